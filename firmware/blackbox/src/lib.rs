@@ -1,0 +1,1 @@
+//! The record: its format, its writer and its reader.

@@ -1,0 +1,5 @@
+//! What the monitor knows and decides: observations in SI units, health checks and usage.
+//! Knows no MAVLink, no card and no executor; time comes in as an argument.
+#![cfg_attr(not(test), no_std)]
+
+pub mod time;

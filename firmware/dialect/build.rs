@@ -1,0 +1,209 @@
+//! Generates the layout table from the message definitions (XML) that the `mavlink` crate carries, so that the
+//! definitions that the typed decoders use and the ones that the framer and the recorder use are the same ones.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+use roxmltree::{Document, Node};
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+/// The root of the definitions: everything that is published, ArduPilot's and PX4's dialects included.
+const ROOT: &str = "all.xml";
+
+struct Field {
+    name: String,
+    /// The type as the checksum seed spells it: `uint8_t`, `char`, …
+    type_name: String,
+    /// The variant of `Kind`.
+    kind: &'static str,
+    size: usize,
+    /// `None` for a scalar.
+    array: Option<usize>,
+    extension: bool,
+    units: String,
+    enumeration: String,
+}
+
+struct Message {
+    name: String,
+    /// In wire order.
+    fields: Vec<Field>,
+}
+
+fn main() -> Result<()> {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=../../Cargo.lock");
+    let definitions = mavlink_crate_dir()?.join("mavlink/message_definitions/v1.0");
+    let mut messages = BTreeMap::new();
+    read_file(&definitions, ROOT, &mut BTreeSet::new(), &mut messages)?;
+    let out = PathBuf::from(env::var("OUT_DIR")?).join("table.rs");
+    fs::write(out, render(&messages)?)?;
+    Ok(())
+}
+
+/// Where cargo unpacked the `mavlink` crate that `Cargo.lock` names.
+fn mavlink_crate_dir() -> Result<PathBuf> {
+    let metadata = cargo_metadata::MetadataCommand::new()
+        .other_options(vec!["--filter-platform".into(), env::var("TARGET")?])
+        .exec()?;
+    let package = metadata
+        .packages
+        .iter()
+        .find(|package| package.name.as_str() == "mavlink")
+        .ok_or("the workspace does not depend on the mavlink crate")?;
+    let manifest = package.manifest_path.clone().into_std_path_buf();
+    Ok(manifest.parent().ok_or("the mavlink crate has no directory")?.to_path_buf())
+}
+
+fn read_file(
+    dir: &Path,
+    name: &str,
+    seen: &mut BTreeSet<String>,
+    messages: &mut BTreeMap<u32, Message>,
+) -> Result<()> {
+    if !seen.insert(name.to_owned()) {
+        return Ok(());
+    }
+    let path = dir.join(name);
+    println!("cargo::rerun-if-changed={}", path.display());
+    let text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let document = Document::parse(&text)?;
+    for node in document.descendants().filter(Node::is_element) {
+        match node.tag_name().name() {
+            "include" => read_file(dir, node.text().unwrap_or_default().trim(), seen, messages)?,
+            "message" => {
+                let id: u32 = attribute(node, "id")?.parse()?;
+                let message = read_message(node)?;
+                if let Some(other) = messages.get(&id) {
+                    if other.name != message.name {
+                        return Err(format!("message id {id}: {} and {}", other.name, message.name).into());
+                    }
+                    continue;
+                }
+                messages.insert(id, message);
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn attribute<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str> {
+    node.attribute(name).ok_or_else(|| format!("<{}> has no attribute {name}", node.tag_name().name()).into())
+}
+
+fn read_message(node: Node) -> Result<Message> {
+    let name = attribute(node, "name")?.to_owned();
+    let mut base = Vec::new();
+    let mut extensions = Vec::new();
+    let mut in_extensions = false;
+    for child in node.children().filter(Node::is_element) {
+        match child.tag_name().name() {
+            "extensions" => in_extensions = true,
+            "field" if in_extensions => extensions.push(read_field(child, true)?),
+            "field" => base.push(read_field(child, false)?),
+            _ => {}
+        }
+    }
+    // Wire order: by size of the element, largest first, otherwise as defined; extensions stay as defined.
+    base.sort_by_key(|field| std::cmp::Reverse(field.size));
+    base.append(&mut extensions);
+    Ok(Message { name, fields: base })
+}
+
+fn read_field(node: Node, extension: bool) -> Result<Field> {
+    let spelled = attribute(node, "type")?;
+    let (base, array) = match spelled.split_once('[') {
+        Some((base, rest)) => (base, Some(rest.trim_end_matches(']').parse()?)),
+        None => (spelled, None),
+    };
+    // "uint8_t_mavlink_version" is a uint8_t that the sender's library fills in.
+    let type_name = base.trim_end_matches("_mavlink_version");
+    let (kind, size) = match type_name {
+        "uint8_t" => ("U8", 1),
+        "int8_t" => ("I8", 1),
+        "char" => ("Char", 1),
+        "uint16_t" => ("U16", 2),
+        "int16_t" => ("I16", 2),
+        "uint32_t" => ("U32", 4),
+        "int32_t" => ("I32", 4),
+        "float" => ("F32", 4),
+        "uint64_t" => ("U64", 8),
+        "int64_t" => ("I64", 8),
+        "double" => ("F64", 8),
+        other => return Err(format!("unknown field type {other}").into()),
+    };
+    Ok(Field {
+        name: attribute(node, "name")?.to_owned(),
+        type_name: type_name.to_owned(),
+        kind,
+        size,
+        array,
+        extension,
+        units: node.attribute("units").unwrap_or_default().to_owned(),
+        enumeration: node.attribute("enum").unwrap_or_default().to_owned(),
+    })
+}
+
+/// CRC-16/MCRF4XX, one byte.
+fn crc_accumulate(crc: u16, byte: u8) -> u16 {
+    let mut x = byte ^ (crc as u8);
+    x ^= x << 4;
+    let x = u16::from(x);
+    (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
+}
+
+/// The seed that makes two definitions of one id incompatible: name, then type, name and array length of each
+/// field but the extensions, in wire order (MAVLink serialization guide, "`CRC_EXTRA` calculation").
+fn crc_extra(message: &Message) -> u8 {
+    let feed = |crc, text: &str| text.bytes().chain([b' ']).fold(crc, crc_accumulate);
+    let mut crc = feed(0xffff, &message.name);
+    for field in message.fields.iter().filter(|field| !field.extension) {
+        crc = feed(crc, &field.type_name);
+        crc = feed(crc, &field.name);
+        if let Some(count) = field.array {
+            crc = crc_accumulate(crc, count as u8);
+        }
+    }
+    (crc ^ (crc >> 8)) as u8
+}
+
+fn render(messages: &BTreeMap<u32, Message>) -> Result<String> {
+    let mut out = String::from("// Generated by build.rs.\npub(crate) static MESSAGES: &[Message] = &[\n");
+    for (id, message) in messages {
+        let bytes = |extensions: bool| -> usize {
+            let counted = message.fields.iter().filter(|field| extensions || !field.extension);
+            counted.map(|field| field.size * field.array.unwrap_or(1)).sum()
+        };
+        let (min, max) = (bytes(false), bytes(true));
+        if max > 255 {
+            return Err(format!("{}: {max} bytes do not fit a frame", message.name).into());
+        }
+        writeln!(
+            out,
+            "    Message {{ id: {id}, crc_extra: {}, len_base: {min}, len_max: {max}, \
+             #[cfg(feature = \"names\")] name: {:?}, fields: &[",
+            crc_extra(message),
+            message.name
+        )?;
+        for field in &message.fields {
+            writeln!(
+                out,
+                "        Field {{ kind: Kind::{}, array: {}, #[cfg(feature = \"names\")] name: {:?}, \
+                 #[cfg(feature = \"names\")] units: {:?}, #[cfg(feature = \"names\")] enumeration: {:?} }},",
+                field.kind,
+                field.array.unwrap_or(0),
+                field.name,
+                field.units,
+                field.enumeration
+            )?;
+        }
+        writeln!(out, "    ] }},")?;
+    }
+    out.push_str("];\n");
+    Ok(out)
+}

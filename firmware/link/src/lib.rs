@@ -1,0 +1,1 @@
+//! The MAVLink edge: framer, decoding to observations, encoding of what we send.

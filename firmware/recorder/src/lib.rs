@@ -1,0 +1,1 @@
+//! Log files on a FAT card, written through embedded-sdmmc.
