@@ -2,4 +2,5 @@
 //! Knows no MAVLink, no card and no executor; time comes in as an argument.
 #![cfg_attr(not(test), no_std)]
 
+pub mod health;
 pub mod time;

@@ -1,0 +1,129 @@
+//! A finding: one check changed its level. The numbers and names here are stored in logs and never change meaning.
+
+use crate::time::Instant;
+
+/// How bad it is. The numbers are stored in logs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Level {
+    /// Within limits, seen recently.
+    Ok = 0,
+    /// Worth knowing, nothing to do in flight.
+    Advisory = 1,
+    /// Outside the normal range: act soon.
+    Warning = 2,
+    /// Act now.
+    Critical = 3,
+    /// The input has stopped (or never came): nobody knows, which is not the same as healthy.
+    Stale = 4,
+}
+
+impl Level {
+    /// All levels, by number.
+    pub const ALL: [Self; 5] = [Self::Ok, Self::Advisory, Self::Warning, Self::Critical, Self::Stale];
+
+    /// The name that logs, JSON and reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Advisory => "advisory",
+            Self::Warning => "warning",
+            Self::Critical => "critical",
+            Self::Stale => "stale",
+        }
+    }
+
+    /// The level of a stored number.
+    pub const fn from_number(number: u8) -> Option<Self> {
+        match number {
+            0 => Some(Self::Ok),
+            1 => Some(Self::Advisory),
+            2 => Some(Self::Warning),
+            3 => Some(Self::Critical),
+            4 => Some(Self::Stale),
+            _ => None,
+        }
+    }
+}
+
+/// The part of the vehicle that a check watches. The numbers are stored in logs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Subsystem {
+    /// Batteries and rails.
+    Power = 0,
+    /// Motors, ESCs and propellers.
+    Propulsion = 1,
+    /// Combustion engine (EFI).
+    Engine = 2,
+    /// Vibration, clipping and load factor.
+    Structure = 3,
+    /// Estimator and GNSS.
+    Navigation = 4,
+    /// Autopilot, RC and telemetry links.
+    Link = 5,
+    /// The autopilot's processor.
+    Computer = 6,
+    /// Roll and pitch.
+    Attitude = 7,
+    /// This monitor: its card, its queues, its own losses.
+    Recorder = 8,
+}
+
+impl Subsystem {
+    /// All subsystems, by number.
+    pub const ALL: [Self; 9] = [
+        Self::Power,
+        Self::Propulsion,
+        Self::Engine,
+        Self::Structure,
+        Self::Navigation,
+        Self::Link,
+        Self::Computer,
+        Self::Attitude,
+        Self::Recorder,
+    ];
+
+    /// The name that logs, JSON and reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Power => "power",
+            Self::Propulsion => "propulsion",
+            Self::Engine => "engine",
+            Self::Structure => "structure",
+            Self::Navigation => "navigation",
+            Self::Link => "link",
+            Self::Computer => "computer",
+            Self::Attitude => "attitude",
+            Self::Recorder => "recorder",
+        }
+    }
+
+    /// The subsystem of a stored number.
+    pub const fn from_number(number: u8) -> Option<Self> {
+        if (number as usize) < Self::ALL.len() { Some(Self::ALL[number as usize]) } else { None }
+    }
+}
+
+/// One check changed its level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finding {
+    /// When the level changed (after the debounce).
+    pub at: Instant,
+    /// The part of the vehicle.
+    pub subsystem: Subsystem,
+    /// The check's stable name, at most 16 characters of `a-z0-9_`, for instance `batt_remaining`.
+    pub check: &'static str,
+    /// Which one, where there are several: battery id, motor number from 0, axis; 0 where there is only one.
+    pub instance: u8,
+    /// The new level.
+    pub level: Level,
+    /// The level before.
+    pub previous: Level,
+    /// The value that decided, in the check's unit; NaN where the input stopped.
+    pub value: f32,
+    /// The limit that it crossed, in the same unit; NaN where there is none (stale).
+    pub limit: f32,
+    /// The unit of both, for instance `V`, `%`, `degC`; empty for a plain number.
+    pub unit: &'static str,
+}
