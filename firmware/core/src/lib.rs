@@ -3,4 +3,6 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod health;
+pub mod observation;
 pub mod time;
+pub mod units;
