@@ -6,7 +6,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use hums_blackbox::sector::{Header, NotASector};
+use hums_blackbox::{Header, NotASector};
 use hums_recorder::LogName;
 use hums_recorder::layout::Layout;
 
@@ -48,7 +48,7 @@ pub struct Image {
 
 /// What a file is, by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Finding {
+pub enum Content {
     /// Sectors of a log.
     Log,
     /// A card: a partition table, or blocks to be looked through.
@@ -93,18 +93,18 @@ pub fn find(inputs: &[PathBuf]) -> Result<Found> {
 /// A file that the user named: it must be something.
 fn named_file(path: &Path, found: &mut Found) -> Result<()> {
     match look(path)? {
-        Finding::Log => found.logs.push(whole_file(path)?),
-        Finding::Image => image(path, found)?,
-        Finding::Empty => bail!("{}: is empty", path.display()),
-        Finding::Newer(version) => bail!(
+        Content::Log => found.logs.push(whole_file(path)?),
+        Content::Image => image(path, found)?,
+        Content::Empty => bail!("{}: is empty", path.display()),
+        Content::Newer(version) => bail!(
             "{}: is a log of format version {version}, which this program is too old for; take a newer hums",
             path.display()
         ),
-        Finding::Mavlink => bail!(
+        Content::Mavlink => bail!(
             "{}: is a recording of MAVLink, not a log of HUMS; `hums pack` makes it one, `hums sim` records it",
             path.display()
         ),
-        Finding::Other => {
+        Content::Other => {
             bail!("{}: is neither a log of HUMS nor an image of an SD card (MBR + FAT32)", path.display())
         }
     }
@@ -112,13 +112,13 @@ fn named_file(path: &Path, found: &mut Found) -> Result<()> {
 }
 
 /// What a file is.
-pub fn look(path: &Path) -> Result<Finding> {
+pub fn look(path: &Path) -> Result<Content> {
     let context = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(context)?;
     let mut start = Vec::new();
     file.by_ref().take((LOOK_BLOCKS * BLOCK_BYTES) as u64).read_to_end(&mut start).with_context(context)?;
     if start.is_empty() {
-        return Ok(Finding::Empty);
+        return Ok(Content::Empty);
     }
     let mut newer = None;
     let mut log_blocks = 0_usize;
@@ -141,13 +141,13 @@ pub fn look(path: &Path) -> Result<Finding> {
     let large = start.len() == LOOK_BLOCKS * BLOCK_BYTES;
     let frame_at = |at: usize| start.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
     Ok(match (log_blocks, newer) {
-        _ if signed && other_blocks > 0 => Finding::Image,
-        (1.., _) => Finding::Log,
-        (0, Some(version)) => Finding::Newer(version),
-        _ if frame_at(0) || frame_at(8) => Finding::Mavlink,
+        _ if signed && other_blocks > 0 => Content::Image,
+        (1.., _) => Content::Log,
+        (0, Some(version)) => Content::Newer(version),
+        _ if frame_at(0) || frame_at(8) => Content::Mavlink,
         // A card whose first blocks are gone: only looking at all of it tells.
-        _ if large => Finding::Image,
-        _ => Finding::Other,
+        _ if large => Content::Image,
+        _ => Content::Other,
     })
 }
 
@@ -175,7 +175,7 @@ fn directory(root: &Path, found: &mut Found) -> Result<()> {
                 if depth < DEPTH_MAX {
                     waiting.push((path, depth + 1));
                 }
-            } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Finding::Log))) {
+            } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Content::Log))) {
                 sessions.entry(name.session).or_default().push((name, path));
             } else if let Err(error) = directory_file(&path, found) {
                 found.remarks.push(format!("{error:#}"));
@@ -198,8 +198,8 @@ fn directory(root: &Path, found: &mut Found) -> Result<()> {
 /// A file that happens to lie in a directory: what is not ours is passed over.
 fn directory_file(path: &Path, found: &mut Found) -> Result<()> {
     match look(path)? {
-        Finding::Log => found.logs.push(whole_file(path)?),
-        Finding::Image if is_card(path)? => {
+        Content::Log => found.logs.push(whole_file(path)?),
+        Content::Image if is_card(path)? => {
             let before = found.logs.len();
             image(path, found)?;
             let stem = path.file_stem().map_or("card".into(), |stem| stem.to_string_lossy());
@@ -207,7 +207,7 @@ fn directory_file(path: &Path, found: &mut Found) -> Result<()> {
                 log.name = format!("{stem}/{}", log.name);
             }
         }
-        Finding::Newer(version) => {
+        Content::Newer(version) => {
             found.remarks.push(format!("{}: format version {version} is newer than this program", path.display()));
         }
         _ => {}

@@ -11,5 +11,5 @@ pub mod places;
 pub mod reader;
 
 
-pub use find::{Finding, Found, find};
+pub use find::{Content, Found, find};
 pub use places::{Log, Piece};
