@@ -97,6 +97,19 @@ params! {
     TiltCrit "TILT_CRIT" "deg" 60.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60";
     RecQueueWarn "REC_QUEUE_WARN" "%" 50.0 0.0 100.0 "half of what a standing card may fill";
     RecQueueCrit "REC_QUEUE_CRIT" "%" 90.0 0.0 100.0 "frames are lost next";
+    RecStopWarn "REC_STOP_WARN" "" 0.5 0.0 3.0 "1: not recording";
+    RecStopCrit "REC_STOP_CRIT" "" 1.5 0.0 3.0 "2: not recording while armed (PX4#12565, ardupilot#6863)";
+    RecLostWarn "REC_LOST_WARN" "frames" 0.5 0.0 1000000.0 "any frame lost in the last ten seconds";
+    EscFailWarn "ESC_FAIL_WARN" "" 0.5 0.0 3.0 "1: any ESC failure flag";
+    EscFailCrit "ESC_FAIL_CRIT" "" 1.5 0.0 3.0 "2: motor stuck, or the ESC failed";
+    EngChtWarn "ENG_CHT_WARN" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngChtCrit "ENG_CHT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngEgtWarn "ENG_EGT_WARN" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngEgtCrit "ENG_EGT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngFuelWarn "ENG_FUEL_WARN" "hPa" 0.0 0.0 20000.0 "by engine; off until set";
+    EngFuelCrit "ENG_FUEL_CRIT" "hPa" 0.0 0.0 20000.0 "by engine; off until set";
+    GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated";
+    GpsJamCrit "GPS_JAM_CRIT" "" 2.5 0.0 4.0 "GNSS_INTEGRITY: 3 is detected";
     Latch "HEALTH_LATCH" "" 0.0 0.0 1.0 "1: a warning stays until the vehicle disarms";
     GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
 }
