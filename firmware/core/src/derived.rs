@@ -4,14 +4,14 @@
 use crate::flight::FlightEvent;
 use crate::health::{Inputs, Reading};
 use crate::latest::Latest;
-use crate::observation::{CELLS_MAX, MOTORS_MAX, Observation};
+use crate::observation::{Battery, CELLS_MAX, MOTORS_MAX, Observation};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const GRAVITY: f32 = 9.806_65;
-/// A full LiPo cell is 4.2 V, a full LiHV cell 4.35 V: a pack of n cells never shows more than this a cell.
+/// A full lithium polymer cell has 4.2 V, a high-voltage one 4.35 V: a pack of n cells never shows more than this a cell.
 const CELL_FULL_V: f32 = 4.4;
 /// A motor that never turned faster is not fitted.
 const TURNING_RPM: f32 = 100.0;
@@ -147,7 +147,7 @@ impl Derived {
             return set;
         }
         let reported =
-            vehicle.batteries.get(battery).and_then(Latest::get).map_or(0, |known| known.cells_reported());
+            vehicle.batteries.get(battery).and_then(Latest::get).map_or(0, Battery::cells_reported);
         if reported > 1 {
             return reported as u8;
         }

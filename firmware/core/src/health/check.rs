@@ -177,9 +177,7 @@ impl State {
             _ => false,
         };
         let better = self.better.run(!held, now, CLEAR);
-        let next = if very_bad {
-            Level::Critical
-        } else if level == Level::Critical && !better {
+        let next = if very_bad || (level == Level::Critical && !better) {
             Level::Critical
         } else if bad || (level == Level::Warning && !better) {
             Level::Warning
