@@ -12,6 +12,7 @@ pub mod outcome;
 pub mod output;
 pub mod pack;
 pub mod rng;
+pub mod run;
 pub mod sink;
 pub mod source;
 pub mod summary;
@@ -41,6 +42,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 fn command(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Decode(args) => decode::run(args),
+        Command::Sim(args) => run::sim::run(args),
+        Command::Emulate(args) => run::emulate::run(args),
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Pack(args) => pack::run(args),
