@@ -91,8 +91,14 @@ impl Recording {
     /// Records `input`; exit code 0 is expected.
     #[track_caller]
     pub fn make(machine: Machine, input: &Path, flags: &[&str]) -> Self {
-        let made = Self::attempt(machine, input, flags);
-        Self { outcome: made.outcome.expect_code(&[0]), ..made }
+        Self::attempt(machine, input, flags).expect_code(&[0])
+    }
+
+    /// It ended with one of these codes.
+    #[track_caller]
+    #[must_use]
+    pub fn expect_code(self, codes: &[i32]) -> Self {
+        Self { outcome: self.outcome.expect_code(codes), ..self }
     }
 
     /// The card's image.

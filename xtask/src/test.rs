@@ -141,7 +141,7 @@ fn fmt() -> Result<()> {
 fn clippy() -> Result<()> {
     Shell::cargo()
         .args(["clippy", "--workspace", "--exclude=hums-app", "--all-targets"])
-        .args(["--features=hums-tests/oracle,hums-tests/emulator", "--", "-D", "warnings"])
+        .args(["--features=hums-tests/emulator", "--", "-D", "warnings"])
         .run()
 }
 
@@ -189,7 +189,7 @@ fn sim() -> Result<()> {
 
 fn emulator() -> Result<()> {
     firmware::build(Board::Emulated)?;
-    end_to_end("oracle,emulator", "emulator")
+    end_to_end("emulator", "emulator")
 }
 
 /// Advisories need a network, which may be missing: asked apart, and never the reason of a failure on their own.
