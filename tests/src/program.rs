@@ -141,12 +141,12 @@ impl Decoded {
     #[track_caller]
     pub fn of(source: &Path, codes: &[i32]) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let mut command =
-            command(["decode".as_ref(), source.as_os_str(), "-o".as_ref(), dir.path().as_os_str()]);
+        // A file where there is one log, a folder where there are several.
+        let out = dir.path().join("out");
+        let mut command = command(["decode".as_ref(), source.as_os_str(), "-o".as_ref(), out.as_os_str()]);
         child::run(command.args(["--format", "tlog"]), LIMIT).expect_code(codes);
-        let mut files: Vec<PathBuf> =
-            fs::read_dir(dir.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
-        files.retain(|file| file.extension().is_some_and(|kind| kind == "tlog"));
+        let mut files = Vec::new();
+        collect(&out, &mut files);
         files.sort();
         Self { tlogs: files.iter().map(|file| fs::read(file).unwrap()).collect() }
     }
@@ -159,5 +159,14 @@ impl Decoded {
     /// The files themselves.
     pub fn tlogs(&self) -> &[Vec<u8>] {
         &self.tlogs
+    }
+}
+
+/// The files at or below `path`, which may not be there at all.
+fn collect(path: &Path, files: &mut Vec<PathBuf>) {
+    if path.is_file() {
+        files.push(path.to_owned());
+    } else if let Ok(entries) = fs::read_dir(path) {
+        entries.for_each(|entry| collect(&entry.unwrap().path(), files));
     }
 }
