@@ -8,7 +8,8 @@ use std::str::FromStr;
 use anyhow::{Context, Result};
 
 /// What `--help` and every usage error say about the forms.
-pub const FORMS: &str = "a file, `-`, `udpin:ADDR:PORT`, `udpout:ADDR:PORT`, `tcp:ADDR:PORT` or `serial:DEVICE:BAUD`";
+pub const FORMS: &str =
+    "a file, `-`, `udpin:ADDR:PORT`, `udpout:ADDR:PORT`, `tcp:ADDR:PORT` or `serial:DEVICE:BAUD`";
 
 /// One end of a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,7 +69,9 @@ impl FromStr for Address {
         let (host, port) = text.rsplit_once(':').ok_or_else(wrong)?;
         let host = host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host);
         if host.is_empty() {
-            return Err(format!("`{text}` has no address before the port: 0.0.0.0 stands for every interface"));
+            return Err(format!(
+                "`{text}` has no address before the port: 0.0.0.0 stands for every interface"
+            ));
         }
         let port = port.parse().map_err(|_| format!("`{port}` is no port: 1 to 65535"))?;
         if port == 0 { Err(wrong()) } else { Ok(Self { host: host.to_owned(), port }) }
@@ -98,18 +101,18 @@ impl FromStr for Endpoint {
             Some(("tcp", rest)) => rest.parse().map(Self::Tcp),
             Some(("serial", rest)) => serial(rest),
             // A scheme that other tools have is a slip, unless there is such a file.
-            Some((scheme @ ("udp" | "udpbcast" | "tcpin" | "tcpout" | "com" | "uart" | "file" | "http"), _))
-                if !PathBuf::from(text).exists() =>
-            {
-                Err(format!("there is no `{scheme}:` here: give {FORMS}"))
-            }
+            Some((
+                scheme @ ("udp" | "udpbcast" | "tcpin" | "tcpout" | "com" | "uart" | "file" | "http"),
+                _,
+            )) if !PathBuf::from(text).exists() => Err(format!("there is no `{scheme}:` here: give {FORMS}")),
             _ => Ok(Self::File(PathBuf::from(text))),
         }
     }
 }
 
 fn serial(text: &str) -> Result<Endpoint, String> {
-    let wrong = || format!("`serial:{text}` is not serial:DEVICE:BAUD, for instance serial:/dev/ttyUSB0:57600");
+    let wrong =
+        || format!("`serial:{text}` is not serial:DEVICE:BAUD, for instance serial:/dev/ttyUSB0:57600");
     let (device, baud) = text.rsplit_once(':').ok_or_else(wrong)?;
     let baud: u32 = baud.parse().map_err(|_| wrong())?;
     if device.is_empty() || baud == 0 {

@@ -24,7 +24,11 @@ pub fn open(endpoint: &Endpoint) -> Result<Box<dyn Write>> {
         Endpoint::UdpOut(address) => {
             let to = address.resolve()?;
             let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
-            Box::new(Datagrams { socket: UdpSocket::bind(any).with_context(context)?, peer: Some(to), answers: false })
+            Box::new(Datagrams {
+                socket: UdpSocket::bind(any).with_context(context)?,
+                peer: Some(to),
+                answers: false,
+            })
         }
         Endpoint::UdpIn(address) => {
             let socket = UdpSocket::bind(address.resolve()?).with_context(context)?;

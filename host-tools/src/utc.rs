@@ -73,7 +73,9 @@ impl std::str::FromStr for When {
         let instant: Result<jiff::Timestamp, _> = text.parse();
         match instant.map(|instant| u64::try_from(instant.as_microsecond())) {
             Ok(Ok(micros)) => Ok(Self::Utc(micros)),
-            _ => Err(format!("`{text}` is neither seconds since the session's start nor UTC as 2026-11-21T10:13:42Z")),
+            _ => Err(format!(
+                "`{text}` is neither seconds since the session's start nor UTC as 2026-11-21T10:13:42Z"
+            )),
         }
     }
 }

@@ -1,71 +1,102 @@
 //! Damaged bytes cost the frames that they are in, and no others.
 
 use std::fs;
+use std::ops::Range;
 
 use hums_tests::damage::{self, Random};
 use hums_tests::flights::{Manifest, OWN, own, stream};
 use hums_tests::program::{Machine, Recording};
 
-/// Damages the bytes of each flight by itself, so that it is known which frames are whole, and expects each of those.
-#[test]
-fn each_frame_that_is_not_itself_damaged_survives() {
-    let manifest = Manifest::own();
-    for (seed, name) in OWN.into_iter().enumerate() {
-        let path = own(name);
+/// The frames of a flight, and the stream that they make.
+struct Clean {
+    stream: Vec<u8>,
+    /// Where each frame lies in the stream.
+    frames: Vec<Range<usize>>,
+}
+
+impl Clean {
+    fn read(name: &str) -> Self {
+        let (path, manifest) = (own(name), Manifest::own());
         let data = fs::read(&path).unwrap();
         let input = manifest.frames_of(&path, &data);
-        let clean = stream(manifest.found(&path).is_tlog, &data, &input);
-        let mut noisy = clean.clone();
-        let hits = damage::noise(&mut noisy, 0.001, seed as u64);
+        let stream = stream(manifest.found(&path).is_tlog, &data, &input);
+        let mut end = 0;
+        let frames = input.iter().map(|frame| {
+            // In order, with other bytes between those of a raw recording.
+            let mut windows = stream[end..].windows(frame.bytes.len());
+            let start = end + windows.position(|window| window == frame.bytes).unwrap();
+            end = start + frame.bytes.len();
+            start..end
+        });
+        let frames = frames.collect();
+        Self { stream, frames }
+    }
 
-        // Where each frame lies in the stream: its frames are in order, with other bytes between those of a raw file.
-        let mut at = 0;
-        let mut whole = Vec::new();
-        for frame in &input {
-            let start =
-                at + clean[at..].windows(frame.bytes.len()).position(|window| window == frame.bytes).unwrap();
-            at = start + frame.bytes.len();
-            if !hits[start..at].contains(&true) {
-                whole.push(frame.bytes);
-            }
-        }
-        assert!(whole.len() < input.len() && whole.len() > input.len() / 2, "{} whole", whole.len());
+    /// What was recorded of `noisy`, which is this stream with damage: each whole frame, next to nothing else, and every
+    /// other byte counted.
+    #[track_caller]
+    fn assert_whole_frames_survive(&self, noisy: &[u8], recording: &Recording) {
+        assert_eq!(noisy.len(), self.stream.len());
+        let whole: Vec<&[u8]> = self
+            .frames
+            .iter()
+            .filter(|range| noisy[(*range).clone()] == self.stream[(*range).clone()])
+            .map(|range| &noisy[range.clone()])
+            .collect();
+        assert!(
+            whole.len() < self.frames.len() && whole.len() > self.frames.len() / 4,
+            "{} whole",
+            whole.len()
+        );
 
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("noisy.raw");
-        fs::write(&file, &noisy).unwrap();
-        let recording = Recording::make(Machine::Sim, &file, &[]);
-        assert_eq!(recording.number("frames_lost"), 0, "{name}");
+        assert_eq!(recording.number("frames_lost"), 0);
         let decoded = recording.decode(&[0]);
-        let output = decoded.frames(&manifest.seeds);
-
+        let output = decoded.frames(&Manifest::own().seeds);
         let mut survivors = output.iter();
         let mut missing = Vec::new();
-        for (index, frame) in whole.iter().enumerate() {
+        for frame in &whole {
             let before = survivors.clone();
             if !survivors.any(|survivor| survivor.bytes == *frame) {
-                missing.push((index, *frame));
+                missing.push(*frame);
                 survivors = before;
             }
         }
         let first = missing.first();
         assert!(
             missing.is_empty(),
-            "{name}: {} of {} whole frames are missing, first {first:02x?}",
+            "{} of {} whole frames are missing: {first:02x?}",
             missing.len(),
             whole.len()
         );
         let invented = output.len() - whole.len();
-        assert!(
-            invented <= whole.len() / 1000,
-            "{name}: {invented} frames came out that never went in whole"
-        );
+        assert!(invented <= whole.len() / 1000, "{invented} frames came out that never went in whole");
         let framed: usize = output.iter().map(|frame| frame.bytes.len()).sum();
-        assert_eq!(
-            recording.number("bytes_not_frames"),
-            (noisy.len() - framed) as u64,
-            "{name}: damage is counted"
-        );
+        assert_eq!(recording.number("bytes_not_frames"), (noisy.len() - framed) as u64, "damage is counted");
+    }
+}
+
+/// The bytes are damaged here, so nothing depends on the program's own noise.
+#[test]
+fn each_frame_that_is_not_itself_damaged_survives() {
+    for (seed, name) in OWN.into_iter().enumerate() {
+        let clean = Clean::read(name);
+        let mut noisy = clean.stream.clone();
+        damage::noise(&mut noisy, 0.001, seed as u64);
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("noisy.raw");
+        fs::write(&file, &noisy).unwrap();
+        clean.assert_whole_frames_survive(&noisy, &Recording::make(Machine::Sim, &file, &[]));
+    }
+}
+
+#[test]
+fn each_frame_that_the_programs_own_noise_leaves_whole_survives() {
+    for (name, probability) in OWN.into_iter().zip(["0.001", "0.001", "0.003", "0.01"]) {
+        let dir = tempfile::tempdir().unwrap();
+        let tap = dir.path().join("tap.raw");
+        let flags = ["--noise", probability, "--seed", "1", "--tap", &tap.display().to_string()];
+        let recording = Recording::make(Machine::Sim, &own(name), &flags);
+        Clean::read(name).assert_whole_frames_survive(&fs::read(&tap).unwrap(), &recording);
     }
 }
 

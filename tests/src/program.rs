@@ -39,6 +39,14 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
+/// The firmware of the emulated board: `HUMS_FIRMWARE` names it, otherwise it is where xtask leaves it.
+fn firmware() -> PathBuf {
+    let built = || root().join("target/firmware/hums-emulated.elf");
+    let path = std::env::var_os("HUMS_FIRMWARE").map_or_else(built, PathBuf::from);
+    assert!(path.is_file(), "{} is missing: `cargo xtask firmware --board emulated`", path.display());
+    path
+}
+
 /// `hums` with these arguments, not yet run.
 pub fn command<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(path());
@@ -81,9 +89,10 @@ impl Recording {
         let mut command = command([name, "--json", "--input"]);
         command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.arg("--gs").arg(dir.path().join("gs.bin")).args(flags);
-        if machine == Machine::Sim {
-            command.args(["--speed", "max"]);
-        }
+        match machine {
+            Machine::Sim => command.args(["--speed", "max"]),
+            Machine::Emulated => command.arg("--firmware").arg(firmware()),
+        };
         let outcome = child::run(&mut command, limit);
         Self { dir, outcome }
     }

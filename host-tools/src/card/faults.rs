@@ -55,7 +55,8 @@ impl FromStr for Stall {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is not MS@T, for instance 2500@60 (milliseconds, from second 60 on)");
+        let wrong =
+            || format!("`{text}` is not MS@T, for instance 2500@60 (milliseconds, from second 60 on)");
         let (ms, from) = text.split_once('@').ok_or_else(wrong)?;
         let ms: f64 = ms.parse().map_err(|_| wrong())?;
         Ok(Self { for_us: micros(ms / 1e3).ok_or_else(wrong)?, from_us: seconds(from).ok_or_else(wrong)? })

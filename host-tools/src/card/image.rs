@@ -29,7 +29,9 @@ pub enum Found {
 /// Opens the image for writing, or makes a sparse file of `size_mib` where there is none.
 pub fn open_or_make(path: &Path, size_mib: Option<u64>) -> Result<(File, Found)> {
     if let Some(size) = size_mib.filter(|size| !(SIZE_MIB_MIN..=SIZE_MIB_MAX).contains(size)) {
-        return Err(usage(format!("--card-size {size}: a FAT32 card has {SIZE_MIB_MIN} to {SIZE_MIB_MAX} MiB")));
+        return Err(usage(format!(
+            "--card-size {size}: a FAT32 card has {SIZE_MIB_MIN} to {SIZE_MIB_MAX} MiB"
+        )));
     }
     match path.metadata() {
         Ok(about) if about.is_dir() => bail!("{}: is a directory; --sd takes an image file", path.display()),
@@ -45,7 +47,10 @@ pub fn open_or_make(path: &Path, size_mib: Option<u64>) -> Result<(File, Found)>
                 )));
             }
             let file = OpenOptions::new().read(true).write(true).open(path);
-            Ok((file.with_context(|| format!("{}: cannot be opened for writing", path.display()))?, Found::Existing))
+            Ok((
+                file.with_context(|| format!("{}: cannot be opened for writing", path.display()))?,
+                Found::Existing,
+            ))
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let file = OpenOptions::new().read(true).write(true).create_new(true).open(path);

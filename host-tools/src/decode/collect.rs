@@ -138,7 +138,8 @@ impl<'a> Collected<'a> {
             self.tlog.extend_from_slice(&utc.to_be_bytes());
             self.tlog.extend_from_slice(bytes);
         }
-        let known = if verified { frame.message().map(|message| Payload::new(message, frame.payload)) } else { None };
+        let known =
+            if verified { frame.message().map(|message| Payload::new(message, frame.payload)) } else { None };
         if self.formats.csv {
             self.csv_frame(at, &frame, known.as_ref());
         }
@@ -204,7 +205,9 @@ impl<'a> Collected<'a> {
         for row in rows {
             self.records += 1;
             if self.formats.csv {
-                self.headers.entry(row.table).or_insert_with(|| row.cells.iter().map(|(name, _)| *name).collect());
+                self.headers
+                    .entry(row.table)
+                    .or_insert_with(|| row.cells.iter().map(|(name, _)| *name).collect());
                 let out = self.tables.entry(Table::Hums(row.table)).or_default();
                 push_times_csv(out, at, self.epoch_us);
                 for (_, cell) in &row.cells {

@@ -125,5 +125,7 @@ pub fn progress_bar(log: &Log) -> ProgressBar {
 
 /// A path inside `dir` for a log's name, which may have directories of its own.
 fn inside(dir: &Path, name: &str) -> PathBuf {
-    name.split('/').filter(|part| !matches!(*part, "" | "." | "..")).fold(dir.to_owned(), |path, part| path.join(part))
+    name.split('/')
+        .filter(|part| !matches!(*part, "" | "." | ".."))
+        .fold(dir.to_owned(), |path, part| path.join(part))
 }

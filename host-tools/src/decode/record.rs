@@ -159,14 +159,19 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("kind", text(fault_kind(fault.kind))),
                 ("task", text(fault.task)),
                 ("place", text(fault.place)),
-                ("registers", Cell::Hex(fault.registers.iter().flat_map(|register| register.to_be_bytes()).collect())),
+                (
+                    "registers",
+                    Cell::Hex(fault.registers.iter().flat_map(|register| register.to_be_bytes()).collect()),
+                ),
                 ("message", text(fault.message)),
             ],
         ),
         Record::Event(event) => {
             one("HUMS_EVENT", vec![("event", text(event_name(event.number))), ("text", text(event.text))])
         }
-        Record::Note(note) => one("HUMS_NOTE", vec![("severity", count(note.severity)), ("text", text(note.text))]),
+        Record::Note(note) => {
+            one("HUMS_NOTE", vec![("severity", count(note.severity)), ("text", text(note.text))])
+        }
         Record::Unknown { kind, version, bytes } => one(
             "HUMS_UNKNOWN",
             vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],

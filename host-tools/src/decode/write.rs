@@ -179,7 +179,9 @@ impl<'a> Deliver<Collected<'a>> for Writers {
 
 /// A table's file, without `.csv`.
 fn file_name(table: Table) -> String {
-    let name = |id| hums_dialect::message(id).map_or_else(|| format!("UNKNOWN_{id}"), |message| message.name.to_owned());
+    let name = |id| {
+        hums_dialect::message(id).map_or_else(|| format!("UNKNOWN_{id}"), |message| message.name.to_owned())
+    };
     match table {
         Table::Message(id) => name(id),
         Table::Unverified(id) => format!("UNVERIFIED_{}", name(id)),

@@ -209,7 +209,8 @@ impl<'a> Volume<'a> {
 
     fn count_lost(&mut self) -> io::Result<()> {
         for cluster in 2..self.layout.clusters + 2 {
-            let used = self.used.get(cluster as usize / 64).is_some_and(|word| word & (1 << (cluster % 64)) != 0);
+            let used =
+                self.used.get(cluster as usize / 64).is_some_and(|word| word & (1 << (cluster % 64)) != 0);
             // 0x0ffffff7 marks a bad cluster.
             if !used && !matches!(self.entry(cluster)?, 0 | 0x0fff_fff7) {
                 self.walk.lost_clusters += 1;
@@ -240,7 +241,9 @@ impl Entry {
         match entry[0] {
             0 => return Some(Self::End),
             0xe5 | b'.' => return None,
-            _ if attributes & ATTRIBUTE_LONG_NAME == ATTRIBUTE_LONG_NAME || attributes & ATTRIBUTE_VOLUME != 0 => {
+            _ if attributes & ATTRIBUTE_LONG_NAME == ATTRIBUTE_LONG_NAME
+                || attributes & ATTRIBUTE_VOLUME != 0 =>
+            {
                 return None;
             }
             _ => {}

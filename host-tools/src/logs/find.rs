@@ -78,7 +78,8 @@ pub fn find(inputs: &[PathBuf]) -> Result<Found> {
             bail!("{}: no log of HUMS is in there", input.display());
         }
         if inputs.len() > 1 {
-            let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
+            let stem =
+                input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
             for log in found.logs.iter_mut().skip(before) {
                 if log.name != stem {
                     log.name = format!("{stem}/{}", log.name);
@@ -175,7 +176,8 @@ fn directory(root: &Path, found: &mut Found) -> Result<()> {
                 if depth < DEPTH_MAX {
                     waiting.push((path, depth + 1));
                 }
-            } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Content::Log))) {
+            } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Content::Log)))
+            {
                 sessions.entry(name.session).or_default().push((name, path));
             } else if let Err(error) = directory_file(&path, found) {
                 found.remarks.push(format!("{error:#}"));
@@ -184,7 +186,8 @@ fn directory(root: &Path, found: &mut Found) -> Result<()> {
         let prefix = dir.strip_prefix(root).unwrap_or(Path::new("")).to_string_lossy().into_owned();
         for (session, mut segments) in sessions {
             segments.sort();
-            let name = if prefix.is_empty() { format!("{session:05}") } else { format!("{prefix}/{session:05}") };
+            let name =
+                if prefix.is_empty() { format!("{session:05}") } else { format!("{prefix}/{session:05}") };
             let mut pieces = Vec::new();
             for (_, path) in segments {
                 pieces.extend(whole_file(&path)?.pieces);
@@ -208,7 +211,9 @@ fn directory_file(path: &Path, found: &mut Found) -> Result<()> {
             }
         }
         Content::Newer(version) => {
-            found.remarks.push(format!("{}: format version {version} is newer than this program", path.display()));
+            found
+                .remarks
+                .push(format!("{}: format version {version} is newer than this program", path.display()));
         }
         _ => {}
     }
@@ -248,7 +253,11 @@ fn image(path: &Path, found: &mut Found) -> Result<()> {
         found.logs.truncate(before);
         let logs = scan(path, file.metadata().with_context(context)?.len())?;
         if logs.is_empty() && !about.damage.is_empty() {
-            bail!("{}: {}; and no block of it is a sector of a HUMS log", path.display(), about.damage.join("; "));
+            bail!(
+                "{}: {}; and no block of it is a sector of a HUMS log",
+                path.display(),
+                about.damage.join("; ")
+            );
         }
         about.scanned = !logs.is_empty();
         found.logs.extend(logs);

@@ -10,6 +10,5 @@ pub mod groups;
 pub mod places;
 pub mod reader;
 
-
 pub use find::{Content, Found, find};
 pub use places::{Log, Piece};

@@ -81,7 +81,8 @@ pub fn peek(bytes: &[u8]) -> Peek<'_> {
         None => Check::Unknown,
         Some(message) => {
             let covered = frame.get(1..end).unwrap_or_default();
-            let sum = covered.iter().chain([&message.crc_extra]).fold(0xffff, |crc, &byte| accumulate(crc, byte));
+            let sum =
+                covered.iter().chain([&message.crc_extra]).fold(0xffff, |crc, &byte| accumulate(crc, byte));
             if sum == u16::from_le_bytes([byte(end), byte(end + 1)]) { Check::Good } else { Check::Bad }
         }
     };
@@ -111,8 +112,8 @@ pub(crate) mod tests {
 
     /// A HEARTBEAT of ArduCopter 4.6, MAVLink 2, taken from a recording.
     pub(crate) const HEARTBEAT: [u8; 21] = [
-        0xfd, 0x09, 0x00, 0x00, 0x00, 0xff, 0xbe, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x06, 0x08, 0x00, 0x04,
-        0x03, 0x3d, 0x48,
+        0xfd, 0x09, 0x00, 0x00, 0x00, 0xff, 0xbe, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x06, 0x08, 0x00,
+        0x04, 0x03, 0x3d, 0x48,
     ];
 
     #[test]

@@ -77,7 +77,9 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
         (sniff::Kind::Empty, _) => bail!("{endpoint}: is empty: not one byte would arrive"),
         (sniff::Kind::Tlog, None) => Box::new(tlog::Tlog::new(input)),
         (sniff::Kind::Tlog, Some(baud)) => Box::new(paced::Paced::new(tlog::Tlog::new(input), baud)),
-        (sniff::Kind::Raw, baud) => Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD))),
+        (sniff::Kind::Raw, baud) => {
+            Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
+        }
     })
 }
 

@@ -6,8 +6,8 @@
 use std::io::{self, Cursor, Read};
 
 use super::read_some;
-use crate::mavlink::frame::{Check, Peek, peek};
 use crate::mavlink::frame::FRAME_BYTES_MAX;
+use crate::mavlink::frame::{Check, Peek, peek};
 
 /// How far to look before calling it: room for a few hundred frames.
 const WINDOW_BYTES: usize = 64 * 1024;
@@ -63,7 +63,8 @@ fn count_votes(bytes: &[u8]) -> i32 {
         match peek(rest) {
             Peek::Frame(frame) if frame.check == Check::Good => {
                 let next = at + frame.bytes.len();
-                let begins = |at: usize| bytes.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
+                let begins =
+                    |at: usize| bytes.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
                 match (begins(next), begins(next + 8)) {
                     (false, true) => votes += 1,
                     (true, false) => votes -= 1,
@@ -105,7 +106,10 @@ mod tests {
     #[test]
     fn frames_alone_are_raw_and_with_times_a_tlog() {
         assert_eq!(kind(&HEARTBEAT.repeat(20)), Kind::Raw);
-        assert_eq!(kind(&(0..20).flat_map(|at| record(1_700_000_000_000_000 + at)).collect::<Vec<_>>()), Kind::Tlog);
+        assert_eq!(
+            kind(&(0..20).flat_map(|at| record(1_700_000_000_000_000 + at)).collect::<Vec<_>>()),
+            Kind::Tlog
+        );
         assert_eq!(kind(&(0..20).flat_map(record).collect::<Vec<_>>()), Kind::Tlog, "times since boot");
     }
 

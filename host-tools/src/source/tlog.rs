@@ -175,10 +175,16 @@ impl<R: Read> Source for Tlog<R> {
     fn remark(&self) -> Option<String> {
         let mut said = Vec::new();
         if self.noise_bytes > 0 {
-            said.push(format!("{} bytes of the tlog belong to no record; they arrive as noise", self.noise_bytes));
+            said.push(format!(
+                "{} bytes of the tlog belong to no record; they arrive as noise",
+                self.noise_bytes
+            ));
         }
         if self.arrival.jumps > 0 {
-            said.push(format!("its clock jumped {} times; time goes on from where it was", self.arrival.jumps));
+            said.push(format!(
+                "its clock jumped {} times; time goes on from where it was",
+                self.arrival.jumps
+            ));
         }
         (!said.is_empty()).then(|| said.join("; "))
     }
@@ -197,7 +203,9 @@ mod tests {
 
     fn chunks(bytes: &[u8]) -> Vec<(u64, usize)> {
         let mut source = Tlog::new(bytes);
-        std::iter::from_fn(|| source.next().expect("memory")).map(|chunk| (chunk.at_us, chunk.bytes.len())).collect()
+        std::iter::from_fn(|| source.next().expect("memory"))
+            .map(|chunk| (chunk.at_us, chunk.bytes.len()))
+            .collect()
     }
 
     #[test]
@@ -209,9 +217,14 @@ mod tests {
     #[test]
     fn a_clock_that_was_set_neither_falls_nor_waits_for_years() {
         let hour = 3_600_000_000;
-        let tlog =
-            [record(START + hour), record(START), record(START + 10), record(START + 400 * 24 * hour), record(START)]
-                .concat();
+        let tlog = [
+            record(START + hour),
+            record(START),
+            record(START + 10),
+            record(START + 400 * 24 * hour),
+            record(START),
+        ]
+        .concat();
         assert_eq!(chunks(&tlog).iter().map(|chunk| chunk.0).collect::<Vec<_>>(), [0, 0, 10, 10, 10]);
     }
 
