@@ -194,7 +194,8 @@ fn apt_install(packages: &[&str], suite: Option<&str>, install: bool) {
                 .args(["DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-y", "-qq"])
                 .args(["--no-install-recommends", "-o", "DPkg::Lock::Timeout=300"])
                 .args(&suite)
-                .args(packages),
+                .args(packages)
+                .quiet(),
         );
     } else {
         let words: Vec<&str> = ["sudo apt-get install -y --no-install-recommends"]
