@@ -192,7 +192,7 @@ fn emulator() -> Result<()> {
     end_to_end("emulator", "emulator")
 }
 
-/// Advisories need a network, which may be missing: asked apart, and never the reason of a failure on their own.
+/// Advisories need a network, which may be missing, and appear on their own day: told, and never a failure.
 fn deny() -> Result<()> {
     let own = repo::target().join("tools");
     let mut program = find_program("cargo-deny").unwrap_or_else(|| own.join("bin/cargo-deny"));
@@ -206,8 +206,10 @@ fn deny() -> Result<()> {
     }
     let deny = || Shell::new(&program).args(["--log-level", "warn"]);
     deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;
-    if deny().args(["check", "advisories"]).run().is_err() {
-        eprintln!("warning: the advisories could not be checked, or say something (see above)");
+    if deny().args(["fetch", "db"]).ask().is_none() {
+        eprintln!("NOT CHECKED: advisories, because their database cannot be fetched here");
+    } else if deny().args(["check", "--disable-fetch", "advisories"]).run().is_err() {
+        eprintln!("warning: there are advisories about dependencies, see above");
     }
     Ok(())
 }
