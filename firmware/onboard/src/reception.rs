@@ -4,8 +4,8 @@
 //! instructions a byte, and never waits.
 
 use hums_core::time::Instant;
-use hums_link::framer::Framer;
 use hums_link::frame::{Check, Frame};
+use hums_link::framer::Framer;
 
 use crate::port::{PortReading, PortStatus};
 use crate::queues::FramesIn;

@@ -18,10 +18,12 @@ pub mod format;
 pub mod gate;
 pub mod layout;
 pub mod name;
+pub mod recorder;
 pub mod status;
 
 pub use card::{Card, CardError};
 pub use name::LogName;
+pub use recorder::{Recorder, Written};
 pub use status::{CardState, CardStatus};
 
 /// A block device that can be told to start over, as a card must be after it was pulled and put back.

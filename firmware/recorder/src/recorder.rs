@@ -10,10 +10,10 @@
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES, Sector};
 use hums_core::time::{Instant, Span};
 
+use crate::CardDevice;
 use crate::card::{Card, CardError, LogEntry};
 use crate::name::LogName;
 use crate::status::{CardState, CardStatus};
-use crate::CardDevice;
 
 /// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
 pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
@@ -162,7 +162,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let base = *log.base.get_or_insert(number);
         let mut at = number.wrapping_sub(base);
         // Also a number from before this segment (a restarted count) gets a segment of its own.
-        let no_room_for_group = sector.starts_group() && at > 0 && at.saturating_add(GROUP_SECTORS as u32) > blocks;
+        let no_room_for_group =
+            sector.starts_group() && at > 0 && at.saturating_add(GROUP_SECTORS as u32) > blocks;
         if at >= blocks || no_room_for_group {
             self.next_segment()?;
             log = self.log.ok_or(CardError::NotOpen)?;
@@ -202,7 +203,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         let resumed = self.log.is_some();
         let fresh = Some(log.name) != newest;
         self.log = Some(log);
-        if fresh { self.open_segment(log.name)? } else { self.next_segment()? }
+        if fresh {
+            self.open_segment(log.name)?
+        } else {
+            self.next_segment()?
+        }
         if resumed {
             self.status.want_group();
         }
