@@ -3,7 +3,7 @@
 use std::fs::{self, File};
 use std::path::Path;
 
-use hums_tests::child;
+use hums_tests::{child, fat};
 use hums_tests::flights::{Manifest, assert_found, own, stream};
 use hums_tests::frames::{self, Frame, build_v2};
 use hums_tests::program::{self, Decoded, LIMIT, Machine, Recording};
@@ -144,6 +144,18 @@ fn a_second_flight_on_the_same_card_leaves_the_first_as_it_was() {
     assert_eq!(all.len() as u64, first.frames + second.frames);
     assert_found(first, &all[..first.frames as usize]);
     assert_found(second, &all[first.frames as usize..]);
+}
+
+#[test]
+fn the_files_that_another_computer_copies_off_the_card_are_the_same_log() {
+    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &[]);
+    fat::assert_clean(&recording.image());
+    let dir = tempfile::tempdir().unwrap();
+    fat::copy_files(&recording.image(), dir.path());
+    let seeds = &Manifest::own().seeds;
+    let (copied, image) = (Decoded::of(dir.path(), &[0]), recording.decode(&[0]));
+    assert!(!copied.frames(seeds).is_empty());
+    assert_eq!(copied.frames(seeds), image.frames(seeds));
 }
 
 #[test]
