@@ -3,10 +3,10 @@
 use std::fs::{self, File};
 use std::path::Path;
 
-use hums_tests::{child, fat};
 use hums_tests::flights::{Manifest, assert_found, own, stream};
 use hums_tests::frames::{self, Frame, build_v2};
 use hums_tests::program::{self, Decoded, LIMIT, Machine, Recording};
+use hums_tests::{child, fat};
 
 /// Records and decodes one flight and compares all that can be compared.
 #[track_caller]
