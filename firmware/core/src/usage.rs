@@ -170,7 +170,7 @@ impl Usage {
                 self.height_max_m = greater(self.height_max_m, global.relative_altitude.0);
             }
             Observation::Battery(_) | Observation::SystemStatus(_) if vehicle.armed() => {
-                self.take_battery(vehicle)
+                self.take_battery(vehicle);
             }
             _ => {}
         }
