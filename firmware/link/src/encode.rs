@@ -17,7 +17,7 @@ pub const GS_FRAME_BYTES_MAX: usize = 280;
 const SYSTEM_DEFAULT: u8 = 1;
 /// Bytes of text in one STATUSTEXT.
 pub const TEXT_BYTES_MAX: usize = 50;
-/// Bytes of a NAMED_VALUE_FLOAT's name.
+/// Bytes of the name in a `NAMED_VALUE_FLOAT`.
 const NAME_BYTES: usize = 10;
 
 /// Makes our frames and counts them.

@@ -1,5 +1,5 @@
 //! The summary stream to the ground station: the vehicle's own frames that matter to a pilot, unaltered and less often,
-//! and what the monitor has to say: heartbeat, findings as STATUSTEXT, levels and flight time as NAMED_VALUE_FLOAT.
+//! and what the monitor has to say: heartbeat, findings as `STATUSTEXT`, levels and flight time as `NAMED_VALUE_FLOAT`.
 //!
 //! A byte budget holds in every window of one second, whatever comes in: [`Budget`] remembers what was sent lately and
 //! lets nothing pass that would exceed it. Forwarded frames may use four fifths of it, so that a finding never finds the

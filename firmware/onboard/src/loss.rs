@@ -7,14 +7,8 @@ use hums_core::time::{Instant, Span};
 const WINDOW: Span = Span::from_secs(1);
 
 /// The kinds of loss that the pipeline can have.
-pub(crate) const KINDS: [Lost; 6] = [
-    Lost::UartOverrun,
-    Lost::NotFrames,
-    Lost::DamagedFrames,
-    Lost::QueueFull,
-    Lost::Card,
-    Lost::Records,
-];
+pub(crate) const KINDS: [Lost; 6] =
+    [Lost::UartOverrun, Lost::NotFrames, Lost::DamagedFrames, Lost::QueueFull, Lost::Card, Lost::Records];
 
 /// One open record a kind.
 #[derive(Clone, Copy, Debug, Default)]

@@ -5,8 +5,8 @@
 //! what time alone asks for.
 
 use hums_blackbox::record::{
-    Boot, Clock, Event, FindingRecord, Lost, Moment, Parameter, Record, Stats, Usage, UsageValue, USAGE_ENTRIES_MAX,
-    Vehicle as VehicleRecord,
+    Boot, Clock, Event, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX, Usage,
+    UsageValue, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
@@ -112,7 +112,8 @@ impl<'a> Monitoring<'a> {
         for (spec, value) in params.iter() {
             // Bit for bit: only a value that was set differs from its default.
             if value.to_bits() != spec.default.to_bits() {
-                let parameter = Parameter { name: spec.name, value: f64::from(value), changed: false, by: (0, 0) };
+                let parameter =
+                    Parameter { name: spec.name, value: f64::from(value), changed: false, by: (0, 0) };
                 self.record(now, &Record::Parameter(parameter), sectors);
             }
         }
@@ -121,7 +122,9 @@ impl<'a> Monitoring<'a> {
 
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
     pub fn drain(&mut self, frames: &mut FramesOut, sectors: &mut SectorsIn, gs: &mut GsIn) -> bool {
-        frames.take(|at_micros, verified, bytes| self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs))
+        frames.take(|at_micros, verified, bytes| {
+            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs)
+        })
     }
 
     fn frame(&mut self, at: Instant, verified: bool, bytes: &[u8], sectors: &mut SectorsIn, gs: &mut GsIn) {
@@ -131,7 +134,7 @@ impl<'a> Monitoring<'a> {
         }
         // What is not ours by its checksum is recorded but not believed.
         let check = if verified { Check::Verified } else { Check::Unverified };
-        let Some(frame) = Frame::parse(bytes, check).filter(|_| verified) else { return };
+        let Some(frame) = Frame::again(bytes, check).filter(|_| verified) else { return };
         self.sequences.frame(at, &frame);
         if let Some((source, observation)) = hums_link::observe(&frame) {
             self.monitor.observe(at, source, &observation);
@@ -211,7 +214,7 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let link = self.sequences.reading(now);
+        let link = self.sequences.reading(now, self.monitor.vehicle().source);
         let recorder = self.recorder_status(now, sectors);
         let Self { monitor, writer, summary, losses, .. } = self;
         monitor.tick(now, &link, &recorder, &mut |finding| {
@@ -257,7 +260,11 @@ impl<'a> Monitoring<'a> {
         self.losses.count(now, Lost::DamagedFrames, u64::from(new.damaged));
         self.losses.count(now, Lost::QueueFull, u64::from(new.frames_lost));
         let card = self.card.read();
-        self.losses.count(now, Lost::Card, u64::from(card.frames_lost.wrapping_sub(self.card_before.frames_lost)));
+        self.losses.count(
+            now,
+            Lost::Card,
+            u64::from(card.frames_lost.wrapping_sub(self.card_before.frames_lost)),
+        );
         self.card_before = card;
         self.queue_sectors_max = self.queue_sectors_max.max(sectors.deepest());
     }
@@ -289,7 +296,9 @@ impl<'a> Monitoring<'a> {
     /// UTC as soon as the autopilot knows it; the reader dates the whole session with it.
     fn record_clock(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let time = &self.monitor.vehicle().time;
-        let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) else { return };
+        let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) else {
+            return;
+        };
         let clock = Clock { boot: at, utc_micros, source: 1 };
         let epoch_micros = clock.epoch_micros();
         if self.epoch_micros.is_some_and(|known| known.abs_diff(epoch_micros) <= CLOCK_STEP_MICROS) {
