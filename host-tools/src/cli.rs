@@ -103,7 +103,7 @@ pub enum Speed {
 }
 
 /// Faults; each run is repeatable.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Faults (each may be given several times)")]
 pub struct FaultFlags {
     /// Power goes at the N-th 512-byte block write (torn: half of that block is old); the run ends there

@@ -348,7 +348,9 @@ fn heading(text: &mut String, log: &Overview) {
     let _ = writeln!(text, "Session {} ({}), {}", log.name, log.files.join(", "), log.ending());
     match (summary.first, summary.last) {
         (Some(first), Some(last)) => {
-            let utc = |at| log.utc_us(at).map_or_else(|| "UTC unknown".to_owned(), |utc| iso8601(utc / 1000 * 1000));
+            let utc = |at| {
+                log.utc_us(at).map_or_else(|| "UTC unknown".to_owned(), |utc| iso8601(utc / 1000 * 1000))
+            };
             let _ = writeln!(text, "  from     {:>10.3} s  {}", first.as_secs_f64(), utc(first));
             let _ = writeln!(text, "  to       {:>10.3} s  {}", last.as_secs_f64(), utc(last));
         }
@@ -361,7 +363,11 @@ fn heading(text: &mut String, log: &Overview) {
         let _ = writeln!(text, "  vehicle  system {}, {autopilot}{firmware}, {kind}{uid}", vehicle.system);
     }
     if let Some(boot) = &contents.boot {
-        let _ = writeln!(text, "  monitor  {} {} on {}, started by {}", boot.version, boot.git, boot.board, boot.reset);
+        let _ = writeln!(
+            text,
+            "  monitor  {} {} on {}, started by {}",
+            boot.version, boot.git, boot.board, boot.reset
+        );
     }
     let _ = writeln!(
         text,
@@ -414,7 +420,11 @@ fn finding_numbers(finding: &crate::summary::FindingLine) -> FindingJsonText {
 fn more(text: &mut String, count: u64, listed: usize) {
     let shown = listed.min(SHOWN_MAX) as u64;
     if count > shown {
-        let _ = writeln!(text, "    … and {} more (see --json, up to {LISTED_MAX}, or hums decode)", count - shown);
+        let _ = writeln!(
+            text,
+            "    … and {} more (see --json, up to {LISTED_MAX}, or hums decode)",
+            count - shown
+        );
     }
 }
 
@@ -424,13 +434,18 @@ fn gaps_text(text: &mut String, log: &Overview) {
         text.push_str("  gaps     none\n");
     } else {
         let (missing, damaged) = (summary.frames_missing, summary.blocks.damaged);
-        let _ = writeln!(text, "  gaps     {}, {missing} frames missing, {damaged} damaged sectors", summary.gaps);
+        let _ = writeln!(
+            text,
+            "  gaps     {}, {missing} frames missing, {damaged} damaged sectors",
+            summary.gaps
+        );
     }
     for gap in contents.gaps.iter().take(SHOWN_MAX) {
         let time = |at: Option<Instant>, none: &str| {
             at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
         };
-        let frames = gap.frames.map_or_else(|| "an unknown number of".to_owned(), |frames| frames.to_string());
+        let frames =
+            gap.frames.map_or_else(|| "an unknown number of".to_owned(), |frames| frames.to_string());
         let _ = writeln!(
             text,
             "    from {} to {}: {}, {} sectors lost, {} more of no use, {frames} frames missing",

@@ -3,6 +3,7 @@
 pub mod card;
 pub mod cli;
 pub mod decode;
+pub mod demo;
 pub mod endpoint;
 pub mod info;
 pub mod interrupt;
@@ -47,6 +48,6 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Pack(args) => pack::run(args),
-        _ => Ok(Outcome::Done),
+        Command::Demo(args) => demo::run(args),
     }
 }

@@ -22,7 +22,10 @@ const FROM_RECORDING: u8 = 2;
 /// Runs `hums pack`.
 pub fn run(args: &cli::Pack) -> Result<Outcome> {
     if args.input.is_live() {
-        return Err(usage(format!("{}: hums pack takes a file or `-`; hums sim records what comes live", args.input)));
+        return Err(usage(format!(
+            "{}: hums pack takes a file or `-`; hums sim records what comes live",
+            args.input
+        )));
     }
     let mut source = source::open(&args.input, Timing { line_rate: None })?;
     let context = || format!("{}: cannot be written", args.output.display());

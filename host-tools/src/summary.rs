@@ -270,7 +270,7 @@ impl Overview {
             // The clock record itself may be in a part that cannot be read; group starts repeat it.
             contents.epoch_us = reader::epoch(log)?;
         }
-        let files = log.pieces.iter().map(|piece| piece.path.display().to_string()).collect();
+        let files = log.files.clone();
         Ok(Self { name: log.name.clone(), files, bytes_on_card: log.bytes(), summary, contents })
     }
 

@@ -52,7 +52,7 @@ fn print(checks: &[Check]) -> Result<()> {
         let detail = if check.detail.is_empty() { String::new() } else { format!("; {}", check.detail) };
         output::line(&format!(
             "  {verdict} {:<18} {} checked, {} failed{detail}",
-            check.check, check.checked, check.failed
+            check.name, check.checked, check.failed
         ))?;
     }
     Ok(())
@@ -77,7 +77,7 @@ struct LogJson {
 /// One kind of check.
 #[derive(Debug, Serialize)]
 struct Check {
-    check: &'static str,
+    name: &'static str,
     checked: u64,
     failed: u64,
     detail: String,
@@ -89,16 +89,20 @@ fn file_system(image: &Image) -> Check {
         // What a cut leaves behind by design: space, no data.
         detail.push(format!("{} clusters belong to no file (lost space, no data)", image.lost_clusters));
     }
-    Check { check: "file system", checked: 1, failed: image.damage.len() as u64, detail: detail.join("; ") }
+    Check { name: "file system", checked: 1, failed: image.damage.len() as u64, detail: detail.join("; ") }
 }
 
 impl LogJson {
     fn new(log: &Overview) -> Self {
         let (summary, contents) = (&log.summary, &log.contents);
         let blocks = summary.blocks;
-        let check = |check, checked, failed, detail: String| Check { check, checked, failed, detail };
-        let unverified: u64 =
-            contents.messages.iter().filter(|((_, verified), _)| !verified).map(|(_, count)| count.frames).sum();
+        let check = |name, checked, failed, detail: String| Check { name, checked, failed, detail };
+        let unverified: u64 = contents
+            .messages
+            .iter()
+            .filter(|((_, verified), _)| !verified)
+            .map(|(_, count)| count.frames)
+            .sum();
         let missing: u64 = contents.gaps.iter().map(|gap| u64::from(gap.sectors_lost)).sum();
         let useless: u64 = contents.gaps.iter().map(|gap| u64::from(gap.sectors_skipped)).sum();
         let checks = vec![
@@ -110,7 +114,9 @@ impl LogJson {
                 "frame checksums",
                 contents.frames() - unverified,
                 contents.bad_frames,
-                format!("{unverified} frames of definitions that the monitor does not know are kept as they came"),
+                format!(
+                    "{unverified} frames of definitions that the monitor does not know are kept as they came"
+                ),
             ),
             check(
                 "frames missing",

@@ -29,7 +29,9 @@ impl Arrivals {
     pub fn open(run: &Run, tap: Option<&Path>) -> Result<Self> {
         let source = source::open(&run.input, Timing { line_rate: run.faults.line_rate })?;
         let create = |path: &Path| {
-            File::create(path).map(BufWriter::new).with_context(|| format!("{}: cannot be written", path.display()))
+            File::create(path)
+                .map(BufWriter::new)
+                .with_context(|| format!("{}: cannot be written", path.display()))
         };
         Ok(Self {
             source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
@@ -41,7 +43,7 @@ impl Arrivals {
     }
 
     /// The next arrival; `None` at the end.
-    pub fn next(&mut self) -> Result<Option<Chunk>> {
+    pub fn next_arrival(&mut self) -> Result<Option<Chunk>> {
         if let Some(chunk) = self.waiting.pop_front() {
             return Ok(Some(chunk));
         }

@@ -39,8 +39,8 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     if let Some(remark) = arrivals.remark() {
         eprintln!("hums: {remark}");
     }
-    let counters: Counters =
-        serde_json::from_str(&json).with_context(|| format!("the firmware's counters are not understood: {json}"))?;
+    let counters: Counters = serde_json::from_str(&json)
+        .with_context(|| format!("the firmware's counters are not understood: {json}"))?;
     let mut report = counters.into_report();
     report.read_card(&run.sd, earlier)?;
     report.print(run.json, run.gs == Some(Endpoint::Standard))
@@ -76,17 +76,22 @@ fn check_flags(run: &cli::Run) -> Result<()> {
         }
     }
     if run.params.is_some() {
-        return Err(usage("--params works with hums sim only: the emulated board starts with its own parameters"));
+        return Err(usage(
+            "--params works with hums sim only: the emulated board starts with its own parameters",
+        ));
     }
     Ok(())
 }
 
 /// The image: as named, as built, or built now.
-fn firmware(named: Option<&Path>) -> Result<PathBuf> {
+pub(crate) fn firmware(named: Option<&Path>) -> Result<PathBuf> {
     let variable = std::env::var_os(FIRMWARE_VARIABLE).map(PathBuf::from);
     if let Some(path) = named.map(Path::to_owned).or(variable) {
         if !path.is_file() {
-            bail!("{}: there is no such firmware image; `cargo xtask firmware --board emulated` builds one", path.display());
+            bail!(
+                "{}: there is no such firmware image; `cargo xtask firmware --board emulated` builds one",
+                path.display()
+            );
         }
         return Ok(std::path::absolute(path)?);
     }
@@ -124,7 +129,8 @@ pub fn source_tree() -> Option<PathBuf> {
     let here = std::env::current_dir().ok();
     let program = std::env::current_exe().ok();
     let starts = here.iter().chain(&program);
-    let is_tree = |dir: &&Path| dir.join("firmware/app/Cargo.toml").is_file() && dir.join("xtask/Cargo.toml").is_file();
+    let is_tree =
+        |dir: &&Path| dir.join("firmware/app/Cargo.toml").is_file() && dir.join("xtask/Cargo.toml").is_file();
     starts.flat_map(|start| start.ancestors()).find(is_tree).map(Path::to_owned)
 }
 

@@ -47,7 +47,7 @@ fn drive(
         interrupt::watch();
     }
     let mut now_us = 0;
-    while let Some(chunk) = arrivals.next()? {
+    while let Some(chunk) = arrivals.next_arrival()? {
         let due = Duration::from_micros(chunk.at_us);
         while pace && !interrupt::requested() {
             let elapsed = start.elapsed();
@@ -55,7 +55,8 @@ fn drive(
                 break;
             }
             std::thread::sleep(STEP.min(due.saturating_sub(elapsed)));
-            now_us = chunk.at_us.min(u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX)).max(now_us);
+            now_us =
+                chunk.at_us.min(u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX)).max(now_us);
             if !machine.arrive(&Chunk { at_us: now_us, bytes: Vec::new() })? {
                 arrivals.put_back(chunk);
                 return Ok(false);
@@ -88,7 +89,8 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
     let (file, found) = image::open_or_make(path, size_mib)?;
     if found == Found::Made {
         let context = || format!("{}: cannot be formatted", path.display());
-        let card = SimCard::new(file.try_clone().with_context(context)?, Faults::default()).with_context(context)?;
+        let card =
+            SimCard::new(file.try_clone().with_context(context)?, Faults::default()).with_context(context)?;
         // A run is repeatable to the byte, the volume's number included.
         let volume_id = (seed as u32).wrapping_mul(0x9e37_79b9) ^ 0x4855_4d53;
         if let Err(error) = hums_recorder::format::format(&card, volume_id) {

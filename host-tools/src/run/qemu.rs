@@ -19,9 +19,9 @@ const PROGRAM: &str = "qemu-system-arm";
 /// The first version that models this chip's memory.
 const VERSION_MIN: u32 = 8;
 /// How long the firmware may take until it listens.
-const BOOT: Duration = Duration::from_secs(60);
+const BOOT: Duration = Duration::from_mins(1);
 /// How long it may take to work off what was sent and to close the log.
-const SHUTDOWN: Duration = Duration::from_secs(180);
+const SHUTDOWN: Duration = Duration::from_mins(3);
 /// How long to wait for a socket to appear.
 const CONNECT: Duration = Duration::from_secs(10);
 
@@ -34,7 +34,9 @@ const ADVICE: &str = "\n  Debian 12:        add bookworm-backports, then apt-get
 pub fn check() -> Result<()> {
     let output = match Command::new(PROGRAM).arg("--version").stdin(Stdio::null()).output() {
         Ok(output) => output,
-        Err(error) => bail!("{PROGRAM} cannot be started ({error}); version {VERSION_MIN}.0 or later is needed:{ADVICE}"),
+        Err(error) => bail!(
+            "{PROGRAM} cannot be started ({error}); version {VERSION_MIN}.0 or later is needed:{ADVICE}"
+        ),
     };
     let text = String::from_utf8_lossy(&output.stdout);
     let version = text.split("version ").nth(1).unwrap_or_default();
@@ -42,10 +44,14 @@ pub fn check() -> Result<()> {
     match major {
         Some(major) if major < VERSION_MIN => {
             let found = version.split_whitespace().next().unwrap_or_default();
-            bail!("{PROGRAM} is {found}; it models this chip's memory only from version {VERSION_MIN}.0 on:{ADVICE}")
+            bail!(
+                "{PROGRAM} is {found}; it models this chip's memory only from version {VERSION_MIN}.0 on:{ADVICE}"
+            )
         }
         Some(_) => Ok(()),
-        None => bail!("{PROGRAM} --version says nothing that is understood; version {VERSION_MIN}.0 is needed:{ADVICE}"),
+        None => bail!(
+            "{PROGRAM} --version says nothing that is understood; version {VERSION_MIN}.0 is needed:{ADVICE}"
+        ),
     }
 }
 
@@ -84,8 +90,7 @@ impl Qemu {
             .spawn()
             .with_context(|| format!("{PROGRAM} cannot be started"))?;
         let (lines, complaints) = listen(&mut child)?;
-        let mut qemu =
-            Self { child, lines, feed: None, uart: None, downlink: None, complaints, dir };
+        let mut qemu = Self { child, lines, feed: None, uart: None, downlink: None, complaints, dir };
         // It waits for this one before it starts the firmware, so that not one byte is missed.
         qemu.downlink = Some(forward(qemu.connect("gs")?, gs));
         qemu.uart = Some(qemu.connect("ap")?);
@@ -143,7 +148,9 @@ impl Qemu {
         let result = match self.lines.recv_timeout(SHUTDOWN) {
             Ok(Line::Result(json)) => Some(json),
             Ok(Line::Ready) | Err(RecvTimeoutError::Disconnected) => None,
-            Err(RecvTimeoutError::Timeout) => bail!("the firmware did not end within {SHUTDOWN:?} after its input"),
+            Err(RecvTimeoutError::Timeout) => {
+                bail!("the firmware did not end within {SHUTDOWN:?} after its input")
+            }
         };
         let status = self.child.wait().context("the emulator's end")?;
         self.uart = None;
@@ -152,25 +159,23 @@ impl Qemu {
         {
             result.context("--gs: cannot be written")?;
         }
-        match (status.code(), result) {
-            (Some(0), Some(json)) => Ok(json),
-            _ => {
-                let why = self.end()?;
-                bail!("the firmware failed{why}")
-            }
+        if let (Some(0), Some(json)) = (status.code(), result) {
+            Ok(json)
+        } else {
+            let why = self.end()?;
+            bail!("the firmware failed{why}")
         }
     }
 
     /// How it ended, as the end of a sentence.
     fn end(&mut self) -> Result<String> {
         (self.feed, self.uart) = (None, None);
-        let status = match self.child.try_wait()? {
-            Some(status) => status,
-            None => {
-                std::thread::sleep(Duration::from_millis(200));
-                let _ = self.child.kill();
-                self.child.wait()?
-            }
+        let status = if let Some(status) = self.child.try_wait()? {
+            status
+        } else {
+            std::thread::sleep(Duration::from_millis(200));
+            let _ = self.child.kill();
+            self.child.wait()?
         };
         let mut why = match status.code() {
             Some(0) => String::new(),
@@ -199,7 +204,8 @@ impl Drop for Qemu {
 }
 
 fn command(firmware: &Path, dir: &Path) -> Command {
-    let socket = |id: &str, more: &str| format!("socket,id={id},path={},server=on,{more}", escaped(&dir.join(id)));
+    let socket =
+        |id: &str, more: &str| format!("socket,id={id},path={},server=on,{more}", escaped(&dir.join(id)));
     let arguments = format!(
         "enable=on,target=native,arg=\"sd={}\" \"feed={}\"",
         escaped(&dir.join("card")),

@@ -98,7 +98,8 @@ impl Report {
             let overview = Overview::of(log)?;
             frames += overview.contents.frames();
             self.log_files.extend(log.files.iter().cloned());
-            self.usage = overview.contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
+            self.usage =
+                overview.contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
             for finding in &overview.contents.findings {
                 let value = f64::from(finding.value);
                 self.findings.push(Finding {
@@ -130,11 +131,23 @@ impl Report {
     fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "frames   {} in, {} logged, {} lost", self.frames_in, self.frames_logged, self.frames_lost);
+        let _ = writeln!(
+            text,
+            "frames   {} in, {} logged, {} lost",
+            self.frames_in, self.frames_logged, self.frames_lost
+        );
         let _ = writeln!(text, "bytes    {} in, {} of no frame", self.bytes_in, self.bytes_not_frames);
-        let _ = writeln!(text, "card     {} bytes of log, {} blocks written", self.bytes_logged, self.blocks_written);
+        let _ = writeln!(
+            text,
+            "card     {} bytes of log, {} blocks written",
+            self.bytes_logged, self.blocks_written
+        );
         let (most, capacity) = (self.queue_bytes_max, self.queue_bytes_capacity);
-        let _ = writeln!(text, "queue    {most} of {capacity} bytes at most; card slowest {} ms", self.sd_stall_ms_max);
+        let _ = writeln!(
+            text,
+            "queue    {most} of {capacity} bytes at most; card slowest {} ms",
+            self.sd_stall_ms_max
+        );
         let _ = writeln!(text, "ground   {} frames, {} bytes", self.gs_frames, self.gs_bytes);
         if self.power_cut {
             let _ = writeln!(text, "power    was cut at a block write, as asked");

@@ -18,6 +18,7 @@ use hums_blackbox::{Header, Writer};
 use hums_core::params::{ParamError, Params};
 use hums_core::time::{Instant, Span};
 use hums_onboard::monitoring::TICK;
+use hums_onboard::port::PortReading;
 use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
 use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
 use hums_recorder::{CardDevice, CardStatus};
@@ -64,7 +65,10 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     };
     world.reboots.sort_unstable();
     let start = WallClock::now();
-    while world.power_on(&mut arrivals, params, |arrivals, machine| drive(arrivals, speed, live, start, machine))? {}
+    while world
+        .power_on(&mut arrivals, params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
+    {
+    }
     if let Some(error) = card.take_image_error() {
         bail!("{}: {error}", run.sd.display());
     }
@@ -91,7 +95,8 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
 fn read_params(path: Option<&Path>) -> Result<Params> {
     let mut params = Params::defaults();
     let Some(path) = path else { return Ok(params) };
-    let text = std::fs::read_to_string(path).with_context(|| format!("--params {}: cannot be read", path.display()))?;
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("--params {}: cannot be read", path.display()))?;
     for (index, line) in text.lines().enumerate() {
         let place = format!("--params {}, line {}", path.display(), index + 1);
         let line = line.split('#').next().unwrap_or_default();
@@ -103,7 +108,9 @@ fn read_params(path: Option<&Path>) -> Result<Params> {
         };
         match params.set(name, value) {
             Ok(()) => {}
-            Err(ParamError::UnknownName) => return Err(usage(format!("{place}: there is no parameter {name}"))),
+            Err(ParamError::UnknownName) => {
+                return Err(usage(format!("{place}: there is no parameter {name}")));
+            }
             Err(ParamError::OutOfRange { min, max }) => {
                 return Err(usage(format!("{place}: {name} takes {min} to {max}, not {value}")));
             }
@@ -172,7 +179,8 @@ impl World<'_> {
         if ended {
             lost = pipeline.finish()?;
         }
-        let stats = pipeline.stats();
+        let mut stats = pipeline.stats();
+        catch_up(&mut stats, port_status.read());
         self.overwritten |= card_status.read().segments_overwritten > 0;
         self.add(&stats, lost);
         if ended {
@@ -216,6 +224,18 @@ impl World<'_> {
             report.frames_lost = report.frames_in - report.frames_logged;
         }
         Ok(report)
+    }
+}
+
+/// The monitor adds up the port's counters at each tick; power may have gone since the last one.
+fn catch_up(stats: &mut Stats, port: PortReading) {
+    for (sum, counter) in [
+        (&mut stats.frames_in, port.frames),
+        (&mut stats.bytes_in, port.bytes),
+        (&mut stats.bytes_not_frames, port.bytes_not_frames),
+    ] {
+        // The counter is the sum modulo 2^32, and ahead of it.
+        *sum += u64::from(counter.wrapping_sub(*sum as u32));
     }
 }
 
@@ -387,9 +407,8 @@ impl Pipeline<'_, '_> {
         let took = Span::from_micros(self.card.clock().saturating_sub(begin_us));
         self.slot_status.note_stall_ms(u32::try_from(took.as_millis()).unwrap_or(u32::MAX));
         self.storage_at = match service {
-            Service::Wrote => Some(self.now + took),
             Service::Idle if self.ends.sectors_out.is_empty() => None,
-            Service::Idle => Some(self.now + took),
+            Service::Wrote | Service::Idle => Some(self.now + took),
             Service::NoCard => Some(self.now + took + NO_CARD_RETRY),
         };
     }
@@ -403,7 +422,7 @@ impl Pipeline<'_, '_> {
         let patience = self.now + CARD_PATIENCE;
         while !self.ends.sectors_out.is_empty() && !self.card.is_dead() {
             let at = self.storage_at.unwrap_or(self.now).max(self.now);
-            if at > patience && self.ends.sectors_out.len() > 0 && self.slot_is_empty() {
+            if at > patience && !self.ends.sectors_out.is_empty() && self.slot_is_empty() {
                 break;
             }
             self.now = at;

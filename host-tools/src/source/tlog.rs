@@ -73,7 +73,7 @@ impl<R: Read> Records<R> {
     }
 
     /// The next record; `None` at the end.
-    pub fn next(&mut self) -> io::Result<Option<Record>> {
+    pub fn next_record(&mut self) -> io::Result<Option<Record>> {
         let mut noise = Vec::new();
         loop {
             self.fill()?;
@@ -166,7 +166,7 @@ impl<R: Read> Tlog<R> {
 
 impl<R: Read> Source for Tlog<R> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
-        Ok(match self.records.next()? {
+        Ok(match self.records.next_record()? {
             None => None,
             Some(Record::Frame { time_us, bytes }) => {
                 if self.arrival.last.is_none() {
