@@ -1,1 +1,40 @@
-//! The record: its format, its writer and its reader.
+//! The black box's record: its format, its writer and its reader, in one crate, so that they cannot drift apart.
+//!
+//! ```text
+//! frames, records -> Writer -> sectors of 512 bytes -> card … blocks -> LogReader -> frames, records, gaps
+//! ```
+//! * An *entry* is a frame as it was received or a record of the monitor's own, with its time.
+//! * The *model* (`codec`) predicts each entry from those before and codes only what it did not foresee.
+//! * A *group* of up to 64 sectors (32 KiB) starts the model afresh: reading can start there, damage ends there.
+//! * A *sector* says what it is and is checked.
+//!
+//! `docs/log-format.md` describes the format completely. Everything here is bounded and, but for the feature `std`,
+//! needs no allocation.
+#![cfg_attr(not(any(test, feature = "std")), no_std)]
+
+mod assemble;
+mod bytes;
+mod codec;
+mod coder;
+mod crc;
+mod group;
+pub mod layouts;
+mod preamble;
+mod reader;
+pub mod record;
+mod sector;
+mod writer;
+
+pub use assemble::{Assembler, BlockCounts, Step};
+pub use codec::FRAME_BYTES_MAX;
+pub use group::{Entry, GroupDecoder, GroupError};
+pub use preamble::Preamble;
+pub use reader::{Cause, Gap, Item, LogReader, Summary};
+pub use record::Record;
+pub use sector::{BODY_BYTES, GROUP_SECTORS, Header, NotASector, SECTOR_BYTES, Sector, VERSION};
+pub use writer::{Counters, ENTRY_SECTORS_MAX, Full, SectorSink, Writer};
+
+/// The codec's state at most, bytes: three quarters of the STM32F405's core-coupled memory.
+pub const WRITER_BYTES_MAX: usize = 48 * 1024;
+
+const _: () = assert!(size_of::<Writer>() <= WRITER_BYTES_MAX);

@@ -3,4 +3,8 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod health;
+pub mod latest;
+pub mod observation;
 pub mod time;
+pub mod units;
+pub mod vehicle;

@@ -1,0 +1,205 @@
+//! Decoding one group: sectors in, entries out. Groups know nothing of each other, so a host decodes many at once.
+
+use hums_core::time::Instant;
+
+use crate::codec::{Decoded, ENTRY_BYTES_MAX, Kind, Model};
+use crate::coder::{Decoder, LOOKAHEAD};
+use crate::layouts::Layouts;
+use crate::preamble::{PREAMBLE_BYTES, Preamble};
+use crate::record::Record;
+use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, Sector};
+
+/// An entry of a group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entry<'a> {
+    /// A frame as it was received.
+    Frame {
+        /// When, on the monitor's clock; whole milliseconds.
+        at: Instant,
+        /// The frame, from its magic byte to its checksum or signature.
+        bytes: &'a [u8],
+        /// Its checksum is that of the definition that the monitor knew.
+        verified: bool,
+    },
+    /// A record of the monitor's own.
+    Record {
+        /// When, on the monitor's clock; whole milliseconds.
+        at: Instant,
+        /// The record.
+        record: Record<'a>,
+    },
+}
+
+/// Why a group, or the rest of it, cannot be decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GroupError {
+    /// The sector is not the next one of this group.
+    OutOfOrder,
+    /// It was written with layouts that this build does not know.
+    UnknownLayouts(u32),
+    /// Its sectors are sound, but what is in them is not what a writer makes.
+    Corrupt,
+}
+
+impl core::fmt::Display for GroupError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::OutOfOrder => f.write_str("the sector is not the next one of its group"),
+            Self::UnknownLayouts(hash) => {
+                write!(f, "written with the message layouts {hash:08x}, which this program does not know")
+            }
+            Self::Corrupt => f.write_str("the sectors are sound, but their content is not"),
+        }
+    }
+}
+
+impl core::error::Error for GroupError {}
+
+/// The decoder of one group; `begin` makes it ready for the next one. It is large (see `size_of`): box it.
+pub struct GroupDecoder {
+    model: Model,
+    decoder: Decoder,
+    input: [u8; GROUP_SECTORS * BODY_BYTES],
+    filled: usize,
+    /// The last sector taken.
+    last: Option<Header>,
+    /// Entries that the sectors taken complete and that were not given out yet.
+    due: u32,
+    frames: u32,
+    preamble: Preamble,
+    entry: [u8; ENTRY_BYTES_MAX],
+    decoded: Decoded,
+}
+
+impl Default for GroupDecoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl GroupDecoder {
+    /// A decoder that waits for a group.
+    pub fn new() -> Self {
+        Self {
+            model: Model::new(),
+            decoder: Decoder::new(&[], 0),
+            input: [0; GROUP_SECTORS * BODY_BYTES],
+            filled: 0,
+            last: None,
+            due: 0,
+            frames: 0,
+            preamble: Preamble::default(),
+            entry: [0; ENTRY_BYTES_MAX],
+            decoded: Decoded { kind: Kind::Record, at_ms: 0, len: 0 },
+        }
+    }
+
+    /// Takes the next sector of the group, which `Header::read` has checked; one that starts a group drops what is
+    /// left of the group before.
+    pub fn push(&mut self, header: &Header, sector: &Sector) -> Result<(), GroupError> {
+        if header.starts_group() {
+            self.begin(header, sector)?;
+        } else if !self.last.is_some_and(|last| follows(&last, header)) {
+            self.last = None;
+            return Err(GroupError::OutOfOrder);
+        } else {
+            self.fill(header, sector);
+        }
+        self.last = Some(*header);
+        self.due += header.entries();
+        Ok(())
+    }
+
+    fn begin(&mut self, header: &Header, sector: &Sector) -> Result<(), GroupError> {
+        self.last = None;
+        self.filled = 0;
+        self.due = 0;
+        self.frames = 0;
+        let body = sector.body().get(..header.body_bytes).unwrap_or_default();
+        self.preamble = Preamble::read(body).ok_or(GroupError::Corrupt)?;
+        let hash = self.preamble.layouts;
+        let layouts = Layouts::by_hash(hash).ok_or(GroupError::UnknownLayouts(hash))?;
+        self.model.reset(self.preamble.start_ms, layouts);
+        self.fill(header, sector);
+        self.decoder = Decoder::new(self.stream(), PREAMBLE_BYTES);
+        Ok(())
+    }
+
+    fn fill(&mut self, header: &Header, sector: &Sector) {
+        let end = self.filled + header.body_bytes;
+        if let (Some(place), Some(body)) =
+            (self.input.get_mut(self.filled..end), sector.body().get(..header.body_bytes))
+        {
+            place.copy_from_slice(body);
+            self.filled = end;
+        }
+    }
+
+    fn stream(&self) -> &[u8] {
+        self.input.get(..self.filled).unwrap_or_default()
+    }
+
+    /// The next entry that the sectors taken so far complete; `None`: more sectors, please. After an error the group
+    /// is over.
+    pub fn next_entry(&mut self) -> Option<Result<Entry<'_>, GroupError>> {
+        match self.advance()? {
+            Ok(()) => Some(Ok(self.entry())),
+            Err(error) => Some(Err(error)),
+        }
+    }
+
+    /// Decodes the next entry, for `entry` to give out.
+    pub(crate) fn advance(&mut self) -> Option<Result<(), GroupError>> {
+        if self.due == 0 || self.last.is_none() {
+            return None;
+        }
+        self.due -= 1;
+        let input = self.input.get(..self.filled).unwrap_or_default();
+        match self.model.decode(&mut self.decoder, input, &mut self.entry) {
+            // Reading on beyond the end is only right where the stream ends.
+            Ok(decoded) if self.decoder.position() <= input.len() + LOOKAHEAD => {
+                self.frames += u32::from(decoded.kind != Kind::Record);
+                self.decoded = decoded;
+                Some(Ok(()))
+            }
+            _ => {
+                self.last = None;
+                Some(Err(GroupError::Corrupt))
+            }
+        }
+    }
+
+    /// The entry that `advance` decoded.
+    pub(crate) fn entry(&self) -> Entry<'_> {
+        let at = Instant::from_millis(self.decoded.at_ms);
+        let bytes = self.entry.get(..self.decoded.len).unwrap_or_default();
+        match self.decoded.kind {
+            Kind::Frame { verified } => Entry::Frame { at, bytes, verified },
+            Kind::Record => Entry::Record { at, record: Record::read(bytes) },
+        }
+    }
+
+    /// Frames given out of this group so far.
+    pub const fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// Drops what is left of the group.
+    pub(crate) fn abandon(&mut self) {
+        self.last = None;
+    }
+
+    /// What the group said at its start.
+    pub const fn preamble(&self) -> Preamble {
+        self.preamble
+    }
+}
+
+/// Whether `next` continues the group of `last`: nothing follows a partial sector.
+fn follows(last: &Header, next: &Header) -> bool {
+    last.session == next.session
+        && last.number.wrapping_add(1) == next.number
+        && last.since_first + 1 == next.since_first
+        && !last.partial
+        && !last.closed
+}

@@ -1,0 +1,53 @@
+//! The plain bytes at the start of each group's first sector: what a reader that starts there needs.
+//!
+//! ```text
+//!   0  u32: hash of the layout table that the group was written with
+//!   4  u48: time of the first entry, milliseconds since power-on
+//!  10  u32: frames of the session before this group
+//!  14  u64: UTC at power-on, microseconds since 1970; 0 where it is not known yet
+//! ```
+
+use crate::bytes::{Fields, Sink};
+
+pub(crate) const PREAMBLE_BYTES: usize = 22;
+
+/// What a group says of itself before its first entry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Preamble {
+    /// Hash of the layout table that the group was written with.
+    pub layouts: u32,
+    /// Time of the first entry, milliseconds since power-on.
+    pub start_ms: u64,
+    /// Frames of the session before this group, modulo 2^32: tells how many are missing.
+    pub frames_before: u32,
+    /// UTC at power-on, microseconds since 1970, where it was known.
+    pub epoch_micros: Option<u64>,
+}
+
+impl Preamble {
+    pub(crate) fn store(&self) -> [u8; PREAMBLE_BYTES] {
+        let mut out = [0; PREAMBLE_BYTES];
+        Sink::new(&mut out)
+            .u32(self.layouts)
+            .bytes(&self.start_ms.to_le_bytes()[..6])
+            .u32(self.frames_before)
+            .u64(self.epoch_micros.unwrap_or(0));
+        out
+    }
+
+    /// Reads it from the body of a group's first sector; `None` where the body is too short.
+    pub fn read(body: &[u8]) -> Option<Self> {
+        let mut fields = Fields::new(body.get(..PREAMBLE_BYTES)?);
+        let layouts = fields.u32();
+        let mut start = [0; 8];
+        start[..6].copy_from_slice(fields.bytes(6));
+        let frames_before = fields.u32();
+        let epoch = fields.u64();
+        Some(Self {
+            layouts,
+            start_ms: u64::from_le_bytes(start),
+            frames_before,
+            epoch_micros: (epoch != 0).then_some(epoch),
+        })
+    }
+}

@@ -1,0 +1,262 @@
+//! The sector: 512 bytes that say what they are and are checked, so that a torn, stale, flipped or missing one is
+//! always noticed.
+//!
+//! ```text
+//!   0  magic 0x48 'H'
+//!   1  0xB0 | format version (1)
+//!   2  bits 0..=5: sectors since the first of the group; bit 6: partial; bit 7: closed
+//!   3  u16: bits 0..=8: bytes of the body in use; bits 9..=15: records completed
+//!   5  u16: frames completed
+//!   7  u32: session
+//!  11  u32: number, counted from 0 in the session
+//!  15  body, 493 bytes
+//! 508  u32: CRC-32C of bytes 0..508
+//! ```
+//! Integers are little endian. *Completed* counts the entries that can be decoded once this sector and those before
+//! it in its group are there. *Partial* marks a copy of a sector still in progress: a later, fuller version with the
+//! same number supersedes it. *Closed* marks the last sector of a session that ended in order.
+
+use crate::crc::crc32c;
+
+/// Bytes of a sector: a block of an SD card.
+pub const SECTOR_BYTES: usize = 512;
+
+/// Sectors of a group at most: 32 KiB.
+pub const GROUP_SECTORS: usize = 64;
+
+/// Bytes of a sector's body.
+pub const BODY_BYTES: usize = CRC_AT - BODY_AT;
+
+/// The format's version.
+pub const VERSION: u8 = 1;
+
+pub(crate) const BODY_AT: usize = 15;
+const CRC_AT: usize = SECTOR_BYTES - 4;
+const MAGIC: u8 = b'H';
+const PARTIAL: u8 = 0x40;
+const CLOSED: u8 = 0x80;
+const SINCE_FIRST: u8 = 0x3f;
+
+/// Records completed in a sector at most: what its field holds.
+pub(crate) const RECORDS_MAX: u8 = 127;
+
+const _: () = assert!(GROUP_SECTORS == SINCE_FIRST as usize + 1 && BODY_BYTES < 1 << 9);
+
+/// One sector of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sector {
+    bytes: [u8; SECTOR_BYTES],
+}
+
+impl Default for Sector {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl Sector {
+    /// All zeros, which is no valid sector.
+    pub const fn zeroed() -> Self {
+        Self { bytes: [0; SECTOR_BYTES] }
+    }
+
+    /// From bytes as they were written or read; `Header::read` checks them.
+    pub const fn from_bytes(bytes: [u8; SECTOR_BYTES]) -> Self {
+        Self { bytes }
+    }
+
+    /// Names the session and sets the check: the last step before the sector is written.
+    pub fn seal(&mut self, session: u32) {
+        self.bytes[7..11].copy_from_slice(&session.to_le_bytes());
+        let crc = crc32c(&self.bytes[..CRC_AT]);
+        self.bytes[CRC_AT..].copy_from_slice(&crc.to_le_bytes());
+    }
+
+    /// The bytes to write.
+    pub const fn bytes(&self) -> &[u8; SECTOR_BYTES] {
+        &self.bytes
+    }
+
+    /// Whether it is a copy of a sector in progress, which a later one with its number supersedes.
+    pub const fn is_partial(&self) -> bool {
+        self.bytes[2] & PARTIAL != 0
+    }
+
+    /// Whether a group, and with it a place where reading can start, begins here.
+    pub const fn starts_group(&self) -> bool {
+        self.bytes[2] & SINCE_FIRST == 0
+    }
+
+    /// The sector's number in its session, from 0.
+    pub fn number(&self) -> u32 {
+        self.u32_at(11)
+    }
+
+    /// Frames completed in this sector.
+    pub fn frames(&self) -> u16 {
+        u16::from_le_bytes([self.bytes[5], self.bytes[6]])
+    }
+
+    /// The body: what is in use of it is for `Header::body_bytes` to say.
+    pub(crate) fn body(&self) -> &[u8] {
+        &self.bytes[BODY_AT..CRC_AT]
+    }
+
+    pub(crate) fn body_mut(&mut self) -> &mut [u8] {
+        &mut self.bytes[BODY_AT..CRC_AT]
+    }
+
+    /// Writes the header but for the session; clears the rest of the body.
+    pub(crate) fn set_header(&mut self, header: &Header) {
+        let flags = if header.partial { PARTIAL } else { 0 } | if header.closed { CLOSED } else { 0 };
+        let body_bytes = (header.body_bytes).min(BODY_BYTES);
+        let lengths = body_bytes as u16 | u16::from(header.records.min(RECORDS_MAX)) << 9;
+        self.bytes[0] = MAGIC;
+        self.bytes[1] = 0xb0 | VERSION;
+        self.bytes[2] = flags | (header.since_first & SINCE_FIRST);
+        self.bytes[3..5].copy_from_slice(&lengths.to_le_bytes());
+        self.bytes[5..7].copy_from_slice(&header.frames.to_le_bytes());
+        self.bytes[7..11].copy_from_slice(&header.session.to_le_bytes());
+        self.bytes[11..15].copy_from_slice(&header.number.to_le_bytes());
+        self.body_mut()[body_bytes..].fill(0);
+    }
+
+    fn u32_at(&self, at: usize) -> u32 {
+        let mut bytes = [0; 4];
+        bytes.copy_from_slice(&self.bytes[at..at + 4]);
+        u32::from_le_bytes(bytes)
+    }
+}
+
+/// What a sector says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// Which session: sectors of another one are left over from an earlier file.
+    pub session: u32,
+    /// The sector's number in its session, from 0.
+    pub number: u32,
+    /// How many sectors after the first one of its group it is: 0 to 63.
+    pub since_first: u8,
+    /// A copy of a sector in progress: the group is readable up to here and no further.
+    pub partial: bool,
+    /// The last sector of a session that was ended in order.
+    pub closed: bool,
+    /// Bytes of the body in use, at most `BODY_BYTES`.
+    pub body_bytes: usize,
+    /// Frames completed in it.
+    pub frames: u16,
+    /// Records completed in it, at most 127.
+    pub records: u8,
+}
+
+/// Why a block is no sector of this format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotASector {
+    /// All zeros: space that was set aside and not written yet.
+    Empty,
+    /// It does not begin as a sector does: some other file's data.
+    Foreign,
+    /// It begins as a sector of another format version does, and its check is right.
+    OtherVersion(u8),
+    /// It begins as a sector does, but the check (or a length in it) is wrong: torn or damaged.
+    Damaged,
+}
+
+impl Header {
+    /// Checks a block and reads its header.
+    pub fn read(block: &[u8; SECTOR_BYTES]) -> Result<Self, NotASector> {
+        let sector = Sector { bytes: *block };
+        if block[0] != MAGIC || block[1] & 0xf0 != 0xb0 {
+            let empty = block.iter().all(|&byte| byte == 0);
+            return Err(if empty { NotASector::Empty } else { NotASector::Foreign });
+        }
+        if crc32c(&block[..CRC_AT]) != sector.u32_at(CRC_AT) {
+            return Err(NotASector::Damaged);
+        }
+        if block[1] & 0x0f != VERSION {
+            return Err(NotASector::OtherVersion(block[1] & 0x0f));
+        }
+        let lengths = u16::from_le_bytes([block[3], block[4]]);
+        let body_bytes = usize::from(lengths & 0x1ff);
+        if body_bytes > BODY_BYTES {
+            return Err(NotASector::Damaged);
+        }
+        Ok(Self {
+            session: sector.u32_at(7),
+            number: sector.u32_at(11),
+            since_first: block[2] & SINCE_FIRST,
+            partial: block[2] & PARTIAL != 0,
+            closed: block[2] & CLOSED != 0,
+            body_bytes,
+            frames: sector.frames(),
+            records: (lengths >> 9) as u8,
+        })
+    }
+
+    /// Whether a group begins here.
+    pub const fn starts_group(&self) -> bool {
+        self.since_first == 0
+    }
+
+    /// The number of the sector that began the group.
+    pub const fn group(&self) -> u32 {
+        self.number.wrapping_sub(self.since_first as u32)
+    }
+
+    /// Entries completed in it.
+    pub const fn entries(&self) -> u32 {
+        self.frames as u32 + self.records as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> (Header, Sector) {
+        let header = Header {
+            session: 0x1234_5678,
+            number: 70_000,
+            since_first: 63,
+            partial: true,
+            closed: false,
+            body_bytes: 493,
+            frames: 65_535,
+            records: 127,
+        };
+        let mut sector = Sector::zeroed();
+        sector.body_mut().fill(0xa5);
+        sector.set_header(&header);
+        sector.seal(header.session);
+        (header, sector)
+    }
+
+    #[test]
+    fn a_header_reads_back_with_every_field_at_its_end_of_range() {
+        let (header, sector) = sample();
+        assert_eq!(Header::read(sector.bytes()), Ok(header));
+        assert_eq!((sector.number(), sector.frames(), sector.starts_group()), (70_000, 65_535, false));
+        assert_eq!(header.group(), 70_000 - 63);
+    }
+
+    #[test]
+    fn every_single_bit_error_is_noticed() {
+        let (_, sector) = sample();
+        for bit in 0..SECTOR_BYTES * 8 {
+            let mut bytes = *sector.bytes();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            assert!(Header::read(&bytes).is_err(), "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn zeros_other_data_and_other_versions_are_told_apart() {
+        assert_eq!(Header::read(&[0; SECTOR_BYTES]), Err(NotASector::Empty));
+        assert_eq!(Header::read(&[0xff; SECTOR_BYTES]), Err(NotASector::Foreign));
+        let (_, mut sector) = sample();
+        sector.bytes[1] = 0xb2;
+        assert_eq!(Header::read(sector.bytes()), Err(NotASector::Damaged));
+        sector.seal(1);
+        assert_eq!(Header::read(sector.bytes()), Err(NotASector::OtherVersion(2)));
+    }
+}

@@ -1,0 +1,342 @@
+//! The writer: frames and records in, sectors out. It allocates nothing, never waits, and keeps its stream decodable
+//! whatever happens behind it.
+//!
+//! *Admission:* before an entry is encoded the sink must have room for `ENTRY_SECTORS_MAX`; otherwise the writer
+//! returns `Full` and its state is as before. *Groups* end after `GROUP_SECTORS`: the entry that does not fit any more is
+//! taken back (the coder's state before it is kept) and becomes the first one of the next group.
+
+use hums_core::time::Instant;
+
+use crate::codec::{CODED_BYTES_MAX, Entry, FRAME_BYTES_MAX, Kind, Model, Out};
+use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
+use crate::layouts::{self, Layouts};
+use crate::preamble::{PREAMBLE_BYTES, Preamble};
+use crate::record::{RECORD_BYTES_MAX, Record};
+use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
+
+/// Sectors that one entry completes at most: the one that ends the old group, and those that a longest entry fills
+/// with the preamble before it.
+pub const ENTRY_SECTORS_MAX: usize = 1 + (PREAMBLE_BYTES + CODED_BYTES_MAX + FLUSH_MAX).div_ceil(BODY_BYTES);
+
+/// Where finished sectors go: a bounded queue.
+pub trait SectorSink {
+    /// How many sectors it takes now.
+    fn room(&self) -> usize;
+    /// Takes a sector; called at most `room` times. The sector is not sealed yet.
+    fn put(&mut self, sector: &Sector);
+}
+
+/// An entry was not taken; the writer is as it was before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Full {
+    /// The sink has no room for it.
+    NoRoom,
+    /// It is longer than an entry may be: no frame, or a record beyond `RECORD_BYTES_MAX`.
+    TooLong,
+}
+
+impl core::fmt::Display for Full {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NoRoom => "the sector queue is full",
+            Self::TooLong => "the entry is longer than an entry may be",
+        })
+    }
+}
+
+impl core::error::Error for Full {}
+
+/// What the writer did so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Frames taken.
+    pub frames: u64,
+    /// Their bytes.
+    pub frame_bytes: u64,
+    /// Records taken.
+    pub records: u64,
+    /// Sectors finished.
+    pub sectors: u64,
+    /// Groups begun.
+    pub groups: u64,
+    /// Entries refused.
+    pub refused: u64,
+}
+
+/// The writer with the model, the sector in progress and room for one coded entry.
+pub struct Writer {
+    model: Model,
+    coder: Encoder,
+    scratch: Out,
+    sector: Sector,
+    /// Of the sector in progress.
+    header: Header,
+    /// Entries that ended too close to the end of the sector before: the next one completes them.
+    ended: Ended,
+    in_group: bool,
+    changed: bool,
+    layouts: Option<u32>,
+    last_ms: u64,
+    epoch_micros: Option<u64>,
+    counters: Counters,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Ended {
+    frames: u16,
+    records: u8,
+}
+
+impl Default for Writer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Writer {
+    /// A writer at the start of a session.
+    pub const fn new() -> Self {
+        Self {
+            model: Model::new(),
+            coder: Encoder::new(),
+            scratch: Out::new(),
+            sector: Sector::zeroed(),
+            header: Header {
+                session: 0,
+                number: 0,
+                since_first: 0,
+                partial: false,
+                closed: false,
+                body_bytes: 0,
+                frames: 0,
+                records: 0,
+            },
+            ended: Ended { frames: 0, records: 0 },
+            in_group: false,
+            changed: false,
+            layouts: None,
+            last_ms: 0,
+            epoch_micros: None,
+            counters: Counters { frames: 0, frame_bytes: 0, records: 0, sectors: 0, groups: 0, refused: 0 },
+        }
+    }
+
+    /// Adds a frame as it was received. `verified`: its checksum is that of our definition.
+    pub fn frame(
+        &mut self,
+        at: Instant,
+        bytes: &[u8],
+        verified: bool,
+        sink: &mut impl SectorSink,
+    ) -> Result<(), Full> {
+        if bytes.len() > FRAME_BYTES_MAX {
+            self.counters.refused += 1;
+            return Err(Full::TooLong);
+        }
+        self.entry(at, Kind::Frame { verified }, bytes, sink)?;
+        self.counters.frames += 1;
+        self.counters.frame_bytes += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Adds a record of the monitor's own.
+    pub fn record(
+        &mut self,
+        at: Instant,
+        record: &Record<'_>,
+        sink: &mut impl SectorSink,
+    ) -> Result<(), Full> {
+        let mut stored = [0; RECORD_BYTES_MAX];
+        let Some(stored) = record.store(&mut stored).ok().and_then(|len| stored.get(..len)) else {
+            self.counters.refused += 1;
+            return Err(Full::TooLong);
+        };
+        self.entry(at, Kind::Record, stored, sink)?;
+        if let Record::Clock(clock) = record {
+            self.epoch_micros = Some(clock.epoch_micros());
+        }
+        self.counters.records += 1;
+        Ok(())
+    }
+
+    /// A copy of the sector in progress that decodes up to the last entry; `false` where nothing is new since the
+    /// last full sector. The full sector, with the same number, supersedes it.
+    pub fn partial(&self, out: &mut Sector) -> bool {
+        if !self.changed {
+            return false;
+        }
+        *out = self.sector;
+        let mut header = self.header;
+        header.partial = true;
+        self.end_stream(&mut header, out);
+        true
+    }
+
+    /// Ends the group: the next entry begins a new one, for instance in a new file or after sectors were lost.
+    /// Does nothing (and may be called again) while the sink has no room.
+    pub fn restart(&mut self, sink: &mut impl SectorSink) -> bool {
+        self.end_group(false, sink)
+    }
+
+    /// Ends the session in order; the next entry would begin a new group. `false` while the sink has no room.
+    pub fn finish(&mut self, sink: &mut impl SectorSink) -> bool {
+        if !self.in_group {
+            // An empty group, so that there is a sector to carry the mark.
+            if sink.room() == 0 {
+                return false;
+            }
+            self.begin_group(self.last_ms);
+        }
+        self.end_group(true, sink)
+    }
+
+    /// What the writer did so far.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn entry(
+        &mut self,
+        at: Instant,
+        kind: Kind,
+        bytes: &[u8],
+        sink: &mut impl SectorSink,
+    ) -> Result<(), Full> {
+        if sink.room() < ENTRY_SECTORS_MAX {
+            self.counters.refused += 1;
+            return Err(Full::NoRoom);
+        }
+        self.last_ms = self.last_ms.max(at.as_millis());
+        let entry = Entry { kind, at_ms: self.last_ms, bytes };
+        if !self.in_group {
+            self.begin_group(entry.at_ms);
+        } else if self.append(&entry, sink) {
+            return Ok(());
+        } else {
+            self.end_group(false, sink);
+            self.begin_group(entry.at_ms);
+        }
+        if !self.append(&entry, sink) {
+            // Cannot be: a fresh group has room for `ENTRY_SECTORS_MAX`, and a fresh model's longest entry fits.
+            self.counters.refused += 1;
+            return Err(Full::TooLong);
+        }
+        Ok(())
+    }
+
+    /// Encodes an entry and adds its bytes; `false` (the model is then spoilt, the stream is not) where the group
+    /// has no room for it or its code is too long.
+    fn append(&mut self, entry: &Entry<'_>, sink: &mut impl SectorSink) -> bool {
+        let before = self.coder;
+        self.scratch.clear();
+        self.model.encode(entry, &mut self.coder, &mut self.scratch);
+        let sectors_after = GROUP_SECTORS - 1 - usize::from(self.header.since_first);
+        let room = sectors_after * BODY_BYTES + (BODY_BYTES - self.header.body_bytes);
+        let Some(len) = self.scratch.bytes().map(<[u8]>::len).filter(|len| len + LOOKAHEAD <= room) else {
+            self.coder = before;
+            return false;
+        };
+        let mut done = 0;
+        while done < len {
+            let at = self.header.body_bytes;
+            let count = (len - done).min(BODY_BYTES - at);
+            if let (Some(place), Some(bytes)) = (
+                self.sector.body_mut().get_mut(at..at + count),
+                self.scratch.bytes().and_then(|bytes| bytes.get(done..done + count)),
+            ) {
+                place.copy_from_slice(bytes);
+            }
+            self.header.body_bytes += count;
+            done += count;
+            if self.header.body_bytes == BODY_BYTES {
+                self.next_sector(sink);
+            }
+        }
+        self.count(entry.kind);
+        self.changed = true;
+        // A partial copy needs room to end the stream; a sector that is too full for that is closed early.
+        if self.header.body_bytes + FLUSH_MAX > BODY_BYTES {
+            self.next_sector(sink);
+        }
+        // The header's counts are full: far beyond what real entries reach.
+        if self.header.records >= RECORDS_MAX - 1 || self.header.frames >= u16::MAX - 1 {
+            self.end_group(false, sink);
+        }
+        true
+    }
+
+    /// An entry is complete in the sector in which the decoder finds all bytes that it reads for it.
+    fn count(&mut self, kind: Kind) {
+        let complete = self.header.body_bytes + LOOKAHEAD <= BODY_BYTES;
+        match (kind, complete) {
+            (Kind::Frame { .. }, true) => self.header.frames = self.header.frames.saturating_add(1),
+            (Kind::Frame { .. }, false) => self.ended.frames = self.ended.frames.saturating_add(1),
+            (Kind::Record, true) => self.header.records = self.header.records.saturating_add(1),
+            (Kind::Record, false) => self.ended.records = self.ended.records.saturating_add(1),
+        }
+    }
+
+    fn begin_group(&mut self, at_ms: u64) {
+        let preamble = Preamble {
+            layouts: *self.layouts.get_or_insert_with(layouts::current),
+            start_ms: at_ms,
+            frames_before: self.counters.frames as u32,
+            epoch_micros: self.epoch_micros,
+        };
+        self.header.since_first = 0;
+        self.sector.body_mut()[..PREAMBLE_BYTES].copy_from_slice(&preamble.store());
+        self.header.body_bytes = PREAMBLE_BYTES;
+        self.model.reset(at_ms, Layouts::Current);
+        self.coder = Encoder::new();
+        self.in_group = true;
+        self.counters.groups += 1;
+    }
+
+    fn end_group(&mut self, closed: bool, sink: &mut impl SectorSink) -> bool {
+        if !self.in_group {
+            return true;
+        }
+        if sink.room() == 0 {
+            return false;
+        }
+        let mut header = self.header;
+        header.closed = closed;
+        let mut sector = self.sector;
+        self.end_stream(&mut header, &mut sector);
+        self.header = header;
+        self.sector = sector;
+        self.ended = Ended::default();
+        self.next_sector(sink);
+        self.header.closed = false;
+        self.in_group = false;
+        self.changed = false;
+        true
+    }
+
+    /// Adds the bytes that end the coder's stream and completes all entries.
+    fn end_stream(&self, header: &mut Header, sector: &mut Sector) {
+        let (bytes, len) = self.coder.flush();
+        let at = header.body_bytes;
+        if let Some(place) = sector.body_mut().get_mut(at..at + len) {
+            place.copy_from_slice(&bytes[..len]);
+        }
+        header.body_bytes = (at + len).min(BODY_BYTES);
+        header.frames = header.frames.saturating_add(self.ended.frames);
+        header.records = header.records.saturating_add(self.ended.records);
+        sector.set_header(header);
+    }
+
+    /// Gives the sector in progress away and starts the next one.
+    fn next_sector(&mut self, sink: &mut impl SectorSink) {
+        self.sector.set_header(&self.header);
+        sink.put(&self.sector);
+        self.counters.sectors += 1;
+        self.header.number = self.header.number.wrapping_add(1);
+        self.header.since_first = self.header.since_first.saturating_add(1);
+        self.header.body_bytes = 0;
+        self.header.frames = self.ended.frames;
+        self.header.records = self.ended.records;
+        self.changed = self.ended.frames != 0 || self.ended.records != 0;
+        self.ended = Ended::default();
+    }
+}

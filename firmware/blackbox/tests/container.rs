@@ -1,0 +1,301 @@
+//! The container, from outside: what is written reads back, whatever happens to the sectors in between.
+
+use hums_blackbox::record::Note;
+use hums_blackbox::{ENTRY_SECTORS_MAX, Full, Item, LogReader, Record, Sector, SectorSink, Summary, Writer};
+use hums_core::time::Instant;
+use proptest::prelude::*;
+
+const SESSION: u32 = 0xfeed_0001;
+
+/// A queue of sectors with a limit.
+struct Queue {
+    sectors: Vec<Sector>,
+    capacity: usize,
+}
+
+impl SectorSink for Queue {
+    fn room(&self) -> usize {
+        self.capacity - self.sectors.len()
+    }
+
+    fn put(&mut self, sector: &Sector) {
+        assert!(self.room() > 0, "the writer exceeds the room it was given");
+        self.sectors.push(*sector);
+    }
+}
+
+fn queue() -> Queue {
+    Queue { sectors: Vec::new(), capacity: 1 << 20 }
+}
+
+type Frame = (u64, Vec<u8>, bool);
+
+/// Frames of a made-up stream: `seed` varies the bytes.
+fn frames(count: usize, seed: u32) -> Vec<Frame> {
+    let mut state = seed | 1;
+    let mut random = move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        state >> 16
+    };
+    (0..count)
+        .map(|index| {
+            let len = 8 + (random() % 40) as usize;
+            let bytes = (0..len).map(|_| random() as u8).collect();
+            (index as u64 * 3, bytes, index % 7 != 0)
+        })
+        .collect()
+}
+
+fn write(frames: &[Frame], finish: bool) -> Vec<Sector> {
+    let (mut writer, mut queue) = (Box::new(Writer::new()), queue());
+    for (at, bytes, verified) in frames {
+        writer.frame(Instant::from_millis(*at), bytes, *verified, &mut queue).expect("room");
+    }
+    if finish {
+        assert!(writer.finish(&mut queue));
+    }
+    queue.sectors.iter_mut().for_each(|sector| sector.seal(SESSION));
+    queue.sectors
+}
+
+#[derive(Default)]
+struct Log {
+    frames: Vec<Frame>,
+    gaps: Vec<hums_blackbox::Gap>,
+    notes: Vec<String>,
+    end: Option<Summary>,
+}
+
+fn read<'a>(blocks: impl IntoIterator<Item = &'a [u8; 512]>) -> Log {
+    let (mut reader, mut log) = (Box::new(LogReader::new()), Log::default());
+    let mut blocks = blocks.into_iter();
+    loop {
+        match blocks.next() {
+            Some(block) => reader.feed(block),
+            None => reader.end(),
+        }
+        while let Some(item) = reader.next() {
+            match item {
+                Item::Frame { at, bytes, verified, .. } => {
+                    log.frames.push((at.as_millis(), bytes.to_vec(), verified));
+                }
+                Item::Record { record: Record::Note(note), .. } => log.notes.push(note.text.to_owned()),
+                Item::Record { .. } => {}
+                Item::Gap(gap) => log.gaps.push(gap),
+                Item::End(summary) => {
+                    log.end = Some(summary);
+                    return log;
+                }
+            }
+        }
+    }
+}
+
+fn bytes(sectors: &[Sector]) -> Vec<[u8; 512]> {
+    sectors.iter().map(|sector| *sector.bytes()).collect()
+}
+
+/// Whether `part` is `whole` with some of it left out.
+fn is_subsequence(part: &[Frame], whole: &[Frame]) -> bool {
+    let mut whole = whole.iter();
+    part.iter().all(|frame| whole.any(|other| other == frame))
+}
+
+#[test]
+fn a_clean_log_reads_back_over_several_groups() {
+    let frames = frames(3_000, 1);
+    let sectors = write(&frames, true);
+    assert!(sectors.iter().filter(|sector| sector.starts_group()).count() > 2);
+    let log = read(&bytes(&sectors));
+    assert_eq!(log.frames, frames);
+    assert_eq!(log.gaps, []);
+    let end = log.end.expect("the last item");
+    assert!(end.closed);
+    assert_eq!(end.frames, 3_000);
+    let counted: u32 = sectors.iter().map(|sector| u32::from(sector.frames())).sum();
+    assert_eq!(counted, 3_000);
+}
+
+#[test]
+fn a_log_that_stops_anywhere_reads_up_to_its_last_full_sector() {
+    let frames = frames(1_500, 2);
+    let blocks = bytes(&write(&frames, true));
+    for len in 0..blocks.len() {
+        let log = read(&blocks[..len]);
+        let counted: usize =
+            blocks[..len].iter().map(|block| usize::from(Sector::from_bytes(*block).frames())).sum();
+        assert_eq!(log.frames, frames[..counted], "{len} sectors");
+        assert_eq!(log.gaps, []);
+        assert!(!log.end.expect("end").closed);
+    }
+}
+
+#[test]
+fn a_missing_or_damaged_sector_costs_at_most_the_rest_of_its_group() {
+    let frames = frames(3_000, 3);
+    let blocks = bytes(&write(&frames, true));
+    for victim in (0..blocks.len()).step_by(5) {
+        for damage in [false, true] {
+            let mut blocks = blocks.clone();
+            if damage {
+                blocks[victim][100] ^= 4;
+            } else {
+                blocks.remove(victim);
+            }
+            let log = read(&blocks);
+            assert!(is_subsequence(&log.frames, &frames));
+            let last = victim + 1 == blocks.len() + usize::from(!damage);
+            if !last || damage {
+                assert_eq!(log.gaps.len(), 1, "sector {victim}");
+            }
+            if let Some(missing) = log.gaps.first().and_then(|gap| gap.frames)
+                && victim > 0
+                && log.gaps[0].to.is_some()
+            {
+                assert_eq!(log.frames.len() + missing as usize, frames.len(), "sector {victim}");
+            }
+            assert!(log.frames.len() + 64 * 30 > frames.len());
+        }
+    }
+}
+
+#[test]
+fn partial_copies_in_both_places_are_superseded_or_complete_the_log() {
+    let frames = frames(400, 4);
+    let (mut writer, mut queue) = (Box::new(Writer::new()), queue());
+    let mut medium: Vec<[u8; 512]> = Vec::new();
+    let mut second_place = false;
+    for (count, (at, bytes, verified)) in frames.iter().enumerate() {
+        writer.frame(Instant::from_millis(*at), bytes, *verified, &mut queue).expect("room");
+        medium.truncate(queue.sectors.len().max(medium.len()));
+        for (place, sector) in queue.sectors.iter().enumerate() {
+            let mut sector = *sector;
+            sector.seal(SESSION);
+            medium.resize(medium.len().max(place + 1), [0; 512]);
+            medium[place] = *sector.bytes();
+        }
+        let mut partial = Sector::zeroed();
+        if count % 3 == 0 && writer.partial(&mut partial) {
+            partial.seal(SESSION);
+            let place = queue.sectors.len() + usize::from(second_place);
+            second_place = !second_place;
+            medium.resize(medium.len().max(place + 1), [0; 512]);
+            medium[place] = *partial.bytes();
+            let log = read(&medium);
+            assert_eq!(log.frames, frames[..=count]);
+            assert_eq!(log.gaps, []);
+        }
+    }
+}
+
+#[test]
+fn stale_sectors_and_zeros_after_the_end_are_no_part_of_the_log() {
+    let (old, new) = (frames(300, 5), frames(100, 6));
+    let mut old = write(&old, true);
+    old.iter_mut().for_each(|sector| sector.seal(7));
+    let mut blocks = bytes(&write(&new, true));
+    blocks.push([0; 512]);
+    blocks.extend(bytes(&old));
+    let log = read(&blocks);
+    assert_eq!(log.frames, new);
+    assert_eq!(log.gaps, []);
+    let counts = log.end.expect("end").blocks;
+    assert_eq!((counts.empty, counts.stale), (1, old.len() as u64));
+}
+
+#[test]
+fn a_full_queue_refuses_without_harm() {
+    let frames = frames(2_000, 8);
+    let (mut writer, mut queue) = (Box::new(Writer::new()), Queue { sectors: Vec::new(), capacity: 8 });
+    let (mut card, mut taken, mut refused) = (Vec::new(), Vec::new(), 0);
+    for (index, (at, bytes, verified)) in frames.iter().enumerate() {
+        match writer.frame(Instant::from_millis(*at), bytes, *verified, &mut queue) {
+            Ok(()) => taken.push(frames[index].clone()),
+            Err(full) => {
+                assert_eq!(full, Full::NoRoom);
+                assert!(queue.room() < ENTRY_SECTORS_MAX);
+                refused += 1;
+            }
+        }
+        if index % 300 == 299 {
+            card.append(&mut queue.sectors);
+        }
+    }
+    card.append(&mut queue.sectors);
+    assert!(writer.finish(&mut queue));
+    card.append(&mut queue.sectors);
+    card.iter_mut().for_each(|sector| sector.seal(SESSION));
+    assert!(refused > 0);
+    let log = read(&bytes(&card));
+    assert_eq!(log.frames, taken);
+    assert_eq!(log.gaps, []);
+}
+
+#[test]
+fn records_stand_among_frames_and_restart_begins_a_group() {
+    let (mut writer, mut queue) = (Box::new(Writer::new()), queue());
+    for index in 0..50_u64 {
+        let text = format!("note {index}");
+        let note = Record::Note(Note { severity: 6, text: &text });
+        writer.record(Instant::from_millis(index), &note, &mut queue).expect("room");
+        writer.frame(Instant::from_millis(index), &[index as u8; 12], false, &mut queue).expect("room");
+        if index == 24 {
+            assert!(writer.restart(&mut queue));
+        }
+    }
+    assert!(writer.finish(&mut queue));
+    queue.sectors.iter_mut().for_each(|sector| sector.seal(SESSION));
+    let log = read(&bytes(&queue.sectors));
+    assert_eq!(log.frames.len(), 50);
+    assert_eq!(log.notes.len(), 50);
+    assert_eq!(log.notes[49], "note 49");
+    assert_eq!(queue.sectors.iter().filter(|sector| sector.starts_group()).count(), 2);
+    // The second group alone, as in a further file of the same session.
+    let start = queue.sectors.iter().rposition(Sector::starts_group).expect("a group");
+    let log = read(&bytes(&queue.sectors[start..]));
+    assert_eq!((log.frames.len(), log.gaps.len()), (25, 0));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn any_bytes_come_back(
+        entries in prop::collection::vec(
+            (0_u64..5_000, prop::collection::vec(any::<u8>(), 0..=280), any::<bool>()),
+            0..200,
+        )
+    ) {
+        let mut at = 0;
+        let frames: Vec<Frame> = entries
+            .into_iter()
+            .map(|(step, bytes, verified)| {
+                at += step;
+                (at, bytes, verified)
+            })
+            .collect();
+        let log = read(&bytes(&write(&frames, true)));
+        prop_assert_eq!(log.frames, frames);
+        prop_assert_eq!(log.gaps, []);
+    }
+
+    #[test]
+    fn no_blocks_whatever_panic_or_hang(
+        seed in any::<u32>(),
+        damage in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..512, any::<u8>(), any::<bool>()), 0..20),
+    ) {
+        let frames = frames(400, seed);
+        let mut blocks = bytes(&write(&frames, true));
+        for (index, at, value, reseal) in damage {
+            let block = &mut blocks[index.index(frames.len() / 40)];
+            block[at] ^= value;
+            if reseal {
+                let mut sector = Sector::from_bytes(*block);
+                sector.seal(SESSION);
+                *block = *sector.bytes();
+            }
+        }
+        let log = read(&blocks);
+        prop_assert!(log.frames.len() < 1_000_000);
+    }
+}
