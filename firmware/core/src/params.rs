@@ -70,8 +70,8 @@ params! {
     VibeCrit "VIBE_CRIT" "m/s2" 60.0 0.0 500.0 "ArduPilot vibration guide";
     VibePx4Warn "VIBE_PX4_WARN" "m/s2" 4.905 0.0 500.0 "PX4 Flight Review: accelerometer metric, yellow";
     VibePx4Crit "VIBE_PX4_CRIT" "m/s2" 9.81 0.0 500.0 "PX4 Flight Review: accelerometer metric, red";
-    ClipWarn "CLIP_WARN" "" 1.0 1.0 100000.0 "ArduPilot vibration guide: clipping should not rise";
-    ClipCrit "CLIP_CRIT" "" 100.0 1.0 100000.0 "ArduPilot vibration guide: more than 100 a flight";
+    ClipWarn "CLIP_WARN" "" 1.0 1.0 100_000.0 "ArduPilot vibration guide: clipping should not rise";
+    ClipCrit "CLIP_CRIT" "" 100.0 1.0 100_000.0 "ArduPilot vibration guide: more than 100 a flight";
     LoadFacWarn "LOAD_FAC_WARN" "g" 2.5 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
     LoadFacCrit "LOAD_FAC_CRIT" "g" 4.0 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
     EkfVarWarn "EKF_VAR_WARN" "" 0.5 0.0 10.0 "ArduPilot EKF failsafe, half way";
@@ -97,6 +97,19 @@ params! {
     TiltCrit "TILT_CRIT" "deg" 60.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60";
     RecQueueWarn "REC_QUEUE_WARN" "%" 50.0 0.0 100.0 "half of what a standing card may fill";
     RecQueueCrit "REC_QUEUE_CRIT" "%" 90.0 0.0 100.0 "frames are lost next";
+    RecStopWarn "REC_STOP_WARN" "" 0.5 0.0 3.0 "1: not recording";
+    RecStopCrit "REC_STOP_CRIT" "" 1.5 0.0 3.0 "2: not recording while armed (PX4#12565, ardupilot#6863)";
+    RecLostWarn "REC_LOST_WARN" "frames" 0.5 0.0 1_000_000.0 "any frame lost in the last ten seconds";
+    EscFailWarn "ESC_FAIL_WARN" "" 0.5 0.0 3.0 "1: any ESC failure flag";
+    EscFailCrit "ESC_FAIL_CRIT" "" 1.5 0.0 3.0 "2: motor stuck, or the ESC failed";
+    EngChtWarn "ENG_CHT_WARN" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngChtCrit "ENG_CHT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngEgtWarn "ENG_EGT_WARN" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngEgtCrit "ENG_EGT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngFuelWarn "ENG_FUEL_WARN" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
+    EngFuelCrit "ENG_FUEL_CRIT" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
+    GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated";
+    GpsJamCrit "GPS_JAM_CRIT" "" 2.5 0.0 4.0 "GNSS_INTEGRITY: 3 is detected";
     Latch "HEALTH_LATCH" "" 0.0 0.0 1.0 "1: a warning stays until the vehicle disarms";
     GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
 }
@@ -165,6 +178,6 @@ mod tests {
         assert_eq!(params.set("NO_SUCH", 1.0), Err(ParamError::UnknownName));
         assert_eq!(params, Params::defaults());
         params.set("BAT_REM_WARN", 20.0).expect("in range");
-        assert_eq!(params.get(Param::BatRemWarn), 20.0);
+        assert!((params.get(Param::BatRemWarn) - 20.0).abs() < f32::EPSILON);
     }
 }

@@ -146,7 +146,10 @@ impl State {
         if !applies {
             *self = Self { level: self.level, ..Self::new() };
             // What no longer applies is no longer bad.
-            return self.level.filter(|level| *level != Level::Ok).and_then(|_| self.go(Level::Ok, f32::NAN, f32::NAN));
+            return self
+                .level
+                .filter(|level| *level != Level::Ok)
+                .and_then(|_| self.go(Level::Ok, f32::NAN, f32::NAN));
         }
         let reading = reading.filter(|reading| reading.value.is_finite())?;
         if check.stale_after.is_some_and(|limit| now.since(reading.at) > limit) {
@@ -174,9 +177,7 @@ impl State {
             _ => false,
         };
         let better = self.better.run(!held, now, CLEAR);
-        let next = if very_bad {
-            Level::Critical
-        } else if level == Level::Critical && !better {
+        let next = if very_bad || (level == Level::Critical && !better) {
             Level::Critical
         } else if bad || (level == Level::Warning && !better) {
             Level::Warning
@@ -229,7 +230,9 @@ mod tests {
             while now_ms < *until_ms {
                 let now = Instant::from_millis(now_ms);
                 let reading = Some(Reading { at: now, value: *value });
-                changes.extend(state.step(check, now, reading, true, &params).map(|change| (now_ms, change.level)));
+                changes.extend(
+                    state.step(check, now, reading, true, &params).map(|change| (now_ms, change.level)),
+                );
                 now_ms += 50;
             }
         }
@@ -239,8 +242,7 @@ mod tests {
     #[test]
     fn a_level_rises_after_its_debounce_and_falls_after_the_clear_time() {
         let changes = run(&CHECK, &[(1_000, 10.0), (3_000, 50.0), (4_000, 70.0), (10_000, 10.0)]);
-        let expected =
-            [(1_500, Level::Warning), (3_200, Level::Critical), (6_000, Level::Ok)];
+        let expected = [(1_500, Level::Warning), (3_200, Level::Critical), (6_000, Level::Ok)];
         assert_eq!(changes, expected);
     }
 
@@ -305,7 +307,8 @@ mod tests {
             state.step(&CHECK, now, Some(Reading { at: now, value: 50.0 }), true, &params);
         }
         assert_eq!(state.level(), Some(Level::Warning));
-        let change = state.step(&CHECK, Instant::from_millis(1_000), None, false, &params).expect("it clears");
+        let change =
+            state.step(&CHECK, Instant::from_millis(1_000), None, false, &params).expect("it clears");
         assert_eq!(change.level, Level::Ok);
     }
 }
