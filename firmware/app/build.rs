@@ -1,10 +1,13 @@
-//! Gives the linker the memory map and its scripts. Only for the bare-metal target: a host build of the workspace
-//! must not see them.
+//! Gives the linker the memory map and its scripts, and the program its commit. Only for the bare-metal target: a host
+//! build of the workspace must not see them.
 
-use std::{env, fs, path::PathBuf};
+use std::path::PathBuf;
+use std::process::Command;
+use std::{env, fs};
 
 fn main() {
     println!("cargo::rerun-if-changed=../../memory.x");
+    println!("cargo::rustc-env=HUMS_GIT={}", commit());
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
@@ -14,4 +17,18 @@ fn main() {
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
+}
+
+/// The commit that is built; empty where there is no git.
+fn commit() -> String {
+    // The log of HEAD grows with every commit, so that the next build looks again.
+    if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]) {
+        println!("cargo::rerun-if-changed={log}");
+    }
+    git(&["rev-parse", "--short=12", "HEAD"]).unwrap_or_default()
+}
+
+fn git(arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").args(arguments).output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8(output.stdout).ok()?.trim().to_owned())
 }

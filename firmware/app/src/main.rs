@@ -1,59 +1,80 @@
-//! probe
+//! The firmware: puts the board's ports and the bodies of `hums_onboard` together.
+//!
+//! ```text
+//! AutopilotRx -> reception -> monitor -> storage -> card
+//!                                    \-> downlink -> GsTx
+//! ```
+//! Everything is allocated here and once: queues, the codec, the tasks. What the tasks do is in `hums_onboard`, where
+//! it is tested on a PC; what the machine does is in `boards`.
 #![no_std]
 #![no_main]
 
 mod boards;
-use boards::{board, Receive, Transmit};
-use core::sync::atomic::{AtomicU32, Ordering};
-use cortex_m_rt::entry;
-use embassy_executor::InterruptExecutor;
-use embassy_stm32::interrupt;
-use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_time::{Duration, Ticker};
+mod costs;
+mod executors;
+mod fault;
+mod links;
+mod memory;
+mod report;
+mod tasks;
 
-pub(crate) static COUNT: AtomicU32 = AtomicU32::new(0);
-pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
-static RECEPTION: InterruptExecutor = InterruptExecutor::new();
-static MONITOR: InterruptExecutor = InterruptExecutor::new();
+use embassy_executor::SpawnToken;
+use hums_blackbox::Writer;
+use hums_blackbox::record::Boot;
+use hums_core::params::Params;
+use hums_onboard::Monitoring;
+use hums_onboard::queues::{Ends, Queues};
+use static_cell::{ConstStaticCell, StaticCell};
 
-#[interrupt]
-unsafe fn CAN1_TX() { unsafe { RECEPTION.on_interrupt() } }
-#[interrupt]
-unsafe fn CAN1_RX0() { unsafe { MONITOR.on_interrupt() } }
+use boards::board;
+use tasks::monitor;
 
-#[embassy_executor::task]
-async fn reception(mut rx: board::AutopilotRx, mut tx: board::GsTx) {
-    let mut b = [0; 2048];
-    loop {
-        let n = rx.receive(&mut b).await.unwrap_or(0);
-        COUNT.fetch_add(n as u32, Ordering::Relaxed);
-        if n == 3 { tx.transmit(&b[..n]).await; }
+static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
+/// In CCM: the hottest data there is, and no DMA reads it (see `memory.x`).
+#[unsafe(link_section = ".ccm.writer")]
+static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
+static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    // SAFETY: this is the program's first statement: nobody has touched CCM, no interrupt is unmasked.
+    unsafe { memory::init() };
+    let fault = fault::take();
+    let boots = fault::count_start();
+    let parts = board::take();
+    defmt::info!("start {=u32}, {}, id {=[u8]:02x}", boots, parts.boot.cause, parts.boot.id);
+    if let Some(fault) = &fault {
+        defmt::error!("before this start: {}", defmt::Display2Format(fault));
+    }
+
+    let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out } = QUEUES.take().split();
+    let identity = Boot {
+        version: env!("CARGO_PKG_VERSION"),
+        git: env!("HUMS_GIT"),
+        board: board::NAME,
+        reset: parts.boot.cause_register,
+        reset_name: parts.boot.cause.name(),
+        uid: parts.boot.id,
+        boots,
+    };
+    let monitoring = MONITORING.init_with(|| {
+        Monitoring::new(Params::defaults(), WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+    });
+
+    let on = executors::start();
+    on.reception.spawn(once(tasks::reception::run(parts.autopilot, frames_in)));
+    let ends = monitor::Ends { frames: frames_out, sectors: sectors_in, gs: gs_in };
+    on.monitor.spawn(once(monitor::run(monitoring, ends, fault, parts.watchdog, parts.led)));
+    on.downlink.spawn(once(tasks::downlink::run(parts.gs, gs_out)));
+    on.storage.spawn(once(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out)));
+    let mut idle = parts.idle;
+    idle.run()
+}
+
+/// A task that is spawned for the first and only time has its place.
+fn once<S, E: core::fmt::Debug>(token: Result<SpawnToken<S>, E>) -> SpawnToken<S> {
+    match token {
+        Ok(token) => token,
+        Err(_) => defmt::panic!("a task was spawned twice"),
     }
 }
-#[embassy_executor::task]
-async fn monitor() {
-    let mut t = Ticker::every(Duration::from_millis(50));
-    loop { t.next().await; TICKS.fetch_add(1, Ordering::Relaxed); }
-}
-
-#[entry]
-fn main() -> ! {
-    let mut parts = board::take();
-    interrupt::USART1.set_priority(Priority::P1);
-    unsafe { cortex_m::peripheral::NVIC::unmask(interrupt::USART1) };
-    interrupt::CAN1_TX.set_priority(Priority::P3);
-    interrupt::CAN1_RX0.set_priority(Priority::P5);
-    RECEPTION.start(interrupt::CAN1_TX).spawn(reception(parts.autopilot, parts.gs).unwrap());
-    MONITOR.start(interrupt::CAN1_RX0).spawn(monitor().unwrap());
-    parts.idle.run()
-}
-#[defmt::global_logger]
-struct L;
-unsafe impl defmt::Logger for L {
-    fn acquire() {}
-    unsafe fn flush() {}
-    unsafe fn release() {}
-    unsafe fn write(_: &[u8]) {}
-}
-#[panic_handler]
-fn panic(i: &core::panic::PanicInfo) -> ! { semihosting::println!("{i}"); semihosting::process::exit(9) }

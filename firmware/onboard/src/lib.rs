@@ -14,7 +14,9 @@ pub mod port;
 pub mod queues;
 pub mod reception;
 pub mod storage;
+pub mod supervisor;
 
 pub use port::PortStatus;
 pub use reception::Reception;
 pub use storage::{Service, Storage};
+pub use supervisor::{Supervisor, Task};
