@@ -173,8 +173,8 @@ pub struct LocalPosition {
 /// The fused global position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GlobalPosition {
-    /// Where it is.
-    pub position: Position,
+    /// Where it is, once the autopilot knows.
+    pub position: Option<Position>,
     /// Above mean sea level.
     pub altitude: Metres,
     /// Above home.

@@ -6,9 +6,10 @@
 
 use crate::latest::Latest;
 use crate::observation::{
-    Air, Attitude, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator, GlobalPosition,
-    Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX, Observation, Processor,
-    RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio, Vibration,
+    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
+    GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
+    Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio, Vibration,
+    VibrationScale,
 };
 use crate::time::Instant;
 
@@ -186,7 +187,7 @@ impl Vehicle {
             Observation::Rails(rails) => self.rails.set(at, rails),
             Observation::Battery(battery) => self.take_battery(at, battery),
             Observation::Estimator(estimator) => self.estimator.set(at, estimator),
-            Observation::Vibration(vibration) => self.vibration.set(at, vibration),
+            Observation::Vibration(vibration) => self.take_vibration(at, vibration),
             Observation::Escs(group) => self.take_escs(at, &group),
             Observation::Engine(engine) => self.engine.set(at, engine),
             Observation::Landed(landed) => self.landed.set(at, landed),
@@ -214,6 +215,13 @@ impl Vehicle {
         if imu.instance == 0 {
             self.imu.set(at, imu);
         }
+    }
+
+    /// The same message on two scales: only the heartbeat tells which.
+    fn take_vibration(&mut self, at: Instant, vibration: Vibration) {
+        let px4 = self.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::Px4);
+        let scale = if px4 { VibrationScale::Px4Metrics } else { VibrationScale::PerAxis };
+        self.vibration.set(at, Vibration { scale, ..vibration });
     }
 
     fn take_battery(&mut self, at: Instant, battery: Battery) {
@@ -255,7 +263,6 @@ fn set_instance<T, const N: usize>(slots: &mut [Latest<T>; N], instance: u8, at:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::Autopilot;
     use crate::units::{Rpm, Volts};
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };

@@ -144,6 +144,12 @@ impl<'a> Frame<'a> {
         Some(Self { header, bytes, check })
     }
 
+    /// A frame that the framer found and checked before, from the queue that it was put in: not checked again.
+    pub fn again(bytes: &'a [u8], check: Check) -> Option<Self> {
+        let header = Header::read(bytes).ok().filter(|header| header.frame_len() == bytes.len())?;
+        Some(Self { header, bytes, check })
+    }
+
     /// `bytes` are exactly the frame of `header`: the framer has seen to that.
     #[inline]
     pub(crate) fn from_parts(header: Header, bytes: &'a [u8], check: Check) -> Self {

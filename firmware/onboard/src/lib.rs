@@ -10,12 +10,15 @@
 //! [`queues`] is the home of all queues, with their capacities and what happens when each is full.
 #![cfg_attr(not(test), no_std)]
 
+mod loss;
+pub mod monitoring;
 pub mod port;
 pub mod queues;
 pub mod reception;
 pub mod storage;
 pub mod supervisor;
 
+pub use monitoring::{Identity, Monitoring};
 pub use port::PortStatus;
 pub use reception::Reception;
 pub use storage::{Service, Storage};

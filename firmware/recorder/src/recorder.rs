@@ -41,6 +41,9 @@ pub struct Recorder<'a, D: CardDevice> {
     slot: Slot<'a, D>,
     retry_at: Instant,
     log: Option<Log>,
+    /// The card in the slot is another one than the group's beginning was written to: nothing is readable on it before
+    /// the next group.
+    await_group: bool,
     finished: bool,
 }
 
@@ -70,7 +73,15 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// where the board has a random number generator, else any number that changes from one power-on to the next.
     pub const fn new(device: D, status: &'a CardStatus, entropy: u32) -> Self {
         let slot = Slot::Waiting(device);
-        Self { status, entropy, slot, retry_at: Instant::ZERO, log: None, finished: false }
+        Self {
+            status,
+            entropy,
+            slot,
+            retry_at: Instant::ZERO,
+            log: None,
+            await_group: false,
+            finished: false,
+        }
     }
 
     /// Looks for a card if there is none, at most once a second. Whether a session is open now.
@@ -105,6 +116,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     pub fn write(&mut self, now: Instant, sector: &mut Sector) -> Written {
         if !self.ready(now) {
             return Written::Later;
+        }
+        self.await_group &= !sector.starts_group();
+        if self.await_group {
+            if !sector.is_partial() {
+                self.status.count_lost_sector(u32::from(sector.frames()));
+            }
+            return Written::Done;
         }
         for _ in 0..WRITE_TRIES {
             match self.try_write(sector) {

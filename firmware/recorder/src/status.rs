@@ -157,7 +157,7 @@ impl CardStatus {
     }
 
     /// Storage asks for a new group: what comes next should be readable without what came before.
-    pub(crate) fn want_group(&self) {
+    pub fn want_group(&self) {
         self.group_wanted.store(true, Ordering::Release);
     }
 

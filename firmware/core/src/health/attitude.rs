@@ -9,6 +9,7 @@ use crate::units::Radians;
 
 const ROLL: Check = Check {
     name: "roll",
+    words: "roll",
     subsystem: Subsystem::Attitude,
     unit: "deg",
     side: Side::Above,
@@ -24,8 +25,15 @@ const ROLL: Check = Check {
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll),
 };
 
-pub(super) const CHECKS: &[Check] =
-    &[ROLL, Check { name: "pitch", read: |inputs, _| degrees(inputs, |attitude| attitude.pitch), ..ROLL }];
+pub(super) const CHECKS: &[Check] = &[
+    ROLL,
+    Check {
+        name: "pitch",
+        words: "pitch",
+        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch),
+        ..ROLL
+    },
+];
 
 fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians) -> Option<Reading> {
     let slot = &inputs.vehicle.attitude;

@@ -56,6 +56,8 @@ impl Reading {
 pub struct Check {
     /// Stable name, at most 16 characters of `a-z0-9_`.
     pub name: &'static str,
+    /// What it means, in a few words that a pilot understands.
+    pub words: &'static str,
     /// The part of the vehicle.
     pub subsystem: Subsystem,
     /// The unit of value and limits.
@@ -206,6 +208,7 @@ mod tests {
 
     const CHECK: Check = Check {
         name: "tilt",
+        words: "tilt",
         subsystem: Subsystem::Attitude,
         unit: "deg",
         side: Side::Above,

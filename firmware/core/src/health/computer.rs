@@ -7,6 +7,7 @@ use crate::time::Span;
 
 const LOAD: Check = Check {
     name: "load",
+    words: "CPU load",
     subsystem: Subsystem::Computer,
     unit: "%",
     side: Side::Above,
@@ -25,6 +26,7 @@ pub(super) const CHECKS: &[Check] = &[
     LOAD,
     Check {
         name: "mcu_temperature",
+        words: "MCU hot",
         unit: "degC",
         warn: Some(Param::McuTempWarn),
         critical: Some(Param::McuTempCrit),

@@ -9,6 +9,7 @@ use crate::time::Span;
 
 const ENGINE: Check = Check {
     name: "cylinder_head",
+    words: "cylinder hot",
     subsystem: Subsystem::Engine,
     unit: "degC",
     side: Side::Above,
@@ -27,6 +28,7 @@ pub(super) const CHECKS: &[Check] = &[
     ENGINE,
     Check {
         name: "exhaust_gas",
+        words: "exhaust hot",
         warn: Some(Param::EngEgtWarn),
         critical: Some(Param::EngEgtCrit),
         read: |inputs, _| read(inputs, |engine| engine.exhaust.map(|temperature| temperature.0)),
@@ -34,6 +36,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "fuel_pressure",
+        words: "fuel pressure",
         unit: "hPa",
         side: Side::Below,
         warn: Some(Param::EngFuelWarn),

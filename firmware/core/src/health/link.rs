@@ -7,6 +7,7 @@ use crate::time::Span;
 
 const HEARTBEAT: Check = Check {
     name: "heartbeat",
+    words: "autopilot silent",
     subsystem: Subsystem::Link,
     unit: "s",
     side: Side::Above,
@@ -23,6 +24,7 @@ const HEARTBEAT: Check = Check {
 
 const RADIO: Check = Check {
     name: "rc_rssi",
+    words: "RC signal",
     unit: "",
     side: Side::Below,
     warn: Some(Param::RcRssiWarn),
@@ -40,6 +42,7 @@ pub(super) const CHECKS: &[Check] = &[
     HEARTBEAT,
     Check {
         name: "frames_lost",
+        words: "frames lost",
         unit: "%",
         warn: Some(Param::LinkLossWarn),
         critical: Some(Param::LinkLossCrit),
@@ -52,6 +55,7 @@ pub(super) const CHECKS: &[Check] = &[
     RADIO,
     Check {
         name: "radio_margin",
+        words: "radio margin",
         warn: Some(Param::RadioMargWarn),
         critical: None,
         read: radio_margin,

@@ -79,6 +79,16 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
     TABLES.into_iter().flatten()
 }
 
+/// What a check means, in a few words that a pilot understands; its name where there is no such check.
+pub fn words(name: &'static str) -> &'static str {
+    checks().find(|check| check.name == name).map_or(name, |check| check.words)
+}
+
+/// How many instances a check has; 0 where there is no such check.
+pub fn instances(name: &str) -> u8 {
+    checks().find(|check| check.name == name).map_or(0, |check| check.instances)
+}
+
 /// The memory of all checks.
 #[derive(Clone, Copy, Debug)]
 pub struct Health {

@@ -9,6 +9,7 @@ use crate::vehicle::RECEIVERS_MAX;
 
 const ESTIMATOR: Check = Check {
     name: "ekf_variance",
+    words: "EKF variance",
     subsystem: Subsystem::Navigation,
     unit: "",
     side: Side::Above,
@@ -25,6 +26,7 @@ const ESTIMATOR: Check = Check {
 
 const GNSS: Check = Check {
     name: "gps_satellites",
+    words: "GPS satellites",
     side: Side::Below,
     warn: Some(Param::GpsSatsWarn),
     critical: None,
@@ -40,6 +42,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         // ArduPilot's failsafe wants two of compass, velocity and position beyond the limit.
         name: "ekf_failsafe",
+        words: "EKF failing",
         warn: None,
         critical: Some(Param::EkfVarCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::Variance, second_largest),
@@ -47,6 +50,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ekf_test_ratio",
+        words: "EKF test ratio",
         warn: Some(Param::EkfRatioWarn),
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest),
@@ -55,6 +59,7 @@ pub(super) const CHECKS: &[Check] = &[
     GNSS,
     Check {
         name: "gps_hdop",
+        words: "GPS HDOP",
         side: Side::Above,
         warn: Some(Param::GpsHdopWarn),
         hysteresis: 0.1,
@@ -63,6 +68,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_accuracy",
+        words: "GPS accuracy",
         unit: "m",
         side: Side::Above,
         warn: Some(Param::GpsHaccWarn),
@@ -72,6 +78,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_fix",
+        words: "GPS fix lost",
         warn: None,
         critical: Some(Param::GpsFixCrit),
         debounce_critical: Span::from_secs(1),
@@ -80,6 +87,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_jamming",
+        words: "GPS jamming",
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
         critical: Some(Param::GpsJamCrit),
@@ -89,6 +97,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_spoofing",
+        words: "GPS spoofing",
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
         critical: Some(Param::GpsJamCrit),

@@ -10,6 +10,7 @@ const BATTERIES: u8 = BATTERIES_MAX as u8;
 
 const BATTERY: Check = Check {
     name: "batt_remaining",
+    words: "battery low",
     subsystem: Subsystem::Power,
     unit: "%",
     side: Side::Below,
@@ -28,6 +29,7 @@ pub(super) const CHECKS: &[Check] = &[
     BATTERY,
     Check {
         name: "cell_voltage",
+        words: "cell voltage",
         unit: "V",
         warn: Some(Param::CellVoltWarn),
         critical: Some(Param::CellVoltCrit),
@@ -40,6 +42,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "cell_deviation",
+        words: "cells uneven",
         unit: "V",
         side: Side::Above,
         warn: Some(Param::CellDevWarn),
@@ -52,6 +55,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "batt_temperature",
+        words: "battery hot",
         unit: "degC",
         side: Side::Above,
         warn: Some(Param::BatTempWarn),
@@ -63,6 +67,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "rail_5v_low",
+        words: "5 V rail low",
         unit: "V",
         warn: Some(Param::RailLowWarn),
         critical: Some(Param::RailLowCrit),
@@ -77,6 +82,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "rail_5v_high",
+        words: "5 V rail high",
         unit: "V",
         side: Side::Above,
         warn: Some(Param::RailHighWarn),

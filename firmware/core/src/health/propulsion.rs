@@ -9,6 +9,7 @@ use crate::vehicle::Motor;
 
 const ESC: Check = Check {
     name: "esc_silent",
+    words: "ESC silent",
     subsystem: Subsystem::Propulsion,
     unit: "s",
     side: Side::Above,
@@ -27,6 +28,7 @@ pub(super) const CHECKS: &[Check] = &[
     ESC,
     Check {
         name: "esc_temperature",
+        words: "ESC hot",
         unit: "degC",
         warn: Some(Param::EscTempWarn),
         critical: Some(Param::EscTempCrit),
@@ -40,6 +42,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "esc_failure",
+        words: "ESC failure",
         unit: "",
         warn: Some(Param::EscFailWarn),
         critical: Some(Param::EscFailCrit),
@@ -50,6 +53,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_imbalance",
+        words: "motor off",
         unit: "%",
         warn: Some(Param::MotImbalWarn),
         critical: Some(Param::MotImbalCrit),

@@ -8,6 +8,7 @@ use crate::time::Span;
 
 const STATE: Check = Check {
     name: "recording",
+    words: "not recording",
     subsystem: Subsystem::Recorder,
     unit: "",
     side: Side::Above,
@@ -26,6 +27,7 @@ pub(super) const CHECKS: &[Check] = &[
     STATE,
     Check {
         name: "record_queue",
+        words: "card slow",
         unit: "%",
         warn: Some(Param::RecQueueWarn),
         critical: Some(Param::RecQueueCrit),
@@ -37,6 +39,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "record_lost",
+        words: "log frames lost",
         unit: "frames",
         warn: Some(Param::RecLostWarn),
         critical: None,

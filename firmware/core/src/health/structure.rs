@@ -8,6 +8,7 @@ use crate::time::Span;
 
 const VIBRATION: Check = Check {
     name: "vibration",
+    words: "vibration",
     subsystem: Subsystem::Structure,
     unit: "m/s2",
     side: Side::Above,
@@ -26,6 +27,7 @@ pub(super) const CHECKS: &[Check] = &[
     VIBRATION,
     Check {
         name: "vibration_px4",
+        words: "vibration",
         warn: Some(Param::VibePx4Warn),
         critical: Some(Param::VibePx4Crit),
         hysteresis: 0.5,
@@ -34,6 +36,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "clipping",
+        words: "accel clipping",
         unit: "",
         warn: Some(Param::ClipWarn),
         critical: Some(Param::ClipCrit),
@@ -46,6 +49,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "load_factor",
+        words: "load factor",
         unit: "g",
         warn: Some(Param::LoadFacWarn),
         critical: Some(Param::LoadFacCrit),
