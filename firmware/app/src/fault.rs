@@ -54,6 +54,14 @@ static NOTE: Note = Note {
     message: Text::new(),
 };
 
+struct Starts {
+    mark: AtomicU32,
+    count: AtomicU32,
+}
+
+#[unsafe(link_section = ".uninit.starts")]
+static STARTS: Starts = Starts { mark: AtomicU32::new(0), count: AtomicU32::new(0) };
+
 /// How the last start ended.
 pub(crate) struct Fault {
     kind: u8,
@@ -95,6 +103,17 @@ pub(crate) fn take() -> Option<Fault> {
         place: NOTE.place.read(),
         message: NOTE.message.read(),
     })
+}
+
+/// Counts a start; how many there were since power-on, this one included.
+pub(crate) fn count_start() -> u32 {
+    let starts = if STARTS.mark.swap(MARK, Ordering::Relaxed) == MARK {
+        STARTS.count.load(Ordering::Relaxed).saturating_add(1)
+    } else {
+        1
+    };
+    STARTS.count.store(starts, Ordering::Relaxed);
+    starts
 }
 
 /// A task has been silent for too long: says so to whoever starts after the watchdog.

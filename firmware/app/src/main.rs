@@ -73,8 +73,6 @@ fn main() -> ! {
 
 /// A task that is spawned for the first and only time has its place.
 fn once<S, E: core::fmt::Debug>(token: Result<SpawnToken<S>, E>) -> SpawnToken<S> {
-    match token {
-        Ok(token) => token,
-        Err(_) => defmt::panic!("a task was spawned twice"),
-    }
+    let Ok(token) = token else { defmt::panic!("a task was spawned twice") };
+    token
 }

@@ -18,7 +18,8 @@ use cortex_m::peripheral::DWT;
 use embassy_stm32::dma::{self, ReadableRingBuffer, TransferOptions};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::mode::{Async, Blocking};
-use embassy_stm32::peripherals::{DMA1_CH6, DMA2_CH2, IWDG};
+use embassy_stm32::peripherals::{DMA1_CH6, DMA2_CH2, IWDG, RNG};
+use embassy_stm32::rng::{self, Rng};
 use embassy_stm32::spi::{self, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, UartRx, UartTx};
@@ -34,6 +35,9 @@ use super::{Boot, Overrun, Receive, ResetCause, Transmit};
 use crate::report::Report;
 
 use defmt_rtt as _;
+
+/// The board's name.
+pub(crate) const NAME: &str = "f405";
 
 /// The crystal.
 const HSE: Hertz = Hertz(8_000_000);
@@ -55,6 +59,7 @@ const WATCHDOG_US: u32 = 1_000_000;
 bind_interrupts!(struct Irqs {
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    HASH_RNG => rng::InterruptHandler<RNG>;
 });
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
@@ -72,7 +77,7 @@ pub(crate) struct Parts {
 
 /// Starts clocks, ports and card. The watchdog runs from its first feeding on.
 pub(crate) fn take() -> Parts {
-    let cause = reset_cause();
+    let (cause, cause_register) = reset_cause();
     let p = embassy_stm32::init(clocks());
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
@@ -104,7 +109,12 @@ pub(crate) fn take() -> Parts {
         led: Led(Output::new(p.PC12, Level::High, Speed::Low)),
         watchdog: Watchdog { timer: IndependentWatchdog::new(p.IWDG, WATCHDOG_US), running: false },
         idle: Idle(()),
-        boot: Boot { id: embassy_stm32::uid::uid(), cause },
+        boot: Boot {
+            id: embassy_stm32::uid::uid(),
+            cause,
+            cause_register,
+            entropy: Rng::new(p.RNG, Irqs).next_u32(),
+        },
     }
 }
 
@@ -128,11 +138,11 @@ fn clocks() -> embassy_stm32::Config {
 }
 
 /// Reads why the machine started, and clears it for the next time.
-fn reset_cause() -> ResetCause {
+fn reset_cause() -> (ResetCause, u32) {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
     // Several flags are set together; the most telling one first.
-    if flags.wdgrstf() || flags.wwdgrstf() {
+    let cause = if flags.wdgrstf() || flags.wwdgrstf() {
         ResetCause::Watchdog
     } else if flags.sftrstf() {
         ResetCause::Software
@@ -142,7 +152,8 @@ fn reset_cause() -> ResetCause {
         ResetCause::BrownOut
     } else {
         ResetCause::Pin
-    }
+    };
+    (cause, flags.0)
 }
 
 /// Reception of the autopilot's bytes: a DMA ring.
@@ -303,7 +314,9 @@ pub(crate) fn cycles() -> u32 {
 
 /// The log is closed: the card can be pulled.
 pub(crate) fn done(report: &Report) {
-    defmt::info!("log closed, {} frames in", report.port.frames);
+    let Report { stats, frames_left, costs, stack } = report;
+    defmt::info!("log closed: {=u64} frames in, {=u64} without a card", stats.frames_in, frames_left);
+    defmt::info!("cycles {=[u64]}, stack {}", costs, stack);
 }
 
 /// Starts anew.

@@ -5,12 +5,13 @@
 //!
 //! | name | what |
 //! |---|---|
+//! | `NAME` | the board's name |
 //! | `take() -> Parts` | starts the machine; to be called once, first |
 //! | `Parts` | `autopilot` ([`Receive`]), `gs` ([`Transmit`]), `card` (`CardDevice`), `led`, `watchdog`, `idle`, `boot` ([`Boot`]) |
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |
 //! | `ended()` | waits for the end of the input; for ever on a board that flies |
 //! | `cycles()` | a free running counter of [`CYCLE_BITS`] bits, for measuring |
-//! | `done()` | the log is closed after `ended()` |
+//! | `done(&Report)` | the log is closed after `ended()` |
 //! | `restart()` | after a fault |
 
 #[cfg(feature = "board-emulated")]
@@ -50,6 +51,7 @@ pub(crate) trait Transmit {
 
 /// Why the machine started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[cfg_attr(feature = "board-emulated", expect(dead_code, reason = "the emulator knows only how to be started"))]
 pub(crate) enum ResetCause {
     /// Power came.
     PowerOn,
@@ -63,10 +65,28 @@ pub(crate) enum ResetCause {
     Watchdog,
 }
 
+impl ResetCause {
+    /// As the log names it.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::PowerOn => "power-on",
+            Self::BrownOut => "brown-out",
+            Self::Pin => "pin",
+            Self::Software => "software",
+            Self::Watchdog => "watchdog",
+        }
+    }
+}
+
 /// What is known about this machine and this start of it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Boot {
     /// The processor's own number, the same for ever.
     pub(crate) id: [u8; 12],
+    /// Why it started.
     pub(crate) cause: ResetCause,
+    /// The register that says so.
+    pub(crate) cause_register: u32,
+    /// Differs from one start to the next.
+    pub(crate) entropy: u32,
 }

@@ -4,6 +4,7 @@ use core::cell::RefCell;
 use core::fmt;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_recorder::CardDevice;
 use semihosting::fs::File;
 use semihosting::io::{Read, Seek, SeekFrom, Write};
 
@@ -77,6 +78,8 @@ impl BlockDevice for ImageCard {
         Ok(BlockCount((bytes / Block::LEN as u64).min(BLOCKS_MAX) as u32))
     }
 }
+
+impl CardDevice for ImageCard {}
 
 fn read_block(file: &mut File, mut rest: &mut [u8]) -> Result<(), CardError> {
     while !rest.is_empty() {

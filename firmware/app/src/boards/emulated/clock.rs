@@ -37,6 +37,11 @@ impl Driver for VirtualClock {
     }
 }
 
+/// Microseconds since power-on.
+pub(crate) fn now_us() -> u64 {
+    CLOCK.now()
+}
+
 /// Moves the clock forward to `to_us`, never back, and wakes the tasks whose alarm has come.
 pub(crate) fn advance(to_us: u64) {
     critical_section::with(|cs| {
