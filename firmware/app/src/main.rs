@@ -21,6 +21,7 @@ mod tasks;
 use embassy_executor::SpawnToken;
 use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
+use hums_core::Monitor;
 use hums_core::params::Params;
 use hums_onboard::Monitoring;
 use hums_onboard::queues::{Ends, Queues};
@@ -33,6 +34,7 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 /// In CCM: the hottest data there is, and no DMA reads it (see `memory.x`).
 #[unsafe(link_section = ".ccm.writer")]
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
+static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
 
 #[cortex_m_rt::entry]
@@ -58,7 +60,7 @@ fn main() -> ! {
         boots,
     };
     let monitoring = MONITORING.init_with(|| {
-        Monitoring::new(Params::defaults(), WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+        Monitoring::new(MONITOR.take(), WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
     });
 
     let on = executors::start();
