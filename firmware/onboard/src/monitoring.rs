@@ -128,7 +128,7 @@ impl<'a> Monitoring<'a> {
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
     pub fn drain(&mut self, frames: &mut FramesOut, sectors: &mut SectorsIn, gs: &mut GsIn) -> bool {
         frames.take(|at_micros, verified, bytes| {
-            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs)
+            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs);
         })
     }
 

@@ -47,6 +47,8 @@ pub struct Recorder<'a, D: CardDevice> {
     finished: bool,
 }
 
+// One of these exists, in a static: the size of the largest variant is the budget.
+#[allow(clippy::large_enum_variant)]
 enum Slot<'a, D: CardDevice> {
     /// The device, while no usable card is in it.
     Waiting(D),
@@ -220,9 +222,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         };
         let before = self.log.replace(log);
         if Some(log.name) == newest {
-            self.next_segment()?
+            self.next_segment()?;
         } else {
-            self.open_segment(log.name)?
+            self.open_segment(log.name)?;
         }
         if let Some(before) = before {
             self.await_group = before.session != log.session;

@@ -100,23 +100,24 @@ fn a_cut_at_any_write_leaves_the_card_in_order() {
             }
             let mut after = blocks.clone();
             after.insert(*at, block);
-            check_in_order(MemCard::with(device.size, after), cut);
+            check_in_order(&MemCard::with(device.size, after), cut);
         }
         blocks.insert(*at, *new);
     }
 }
 
-fn check_in_order(device: MemCard, cut: usize) {
+fn check_in_order(device: &MemCard, cut: usize) {
     let status = CardStatus::new();
-    let mut card = mount(&device, &status);
+    let mut card = mount(device, &status);
     let found = logs(&card);
     assert!(!found.is_empty() && found.len() <= 2, "cut {cut}: {found:?}");
     for log in found {
-        card.open(log.name).unwrap_or_else(|error| panic!("cut {cut}: {}: {error}", log.name));
+        card.open(log.name).map_err(|error| format!("cut {cut}: {}: {error}", log.name)).expect("it opens");
         let mut block = [0; 512];
         for index in 0..card.open_blocks() {
             card.read(index, &mut block)
-                .unwrap_or_else(|error| panic!("cut {cut}: {} {index}: {error}", log.name));
+                .map_err(|error| format!("cut {cut}: {} {index}: {error}", log.name))
+                .expect("it reads");
             if log.name == FIRST && index == 7 {
                 assert_eq!(block, pattern(7), "cut {cut}");
             }

@@ -26,12 +26,14 @@ impl std::error::Error for Broken {}
 
 pub type Blocks = BTreeMap<u32, [u8; 512]>;
 
+type Write = (u32, [u8; 512]);
+
 /// A sparse card that keeps a journal of its writes.
 #[derive(Clone)]
 pub struct MemCard {
     pub size: u32,
     pub blocks: Rc<RefCell<Blocks>>,
-    pub journal: Rc<RefCell<Vec<(u32, [u8; 512])>>>,
+    pub journal: Rc<RefCell<Vec<Write>>>,
     pub broken: Rc<Cell<bool>>,
 }
 
