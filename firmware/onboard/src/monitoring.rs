@@ -5,7 +5,7 @@
 //! what time alone asks for.
 
 use hums_blackbox::record::{
-    Boot, Clock, Event, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX, Usage,
+    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX, Usage,
     UsageValue, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
@@ -118,6 +118,11 @@ impl<'a> Monitoring<'a> {
             }
         }
         self.record_usage(now, Moment::Start, sectors);
+    }
+
+    /// Records how the boot before this one ended. To be called after [`Self::start`].
+    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, sectors: &mut SectorsIn) {
+        self.record(now, &Record::Fault(*fault), sectors);
     }
 
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
