@@ -1,1 +1,53 @@
-//! The hums command.
+//! The `hums` command: the pipeline of the firmware on this PC, and everything that reads what it wrote.
+
+pub mod card;
+pub mod cli;
+pub mod decode;
+pub mod demo;
+pub mod endpoint;
+pub mod info;
+pub mod interrupt;
+pub mod logs;
+pub mod mavlink;
+pub mod outcome;
+pub mod output;
+pub mod pack;
+pub mod rng;
+pub mod run;
+pub mod sink;
+pub mod source;
+pub mod summary;
+pub mod utc;
+pub mod verify;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use cli::{Cli, Command};
+use outcome::Outcome;
+
+/// Runs the program with these arguments (the first is the program's own name).
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    match Cli::try_parse_from(arguments) {
+        Ok(cli) => outcome::exit_code(command(&cli.command)),
+        Err(error) => {
+            // Help and version go to standard output and are no failure; a reader that has gone is none either.
+            let _ = error.print();
+            ExitCode::from(if error.use_stderr() { 2 } else { 0 })
+        }
+    }
+}
+
+fn command(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Decode(args) => decode::run(args),
+        Command::Sim(args) => run::sim::run(args),
+        Command::Emulate(args) => run::emulate::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Verify(args) => verify::run(args),
+        Command::Pack(args) => pack::run(args),
+        Command::Demo(args) => demo::run(args),
+    }
+}

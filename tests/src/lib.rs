@@ -1,1 +1,22 @@
-//! Helpers of the end-to-end tests.
+//! Helpers of the end-to-end tests: the `hums` program as a user runs it, the recorded flights, and readers of MAVLink
+//! that share no code with what they check.
+//!
+//! * [`child`] runs a program with a limit on its time, and tells what it said and the memory it took.
+//! * [`program`] runs `hums` and reads what it left behind.
+//! * [`frames`] reads MAVLink frames with a few lines of its own and the checksum seeds of pymavlink.
+//! * [`flights`] knows the recordings and what pymavlink found in them; [`oracle`] asks it about others.
+//! * [`damage`] makes noise; [`fat`] checks a card's file system with the system's own tools.
+#![allow(
+    clippy::missing_panics_doc,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test's helper fails by panicking"
+)]
+
+pub mod child;
+pub mod damage;
+pub mod fat;
+pub mod flights;
+pub mod frames;
+pub mod oracle;
+pub mod program;

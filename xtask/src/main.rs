@@ -1,2 +1,186 @@
-//! `cargo xtask`.
-fn main() {}
+//! `cargo xtask`: what this repository can do, from nothing but Rust and git.
+//!
+//! Each command first sees to what it needs ([`setup`]): it installs what is missing where it may, and where it may
+//! not it says what to type and goes on as far as that goes. Nothing here is needed to use `hums` itself.
+
+mod apt;
+mod budgets;
+mod demo;
+mod firmware;
+mod oracle;
+mod repo;
+mod setup;
+mod shell;
+mod test;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+use crate::firmware::Board;
+use crate::setup::Need;
+
+const HELP: &str = "\
+cargo xtask COMMAND
+
+  demo [--flight FILE] [--pc]    a recorded flight through the firmware in the emulator, and what came of it;
+                                 without an emulator, or with --pc, through the same pipeline on this PC
+  test [--only STEP]... [--list] everything that CI checks, or the steps named
+  firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
+  size                           flash and RAM of both boards against budgets.toml
+  setup [--dry-run]              install what demo and test need, or only say what is missing
+  manifest                       make tests/flights/manifest.json anew with pymavlink
+  help                           this text
+
+Exit codes: 0 done, 1 failed, 2 usage.";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let command = match Command::parse(&arguments) {
+        Ok(command) => command,
+        Err(error) => {
+            eprintln!("{error}\n\n{HELP}");
+            return ExitCode::from(2);
+        }
+    };
+    match command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nerror: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// What was asked for.
+#[derive(Debug, PartialEq, Eq)]
+enum Command {
+    Demo(demo::Options),
+    Test { only: Vec<String>, list: bool },
+    Firmware(Board),
+    Size,
+    Setup { dry_run: bool },
+    Manifest,
+    Help,
+}
+
+impl Command {
+    fn parse(arguments: &[String]) -> Result<Self> {
+        let mut words = arguments.iter().map(String::as_str);
+        let Some(name) = words.next() else { return Ok(Self::Help) };
+        let rest: Vec<&str> = words.collect();
+        if rest.iter().any(|word| matches!(*word, "--help" | "-h")) {
+            return Ok(Self::Help);
+        }
+        match name {
+            "demo" => Ok(Self::Demo(demo::Options::parse(&rest)?)),
+            "test" => parse_test(&rest),
+            "firmware" => match rest.as_slice() {
+                [] => Ok(Self::Firmware(Board::F405)),
+                ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
+                _ => bail!("firmware takes --board f405 or --board emulated"),
+            },
+            "setup" => match rest.as_slice() {
+                [] => Ok(Self::Setup { dry_run: false }),
+                ["--dry-run"] => Ok(Self::Setup { dry_run: true }),
+                _ => bail!("setup takes nothing or --dry-run"),
+            },
+            "size" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
+                bail!("{name} takes nothing")
+            }
+            "size" => Ok(Self::Size),
+            "manifest" => Ok(Self::Manifest),
+            "help" | "--help" | "-h" => Ok(Self::Help),
+            other => bail!("there is no command {other}"),
+        }
+    }
+
+    fn run(self) -> Result<()> {
+        match self {
+            Self::Demo(options) => demo::run(&options),
+            Self::Test { list: true, .. } => {
+                test::list();
+                Ok(())
+            }
+            Self::Test { only, list: false } => test::run(&only),
+            Self::Firmware(board) => {
+                setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+                println!("{}", firmware::build(board)?.display());
+                Ok(())
+            }
+            Self::Size => {
+                setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+                budgets::check_all()
+            }
+            Self::Setup { dry_run } => {
+                let outcome = setup::ensure(&Need::ALL, dry_run);
+                if !dry_run && outcome.has(Need::PythonVenv) {
+                    oracle::prepare()?;
+                }
+                outcome.require_all()
+            }
+            Self::Manifest => {
+                setup::ensure(&[Need::PythonVenv], false).require_all()?;
+                oracle::write_manifest()
+            }
+            Self::Help => {
+                println!("{HELP}");
+                Ok(())
+            }
+        }
+    }
+}
+
+fn parse_test(rest: &[&str]) -> Result<Command> {
+    let (mut only, mut list) = (Vec::new(), false);
+    let mut words = rest.iter();
+    while let Some(word) = words.next() {
+        match *word {
+            "--list" => list = true,
+            "--only" => {
+                let Some(step) = words.next() else { bail!("--only wants the name of a step") };
+                only.push((*step).to_owned());
+            }
+            other => bail!("test takes --only STEP and --list, not {other}"),
+        }
+    }
+    test::check_names(&only)?;
+    Ok(Command::Test { only, list })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(line: &str) -> Result<Command> {
+        Command::parse(&line.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn nothing_and_help_show_the_help() {
+        for line in ["", "help", "--help", "-h", "test --help"] {
+            assert_eq!(parse(line).unwrap(), Command::Help, "{line}");
+        }
+    }
+
+    #[test]
+    fn a_mistyped_word_is_a_usage_error_and_not_ignored() {
+        for line in [
+            "tset",
+            "size now",
+            "setup --dry",
+            "firmware --board f407",
+            "test --only",
+            "test --only fmtt",
+            "demo --fligth x",
+        ] {
+            assert!(parse(line).is_err(), "{line}");
+        }
+    }
+
+    #[test]
+    fn steps_are_chosen_by_name() {
+        let expected = Command::Test { only: vec!["fmt".into(), "budgets".into()], list: false };
+        assert_eq!(parse("test --only fmt --only budgets").unwrap(), expected);
+    }
+}

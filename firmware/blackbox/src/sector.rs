@@ -77,6 +77,11 @@ impl Sector {
         &self.bytes
     }
 
+    /// Whether it is a copy of a sector in progress, which a later one with its number supersedes.
+    pub const fn is_partial(&self) -> bool {
+        self.bytes[2] & PARTIAL != 0
+    }
+
     /// Whether a group, and with it a place where reading can start, begins here.
     pub const fn starts_group(&self) -> bool {
         self.bytes[2] & SINCE_FIRST == 0

@@ -2,5 +2,17 @@
 //! Knows no MAVLink, no card and no executor; time comes in as an argument.
 #![cfg_attr(not(test), no_std)]
 
+pub mod derived;
+pub mod flight;
 pub mod health;
+pub mod latest;
+pub mod monitor;
+pub mod observation;
+pub mod params;
+pub mod status;
 pub mod time;
+pub mod units;
+pub mod usage;
+pub mod vehicle;
+
+pub use monitor::Monitor;

@@ -1,1 +1,33 @@
-//! Log files on a FAT card, written through embedded-sdmmc.
+//! Log files on a FAT32 card: what the storage task does with sectors.
+//!
+//! The card's file system is the one thing here that power can cut in half, so it is touched as rarely as possible and
+//! in an order that leaves it whole at every single block write:
+//!
+//! * A log is a row of *segments*: files that are allocated whole when they are made ([`card::Card::create`]) and
+//!   written in place from then on, one block write a sector, without a directory or FAT update.
+//! * A new segment's FAT blocks are held back and written first, its directory entry last ([`gate::Gate`]): a cut in
+//!   between leaves unused clusters, nothing else.
+//! * When the card is full the oldest segment is renamed, one block write, and written anew ([`card::Card::recycle`]).
+//!
+//! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before `embedded-sdmmc` sees the card, and
+//! [`gate::Gate`] checks what it reads of the FAT and bounds how much it may read.
+#![cfg_attr(not(test), no_std)]
+
+pub mod card;
+pub mod format;
+pub mod gate;
+pub mod layout;
+pub mod name;
+pub mod recorder;
+pub mod status;
+
+pub use card::{Card, CardError};
+pub use name::LogName;
+pub use recorder::{Recorder, Written};
+pub use status::{CardState, CardStatus};
+
+/// A block device that can be told to start over, as a card must be after it was pulled and put back.
+pub trait CardDevice: embedded_sdmmc::BlockDevice {
+    /// Forgets what is known of the card, so that the next access identifies it anew.
+    fn reset(&self) {}
+}

@@ -1,0 +1,243 @@
+//! What the raw messages do not say by themselves: cell count and cell voltage, silence of an ESC against its own rhythm,
+//! imbalance of motors in steady flight, clips since take-off, load factor.
+
+use crate::flight::FlightEvent;
+use crate::health::{Inputs, Reading};
+use crate::latest::Latest;
+use crate::observation::{Battery, CELLS_MAX, MOTORS_MAX, Observation};
+use crate::params::{Param, Params};
+use crate::time::{Instant, Span};
+use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
+
+/// Standard gravity, m/s2 (CGPM 1901).
+pub const GRAVITY: f32 = 9.806_65;
+/// A full lithium polymer cell has 4.2 V, a high-voltage one 4.35 V: a pack of n cells never shows more than this a cell.
+const CELL_FULL_V: f32 = 4.4;
+/// A motor that never turned faster is not fitted.
+const TURNING_RPM: f32 = 100.0;
+/// An ESC is silent when it misses this many of its own intervals.
+const INTERVALS_MISSED: f32 = 3.0;
+/// Steady flight: in the air for this long, and not tilted further.
+const STEADY_AFTER: Span = Span::from_secs(3);
+const STEADY_TILT_RAD: f32 = 0.26;
+/// Time constant of the motor speeds that are compared.
+const MOTOR_SMOOTHING_S: f32 = 1.0;
+/// How long a loss of frames stays a warning.
+const LOSS_MEMORY: Span = Span::from_secs(10);
+
+#[derive(Clone, Copy, Debug, Default)]
+struct MotorTrack {
+    /// Smoothed interval between messages that carry speed or current, seconds; 0 before there are two.
+    interval_s: f32,
+    last: Option<Instant>,
+    highest_rpm: f32,
+    smooth_rpm: f32,
+}
+
+/// The memory of derived quantities.
+#[derive(Clone, Copy, Debug)]
+pub struct Derived {
+    highest_pack_v: [f32; BATTERIES_MAX],
+    motors: [MotorTrack; MOTORS_MAX],
+    load_factor: Latest<f32>,
+    had_fix: [bool; RECEIVERS_MAX],
+    clips_at_takeoff: Option<u32>,
+    frames_lost: u64,
+    frames_lost_at: Option<Instant>,
+    frames_lost_before: u64,
+}
+
+impl Default for Derived {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Derived {
+    /// Nothing seen yet.
+    pub const fn new() -> Self {
+        const MOTOR: MotorTrack =
+            MotorTrack { interval_s: 0.0, last: None, highest_rpm: 0.0, smooth_rpm: 0.0 };
+        Self {
+            highest_pack_v: [0.0; BATTERIES_MAX],
+            motors: [MOTOR; MOTORS_MAX],
+            load_factor: Latest::nothing(),
+            had_fix: [false; RECEIVERS_MAX],
+            clips_at_takeoff: None,
+            frames_lost: 0,
+            frames_lost_at: None,
+            frames_lost_before: 0,
+        }
+    }
+
+    /// Takes an observation that the vehicle took.
+    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
+        match observation {
+            Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
+                if let Some([x, y, z]) = imu.acceleration {
+                    let norm = libm::sqrtf(x.0 * x.0 + y.0 * y.0 + z.0 * z.0);
+                    self.load_factor.set(at, norm / GRAVITY);
+                }
+            }
+            Observation::Gnss(gnss) => {
+                if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
+                    *had_fix |= gnss.fix >= 3;
+                }
+            }
+            Observation::Battery(_) | Observation::SystemStatus(_) => self.take_voltages(vehicle),
+            Observation::Escs(group) => {
+                let first = usize::from(group.first);
+                for number in first..first.saturating_add(group.escs.len()).min(MOTORS_MAX) {
+                    self.take_motor(at, vehicle, number);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn take_voltages(&mut self, vehicle: &Vehicle) {
+        for (battery, highest) in self.highest_pack_v.iter_mut().enumerate() {
+            if let Some(pack_v) = pack_v(vehicle, battery).filter(|pack_v| pack_v.is_finite()) {
+                *highest = highest.max(pack_v);
+            }
+        }
+    }
+
+    fn take_motor(&mut self, at: Instant, vehicle: &Vehicle, number: usize) {
+        let (motor, track) = (&vehicle.motors[number], &mut self.motors[number]);
+        if motor.moved_at != Some(at) || track.last == Some(at) {
+            return;
+        }
+        let interval_s = track.last.map(|last| at.since(last).as_secs_f32());
+        track.last = Some(at);
+        // A pause is not a rhythm: it must not make the next pause look normal.
+        if let Some(interval_s) = interval_s.filter(|interval_s| *interval_s < 5.0) {
+            let weight = if track.interval_s == 0.0 { 1.0 } else { 0.1 };
+            track.interval_s += weight * (interval_s - track.interval_s);
+        }
+        if let Some(rpm) = motor.esc.rpm.and_then(crate::units::Rpm::finite) {
+            let speed = rpm.0.abs();
+            track.highest_rpm = track.highest_rpm.max(speed);
+            let step_s = interval_s.unwrap_or(MOTOR_SMOOTHING_S);
+            let weight = (step_s / (MOTOR_SMOOTHING_S + step_s)).clamp(0.0, 1.0);
+            track.smooth_rpm += weight * (speed - track.smooth_rpm);
+        }
+    }
+
+    /// One step, at least every 50 ms, after the flight's own.
+    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, event: Option<FlightEvent>, frames_lost: u64) {
+        match event {
+            Some(FlightEvent::TakeOff) => self.clips_at_takeoff = clips(vehicle),
+            Some(FlightEvent::Landing) => self.clips_at_takeoff = None,
+            None => {}
+        }
+        if frames_lost > self.frames_lost {
+            self.frames_lost = frames_lost;
+            self.frames_lost_at = Some(now);
+        } else if self.frames_lost_at.is_some_and(|at| now.since(at) > LOSS_MEMORY) {
+            self.frames_lost_before = self.frames_lost;
+            self.frames_lost_at = None;
+        }
+    }
+
+    /// Cells of a battery: set, reported, or found from the highest voltage seen. 0 while nothing is known.
+    pub fn cell_count(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> u8 {
+        let set = params.get(Param::BatCells) as u8;
+        if set > 0 {
+            return set;
+        }
+        let reported =
+            vehicle.batteries.get(battery).and_then(Latest::get).map_or(0, Battery::cells_reported);
+        if reported > 1 {
+            return reported as u8;
+        }
+        let highest = self.highest_pack_v.get(battery).copied().unwrap_or(0.0);
+        libm::ceilf(highest / CELL_FULL_V).clamp(0.0, CELLS_MAX as f32) as u8
+    }
+
+    /// The lowest cell's voltage where cells are measured, the pack's share of it otherwise.
+    pub(crate) fn cell_voltage(&self, inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
+        let index = usize::from(battery);
+        let slot = inputs.vehicle.batteries.get(index)?;
+        let at = if slot.get().is_some() { slot.at() } else { inputs.vehicle.system.at() };
+        let lowest = slot
+            .get()
+            .filter(|known| known.cells_reported() > 1)
+            .and_then(|known| known.cells.iter().flatten().map(|cell| cell.0).reduce(f32::min));
+        let share = || {
+            let cells = self.cell_count(inputs.vehicle, index, inputs.params);
+            pack_v(inputs.vehicle, index).filter(|_| cells > 0).map(|pack_v| pack_v / f32::from(cells))
+        };
+        Reading::new(at, lowest.or_else(share))
+    }
+
+    /// Seconds since an ESC last told speed or current, once it has missed some of its own intervals; 0 before.
+    pub(crate) fn esc_silence(&self, inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
+        let track = self.motors.get(usize::from(motor))?;
+        let silence_s = inputs.now.since(track.last?).as_secs_f32();
+        let missed = track.interval_s > 0.0 && silence_s > INTERVALS_MISSED * track.interval_s;
+        Some(Reading { at: inputs.now, value: if missed { silence_s } else { 0.0 } })
+    }
+
+    /// How far a motor's speed is from the mean of the others, in percent of it, in steady flight.
+    pub(crate) fn motor_imbalance(&self, inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
+        let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
+        let steady =
+            inputs.flight.airborne_since().is_some_and(|since| inputs.now.since(since) > STEADY_AFTER)
+                && inputs.vehicle.attitude.get().is_none_or(|attitude| {
+                    attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
+                });
+        let others = self.motors.iter().enumerate();
+        let others =
+            others.filter(|(other, track)| *other != usize::from(motor) && track.highest_rpm > TURNING_RPM);
+        let (sum, count) =
+            others.fold((0.0, 0_u8), |(sum, count), (_, other)| (sum + other.smooth_rpm, count + 1));
+        let mean = sum / f32::from(count);
+        if !steady || count == 0 || mean < TURNING_RPM {
+            return None;
+        }
+        Reading::new(track.last, Some((track.smooth_rpm - mean).abs() / mean * 100.0))
+    }
+
+    /// Clipped samples since take-off, the worst accelerometer.
+    pub(crate) fn clips(&self, inputs: &Inputs<'_>) -> Option<Reading> {
+        let since = clips(inputs.vehicle)?.saturating_sub(self.clips_at_takeoff?);
+        Reading::new(inputs.vehicle.vibration.at(), Some(since as f32))
+    }
+
+    /// Magnitude of the specific force in units of gravity: 1 at rest and in steady flight.
+    pub(crate) fn load_factor(&self, _: &Inputs<'_>) -> Option<Reading> {
+        Reading::new(self.load_factor.at(), self.load_factor.get().copied())
+    }
+
+    /// The latest load factor, in units of gravity.
+    pub fn load_factor_g(&self) -> Option<f32> {
+        self.load_factor.get().copied()
+    }
+
+    /// Whether a receiver has had a 3D fix since power-on.
+    pub(crate) fn had_fix(&self, receiver: u8) -> bool {
+        self.had_fix.get(usize::from(receiver)).copied().unwrap_or(false)
+    }
+
+    /// Frames that our own recording lost in the last ten seconds.
+    pub(crate) fn frames_lost_lately(&self, _: &Inputs<'_>) -> f32 {
+        self.frames_lost.saturating_sub(self.frames_lost_before) as f32
+    }
+
+    /// Whether a motor turns now.
+    pub fn turns(vehicle: &Vehicle, motor: usize) -> bool {
+        vehicle.motors.get(motor).and_then(|motor| motor.esc.rpm).is_some_and(|rpm| rpm.0.abs() > TURNING_RPM)
+    }
+}
+
+/// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.
+fn pack_v(vehicle: &Vehicle, battery: usize) -> Option<f32> {
+    let known = vehicle.batteries.get(battery)?.get();
+    let system = || vehicle.system.get().filter(|_| battery == 0).and_then(|system| system.voltage);
+    known.map_or_else(system, |known| known.voltage).map(|voltage| voltage.0)
+}
+
+fn clips(vehicle: &Vehicle) -> Option<u32> {
+    vehicle.vibration.get().map(|vibration| vibration.clips.into_iter().max().unwrap_or(0))
+}

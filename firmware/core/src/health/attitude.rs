@@ -1,0 +1,41 @@
+//! Roll and pitch.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, STALE, Subsystem};
+use crate::observation::Attitude;
+use crate::params::Param;
+use crate::time::Span;
+use crate::units::Radians;
+
+const ROLL: Check = Check {
+    name: "roll",
+    words: "roll",
+    subsystem: Subsystem::Attitude,
+    unit: "deg",
+    side: Side::Above,
+    warn: Some(Param::TiltWarn),
+    critical: Some(Param::TiltCrit),
+    hysteresis: 5.0,
+    debounce_warn: Span::from_millis(500),
+    // PX4's failure detector: FD_FAIL_R_TTRI, FD_FAIL_P_TTRI 0.3 s.
+    debounce_critical: Span::from_millis(300),
+    when: When::InFlight,
+    stale_after: STALE,
+    instances: 1,
+    read: |inputs, _| degrees(inputs, |attitude| attitude.roll),
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    ROLL,
+    Check {
+        name: "pitch",
+        words: "pitch",
+        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch),
+        ..ROLL
+    },
+];
+
+fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians) -> Option<Reading> {
+    let slot = &inputs.vehicle.attitude;
+    Reading::new(slot.at(), slot.get().map(|attitude| angle(attitude).0.to_degrees().abs()))
+}

@@ -1,0 +1,53 @@
+//! The combustion engine (EFI). What is normal depends on the engine, so the limits are off (at their maximum) until
+//! they are set.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, STALE, Subsystem};
+use crate::observation::Engine;
+use crate::params::Param;
+use crate::time::Span;
+
+const ENGINE: Check = Check {
+    name: "cylinder_head",
+    words: "cylinder hot",
+    subsystem: Subsystem::Engine,
+    unit: "degC",
+    side: Side::Above,
+    warn: Some(Param::EngChtWarn),
+    critical: Some(Param::EngChtCrit),
+    hysteresis: 5.0,
+    debounce_warn: Span::from_secs(2),
+    debounce_critical: Span::from_secs(1),
+    when: When::Always,
+    stale_after: STALE,
+    instances: 1,
+    read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    ENGINE,
+    Check {
+        name: "exhaust_gas",
+        words: "exhaust hot",
+        warn: Some(Param::EngEgtWarn),
+        critical: Some(Param::EngEgtCrit),
+        read: |inputs, _| read(inputs, |engine| engine.exhaust.map(|temperature| temperature.0)),
+        ..ENGINE
+    },
+    Check {
+        name: "fuel_pressure",
+        words: "fuel pressure",
+        unit: "hPa",
+        side: Side::Below,
+        warn: Some(Param::EngFuelWarn),
+        critical: Some(Param::EngFuelCrit),
+        when: When::Armed,
+        read: |inputs, _| read(inputs, |engine| engine.fuel_pressure.map(|pressure| pressure.0)),
+        ..ENGINE
+    },
+];
+
+fn read(inputs: &Inputs<'_>, value: impl FnOnce(&Engine) -> Option<f32>) -> Option<Reading> {
+    let engine = &inputs.vehicle.engine;
+    Reading::new(engine.at(), value(engine.get()?))
+}

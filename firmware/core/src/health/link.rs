@@ -1,0 +1,87 @@
+//! The autopilot's, the pilot's and the ground station's links.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, STALE, Subsystem};
+use crate::params::Param;
+use crate::time::Span;
+
+const HEARTBEAT: Check = Check {
+    name: "heartbeat",
+    words: "autopilot silent",
+    subsystem: Subsystem::Link,
+    unit: "s",
+    side: Side::Above,
+    warn: Some(Param::LinkAgeWarn),
+    critical: Some(Param::LinkAgeCrit),
+    hysteresis: 0.0,
+    debounce_warn: Span::ZERO,
+    debounce_critical: Span::ZERO,
+    when: When::Always,
+    stale_after: None,
+    instances: 1,
+    read: heartbeat_age_s,
+};
+
+const RADIO: Check = Check {
+    name: "rc_rssi",
+    words: "RC signal",
+    unit: "",
+    side: Side::Below,
+    warn: Some(Param::RcRssiWarn),
+    critical: Some(Param::RcRssiCrit),
+    hysteresis: 2.0,
+    debounce_warn: Span::from_secs(2),
+    debounce_critical: Span::from_secs(1),
+    when: When::Armed,
+    stale_after: STALE,
+    read: rc_rssi,
+    ..HEARTBEAT
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    HEARTBEAT,
+    Check {
+        name: "frames_lost",
+        words: "frames lost",
+        unit: "%",
+        warn: Some(Param::LinkLossWarn),
+        critical: Some(Param::LinkLossCrit),
+        hysteresis: 0.2,
+        debounce_warn: Span::from_secs(2),
+        debounce_critical: Span::from_secs(2),
+        read: frames_lost_percent,
+        ..HEARTBEAT
+    },
+    RADIO,
+    Check {
+        name: "radio_margin",
+        words: "radio margin",
+        warn: Some(Param::RadioMargWarn),
+        critical: None,
+        read: radio_margin,
+        ..RADIO
+    },
+];
+
+fn heartbeat_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let at = inputs.vehicle.heartbeat.at()?;
+    Some(Reading { at: inputs.now, value: inputs.now.since(at).as_secs_f32() })
+}
+
+fn frames_lost_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    Reading::new(Some(inputs.link.at), inputs.link.frames_lost.map(|lost| lost * 100.0))
+}
+
+fn rc_rssi(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let slot = &inputs.vehicle.rc;
+    Reading::new(slot.at(), slot.get()?.rssi.map(f32::from))
+}
+
+/// The weaker end's signal above its noise.
+fn radio_margin(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let slot = &inputs.vehicle.radio;
+    let radio = slot.get()?;
+    let margin = |rssi: Option<u8>, noise: Option<u8>| Some(f32::from(rssi?) - f32::from(noise?));
+    let ends = [margin(radio.rssi, radio.noise), margin(radio.remote_rssi, radio.remote_noise)];
+    Reading::new(slot.at(), ends.into_iter().flatten().reduce(f32::min))
+}

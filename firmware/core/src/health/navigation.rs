@@ -1,0 +1,152 @@
+//! Estimator and GNSS.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, STALE, Subsystem};
+use crate::observation::{Estimator, EstimatorScale, Gnss};
+use crate::params::Param;
+use crate::time::Span;
+use crate::vehicle::RECEIVERS_MAX;
+
+const ESTIMATOR: Check = Check {
+    name: "ekf_variance",
+    words: "EKF variance",
+    subsystem: Subsystem::Navigation,
+    unit: "",
+    side: Side::Above,
+    warn: Some(Param::EkfVarWarn),
+    critical: None,
+    hysteresis: 0.05,
+    debounce_warn: Span::from_secs(1),
+    debounce_critical: Span::from_secs(1),
+    when: When::InFlight,
+    stale_after: STALE,
+    instances: 1,
+    read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
+};
+
+const GNSS: Check = Check {
+    name: "gps_satellites",
+    words: "GPS satellites",
+    side: Side::Below,
+    warn: Some(Param::GpsSatsWarn),
+    critical: None,
+    hysteresis: 0.0,
+    debounce_warn: Span::from_secs(2),
+    instances: RECEIVERS_MAX as u8,
+    read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.satellites.map(f32::from)),
+    ..ESTIMATOR
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    ESTIMATOR,
+    Check {
+        // ArduPilot's failsafe wants two of compass, velocity and position beyond the limit.
+        name: "ekf_failsafe",
+        words: "EKF failing",
+        warn: None,
+        critical: Some(Param::EkfVarCrit),
+        read: |inputs, _| estimator(inputs, EstimatorScale::Variance, second_largest),
+        ..ESTIMATOR
+    },
+    Check {
+        name: "ekf_test_ratio",
+        words: "EKF test ratio",
+        warn: Some(Param::EkfRatioWarn),
+        critical: Some(Param::EkfRatioCrit),
+        read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest),
+        ..ESTIMATOR
+    },
+    GNSS,
+    Check {
+        name: "gps_hdop",
+        words: "GPS HDOP",
+        side: Side::Above,
+        warn: Some(Param::GpsHdopWarn),
+        hysteresis: 0.1,
+        read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.hdop),
+        ..GNSS
+    },
+    Check {
+        name: "gps_accuracy",
+        words: "GPS accuracy",
+        unit: "m",
+        side: Side::Above,
+        warn: Some(Param::GpsHaccWarn),
+        hysteresis: 0.1,
+        read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.accuracy.map(|accuracy| accuracy.0)),
+        ..GNSS
+    },
+    Check {
+        name: "gps_fix",
+        words: "GPS fix lost",
+        warn: None,
+        critical: Some(Param::GpsFixCrit),
+        debounce_critical: Span::from_secs(1),
+        read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix))),
+        ..GNSS
+    },
+    Check {
+        name: "gps_jamming",
+        words: "GPS jamming",
+        side: Side::Above,
+        warn: Some(Param::GpsJamWarn),
+        critical: Some(Param::GpsJamCrit),
+        when: When::Always,
+        read: |inputs, receiver| integrity(inputs, receiver, |jamming, _| jamming),
+        ..GNSS
+    },
+    Check {
+        name: "gps_spoofing",
+        words: "GPS spoofing",
+        side: Side::Above,
+        warn: Some(Param::GpsJamWarn),
+        critical: Some(Param::GpsJamCrit),
+        when: When::Always,
+        read: |inputs, receiver| integrity(inputs, receiver, |_, spoofing| spoofing),
+        ..GNSS
+    },
+];
+
+fn estimator(
+    inputs: &Inputs<'_>,
+    scale: EstimatorScale,
+    pick: fn(&Estimator) -> Option<f32>,
+) -> Option<Reading> {
+    let slot = &inputs.vehicle.estimator;
+    let estimator = slot.get().filter(|estimator| estimator.scale == scale)?;
+    Reading::new(slot.at(), pick(estimator))
+}
+
+fn largest(estimator: &Estimator) -> Option<f32> {
+    [estimator.velocity, estimator.position_horizontal, estimator.position_vertical, estimator.compass]
+        .into_iter()
+        .flatten()
+        .reduce(f32::max)
+}
+
+fn second_largest(estimator: &Estimator) -> Option<f32> {
+    let (mut first, mut second) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
+    for value in [estimator.velocity, estimator.position_horizontal, estimator.compass].into_iter().flatten()
+    {
+        if value > first {
+            (first, second) = (value, first);
+        } else if value > second {
+            second = value;
+        }
+    }
+    Some(second).filter(|second| second.is_finite())
+}
+
+/// A second receiver that never had a fix is not fitted; it says nothing.
+fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f32>) -> Option<Reading> {
+    let slot = inputs.vehicle.gnss.get(usize::from(receiver))?;
+    let known = slot.get().filter(|_| inputs.derived.had_fix(receiver))?;
+    Reading::new(slot.at(), value(known))
+}
+
+fn integrity(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(u8, u8) -> u8) -> Option<Reading> {
+    let slot = inputs.vehicle.gnss_integrity.get(usize::from(receiver))?;
+    let known = slot.get()?;
+    let state = value(known.jamming, known.spoofing);
+    Reading::new(slot.at(), (state > 0).then_some(f32::from(state)))
+}

@@ -1,0 +1,127 @@
+//! Batteries and rails.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, STALE, STALE_SLOW, Subsystem};
+use crate::params::Param;
+use crate::time::Span;
+use crate::vehicle::BATTERIES_MAX;
+
+const BATTERIES: u8 = BATTERIES_MAX as u8;
+
+const BATTERY: Check = Check {
+    name: "batt_remaining",
+    words: "battery low",
+    subsystem: Subsystem::Power,
+    unit: "%",
+    side: Side::Below,
+    warn: Some(Param::BatRemWarn),
+    critical: Some(Param::BatRemCrit),
+    hysteresis: 1.0,
+    debounce_warn: Span::from_secs(2),
+    debounce_critical: Span::from_secs(2),
+    when: When::Armed,
+    stale_after: STALE_SLOW,
+    instances: BATTERIES,
+    read: remaining_percent,
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    BATTERY,
+    Check {
+        name: "cell_voltage",
+        words: "cell voltage",
+        unit: "V",
+        warn: Some(Param::CellVoltWarn),
+        critical: Some(Param::CellVoltCrit),
+        hysteresis: 0.05,
+        // ArduPilot's low voltage timer is 10 s: a sag under full throttle is not an empty battery.
+        debounce_warn: Span::from_secs(10),
+        debounce_critical: Span::from_secs(5),
+        read: |inputs, battery| inputs.derived.cell_voltage(inputs, battery),
+        ..BATTERY
+    },
+    Check {
+        name: "cell_deviation",
+        words: "cells uneven",
+        unit: "V",
+        side: Side::Above,
+        warn: Some(Param::CellDevWarn),
+        critical: Some(Param::CellDevCrit),
+        hysteresis: 0.01,
+        debounce_warn: Span::from_secs(10),
+        debounce_critical: Span::from_secs(10),
+        read: cell_deviation_v,
+        ..BATTERY
+    },
+    Check {
+        name: "batt_temperature",
+        words: "battery hot",
+        unit: "degC",
+        side: Side::Above,
+        warn: Some(Param::BatTempWarn),
+        critical: Some(Param::BatTempCrit),
+        hysteresis: 3.0,
+        when: When::Always,
+        read: temperature_c,
+        ..BATTERY
+    },
+    Check {
+        name: "rail_5v_low",
+        words: "5 V rail low",
+        unit: "V",
+        warn: Some(Param::RailLowWarn),
+        critical: Some(Param::RailLowCrit),
+        hysteresis: 0.05,
+        debounce_warn: Span::from_secs(1),
+        debounce_critical: Span::from_millis(500),
+        when: When::Armed,
+        stale_after: STALE,
+        instances: 1,
+        read: rail_v,
+        ..BATTERY
+    },
+    Check {
+        name: "rail_5v_high",
+        words: "5 V rail high",
+        unit: "V",
+        side: Side::Above,
+        warn: Some(Param::RailHighWarn),
+        critical: None,
+        hysteresis: 0.05,
+        debounce_warn: Span::from_secs(1),
+        stale_after: STALE,
+        instances: 1,
+        read: rail_v,
+        ..BATTERY
+    },
+];
+
+/// A battery's own figure; the autopilot's only where no battery reports itself (it is ambiguous with several).
+fn remaining_percent(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
+    let vehicle = inputs.vehicle;
+    let slot = vehicle.batteries.get(usize::from(battery))?;
+    if let Some(known) = slot.get() {
+        return Reading::new(slot.at(), known.remaining.map(|remaining| remaining.0 * 100.0));
+    }
+    let none_reported = vehicle.batteries.iter().all(|slot| slot.get().is_none());
+    let system = vehicle.system.get().filter(|_| battery == 0 && none_reported)?;
+    Reading::new(vehicle.system.at(), system.remaining.map(|remaining| remaining.0 * 100.0))
+}
+
+fn cell_deviation_v(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
+    let slot = inputs.vehicle.batteries.get(usize::from(battery))?;
+    let cells = slot.get()?.cells.iter().flatten().map(|cell| cell.0);
+    let lowest = cells.clone().fold(f32::INFINITY, f32::min);
+    let highest = cells.fold(f32::NEG_INFINITY, f32::max);
+    Reading::new(slot.at(), Some(highest - lowest))
+}
+
+fn temperature_c(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
+    let slot = inputs.vehicle.batteries.get(usize::from(battery))?;
+    Reading::new(slot.at(), slot.get()?.temperature.map(|temperature| temperature.0))
+}
+
+fn rail_v(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let rails = inputs.vehicle.rails;
+    Reading::new(rails.at(), rails.get()?.vcc.map(|vcc| vcc.0))
+}

@@ -1,0 +1,90 @@
+//! Motors, ESCs and propellers.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, STALE_SLOW, Subsystem};
+use crate::observation::MOTORS_MAX;
+use crate::params::Param;
+use crate::time::Span;
+use crate::vehicle::Motor;
+
+const ESC: Check = Check {
+    name: "esc_silent",
+    words: "ESC silent",
+    subsystem: Subsystem::Propulsion,
+    unit: "s",
+    side: Side::Above,
+    warn: Some(Param::EscAgeWarn),
+    critical: Some(Param::EscAgeCrit),
+    hysteresis: 0.0,
+    debounce_warn: Span::ZERO,
+    debounce_critical: Span::ZERO,
+    when: When::Armed,
+    stale_after: None,
+    instances: MOTORS_MAX as u8,
+    read: |inputs, motor| inputs.derived.esc_silence(inputs, motor),
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    ESC,
+    Check {
+        name: "esc_temperature",
+        words: "ESC hot",
+        unit: "degC",
+        warn: Some(Param::EscTempWarn),
+        critical: Some(Param::EscTempCrit),
+        hysteresis: 3.0,
+        debounce_warn: Span::from_secs(1),
+        debounce_critical: Span::from_millis(500),
+        when: When::Always,
+        stale_after: STALE_SLOW,
+        read: temperature_c,
+        ..ESC
+    },
+    Check {
+        name: "esc_failure",
+        words: "ESC failure",
+        unit: "",
+        warn: Some(Param::EscFailWarn),
+        critical: Some(Param::EscFailCrit),
+        stale_after: STALE_SLOW,
+        when: When::Always,
+        read: failure_rank,
+        ..ESC
+    },
+    Check {
+        name: "motor_imbalance",
+        words: "motor off",
+        unit: "%",
+        warn: Some(Param::MotImbalWarn),
+        critical: Some(Param::MotImbalCrit),
+        hysteresis: 2.0,
+        debounce_warn: Span::from_secs(3),
+        debounce_critical: Span::from_secs(1),
+        when: When::InFlight,
+        stale_after: STALE_SLOW,
+        read: |inputs, motor| inputs.derived.motor_imbalance(inputs, motor),
+        ..ESC
+    },
+];
+
+fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {
+    inputs.vehicle.motors.get(usize::from(motor)).copied()
+}
+
+fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
+    let motor = motor(inputs, number)?;
+    Reading::new(motor.at, motor.esc.temperature.map(|temperature| temperature.0))
+}
+
+/// `ESC_FAILURE_FLAGS`: over current 1, over voltage 2, over temperature 4, over rpm 8, inconsistent command 16, motor
+/// stuck 32, generic 64. A motor that is stuck or an ESC that failed cannot be flown on.
+fn failure_rank(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
+    const CRITICAL: u16 = 32 | 64;
+    let motor = motor(inputs, number)?;
+    let rank = |flags: u16| match flags {
+        0 => 0.0,
+        flags if flags & CRITICAL != 0 => 2.0,
+        _ => 1.0,
+    };
+    Reading::new(motor.at, motor.esc.failures.map(rank))
+}

@@ -1,0 +1,61 @@
+//! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, Subsystem};
+use crate::params::Param;
+use crate::status::Recording;
+use crate::time::Span;
+
+const STATE: Check = Check {
+    name: "recording",
+    words: "not recording",
+    subsystem: Subsystem::Recorder,
+    unit: "",
+    side: Side::Above,
+    warn: Some(Param::RecStopWarn),
+    critical: Some(Param::RecStopCrit),
+    hysteresis: 0.0,
+    debounce_warn: Span::from_secs(1),
+    debounce_critical: Span::from_secs(1),
+    when: When::Always,
+    stale_after: None,
+    instances: 1,
+    read: stopped_rank,
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    STATE,
+    Check {
+        name: "record_queue",
+        words: "card slow",
+        unit: "%",
+        warn: Some(Param::RecQueueWarn),
+        critical: Some(Param::RecQueueCrit),
+        hysteresis: 10.0,
+        debounce_warn: Span::ZERO,
+        debounce_critical: Span::ZERO,
+        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.queue * 100.0 }),
+        ..STATE
+    },
+    Check {
+        name: "record_lost",
+        words: "log frames lost",
+        unit: "frames",
+        warn: Some(Param::RecLostWarn),
+        critical: None,
+        debounce_warn: Span::ZERO,
+        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.frames_lost_lately(inputs) }),
+        ..STATE
+    },
+];
+
+/// 0 recording, 1 not recording, 2 not recording while armed.
+fn stopped_rank(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let value = match inputs.recorder.recording {
+        Recording::Starting => return None,
+        Recording::Running => 0.0,
+        Recording::Stopped if inputs.vehicle.armed() => 2.0,
+        Recording::Stopped => 1.0,
+    };
+    Some(Reading { at: inputs.now, value })
+}

@@ -1,0 +1,76 @@
+//! Vibration, clipping and load factor.
+
+use super::check::{Check, Reading, Side, When};
+use super::{Inputs, STALE, Subsystem};
+use crate::observation::VibrationScale;
+use crate::params::Param;
+use crate::time::Span;
+
+const VIBRATION: Check = Check {
+    name: "vibration",
+    words: "vibration",
+    subsystem: Subsystem::Structure,
+    unit: "m/s2",
+    side: Side::Above,
+    warn: Some(Param::VibeWarn),
+    critical: Some(Param::VibeCrit),
+    hysteresis: 3.0,
+    debounce_warn: Span::from_secs(1),
+    debounce_critical: Span::from_secs(1),
+    when: When::Armed,
+    stale_after: STALE,
+    instances: 1,
+    read: per_axis,
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    VIBRATION,
+    Check {
+        name: "vibration_px4",
+        words: "vibration",
+        warn: Some(Param::VibePx4Warn),
+        critical: Some(Param::VibePx4Crit),
+        hysteresis: 0.5,
+        read: px4_metric,
+        ..VIBRATION
+    },
+    Check {
+        name: "clipping",
+        words: "accel clipping",
+        unit: "",
+        warn: Some(Param::ClipWarn),
+        critical: Some(Param::ClipCrit),
+        hysteresis: 0.0,
+        debounce_warn: Span::ZERO,
+        debounce_critical: Span::ZERO,
+        when: When::InFlight,
+        read: |inputs, _| inputs.derived.clips(inputs),
+        ..VIBRATION
+    },
+    Check {
+        name: "load_factor",
+        words: "load factor",
+        unit: "g",
+        warn: Some(Param::LoadFacWarn),
+        critical: Some(Param::LoadFacCrit),
+        hysteresis: 0.2,
+        debounce_warn: Span::from_millis(100),
+        debounce_critical: Span::from_millis(100),
+        when: When::InFlight,
+        read: |inputs, _| inputs.derived.load_factor(inputs),
+        ..VIBRATION
+    },
+];
+
+fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let slot = &inputs.vehicle.vibration;
+    let vibration = slot.get().filter(|vibration| vibration.scale == VibrationScale::PerAxis)?;
+    Reading::new(slot.at(), vibration.levels.into_iter().flatten().reduce(f32::max))
+}
+
+/// The third of PX4's metrics: high-frequency acceleration.
+fn px4_metric(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    let slot = &inputs.vehicle.vibration;
+    let vibration = slot.get().filter(|vibration| vibration.scale == VibrationScale::Px4Metrics)?;
+    Reading::new(slot.at(), vibration.levels[2])
+}

@@ -1,0 +1,63 @@
+//! The latest value of something, with its time: what is known, and how old the knowledge is.
+
+use crate::time::{Instant, Span};
+
+/// The latest value, or nothing yet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Latest<T> {
+    slot: Option<(Instant, T)>,
+}
+
+impl<T> Default for Latest<T> {
+    fn default() -> Self {
+        Self::nothing()
+    }
+}
+
+impl<T> Latest<T> {
+    /// Nothing yet.
+    pub const fn nothing() -> Self {
+        Self { slot: None }
+    }
+
+    /// Replaces the value.
+    pub fn set(&mut self, at: Instant, value: T) {
+        self.slot = Some((at, value));
+    }
+
+    /// The value, however old.
+    pub const fn get(&self) -> Option<&T> {
+        match &self.slot {
+            Some((_, value)) => Some(value),
+            None => None,
+        }
+    }
+
+    /// When it was set.
+    pub const fn at(&self) -> Option<Instant> {
+        match &self.slot {
+            Some((at, _)) => Some(*at),
+            None => None,
+        }
+    }
+
+    /// The value, if it is younger than `limit`.
+    pub fn within(&self, now: Instant, limit: Span) -> Option<&T> {
+        self.slot.as_ref().filter(|(at, _)| now.since(*at) <= limit).map(|(_, value)| value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_ages() {
+        let mut latest = Latest::nothing();
+        assert_eq!(latest.within(Instant::ZERO, Span::from_secs(9)), None);
+        latest.set(Instant::from_millis(100), 7);
+        assert_eq!(latest.within(Instant::from_millis(600), Span::from_millis(500)), Some(&7));
+        assert_eq!(latest.within(Instant::from_millis(601), Span::from_millis(500)), None);
+        assert_eq!(latest.get(), Some(&7));
+    }
+}

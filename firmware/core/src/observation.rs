@@ -1,0 +1,495 @@
+//! What a vehicle says, in one model for PX4 and ArduPilot: SI units, `None` where the sender did not know.
+//!
+//! The link crate makes these from MAVLink messages and resolves every trap of that format (scales, "unknown" values,
+//! extension fields that read as zero); from here on nobody needs to know where a value came from, but for the few
+//! quantities that the two autopilots define differently, which say so ([`VibrationScale`], [`EstimatorScale`]).
+
+use crate::units::{
+    AmpereHours, Amperes, Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
+    Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
+};
+
+/// Motors of one vehicle at most: a dodecacopter.
+pub const MOTORS_MAX: usize = 12;
+/// Cells of one battery at most: what `BATTERY_STATUS` holds.
+pub const CELLS_MAX: usize = 14;
+/// Motors in one ESC message.
+pub const ESC_GROUP: usize = 4;
+
+/// Who said it: MAVLink system and component id.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Source {
+    /// System id: the vehicle.
+    pub system: u8,
+    /// Component id: which part of it.
+    pub component: u8,
+}
+
+/// Which autopilot firmware speaks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Autopilot {
+    /// `MAV_AUTOPILOT_ARDUPILOTMEGA`
+    ArduPilot,
+    /// `MAV_AUTOPILOT_PX4`
+    Px4,
+    /// Some other autopilot.
+    #[default]
+    Other,
+}
+
+/// What kind of vehicle it is, as far as flight detection and limits care.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VehicleKind {
+    /// Hovers on rotors.
+    Rotorcraft,
+    /// Flies on wings.
+    Plane,
+    /// Both.
+    Vtol,
+    /// Does not fly: rover, boat, submarine.
+    Surface,
+    /// Anything else.
+    #[default]
+    Other,
+}
+
+/// A heartbeat of an autopilot (heartbeats of ground stations, gimbals and companions are not observations).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heartbeat {
+    /// Who made the autopilot.
+    pub autopilot: Autopilot,
+    /// `MAV_AUTOPILOT` as sent.
+    pub autopilot_number: u8,
+    /// What it flies.
+    pub kind: VehicleKind,
+    /// `MAV_TYPE` as sent.
+    pub type_number: u8,
+    /// Motors may turn.
+    pub armed: bool,
+    /// `MAV_STATE` as sent: 3 standby, 4 active, 5 critical, 6 emergency.
+    pub state: u8,
+    /// The autopilot's own mode number.
+    pub mode: u32,
+}
+
+/// The autopilot's processor and its idea of the (first) battery: `SYS_STATUS`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SystemStatus {
+    /// Load of the autopilot's processor.
+    pub load: Option<Fraction>,
+    /// Battery voltage.
+    pub voltage: Option<Volts>,
+    /// Battery current; negative charges.
+    pub current: Option<Amperes>,
+    /// What is left of the battery.
+    pub remaining: Option<Fraction>,
+    /// Sensors present and enabled that report themselves unhealthy (`MAV_SYS_STATUS_SENSOR` bits).
+    pub unhealthy: u32,
+}
+
+/// Time: `SYSTEM_TIME`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SystemTime {
+    /// UTC in microseconds since 1970, when the autopilot knows it.
+    pub utc_micros: Option<u64>,
+    /// Milliseconds since the autopilot's boot.
+    pub boot_ms: u32,
+}
+
+/// One GNSS receiver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gnss {
+    /// Receiver, from 0.
+    pub instance: u8,
+    /// `GPS_FIX_TYPE`: 0 and 1 none, 2 2D, 3 3D, 4 and more better than that.
+    pub fix: u8,
+    /// Satellites in use.
+    pub satellites: Option<u8>,
+    /// Horizontal dilution of precision.
+    pub hdop: Option<f32>,
+    /// Horizontal accuracy (1 sigma).
+    pub accuracy: Option<Metres>,
+    /// Where it is, when it has a fix.
+    pub position: Option<Position>,
+    /// Above mean sea level.
+    pub altitude: Option<Metres>,
+    /// Ground speed.
+    pub speed: Option<MetresPerSecond>,
+}
+
+/// Interference that a GNSS receiver reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GnssIntegrity {
+    /// Receiver, from 0.
+    pub instance: u8,
+    /// Jamming: 0 unknown, 1 none, 2 mitigated, 3 detected (`GPS_JAMMING_STATE`).
+    pub jamming: u8,
+    /// Spoofing: 0 unknown, 1 none, 2 mitigated, 3 detected (`GPS_SPOOFING_STATE`).
+    pub spoofing: u8,
+}
+
+/// One inertial sensor, body axes forward, right, down.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Imu {
+    /// Sensor, from 0.
+    pub instance: u8,
+    /// Specific force.
+    pub acceleration: Option<[MetresPerSecond2; 3]>,
+    /// Angular rate.
+    pub rate: Option<[RadiansPerSecond; 3]>,
+    /// The sensor's temperature.
+    pub temperature: Option<Celsius>,
+}
+
+/// The air outside.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Air {
+    /// Static pressure.
+    pub pressure: Option<Hectopascals>,
+    /// The barometer's temperature.
+    pub temperature: Option<Celsius>,
+}
+
+/// Attitude, Tait-Bryan angles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Attitude {
+    /// Right wing down is positive.
+    pub roll: Radians,
+    /// Nose up is positive.
+    pub pitch: Radians,
+    /// From north, clockwise.
+    pub yaw: Radians,
+}
+
+/// Position and velocity from the local origin, north, east, down.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LocalPosition {
+    /// From the origin.
+    pub position: [Metres; 3],
+    /// Over ground.
+    pub velocity: [MetresPerSecond; 3],
+}
+
+/// The fused global position.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GlobalPosition {
+    /// Where it is, once the autopilot knows.
+    pub position: Option<Position>,
+    /// Above mean sea level.
+    pub altitude: Metres,
+    /// Above home.
+    pub relative_altitude: Metres,
+    /// North, east, down.
+    pub velocity: [MetresPerSecond; 3],
+}
+
+/// What a pilot's display shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hud {
+    /// Through the air.
+    pub airspeed: Option<MetresPerSecond>,
+    /// Over ground.
+    pub groundspeed: Option<MetresPerSecond>,
+    /// 0 to 360 degrees, 0 is north.
+    pub heading_deg: Option<f32>,
+    /// Throttle.
+    pub throttle: Option<Fraction>,
+    /// Above mean sea level (ArduPilot copters: see its parameters).
+    pub altitude: Option<Metres>,
+    /// Up is positive.
+    pub climb: Option<MetresPerSecond>,
+}
+
+/// The pilot's radio control.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RadioControl {
+    /// Signal strength on the device's scale, 0 to 254.
+    pub rssi: Option<u8>,
+}
+
+/// A telemetry radio's own report, in the device's units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TelemetryRadio {
+    /// Signal strength here.
+    pub rssi: Option<u8>,
+    /// Signal strength at the other end.
+    pub remote_rssi: Option<u8>,
+    /// Noise here.
+    pub noise: Option<u8>,
+    /// Noise at the other end.
+    pub remote_noise: Option<u8>,
+    /// Errors since its start.
+    pub errors: u16,
+}
+
+/// The autopilot's rails.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rails {
+    /// The 5 V rail.
+    pub vcc: Option<Volts>,
+    /// The servo rail.
+    pub servo: Option<Volts>,
+}
+
+/// One battery.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Battery {
+    /// Which one.
+    pub id: u8,
+    /// Voltage of each cell, where the battery measures them.
+    pub cells: [Option<Volts>; CELLS_MAX],
+    /// Of the whole battery.
+    pub voltage: Option<Volts>,
+    /// Negative charges.
+    pub current: Option<Amperes>,
+    /// Charge taken since the start.
+    pub consumed: Option<AmpereHours>,
+    /// Energy taken since the start.
+    pub energy: Option<WattHours>,
+    /// What is left.
+    pub remaining: Option<Fraction>,
+    /// Of the battery.
+    pub temperature: Option<Celsius>,
+    /// `MAV_BATTERY_FAULT` bits.
+    pub faults: u32,
+}
+
+impl Default for Battery {
+    fn default() -> Self {
+        Self {
+            id: 0,
+            cells: [None; CELLS_MAX],
+            voltage: None,
+            current: None,
+            consumed: None,
+            energy: None,
+            remaining: None,
+            temperature: None,
+            faults: 0,
+        }
+    }
+}
+
+impl Battery {
+    /// How many cells report a voltage.
+    pub fn cells_reported(&self) -> usize {
+        self.cells.iter().flatten().count()
+    }
+}
+
+/// Which scale an estimator's figures are on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EstimatorScale {
+    /// ArduPilot: variances, its failsafe acts at 0.8 on two of them.
+    #[default]
+    Variance,
+    /// PX4: innovation test ratios, a sensor is rejected above 1.
+    TestRatio,
+}
+
+/// How well the estimator believes its sensors: 0 is perfect.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimator {
+    /// What the figures mean.
+    pub scale: EstimatorScale,
+    /// Velocity.
+    pub velocity: Option<f32>,
+    /// Horizontal position.
+    pub position_horizontal: Option<f32>,
+    /// Vertical position.
+    pub position_vertical: Option<f32>,
+    /// Compass.
+    pub compass: Option<f32>,
+    /// `ESTIMATOR_STATUS_FLAGS` or `EKF_STATUS_FLAGS`, whose lower bits agree.
+    pub flags: u16,
+}
+
+/// Which scale a vibration figure is on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VibrationScale {
+    /// ArduPilot: standard deviation of acceleration a body axis, m/s2.
+    #[default]
+    PerAxis,
+    /// PX4: coning metric, gyro high-frequency metric, accelerometer high-frequency metric.
+    Px4Metrics,
+}
+
+/// Vibration.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Vibration {
+    /// What the levels mean.
+    pub scale: VibrationScale,
+    /// Three levels.
+    pub levels: [Option<f32>; 3],
+    /// Clipped samples of three accelerometers since boot.
+    pub clips: [u32; 3],
+}
+
+/// One motor's ESC; each message fills what it carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Esc {
+    /// Speed; ArduPilot may send electrical speed where the pole count is not set.
+    pub rpm: Option<Rpm>,
+    /// At the ESC.
+    pub voltage: Option<Volts>,
+    /// Of the motor.
+    pub current: Option<Amperes>,
+    /// Of the ESC.
+    pub temperature: Option<Celsius>,
+    /// `ESC_FAILURE_FLAGS`.
+    pub failures: Option<u16>,
+    /// Errors since the ESC's start; may wrap.
+    pub errors: Option<u32>,
+}
+
+/// A group of ESCs: motor `first`, `first + 1`, …
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EscGroup {
+    /// Motor number of the first, from 0.
+    pub first: u8,
+    /// `None` where there is no such motor.
+    pub escs: [Option<Esc>; ESC_GROUP],
+}
+
+/// A combustion engine; `None` where the controller does not measure it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Engine {
+    /// Whether the controller reports itself healthy.
+    pub healthy: bool,
+    /// Crankshaft speed.
+    pub rpm: Option<Rpm>,
+    /// Engine load.
+    pub load: Option<Fraction>,
+    /// Fuel taken, in the controller's unit (g or cm3).
+    pub fuel_consumed: Option<f32>,
+    /// Fuel flow, g/min or cm3/min.
+    pub fuel_flow: Option<f32>,
+    /// Cylinder head.
+    pub cylinder_head: Option<Celsius>,
+    /// Exhaust gas.
+    pub exhaust: Option<Celsius>,
+    /// Intake air.
+    pub intake: Option<Celsius>,
+    /// Fuel pressure.
+    pub fuel_pressure: Option<Hectopascals>,
+    /// Ignition supply.
+    pub ignition: Option<Volts>,
+}
+
+/// A speed sensor: `RPM` or `RAW_RPM`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpeedSensor {
+    /// Sensor, from 0.
+    pub index: u8,
+    /// What it measures.
+    pub rpm: Rpm,
+}
+
+/// Whether the vehicle is on the ground: `EXTENDED_SYS_STATE`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LandedState {
+    /// The autopilot does not know.
+    #[default]
+    Unknown,
+    /// On the ground.
+    OnGround,
+    /// In the air.
+    InAir,
+    /// Taking off.
+    TakingOff,
+    /// Landing.
+    Landing,
+}
+
+/// The autopilot's processor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Processor {
+    /// Its temperature.
+    pub temperature: Option<Celsius>,
+    /// Its supply.
+    pub voltage: Option<Volts>,
+}
+
+/// Which autopilot it is: `AUTOPILOT_VERSION`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AutopilotIdentity {
+    /// Flight firmware version, major, minor, patch, type from the top byte down.
+    pub firmware: u32,
+    /// The autopilot's unique id; 0 unknown.
+    pub uid: u64,
+}
+
+/// An answer to a command: `COMMAND_ACK`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CommandAck {
+    /// `MAV_CMD`.
+    pub command: u16,
+    /// `MAV_RESULT`.
+    pub result: u8,
+}
+
+/// One message's worth of knowledge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Observation {
+    /// `HEARTBEAT` of an autopilot.
+    Heartbeat(Heartbeat),
+    /// `SYS_STATUS`
+    SystemStatus(SystemStatus),
+    /// `SYSTEM_TIME`
+    SystemTime(SystemTime),
+    /// `GPS_RAW_INT`, `GPS2_RAW`
+    Gnss(Gnss),
+    /// `GNSS_INTEGRITY`
+    GnssIntegrity(GnssIntegrity),
+    /// `SCALED_IMU*`, `RAW_IMU`, `HIGHRES_IMU`
+    Imu(Imu),
+    /// `SCALED_PRESSURE`, `HIGHRES_IMU`
+    Air(Air),
+    /// `HIGHRES_IMU`: both at once.
+    ImuAndAir(Imu, Air),
+    /// `ATTITUDE`
+    Attitude(Attitude),
+    /// `LOCAL_POSITION_NED`
+    LocalPosition(LocalPosition),
+    /// `GLOBAL_POSITION_INT`
+    GlobalPosition(GlobalPosition),
+    /// `VFR_HUD`
+    Hud(Hud),
+    /// `RC_CHANNELS`
+    RadioControl(RadioControl),
+    /// `RADIO_STATUS`
+    TelemetryRadio(TelemetryRadio),
+    /// `POWER_STATUS`
+    Rails(Rails),
+    /// `BATTERY_STATUS`
+    Battery(Battery),
+    /// `EKF_STATUS_REPORT`, `ESTIMATOR_STATUS`
+    Estimator(Estimator),
+    /// `VIBRATION`
+    Vibration(Vibration),
+    /// `ESC_INFO`, `ESC_STATUS`, `ESC_TELEMETRY_*`
+    Escs(EscGroup),
+    /// `EFI_STATUS`
+    Engine(Engine),
+    /// `RPM` (two sensors), `RAW_RPM`
+    SpeedSensors([Option<SpeedSensor>; 2]),
+    /// `EXTENDED_SYS_STATE`
+    Landed(LandedState),
+    /// `MCU_STATUS`
+    Processor(Processor),
+    /// `AUTOPILOT_VERSION`
+    Identity(AutopilotIdentity),
+    /// `MISSION_CURRENT`: the item in work.
+    MissionCurrent(u16),
+    /// `MISSION_ITEM_REACHED`
+    MissionReached(u16),
+    /// `COMMAND_ACK`
+    CommandAck(CommandAck),
+    /// `FLIGHT_INFORMATION`: the number of the flight and its take-off, milliseconds since boot (0 not yet).
+    FlightInformation {
+        /// The flight's unique number.
+        flight: u64,
+        /// Milliseconds since the autopilot's boot; 0 before take-off.
+        takeoff_boot_ms: u32,
+    },
+}

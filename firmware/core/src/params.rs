@@ -1,0 +1,183 @@
+//! The parameter table: every limit and setting, in one place, with unit, default, range and source. Names are those
+//! that a ground station shows (at most 16 characters); a limit that is NaN is off.
+
+/// What is known of a parameter but its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParamSpec {
+    /// At most 16 characters: what `PARAM_VALUE` carries.
+    pub name: &'static str,
+    /// The unit of value, default and range.
+    pub unit: &'static str,
+    /// Used until it is set.
+    pub default: f32,
+    /// The smallest value that is accepted.
+    pub min: f32,
+    /// The largest value that is accepted.
+    pub max: f32,
+    /// Where the default comes from.
+    pub source: &'static str,
+}
+
+macro_rules! params {
+    ($($variant:ident $name:literal $unit:literal $default:literal $min:literal $max:literal $source:literal;)*) => {
+        /// A parameter; its number is its index in [`TABLE`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum Param {
+            $(#[doc = concat!("`", $name, "`: ", $source)] $variant,)*
+        }
+
+        /// All parameters, in the order of [`Param`].
+        pub const TABLE: &[ParamSpec] = &[
+            $(ParamSpec {
+                name: $name, unit: $unit, default: $default, min: $min, max: $max, source: $source,
+            },)*
+        ];
+
+        /// The values of all parameters.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Params([f32; TABLE.len()]);
+
+        impl Params {
+            /// All defaults.
+            pub const fn defaults() -> Self {
+                Self([$($default,)*])
+            }
+        }
+    };
+}
+
+params! {
+    BatRemWarn "BAT_REM_WARN" "%" 15.0 0.0 100.0 "PX4 commander, COM_LOW_BAT (BAT_LOW_THR 15 %)";
+    BatRemCrit "BAT_REM_CRIT" "%" 7.0 0.0 100.0 "PX4 commander, BAT_CRIT_THR 7 %";
+    BatCells "BAT_CELLS" "" 0.0 0.0 14.0 "0: reported, or found from the highest voltage seen";
+    CellVoltWarn "CELL_VOLT_WARN" "V" 3.6 0.0 4.5 "common LiPo practice";
+    CellVoltCrit "CELL_VOLT_CRIT" "V" 3.5 0.0 4.5 "common LiPo practice";
+    CellDevWarn "CELL_DEV_WARN" "V" 0.07 0.0 2.0 "AirData: 0.07 V for 10 s";
+    CellDevCrit "CELL_DEV_CRIT" "V" 0.15 0.0 2.0 "AirData: 0.15 V for 10 s";
+    BatTempWarn "BAT_TEMP_WARN" "degC" 60.0 0.0 150.0 "battery vendors";
+    BatTempCrit "BAT_TEMP_CRIT" "degC" 75.0 0.0 150.0 "battery vendors";
+    RailLowWarn "RAIL_LOW_WARN" "V" 4.8 0.0 6.0 "PX4 power check";
+    RailLowCrit "RAIL_LOW_CRIT" "V" 4.5 0.0 6.0 "PX4 power check";
+    RailHighWarn "RAIL_HIGH_WARN" "V" 5.4 0.0 6.0 "PX4 power check";
+    EscAgeWarn "ESC_AGE_WARN" "s" 0.3 0.05 60.0 "PX4 ESC telemetry timeout 300 ms";
+    EscAgeCrit "ESC_AGE_CRIT" "s" 2.0 0.05 60.0 "ESC telemetry silent for good";
+    EscTempWarn "ESC_TEMP_WARN" "degC" 90.0 0.0 200.0 "ESC vendors";
+    EscTempCrit "ESC_TEMP_CRIT" "degC" 110.0 0.0 200.0 "ESC vendors";
+    MotImbalWarn "MOT_IMBAL_WARN" "%" 15.0 1.0 100.0 "LogHat; PX4 imbalanced propeller metric";
+    MotImbalCrit "MOT_IMBAL_CRIT" "%" 30.0 1.0 100.0 "LogHat; PX4 imbalanced propeller metric 30";
+    VibeWarn "VIBE_WARN" "m/s2" 30.0 0.0 500.0 "ArduPilot vibration guide";
+    VibeCrit "VIBE_CRIT" "m/s2" 60.0 0.0 500.0 "ArduPilot vibration guide";
+    VibePx4Warn "VIBE_PX4_WARN" "m/s2" 4.905 0.0 500.0 "PX4 Flight Review: accelerometer metric, yellow";
+    VibePx4Crit "VIBE_PX4_CRIT" "m/s2" 9.81 0.0 500.0 "PX4 Flight Review: accelerometer metric, red";
+    ClipWarn "CLIP_WARN" "" 1.0 1.0 100_000.0 "ArduPilot vibration guide: clipping should not rise";
+    ClipCrit "CLIP_CRIT" "" 100.0 1.0 100_000.0 "ArduPilot vibration guide: more than 100 a flight";
+    LoadFacWarn "LOAD_FAC_WARN" "g" 2.5 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
+    LoadFacCrit "LOAD_FAC_CRIT" "g" 4.0 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
+    EkfVarWarn "EKF_VAR_WARN" "" 0.5 0.0 10.0 "ArduPilot EKF failsafe, half way";
+    EkfVarCrit "EKF_VAR_CRIT" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8 on two of three";
+    EkfRatioWarn "EKF_RATIO_WARN" "" 0.5 0.0 10.0 "PX4 innovation test ratio, half way";
+    EkfRatioCrit "EKF_RATIO_CRIT" "" 1.0 0.0 10.0 "PX4: a ratio above 1 rejects the sensor";
+    GpsSatsWarn "GPS_SATS_WARN" "" 12.0 0.0 60.0 "PX4 Flight Review guide";
+    GpsHdopWarn "GPS_HDOP_WARN" "" 1.5 0.0 50.0 "PX4 Flight Review guide";
+    GpsHaccWarn "GPS_HACC_WARN" "m" 1.0 0.0 100.0 "PX4 Flight Review guide";
+    GpsFixCrit "GPS_FIX_CRIT" "" 3.0 0.0 6.0 "less than a 3D fix in flight";
+    LinkAgeWarn "LINK_AGE_WARN" "s" 2.0 0.5 60.0 "MAVLink heartbeat protocol";
+    LinkAgeCrit "LINK_AGE_CRIT" "s" 5.0 0.5 60.0 "MAVLink heartbeat protocol: 4 to 5 missed";
+    LinkLossWarn "LINK_LOSS_WARN" "%" 1.0 0.0 100.0 "frames lost on the autopilot's port";
+    LinkLossCrit "LINK_LOSS_CRIT" "%" 5.0 0.0 100.0 "frames lost on the autopilot's port";
+    RcRssiWarn "RC_RSSI_WARN" "" 0.0 0.0 254.0 "device scale; 0 is off";
+    RcRssiCrit "RC_RSSI_CRIT" "" 0.0 0.0 254.0 "device scale; 0 is off";
+    RadioMargWarn "RADIO_MARG_WARN" "" 10.0 0.0 254.0 "SiK radio: rssi above noise, device scale";
+    CpuLoadWarn "CPU_LOAD_WARN" "%" 80.0 0.0 100.0 "PX4 CPU check";
+    CpuLoadCrit "CPU_LOAD_CRIT" "%" 95.0 0.0 100.0 "PX4 CPU check";
+    McuTempWarn "MCU_TEMP_WARN" "degC" 85.0 0.0 150.0 "PX4; STM32 ambient limit";
+    McuTempCrit "MCU_TEMP_CRIT" "degC" 100.0 0.0 150.0 "PX4; STM32 junction limit 105";
+    TiltWarn "TILT_WARN" "deg" 45.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60";
+    TiltCrit "TILT_CRIT" "deg" 60.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60";
+    RecQueueWarn "REC_QUEUE_WARN" "%" 50.0 0.0 100.0 "half of what a standing card may fill";
+    RecQueueCrit "REC_QUEUE_CRIT" "%" 90.0 0.0 100.0 "frames are lost next";
+    RecStopWarn "REC_STOP_WARN" "" 0.5 0.0 3.0 "1: not recording";
+    RecStopCrit "REC_STOP_CRIT" "" 1.5 0.0 3.0 "2: not recording while armed (PX4#12565, ardupilot#6863)";
+    RecLostWarn "REC_LOST_WARN" "frames" 0.5 0.0 1_000_000.0 "any frame lost in the last ten seconds";
+    EscFailWarn "ESC_FAIL_WARN" "" 0.5 0.0 3.0 "1: any ESC failure flag";
+    EscFailCrit "ESC_FAIL_CRIT" "" 1.5 0.0 3.0 "2: motor stuck, or the ESC failed";
+    EngChtWarn "ENG_CHT_WARN" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngChtCrit "ENG_CHT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngEgtWarn "ENG_EGT_WARN" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngEgtCrit "ENG_EGT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
+    EngFuelWarn "ENG_FUEL_WARN" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
+    EngFuelCrit "ENG_FUEL_CRIT" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
+    GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated";
+    GpsJamCrit "GPS_JAM_CRIT" "" 2.5 0.0 4.0 "GNSS_INTEGRITY: 3 is detected";
+    Latch "HEALTH_LATCH" "" 0.0 0.0 1.0 "1: a warning stays until the vehicle disarms";
+    GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self::defaults()
+    }
+}
+
+impl Params {
+    /// A parameter's value.
+    pub const fn get(&self, param: Param) -> f32 {
+        self.0[param as usize]
+    }
+
+    /// Sets a parameter by name; `Err` says what is wrong with name or value, and nothing changed.
+    pub fn set(&mut self, name: &str, value: f32) -> Result<(), ParamError> {
+        let index = TABLE.iter().position(|spec| spec.name == name).ok_or(ParamError::UnknownName)?;
+        let spec = &TABLE[index];
+        if !(spec.min..=spec.max).contains(&value) {
+            return Err(ParamError::OutOfRange { min: spec.min, max: spec.max });
+        }
+        self.0[index] = value;
+        Ok(())
+    }
+
+    /// All parameters with their values, in table order.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static ParamSpec, f32)> {
+        TABLE.iter().zip(self.0)
+    }
+}
+
+/// Why a parameter was not set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ParamError {
+    /// No parameter has this name.
+    UnknownName,
+    /// The value is not a number within the range.
+    OutOfRange {
+        /// The smallest value that is accepted.
+        min: f32,
+        /// The largest value that is accepted.
+        max: f32,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_fit_a_param_value_and_are_unique() {
+        for (index, spec) in TABLE.iter().enumerate() {
+            assert!(spec.name.len() <= 16, "{}", spec.name);
+            assert!(TABLE[..index].iter().all(|other| other.name != spec.name), "{}", spec.name);
+            assert!((spec.min..=spec.max).contains(&spec.default), "{}", spec.name);
+        }
+    }
+
+    #[test]
+    fn a_value_out_of_range_changes_nothing() {
+        let mut params = Params::defaults();
+        assert_eq!(params.set("BAT_REM_WARN", 101.0), Err(ParamError::OutOfRange { min: 0.0, max: 100.0 }));
+        assert!(params.set("BAT_REM_WARN", f32::NAN).is_err());
+        assert_eq!(params.set("NO_SUCH", 1.0), Err(ParamError::UnknownName));
+        assert_eq!(params, Params::defaults());
+        params.set("BAT_REM_WARN", 20.0).expect("in range");
+        assert!((params.get(Param::BatRemWarn) - 20.0).abs() < f32::EPSILON);
+    }
+}

@@ -1,0 +1,309 @@
+//! Usage: what a mechanic acts on. Counters since power-on, each a number that is stored, with a name that carries its
+//! unit.
+
+use crate::derived::Derived;
+use crate::flight::{Flight, FlightEvent, ground_speed_mps};
+use crate::observation::{MOTORS_MAX, Observation};
+use crate::time::{Instant, Span};
+use crate::vehicle::Vehicle;
+
+macro_rules! counters {
+    ($($(#[$doc:meta])* $variant:ident = $number:literal $name:literal;)*) => {
+        /// A usage counter. The numbers are stored in logs and never change meaning.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum UsageCounter {
+            $($(#[$doc])* $variant = $number,)*
+        }
+
+        impl UsageCounter {
+            /// All counters that are not one a motor, by number.
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+
+            /// The name, which ends in the unit.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)*
+                }
+            }
+        }
+    };
+}
+
+counters! {
+    /// Seconds since power-on.
+    Powered = 0 "powered_time_s";
+    /// Seconds armed.
+    Armed = 1 "armed_time_s";
+    /// Seconds in the air.
+    Flight = 2 "flight_time_s";
+    /// Take-offs.
+    Flights = 3 "flights";
+    /// Landings.
+    Landings = 4 "landings";
+    /// Metres over ground while in the air.
+    Distance = 5 "distance_m";
+    /// The greatest height above home, metres.
+    HeightMax = 6 "height_max_m";
+    /// The greatest speed over ground, m/s.
+    SpeedMax = 7 "speed_max_m_s";
+    /// The greatest load factor in the air, units of gravity.
+    LoadFactorMax = 8 "load_factor_max_g";
+    /// Charge taken from the first battery, ampere hours.
+    Charge = 9 "charge_ah";
+    /// Energy taken from the first battery, watt hours.
+    Energy = 10 "energy_wh";
+    /// The highest battery current, amperes.
+    CurrentMax = 11 "current_max_a";
+    /// The lowest battery voltage while armed, volts.
+    VoltageMin = 12 "voltage_min_v";
+    /// The highest vibration while armed, on the autopilot's own scale, m/s2.
+    VibrationMax = 13 "vibration_max_m_s2";
+    /// Reboots of the autopilot.
+    AutopilotReboots = 14 "autopilot_reboots";
+}
+
+/// Counters one a motor: run time in seconds from this number on, motor by motor.
+pub const MOTOR_TIME_FIRST: u8 = 100;
+/// Counters one a motor: revolutions from this number on, motor by motor.
+pub const MOTOR_REVOLUTIONS_FIRST: u8 = 120;
+
+/// What a stored counter number means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CounterName {
+    /// A counter of the vehicle.
+    Vehicle(&'static str),
+    /// A counter of one motor, numbered from 0: name and motor.
+    Motor(&'static str, u8),
+}
+
+/// The meaning of a stored counter number; `None` for one that a later version wrote.
+pub fn counter_name(number: u8) -> Option<CounterName> {
+    let motor = |first: u8| number.checked_sub(first).filter(|motor| usize::from(*motor) < MOTORS_MAX);
+    if let Some(motor) = motor(MOTOR_TIME_FIRST) {
+        return Some(CounterName::Motor("run_time_s", motor));
+    }
+    if let Some(motor) = motor(MOTOR_REVOLUTIONS_FIRST) {
+        return Some(CounterName::Motor("revolutions", motor));
+    }
+    UsageCounter::ALL
+        .iter()
+        .find(|counter| **counter as u8 == number)
+        .map(|counter| CounterName::Vehicle(counter.name()))
+}
+
+/// Integration steps longer than this are gaps: nothing is known of what happened in them.
+const STEP_MAX: Span = Span::from_secs(2);
+/// A battery figure holds this long.
+const BATTERY_AGE: Span = Span::from_secs(5);
+/// A motor speed holds this long.
+const MOTOR_AGE: Span = Span::from_secs(2);
+
+#[derive(Clone, Copy, Debug, Default)]
+struct MotorUsage {
+    seconds: f64,
+    revolutions: f64,
+}
+
+/// Usage since power-on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Usage {
+    last: Option<Instant>,
+    armed_s: f64,
+    flight_s: f64,
+    flights: u32,
+    landings: u32,
+    distance_m: f64,
+    height_max_m: f32,
+    speed_max_mps: f32,
+    load_factor_max_g: f32,
+    charge_ah: f64,
+    energy_wh: f64,
+    current_max_a: f32,
+    voltage_min_v: Option<f32>,
+    vibration_max: f32,
+    reboots: u32,
+    motors: [MotorUsage; MOTORS_MAX],
+}
+
+impl Usage {
+    /// All zero.
+    pub const fn new() -> Self {
+        Self {
+            last: None,
+            armed_s: 0.0,
+            flight_s: 0.0,
+            flights: 0,
+            landings: 0,
+            distance_m: 0.0,
+            height_max_m: 0.0,
+            speed_max_mps: 0.0,
+            load_factor_max_g: 0.0,
+            charge_ah: 0.0,
+            energy_wh: 0.0,
+            current_max_a: 0.0,
+            voltage_min_v: None,
+            vibration_max: 0.0,
+            reboots: 0,
+            motors: [MotorUsage { seconds: 0.0, revolutions: 0.0 }; MOTORS_MAX],
+        }
+    }
+
+    /// Takes an observation's extremes, which a step could miss.
+    pub fn observe(
+        &mut self,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        derived: &Derived,
+        observation: &Observation,
+    ) {
+        match observation {
+            Observation::Vibration(vibration) if vehicle.armed() => {
+                let highest = vibration.levels.into_iter().flatten().fold(0.0, f32::max);
+                self.vibration_max = greater(self.vibration_max, highest);
+            }
+            Observation::Imu(_) | Observation::ImuAndAir(..) if flight.airborne() => {
+                let load_factor_g = derived.load_factor_g().unwrap_or(0.0);
+                self.load_factor_max_g = greater(self.load_factor_max_g, load_factor_g);
+            }
+            Observation::GlobalPosition(global) if flight.airborne() => {
+                self.height_max_m = greater(self.height_max_m, global.relative_altitude.0);
+            }
+            Observation::Battery(_) | Observation::SystemStatus(_) if vehicle.armed() => {
+                self.take_battery(vehicle);
+            }
+            _ => {}
+        }
+    }
+
+    fn take_battery(&mut self, vehicle: &Vehicle) {
+        let (voltage_v, current_a) = power(vehicle);
+        if let Some(voltage_v) = voltage_v.filter(|voltage_v| *voltage_v > 0.0) {
+            self.voltage_min_v = Some(self.voltage_min_v.map_or(voltage_v, |lowest| lowest.min(voltage_v)));
+        }
+        self.current_max_a = greater(self.current_max_a, current_a.unwrap_or(0.0));
+    }
+
+    /// One step, at least every 50 ms, after the flight's own.
+    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, event: Option<FlightEvent>) {
+        match event {
+            Some(FlightEvent::TakeOff) => self.flights += 1,
+            Some(FlightEvent::Landing) => self.landings += 1,
+            None => {}
+        }
+        self.reboots = vehicle.reboots;
+        let step = self.last.map_or(Span::ZERO, |last| now.since(last));
+        self.last = Some(now);
+        if step > STEP_MAX {
+            return;
+        }
+        let step_s = f64::from(step.as_secs_f32());
+        if vehicle.armed() {
+            self.armed_s += step_s;
+        }
+        if flight.airborne() {
+            self.flight_s += step_s;
+            if let Some(speed_mps) = ground_speed_mps(now, vehicle) {
+                self.distance_m += f64::from(speed_mps) * step_s;
+                self.speed_max_mps = greater(self.speed_max_mps, speed_mps);
+            }
+        }
+        self.step_battery(now, vehicle, step_s);
+        self.step_motors(now, vehicle, step_s);
+    }
+
+    fn step_battery(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
+        let at = vehicle.batteries[0].at().or(vehicle.system.at());
+        if at.is_none_or(|at| now.since(at) > BATTERY_AGE) {
+            return;
+        }
+        let (voltage_v, current_a) = power(vehicle);
+        let Some(current_a) = current_a else { return };
+        self.charge_ah += f64::from(current_a) * step_s / 3_600.0;
+        if let Some(voltage_v) = voltage_v {
+            self.energy_wh += f64::from(voltage_v * current_a) * step_s / 3_600.0;
+        }
+    }
+
+    fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
+        for (number, usage) in self.motors.iter_mut().enumerate() {
+            let motor = &vehicle.motors[number];
+            let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
+            if fresh && Derived::turns(vehicle, number) {
+                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs());
+                usage.seconds += step_s;
+                usage.revolutions += f64::from(rpm) * step_s / 60.0;
+            }
+        }
+    }
+
+    /// Every counter that has something to say: its stored number and its value.
+    pub fn for_each(&self, mut each: impl FnMut(u8, f64)) {
+        for counter in UsageCounter::ALL {
+            if let Some(value) = self.value(*counter) {
+                each(*counter as u8, value);
+            }
+        }
+        for (motor, usage) in (0..).zip(&self.motors) {
+            if usage.seconds > 0.0 {
+                each(MOTOR_TIME_FIRST + motor, usage.seconds);
+                each(MOTOR_REVOLUTIONS_FIRST + motor, usage.revolutions);
+            }
+        }
+    }
+
+    /// A counter's value; `None` for a minimum that was never measured.
+    pub fn value(&self, counter: UsageCounter) -> Option<f64> {
+        Some(match counter {
+            UsageCounter::Powered => self.last.map_or(0.0, Instant::as_secs_f64),
+            UsageCounter::Armed => self.armed_s,
+            UsageCounter::Flight => self.flight_s,
+            UsageCounter::Flights => f64::from(self.flights),
+            UsageCounter::Landings => f64::from(self.landings),
+            UsageCounter::Distance => self.distance_m,
+            UsageCounter::HeightMax => f64::from(self.height_max_m),
+            UsageCounter::SpeedMax => f64::from(self.speed_max_mps),
+            UsageCounter::LoadFactorMax => f64::from(self.load_factor_max_g),
+            UsageCounter::Charge => self.charge_ah,
+            UsageCounter::Energy => self.energy_wh,
+            UsageCounter::CurrentMax => f64::from(self.current_max_a),
+            UsageCounter::VoltageMin => f64::from(self.voltage_min_v?),
+            UsageCounter::VibrationMax => f64::from(self.vibration_max),
+            UsageCounter::AutopilotReboots => f64::from(self.reboots),
+        })
+    }
+}
+
+/// The larger one; what is no number or no sensible size is left out.
+fn greater(highest: f32, value: f32) -> f32 {
+    if value.is_finite() { highest.max(value) } else { highest }
+}
+
+/// Voltage and discharge current of the first battery, or the autopilot's figures where none reports itself.
+fn power(vehicle: &Vehicle) -> (Option<f32>, Option<f32>) {
+    let (voltage, current) = match (vehicle.batteries[0].get(), vehicle.system.get()) {
+        (Some(battery), _) => (battery.voltage, battery.current),
+        (None, Some(system)) => (system.voltage, system.current),
+        (None, None) => (None, None),
+    };
+    let finite = |value: f32| value.is_finite().then_some(value);
+    let current = current.and_then(|current| finite(current.0)).map(|current| current.max(0.0));
+    (voltage.and_then(|voltage| finite(voltage.0)), current)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_counter_has_a_number_of_its_own_and_a_name() {
+        let mut count = 0;
+        for number in 0..=255 {
+            if let Some(name) = counter_name(number) {
+                count += 1;
+                assert!(!matches!(name, CounterName::Vehicle("")), "{number}");
+            }
+        }
+        assert_eq!(count, UsageCounter::ALL.len() + 2 * MOTORS_MAX);
+    }
+}

@@ -1,0 +1,313 @@
+//! What is known of the vehicle now: the latest of each observation with its time.
+//!
+//! The vehicle is the first system whose autopilot sends a heartbeat; other systems on the link (ground stations, other
+//! vehicles) are recorded but not monitored. Bounded: [`BATTERIES_MAX`] batteries, [`MOTORS_MAX`] motors; what is
+//! beyond is recorded only.
+
+use crate::latest::Latest;
+use crate::observation::{
+    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
+    GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
+    Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio, Vibration,
+    VibrationScale,
+};
+use crate::time::Instant;
+
+/// Batteries that are monitored.
+pub const BATTERIES_MAX: usize = 4;
+/// GNSS receivers that are monitored.
+pub const RECEIVERS_MAX: usize = 2;
+/// A boot time that falls by more than this is a reboot, not reordering.
+const REBOOT_MS: u32 = 1_000;
+
+/// One motor, put together from whichever ESC messages the vehicle sends.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motor {
+    /// What its ESC said last, field by field.
+    pub esc: Esc,
+    /// When it said anything.
+    pub at: Option<Instant>,
+    /// When `rpm` or `current` came.
+    pub moved_at: Option<Instant>,
+}
+
+/// The vehicle as it is known now.
+#[derive(Clone, Copy, Debug)]
+pub struct Vehicle {
+    /// The autopilot, once it has sent a heartbeat.
+    pub source: Option<Source>,
+    /// The autopilot's heartbeat.
+    pub heartbeat: Latest<Heartbeat>,
+    /// `SYS_STATUS`
+    pub system: Latest<SystemStatus>,
+    /// `SYSTEM_TIME`
+    pub time: Latest<SystemTime>,
+    /// Receivers by instance.
+    pub gnss: [Latest<Gnss>; RECEIVERS_MAX],
+    /// Receivers by instance.
+    pub gnss_integrity: [Latest<GnssIntegrity>; RECEIVERS_MAX],
+    /// The first inertial sensor.
+    pub imu: Latest<Imu>,
+    /// The air.
+    pub air: Latest<Air>,
+    /// Attitude.
+    pub attitude: Latest<Attitude>,
+    /// Position from the local origin.
+    pub local: Latest<LocalPosition>,
+    /// The fused position.
+    pub global: Latest<GlobalPosition>,
+    /// The pilot's display.
+    pub hud: Latest<Hud>,
+    /// Radio control.
+    pub rc: Latest<RadioControl>,
+    /// The telemetry radio.
+    pub radio: Latest<TelemetryRadio>,
+    /// The autopilot's rails.
+    pub rails: Latest<Rails>,
+    /// Batteries in the order in which they were first seen.
+    pub batteries: [Latest<Battery>; BATTERIES_MAX],
+    /// The estimator.
+    pub estimator: Latest<Estimator>,
+    /// Vibration.
+    pub vibration: Latest<Vibration>,
+    /// Motors by number.
+    pub motors: [Motor; MOTORS_MAX],
+    /// The combustion engine.
+    pub engine: Latest<Engine>,
+    /// The autopilot's word on flying.
+    pub landed: Latest<LandedState>,
+    /// The autopilot's processor.
+    pub processor: Latest<Processor>,
+    /// The autopilot's identity.
+    pub identity: Latest<AutopilotIdentity>,
+    /// The last answer to a command.
+    pub command_ack: Latest<CommandAck>,
+    /// How often the autopilot has rebooted since our power-on.
+    pub reboots: u32,
+}
+
+impl Default for Vehicle {
+    fn default() -> Self {
+        Self::unknown()
+    }
+}
+
+impl Vehicle {
+    /// Nothing known.
+    pub const fn unknown() -> Self {
+        Self {
+            source: None,
+            heartbeat: Latest::nothing(),
+            system: Latest::nothing(),
+            time: Latest::nothing(),
+            gnss: [const { Latest::nothing() }; RECEIVERS_MAX],
+            gnss_integrity: [const { Latest::nothing() }; RECEIVERS_MAX],
+            imu: Latest::nothing(),
+            air: Latest::nothing(),
+            attitude: Latest::nothing(),
+            local: Latest::nothing(),
+            global: Latest::nothing(),
+            hud: Latest::nothing(),
+            rc: Latest::nothing(),
+            radio: Latest::nothing(),
+            rails: Latest::nothing(),
+            batteries: [const { Latest::nothing() }; BATTERIES_MAX],
+            estimator: Latest::nothing(),
+            vibration: Latest::nothing(),
+            motors: [Motor {
+                esc: Esc {
+                    rpm: None,
+                    voltage: None,
+                    current: None,
+                    temperature: None,
+                    failures: None,
+                    errors: None,
+                },
+                at: None,
+                moved_at: None,
+            }; MOTORS_MAX],
+            engine: Latest::nothing(),
+            landed: Latest::nothing(),
+            processor: Latest::nothing(),
+            identity: Latest::nothing(),
+            command_ack: Latest::nothing(),
+            reboots: 0,
+        }
+    }
+
+    /// Whether motors may turn, by the last heartbeat.
+    pub fn armed(&self) -> bool {
+        self.heartbeat.get().is_some_and(|heartbeat| heartbeat.armed)
+    }
+
+    /// Takes an observation; `false` when it is not of this vehicle.
+    pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
+        if self.source.is_none() && matches!(observation, Observation::Heartbeat(_)) {
+            self.source = Some(source);
+        }
+        if !self.concerns(source, observation) {
+            return false;
+        }
+        self.take(at, observation);
+        true
+    }
+
+    /// Batteries, ESCs and engines may be components of their own; a radio is a system of its own (51, 68).
+    fn concerns(&self, source: Source, observation: &Observation) -> bool {
+        match observation {
+            Observation::TelemetryRadio(_) => true,
+            Observation::Battery(_) | Observation::Escs(_) | Observation::Engine(_) => {
+                self.source.is_some_and(|vehicle| vehicle.system == source.system)
+            }
+            _ => self.source == Some(source),
+        }
+    }
+
+    fn take(&mut self, at: Instant, observation: &Observation) {
+        match *observation {
+            Observation::Heartbeat(heartbeat) => self.heartbeat.set(at, heartbeat),
+            Observation::SystemStatus(system) => self.system.set(at, system),
+            Observation::SystemTime(time) => self.take_time(at, time),
+            Observation::Gnss(gnss) => set_instance(&mut self.gnss, gnss.instance, at, gnss),
+            Observation::GnssIntegrity(integrity) => {
+                set_instance(&mut self.gnss_integrity, integrity.instance, at, integrity);
+            }
+            Observation::Imu(imu) => self.take_imu(at, imu),
+            Observation::Air(air) => self.air.set(at, air),
+            Observation::ImuAndAir(imu, air) => {
+                self.take_imu(at, imu);
+                self.air.set(at, air);
+            }
+            Observation::Attitude(attitude) => self.attitude.set(at, attitude),
+            Observation::LocalPosition(local) => self.local.set(at, local),
+            Observation::GlobalPosition(global) => self.global.set(at, global),
+            Observation::Hud(hud) => self.hud.set(at, hud),
+            Observation::RadioControl(rc) => self.rc.set(at, rc),
+            Observation::TelemetryRadio(radio) => self.radio.set(at, radio),
+            Observation::Rails(rails) => self.rails.set(at, rails),
+            Observation::Battery(battery) => self.take_battery(at, battery),
+            Observation::Estimator(estimator) => self.estimator.set(at, estimator),
+            Observation::Vibration(vibration) => self.take_vibration(at, vibration),
+            Observation::Escs(group) => self.take_escs(at, &group),
+            Observation::Engine(engine) => self.engine.set(at, engine),
+            Observation::Landed(landed) => self.landed.set(at, landed),
+            Observation::Processor(processor) => self.processor.set(at, processor),
+            Observation::Identity(identity) => self.identity.set(at, identity),
+            Observation::CommandAck(ack) => self.command_ack.set(at, ack),
+            Observation::SpeedSensors(_)
+            | Observation::MissionCurrent(_)
+            | Observation::MissionReached(_)
+            | Observation::FlightInformation { .. } => {}
+        }
+    }
+
+    fn take_time(&mut self, at: Instant, time: SystemTime) {
+        if let Some(before) = self.time.get()
+            && time.boot_ms.saturating_add(REBOOT_MS) < before.boot_ms
+        {
+            self.reboots = self.reboots.saturating_add(1);
+        }
+        self.time.set(at, time);
+    }
+
+    /// The first sensor's figures serve; the others measure the same thing.
+    fn take_imu(&mut self, at: Instant, imu: Imu) {
+        if imu.instance == 0 {
+            self.imu.set(at, imu);
+        }
+    }
+
+    /// The same message on two scales: only the heartbeat tells which.
+    fn take_vibration(&mut self, at: Instant, vibration: Vibration) {
+        let px4 = self.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::Px4);
+        let scale = if px4 { VibrationScale::Px4Metrics } else { VibrationScale::PerAxis };
+        self.vibration.set(at, Vibration { scale, ..vibration });
+    }
+
+    fn take_battery(&mut self, at: Instant, battery: Battery) {
+        let known = |slot: &Latest<Battery>| slot.get().is_none_or(|other| other.id == battery.id);
+        if let Some(slot) = self.batteries.iter_mut().find(|slot| known(slot)) {
+            slot.set(at, battery);
+        }
+    }
+
+    fn take_escs(&mut self, at: Instant, group: &EscGroup) {
+        for (offset, esc) in group.escs.iter().enumerate() {
+            let (Some(esc), Some(motor)) = (esc, self.motors.get_mut(usize::from(group.first) + offset))
+            else {
+                continue;
+            };
+            let moved = esc.rpm.is_some() || esc.current.is_some();
+            motor.esc = Esc {
+                rpm: esc.rpm.or(motor.esc.rpm),
+                voltage: esc.voltage.or(motor.esc.voltage),
+                current: esc.current.or(motor.esc.current),
+                temperature: esc.temperature.or(motor.esc.temperature),
+                failures: esc.failures.or(motor.esc.failures),
+                errors: esc.errors.or(motor.esc.errors),
+            };
+            motor.at = Some(at);
+            if moved {
+                motor.moved_at = Some(at);
+            }
+        }
+    }
+}
+
+fn set_instance<T, const N: usize>(slots: &mut [Latest<T>; N], instance: u8, at: Instant, value: T) {
+    if let Some(slot) = slots.get_mut(usize::from(instance)) {
+        slot.set(at, value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{Rpm, Volts};
+
+    const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+    fn known() -> Vehicle {
+        let mut vehicle = Vehicle::unknown();
+        let heartbeat = Heartbeat { autopilot: Autopilot::Px4, ..Heartbeat::default() };
+        assert!(vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat)));
+        vehicle
+    }
+
+    #[test]
+    fn only_the_first_vehicle_is_monitored() {
+        let mut vehicle = known();
+        let other = Source { system: 2, component: 1 };
+        assert!(!vehicle.observe(Instant::ZERO, other, &Observation::Heartbeat(Heartbeat::default())));
+        assert!(!vehicle.observe(Instant::ZERO, other, &Observation::Attitude(Attitude::default())));
+        let gimbal = Source { system: 1, component: 154 };
+        assert!(!vehicle.observe(Instant::ZERO, gimbal, &Observation::Attitude(Attitude::default())));
+        let battery = Source { system: 1, component: 180 };
+        assert!(vehicle.observe(Instant::ZERO, battery, &Observation::Battery(Battery::default())));
+    }
+
+    #[test]
+    fn an_esc_is_put_together_from_several_messages() {
+        let mut vehicle = known();
+        let status = Esc { rpm: Some(Rpm(5_000.0)), voltage: Some(Volts(12.0)), ..Esc::default() };
+        let info = Esc { errors: Some(3), ..Esc::default() };
+        for (at, esc) in [(1, status), (2, info)] {
+            let group = EscGroup { first: 11, escs: [Some(esc); 4] };
+            vehicle.observe(Instant::from_millis(at), AUTOPILOT, &Observation::Escs(group));
+        }
+        let motor = vehicle.motors[11];
+        assert_eq!((motor.esc.rpm, motor.esc.errors), (Some(Rpm(5_000.0)), Some(3)));
+        assert_eq!(motor.moved_at, Some(Instant::from_millis(1)));
+        assert_eq!(motor.at, Some(Instant::from_millis(2)));
+    }
+
+    #[test]
+    fn a_falling_boot_time_is_a_reboot_and_reordering_is_not() {
+        let mut vehicle = known();
+        for boot_ms in [5_000, 6_000, 5_500, 7_000, 300] {
+            let time = SystemTime { boot_ms, utc_micros: None };
+            vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::SystemTime(time));
+        }
+        assert_eq!(vehicle.reboots, 1);
+    }
+}

@@ -1,0 +1,265 @@
+//! One MAVLink frame as it came: borrowed bytes and where its parts lie. Nothing is copied and nothing is altered, so
+//! that a frame can be recorded and forwarded bit for bit.
+
+use crate::crc;
+
+/// The first byte of a MAVLink 1 frame.
+pub const START_V1: u8 = 0xfe;
+/// The first byte of a MAVLink 2 frame.
+pub const START_V2: u8 = 0xfd;
+/// Start byte, length, sequence, system, component, message id.
+pub const HEADER_V1: usize = 6;
+/// Start byte, length, two flag bytes, sequence, system, component, message id of three bytes.
+pub const HEADER_V2: usize = 10;
+/// The checksum's bytes.
+pub const CHECKSUM: usize = 2;
+/// Link id, time stamp of 6 bytes and signature of 6 bytes that follow the checksum of a signed frame.
+pub const SIGNATURE: usize = 13;
+/// The longest frame: MAVLink 2, 255 bytes of payload, signed.
+pub const FRAME_MAX: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
+
+/// The only incompatibility flag there is: the frame is signed.
+const INCOMPAT_SIGNED: u8 = 1;
+
+/// What the checksum says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Check {
+    /// Right, with the definition that we know: the payload means what the definition says.
+    Verified,
+    /// Framed consistently, but with a definition that we do not know: only to be kept and passed on.
+    Unverified,
+}
+
+/// Where the parts of a frame lie; what its first bytes say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Header {
+    /// 1 or 2.
+    pub(crate) version: u8,
+    pub(crate) signed: bool,
+    pub(crate) payload_len: u8,
+    pub(crate) sequence: u8,
+    pub(crate) system: u8,
+    pub(crate) component: u8,
+    pub(crate) id: u32,
+}
+
+/// Why there is no header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoHeader {
+    /// It may become one: so many bytes are needed to say.
+    Incomplete(usize),
+    /// It is none: no start byte, or a flag that changes the frame in a way that we do not know.
+    Invalid,
+}
+
+impl Header {
+    /// Reads the first bytes of what may be a frame.
+    #[inline]
+    pub(crate) fn read(bytes: &[u8]) -> Result<Self, NoHeader> {
+        match *bytes {
+            [START_V1, payload_len, sequence, system, component, id, ..] => Ok(Self {
+                version: 1,
+                signed: false,
+                payload_len,
+                sequence,
+                system,
+                component,
+                id: u32::from(id),
+            }),
+            [START_V2, payload_len, incompat, _, sequence, system, component, id0, id1, id2, ..]
+                if incompat & !INCOMPAT_SIGNED == 0 =>
+            {
+                Ok(Self {
+                    version: 2,
+                    signed: incompat == INCOMPAT_SIGNED,
+                    payload_len,
+                    sequence,
+                    system,
+                    component,
+                    id: u32::from_le_bytes([id0, id1, id2, 0]),
+                })
+            }
+            [START_V1] | [START_V1, _, ..] if bytes.len() < HEADER_V1 => Err(NoHeader::Incomplete(HEADER_V1)),
+            // The flags come early: most false starts end here without waiting for more.
+            [START_V2] | [START_V2, _] => Err(NoHeader::Incomplete(3)),
+            [START_V2, _, incompat, ..] if incompat & !INCOMPAT_SIGNED == 0 && bytes.len() < HEADER_V2 => {
+                Err(NoHeader::Incomplete(HEADER_V2))
+            }
+            _ => Err(NoHeader::Invalid),
+        }
+    }
+
+    /// Where the payload begins.
+    #[inline]
+    pub(crate) const fn payload_at(&self) -> usize {
+        if self.version == 1 { HEADER_V1 } else { HEADER_V2 }
+    }
+
+    /// Where the checksum begins.
+    #[inline]
+    pub(crate) const fn checksum_at(&self) -> usize {
+        self.payload_at() + self.payload_len as usize
+    }
+
+    /// All bytes of the frame.
+    #[inline]
+    pub(crate) const fn frame_len(&self) -> usize {
+        self.checksum_at() + CHECKSUM + if self.signed { SIGNATURE } else { 0 }
+    }
+}
+
+/// The checksum that was computed, before `crc_extra`, and the one that was sent.
+#[inline]
+pub(crate) fn checksums(header: &Header, bytes: &[u8]) -> Option<(u16, u16)> {
+    let at = header.checksum_at();
+    let computed = crc::update(crc::START, bytes.get(1..at)?);
+    let sent = u16::from_le_bytes([*bytes.get(at)?, *bytes.get(at + 1)?]);
+    Some((computed, sent))
+}
+
+/// A whole frame, as it came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame<'a> {
+    header: Header,
+    bytes: &'a [u8],
+    check: Check,
+}
+
+impl<'a> Frame<'a> {
+    /// The frame that `bytes` are, from the first byte to the last, or `None` where they are none: no start byte,
+    /// unknown flags, or another length than the header says. The checksum is compared with our definition of the
+    /// message: where it does not fit, or there is none, the frame is [`Check::Unverified`].
+    ///
+    /// For bytes that were a frame before (from a log, or made by us); what comes from a line goes through
+    /// [`crate::framer::Framer`], which tells frames from noise.
+    pub fn parse(bytes: &'a [u8]) -> Option<Self> {
+        let header = Header::read(bytes).ok()?;
+        if header.frame_len() != bytes.len() {
+            return None;
+        }
+        let (computed, sent) = checksums(&header, bytes)?;
+        let verified = hums_dialect::message(header.id)
+            .is_some_and(|message| crc::step(computed, message.crc_extra) == sent);
+        let check = if verified { Check::Verified } else { Check::Unverified };
+        Some(Self { header, bytes, check })
+    }
+
+    /// A frame that the framer found and checked before, from the queue that it was put in: not checked again.
+    pub fn again(bytes: &'a [u8], check: Check) -> Option<Self> {
+        let header = Header::read(bytes).ok().filter(|header| header.frame_len() == bytes.len())?;
+        Some(Self { header, bytes, check })
+    }
+
+    /// `bytes` are exactly the frame of `header`: the framer has seen to that.
+    #[inline]
+    pub(crate) fn from_parts(header: Header, bytes: &'a [u8], check: Check) -> Self {
+        debug_assert_eq!(header.frame_len(), bytes.len());
+        Self { header, bytes, check }
+    }
+
+    /// The message id.
+    #[inline]
+    pub const fn id(&self) -> u32 {
+        self.header.id
+    }
+
+    /// The system that sent it.
+    #[inline]
+    pub const fn system(&self) -> u8 {
+        self.header.system
+    }
+
+    /// The component of that system.
+    #[inline]
+    pub const fn component(&self) -> u8 {
+        self.header.component
+    }
+
+    /// The sender's count of frames, modulo 256.
+    #[inline]
+    pub const fn sequence(&self) -> u8 {
+        self.header.sequence
+    }
+
+    /// The MAVLink version: 1 or 2.
+    #[inline]
+    pub const fn version(&self) -> u8 {
+        self.header.version
+    }
+
+    /// Whether a signature follows the checksum. It is carried, not verified: the key is the ground station's.
+    #[inline]
+    pub const fn signed(&self) -> bool {
+        self.header.signed
+    }
+
+    /// The payload as sent: MAVLink 2 leaves out zeros at the end.
+    #[inline]
+    pub fn payload(&self) -> &'a [u8] {
+        self.bytes.get(self.header.payload_at()..self.header.checksum_at()).unwrap_or_default()
+    }
+
+    /// All bytes of the frame.
+    #[inline]
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// What the checksum says.
+    #[inline]
+    pub const fn check(&self) -> Check {
+        self.check
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// HEARTBEAT of an ArduPilot quad, from the MAVLink serialisation guide's layout; checksum by pymavlink.
+    const HEARTBEAT_V1: [u8; 17] = [0xfe, 9, 78, 1, 1, 0, 0, 0, 0, 0, 2, 3, 81, 3, 3, 0x19, 0xf3];
+
+    #[test]
+    fn a_frame_with_another_length_than_its_header_says_is_none() {
+        assert_eq!(Frame::parse(&HEARTBEAT_V1[..16]), None);
+        let mut longer = HEARTBEAT_V1.to_vec();
+        longer.push(0);
+        assert_eq!(Frame::parse(&longer), None);
+        assert_eq!(Frame::parse(&[]), None);
+    }
+
+    #[test]
+    fn parts_of_a_frame_lie_where_the_guide_says() {
+        let frame = Frame::parse(&HEARTBEAT_V1).expect("a frame");
+        assert_eq!((frame.id(), frame.system(), frame.component(), frame.sequence()), (0, 1, 1, 78));
+        assert_eq!((frame.version(), frame.signed(), frame.payload().len()), (1, false, 9));
+        assert_eq!(frame.check(), Check::Verified);
+    }
+
+    #[test]
+    fn a_checksum_of_another_definition_is_unverified() {
+        let mut bytes = HEARTBEAT_V1;
+        bytes[15] ^= 1;
+        assert_eq!(Frame::parse(&bytes).map(|frame| frame.check()), Some(Check::Unverified));
+    }
+
+    #[test]
+    fn unknown_incompatibility_flags_make_it_no_frame() {
+        let mut bytes = [0; 12];
+        bytes[..3].copy_from_slice(&[START_V2, 0, 2]);
+        assert_eq!(Frame::parse(&bytes), None);
+        bytes[2] = 0;
+        assert!(Frame::parse(&bytes).is_some());
+    }
+
+    #[test]
+    fn a_header_is_refused_as_soon_as_it_can_be() {
+        assert_eq!(Header::read(&[START_V2, 9, 4]), Err(NoHeader::Invalid));
+        assert_eq!(Header::read(&[START_V2, 9]), Err(NoHeader::Incomplete(3)));
+        assert_eq!(Header::read(&[START_V2, 9, 0, 0]), Err(NoHeader::Incomplete(HEADER_V2)));
+        assert_eq!(Header::read(&[START_V1]), Err(NoHeader::Incomplete(HEADER_V1)));
+        assert_eq!(Header::read(&[START_V1, 1, 2, 3, 4]), Err(NoHeader::Incomplete(HEADER_V1)));
+        assert_eq!(Header::read(&[0x55]), Err(NoHeader::Invalid));
+        assert_eq!(Header::read(&[]), Err(NoHeader::Invalid));
+    }
+}

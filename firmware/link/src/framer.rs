@@ -1,0 +1,315 @@
+//! Bytes of a line in, frames out: MAVLink 1, MAVLink 2 and signed frames, mixed, from any number of systems.
+//!
+//! Sans-io: [`Framer::push`] takes whatever bytes have come and calls the sink with each frame as soon as its last byte
+//! is there; [`Framer::idle`] says that the line is silent. Nothing depends on how the bytes are cut into pushes.
+//!
+//! # Resynchronising
+//! A *candidate* is a start byte and what follows it. Its bytes stay in the buffer until it is decided, and when it is
+//! no frame only its start byte is dropped and the search goes on from the next byte, so that a frame hidden behind a
+//! false start (a damaged length, a start byte in the payload, noise) is not lost with it.
+//!
+//! # Frames of definitions that we do not have
+//! They must be recorded and passed on, yet line noise must not. For each checksum that does not fit we compute which
+//! `crc_extra` would make it fit ([`crc::extra_of`]; 1 in 256 of random bytes has one), and let the candidate through
+//! as [`Check::Unverified`] if that extra is the one that this system used for this id before, or, at first sight, if
+//! it stands between frames: a frame (a damaged one, silence) before it, a start byte (or silence) after it, and no whole frame of
+//! a known definition inside. Without a frame before it, its extra is only remembered, and the next one comes through.
+//! An id that this system has sent with our definition never comes through unverified: then it is damage.
+//!
+//! # Limits
+//! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy, one
+//! step of the checksum; candidates that are not trusted may cost no more than [`CREDIT_PER_BYTE`] such steps for each
+//! byte received, so that no input can starve the other tasks.
+
+use crate::crc;
+use crate::frame::{self, Check, FRAME_MAX, Frame, Header, NoHeader, START_V1, START_V2};
+use crate::seen::{Extra, Seen};
+
+/// Bytes held: the longest frame, the byte after it, and as much again so that bytes are seldom moved.
+const BUFFER: usize = 2 * FRAME_MAX;
+
+/// Steps of the checksum that candidates which are not trusted may cost, for each byte received.
+const CREDIT_PER_BYTE: u32 = 4;
+/// Credit that can be saved up: some dozens of frames of a private definition at once.
+const CREDIT_MAX: u32 = 4_096;
+
+/// What went through a [`Framer`]. Always `bytes == bytes_in_frames + bytes_not_frames +` [`Framer::held`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FramerCounts {
+    /// Bytes received.
+    pub bytes: u64,
+    /// Frames given to the sink, the unverified ones included.
+    pub frames: u64,
+    /// Those of them whose definition we do not know.
+    pub unverified: u64,
+    /// What looked like a frame and has a wrong checksum. Damage to a start byte or a length shows only in
+    /// `bytes_not_frames`.
+    pub damaged: u64,
+    /// Bytes of the frames given to the sink.
+    pub bytes_in_frames: u64,
+    /// Bytes that belong to no frame: noise, text, damaged frames.
+    pub bytes_not_frames: u64,
+}
+
+/// Finds the frames in a line's bytes. See the module's description.
+#[derive(Debug)]
+pub struct Framer {
+    buffer: [u8; BUFFER],
+    /// The first byte held.
+    start: usize,
+    /// After the last byte held.
+    end: usize,
+    /// The first candidate cannot be decided with fewer bytes than this.
+    needed: usize,
+    /// Bytes until the end of the last damaged frame: false starts inside are the same damage, counted once.
+    damage_left: usize,
+    /// The first byte held follows a frame, a damaged frame or silence.
+    after_frame: bool,
+    credit: u32,
+    seen: Seen,
+    counts: FramerCounts,
+}
+
+const _: () = assert!(size_of::<Framer>() <= 1_280);
+const _: () = assert!(BUFFER > FRAME_MAX + 1, "a decided candidate must always make room");
+
+/// What becomes of the first bytes held.
+enum Verdict {
+    /// A frame.
+    Frame(Header, Check),
+    /// So many bytes are of no frame.
+    Skip(usize),
+    /// Nobody can say with fewer bytes than this.
+    Wait(usize),
+}
+
+impl Framer {
+    /// A framer that has seen nothing.
+    pub const fn new() -> Self {
+        Self {
+            buffer: [0; BUFFER],
+            start: 0,
+            end: 0,
+            needed: 1,
+            damage_left: 0,
+            after_frame: true,
+            credit: CREDIT_MAX,
+            seen: Seen::new(),
+            counts: FramerCounts {
+                bytes: 0,
+                frames: 0,
+                unverified: 0,
+                damaged: 0,
+                bytes_in_frames: 0,
+                bytes_not_frames: 0,
+            },
+        }
+    }
+
+    /// Takes the bytes that came and calls `sink` with every frame that they complete, in order.
+    pub fn push(&mut self, bytes: &[u8], sink: &mut impl FnMut(Frame<'_>)) {
+        self.counts.bytes = self.counts.bytes.wrapping_add(bytes.len() as u64);
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            if self.start > 0 && BUFFER - self.end < rest.len() {
+                self.buffer.copy_within(self.start..self.end, 0);
+                self.end -= self.start;
+                self.start = 0;
+            }
+            let (now, later) = rest.split_at(rest.len().min(BUFFER - self.end));
+            self.buffer[self.end..self.end + now.len()].copy_from_slice(now);
+            self.end += now.len();
+            rest = later;
+            self.scan(false, sink);
+        }
+    }
+
+    /// The line has been silent for longer than a sender pauses inside a frame, or has ended: no byte is waited for
+    /// any longer. A candidate that lacks bytes is abandoned and what it held is searched; afterwards nothing is held.
+    pub fn idle(&mut self, sink: &mut impl FnMut(Frame<'_>)) {
+        self.scan(true, sink);
+        self.after_frame = true;
+    }
+
+    /// Bytes received and not yet decided: at most [`FRAME_MAX`].
+    pub const fn held(&self) -> usize {
+        self.end - self.start
+    }
+
+    /// What went through so far.
+    pub const fn counts(&self) -> FramerCounts {
+        self.counts
+    }
+
+    fn scan(&mut self, idle: bool, sink: &mut impl FnMut(Frame<'_>)) {
+        while self.held() >= self.needed || (idle && self.held() > 0) {
+            match self.judge(idle) {
+                Verdict::Frame(header, check) => {
+                    let len = header.frame_len();
+                    let bytes = &self.buffer[self.start..self.start + len];
+                    sink(Frame::from_parts(header, bytes, check));
+                    self.counts.frames = self.counts.frames.wrapping_add(1);
+                    let unverified = u64::from(check == Check::Unverified);
+                    self.counts.unverified = self.counts.unverified.wrapping_add(unverified);
+                    self.counts.bytes_in_frames = self.counts.bytes_in_frames.wrapping_add(len as u64);
+                    self.consume(len);
+                    self.after_frame = true;
+                }
+                Verdict::Skip(len) => {
+                    self.counts.bytes_not_frames = self.counts.bytes_not_frames.wrapping_add(len as u64);
+                    // The end of a damaged frame is a frame's end too.
+                    self.after_frame = self.damage_left == len;
+                    self.consume(len);
+                }
+                Verdict::Wait(needed) => {
+                    debug_assert!(needed > self.held() && needed <= FRAME_MAX + 1);
+                    self.needed = needed;
+                    return;
+                }
+            }
+        }
+    }
+
+    fn consume(&mut self, len: usize) {
+        self.start += len;
+        self.needed = 1;
+        self.damage_left = self.damage_left.saturating_sub(len);
+        self.credit = CREDIT_MAX.min(self.credit + CREDIT_PER_BYTE * len as u32);
+        if self.start == self.end {
+            self.start = 0;
+            self.end = 0;
+        }
+    }
+
+    /// Decides the first candidate. With `idle`, nothing is waited for.
+    fn judge(&mut self, idle: bool) -> Verdict {
+        let held = &self.buffer[self.start..self.end];
+        match held.iter().position(|&byte| is_start(byte)) {
+            Some(0) => {}
+            Some(at) => return Verdict::Skip(at),
+            None => return Verdict::Skip(held.len()),
+        }
+        let header = match Header::read(held) {
+            Ok(header) => header,
+            Err(NoHeader::Incomplete(needed)) if !idle => return Verdict::Wait(needed),
+            Err(_) => return Verdict::Skip(1),
+        };
+        let len = header.frame_len();
+        if held.len() < len {
+            return if idle { Verdict::Skip(1) } else { Verdict::Wait(len) };
+        }
+        let known = Known::of(&header);
+        if let Known::Fits { index, crc_extra } = known {
+            let Some((computed, sent)) = frame::checksums(&header, held) else { return Verdict::Skip(1) };
+            if crc::step(computed, crc_extra) == sent {
+                self.seen.verified(header.system, index);
+                return Verdict::Frame(header, Check::Verified);
+            }
+            if self.seen.was_verified(header.system, index) {
+                return self.damaged(len);
+            }
+        }
+        self.judge_unknown(&header, known, idle)
+    }
+
+    /// Decides a candidate whose definition is not ours, or only looks as if it were.
+    fn judge_unknown(&mut self, header: &Header, known: Known, idle: bool) -> Verdict {
+        let held = &self.buffer[self.start..self.end];
+        let len = header.frame_len();
+        // The cheap check comes first: a false start in noise is seldom followed by a start byte where it ends.
+        let learned = self.seen.extra(header.system, header.id);
+        if !matches!(learned, Extra::Confirmed(_)) {
+            match held.get(len) {
+                Some(&next) if is_start(next) => {}
+                Some(_) => return self.not_a_frame(known, len),
+                None if idle => {}
+                None => return Verdict::Wait(len + 1),
+            }
+        }
+        let Some(credit) = self.credit.checked_sub(len as u32) else { return Verdict::Skip(1) };
+        self.credit = credit;
+        let Some((computed, sent)) = frame::checksums(header, held) else { return Verdict::Skip(1) };
+        if let Known::Misfits { crc_extra } = known
+            && crc::step(computed, crc_extra) == sent
+        {
+            return Verdict::Frame(*header, Check::Verified);
+        }
+        let Some(extra) = crc::extra_of(computed, sent) else { return self.damaged(len) };
+        let accepted = match learned {
+            Extra::Confirmed(confirmed) if confirmed != extra => return self.damaged(len),
+            Extra::Full => return self.damaged(len),
+            Extra::Confirmed(_) => true,
+            Extra::Once(once) if once == extra => true,
+            Extra::Once(_) | Extra::None => self.after_frame && !holds_a_known_frame(&held[..len]),
+        };
+        self.seen.learn(header.system, header.id, extra);
+        if !accepted {
+            return self.damaged(len);
+        }
+        Verdict::Frame(*header, Check::Unverified)
+    }
+
+    /// A wrong checksum where nothing but the checksum speaks for a frame: damage if id and length are those of a
+    /// message that we know, otherwise a false start.
+    fn not_a_frame(&mut self, known: Known, len: usize) -> Verdict {
+        if matches!(known, Known::Fits { .. }) { self.damaged(len) } else { Verdict::Skip(1) }
+    }
+
+    fn damaged(&mut self, len: usize) -> Verdict {
+        if self.damage_left == 0 {
+            self.counts.damaged = self.counts.damaged.wrapping_add(1);
+            self.damage_left = len;
+        }
+        Verdict::Skip(1)
+    }
+}
+
+impl Default for Framer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[inline]
+const fn is_start(byte: u8) -> bool {
+    byte == START_V1 || byte == START_V2
+}
+
+/// What our definitions say of a header.
+#[derive(Clone, Copy)]
+enum Known {
+    /// There is a message of this id, and the payload may have this length.
+    Fits { index: usize, crc_extra: u8 },
+    /// There is a message of this id, but no encoder makes it so long or so short.
+    Misfits { crc_extra: u8 },
+    /// No such message.
+    No,
+}
+
+impl Known {
+    fn of(header: &Header) -> Self {
+        let messages = hums_dialect::messages();
+        let Ok(index) = messages.binary_search_by_key(&header.id, |message| message.id) else {
+            return Self::No;
+        };
+        let message = &messages[index];
+        // MAVLink 1 sends all fields but the extensions. MAVLink 2 leaves out zeros at the end, and a newer definition
+        // may have extension fields that ours has not.
+        if header.version == 1 && header.payload_len != message.len_base {
+            return Self::Misfits { crc_extra: message.crc_extra };
+        }
+        Self::Fits { index, crc_extra: message.crc_extra }
+    }
+}
+
+/// Whether a whole frame of a known definition begins inside `candidate`, after its first byte.
+fn holds_a_known_frame(candidate: &[u8]) -> bool {
+    (1..candidate.len()).any(|at| {
+        let bytes = &candidate[at..];
+        let Ok(header) = Header::read(bytes) else { return false };
+        let Known::Fits { crc_extra, .. } = Known::of(&header) else { return false };
+        bytes.len() >= header.frame_len()
+            && frame::checksums(&header, bytes)
+                .is_some_and(|(computed, sent)| crc::step(computed, crc_extra) == sent)
+    })
+}

@@ -1,0 +1,105 @@
+//! From a frame to what it says, in SI units. One function a message; the traps of each stand beside it.
+//!
+//! The payload is decoded by the `mavlink` crate's own structures, message by message, so that only those used are
+//! linked. Their decoders refuse a message whole when one field has a number that their enumeration lacks; a newer
+//! sender's HEARTBEAT must not vanish for that, so such fields are set to zero and the rest is read.
+
+mod motion;
+mod power;
+mod propulsion;
+mod system;
+
+use hums_core::observation::{Observation, Source};
+use mavlink::MavlinkVersion;
+use mavlink::dialects::ardupilotmega as ap;
+
+use crate::frame::{Check, Frame};
+
+/// The longest payload.
+const PAYLOAD_MAX: usize = 255;
+
+/// What a frame says, and who says it; `None` where it is none of our business: an id that we do not use, a checksum
+/// that is not verified, a HEARTBEAT of something that is no vehicle.
+pub fn observe(frame: &Frame<'_>) -> Option<(Source, Observation)> {
+    if frame.check() != Check::Verified {
+        return None;
+    }
+    let observation = by_id(frame.id(), frame.payload())?;
+    Some((Source { system: frame.system(), component: frame.component() }, observation))
+}
+
+fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
+    Some(match id {
+        0 => Observation::Heartbeat(system::heartbeat(payload)?),
+        1 => Observation::SystemStatus(system::status(payload)?),
+        2 => Observation::SystemTime(system::time(payload)?),
+        24 => Observation::Gnss(motion::gnss(payload)?),
+        26 | 27 | 116 | 129 => Observation::Imu(motion::imu(id, payload)?),
+        29 => Observation::Air(motion::air(payload)?),
+        30 => Observation::Attitude(motion::attitude(payload)?),
+        32 => Observation::LocalPosition(motion::local_position(payload)?),
+        33 => Observation::GlobalPosition(motion::global_position(payload)?),
+        42 => Observation::MissionCurrent(read::<ap::MISSION_CURRENT_DATA>(payload, &[4])?.seq),
+        46 => Observation::MissionReached(read::<ap::MISSION_ITEM_REACHED_DATA>(payload, &[])?.seq),
+        65 => Observation::RadioControl(system::rc(payload)?),
+        74 => Observation::Hud(motion::hud(payload)?),
+        77 => Observation::CommandAck(system::command_ack(payload)),
+        105 => {
+            let (imu, air) = motion::highres_imu(payload)?;
+            Observation::ImuAndAir(imu, air)
+        }
+        109 => Observation::TelemetryRadio(system::radio(payload)?),
+        124 => Observation::Gnss(motion::gnss2(payload)?),
+        125 => Observation::Rails(power::rails(payload)?),
+        147 => Observation::Battery(power::battery(payload)?),
+        148 => Observation::Identity(system::identity(payload)?),
+        193 => Observation::Estimator(motion::ekf_status_report(payload)?),
+        225 => Observation::Engine(propulsion::engine(payload)?),
+        226 => Observation::SpeedSensors(propulsion::rpm(payload)?),
+        230 => Observation::Estimator(motion::estimator_status(payload)?),
+        241 => Observation::Vibration(motion::vibration(payload)?),
+        245 => Observation::Landed(system::landed(payload)),
+        264 => system::flight_information(payload)?,
+        290 => Observation::Escs(propulsion::esc_info(payload)?),
+        291 => Observation::Escs(propulsion::esc_status(payload)?),
+        339 => Observation::SpeedSensors(propulsion::raw_rpm(payload)?),
+        441 => Observation::GnssIntegrity(motion::gnss_integrity(payload)),
+        11_030..=11_032 => Observation::Escs(propulsion::esc_telemetry(id, payload)?),
+        11_039 => Observation::Processor(system::processor(payload)?),
+        _ => return None,
+    })
+}
+
+/// Decodes a payload. `enumerations` are the offsets of the bytes that hold enumerations: where a sender uses a number
+/// that ours lacks, they are read as zero.
+fn read<M: mavlink::MessageData>(payload: &[u8], enumerations: &[usize]) -> Option<M> {
+    if let Ok(message) = M::deser(MavlinkVersion::V2, payload) {
+        return Some(message);
+    }
+    let mut bytes = [0; PAYLOAD_MAX];
+    bytes.get_mut(..payload.len())?.copy_from_slice(payload);
+    for &at in enumerations {
+        *bytes.get_mut(at)? = 0;
+    }
+    M::deser(MavlinkVersion::V2, &bytes).ok()
+}
+
+/// A byte of a payload: those that MAVLink 2 left out are zero.
+fn byte(payload: &[u8], at: usize) -> u8 {
+    payload.get(at).copied().unwrap_or(0)
+}
+
+/// A value that is unknown where it is `unknown`.
+fn unless<T: PartialEq + Copy>(value: T, unknown: T) -> Option<T> {
+    (value != unknown).then_some(value)
+}
+
+/// UTC is told from the time since boot by its size: no vehicle has been up since before 2000.
+fn unix_time(micros: u64) -> Option<u64> {
+    const YEAR_2000_US: u64 = 946_684_800_000_000;
+    const YEAR_2200_US: u64 = 7_258_118_400_000_000;
+    (YEAR_2000_US..YEAR_2200_US).contains(&micros).then_some(micros)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,226 @@
+//! Where the vehicle is, how it moves and how well it knows.
+
+use hums_core::observation::{
+    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud, Imu, LocalPosition,
+    Vibration, VibrationScale,
+};
+use hums_core::units::{
+    Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    RadiansPerSecond,
+};
+use mavlink::dialects::ardupilotmega as ap;
+
+use super::{byte, read, unless};
+
+/// Standard gravity, m/s2.
+const GRAVITY: f32 = hums_core::derived::GRAVITY;
+/// A fix with a position: `GPS_FIX_TYPE_2D_FIX`.
+const FIX_2D: u8 = 2;
+
+/// All three, or none: half a vector is of no use.
+fn vector(values: [f32; 3]) -> Option<[f32; 3]> {
+    values.iter().all(|value| value.is_finite()).then_some(values)
+}
+
+/// Degrees x 1e7. 0, 0 is what receivers send that do not know, and no place to fly.
+fn position(latitude: i32, longitude: i32) -> Option<Position> {
+    let valid = (-900_000_000..=900_000_000).contains(&latitude)
+        && (-1_800_000_000..=1_800_000_000).contains(&longitude);
+    (valid && (latitude, longitude) != (0, 0)).then(|| Position {
+        latitude_deg: f64::from(latitude) / 1e7,
+        longitude_deg: f64::from(longitude) / 1e7,
+    })
+}
+
+/// Dilution x 100: 65535 is unknown, and no geometry has 0.
+fn dilution(hundredths: u16) -> Option<f32> {
+    (hundredths != 0 && hundredths != u16::MAX).then(|| f32::from(hundredths) / 100.0)
+}
+
+/// Millimetres in an extension field: 0 is unknown.
+fn error(millimetres: u32) -> Option<Metres> {
+    (millimetres != 0 && millimetres != u32::MAX).then(|| Metres(millimetres as f32 / 1e3))
+}
+
+fn speed(centimetres: u16) -> Option<MetresPerSecond> {
+    unless(centimetres, u16::MAX).map(|speed| MetresPerSecond(f32::from(speed) / 100.0))
+}
+
+pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
+    /// Where the fix stands: the only enumeration.
+    const FIX: usize = 28;
+    let gps = read::<ap::GPS_RAW_INT_DATA>(payload, &[FIX])?;
+    let fix = byte(payload, FIX);
+    let has_position = fix >= FIX_2D;
+    Some(Gnss {
+        instance: 0,
+        fix,
+        satellites: unless(gps.satellites_visible, u8::MAX),
+        hdop: dilution(gps.eph),
+        accuracy: error(gps.h_acc),
+        speed: speed(gps.vel),
+        position: position(gps.lat, gps.lon).filter(|_| has_position),
+        altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
+    })
+}
+
+pub(super) fn gnss2(payload: &[u8]) -> Option<Gnss> {
+    const FIX: usize = 32;
+    let gps = read::<ap::GPS2_RAW_DATA>(payload, &[FIX])?;
+    let fix = byte(payload, FIX);
+    let has_position = fix >= FIX_2D;
+    Some(Gnss {
+        instance: 1,
+        fix,
+        satellites: unless(gps.satellites_visible, u8::MAX),
+        hdop: dilution(gps.eph),
+        accuracy: error(gps.h_acc),
+        speed: speed(gps.vel),
+        position: position(gps.lat, gps.lon).filter(|_| has_position),
+        altitude: has_position.then(|| Metres(gps.alt as f32 / 1e3)),
+    })
+}
+
+/// `GNSS_INTEGRITY` is not in the typed dialect: number of the receiver at byte 8, jamming at 10, spoofing at 11.
+pub(super) fn gnss_integrity(payload: &[u8]) -> GnssIntegrity {
+    // 0 is unknown; a state that is newer than our list is unknown too.
+    let known = |state: u8| if state <= 3 { state } else { 0 };
+    GnssIntegrity {
+        instance: byte(payload, 8),
+        jamming: known(byte(payload, 10)),
+        spoofing: known(byte(payload, 11)),
+    }
+}
+
+/// Milli-g and mrad/s, also in ArduPilot's `RAW_IMU`, in spite of its name.
+fn scaled(instance: u8, acceleration: [i16; 3], rotation: [i16; 3], temperature: i16) -> Imu {
+    Imu {
+        instance,
+        acceleration: Some(acceleration.map(|milli_g| MetresPerSecond2(f32::from(milli_g) * GRAVITY / 1e3))),
+        rate: Some(rotation.map(|milli| RadiansPerSecond(f32::from(milli) / 1e3))),
+        temperature: unless(temperature, 0).map(|hundredths| Celsius(f32::from(hundredths) / 100.0)),
+    }
+}
+
+pub(super) fn imu(id: u32, payload: &[u8]) -> Option<Imu> {
+    if id == 27 {
+        let imu = read::<ap::RAW_IMU_DATA>(payload, &[])?;
+        let rotation = [imu.xgyro, imu.ygyro, imu.zgyro];
+        return Some(scaled(imu.id, [imu.xacc, imu.yacc, imu.zacc], rotation, imu.temperature));
+    }
+    // The second and the third have the fields of the first.
+    let imu = read::<ap::SCALED_IMU_DATA>(payload, &[])?;
+    let instance = match id {
+        26 => 0,
+        116 => 1,
+        _ => 2,
+    };
+    let rotation = [imu.xgyro, imu.ygyro, imu.zgyro];
+    Some(scaled(instance, [imu.xacc, imu.yacc, imu.zacc], rotation, imu.temperature))
+}
+
+/// Only what `fields_updated` names is new; the rest repeats an older sample.
+pub(super) fn highres_imu(payload: &[u8]) -> Option<(Imu, Air)> {
+    let imu = read::<ap::HIGHRES_IMU_DATA>(payload, &[])?;
+    let updated = imu.fields_updated.bits();
+    let all = |bits: u16| updated & bits == bits;
+    let acceleration = vector([imu.xacc, imu.yacc, imu.zacc]).filter(|_| all(0b111));
+    let rate = vector([imu.xgyro, imu.ygyro, imu.zgyro]).filter(|_| all(0b11_1000));
+    let temperature = Celsius(imu.temperature).finite().filter(|_| all(1 << 12));
+    let pressure = Hectopascals(imu.abs_pressure).finite().filter(|_| all(1 << 9));
+    let sensor = Imu {
+        instance: imu.id,
+        acceleration: acceleration.map(|values| values.map(MetresPerSecond2)),
+        rate: rate.map(|values| values.map(RadiansPerSecond)),
+        temperature,
+    };
+    Some((sensor, Air { pressure, temperature }))
+}
+
+pub(super) fn air(payload: &[u8]) -> Option<Air> {
+    let pressure = read::<ap::SCALED_PRESSURE_DATA>(payload, &[])?;
+    Some(Air {
+        pressure: Hectopascals(pressure.press_abs).finite().filter(|pressure| pressure.0 > 0.0),
+        temperature: Some(Celsius(f32::from(pressure.temperature) / 100.0)),
+    })
+}
+
+/// An attitude that is no number is none.
+pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
+    let attitude = read::<ap::ATTITUDE_DATA>(payload, &[])?;
+    let [roll, pitch, yaw] = vector([attitude.roll, attitude.pitch, attitude.yaw])?.map(Radians);
+    Some(Attitude { roll, pitch, yaw })
+}
+
+pub(super) fn local_position(payload: &[u8]) -> Option<LocalPosition> {
+    let local = read::<ap::LOCAL_POSITION_NED_DATA>(payload, &[])?;
+    Some(LocalPosition {
+        position: vector([local.x, local.y, local.z])?.map(Metres),
+        velocity: vector([local.vx, local.vy, local.vz])?.map(MetresPerSecond),
+    })
+}
+
+pub(super) fn global_position(payload: &[u8]) -> Option<GlobalPosition> {
+    let global = read::<ap::GLOBAL_POSITION_INT_DATA>(payload, &[])?;
+    Some(GlobalPosition {
+        position: position(global.lat, global.lon),
+        altitude: Metres(global.alt as f32 / 1e3),
+        relative_altitude: Metres(global.relative_alt as f32 / 1e3),
+        velocity: [global.vx, global.vy, global.vz].map(|speed| MetresPerSecond(f32::from(speed) / 100.0)),
+    })
+}
+
+pub(super) fn hud(payload: &[u8]) -> Option<Hud> {
+    let hud = read::<ap::VFR_HUD_DATA>(payload, &[])?;
+    Some(Hud {
+        airspeed: MetresPerSecond(hud.airspeed).finite(),
+        groundspeed: MetresPerSecond(hud.groundspeed).finite(),
+        heading_deg: (0..=360).contains(&hud.heading).then(|| f32::from(hud.heading)),
+        throttle: (hud.throttle <= 100).then(|| Fraction(f32::from(hud.throttle) / 100.0)),
+        altitude: Metres(hud.alt).finite(),
+        climb: MetresPerSecond(hud.climb).finite(),
+    })
+}
+
+fn ratio(value: f32) -> Option<f32> {
+    (value.is_finite() && value >= 0.0).then_some(value)
+}
+
+/// ArduPilot. Before the filter runs it sends zeros, which are no variances.
+pub(super) fn ekf_status_report(payload: &[u8]) -> Option<Estimator> {
+    const UNINITIALISED: u16 = 1_024;
+    let ekf = read::<ap::EKF_STATUS_REPORT_DATA>(payload, &[])?;
+    let flags = ekf.flags.bits();
+    let known = |value: f32| ratio(value).filter(|_| flags != 0 && flags & UNINITIALISED == 0);
+    Some(Estimator {
+        scale: EstimatorScale::Variance,
+        velocity: known(ekf.velocity_variance),
+        position_horizontal: known(ekf.pos_horiz_variance),
+        position_vertical: known(ekf.pos_vert_variance),
+        compass: known(ekf.compass_variance),
+        flags,
+    })
+}
+
+/// PX4: NaN where the filter does not use the sensor.
+pub(super) fn estimator_status(payload: &[u8]) -> Option<Estimator> {
+    let estimator = read::<ap::ESTIMATOR_STATUS_DATA>(payload, &[])?;
+    Some(Estimator {
+        scale: EstimatorScale::TestRatio,
+        velocity: ratio(estimator.vel_ratio),
+        position_horizontal: ratio(estimator.pos_horiz_ratio),
+        position_vertical: ratio(estimator.pos_vert_ratio),
+        compass: ratio(estimator.mag_ratio),
+        flags: estimator.flags.bits(),
+    })
+}
+
+/// The scale is the sender's: see `Vehicle`, which knows whose message it is.
+pub(super) fn vibration(payload: &[u8]) -> Option<Vibration> {
+    let vibration = read::<ap::VIBRATION_DATA>(payload, &[])?;
+    Some(Vibration {
+        scale: VibrationScale::default(),
+        levels: [vibration.vibration_x, vibration.vibration_y, vibration.vibration_z].map(ratio),
+        clips: [vibration.clipping_0, vibration.clipping_1, vibration.clipping_2],
+    })
+}

@@ -1,0 +1,54 @@
+//! Batteries and rails.
+
+use hums_core::observation::{Battery, CELLS_MAX, Rails};
+use hums_core::units::{AmpereHours, Celsius, Volts, WattHours};
+use mavlink::dialects::ardupilotmega as ap;
+
+use super::read;
+use super::system::{current, percent, voltage};
+
+/// No lithium cell is charged above this, mV: what says more is the sum of several.
+const CELL_MAX_MV: u16 = 5_000;
+
+pub(super) fn rails(payload: &[u8]) -> Option<Rails> {
+    let rails = read::<ap::POWER_STATUS_DATA>(payload, &[])?;
+    Some(Rails { vcc: voltage(rails.Vcc), servo: voltage(rails.Vservo) })
+}
+
+pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
+    // Function, type, charge state and mode; the rest of the message does not depend on them.
+    let battery = read::<ap::BATTERY_STATUS_DATA>(payload, &[33, 34, 40, 49])?;
+    let (voltage, cells) = cells(&battery.voltages, battery.voltages_ext);
+    Some(Battery {
+        id: battery.id,
+        voltage,
+        cells,
+        current: current(battery.current_battery),
+        // -1 is unknown; PX4 scales its own -1 and then sends other negative numbers.
+        consumed: (battery.current_consumed >= 0).then(|| AmpereHours(battery.current_consumed as f32 / 1e3)),
+        energy: (battery.energy_consumed >= 0).then(|| WattHours(battery.energy_consumed as f32 / 36.0)),
+        remaining: percent(battery.battery_remaining),
+        temperature: (battery.temperature != i16::MAX)
+            .then(|| Celsius(f32::from(battery.temperature) / 100.0)),
+        faults: battery.fault_bitmask.bits(),
+    })
+}
+
+/// The sum, and the cells where they are known one by one. A sender that knows only the sum puts it into the first
+/// place, and what does not fit there into the next; an unused place is 65535, in the extension 0.
+fn cells(base: &[u16; 10], extension: [u16; 4]) -> (Option<Volts>, [Option<Volts>; CELLS_MAX]) {
+    let mut cells = [None; CELLS_MAX];
+    let mut sum_mv = 0_u32;
+    let mut singly = true;
+    let used = base
+        .iter()
+        .filter(|&&mv| mv != u16::MAX)
+        .chain(extension.iter().filter(|&&mv| mv != 0 && mv != u16::MAX));
+    for (cell, &mv) in cells.iter_mut().zip(used) {
+        *cell = Some(Volts(f32::from(mv) / 1e3));
+        sum_mv += u32::from(mv);
+        singly &= mv <= CELL_MAX_MV;
+    }
+    let voltage = (sum_mv > 0).then(|| Volts(sum_mv as f32 / 1e3));
+    if voltage.is_some() && singly { (voltage, cells) } else { (voltage, [None; CELLS_MAX]) }
+}

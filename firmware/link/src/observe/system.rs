@@ -1,0 +1,125 @@
+//! The autopilot itself, its links, its words.
+
+use hums_core::observation::{
+    Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, Processor, RadioControl,
+    SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
+};
+use hums_core::units::{Amperes, Celsius, Fraction, Volts};
+use mavlink::dialects::ardupilotmega as ap;
+
+use super::{byte, read, unix_time, unless};
+
+/// A vehicle is one whose autopilot is not INVALID; some ground stations and companions claim one nevertheless, so
+/// types that cannot be vehicles are left out too. Type, autopilot and state are bytes 4, 5 and 7: read as they are,
+/// because the list of vehicle types grows every year.
+pub(super) fn heartbeat(payload: &[u8]) -> Option<Heartbeat> {
+    const AUTOPILOT_INVALID: u8 = 8;
+    const ARMED: u8 = 1 << 7;
+    let mode = u32::from_le_bytes([byte(payload, 0), byte(payload, 1), byte(payload, 2), byte(payload, 3)]);
+    let (type_number, autopilot_number, base_mode, state) =
+        (byte(payload, 4), byte(payload, 5), byte(payload, 6), byte(payload, 7));
+    if autopilot_number == AUTOPILOT_INVALID {
+        return None;
+    }
+    let kind = match type_number {
+        2 | 3 | 4 | 13 | 14 | 15 | 29 | 35 => VehicleKind::Rotorcraft,
+        1 | 16 | 17 | 28 => VehicleKind::Plane,
+        19..=25 => VehicleKind::Vtol,
+        10..=12 => VehicleKind::Surface,
+        // Antenna tracker, GCS, companion, gimbal, ADS-B, camera, charging station, FLARM, servo, ODID and so on.
+        5 | 6 | 18 | 26 | 27 | 30 | 31 | 32 | 33 | 34 | 36..=42 => return None,
+        _ => VehicleKind::Other,
+    };
+    let autopilot = match autopilot_number {
+        3 => Autopilot::ArduPilot,
+        12 => Autopilot::Px4,
+        _ => Autopilot::Other,
+    };
+    let armed = base_mode & ARMED != 0;
+    Some(Heartbeat { autopilot, autopilot_number, kind, type_number, armed, state, mode })
+}
+
+pub(super) fn status(payload: &[u8]) -> Option<SystemStatus> {
+    let status = read::<ap::SYS_STATUS_DATA>(payload, &[])?;
+    let unhealthy = status.onboard_control_sensors_present.bits()
+        & status.onboard_control_sensors_enabled.bits()
+        & !status.onboard_control_sensors_health.bits();
+    Some(SystemStatus {
+        load: (status.load <= 1_000).then(|| Fraction(f32::from(status.load) / 1e3)),
+        voltage: voltage(status.voltage_battery),
+        current: current(status.current_battery),
+        remaining: percent(status.battery_remaining),
+        unhealthy,
+    })
+}
+
+/// Millivolts; 65535 is unknown, and nothing runs from 0 V.
+pub(super) fn voltage(millivolts: u16) -> Option<Volts> {
+    (millivolts != 0 && millivolts != u16::MAX).then(|| Volts(f32::from(millivolts) / 1e3))
+}
+
+/// Centiamperes; -1 is unknown, and PX4 scales its own -1 A for unknown to -100.
+pub(super) fn current(centiamperes: i16) -> Option<Amperes> {
+    (centiamperes != -1 && centiamperes != -100).then(|| Amperes(f32::from(centiamperes) / 100.0))
+}
+
+/// -1 is unknown.
+pub(super) fn percent(percent: i8) -> Option<Fraction> {
+    (0..=100).contains(&percent).then(|| Fraction(f32::from(percent) / 100.0))
+}
+
+pub(super) fn time(payload: &[u8]) -> Option<SystemTime> {
+    let time = read::<ap::SYSTEM_TIME_DATA>(payload, &[])?;
+    Some(SystemTime { utc_micros: unix_time(time.time_unix_usec), boot_ms: time.time_boot_ms })
+}
+
+pub(super) fn rc(payload: &[u8]) -> Option<RadioControl> {
+    let rc = read::<ap::RC_CHANNELS_DATA>(payload, &[])?;
+    Some(RadioControl { rssi: unless(rc.rssi, u8::MAX) })
+}
+
+pub(super) fn radio(payload: &[u8]) -> Option<TelemetryRadio> {
+    let radio = read::<ap::RADIO_STATUS_DATA>(payload, &[])?;
+    Some(TelemetryRadio {
+        rssi: unless(radio.rssi, u8::MAX),
+        remote_rssi: unless(radio.remrssi, u8::MAX),
+        noise: unless(radio.noise, u8::MAX),
+        remote_noise: unless(radio.remnoise, u8::MAX),
+        errors: radio.rxerrors,
+    })
+}
+
+pub(super) fn processor(payload: &[u8]) -> Option<Processor> {
+    let mcu = read::<ap::MCU_STATUS_DATA>(payload, &[])?;
+    let temperature = (mcu.MCU_temperature != i16::MAX && mcu.MCU_temperature != 0)
+        .then(|| Celsius(f32::from(mcu.MCU_temperature) / 100.0));
+    Some(Processor { temperature, voltage: voltage(mcu.MCU_voltage) })
+}
+
+pub(super) fn identity(payload: &[u8]) -> Option<AutopilotIdentity> {
+    let version = read::<ap::AUTOPILOT_VERSION_DATA>(payload, &[])?;
+    Some(AutopilotIdentity { firmware: version.flight_sw_version, uid: version.uid })
+}
+
+pub(super) fn landed(payload: &[u8]) -> LandedState {
+    // Two bytes, both enumerations; the vehicle's state is the second.
+    match byte(payload, 1) {
+        1 => LandedState::OnGround,
+        2 => LandedState::InAir,
+        3 => LandedState::TakingOff,
+        4 => LandedState::Landing,
+        _ => LandedState::Unknown,
+    }
+}
+
+/// The fields are named utc and hold the time since boot; 0 is not yet.
+pub(super) fn flight_information(payload: &[u8]) -> Option<Observation> {
+    let information = read::<ap::FLIGHT_INFORMATION_DATA>(payload, &[])?;
+    let takeoff_boot_ms = (information.takeoff_time_utc / 1_000).min(u64::from(u32::MAX)) as u32;
+    Some(Observation::FlightInformation { flight: information.flight_uuid, takeoff_boot_ms })
+}
+
+/// Read as it is: the list of commands grows faster than any definition.
+pub(super) fn command_ack(payload: &[u8]) -> CommandAck {
+    CommandAck { command: u16::from_le_bytes([byte(payload, 0), byte(payload, 1)]), result: byte(payload, 2) }
+}

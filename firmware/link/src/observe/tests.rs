@@ -1,0 +1,220 @@
+//! The traps, one by one. Payloads are built by the typed encoders.
+use hums_core::observation::{Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind};
+use hums_core::units::{Amperes, Celsius, Fraction, MetresPerSecond2, Volts};
+use mavlink::dialects::ardupilotmega as ap;
+use mavlink::{MavlinkVersion, MessageData};
+use proptest::prelude::*;
+
+use super::*;
+
+/// What the message says, as sent: MAVLink 2, zeros at the end left out.
+fn said<M: MessageData>(message: &M) -> Option<Observation> {
+    let mut bytes = [0; 255];
+    let len = message.ser(MavlinkVersion::V2, &mut bytes);
+    by_id(M::ID, &bytes[..len])
+}
+
+#[test]
+fn ground_stations_gimbals_and_companions_are_no_vehicles() {
+    for (kind, autopilot) in [(6, 8), (6, 3), (26, 8), (18, 8), (18, 12), (2, 8)] {
+        assert_eq!(by_id(0, &[0, 0, 0, 0, kind, autopilot, 0, 4, 3]), None, "{kind} {autopilot}");
+    }
+}
+
+#[test]
+fn a_vehicle_of_a_type_that_is_newer_than_our_list_is_a_vehicle() {
+    let Some(Observation::Heartbeat(heartbeat)) = by_id(0, &[1, 0, 0, 0, 250, 12, 0x81, 4, 3]) else {
+        panic!("not recognised")
+    };
+    assert_eq!(
+        (heartbeat.kind, heartbeat.autopilot, heartbeat.armed),
+        (VehicleKind::Other, Autopilot::Px4, true)
+    );
+}
+
+#[test]
+fn unknown_system_status_is_none_of_the_values() {
+    let message = ap::SYS_STATUS_DATA {
+        load: u16::MAX,
+        voltage_battery: u16::MAX,
+        current_battery: -1,
+        battery_remaining: -1,
+        ..Default::default()
+    };
+    let Some(Observation::SystemStatus(status)) = said(&message) else { panic!() };
+    assert_eq!((status.load, status.voltage, status.current, status.remaining), (None, None, None, None));
+    let px4 = ap::SYS_STATUS_DATA { load: 123, current_battery: -100, ..message };
+    let Some(Observation::SystemStatus(status)) = said(&px4) else { panic!() };
+    assert_eq!((status.load, status.current), (Some(Fraction(0.123)), None));
+}
+
+fn battery(voltages: [u16; 10], voltages_ext: [u16; 4]) -> hums_core::observation::Battery {
+    let message = ap::BATTERY_STATUS_DATA { voltages, voltages_ext, ..Default::default() };
+    let Some(Observation::Battery(battery)) = said(&message) else { panic!() };
+    battery
+}
+
+#[test]
+fn a_sum_in_the_first_cell_is_no_cell() {
+    const NONE: u16 = u16::MAX;
+    let sum = battery([12_600, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE], [0; 4]);
+    assert_eq!((sum.voltage, sum.cells_reported()), (Some(Volts(12.6)), 0));
+    // Above 65.534 V the rest is in the next place.
+    let spilled = battery([65_534, 4_466, NONE, NONE, NONE, NONE, NONE, NONE, NONE, NONE], [0; 4]);
+    assert_eq!((spilled.voltage, spilled.cells_reported()), (Some(Volts(70.0)), 0));
+    let none = battery([NONE; 10], [0; 4]);
+    assert_eq!((none.voltage, none.cells_reported()), (None, 0));
+}
+
+#[test]
+fn cells_reach_into_the_extension() {
+    let battery = battery([4_000; 10], [4_000, 3_900, 0, 0]);
+    assert_eq!(battery.cells_reported(), 12);
+    assert!((battery.voltage.expect("known").0 - 47.9).abs() < 1e-3);
+    assert!(battery.cells[11] == Some(Volts(3.9)));
+}
+
+#[test]
+fn battery_figures_have_their_own_scales_and_unknowns() {
+    let message = ap::BATTERY_STATUS_DATA {
+        current_battery: 2_734,
+        current_consumed: 454,
+        energy_consumed: 360,
+        temperature: i16::MAX,
+        battery_remaining: 86,
+        ..Default::default()
+    };
+    let Some(Observation::Battery(known)) = said(&message) else { panic!() };
+    assert_eq!(
+        (known.current, known.remaining, known.temperature),
+        (Some(Amperes(27.34)), Some(Fraction(0.86)), None)
+    );
+    assert!((known.energy.expect("known").0 - 10.0).abs() < 1e-5, "360 hJ are 10 Wh");
+    let unknown = ap::BATTERY_STATUS_DATA { current_consumed: -29, energy_consumed: -1, ..message };
+    let Some(Observation::Battery(unknown)) = said(&unknown) else { panic!() };
+    assert_eq!((unknown.consumed, unknown.energy), (None, None));
+}
+
+#[test]
+fn a_receiver_that_knows_nothing_says_nothing() {
+    let message = ap::GPS_RAW_INT_DATA {
+        eph: u16::MAX,
+        epv: u16::MAX,
+        vel: u16::MAX,
+        satellites_visible: u8::MAX,
+        fix_type: ap::GpsFixType::GPS_FIX_TYPE_NO_GPS,
+        ..Default::default()
+    };
+    let Some(Observation::Gnss(gnss)) = said(&message) else { panic!() };
+    assert_eq!((gnss.fix, gnss.satellites, gnss.hdop, gnss.speed), (0, None, None, None));
+    assert_eq!((gnss.position, gnss.altitude, gnss.accuracy), (None, None, None));
+}
+
+#[test]
+fn a_fix_of_a_kind_that_is_newer_than_our_list_is_kept_and_the_rest_is_read() {
+    let message = ap::GPS_RAW_INT_DATA { satellites_visible: 17, ..Default::default() };
+    let mut bytes = [0; 255];
+    message.ser(MavlinkVersion::V2, &mut bytes);
+    bytes[28] = 99;
+    let Some(Observation::Gnss(gnss)) = by_id(24, &bytes[..52]) else { panic!() };
+    assert_eq!((gnss.fix, gnss.satellites), (99, Some(17)));
+}
+
+#[test]
+fn time_is_utc_or_since_boot_by_its_size() {
+    assert_eq!(unix_time(4_500_999), None);
+    assert_eq!(unix_time(1_732_190_000_000_000), Some(1_732_190_000_000_000));
+    let mut bytes = [0; 12];
+    bytes[8] = 7;
+    let time = SystemTime { utc_micros: None, boot_ms: 7 };
+    assert_eq!(by_id(2, &bytes), Some(Observation::SystemTime(time)));
+}
+
+#[test]
+fn highres_imu_gives_only_what_was_updated() {
+    let message = ap::HIGHRES_IMU_DATA {
+        zacc: -9.8,
+        temperature: 20.0,
+        fields_updated: ap::HighresImuUpdatedFlags::from_bits_retain(0b111),
+        ..Default::default()
+    };
+    let Some(Observation::ImuAndAir(imu, air)) = said(&message) else { panic!() };
+    assert_eq!(imu.acceleration, Some([0.0, 0.0, -9.8].map(MetresPerSecond2)));
+    assert_eq!((imu.rate, imu.temperature, air.pressure), (None, None, None));
+}
+
+#[test]
+fn an_estimator_that_has_not_started_has_no_variances() {
+    let message = ap::EKF_STATUS_REPORT_DATA {
+        flags: ap::EkfStatusFlags::from_bits_retain(1_024),
+        ..Default::default()
+    };
+    let Some(Observation::Estimator(estimator)) = said(&message) else { panic!() };
+    assert_eq!((estimator.scale, estimator.velocity), (EstimatorScale::Variance, None));
+    let running = ap::EKF_STATUS_REPORT_DATA { flags: ap::EkfStatusFlags::from_bits_retain(831), ..message };
+    let Some(Observation::Estimator(estimator)) = said(&running) else { panic!() };
+    assert_eq!(estimator.velocity, Some(0.0));
+}
+
+#[test]
+fn an_exhaust_at_absolute_zero_and_extensions_at_zero_are_unknown() {
+    let message = ap::EFI_STATUS_DATA {
+        exhaust_gas_temperature: -273.15,
+        cylinder_head_temperature: 201.0,
+        ..Default::default()
+    };
+    let Some(Observation::Engine(engine)) = said(&message) else { panic!() };
+    assert_eq!((engine.exhaust, engine.fuel_pressure, engine.ignition), (None, None, None));
+    assert_eq!(engine.cylinder_head, Some(Celsius(201.0)));
+}
+
+#[test]
+fn escs_beyond_the_count_do_not_exist() {
+    let message = ap::ESC_INFO_DATA { index: 4, count: 6, ..Default::default() };
+    let Some(Observation::Escs(group)) = said(&message) else { panic!() };
+    assert_eq!(group.first, 4);
+    assert_eq!(group.escs.map(|esc| esc.is_some()), [true, true, false, false]);
+}
+
+#[test]
+fn ardupilot_escs_come_in_hundredths_and_the_second_message_begins_at_motor_4() {
+    let mut message = ap::ESC_TELEMETRY_5_TO_8_DATA::default();
+    (message.voltage[1], message.current[1], message.rpm[1], message.count[1]) = (1_679, 80, 5_004, 9);
+    let Some(Observation::Escs(group)) = said(&message) else { panic!() };
+    assert_eq!((group.first, group.escs[0]), (4, None));
+    let esc = group.escs[1].expect("fitted");
+    assert_eq!((esc.voltage, esc.current, esc.temperature), (Some(Volts(16.79)), Some(Amperes(0.8)), None));
+}
+
+#[test]
+fn landed_state_is_the_second_byte() {
+    assert_eq!(by_id(245, &[3, 1]), Some(Observation::Landed(LandedState::OnGround)));
+    assert_eq!(by_id(245, &[2]), Some(Observation::Landed(LandedState::Unknown)), "trimmed: undefined");
+}
+
+#[test]
+fn unverified_frames_are_not_observed() {
+    let bytes = [0xfe, 9, 78, 1, 1, 0, 0, 0, 0, 0, 2, 3, 81, 3, 3, 0x19, 0xf3];
+    let frame = Frame::parse(&bytes).expect("a frame");
+    assert!(observe(&frame).is_some());
+    let mut other = bytes;
+    other[16] ^= 1;
+    assert!(observe(&Frame::parse(&other).expect("a frame")).is_none());
+}
+
+const USED: [u32; 36] = [
+    0, 1, 2, 24, 26, 27, 29, 30, 32, 33, 42, 46, 65, 74, 77, 105, 109, 116, 124, 125, 129, 147, 148, 193,
+    225, 226, 230, 241, 245, 253, 264, 290, 291, 339, 441, 11_030,
+];
+
+proptest! {
+    #[test]
+    fn no_payload_panics(at in 0..USED.len(), payload in prop::collection::vec(any::<u8>(), 0..=255)) {
+        by_id(USED[at], &payload);
+    }
+
+    #[test]
+    fn no_payload_of_repeated_bytes_panics(at in 0..USED.len(), byte in any::<u8>(), len in 0..=255_usize) {
+        by_id(USED[at], &[byte; 255][..len]);
+    }
+}

@@ -1,0 +1,175 @@
+//! What a line has carried so far: which known messages each system has sent with our definition, and which
+//! `crc_extra` each system uses for messages that we do not know. Bounded; strict when full.
+
+/// Systems that are told apart; further ones share the last place.
+const SYSTEMS: usize = 4;
+/// Words of 32 messages each: room for 512 known messages, and all.xml has 392.
+const WORDS: usize = 16;
+/// Unknown (system, id) pairs that are remembered.
+const EXTRAS: usize = 64;
+/// A free place in the table of extras. Id `0xff_ffff` of system 255 looks the same, and is always "seen once".
+const FREE: u32 = u32::MAX;
+
+/// What is known of the `crc_extra` of a (system, id) pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extra {
+    /// Never seen.
+    None,
+    /// Seen once: it may have been chance.
+    Once(u8),
+    /// Seen at least twice.
+    Confirmed(u8),
+    /// Never seen, and no place left to remember it.
+    Full,
+}
+
+/// See the module's description.
+#[derive(Debug)]
+pub(crate) struct Seen {
+    systems: [u8; SYSTEMS],
+    systems_used: u8,
+    /// One bit for each known message, by its index in the dialect's table.
+    verified: [[u32; WORDS]; SYSTEMS],
+    /// System in the high byte, message id below.
+    keys: [u32; EXTRAS],
+    extras: [u8; EXTRAS],
+    /// One bit for each key.
+    confirmed: u64,
+}
+
+impl Seen {
+    pub(crate) const fn new() -> Self {
+        Self {
+            systems: [0; SYSTEMS],
+            systems_used: 0,
+            verified: [[0; WORDS]; SYSTEMS],
+            keys: [FREE; EXTRAS],
+            extras: [0; EXTRAS],
+            confirmed: 0,
+        }
+    }
+
+    /// The message at `index` of the dialect's table came from `system` with a right checksum.
+    pub(crate) fn verified(&mut self, system: u8, index: usize) {
+        let place = self.place_of(system).unwrap_or_else(|| {
+            let used = usize::from(self.systems_used);
+            if used < SYSTEMS {
+                self.systems[used] = system;
+                self.systems_used += 1;
+            }
+            used.min(SYSTEMS - 1)
+        });
+        if let Some(word) = self.verified[place].get_mut(index / 32) {
+            *word |= 1 << (index % 32);
+        }
+    }
+
+    /// Whether the message at `index` has come from `system` with a right checksum. Of a system that has no place of
+    /// its own: whether it came from any that share the last one.
+    pub(crate) fn was_verified(&self, system: u8, index: usize) -> bool {
+        let place = match self.place_of(system) {
+            Some(place) => place,
+            None if usize::from(self.systems_used) == SYSTEMS => SYSTEMS - 1,
+            None => return false,
+        };
+        self.verified[place].get(index / 32).is_none_or(|word| word & (1 << (index % 32)) != 0)
+    }
+
+    /// What is known of the extra that `system` uses for `id`.
+    pub(crate) fn extra(&self, system: u8, id: u32) -> Extra {
+        match self.keys.iter().position(|&key| key == key_of(system, id)) {
+            Some(at) if self.confirmed & (1 << at) != 0 => Extra::Confirmed(self.extras[at]),
+            Some(at) => Extra::Once(self.extras[at]),
+            None if self.place_for_new().is_some() => Extra::None,
+            None => Extra::Full,
+        }
+    }
+
+    /// Remembers that `system` used `extra` for `id`. A pair seen once may have been chance: it gives way to a new
+    /// one when the table is full, and to another extra of the same pair.
+    pub(crate) fn learn(&mut self, system: u8, id: u32, extra: u8) {
+        let key = key_of(system, id);
+        let known = self.keys.iter().position(|&other| other == key);
+        if let Some(at) = known
+            && self.extras[at] == extra
+        {
+            self.confirmed |= 1 << at;
+        } else if let Some(at) = known.or_else(|| self.place_for_new()) {
+            self.keys[at] = key;
+            self.extras[at] = extra;
+            self.confirmed &= !(1 << at);
+        }
+    }
+
+    fn place_of(&self, system: u8) -> Option<usize> {
+        self.systems[..usize::from(self.systems_used)].iter().position(|&other| other == system)
+    }
+
+    /// A free place, else one that was seen only once.
+    fn place_for_new(&self) -> Option<usize> {
+        let once = (!self.confirmed).trailing_zeros() as usize;
+        self.keys.iter().position(|&key| key == FREE).or((once < EXTRAS).then_some(once))
+    }
+}
+
+const fn key_of(system: u8, id: u32) -> u32 {
+    (system as u32) << 24 | (id & 0x00ff_ffff)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_dialect_fits() {
+        assert!(hums_dialect::messages().len() <= 32 * WORDS);
+    }
+
+    #[test]
+    fn systems_are_told_apart_until_places_run_out() {
+        let mut seen = Seen::new();
+        for system in 1..=5 {
+            assert!(!seen.was_verified(1, 7) || system > 1);
+            seen.verified(system, usize::from(system));
+        }
+        assert!(seen.was_verified(1, 1) && !seen.was_verified(1, 2) && !seen.was_verified(2, 1));
+        // 5 shares the place of 4, and so does anyone who comes later: strict, never lenient.
+        assert!(seen.was_verified(4, 5) && seen.was_verified(5, 4) && seen.was_verified(9, 5));
+    }
+
+    #[test]
+    fn an_extra_is_confirmed_by_its_second_sight() {
+        let mut seen = Seen::new();
+        assert_eq!(seen.extra(1, 50_000), Extra::None);
+        seen.learn(1, 50_000, 3);
+        assert_eq!(seen.extra(1, 50_000), Extra::Once(3));
+        seen.learn(1, 50_000, 4);
+        assert_eq!(seen.extra(1, 50_000), Extra::Once(4));
+        seen.learn(1, 50_000, 4);
+        assert_eq!(seen.extra(1, 50_000), Extra::Confirmed(4));
+        assert_eq!(seen.extra(2, 50_000), Extra::None);
+    }
+
+    #[test]
+    fn a_full_table_keeps_what_is_confirmed_and_takes_nothing_new() {
+        let mut seen = Seen::new();
+        for id in 0..EXTRAS as u32 {
+            seen.learn(1, 60_000 + id, 1);
+            seen.learn(1, 60_000 + id, 1);
+        }
+        assert_eq!(seen.extra(1, 70_000), Extra::Full);
+        seen.learn(1, 70_000, 1);
+        assert_eq!(seen.extra(1, 70_000), Extra::Full);
+        assert_eq!(seen.extra(1, 60_000), Extra::Confirmed(1));
+    }
+
+    #[test]
+    fn chance_sights_give_way_when_the_table_is_full() {
+        let mut seen = Seen::new();
+        for id in 0..EXTRAS as u32 {
+            seen.learn(1, 60_000 + id, 1);
+        }
+        seen.learn(1, 70_000, 1);
+        assert_eq!(seen.extra(1, 70_000), Extra::Once(1));
+    }
+}

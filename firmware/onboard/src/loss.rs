@@ -1,0 +1,69 @@
+//! Losses waiting to be recorded: what was lost is itself data, with its count and its first and last moment.
+
+use hums_blackbox::record::{Loss, Lost};
+use hums_core::time::{Instant, Span};
+
+/// Losses of one kind within this long are one record.
+const WINDOW: Span = Span::from_secs(1);
+
+/// The kinds of loss that the pipeline can have.
+pub(crate) const KINDS: [Lost; 6] =
+    [Lost::UartOverrun, Lost::NotFrames, Lost::DamagedFrames, Lost::QueueFull, Lost::Card, Lost::Records];
+
+/// One open record a kind.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Losses {
+    open: [Option<Loss>; KINDS.len()],
+}
+
+impl Losses {
+    pub(crate) const fn new() -> Self {
+        Self { open: [None; KINDS.len()] }
+    }
+
+    /// Counts a loss that was noticed at `now`.
+    pub(crate) fn count(&mut self, now: Instant, what: Lost, count: u64) {
+        let Some(slot) = KINDS.iter().position(|kind| *kind == what).filter(|_| count > 0) else { return };
+        let loss = self.open[slot].get_or_insert(Loss { what, count: 0, from: now, to: now });
+        loss.count = loss.count.saturating_add(count);
+        loss.to = now;
+    }
+
+    /// Hands each loss whose window is over (or every one, at the end) to `write`, which says whether it was written;
+    /// one that was not stays open.
+    pub(crate) fn flush(&mut self, now: Instant, all: bool, mut write: impl FnMut(&Loss) -> bool) {
+        for slot in &mut self.open {
+            if let Some(loss) = slot
+                && (all || now.since(loss.from) >= WINDOW)
+                && write(loss)
+            {
+                *slot = None;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn losses_of_a_second_are_one_record_and_wait_until_it_is_written() {
+        let mut losses = Losses::new();
+        losses.count(Instant::from_millis(100), Lost::NotFrames, 3);
+        losses.count(Instant::from_millis(900), Lost::NotFrames, 4);
+        let mut written = Vec::new();
+        losses.flush(Instant::from_millis(1_000), false, |loss| {
+            written.push(*loss);
+            true
+        });
+        assert_eq!(written, [], "the window is not over");
+        losses.flush(Instant::from_millis(1_100), false, |_| false);
+        losses.flush(Instant::from_millis(1_200), false, |loss| {
+            written.push(*loss);
+            true
+        });
+        let (from, to) = (Instant::from_millis(100), Instant::from_millis(900));
+        assert_eq!(written, [Loss { what: Lost::NotFrames, count: 7, from, to }]);
+    }
+}

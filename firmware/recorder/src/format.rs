@@ -1,0 +1,135 @@
+//! Formats a card: one partition, FAT32. Used for the PC's card images, and by command on the board, never unasked.
+//!
+//! One FAT instead of two, deliberately: with two, every update has a moment in which the copies differ, and a cut
+//! there is what a file system check complains about. The second copy is never read by any system in use.
+
+use embedded_sdmmc::{Block, BlockDevice, BlockIdx};
+
+use crate::layout::FAT32_CLUSTERS_MIN;
+
+/// The partition begins at 1 MiB, as SD cards and every partitioning tool have it.
+const PARTITION_START: u32 = 2048;
+/// Blocks before the FAT: the customary 32.
+const RESERVED_BLOCKS: u32 = 32;
+const INFO_BLOCK: u32 = 1;
+const BACKUP_BLOCK: u32 = 6;
+const ROOT_CLUSTER: u32 = 2;
+/// FAT entries in a block.
+const ENTRIES: u32 = 128;
+/// The smallest card that FAT32 fits on, in blocks: 65,525 clusters of one block, their FAT and what is before them.
+pub const BLOCKS_MIN: u32 =
+    PARTITION_START + RESERVED_BLOCKS + (FAT32_CLUSTERS_MIN + 2).div_ceil(ENTRIES) + FAT32_CLUSTERS_MIN;
+
+/// Why a card was not formatted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FormatError<E> {
+    /// The card did not take a block.
+    Device(E),
+    /// The card is smaller than [`BLOCKS_MIN`].
+    TooSmall,
+}
+
+/// The largest cluster that leaves a volume of this size enough clusters to be FAT32: the larger the clusters, the
+/// fewer FAT blocks a new segment takes. At most 32 KiB, which every system reads.
+const fn cluster_blocks(volume_blocks: u32) -> u32 {
+    let mut blocks = 64;
+    while blocks > 1 && volume_blocks / blocks < FAT32_CLUSTERS_MIN + FAT32_CLUSTERS_MIN / ENTRIES {
+        blocks /= 2;
+    }
+    blocks
+}
+
+/// Makes a partition table and an empty FAT32 volume; everything on the card is lost.
+pub fn format<D: BlockDevice>(device: &D, volume_id: u32) -> Result<(), FormatError<D::Error>> {
+    let card_blocks = device.num_blocks().map_err(FormatError::Device)?.0;
+    if card_blocks < BLOCKS_MIN {
+        return Err(FormatError::TooSmall);
+    }
+    let total = card_blocks - PARTITION_START;
+    let cluster_blocks = cluster_blocks(total);
+    // The FAT for all that is left is a little more than needed: it also covers the blocks that it takes itself.
+    let fat_blocks = ((total - RESERVED_BLOCKS) / cluster_blocks + 2).div_ceil(ENTRIES);
+    let clusters = (total - RESERVED_BLOCKS - fat_blocks) / cluster_blocks;
+    let write = |block: &Block, at: u32| {
+        device.write(core::slice::from_ref(block), BlockIdx(at)).map_err(FormatError::Device)
+    };
+
+    // The partition table comes last, so that a cut before it leaves an unformatted card, not a damaged volume.
+    let boot = boot_sector(total, cluster_blocks, fat_blocks, volume_id);
+    let info = info_sector();
+    for base in [0, BACKUP_BLOCK] {
+        write(&boot, PARTITION_START + base)?;
+        write(&info, PARTITION_START + base + INFO_BLOCK)?;
+    }
+    let fat_start = PARTITION_START + RESERVED_BLOCKS;
+    for index in 0..fat_blocks {
+        write(&fat_block(index), fat_start + index)?;
+    }
+    let data_start = fat_start + fat_blocks;
+    debug_assert!(clusters > ROOT_CLUSTER);
+    for index in 0..cluster_blocks {
+        write(&Block::new(), data_start + index)?;
+    }
+    write(&partition_table(total), 0)
+}
+
+fn put(block: &mut Block, at: usize, bytes: &[u8]) {
+    block[at..at + bytes.len()].copy_from_slice(bytes);
+}
+
+fn partition_table(total: u32) -> Block {
+    let mut block = Block::new();
+    // Status, CHS of the first block ("too far"), type FAT32 LBA, CHS of the last block.
+    put(&mut block, 446, &[0x00, 0xFE, 0xFF, 0xFF, 0x0C, 0xFE, 0xFF, 0xFF]);
+    put(&mut block, 454, &PARTITION_START.to_le_bytes());
+    put(&mut block, 458, &total.to_le_bytes());
+    put(&mut block, 510, &[0x55, 0xAA]);
+    block
+}
+
+fn boot_sector(total: u32, cluster_blocks: u32, fat_blocks: u32, volume_id: u32) -> Block {
+    let mut block = Block::new();
+    put(&mut block, 0, &[0xEB, 0x58, 0x90]);
+    put(&mut block, 3, b"HUMS    ");
+    put(&mut block, 11, &(Block::LEN as u16).to_le_bytes());
+    put(&mut block, 13, &[cluster_blocks as u8]);
+    put(&mut block, 14, &(RESERVED_BLOCKS as u16).to_le_bytes());
+    put(&mut block, 16, &[1]); // one FAT
+    put(&mut block, 21, &[0xF8]); // media: fixed
+    put(&mut block, 24, &63_u16.to_le_bytes());
+    put(&mut block, 26, &255_u16.to_le_bytes());
+    put(&mut block, 28, &PARTITION_START.to_le_bytes());
+    put(&mut block, 32, &total.to_le_bytes());
+    put(&mut block, 36, &fat_blocks.to_le_bytes());
+    put(&mut block, 44, &ROOT_CLUSTER.to_le_bytes());
+    put(&mut block, 48, &(INFO_BLOCK as u16).to_le_bytes());
+    put(&mut block, 50, &(BACKUP_BLOCK as u16).to_le_bytes());
+    put(&mut block, 64, &[0x80, 0, 0x29]);
+    put(&mut block, 67, &volume_id.to_le_bytes());
+    put(&mut block, 71, b"NO NAME    ");
+    put(&mut block, 82, b"FAT32   ");
+    put(&mut block, 510, &[0x55, 0xAA]);
+    block
+}
+
+/// The free count stays unknown for ever (see [`crate::gate`]), so it can never be wrong.
+fn info_sector() -> Block {
+    let mut block = Block::new();
+    put(&mut block, 0, &0x4161_5252_u32.to_le_bytes());
+    put(&mut block, 484, &0x6141_7272_u32.to_le_bytes());
+    put(&mut block, 488, &u32::MAX.to_le_bytes());
+    put(&mut block, 492, &(ROOT_CLUSTER + 1).to_le_bytes());
+    put(&mut block, 510, &[0x55, 0xAA]);
+    block
+}
+
+fn fat_block(index: u32) -> Block {
+    let mut block = Block::new();
+    if index == 0 {
+        // Media, "clean" flags, and the root directory of one cluster.
+        for (entry, value) in [0x0FFF_FFF8_u32, 0x0FFF_FFFF, 0x0FFF_FFFF].iter().enumerate() {
+            put(&mut block, entry * 4, &value.to_le_bytes());
+        }
+    }
+    block
+}

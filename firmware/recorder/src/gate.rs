@@ -1,0 +1,270 @@
+//! Stands between `embedded-sdmmc` and the card, so that neither can hurt the other.
+//!
+//! **Order of metadata.** The library writes FAT blocks and directory entries as it goes, and a cut between two of them
+//! leaves a chain longer than its file, or a file without a chain. Within a transaction the gate holds these blocks
+//! back; [`Gate::commit`] then writes FAT blocks first and directory entries last. Every cut then leaves the old
+//! directory, and at worst clusters that no file uses. Outside a transaction metadata cannot be written at all.
+//!
+//! **Allocation without data.** The library allocates by writing; while [`Gate::discard_data`] is on, what it writes
+//! into clusters goes nowhere, so a segment of 8 MiB costs its FAT blocks and no more. What an earlier file left in
+//! those clusters stays there until it is overwritten: readers tell it by its session.
+//!
+//! **The free count** of the information sector is set to "unknown" once, so that it can never be wrong; the hint
+//! where to look for free clusters is kept.
+//!
+//! **Bad FAT entries** would make the library compute with clusters that do not exist: they are shown to it as bad
+//! clusters, which it refuses, and the block that holds them is never written back. A chain that goes in circles ends
+//! when the reads that one operation may take are used up.
+
+use core::cell::{Cell, RefCell};
+use core::fmt;
+
+use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use heapless::Vec;
+
+use crate::layout::Layout;
+
+/// Metadata blocks held back in a transaction: the FAT blocks of the segment in work, its directory block, and the
+/// information sector. FAT blocks beyond this are written early, which is harmless: nothing refers to them yet.
+pub const HELD_BLOCKS: usize = 12;
+
+/// What went wrong below the file system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GateError<E> {
+    /// The card reported an error.
+    Device(E),
+    /// The file system would have been written outside a transaction or outside its volume.
+    Refused,
+    /// One operation read more blocks than the volume's structures can hold: they go in circles.
+    Runaway,
+}
+
+impl<E: fmt::Debug> fmt::Display for GateError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Device(error) => write!(f, "the card failed: {error:?}"),
+            Self::Refused => {
+                write!(f, "a write to the file system was refused because its structures are damaged")
+            }
+            Self::Runaway => write!(f, "the card's file system goes in circles: format the card"),
+        }
+    }
+}
+
+impl<E: fmt::Debug> core::error::Error for GateError<E> {}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Fat,
+    Info,
+    Directory,
+}
+
+struct Held {
+    block: Block,
+    at: u32,
+    kind: Kind,
+}
+
+/// The gate. Its methods take `&self` because the library owns it and hands out only shared references.
+pub struct Gate<D> {
+    device: D,
+    layout: Layout,
+    transaction: Cell<bool>,
+    discard: Cell<bool>,
+    reads_left: Cell<u32>,
+    held: RefCell<Vec<Held, HELD_BLOCKS>>,
+}
+
+impl<D: BlockDevice> Gate<D> {
+    /// A gate for a card whose layout was checked.
+    pub const fn new(device: D, layout: Layout) -> Self {
+        Self {
+            device,
+            layout,
+            transaction: Cell::new(false),
+            discard: Cell::new(false),
+            reads_left: Cell::new(0),
+            held: RefCell::new(Vec::new()),
+        }
+    }
+
+    /// The card.
+    pub const fn device(&self) -> &D {
+        &self.device
+    }
+
+    /// Gives the card back; what was held back is forgotten.
+    pub fn into_device(self) -> D {
+        self.device
+    }
+
+    /// The layout that the gate guards.
+    pub const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Lets the next operation read at most `blocks` blocks.
+    pub fn allow_reads(&self, blocks: u32) {
+        self.reads_left.set(blocks);
+    }
+
+    /// Holds metadata back from now on.
+    pub fn begin(&self) {
+        self.held.borrow_mut().clear();
+        self.transaction.set(true);
+    }
+
+    /// While on (within a transaction), writes into clusters go nowhere.
+    pub fn discard_data(&self, on: bool) {
+        self.discard.set(on);
+    }
+
+    /// Writes what was held back, FAT blocks first, directory entries last.
+    pub fn commit(&self) -> Result<(), GateError<D::Error>> {
+        self.transaction.set(false);
+        self.discard.set(false);
+        let mut held = self.held.borrow_mut();
+        for kind in [Kind::Fat, Kind::Info, Kind::Directory] {
+            for entry in held.iter().filter(|entry| entry.kind == kind) {
+                self.write_device(&entry.block, entry.at)?;
+            }
+        }
+        held.clear();
+        Ok(())
+    }
+
+    /// Forgets what was held back. The library may still remember some of it: open the volume anew.
+    pub fn abort(&self) {
+        self.transaction.set(false);
+        self.discard.set(false);
+        self.held.borrow_mut().clear();
+    }
+
+    fn write_device(&self, block: &Block, at: u32) -> Result<(), GateError<D::Error>> {
+        self.device.write(core::slice::from_ref(block), BlockIdx(at)).map_err(GateError::Device)
+    }
+
+    fn read_block(&self, block: &mut Block, at: u32) -> Result<(), GateError<D::Error>> {
+        let left = self.reads_left.get().checked_sub(1).ok_or(GateError::Runaway)?;
+        self.reads_left.set(left);
+        if let Some(held) = self.held.borrow().iter().find(|held| held.at == at) {
+            *block = held.block.clone();
+            return Ok(());
+        }
+        self.device.read(core::slice::from_mut(block), BlockIdx(at)).map_err(GateError::Device)?;
+        if self.layout.is_fat(at) {
+            self.for_bad_entries(block, at, |entry| entry.copy_from_slice(&0x0FFF_FFF7_u32.to_le_bytes()));
+        } else if at == self.layout.info {
+            self.correct_info(block);
+        }
+        Ok(())
+    }
+
+    /// Calls `bad` for each FAT entry of this block that names a cluster that does not exist.
+    fn for_bad_entries(&self, block: &mut Block, at: u32, mut bad: impl FnMut(&mut [u8])) {
+        let first = (at - self.layout.fat_start) % self.layout.fat_blocks * 128;
+        let end = self.layout.clusters + 2;
+        for (index, entry) in block.chunks_exact_mut(4).enumerate() {
+            let number = first + index as u32;
+            let next = u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3]]) & 0x0FFF_FFFF;
+            // Free, bad and end marks are in order; entry 0 and 1 are flags; entries past the end do not exist.
+            let in_order = next == 0 || (2..end).contains(&next) || next >= 0x0FFF_FFF7;
+            if number >= 2 && number < end && !in_order {
+                bad(entry);
+            }
+        }
+    }
+
+    fn correct_info(&self, block: &mut Block) {
+        block[488..492].copy_from_slice(&u32::MAX.to_le_bytes());
+        let hint = u32::from_le_bytes([block[492], block[493], block[494], block[495]]);
+        if !(2..self.layout.clusters + 2).contains(&hint) {
+            block[492..496].copy_from_slice(&u32::MAX.to_le_bytes());
+        }
+    }
+
+    fn write_block(&self, block: &Block, at: u32) -> Result<(), GateError<D::Error>> {
+        if self.layout.is_data(at) {
+            return self.write_cluster(block, at);
+        }
+        if !self.transaction.get() {
+            return Err(GateError::Refused);
+        }
+        if self.layout.is_fat(at) {
+            self.refuse_damaged(at)?;
+            return self.hold(block, at, Kind::Fat);
+        }
+        if at == self.layout.info {
+            let mut corrected = block.clone();
+            self.correct_info(&mut corrected);
+            return self.hold(&corrected, at, Kind::Info);
+        }
+        Err(GateError::Refused)
+    }
+
+    fn write_cluster(&self, block: &Block, at: u32) -> Result<(), GateError<D::Error>> {
+        if !self.transaction.get() {
+            return self.write_device(block, at);
+        }
+        if self.discard.get() {
+            return Ok(());
+        }
+        // The only blocks of zeros that the library writes here are those of a cluster that makes the directory
+        // longer: nothing refers to it yet, so it can be cleared at once.
+        let known = self.held.borrow().iter().any(|held| held.at == at);
+        if !known && block.iter().all(|byte| *byte == 0) {
+            return self.write_device(block, at);
+        }
+        self.hold(block, at, Kind::Directory)
+    }
+
+    /// A FAT block with entries that were shown as bad clusters must not be written with them.
+    fn refuse_damaged(&self, at: u32) -> Result<(), GateError<D::Error>> {
+        if self.held.borrow().iter().any(|held| held.at == at) {
+            return Ok(());
+        }
+        let mut block = [Block::new()];
+        self.device.read(&mut block, BlockIdx(at)).map_err(GateError::Device)?;
+        let mut damaged = false;
+        self.for_bad_entries(&mut block[0], at, |_| damaged = true);
+        if damaged { Err(GateError::Refused) } else { Ok(()) }
+    }
+
+    fn hold(&self, block: &Block, at: u32, kind: Kind) -> Result<(), GateError<D::Error>> {
+        let mut held = self.held.borrow_mut();
+        if let Some(entry) = held.iter_mut().find(|entry| entry.at == at) {
+            entry.block = block.clone();
+            return Ok(());
+        }
+        if held.is_full() {
+            // Nothing refers to the new chain before the directory entry is written, so its blocks may go early.
+            let oldest = held.iter().position(|entry| entry.kind == Kind::Fat).ok_or(GateError::Refused)?;
+            let early = held.remove(oldest);
+            self.write_device(&early.block, early.at)?;
+        }
+        held.push(Held { block: block.clone(), at, kind }).map_err(|_| GateError::Refused)
+    }
+}
+
+impl<D: BlockDevice> BlockDevice for Gate<D> {
+    type Error = GateError<D::Error>;
+
+    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Self::Error> {
+        for (index, block) in blocks.iter_mut().enumerate() {
+            self.read_block(block, start.0.saturating_add(index as u32))?;
+        }
+        Ok(())
+    }
+
+    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), Self::Error> {
+        for (index, block) in blocks.iter().enumerate() {
+            self.write_block(block, start.0.saturating_add(index as u32))?;
+        }
+        Ok(())
+    }
+
+    fn num_blocks(&self) -> Result<BlockCount, Self::Error> {
+        self.device.num_blocks().map_err(GateError::Device)
+    }
+}

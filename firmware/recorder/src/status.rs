@@ -1,0 +1,225 @@
+//! What the storage task tells the others, and what it is told: plain atomics, so that neither side ever waits.
+
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+
+use embedded_sdmmc::{TimeSource, Timestamp};
+
+/// What the card is doing. The numbers are stored in logs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum CardState {
+    /// Not looked at yet.
+    Unknown = 0,
+    /// A session is being recorded.
+    Recording = 1,
+    /// No card, or it does not answer.
+    Absent = 2,
+    /// A card that cannot be used as it is: no FAT32, or a damaged one. Never formatted unasked.
+    Foreign = 3,
+    /// No free clusters, and no log of ours to overwrite.
+    Full = 4,
+    /// The card answers but does not take blocks.
+    Failing = 5,
+    /// The session was finished.
+    Finished = 6,
+}
+
+impl CardState {
+    /// The state of a stored number.
+    pub const fn from_number(number: u8) -> Self {
+        match number {
+            1 => Self::Recording,
+            2 => Self::Absent,
+            3 => Self::Foreign,
+            4 => Self::Full,
+            5 => Self::Failing,
+            6 => Self::Finished,
+            _ => Self::Unknown,
+        }
+    }
+}
+
+/// Shared by the storage task, which writes it, and the monitor, which reads it; the three `request`-like fields at the
+/// end go the other way.
+#[derive(Debug)]
+pub struct CardStatus {
+    state: AtomicU8,
+    session: AtomicU32,
+    segments: AtomicU32,
+    segments_overwritten: AtomicU32,
+    blocks_written: AtomicU32,
+    write_errors: AtomicU32,
+    frames_lost: AtomicU32,
+    sectors_lost: AtomicU32,
+    stall_ms_max: AtomicU32,
+    queue_sectors_max: AtomicU32,
+    group_wanted: AtomicBool,
+    fat_time: AtomicU32,
+}
+
+/// A reading of [`CardStatus`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CardReading {
+    /// What the card is doing.
+    pub state: CardState,
+    /// The session's number on this card; 0 before there is one.
+    pub session: u32,
+    /// Segments begun in this session.
+    pub segments: u32,
+    /// Segments of earlier sessions that were overwritten because the card is full.
+    pub segments_overwritten: u32,
+    /// Blocks of 512 bytes of log data that the card took.
+    pub blocks_written: u32,
+    /// Writes that failed, retries included.
+    pub write_errors: u32,
+    /// Frames in sectors that could not be written.
+    pub frames_lost: u32,
+    /// Sectors that could not be written.
+    pub sectors_lost: u32,
+    /// The longest time that one service of the card took, in milliseconds.
+    pub stall_ms_max: u32,
+    /// The most sectors that waited at once.
+    pub queue_sectors_max: u32,
+}
+
+impl Default for CardStatus {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl CardStatus {
+    /// Before the card was looked at.
+    pub const fn new() -> Self {
+        Self {
+            state: AtomicU8::new(CardState::Unknown as u8),
+            session: AtomicU32::new(0),
+            segments: AtomicU32::new(0),
+            segments_overwritten: AtomicU32::new(0),
+            blocks_written: AtomicU32::new(0),
+            write_errors: AtomicU32::new(0),
+            frames_lost: AtomicU32::new(0),
+            sectors_lost: AtomicU32::new(0),
+            stall_ms_max: AtomicU32::new(0),
+            queue_sectors_max: AtomicU32::new(0),
+            group_wanted: AtomicBool::new(false),
+            fat_time: AtomicU32::new(0),
+        }
+    }
+
+    /// All figures; each is right by itself, they may be a moment apart.
+    pub fn read(&self) -> CardReading {
+        CardReading {
+            state: CardState::from_number(self.state.load(Ordering::Relaxed)),
+            session: self.session.load(Ordering::Relaxed),
+            segments: self.segments.load(Ordering::Relaxed),
+            segments_overwritten: self.segments_overwritten.load(Ordering::Relaxed),
+            blocks_written: self.blocks_written.load(Ordering::Relaxed),
+            write_errors: self.write_errors.load(Ordering::Relaxed),
+            frames_lost: self.frames_lost.load(Ordering::Relaxed),
+            sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
+            stall_ms_max: self.stall_ms_max.load(Ordering::Relaxed),
+            queue_sectors_max: self.queue_sectors_max.load(Ordering::Relaxed),
+        }
+    }
+
+    pub(crate) fn set_state(&self, state: CardState) {
+        self.state.store(state as u8, Ordering::Relaxed);
+    }
+
+    pub(crate) fn begin_segment(&self, session: u32, overwrote: bool) {
+        self.session.store(session, Ordering::Relaxed);
+        self.segments.fetch_add(1, Ordering::Relaxed);
+        self.segments_overwritten.fetch_add(u32::from(overwrote), Ordering::Relaxed);
+    }
+
+    pub(crate) fn count_block(&self) {
+        self.blocks_written.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn count_write_error(&self) {
+        self.write_errors.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn count_lost_sector(&self, frames: u32) {
+        self.sectors_lost.fetch_add(1, Ordering::Relaxed);
+        self.frames_lost.fetch_add(frames, Ordering::Relaxed);
+    }
+
+    /// Notes how long one service of the card took.
+    pub fn note_stall_ms(&self, stall_ms: u32) {
+        self.stall_ms_max.fetch_max(stall_ms, Ordering::Relaxed);
+    }
+
+    /// Notes how many sectors wait.
+    pub fn note_queue_sectors(&self, sectors: u32) {
+        self.queue_sectors_max.fetch_max(sectors, Ordering::Relaxed);
+    }
+
+    /// Storage asks for a new group: what comes next should be readable without what came before.
+    pub fn want_group(&self) {
+        self.group_wanted.store(true, Ordering::Release);
+    }
+
+    /// Whether storage asked for a new group since the last call.
+    pub fn take_group_wanted(&self) -> bool {
+        self.group_wanted.swap(false, Ordering::Acquire)
+    }
+
+    /// Tells the date for directory entries, in seconds since 1970 UTC.
+    pub fn set_utc_secs(&self, utc_secs: u32) {
+        self.fat_time.store(utc_secs, Ordering::Relaxed);
+    }
+}
+
+/// The clock of directory entries: UTC once it is known, 1 January 1980 (FAT's zero) before.
+#[derive(Clone, Copy, Debug)]
+pub struct FatClock<'a>(pub &'a CardStatus);
+
+impl TimeSource for FatClock<'_> {
+    fn get_timestamp(&self) -> Timestamp {
+        timestamp(self.0.fat_time.load(Ordering::Relaxed))
+    }
+}
+
+/// Civil date from days since 1970 (Howard Hinnant, "chrono-compatible low-level date algorithms"), for 1980 to 2106.
+fn timestamp(utc_secs: u32) -> Timestamp {
+    const FAT_EPOCH_SECS: u32 = 315_532_800; // 1980-01-01
+    let secs = utc_secs.max(FAT_EPOCH_SECS);
+    let (days, second_of_day) = (secs / 86_400 + 719_468, secs % 86_400);
+    let (era, day_of_era) = (days / 146_097, days % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let year = year_of_era + era * 400 + u32::from(month <= 2);
+    Timestamp {
+        year_since_1970: (year - 1970) as u8,
+        zero_indexed_month: (month - 1) as u8,
+        zero_indexed_day: (day - 1) as u8,
+        hours: (second_of_day / 3_600) as u8,
+        minutes: (second_of_day / 60 % 60) as u8,
+        seconds: (second_of_day % 60) as u8,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_civil() {
+        let leap_day = timestamp(1_709_210_096); // 2024-02-29T12:34:56Z
+        assert_eq!(leap_day.to_string(), "2024-02-29 12:34:56");
+        assert_eq!(timestamp(0).to_string(), "1980-01-01 00:00:00");
+    }
+
+    #[test]
+    fn a_wanted_group_is_told_once() {
+        let status = CardStatus::new();
+        status.want_group();
+        assert!(status.take_group_wanted());
+        assert!(!status.take_group_wanted());
+    }
+}

@@ -1,0 +1,246 @@
+//! The card layer against a card in memory that remembers every block write, so that power can be cut at each of them.
+
+mod common;
+
+use common::{Broken, MIB_BLOCKS, MemCard};
+use hums_recorder::card::{Card, CardError, LogEntry};
+use hums_recorder::format::{BLOCKS_MIN, FormatError, format};
+use hums_recorder::layout::LayoutError;
+use hums_recorder::{CardState, CardStatus, LogName};
+
+const FIRST: LogName = LogName { session: 1, segment: 0 };
+const SECOND: LogName = LogName { session: 2, segment: 0 };
+
+fn mount<'a>(card: &MemCard, status: &'a CardStatus) -> Card<'a, MemCard> {
+    Card::mount(card.clone(), status).map_err(|(_, error)| error).expect("the card mounts")
+}
+
+fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
+    let mut logs = Vec::new();
+    card.logs(|entry| logs.push(entry)).expect("the directory reads");
+    logs
+}
+
+fn pattern(seed: u32) -> [u8; 512] {
+    std::array::from_fn(|index| (seed as usize * 31 + index) as u8)
+}
+
+#[test]
+fn a_segment_reads_back_after_a_remount() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 1 << 20).expect("there is room");
+    assert_eq!(card.open_blocks(), 2048);
+    for index in (0..2048).rev() {
+        card.write(index, &pattern(index)).expect("in place");
+    }
+    drop(card);
+    let mut card = mount(&device, &status);
+    assert_eq!(logs(&card).iter().map(|log| (log.name, log.bytes)).collect::<Vec<_>>(), [(FIRST, 1 << 20)]);
+    card.open(FIRST).expect("it is there");
+    let mut block = [0; 512];
+    for index in 0..2048 {
+        card.read(index, &mut block).expect("it reads");
+        assert_eq!(block, pattern(index), "block {index}");
+    }
+    assert_eq!(card.write(2048, &block), Err(CardError::NotOpen));
+}
+
+#[test]
+fn writing_in_place_touches_neither_fat_nor_directory() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 1 << 20).expect("there is room");
+    device.journal.borrow_mut().clear();
+    for index in 0..2048 {
+        card.write(index, &pattern(index)).expect("in place");
+    }
+    assert_eq!(device.journal.borrow().len(), 2048);
+    let layout = *card.layout();
+    assert!(
+        device
+            .journal
+            .borrow()
+            .iter()
+            .all(|(at, _)| layout.is_data(*at) && *at >= layout.data_start + layout.cluster_blocks),
+        "only the segment"
+    );
+}
+
+/// Every prefix of the journal, whole and with the last block torn either way, is a card in order: all logs that it
+/// lists can be read to their ends, and none of an earlier session has changed.
+#[test]
+fn a_cut_at_any_write_leaves_the_card_in_order() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 256 * 1024).expect("there is room");
+    card.write(7, &pattern(7)).expect("in place");
+    let before = device.blocks.borrow().clone();
+    device.journal.borrow_mut().clear();
+    card.create(SECOND, 4 << 20).expect("there is room");
+    card.write(0, &pattern(0)).expect("in place");
+    let oldest = logs(&card)[0];
+    card.recycle(&oldest, LogName { session: 3, segment: 0 }).expect("it is there");
+    card.write(1, &pattern(1)).expect("in place");
+
+    let journal = device.journal.borrow().clone();
+    assert!(journal.len() > 20 && journal.len() < 200, "{} writes", journal.len());
+    let mut blocks = before;
+    for (cut, (at, new)) in journal.iter().enumerate() {
+        let old = blocks.get(at).copied().unwrap_or([0; 512]);
+        for torn in 0..3 {
+            let mut block = if torn == 0 { old } else { *new };
+            match torn {
+                1 => block[256..].copy_from_slice(&old[256..]),
+                2 => block[..256].copy_from_slice(&old[..256]),
+                _ => {}
+            }
+            let mut after = blocks.clone();
+            after.insert(*at, block);
+            check_in_order(&MemCard::with(device.size, after), cut);
+        }
+        blocks.insert(*at, *new);
+    }
+}
+
+fn check_in_order(device: &MemCard, cut: usize) {
+    let status = CardStatus::new();
+    let mut card = mount(device, &status);
+    let found = logs(&card);
+    assert!(!found.is_empty() && found.len() <= 2, "cut {cut}: {found:?}");
+    for log in found {
+        card.open(log.name).map_err(|error| format!("cut {cut}: {}: {error}", log.name)).expect("it opens");
+        let mut block = [0; 512];
+        for index in 0..card.open_blocks() {
+            card.read(index, &mut block)
+                .map_err(|error| format!("cut {cut}: {} {index}: {error}", log.name))
+                .expect("it reads");
+            if log.name == FIRST && index == 7 {
+                assert_eq!(block, pattern(7), "cut {cut}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_full_card_says_so_and_keeps_its_free_clusters() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 30 << 20).expect("there is room");
+    assert_eq!(card.create(SECOND, 30 << 20), Err(CardError::Full));
+    card.create(SECOND, 4 << 20).expect("what is left can still be used");
+    assert_eq!(logs(&card).len(), 2);
+}
+
+#[test]
+fn a_recycled_segment_keeps_its_size_under_its_new_name() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 1 << 20).expect("there is room");
+    let oldest = logs(&card)[0];
+    device.journal.borrow_mut().clear();
+    card.recycle(&oldest, SECOND).expect("it is there");
+    assert_eq!(device.journal.borrow().len(), 1, "one block write");
+    assert_eq!(card.open_name(), Some(SECOND));
+    assert_eq!(logs(&card).iter().map(|log| (log.name, log.bytes)).collect::<Vec<_>>(), [(SECOND, 1 << 20)]);
+    assert_eq!(card.recycle(&oldest, FIRST), Err(CardError::Damaged), "the entry is another one now");
+}
+
+#[test]
+fn a_directory_of_more_than_a_cluster_grows() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    for session in 1..=60 {
+        card.create(LogName { session, segment: 0 }, 64 * 1024).expect("there is room");
+    }
+    assert_eq!(logs(&card).len(), 60);
+}
+
+#[test]
+fn cards_that_cannot_be_used_are_told_and_left_alone() {
+    let status = CardStatus::new();
+    let reason = |card: &MemCard| Card::mount(card.clone(), &status).map_err(|(_, error)| error).err();
+    let empty = MemCard::new(64 * MIB_BLOCKS);
+    assert_eq!(reason(&empty), Some(CardError::Foreign(LayoutError::NoPartitionTable)));
+    let damage = |at: u32, offset: usize, bytes: &[u8]| {
+        let card = MemCard::formatted(64 * MIB_BLOCKS);
+        let mut blocks = card.blocks.borrow_mut();
+        blocks.entry(at).or_insert([0; 512])[offset..offset + bytes.len()].copy_from_slice(bytes);
+        drop(blocks);
+        card
+    };
+    assert_eq!(reason(&damage(0, 450, &[7])), Some(CardError::Foreign(LayoutError::NotFat32(7))));
+    for (offset, bytes) in [
+        (11, &[0, 4][..]),
+        (13, &[0]),
+        (13, &[3]),
+        (16, &[0]),
+        (36, &[255; 4]),
+        (32, &[255; 4]),
+        (44, &[255; 4]),
+    ] {
+        let card = damage(2048, offset, bytes);
+        assert!(
+            matches!(reason(&card), Some(CardError::Foreign(LayoutError::BadVolume(_)))),
+            "offset {offset}: {:?}",
+            reason(&card)
+        );
+        assert!(card.journal.borrow().is_empty());
+    }
+    let broken = MemCard::formatted(64 * MIB_BLOCKS);
+    broken.broken.set(true);
+    assert_eq!(reason(&broken), Some(CardError::Device(Broken)));
+}
+
+#[test]
+fn a_fat_full_of_nonsense_is_an_error_and_never_a_panic() {
+    let mut state = 0x9E37_79B9_u32;
+    let mut random = move || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state
+    };
+    for round in 0..200 {
+        let device = MemCard::formatted(40 * MIB_BLOCKS);
+        let status = CardStatus::new();
+        let mut card = mount(&device, &status);
+        card.create(FIRST, 512 * 1024).expect("there is room");
+        let layout = *card.layout();
+        drop(card);
+        for _ in 0..40 {
+            let span = if random() % 2 == 0 { 4 } else { layout.data_start - layout.fat_start + 2 };
+            let at = layout.fat_start + random() % span;
+            let offset = random() as usize % 128 * 4;
+            let value = if random() % 2 == 0 { random() } else { random() % (layout.clusters + 4) };
+            let mut blocks = device.blocks.borrow_mut();
+            blocks.entry(at).or_insert([0; 512])[offset..offset + 4].copy_from_slice(&value.to_le_bytes());
+        }
+        if let Ok(mut card) = Card::mount(device.clone(), &status) {
+            let _ = card.logs(|_| {});
+            let _ = card.create(SECOND, 512 * 1024);
+            let _ = card.open(FIRST);
+            let mut block = [0; 512];
+            for index in 0..card.open_blocks().min(5_000) {
+                if card.read(index, &mut block).is_err() || card.write(index, &block).is_err() {
+                    break;
+                }
+            }
+        }
+        assert_eq!(status.read().state, CardState::Unknown, "round {round}");
+    }
+}
+
+#[test]
+fn a_card_too_small_for_fat32_is_not_formatted() {
+    let card = MemCard::new(BLOCKS_MIN - 1);
+    assert_eq!(format(&card, 1), Err(FormatError::TooSmall));
+    assert!(card.journal.borrow().is_empty());
+    format(&MemCard::new(BLOCKS_MIN), 1).expect("the smallest card");
+}

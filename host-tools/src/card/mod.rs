@@ -1,0 +1,9 @@
+//! The SD card as the host tools see it: an image file as a block device, to write (with faults) or only to read.
+
+pub mod faults;
+pub mod image;
+pub mod sim;
+
+pub use faults::Faults;
+pub use image::ReadOnlyImage;
+pub use sim::SimCard;

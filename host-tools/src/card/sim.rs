@@ -1,0 +1,284 @@
+//! The simulated card: an image file behind the same block device interface as a real one, with a real one's faults
+//! and a real one's slowness, in the simulation's own time.
+//!
+//! Every operation takes virtual time, which the card adds to its clock: the caller sets the clock, lets the storage
+//! task run, and reads from the clock how long the card kept it. A stall is an operation that takes longer.
+
+use std::cell::{Cell, RefCell};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+
+use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+
+use super::faults::{Cut, Faults, Stall};
+use crate::rng::Rng;
+
+/// What a command costs beside its data: a usual card's programming time, in microseconds.
+const COMMAND_US: u64 = 300;
+/// One block over SPI at 21 MHz, in microseconds.
+const BLOCK_US: u64 = 200;
+/// How long the driver waits for a card that is not there, in microseconds.
+const ABSENT_US: u64 = 10_000;
+
+const PURPOSE: u64 = 2;
+
+/// Why an operation failed.
+#[derive(Debug)]
+pub enum CardError {
+    /// Power has gone: nothing answers any more.
+    PowerGone,
+    /// No card is in the slot.
+    Absent,
+    /// The card refused the write.
+    WriteRefused,
+    /// The block is beyond the card's end.
+    OutOfRange,
+    /// The image file itself failed.
+    Image(io::Error),
+}
+
+impl std::fmt::Display for CardError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::PowerGone => f.write_str("power has gone"),
+            Self::Absent => f.write_str("no card"),
+            Self::WriteRefused => f.write_str("the card refused a write"),
+            Self::OutOfRange => f.write_str("beyond the card's end"),
+            Self::Image(error) => write!(f, "the image file: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for CardError {}
+
+/// A card in an image file. The methods take `&self`, as the block device's do; one thread uses it.
+#[derive(Debug)]
+pub struct SimCard {
+    image: RefCell<File>,
+    blocks: u32,
+    faults: Faults,
+    rng: RefCell<Rng>,
+    clock_us: Cell<u64>,
+    writes: Cell<u64>,
+    dead: Cell<bool>,
+    image_error: RefCell<Option<io::Error>>,
+}
+
+impl SimCard {
+    /// A card of the size of `image`, whole blocks only.
+    pub fn new(image: File, faults: Faults) -> io::Result<Self> {
+        let blocks = image.metadata()?.len() / Block::LEN as u64;
+        let rng = RefCell::new(Rng::new(faults.seed, PURPOSE));
+        Ok(Self {
+            image: RefCell::new(image),
+            blocks: u32::try_from(blocks).unwrap_or(u32::MAX),
+            faults,
+            rng,
+            clock_us: Cell::new(0),
+            writes: Cell::new(0),
+            dead: Cell::new(false),
+            image_error: RefCell::new(None),
+        })
+    }
+
+    /// Sets the card's clock, in microseconds since the first input byte.
+    pub fn set_clock(&self, now_us: u64) {
+        self.clock_us.set(now_us);
+    }
+
+    /// The card's clock: what was set, and the time that the operations since then took.
+    pub fn clock(&self) -> u64 {
+        self.clock_us.get()
+    }
+
+    /// Block writes that reached the card, a torn one included.
+    pub fn writes(&self) -> u64 {
+        self.writes.get()
+    }
+
+    /// Whether power has gone.
+    pub fn is_dead(&self) -> bool {
+        self.dead.get()
+    }
+
+    /// Whether a card is in the slot now.
+    pub fn is_present(&self) -> bool {
+        let now = self.clock();
+        !self.faults.outs.iter().any(|out| (out.from_us..out.to_us).contains(&now))
+    }
+
+    /// The error of the image file itself, if there was one: a full disk is not the simulated card's fault.
+    pub fn take_image_error(&self) -> Option<io::Error> {
+        self.image_error.borrow_mut().take()
+    }
+
+    /// What every operation does first: take its time, and see whether the card is there.
+    fn begin(&self, cost_us: u64) -> Result<(), CardError> {
+        if self.is_dead() {
+            return Err(CardError::PowerGone);
+        }
+        let now = self.clock();
+        let end_of = |stall: &Stall| stall.from_us.saturating_add(stall.for_us);
+        let stalled = self.faults.stalls.iter().filter(|stall| (stall.from_us..end_of(stall)).contains(&now));
+        let free_at = stalled.map(end_of).max().unwrap_or(now);
+        if self.is_present() {
+            self.clock_us.set(free_at.saturating_add(cost_us));
+        }
+        if self.is_present() {
+            return Ok(());
+        }
+        self.clock_us.set(self.clock().saturating_add(ABSENT_US));
+        Err(CardError::Absent)
+    }
+
+    /// One block write; false where power went with it.
+    fn write_block(&self, bytes: &[u8; Block::LEN], offset: u64) -> Result<(), CardError> {
+        if self.rng.borrow_mut().chance(self.faults.write_error) {
+            return Err(CardError::WriteRefused);
+        }
+        let count = self.writes.get() + 1;
+        self.writes.set(count);
+        let cut = self.faults.cuts.iter().filter(|cut| cut.write <= count).min_by_key(|cut| cut.write);
+        let bytes = match cut {
+            Some(Cut { torn: true, .. }) => bytes.get(..Block::LEN / 2).unwrap_or_default(),
+            _ => &bytes[..],
+        };
+        let mut image = self.image.borrow_mut();
+        let result = image.seek(SeekFrom::Start(offset)).and_then(|_| image.write_all(bytes));
+        result.map_err(|error| self.keep(error))?;
+        if cut.is_some() {
+            self.dead.set(true);
+            return Err(CardError::PowerGone);
+        }
+        Ok(())
+    }
+
+    fn keep(&self, error: io::Error) -> CardError {
+        let copy = io::Error::new(error.kind(), error.to_string());
+        self.image_error.borrow_mut().get_or_insert(copy);
+        CardError::Image(error)
+    }
+
+    fn check_range(&self, start: BlockIdx, count: usize) -> Result<(), CardError> {
+        let end = u64::from(start.0) + count as u64;
+        if end <= u64::from(self.blocks) { Ok(()) } else { Err(CardError::OutOfRange) }
+    }
+}
+
+impl BlockDevice for SimCard {
+    type Error = CardError;
+
+    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {
+        self.begin(COMMAND_US + BLOCK_US * blocks.len() as u64)?;
+        self.check_range(start, blocks.len())?;
+        let mut image = self.image.borrow_mut();
+        image.seek(SeekFrom::Start(start.into_bytes())).map_err(|error| self.keep(error))?;
+        for block in blocks {
+            image.read_exact(&mut block.contents).map_err(|error| self.keep(error))?;
+        }
+        Ok(())
+    }
+
+    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
+        self.begin(COMMAND_US + BLOCK_US * blocks.len() as u64)?;
+        self.check_range(start, blocks.len())?;
+        let mut offset = start.into_bytes();
+        for block in blocks {
+            self.write_block(&block.contents, offset)?;
+            offset += Block::LEN as u64;
+        }
+        Ok(())
+    }
+
+    fn num_blocks(&self) -> Result<BlockCount, CardError> {
+        self.begin(COMMAND_US)?;
+        Ok(BlockCount(self.blocks))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::faults::CardOut;
+    use super::*;
+
+    fn card(faults: Faults) -> SimCard {
+        let image = tempfile::tempfile().expect("temporary file");
+        image.set_len(64 * 512).expect("64 blocks");
+        SimCard::new(image, faults).expect("card")
+    }
+
+    fn block(byte: u8) -> Block {
+        let mut block = Block::new();
+        block.contents = [byte; 512];
+        block
+    }
+
+    fn content(card: &SimCard, index: u32) -> [u8; 512] {
+        let mut image = card.image.borrow_mut();
+        let mut bytes = [0; 512];
+        image.seek(SeekFrom::Start(u64::from(index) * 512)).expect("seek");
+        image.read_exact(&mut bytes).expect("read");
+        bytes
+    }
+
+    #[test]
+    fn power_goes_within_a_write_of_several_blocks() {
+        for torn in [false, true] {
+            let card = card(Faults { cuts: vec![Cut { write: 3, torn }], ..Faults::default() });
+            card.write(&[block(1)], BlockIdx(0)).expect("first");
+            let cut = card.write(&[block(2), block(3), block(4)], BlockIdx(1));
+            assert!(matches!(cut, Err(CardError::PowerGone)));
+            assert_eq!(content(&card, 1), [2; 512]);
+            assert_eq!(content(&card, 2)[..256], [3; 256]);
+            assert_eq!(content(&card, 2)[256..], [if torn { 0 } else { 3 }; 256]);
+            assert_eq!(content(&card, 3), [0; 512], "nothing after the cut");
+            assert!(card.is_dead() && card.write(&[block(5)], BlockIdx(0)).is_err());
+            assert_eq!(card.writes(), 3);
+        }
+    }
+
+    #[test]
+    fn a_stall_takes_its_time_and_then_the_write_is_done() {
+        let stall = Stall { from_us: 1_000_000, for_us: 2_500_000 };
+        let card = card(Faults { stalls: vec![stall], ..Faults::default() });
+        card.set_clock(999_000);
+        card.write(&[block(1)], BlockIdx(0)).expect("before");
+        assert!(card.clock() < 1_000_000);
+        card.set_clock(1_400_000);
+        card.write(&[block(2)], BlockIdx(0)).expect("stalled");
+        assert_eq!(card.clock(), 3_500_000 + COMMAND_US + BLOCK_US);
+        assert_eq!(content(&card, 0), [2; 512]);
+    }
+
+    #[test]
+    fn a_card_that_is_out_comes_back_with_its_content() {
+        let out = CardOut { from_us: 1_000_000, to_us: 2_000_000 };
+        let card = card(Faults { outs: vec![out], ..Faults::default() });
+        card.write(&[block(1)], BlockIdx(0)).expect("before");
+        card.set_clock(1_500_000);
+        assert!(matches!(card.write(&[block(2)], BlockIdx(0)), Err(CardError::Absent)));
+        card.set_clock(2_000_000);
+        let mut back = [Block::new()];
+        card.read(&mut back, BlockIdx(0)).expect("after");
+        assert_eq!(back[0].contents, [1; 512]);
+    }
+
+    #[test]
+    fn write_errors_repeat_with_the_seed() {
+        let run = |seed| {
+            let card = card(Faults { write_error: 0.3, seed, ..Faults::default() });
+            (0..60).map(|at| card.write(&[block(1)], BlockIdx(at)).is_ok()).collect::<Vec<_>>()
+        };
+        assert_eq!(run(1), run(1));
+        assert_ne!(run(1), run(2));
+        assert!(run(1).contains(&true) && run(1).contains(&false));
+    }
+
+    #[test]
+    fn the_end_of_the_card_is_an_error() {
+        let card = card(Faults::default());
+        assert!(matches!(card.write(&[block(1), block(1)], BlockIdx(63)), Err(CardError::OutOfRange)));
+        assert!(matches!(card.read(&mut [Block::new()], BlockIdx(u32::MAX)), Err(CardError::OutOfRange)));
+        assert_eq!(card.num_blocks().expect("size"), BlockCount(64));
+    }
+}

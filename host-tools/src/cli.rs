@@ -1,0 +1,283 @@
+//! The command line, as clap reads it and `--help` teaches it.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::card::faults::{self, CardOut, Cut, Stall};
+use crate::endpoint::Endpoint;
+use crate::utc::When;
+
+const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.
+
+The firmware listens at the autopilot's UART, records every frame on an SD card, checks the vehicle's health and sends
+a summary to the ground station. This program runs the same pipeline on this PC, and reads the cards.";
+
+const AFTER: &str = "Where bytes come from and go to (SRC, SINK):
+  FILE                  a tlog or raw MAVLink bytes, told apart by what is in it
+  -                     standard input or output
+  udpin:ADDR:PORT       a UDP port of this PC that others send to, e.g. udpin:0.0.0.0:14550
+  udpout:ADDR:PORT      a UDP port of another machine
+  tcp:ADDR:PORT         a TCP server
+  serial:DEVICE:BAUD    a serial port, e.g. serial:/dev/ttyUSB0:921600
+
+Examples:
+  hums demo                                                  a recorded flight through all of it
+  hums sim --input flight.tlog --sd card.img                 record a flight onto an SD card image
+  hums info card.img                                         what is on a card
+  hums decode card.img -o out --format tlog,csv              a card's logs for other tools
+
+Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage (all that could be read was read).
+Results go to standard output, everything else to standard error.";
+
+/// The whole command line.
+#[derive(Debug, Parser)]
+#[command(name = "hums", version, about = ABOUT, after_help = AFTER, max_term_width = 110)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
+    Sim(Sim),
+    /// The same with the real Cortex-M4 firmware image, in QEMU
+    Emulate(Emulate),
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines
+    Decode(Decode),
+    /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
+    Info(Info),
+    /// Check everything that can be checked about a log or a card
+    Verify(Verify),
+    /// Write one log file from a recording, without a card's file system
+    Pack(Pack),
+    /// Show it: a recorded flight is recorded, decoded and summed up
+    Demo(Demo),
+}
+
+const SIM_EXAMPLES: &str = "Examples:
+  hums sim --input flight.tlog --sd card.img --gs gs.bin
+  hums sim --input flight.tlog --sd card.img --json --line-rate 921600
+  hums sim --input udpin:0.0.0.0:14550 --sd card.img --gs udpout:127.0.0.1:14551
+  hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
+  hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
+
+Raw bytes carry no times: they come as on a line at 115,200 baud. --sd is kept: a second run adds a session to it.";
+
+/// What `sim` and `emulate` share.
+#[derive(Args, Clone, Debug)]
+pub struct Run {
+    /// Where the autopilot's bytes come from: a file (tlog or raw MAVLink), `-`, udpin:, udpout:, tcp: or serial:
+    #[arg(long, value_name = "SRC")]
+    pub input: Endpoint,
+    /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
+    #[arg(long, value_name = "IMAGE")]
+    pub sd: PathBuf,
+    /// Where the bytes for the ground station go
+    #[arg(long, value_name = "SINK")]
+    pub gs: Option<Endpoint>,
+    /// Parameters to start with: a file of `NAME VALUE` lines
+    #[arg(long, value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// As fast as possible on a virtual clock (repeatable), or in real time; live inputs are always real
+    #[arg(long, value_enum)]
+    pub speed: Option<Speed>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// What to put in the way
+    #[command(flatten)]
+    pub faults: FaultFlags,
+}
+
+/// How fast time passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Speed {
+    /// A virtual clock, as fast as the machine goes
+    Max,
+    /// The wall's clock
+    Real,
+}
+
+/// Faults; each run is repeatable.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Faults (each may be given several times)")]
+pub struct FaultFlags {
+    /// Power goes at the N-th 512-byte block write (torn: half of that block is old); the run ends there
+    #[arg(long, value_name = "N[:torn]")]
+    pub cut_after_writes: Vec<Cut>,
+    /// The card answers nothing for MS milliseconds from T seconds on
+    #[arg(long, value_name = "MS@T")]
+    pub stall: Vec<Stall>,
+    /// The card is out of its slot from T to T seconds
+    #[arg(long, value_name = "T..T")]
+    pub card_out: Vec<CardOut>,
+    /// Each block write fails with this probability
+    #[arg(long, value_name = "P", value_parser = faults::probability, overrides_with = "write_error")]
+    pub write_error: Option<f64>,
+    /// The size of the card image that is made, in MiB
+    #[arg(long, value_name = "MIB", overrides_with = "card_size")]
+    pub card_size: Option<u64>,
+    /// Each byte from the autopilot is damaged with this probability
+    #[arg(long, value_name = "P", value_parser = faults::probability, overrides_with = "noise")]
+    pub noise: Option<f64>,
+    /// Ignore the recorded times: feed the bytes back to back at this rate
+    #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(1..), overrides_with = "line_rate")]
+    pub line_rate: Option<u32>,
+    /// Our own power goes for a moment T seconds after the first byte; the card stays
+    #[arg(long, value_name = "T", value_parser = at)]
+    pub reboot_at: Vec<u64>,
+    /// Which of the possible random faults happen
+    #[arg(long, value_name = "N", default_value_t = 0, overrides_with = "seed")]
+    pub seed: u64,
+}
+
+fn at(text: &str) -> Result<u64, String> {
+    faults::seconds(text).ok_or_else(|| format!("`{text}` is no time: seconds since the first byte"))
+}
+
+/// `hums sim`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = SIM_EXAMPLES)]
+pub struct Sim {
+    /// The run.
+    #[command(flatten)]
+    pub run: Run,
+    /// Also write the bytes as they arrived at the UART, noise and all, to this file
+    #[arg(long, value_name = "FILE")]
+    pub tap: Option<PathBuf>,
+}
+
+const EMULATE_EXAMPLES: &str = "Examples:
+  hums emulate --input flight.tlog --sd card.img
+  hums emulate --input flight.tlog --sd card.img --json --firmware target/thumbv7em-none-eabihf/firmware/hums-firmware
+
+Needs qemu-system-arm 8.0 or later. Inside the source tree a missing firmware image is built first.";
+
+/// `hums emulate`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = EMULATE_EXAMPLES)]
+pub struct Emulate {
+    /// The run.
+    #[command(flatten)]
+    pub run: Run,
+    /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
+    #[arg(long, value_name = "ELF")]
+    pub firmware: Option<PathBuf>,
+}
+
+const DECODE_EXAMPLES: &str = "Examples:
+  hums decode card.img -o flight.tlog --format tlog
+  hums decode card.img -o out --format tlog,csv,jsonl
+  hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
+  hums decode 00042.hum -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
+
+Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl), unless it is a
+directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl and, for tables, OUT/LOG/ATTITUDE.csv and so on.
+`-o -` is standard output.
+Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
+
+/// `hums decode`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = DECODE_EXAMPLES)]
+pub struct Decode {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// The file or directory to write
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// What to write, several with commas
+    #[arg(long, value_enum, value_delimiter = ',', required = true)]
+    pub format: Vec<Format>,
+    /// Leave out what is earlier: seconds since the session's start, or UTC as 2026-11-21T10:13:42Z
+    #[arg(long, value_name = "T")]
+    pub from: Option<When>,
+    /// Leave out what is later
+    #[arg(long, value_name = "T")]
+    pub to: Option<When>,
+    /// Only these MAVLink messages, by name; HUMS records and gaps stay
+    #[arg(long, value_name = "NAME")]
+    pub message: Vec<String>,
+}
+
+/// What to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// A ground station's log: opens in Mission Planner, QGroundControl, MAVProxy, pymavlink
+    Tlog,
+    /// A table for each message type, units in the header
+    Csv,
+    /// An object a line, in order of time
+    Jsonl,
+}
+
+const INFO_EXAMPLES: &str = "Examples:
+  hums info card.img
+  hums info --json 00042_00.HUM";
+
+/// `hums info`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = INFO_EXAMPLES)]
+pub struct Info {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+const VERIFY_EXAMPLES: &str = "Examples:
+  hums verify card.img
+  hums verify --json card.img
+
+Checks the file system's structures, every sector's checksum and number, every group's decoding, every frame's own
+checksum and the order of times. Exit code 3 means damage or losses were found.";
+
+/// `hums verify`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = VERIFY_EXAMPLES)]
+pub struct Verify {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+const PACK_EXAMPLES: &str = "Examples:
+  hums pack flight.tlog -o flight.hum
+  hums decode flight.hum -o back.tlog --format tlog";
+
+/// `hums pack`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = PACK_EXAMPLES)]
+pub struct Pack {
+    /// A tlog or raw MAVLink bytes
+    #[arg(value_name = "TLOG")]
+    pub input: Endpoint,
+    /// The log file to write
+    #[arg(short, long, value_name = "LOG")]
+    pub output: PathBuf,
+}
+
+const DEMO_EXAMPLES: &str = "Examples:
+  hums demo
+  hums demo --input flight.tlog --dir demo";
+
+/// `hums demo`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = DEMO_EXAMPLES)]
+pub struct Demo {
+    /// The flight; otherwise one of the source tree's own
+    #[arg(long, value_name = "SRC")]
+    pub input: Option<Endpoint>,
+    /// Where to put the card image and what is decoded from it
+    #[arg(long, value_name = "DIR", default_value = "hums-demo")]
+    pub dir: PathBuf,
+}

@@ -1,0 +1,60 @@
+//! A log's blocks as groups of sectors, each of which decodes by itself: the unit of parallel work.
+
+use anyhow::Result;
+use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
+
+use super::places::{Blocks, Log};
+
+/// Sectors that belong together, in order: a group, or a part of one whose beginning is missing.
+pub type Group = Vec<Step>;
+
+/// Streams a log's groups.
+pub struct Groups<'a> {
+    blocks: Blocks<'a>,
+    assembler: Assembler,
+    group: Group,
+    ended: bool,
+}
+
+impl<'a> Groups<'a> {
+    /// The groups of a log.
+    pub fn new(log: &'a Log) -> Self {
+        let assembler = log.session.map_or_else(Assembler::new, Assembler::for_session);
+        Self { blocks: log.blocks(), assembler, group: Vec::new(), ended: false }
+    }
+
+    /// The next group; `None` at the end.
+    pub fn next_group(&mut self) -> Result<Option<Group>> {
+        while !self.ended {
+            let step = if let Some(block) = self.blocks.next_block()? {
+                self.assembler.feed(&block)
+            } else {
+                self.ended = true;
+                self.assembler.end()
+            };
+            let Some(step) = step else { continue };
+            let full = self.group.len() >= GROUP_SECTORS;
+            let broken = step.missing > 0 || self.group.last().is_some_and(|last| last.header.partial);
+            if !self.group.is_empty() && (step.header.starts_group() || broken || full) {
+                return Ok(Some(std::mem::replace(&mut self.group, vec![step])));
+            }
+            self.group.push(step);
+        }
+        Ok((!self.group.is_empty()).then(|| std::mem::take(&mut self.group)))
+    }
+
+    /// What was seen so far.
+    pub fn counts(&self) -> BlockCounts {
+        self.assembler.counts()
+    }
+
+    /// The session that its sectors name, once one was seen.
+    pub fn session(&self) -> Option<u32> {
+        self.assembler.session()
+    }
+
+    /// Blocks after the last sector that begin as one and fail their check.
+    pub fn damaged_at_end(&self) -> u32 {
+        self.assembler.damaged_since()
+    }
+}

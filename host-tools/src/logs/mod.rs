@@ -1,0 +1,14 @@
+//! What the command line calls LOG, IMAGE and DIR, and the logs in it.
+//!
+//! A log is what the monitor recorded in one session on one card. On the card it is a row of segments
+//! (`00042_00.HUM`, `00042_01.HUM`, …); copied off the card the same files, in a directory; packed, one file.
+//! Whatever it was, here it is a list of places to read blocks of 512 bytes from.
+
+pub mod fat;
+pub mod find;
+pub mod groups;
+pub mod places;
+pub mod reader;
+
+pub use find::{Content, Found, find, on_card};
+pub use places::{Log, Piece};

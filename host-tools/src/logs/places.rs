@@ -1,0 +1,107 @@
+//! A log as a list of places, and the blocks that are there, streamed.
+
+use std::fs::File;
+use std::io;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+
+use super::fat::{self, Extent};
+
+/// Bytes of a block: a sector of the log.
+pub const BLOCK_BYTES: usize = 512;
+/// How much is read at once.
+const READ_BYTES: u64 = 256 * 1024;
+
+/// A part of a log: places in one file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// The file: a segment, a packed log or a card image.
+    pub path: PathBuf,
+    /// Where in it.
+    pub extents: Vec<Extent>,
+}
+
+/// One log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Log {
+    /// A name for directories and reports, unique within one call: `00042`, or `card/00042` where there are several
+    /// inputs.
+    pub name: String,
+    /// The names of its files: on the card for a card's, on this PC otherwise.
+    pub files: Vec<String>,
+    /// Where it lies, in order.
+    pub pieces: Vec<Piece>,
+    /// What its sectors name as their session, where a scan told it; otherwise that of the first sector counts.
+    pub session: Option<u32>,
+}
+
+impl Log {
+    /// Bytes that its places cover.
+    pub fn bytes(&self) -> u64 {
+        self.pieces.iter().flat_map(|piece| &piece.extents).map(|extent| extent.length).sum()
+    }
+
+    /// The blocks, in order.
+    pub fn blocks(&self) -> Blocks<'_> {
+        Blocks { log: self, piece: 0, extent: 0, offset: 0, file: None, buffer: Vec::new(), at: 0 }
+    }
+}
+
+/// Streams a log's blocks. A last part of less than a block is padded with zeros: it is damaged either way.
+pub struct Blocks<'a> {
+    log: &'a Log,
+    piece: usize,
+    extent: usize,
+    /// Bytes of the extent already read.
+    offset: u64,
+    file: Option<File>,
+    buffer: Vec<u8>,
+    at: usize,
+}
+
+impl Blocks<'_> {
+    /// The next block; `None` at the end.
+    pub fn next_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
+        loop {
+            if let Some(block) = self.buffer.get(self.at..self.at + BLOCK_BYTES) {
+                self.at += BLOCK_BYTES;
+                return Ok(block.try_into().ok());
+            }
+            if !self.refill()? {
+                return Ok(None);
+            }
+        }
+    }
+
+    fn refill(&mut self) -> Result<bool> {
+        loop {
+            let Some(piece) = self.log.pieces.get(self.piece) else { return Ok(false) };
+            let Some(extent) = piece.extents.get(self.extent) else {
+                (self.piece, self.extent, self.offset, self.file) = (self.piece + 1, 0, 0, None);
+                continue;
+            };
+            let length = READ_BYTES.min(extent.length.saturating_sub(self.offset));
+            if length == 0 {
+                (self.extent, self.offset) = (self.extent + 1, 0);
+                continue;
+            }
+            let context = || format!("{}: cannot be read", piece.path.display());
+            let file = match &mut self.file {
+                Some(file) => file,
+                none => none.insert(File::open(&piece.path).with_context(context)?),
+            };
+            self.buffer.clear();
+            self.buffer.resize((length as usize).next_multiple_of(BLOCK_BYTES), 0);
+            let bytes = self.buffer.get_mut(..length as usize).unwrap_or_default();
+            read(file, extent.start + self.offset, bytes).with_context(context)?;
+            self.offset += length;
+            self.at = 0;
+            return Ok(true);
+        }
+    }
+}
+
+fn read(file: &File, start: u64, bytes: &mut [u8]) -> io::Result<()> {
+    fat::read_at(file, start, bytes)
+}

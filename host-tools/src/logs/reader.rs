@@ -1,0 +1,267 @@
+//! Reads a log: groups are decoded in parallel, a few at a time, and what they hold is handed on in order, with the
+//! gaps between them. Memory is bounded by a batch of groups, whatever the log's size.
+
+use anyhow::Result;
+use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Record};
+use hums_core::time::Instant;
+use rayon::prelude::*;
+
+use super::groups::{Group, Groups};
+use super::places::Log;
+
+/// Groups of a batch for each thread, and at most: each becomes up to some megabytes of text.
+const GROUPS_PER_THREAD: usize = 2;
+const GROUPS_MAX: usize = 16;
+
+/// What one group's entries become; made in parallel, handed on in order.
+pub trait Collect: Send {
+    /// Takes the next entry of the group.
+    fn entry(&mut self, entry: &Entry<'_>);
+}
+
+/// Where collected groups go, in order.
+pub trait Deliver<C> {
+    /// Something is missing here.
+    fn gap(&mut self, gap: &Gap) -> Result<()>;
+    /// The entries of the next group.
+    fn group(&mut self, collected: C) -> Result<()>;
+}
+
+/// What was read, in all.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// The session that the sectors name.
+    pub session: Option<u32>,
+    /// It was ended in order; otherwise power went.
+    pub closed: bool,
+    /// Frames read.
+    pub frames: u64,
+    /// Groups read.
+    pub groups: u64,
+    /// Gaps.
+    pub gaps: u64,
+    /// Frames that are known to be missing.
+    pub frames_missing: u64,
+    /// Groups whose first entry came before the last one of the group before.
+    pub times_fell: u64,
+    /// What the blocks were.
+    pub blocks: BlockCounts,
+    /// The first entry's time.
+    pub first: Option<Instant>,
+    /// The last entry's time.
+    pub last: Option<Instant>,
+}
+
+/// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
+pub fn read<C: Collect>(
+    log: &Log,
+    new: impl Fn() -> C + Sync,
+    deliver: &mut impl Deliver<C>,
+    mut progress: impl FnMut(u64),
+) -> Result<Summary> {
+    let mut groups = Groups::new(log);
+    let batch_groups = (rayon::current_num_threads() * GROUPS_PER_THREAD).clamp(1, GROUPS_MAX);
+    let mut stitch = Stitch::default();
+    loop {
+        let mut batch = Vec::with_capacity(batch_groups);
+        while batch.len() < batch_groups {
+            match groups.next_group()? {
+                Some(group) => batch.push(group),
+                None => break,
+            }
+        }
+        if batch.is_empty() {
+            break;
+        }
+        let decoded: Vec<Decoded<C>> = batch
+            .into_par_iter()
+            .map_init(|| Box::new(GroupDecoder::new()), |decoder, group| decode(decoder, &group, new()))
+            .collect();
+        for group in decoded {
+            stitch.take(group, deliver)?;
+        }
+        progress(groups.counts().blocks);
+    }
+    stitch.end(groups.damaged_at_end(), deliver)?;
+    let mut summary = stitch.summary;
+    summary.session = groups.session();
+    summary.blocks = groups.counts();
+    Ok(summary)
+}
+
+/// A group, decoded.
+struct Decoded<C> {
+    collected: C,
+    /// Sectors missing before it, and whether blocks there were damaged.
+    missing: u32,
+    damaged: bool,
+    sectors: u32,
+    /// The number of its first sector.
+    number: u32,
+    /// Frames that its sectors say they complete.
+    frames_said: u32,
+    /// How it began: its first time and the count of frames before it; `None` where nothing of it can be decoded.
+    begun: Option<(Instant, u32)>,
+    frames: u32,
+    last: Option<Instant>,
+    error: Option<GroupError>,
+    ends_partial: bool,
+    closed: bool,
+}
+
+fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: C) -> Decoded<C> {
+    let (mut error, mut begun, mut frames, mut last) = (None, None, 0, None);
+    for step in group {
+        if let Err(why) = decoder.push(&step.header, &step.sector) {
+            error = error.or(Some(why));
+            break;
+        }
+        let preamble = decoder.preamble();
+        begun.get_or_insert((Instant::from_millis(preamble.start_ms), preamble.frames_before));
+        while let Some(entry) = decoder.next_entry() {
+            match entry {
+                Ok(entry) => {
+                    let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
+                    last = Some(at);
+                    frames += u32::from(matches!(entry, Entry::Frame { .. }));
+                    collected.entry(&entry);
+                }
+                Err(why) => error = error.or(Some(why)),
+            }
+        }
+    }
+    let first = group.first();
+    Decoded {
+        collected,
+        missing: first.map_or(0, |step| step.missing),
+        damaged: first.is_some_and(|step| step.damaged > 0),
+        sectors: group.len() as u32,
+        number: first.map_or(0, |step| step.header.number),
+        frames_said: group.iter().map(|step| u32::from(step.header.frames)).sum(),
+        begun,
+        frames,
+        last,
+        error,
+        ends_partial: group.last().is_some_and(|step| step.header.partial),
+        closed: group.last().is_some_and(|step| step.header.closed),
+    }
+}
+
+/// Puts groups together again and finds what is missing between them.
+#[derive(Default)]
+struct Stitch {
+    summary: Summary,
+    open: Option<Gap>,
+    /// Frames of the session up to here, modulo 2^32, while the count is unbroken.
+    expected: Option<u32>,
+    cut: bool,
+}
+
+impl Stitch {
+    fn take<C>(&mut self, group: Decoded<C>, deliver: &mut impl Deliver<C>) -> Result<()> {
+        let begins_late = self.summary.groups == 0 && self.open.is_none() && group.number > 0;
+        let cut = std::mem::replace(&mut self.cut, group.ends_partial);
+        if group.missing > 0 || cut || begins_late {
+            let cause = if group.damaged { Cause::Damaged } else { Cause::Missing };
+            let missing = if begins_late { group.number } else { group.missing.max(u32::from(cut)) };
+            let gap = self.gap(cause);
+            gap.sectors_lost = gap.sectors_lost.saturating_add(missing);
+        }
+        self.summary.closed = group.closed;
+        match group.begun {
+            None => self.skip(&group),
+            Some((start, frames_before)) => {
+                let missing = frames_before.wrapping_sub(self.expected.unwrap_or(0));
+                let missing = Some(missing).filter(|&missing| missing < 1 << 31);
+                if missing != Some(0) {
+                    self.gap(Cause::Missing);
+                }
+                if let Some(mut gap) = self.open.take() {
+                    (gap.to, gap.frames) = (Some(start), missing);
+                    self.close(gap, deliver)?;
+                }
+                self.summary.times_fell += u64::from(self.summary.last.is_some_and(|last| start < last));
+                self.expected = Some(frames_before.wrapping_add(group.frames));
+                self.summary.first = self.summary.first.or(Some(start));
+                self.summary.last = group.last.or(self.summary.last);
+                self.summary.groups += 1;
+                self.summary.frames += u64::from(group.frames);
+                deliver.group(group.collected)?;
+                if let Some(error) = group.error {
+                    let gap = self.gap(cause_of(error));
+                    gap.frames = Some(group.frames_said.saturating_sub(group.frames));
+                    gap.sectors_skipped += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Nothing of a group could be decoded.
+    fn skip<C>(&mut self, group: &Decoded<C>) {
+        let gap = self.gap(group.error.map_or(Cause::Missing, cause_of));
+        gap.sectors_skipped = gap.sectors_skipped.saturating_add(group.sectors);
+        gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(group.frames_said));
+    }
+
+    /// The gap that is going on, begun here if there is none.
+    fn gap(&mut self, cause: Cause) -> &mut Gap {
+        let from = self.summary.last;
+        let new = Gap { from, to: None, cause, sectors_lost: 0, sectors_skipped: 0, frames: None };
+        self.open.get_or_insert(new)
+    }
+
+    fn close<C>(&mut self, gap: Gap, deliver: &mut impl Deliver<C>) -> Result<()> {
+        self.summary.gaps += 1;
+        self.summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
+        deliver.gap(&gap)
+    }
+
+    fn end<C>(&mut self, damaged: u32, deliver: &mut impl Deliver<C>) -> Result<()> {
+        if damaged > 0 {
+            let gap = self.gap(Cause::Damaged);
+            gap.sectors_lost = gap.sectors_lost.saturating_add(damaged);
+        }
+        match self.open.take() {
+            Some(gap) => self.close(gap, deliver),
+            None => Ok(()),
+        }
+    }
+}
+
+fn cause_of(error: GroupError) -> Cause {
+    match error {
+        GroupError::OutOfOrder => Cause::Missing,
+        GroupError::UnknownLayouts(hash) => Cause::UnknownLayouts(hash),
+        GroupError::Corrupt => Cause::Corrupt,
+    }
+}
+
+/// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.
+pub fn epoch(log: &Log) -> Result<Option<u64>> {
+    let mut groups = Groups::new(log);
+    let mut decoder = Box::new(GroupDecoder::new());
+    let (mut epoch, mut last) = (None, Vec::new());
+    while let Some(group) = groups.next_group()? {
+        if let Some(first) = group.first() {
+            // The preamble is plain: nothing is decoded here.
+            if decoder.push(&first.header, &first.sector).is_ok() {
+                epoch = decoder.preamble().epoch_micros.or(epoch);
+            }
+        }
+        last = group;
+    }
+    // A clock record in the last group has no preamble after it.
+    decode(&mut decoder, &last, Epoch(&mut epoch));
+    Ok(epoch)
+}
+
+struct Epoch<'a>(&'a mut Option<u64>);
+
+impl Collect for Epoch<'_> {
+    fn entry(&mut self, entry: &Entry<'_>) {
+        if let Entry::Record { record: Record::Clock(clock), .. } = entry {
+            *self.0 = Some(clock.epoch_micros());
+        }
+    }
+}

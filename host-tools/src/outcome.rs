@@ -1,0 +1,75 @@
+//! How a run ended, and the one place that turns it into an exit code.
+//!
+//! | code | meaning |
+//! |---|---|
+//! | 0 | done |
+//! | 1 | failed: the message says what, and where it can what to do |
+//! | 2 | usage: the command line itself is wrong |
+//! | 3 | done, but the log has losses or damage: all that could be read was read |
+
+use std::fmt;
+use std::process::ExitCode;
+
+/// The end of a run that did what it was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything, exactly.
+    Done,
+    /// All that could be had; something was lost or damaged, and the results say what.
+    Losses,
+}
+
+impl Outcome {
+    /// `Losses` where `lossy`.
+    pub fn lossy(lossy: bool) -> Self {
+        if lossy { Self::Losses } else { Self::Done }
+    }
+
+    /// The worse of both.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self::lossy(self == Self::Losses || other == Self::Losses)
+    }
+}
+
+/// The command line asks for something that makes no sense: exit code 2.
+#[derive(Debug)]
+pub struct Usage(pub String);
+
+impl fmt::Display for Usage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
+/// A usage error with this message.
+pub fn usage(message: impl Into<String>) -> anyhow::Error {
+    Usage(message.into()).into()
+}
+
+/// Whoever read our standard output has gone (`hums info | head`): not an error, nothing to say.
+#[derive(Debug)]
+pub struct ReaderGone;
+
+impl fmt::Display for ReaderGone {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("standard output was closed")
+    }
+}
+
+impl std::error::Error for ReaderGone {}
+
+/// Says on standard error what went wrong, and gives the exit code.
+pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
+    match result {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Losses) => ExitCode::from(3),
+        Err(error) if error.is::<ReaderGone>() => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("hums: {error:#}");
+            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Bytes that come in their own time: UDP, TCP, serial. Their arrival times are the clock's, counted from the first.
+//!
+//! A live source ends when its peer closes it or on Ctrl-C (see [`crate::interrupt`]); silence is handed on as chunks
+//! without bytes, so that the pipeline's clock goes on.
+
+use std::io::{self, ErrorKind, Read};
+use std::net::{TcpStream, UdpSocket};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use super::{Chunk, Source};
+use crate::endpoint::Endpoint;
+use crate::interrupt;
+
+/// How long silence may last before it is handed on.
+const SILENCE: Duration = Duration::from_millis(50);
+const CONNECT: Duration = Duration::from_secs(10);
+/// The largest UDP datagram.
+const BUFFER_BYTES: usize = 65_536;
+
+/// Anything that reads with a time limit.
+trait Port {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
+}
+
+struct Stream<R>(R);
+
+impl<R: Read> Port for Stream<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.read(buffer)
+    }
+}
+
+struct Datagrams {
+    socket: UdpSocket,
+}
+
+impl Port for Datagrams {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.socket.recv(buffer) {
+            // An empty datagram is not the end of anything.
+            Ok(0) => Err(ErrorKind::WouldBlock.into()),
+            // `udpout` before its peer listens: the peer may come yet.
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Err(ErrorKind::WouldBlock.into()),
+            result => result,
+        }
+    }
+}
+
+struct Live {
+    port: Box<dyn Port>,
+    first: Option<Instant>,
+    buffer: Vec<u8>,
+}
+
+/// Opens a live SRC.
+pub(super) fn open(endpoint: &Endpoint) -> Result<Box<dyn Source>> {
+    let context = || format!("{endpoint}: cannot be opened");
+    let port: Box<dyn Port> = match endpoint {
+        Endpoint::UdpIn(address) => {
+            let socket = UdpSocket::bind(address.resolve()?).with_context(context)?;
+            socket.set_read_timeout(Some(SILENCE)).with_context(context)?;
+            Box::new(Datagrams { socket })
+        }
+        Endpoint::UdpOut(address) => {
+            let to = address.resolve()?;
+            let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
+            let socket = UdpSocket::bind(any).with_context(context)?;
+            socket.connect(to).with_context(context)?;
+            socket.set_read_timeout(Some(SILENCE)).with_context(context)?;
+            // Who listens learns from a first, empty datagram where to answer.
+            let _ = socket.send(&[]);
+            Box::new(Datagrams { socket })
+        }
+        Endpoint::Tcp(address) => {
+            let stream = TcpStream::connect_timeout(&address.resolve()?, CONNECT).with_context(context)?;
+            stream.set_read_timeout(Some(SILENCE)).with_context(context)?;
+            Box::new(Stream(stream))
+        }
+        Endpoint::Serial { device, baud } => {
+            let port = serialport::new(device, *baud).timeout(SILENCE).open().with_context(context)?;
+            Box::new(Stream(port))
+        }
+        Endpoint::File(_) | Endpoint::Standard => bail!("{endpoint} is not a live source"),
+    };
+    interrupt::watch();
+    Ok(Box::new(Live { port, first: None, buffer: vec![0; BUFFER_BYTES] }))
+}
+
+impl Source for Live {
+    fn next(&mut self) -> io::Result<Option<Chunk>> {
+        loop {
+            if interrupt::requested() {
+                return Ok(None);
+            }
+            let got = match self.port.read(&mut self.buffer) {
+                Ok(0) => return Ok(None),
+                Ok(got) => got,
+                Err(error) if is_silence(&error) => 0,
+                Err(error) => return Err(error),
+            };
+            // Before the first byte there is no time to speak of.
+            if got == 0 && self.first.is_none() {
+                continue;
+            }
+            let now = Instant::now();
+            let first = *self.first.get_or_insert(now);
+            let at_us = u64::try_from(now.duration_since(first).as_micros()).unwrap_or(u64::MAX);
+            let bytes = self.buffer.get(..got).unwrap_or_default().to_vec();
+            return Ok(Some(Chunk { at_us, bytes }));
+        }
+    }
+}
+
+fn is_silence(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}

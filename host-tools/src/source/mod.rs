@@ -1,0 +1,104 @@
+//! Where the bytes of the autopilot's UART come from: chunks of bytes with the times at which they arrive.
+//!
+//! | source | arrival times |
+//! |---|---|
+//! | a tlog (file or `-`) | the recorded ones, counted from the first |
+//! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud |
+//! | UDP, TCP, serial | the clock's |
+//!
+//! Times are microseconds since the first byte and never fall: see [`tlog`] for what happens to clocks that jumped.
+//! Everything streams: memory does not grow with the input.
+
+pub mod live;
+pub mod noise;
+pub mod paced;
+pub mod raw;
+pub mod sniff;
+pub mod tlog;
+
+use std::fs::File;
+use std::io::{self, Read};
+
+use anyhow::{Context, Result, bail};
+
+use crate::endpoint::Endpoint;
+use crate::outcome::usage;
+
+/// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
+pub const RAW_BAUD: u32 = 115_200;
+
+/// Bytes that arrive together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chunk {
+    /// When the last of them is there, in microseconds since the first byte of the input; never falls.
+    pub at_us: u64,
+    /// The bytes; may be none where only time passed (a live source that is silent).
+    pub bytes: Vec<u8>,
+}
+
+/// A stream of chunks.
+pub trait Source {
+    /// The next chunk; `None` at the end.
+    fn next(&mut self) -> io::Result<Option<Chunk>>;
+
+    /// UTC at the first byte, microseconds since 1970, where the input told it (known once a chunk was read).
+    fn utc_start_us(&self) -> Option<u64> {
+        None
+    }
+
+    /// Whether each chunk is a record of its own (a frame of a tlog), not just some bytes of a stream.
+    fn has_records(&self) -> bool {
+        false
+    }
+
+    /// A sentence about what was strange in the input, once it has been read.
+    fn remark(&self) -> Option<String> {
+        None
+    }
+}
+
+/// Which times count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// Ignore recorded times: feed back to back at this rate, in baud.
+    pub line_rate: Option<u32>,
+}
+
+/// Opens SRC.
+pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
+    if endpoint.is_live() {
+        if timing.line_rate.is_some() {
+            return Err(usage(format!("--line-rate: {endpoint} comes at its own rate; give a file or `-`")));
+        }
+        return live::open(endpoint);
+    }
+    let input: Box<dyn Read + Send> = match endpoint {
+        Endpoint::File(path) => {
+            let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
+            if file.metadata()?.is_dir() {
+                bail!("{}: is a directory; give a recording (tlog or raw MAVLink bytes)", path.display());
+            }
+            Box::new(file)
+        }
+        _ => Box::new(io::stdin()),
+    };
+    let (kind, input) = sniff::sniff(input).with_context(|| format!("{endpoint}"))?;
+    Ok(match (kind, timing.line_rate) {
+        (sniff::Kind::Empty, _) => bail!("{endpoint}: is empty: not one byte would arrive"),
+        (sniff::Kind::Tlog, None) => Box::new(tlog::Tlog::new(input)),
+        (sniff::Kind::Tlog, Some(baud)) => Box::new(paced::Paced::new(tlog::Tlog::new(input), baud)),
+        (sniff::Kind::Raw, baud) => {
+            Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
+        }
+    })
+}
+
+/// Reads what there is, going on after an interrupted call; 0 at the end.
+fn read_some(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
+    loop {
+        match input.read(buffer) {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            result => return result,
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! A noisy line: each byte is damaged with a given probability, repeatably.
+
+use std::io;
+
+use super::{Chunk, Source};
+use crate::rng::Rng;
+
+const PURPOSE: u64 = 1;
+
+/// The bytes of another source, some of them damaged.
+pub struct Noisy<S> {
+    inner: S,
+    probability: f64,
+    rng: Rng,
+}
+
+impl<S: Source> Noisy<S> {
+    /// Damages each byte of `inner` with `probability`.
+    pub fn new(inner: S, probability: f64, seed: u64) -> Self {
+        Self { inner, probability, rng: Rng::new(seed, PURPOSE) }
+    }
+}
+
+impl<S: Source> Source for Noisy<S> {
+    fn next(&mut self) -> io::Result<Option<Chunk>> {
+        let Some(mut chunk) = self.inner.next()? else { return Ok(None) };
+        for byte in &mut chunk.bytes {
+            if self.rng.chance(self.probability) {
+                // A damaged byte differs: exclusive or with 1 to 255.
+                *byte ^= (self.rng.next_u64() % 255 + 1) as u8;
+            }
+        }
+        Ok(Some(chunk))
+    }
+
+    fn utc_start_us(&self) -> Option<u64> {
+        self.inner.utc_start_us()
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.inner.remark()
+    }
+}
+
+impl Source for Box<dyn Source> {
+    fn next(&mut self) -> io::Result<Option<Chunk>> {
+        (**self).next()
+    }
+
+    fn utc_start_us(&self) -> Option<u64> {
+        (**self).utc_start_us()
+    }
+
+    fn has_records(&self) -> bool {
+        (**self).has_records()
+    }
+
+    fn remark(&self) -> Option<String> {
+        (**self).remark()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::raw::Raw;
+    use super::*;
+
+    #[test]
+    fn a_thousandth_of_the_bytes_differ_and_a_run_repeats() {
+        let clean = vec![0x55u8; 200_000];
+        let run = |seed| {
+            let mut source = Noisy::new(Raw::new(&clean[..]), 0.001, seed);
+            let mut bytes = Vec::new();
+            while let Some(chunk) = source.next().expect("memory") {
+                bytes.extend(chunk.bytes);
+            }
+            bytes
+        };
+        let differing = run(7).iter().filter(|&&byte| byte != 0x55).count();
+        assert!((140..260).contains(&differing), "{differing}");
+        assert_eq!(run(7), run(7));
+        assert_ne!(run(7), run(8));
+    }
+}

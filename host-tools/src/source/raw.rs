@@ -1,0 +1,28 @@
+//! Raw bytes from a store: no times of their own, so they are always paced (see [`super::paced`]).
+
+use std::io::{self, Read};
+
+use super::{Chunk, Source};
+
+const CHUNK_BYTES: usize = 4096;
+
+/// Bytes as they come, all at time zero.
+pub struct Raw<R> {
+    input: R,
+}
+
+impl<R: Read> Raw<R> {
+    /// The bytes of `input`.
+    pub fn new(input: R) -> Self {
+        Self { input }
+    }
+}
+
+impl<R: Read> Source for Raw<R> {
+    fn next(&mut self) -> io::Result<Option<Chunk>> {
+        let mut bytes = vec![0; CHUNK_BYTES];
+        let got = super::read_some(&mut self.input, &mut bytes)?;
+        bytes.truncate(got);
+        Ok((got > 0).then_some(Chunk { at_us: 0, bytes }))
+    }
+}

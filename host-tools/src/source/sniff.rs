@@ -1,0 +1,135 @@
+//! Tells a tlog from raw bytes by what is in it, never by its name.
+//!
+//! In a tlog eight bytes of time stand before every frame; in raw bytes the next frame follows at once. Every frame
+//! whose checksum holds is a vote, so a damaged beginning, or boot text before the first frame, decides nothing.
+
+use std::io::{self, Cursor, Read};
+
+use super::read_some;
+use crate::mavlink::frame::FRAME_BYTES_MAX;
+use crate::mavlink::frame::{Check, Peek, peek};
+
+/// How far to look before calling it: room for a few hundred frames.
+const WINDOW_BYTES: usize = 64 * 1024;
+
+/// Votes that settle it, so that a live pipe is not held up until the window is full.
+const LEAD: i32 = 3;
+
+/// What an input is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Not one byte.
+    Empty,
+    /// A ground station's log: time, frame, time, frame.
+    Tlog,
+    /// The bytes of a port.
+    Raw,
+}
+
+/// The input with its beginning put back.
+pub type Sniffed<R> = io::Chain<Cursor<Vec<u8>>, R>;
+
+/// Looks at the beginning of `input`.
+pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
+    let mut window = vec![0; WINDOW_BYTES];
+    let mut filled = 0;
+    let mut votes = 0;
+    loop {
+        let got = read_some(&mut input, window.get_mut(filled..).unwrap_or_default())?;
+        filled += got;
+        let seen = window.get(..filled).unwrap_or_default();
+        if got == 0 || filled >= 4 * FRAME_BYTES_MAX {
+            votes = count_votes(seen);
+        }
+        if got == 0 || filled == WINDOW_BYTES || votes.abs() >= LEAD {
+            break;
+        }
+    }
+    window.truncate(filled);
+    let kind = match (filled, votes) {
+        (0, _) => Kind::Empty,
+        (_, 1..) => Kind::Tlog,
+        (_, ..=-1) => Kind::Raw,
+        (_, 0) => single_record(&window),
+    };
+    Ok((kind, Cursor::new(window).chain(input)))
+}
+
+/// Frames followed by a time and a frame, less frames followed by a frame.
+fn count_votes(bytes: &[u8]) -> i32 {
+    let mut votes = 0;
+    let mut at = 0;
+    while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty()) {
+        match peek(rest) {
+            Peek::Frame(frame) if frame.check == Check::Good => {
+                let next = at + frame.bytes.len();
+                let begins =
+                    |at: usize| bytes.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
+                match (begins(next), begins(next + 8)) {
+                    (false, true) => votes += 1,
+                    (true, false) => votes -= 1,
+                    _ => {}
+                }
+                at = next;
+            }
+            _ => at += 1,
+        }
+    }
+    votes
+}
+
+/// Where no frame has a neighbour, one whole record at the beginning still is a tlog.
+fn single_record(bytes: &[u8]) -> Kind {
+    match bytes.get(8..).map(peek) {
+        Some(Peek::Frame(_)) if !matches!(peek(bytes), Peek::Frame(_)) => Kind::Tlog,
+        _ => Kind::Raw,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mavlink::frame::tests::HEARTBEAT;
+
+    fn kind(bytes: &[u8]) -> Kind {
+        let (kind, mut rest) = sniff(bytes).expect("memory");
+        let mut back = Vec::new();
+        rest.read_to_end(&mut back).expect("memory");
+        assert_eq!(back, bytes, "what was looked at is put back");
+        kind
+    }
+
+    fn record(time: u64) -> Vec<u8> {
+        [&time.to_be_bytes()[..], &HEARTBEAT].concat()
+    }
+
+    #[test]
+    fn frames_alone_are_raw_and_with_times_a_tlog() {
+        assert_eq!(kind(&HEARTBEAT.repeat(20)), Kind::Raw);
+        assert_eq!(
+            kind(&(0..20).flat_map(|at| record(1_700_000_000_000_000 + at)).collect::<Vec<_>>()),
+            Kind::Tlog
+        );
+        assert_eq!(kind(&(0..20).flat_map(record).collect::<Vec<_>>()), Kind::Tlog, "times since boot");
+    }
+
+    #[test]
+    fn a_damaged_beginning_does_not_mislead() {
+        let tlog: Vec<u8> = (0..20).flat_map(|at| record(1_700_000_000_000_000 + at)).collect();
+        assert_eq!(kind(&tlog[5..]), Kind::Tlog);
+        assert_eq!(kind(&[b"Init ArduCopter\n\xfd\xfe\xfd", &HEARTBEAT.repeat(3)[..]].concat()), Kind::Raw);
+    }
+
+    #[test]
+    fn a_single_frame_tells_by_where_it_begins() {
+        assert_eq!(kind(&record(5)), Kind::Tlog);
+        assert_eq!(kind(&HEARTBEAT), Kind::Raw);
+    }
+
+    #[test]
+    fn nothing_and_garbage() {
+        assert_eq!(kind(b""), Kind::Empty);
+        assert_eq!(kind(b"garbage"), Kind::Raw);
+        assert_eq!(kind(&vec![0xfd; 100_000]), Kind::Raw);
+    }
+}

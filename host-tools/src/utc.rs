@@ -1,0 +1,113 @@
+//! Times as people and other tools read them: UTC in ISO 8601, and seconds since the monitor's power-on.
+
+use std::io::Write;
+
+/// Microseconds since 1970 as `2026-11-21T10:13:42.123456Z`, appended to `out`. Years up to 9999; a later time is
+/// damage and reads as the last one.
+pub fn push_iso8601(out: &mut Vec<u8>, utc_us: u64) {
+    const LAST_US: u64 = 253_402_300_799_999_999;
+    let utc_us = utc_us.min(LAST_US);
+    let seconds = utc_us / 1_000_000;
+    let (year, month, day) = civil(seconds / 86_400);
+    let (hour, minute, second) = (seconds / 3600 % 24, seconds / 60 % 60, seconds % 60);
+    // Digits by hand: this stands in every line of every table, and `write!` takes four times as long.
+    push_digits(out, year, 4);
+    for (separator, number) in [(b'-', month), (b'-', day), (b'T', hour), (b':', minute), (b':', second)] {
+        out.push(separator);
+        push_digits(out, number, 2);
+    }
+    out.push(b'.');
+    push_digits(out, utc_us % 1_000_000, 6);
+    out.push(b'Z');
+}
+
+/// The same as a `String`.
+pub fn iso8601(utc_us: u64) -> String {
+    let mut out = Vec::with_capacity(27);
+    push_iso8601(&mut out, utc_us);
+    String::from_utf8_lossy(&out).into_owned()
+}
+
+/// Microseconds as seconds with all six decimals.
+pub fn push_seconds(out: &mut Vec<u8>, micros: u64) {
+    // Writing to a Vec cannot fail.
+    let _ = write!(out, "{}.", micros / 1_000_000);
+    push_digits(out, micros % 1_000_000, 6);
+}
+
+fn push_digits(out: &mut Vec<u8>, number: u64, width: u32) {
+    for place in (0..width).rev() {
+        out.push(b'0' + (number / 10u64.pow(place) % 10) as u8);
+    }
+}
+
+/// Days since 1970 as year, month, day: Howard Hinnant's `civil_from_days`, for days from 1970 on.
+fn civil(days: u64) -> (u64, u64, u64) {
+    let days = days + 719_468;
+    let era = days / 146_097;
+    let day_of_era = days % 146_097;
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month + 2) / 5 + 1;
+    let month = if month < 10 { month + 3 } else { month - 9 };
+    (year_of_era + era * 400 + u64::from(month <= 2), month, day)
+}
+
+/// A point in time on the command line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum When {
+    /// Microseconds since the session's start.
+    SinceStart(u64),
+    /// Microseconds since 1970.
+    Utc(u64),
+}
+
+impl std::str::FromStr for When {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(micros) = crate::card::faults::seconds(text) {
+            return Ok(Self::SinceStart(micros));
+        }
+        let instant: Result<jiff::Timestamp, _> = text.parse();
+        match instant.map(|instant| u64::try_from(instant.as_microsecond())) {
+            Ok(Ok(micros)) => Ok(Self::Utc(micros)),
+            _ => Err(format!(
+                "`{text}` is neither seconds since the session's start nor UTC as 2026-11-21T10:13:42Z"
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_day_of_four_centuries_agrees_with_jiff() {
+        for day in 0..146_097u64 {
+            let micros = day * 86_400_000_000 + 45_296_123_456;
+            let theirs = jiff::Timestamp::from_microsecond(micros as i64).expect("in range");
+            assert_eq!(iso8601(micros), format!("{theirs:.6}"));
+        }
+    }
+
+    #[test]
+    fn seconds_keep_every_microsecond() {
+        let mut out = Vec::new();
+        push_seconds(&mut out, 12_000_034);
+        assert_eq!(out, b"12.000034");
+        assert_eq!(iso8601(u64::MAX), "9999-12-31T23:59:59.999999Z");
+    }
+
+    #[test]
+    fn both_forms_of_a_time() {
+        assert_eq!("12.5".parse(), Ok(When::SinceStart(12_500_000)));
+        assert_eq!("1970-01-01T00:00:01.5Z".parse(), Ok(When::Utc(1_500_000)));
+        assert_eq!("1970-01-01T02:00:00+02:00".parse(), Ok(When::Utc(0)));
+        for text in ["", "yesterday", "-5", "1960-01-01T00:00:00Z"] {
+            assert!(text.parse::<When>().is_err(), "{text}");
+        }
+    }
+}

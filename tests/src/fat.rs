@@ -1,0 +1,101 @@
+//! The file system of a card's image, looked at with dosfstools and mtools.
+
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use crate::child;
+
+const SECTOR: u64 = 512;
+/// Copied in pieces of this size; a piece of zeros is left out, so that sparse stays sparse.
+const PIECE: usize = 1 << 16;
+
+/// Where the first partition of an image starts and how long it is, in bytes.
+fn partition(image: &mut File) -> (u64, u64) {
+    let mut table = [0; 512];
+    image.read_exact(&mut table).unwrap();
+    assert_eq!(table[510..], [0x55, 0xAA], "no partition table");
+    let number = |at: usize| u64::from(u32::from_le_bytes(table[at..at + 4].try_into().unwrap()));
+    (number(0x1BE + 8) * SECTOR, number(0x1BE + 12) * SECTOR)
+}
+
+/// `fsck.vfat -n` finds nothing but what a power cut may leave: clusters that belong to no file, the count of free
+/// clusters that goes with them, and the mark that the card was in use.
+///
+/// # Panics
+/// If it finds anything else.
+#[track_caller]
+pub fn assert_clean(image: &Path) {
+    let dir = tempfile::tempdir().unwrap();
+    let copy = dir.path().join("partition");
+    extract(image, &copy);
+    let outcome = child::run(Command::new(fsck()).arg("-n").arg(&copy), Duration::from_mins(1));
+    let text = outcome.text();
+    let odd: Vec<&str> = text.lines().filter(|line| !harmless(line)).collect();
+    assert!(odd.is_empty(), "fsck.vfat says: {odd:#?}\nin all: {text}");
+    assert!(
+        matches!(outcome.code, Some(0 | 1)),
+        "fsck.vfat ended with {:?}: {text} {}",
+        outcome.code,
+        outcome.stderr
+    );
+}
+
+/// Copies all files of the card into `folder` with mtools, as any other computer would.
+///
+/// # Panics
+/// If mtools cannot.
+#[track_caller]
+pub fn copy_files(image: &Path, folder: &Path) {
+    let (start, _) = partition(&mut File::open(image).unwrap());
+    let mut command = Command::new("mcopy");
+    command.args(["-s", "-n", "-i"]).arg(format!("{}@@{start}", image.display())).arg("::/").arg(folder);
+    let outcome = child::run(&mut command, Duration::from_mins(1));
+    assert_eq!(outcome.code, Some(0), "mcopy: {}", outcome.stderr);
+}
+
+fn harmless(line: &str) -> bool {
+    let line = line.trim();
+    line.is_empty()
+        || [
+            "fsck.fat ",
+            "Reclaiming unconnected clusters",
+            "Reclaimed ",
+            "Free cluster summary wrong",
+            "Free cluster summary uninitialized",
+            "Auto-correcting",
+            "Leaving filesystem unchanged",
+            "Dirty bit is set",
+            "Automatically removing dirty bit",
+        ]
+        .iter()
+        .any(|start| line.starts_with(start))
+        || line.contains(" files, ") && line.ends_with("clusters")
+}
+
+fn fsck() -> PathBuf {
+    let places = ["/usr/sbin/fsck.vfat", "/sbin/fsck.vfat", "/usr/bin/fsck.vfat"];
+    let found = places.iter().map(PathBuf::from).find(|path| path.is_file());
+    found.expect("fsck.vfat is missing: `cargo xtask setup` installs dosfstools")
+}
+
+fn extract(image: &Path, to: &Path) {
+    let mut from = File::open(image).unwrap();
+    let (start, length) = partition(&mut from);
+    let mut out = File::create(to).unwrap();
+    out.set_len(length).unwrap();
+    from.seek(SeekFrom::Start(start)).unwrap();
+    let mut piece = vec![0; PIECE];
+    let mut at = 0;
+    while at < length {
+        let wanted = PIECE.min((length - at) as usize);
+        from.read_exact(&mut piece[..wanted]).unwrap();
+        if piece[..wanted].iter().any(|byte| *byte != 0) {
+            out.seek(SeekFrom::Start(at)).unwrap();
+            out.write_all(&piece[..wanted]).unwrap();
+        }
+        at += wanted as u64;
+    }
+}

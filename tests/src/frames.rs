@@ -1,0 +1,172 @@
+//! MAVLink frames, read with as little code as it takes. The checksum seeds come from pymavlink, by way of the manifest,
+//! so nothing here shares a line with the framer that the tests check.
+
+use std::collections::BTreeMap;
+
+const STX_V1: u8 = 0xFE;
+const STX_V2: u8 = 0xFD;
+const SIGNED: u8 = 0x01;
+
+/// The checksum seed of each message id.
+pub type Seeds = BTreeMap<u32, u8>;
+
+/// One frame of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// Microseconds since 1970, where the recording has times.
+    pub time_us: Option<u64>,
+    /// The message id.
+    pub id: u32,
+    /// The whole frame, from its start byte to its checksum or signature.
+    pub bytes: &'a [u8],
+    /// Its id is known and its checksum fits.
+    pub verified: bool,
+}
+
+/// Length of the frame that may start here, and its message id.
+fn header(data: &[u8]) -> Option<(usize, u32)> {
+    let (length, id) = match *data.first()? {
+        STX_V1 => (8 + usize::from(*data.get(1)?), u32::from(*data.get(5)?)),
+        STX_V2 => {
+            let flags = *data.get(2)?;
+            if flags & !SIGNED != 0 {
+                return None;
+            }
+            let signature = if flags & SIGNED == 0 { 0 } else { 13 };
+            let id = u32::from_le_bytes([*data.get(7)?, *data.get(8)?, *data.get(9)?, 0]);
+            (12 + usize::from(data[1]) + signature, id)
+        }
+        _ => return None,
+    };
+    (length <= data.len()).then_some((length, id))
+}
+
+/// The X.25 checksum that MAVLink uses, bit by bit.
+pub fn checksum(covered: &[u8], seed: u8) -> u16 {
+    covered.iter().chain([&seed]).fold(0xFFFF, |crc, byte| {
+        (0..8)
+            .fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0x8408 } else { crc >> 1 })
+    })
+}
+
+fn verified(frame: &[u8], id: u32, seeds: &Seeds) -> bool {
+    let Some(seed) = seeds.get(&id) else { return false };
+    let end = if frame[0] == STX_V1 { 6 } else { 10 } + usize::from(frame[1]);
+    checksum(&frame[1..end], *seed).to_le_bytes() == frame[end..end + 2]
+}
+
+/// The frames of a tlog: each entry that is one, whether its checksum can be verified or not.
+///
+/// # Panics
+/// With `strict`, if anything but entries is in it.
+pub fn of_tlog<'a>(data: &'a [u8], seeds: &Seeds, strict: bool) -> Vec<Frame<'a>> {
+    let mut frames = Vec::new();
+    let mut at = 0;
+    while at + 8 < data.len() {
+        let Some((length, id)) = header(&data[at + 8..]) else {
+            assert!(!strict, "no entry of a tlog at byte {at}");
+            at += 1;
+            continue;
+        };
+        let bytes = &data[at + 8..at + 8 + length];
+        let time_us = u64::from_be_bytes(data[at..at + 8].try_into().unwrap());
+        frames.push(Frame { time_us: Some(time_us), id, bytes, verified: verified(bytes, id, seeds) });
+        at += 8 + length;
+    }
+    assert!(!strict || at == data.len(), "the tlog ends inside an entry");
+    frames
+}
+
+/// The frames of a raw recording whose checksum can be verified.
+pub fn of_raw<'a>(data: &'a [u8], seeds: &Seeds) -> Vec<Frame<'a>> {
+    let mut frames = Vec::new();
+    let mut at = 0;
+    while at < data.len() {
+        match header(&data[at..]) {
+            Some((length, id)) if verified(&data[at..at + length], id, seeds) => {
+                frames.push(Frame { time_us: None, id, bytes: &data[at..at + length], verified: true });
+                at += length;
+            }
+            _ => at += 1,
+        }
+    }
+    frames
+}
+
+/// Makes a v2 frame with the checksum that `seed` gives.
+pub fn build_v2(sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<u8> {
+    let [low, middle, high, _] = id.to_le_bytes();
+    let length = u8::try_from(payload.len()).unwrap();
+    let mut frame = vec![STX_V2, length, 0, 0, sequence, 1, 1, low, middle, high];
+    frame.extend_from_slice(payload);
+    let checksum = checksum(&frame[1..], seed);
+    frame.extend_from_slice(&checksum.to_le_bytes());
+    frame
+}
+
+/// The verified frames of both are the same ones, bit for bit and in the same order, and whatever else is in `output`
+/// is in the bytes of `stream`, in the same order.
+///
+/// # Panics
+/// If not, naming the first difference.
+#[track_caller]
+pub fn assert_same(expected: &[Frame<'_>], output: &[Frame<'_>], stream: &[u8]) {
+    let expected: Vec<_> = expected.iter().filter(|frame| frame.verified).collect();
+    let verified: Vec<_> = output.iter().filter(|frame| frame.verified).collect();
+    for (index, (a, b)) in expected.iter().zip(&verified).enumerate() {
+        assert_eq!(
+            a.bytes,
+            b.bytes,
+            "frame {index} (of {}) differs; ids {} and {}",
+            expected.len(),
+            a.id,
+            b.id
+        );
+    }
+    assert_eq!(expected.len(), verified.len(), "number of verified frames");
+    let mut at = 0;
+    for frame in output.iter().filter(|frame| !frame.verified) {
+        let found = stream[at..].windows(frame.bytes.len()).position(|window| window == frame.bytes);
+        let Some(offset) = found else {
+            panic!("a frame of id {} came out that never went in: {:02x?}", frame.id, frame.bytes);
+        };
+        at += offset + frame.bytes.len();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        // CRC-16/MCRF4XX of "123456789" is 0x6F91; the last digit stands in as the seed.
+        assert_eq!(checksum(b"12345678", b'9'), 0x6F91);
+    }
+
+    #[test]
+    fn a_damaged_frame_is_not_verified() {
+        let seeds = Seeds::from([(0, 50)]);
+        let mut data = build_v2(1, 0, &[1, 2, 3], 50);
+        assert_eq!(of_raw(&data, &seeds).len(), 1);
+        data[11] ^= 1;
+        assert_eq!(of_raw(&data, &seeds).len(), 0);
+    }
+
+    #[test]
+    #[should_panic(expected = "number of verified frames")]
+    fn a_missing_frame_is_a_difference() {
+        let data = build_v2(1, 0, &[1], 50);
+        let frames = of_raw(&data, &Seeds::from([(0, 50)]));
+        assert_same(&frames, &[], &data);
+    }
+
+    #[test]
+    #[should_panic(expected = "never went in")]
+    fn an_invented_frame_is_a_difference() {
+        let data = build_v2(1, 0, &[1], 50);
+        let invented = build_v2(1, 77_777, &[1], 0);
+        let output = [Frame { time_us: None, id: 77_777, bytes: &invented, verified: false }];
+        assert_same(&[], &output, &data);
+    }
+}

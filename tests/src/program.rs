@@ -1,0 +1,181 @@
+//! The `hums` program, run as a user runs it.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::child::{self, Outcome};
+use crate::flights::root;
+use crate::frames::{self, Frame, Seeds};
+
+/// No command of the tests may take longer on this PC; one that does hangs.
+pub const LIMIT: Duration = Duration::from_mins(2);
+
+/// The emulator takes bytes at the pace of its UART, and two runs share two cores with all else.
+pub const LIMIT_EMULATED: Duration = Duration::from_mins(20);
+
+/// Where `hums` lies: `HUMS_BIN` names it, or it is built, once.
+pub fn path() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| match std::env::var_os("HUMS_BIN") {
+        Some(path) => PathBuf::from(path),
+        None => build(),
+    })
+}
+
+fn build() -> PathBuf {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(root()).args(["build", "--release", "--package=hums", "--message-format=json"]);
+    let outcome = child::run(&mut cargo, Duration::from_mins(20)).expect_code(&[0]);
+    let text = outcome.text();
+    let mut messages = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let executable = messages.find_map(|message| message["executable"].as_str().map(PathBuf::from));
+    executable.expect("the package hums has a program")
+}
+
+/// The firmware of the emulated board: `HUMS_FIRMWARE` names it, otherwise it is where xtask leaves it.
+fn firmware() -> PathBuf {
+    let built = || root().join("target/firmware/hums-emulated.elf");
+    let path = std::env::var_os("HUMS_FIRMWARE").map_or_else(built, PathBuf::from);
+    assert!(path.is_file(), "{} is missing: `cargo xtask firmware --board emulated`", path.display());
+    path
+}
+
+/// `hums` with these arguments, not yet run.
+pub fn command<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
+    let mut command = Command::new(path());
+    command.args(arguments);
+    command
+}
+
+/// Runs `hums` with these arguments.
+#[track_caller]
+pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome {
+    child::run(&mut command(arguments), LIMIT)
+}
+
+/// What runs the pipeline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Machine {
+    /// `hums sim`: this PC.
+    Sim,
+    /// `hums emulate`: the firmware in QEMU.
+    Emulated,
+}
+
+/// A recording that was made, in a folder that goes with it.
+#[derive(Debug)]
+pub struct Recording {
+    dir: TempDir,
+    /// How `hums` ended.
+    pub outcome: Outcome,
+}
+
+impl Recording {
+    /// Records `input` with these further flags, whatever comes of it.
+    #[track_caller]
+    pub fn attempt(machine: Machine, input: &Path, flags: &[&str]) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let (name, limit) = match machine {
+            Machine::Sim => ("sim", LIMIT),
+            Machine::Emulated => ("emulate", LIMIT_EMULATED),
+        };
+        let mut command = command([name, "--json", "--input"]);
+        command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
+        command.arg("--gs").arg(dir.path().join("gs.bin")).args(flags);
+        match machine {
+            Machine::Sim => command.args(["--speed", "max"]),
+            Machine::Emulated => command.arg("--firmware").arg(firmware()),
+        };
+        let outcome = child::run(&mut command, limit);
+        Self { dir, outcome }
+    }
+
+    /// Records `input`; exit code 0 is expected.
+    #[track_caller]
+    pub fn make(machine: Machine, input: &Path, flags: &[&str]) -> Self {
+        Self::attempt(machine, input, flags).expect_code(&[0])
+    }
+
+    /// It ended with one of these codes.
+    #[track_caller]
+    #[must_use]
+    pub fn expect_code(self, codes: &[i32]) -> Self {
+        Self { outcome: self.outcome.expect_code(codes), ..self }
+    }
+
+    /// The card's image.
+    pub fn image(&self) -> PathBuf {
+        self.dir.path().join("card.img")
+    }
+
+    /// What the ground station got.
+    pub fn gs(&self) -> PathBuf {
+        self.dir.path().join("gs.bin")
+    }
+
+    /// The object that `--json` printed.
+    pub fn json(&self) -> Value {
+        let text = self.outcome.text();
+        serde_json::from_str(&text)
+            .unwrap_or_else(|error| panic!("--json printed no JSON ({error}): {text:?}"))
+    }
+
+    /// One of its numbers.
+    pub fn number(&self, name: &str) -> u64 {
+        self.json()[name].as_u64().unwrap_or_else(|| panic!("--json has no number {name}: {}", self.json()))
+    }
+
+    /// Everything on the card, decoded; the exit code is one of `codes`.
+    #[track_caller]
+    pub fn decode(&self, codes: &[i32]) -> Decoded {
+        Decoded::of(&self.image(), codes)
+    }
+}
+
+/// A decoded card or log.
+#[derive(Debug)]
+pub struct Decoded {
+    tlogs: Vec<Vec<u8>>,
+}
+
+impl Decoded {
+    /// Decodes to tlog; the exit code is one of `codes`.
+    #[track_caller]
+    pub fn of(source: &Path, codes: &[i32]) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        // A file where there is one log, a folder where there are several.
+        let out = dir.path().join("out");
+        let mut command = command(["decode".as_ref(), source.as_os_str(), "-o".as_ref(), out.as_os_str()]);
+        child::run(command.args(["--format", "tlog"]), LIMIT).expect_code(codes);
+        let mut files = Vec::new();
+        collect(&out, &mut files);
+        files.sort();
+        Self { tlogs: files.iter().map(|file| fs::read(file).unwrap()).collect() }
+    }
+
+    /// All frames, in the order of the files' names and in their order there.
+    pub fn frames(&self, seeds: &Seeds) -> Vec<Frame<'_>> {
+        self.tlogs.iter().flat_map(|tlog| frames::of_tlog(tlog, seeds, true)).collect()
+    }
+
+    /// The files themselves.
+    pub fn tlogs(&self) -> &[Vec<u8>] {
+        &self.tlogs
+    }
+}
+
+/// The files at or below `path`, which may not be there at all.
+fn collect(path: &Path, files: &mut Vec<PathBuf>) {
+    if path.is_file() {
+        files.push(path.to_owned());
+    } else if let Ok(entries) = fs::read_dir(path) {
+        entries.for_each(|entry| collect(&entry.unwrap().path(), files));
+    }
+}

@@ -1,0 +1,142 @@
+//! A recorded flight through all of it, and what came of it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::firmware::{self, Board};
+use crate::repo;
+use crate::setup::{self, Need};
+use crate::shell::Shell;
+use crate::test::build_hums;
+
+/// A whole flight of a PX4 quadcopter at the rates of a telemetry port: the shortest that has everything.
+const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
+
+/// `hums` did all it could, and there are losses to report.
+const DONE_WITH_LOSSES: i32 = 3;
+
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Options {
+    flight: PathBuf,
+    /// On this PC even if there is an emulator.
+    pc: bool,
+}
+
+impl Options {
+    pub(crate) fn parse(words: &[&str]) -> Result<Self> {
+        let mut options = Self { flight: repo::root().join(FLIGHT), pc: false };
+        let mut words = words.iter();
+        while let Some(word) = words.next() {
+            match *word {
+                "--pc" => options.pc = true,
+                "--flight" => {
+                    let Some(flight) = words.next() else {
+                        bail!("--flight wants a tlog or a raw recording")
+                    };
+                    // As typed where it was typed: the commands themselves run at the root.
+                    options.flight = std::path::absolute(flight)?;
+                }
+                other => bail!("demo takes --flight FILE and --pc, not {other}"),
+            }
+        }
+        Ok(options)
+    }
+}
+
+/// In CI the demo must run in the emulator.
+pub(crate) fn as_test() -> Result<()> {
+    run(&Options::parse(&[])?)
+}
+
+pub(crate) fn run(options: &Options) -> Result<()> {
+    let start = Instant::now();
+    let outcome = setup::ensure(&[Need::Linker, Need::FirmwareTarget, Need::Qemu], false);
+    let emulated = !options.pc && outcome.has(Need::FirmwareTarget) && outcome.has(Need::Qemu);
+    if !emulated && !options.pc {
+        eprintln!("\nNo emulator here (what to type is above): the same pipeline runs on this PC instead.\n");
+    }
+    build_hums()?;
+    let folder = repo::target().join("demo");
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    fs::create_dir_all(&folder)?;
+    let built = start.elapsed();
+
+    let (card, gs, figures) = (folder.join("card.img"), folder.join("gs.bin"), folder.join("run.json"));
+    let mut hums = Shell::new(repo::hums());
+    if emulated {
+        hums = hums.arg("emulate").arg("--firmware").arg(firmware::build(Board::Emulated)?);
+    } else {
+        hums = hums.arg("sim");
+    }
+    let recording = Instant::now();
+    let (json, code) = hums
+        .args(["--json".as_ref(), "--input".as_ref(), options.flight.as_os_str()])
+        .args(["--sd".as_ref(), card.as_os_str(), "--gs".as_ref(), gs.as_os_str()])
+        .output_and_code()?;
+    if code != 0 && code != DONE_WITH_LOSSES {
+        bail!("the recording failed with exit code {code}");
+    }
+    fs::write(&figures, &json)?;
+    let recorded = recording.elapsed();
+    let decoded = folder.join("decoded");
+    decode(&card, &decoded)?;
+
+    println!();
+    Shell::new(repo::hums()).arg("info").arg(&card).run()?;
+    let run: serde_json::Value = serde_json::from_str(&json).context("what hums --json printed")?;
+    println!();
+    for (label, key) in [
+        ("frames in", "frames_in"),
+        ("frames logged", "frames_logged"),
+        ("frames lost", "frames_lost"),
+        ("bytes in", "bytes_in"),
+        ("bytes logged", "bytes_logged"),
+        ("frames to the ground station", "gs_frames"),
+    ] {
+        println!("{label:<30} {:>10}", run.get(key).map_or_else(|| "?".to_owned(), ToString::to_string));
+    }
+    println!();
+    println!("{:<30} {}", "the flight", repo::shown(&options.flight));
+    let by = if emulated { "the firmware, in the emulator" } else { "this PC, with the firmware's pipeline" };
+    println!("{:<30} {by}", "recorded by");
+    for (label, path) in [
+        ("the SD card's image", &card),
+        ("the decoded log", &decoded),
+        ("what the ground station got", &gs),
+        ("all figures of the run", &figures),
+    ] {
+        println!("{label:<30} {}", repo::shown(path));
+    }
+    let (built, recorded) = (built.as_secs(), recorded.as_secs());
+    println!("{:<30} {built} s to build, {recorded} s to record", "it took");
+    if run.get("frames_lost").and_then(serde_json::Value::as_u64) != Some(0) {
+        bail!("frames were lost");
+    }
+    Ok(())
+}
+
+fn decode(card: &Path, to: &Path) -> Result<()> {
+    Shell::new(repo::hums()).arg("decode").arg(card).arg("-o").arg(to).args(["--format", "tlog,csv"]).run()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_flight_of_the_demo_is_in_the_repository() {
+        assert!(Options::parse(&[]).unwrap().flight.is_file());
+    }
+
+    #[test]
+    fn a_flight_is_named_from_where_the_user_is() {
+        let options = Options::parse(&["--flight", "mine.tlog", "--pc"]).unwrap();
+        assert_eq!(options.flight, std::env::current_dir().unwrap().join("mine.tlog"));
+        assert!(options.pc);
+    }
+}

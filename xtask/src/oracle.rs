@@ -1,0 +1,95 @@
+//! The independent reader of MAVLink: pymavlink in a virtual environment of its own, with a dialect that its `mavgen`
+//! makes from the very definitions that the firmware is built with (the XML files of the `mavlink` crate). pymavlink's
+//! own dialects lack messages that PX4 sends.
+
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result};
+use cargo_metadata::MetadataCommand;
+
+use crate::repo;
+use crate::shell::Shell;
+
+/// The scripts and the pinned requirements.
+const FOLDER: &str = "tests/oracle";
+
+fn venv() -> PathBuf {
+    repo::target().join("venv")
+}
+
+/// The interpreter that has pymavlink.
+pub(crate) fn python() -> PathBuf {
+    venv().join("bin/python")
+}
+
+/// The dialect, a Python module.
+pub(crate) fn dialect() -> PathBuf {
+    repo::target().join("oracle/hums_dialect.py")
+}
+
+/// Makes the environment and the dialect unless they are there already.
+pub(crate) fn prepare() -> Result<()> {
+    let requirements = repo::root().join(FOLDER).join("requirements.txt");
+    let wanted = fs::read_to_string(&requirements).with_context(|| format!("{}", requirements.display()))?;
+    // The stamp is written last, so an interrupted installation is made anew.
+    let stamp = venv().join("requirements.txt");
+    if fs::read_to_string(&stamp).ok().as_deref() != Some(&wanted) {
+        Shell::new("python3").args(["-m", "venv", "--clear"]).arg(venv()).run()?;
+        let pip = Shell::new(python()).args([
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            "-r",
+        ]);
+        pip.arg(&requirements).run().context("pymavlink cannot be installed: is there a network?")?;
+        fs::write(&stamp, &wanted)?;
+    }
+    let definitions = definitions()?;
+    let stamp = dialect().with_extension("stamp");
+    let made_of = format!("{}\n{wanted}", definitions.display());
+    if !dialect().is_file() || fs::read_to_string(&stamp).ok().as_deref() != Some(&made_of) {
+        fs::create_dir_all(repo::target().join("oracle"))?;
+        Shell::new(python())
+            .args([
+                "-m",
+                "pymavlink.tools.mavgen",
+                "--lang=Python3",
+                "--wire-protocol=2.0",
+                "--no-validate",
+                "-o",
+            ])
+            .arg(dialect())
+            .arg(definitions)
+            .output()?;
+        fs::write(stamp, made_of)?;
+    }
+    Ok(())
+}
+
+/// The root of the message definitions that the `mavlink` crate in `Cargo.lock` carries.
+fn definitions() -> Result<PathBuf> {
+    let metadata = MetadataCommand::new().current_dir(repo::root()).exec()?;
+    let package = metadata.packages.iter().find(|package| package.name.as_str() == "mavlink");
+    let package = package.context("the workspace does not depend on the mavlink crate")?;
+    let folder = package.manifest_path.parent().context("the mavlink crate has no folder")?;
+    Ok(folder.join("mavlink/message_definitions/v1.0/all.xml").into())
+}
+
+/// Makes `tests/flights/manifest.json` anew.
+pub(crate) fn write_manifest() -> Result<()> {
+    prepare()?;
+    let flights = repo::root().join("tests/flights");
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(&flights)?.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.retain(|file| file.extension().is_some_and(|kind| kind == "tlog" || kind == "raw"));
+    files.sort();
+    let script = repo::root().join(FOLDER).join("manifest.py");
+    let manifest = Shell::new(python()).arg(script).arg(dialect()).args(files).output()?;
+    let path = flights.join("manifest.json");
+    fs::write(&path, manifest)?;
+    println!("{}", repo::shown(&path));
+    Ok(())
+}

@@ -1,0 +1,27 @@
+//! Where things lie.
+
+use std::path::{Path, PathBuf};
+
+/// The triple of the firmware: a Cortex-M4 with its FPU.
+pub(crate) const FIRMWARE_TARGET: &str = "thumbv7em-none-eabihf";
+
+/// The root of the repository.
+pub(crate) fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask is one folder below the root")
+}
+
+/// The build folder: cargo's own, wherever the user keeps it.
+pub(crate) fn target() -> PathBuf {
+    let chosen = std::env::var_os("CARGO_TARGET_DIR").filter(|dir| !dir.is_empty());
+    chosen.map_or_else(|| root().join("target"), |dir| root().join(dir))
+}
+
+/// The `hums` program.
+pub(crate) fn hums() -> PathBuf {
+    target().join("release/hums")
+}
+
+/// A path as a person would type it from the root.
+pub(crate) fn shown(path: &Path) -> String {
+    path.strip_prefix(root()).unwrap_or(path).display().to_string()
+}

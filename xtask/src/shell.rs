@@ -1,0 +1,150 @@
+//! Running other programs: every command is shown before it runs, so that what xtask does can be typed by hand.
+
+use std::ffi::OsStr;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context as _, Result, bail};
+
+/// A command line with a readable form.
+pub(crate) struct Shell {
+    command: Command,
+    shown: String,
+}
+
+impl Shell {
+    pub(crate) fn new(program: impl AsRef<OsStr>) -> Self {
+        let program = program.as_ref();
+        let mut command = Command::new(program);
+        command.current_dir(crate::repo::root());
+        Self { command, shown: program.to_string_lossy().into_owned() }
+    }
+
+    /// The cargo that runs this xtask, so that the toolchain stays the one the user chose.
+    pub(crate) fn cargo() -> Self {
+        let mut shell = Self::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        "cargo".clone_into(&mut shell.shown);
+        shell
+    }
+
+    /// As root: as it is for root, through `sudo -n` for anyone else.
+    pub(crate) fn as_root(program: &str) -> Self {
+        if crate::setup::is_root() { Self::new(program) } else { Self::new("sudo").args(["-n", program]) }
+    }
+
+    pub(crate) fn arg(mut self, argument: impl AsRef<OsStr>) -> Self {
+        let argument = argument.as_ref();
+        self.shown.push(' ');
+        self.shown.push_str(&quoted(&argument.to_string_lossy()));
+        self.command.arg(argument);
+        self
+    }
+
+    pub(crate) fn args<A: AsRef<OsStr>>(self, arguments: impl IntoIterator<Item = A>) -> Self {
+        arguments.into_iter().fold(self, Self::arg)
+    }
+
+    pub(crate) fn env(mut self, name: &str, value: impl AsRef<OsStr>) -> Self {
+        self.shown = format!("{name}={} {}", quoted(&value.as_ref().to_string_lossy()), self.shown);
+        self.command.env(name, value);
+        self
+    }
+
+    /// Without what it writes to stdout, for programs that say much and mean little.
+    pub(crate) fn quiet(mut self) -> Self {
+        self.command.stdout(Stdio::null());
+        self
+    }
+
+    /// Runs it with our own stdout and stderr; a non-zero exit is an error.
+    pub(crate) fn run(mut self) -> Result<()> {
+        eprintln!("$ {}", self.shown);
+        let status = self.command.status().with_context(|| format!("cannot run {}", self.shown))?;
+        if !status.success() {
+            bail!("`{}` ended with {status}", self.shown);
+        }
+        Ok(())
+    }
+
+    /// Runs it and returns what it wrote to stdout; stderr stays ours. Also the exit code, for programs such as
+    /// `hums decode` whose code 3 is a result.
+    pub(crate) fn output_and_code(mut self) -> Result<(String, i32)> {
+        eprintln!("$ {}", self.shown);
+        let output = self
+            .command
+            .stderr(Stdio::inherit())
+            .output()
+            .with_context(|| format!("cannot run {}", self.shown))?;
+        let code = output.status.code().with_context(|| format!("`{}` was ended by a signal", self.shown))?;
+        Ok((String::from_utf8_lossy(&output.stdout).into_owned(), code))
+    }
+
+    /// As [`Shell::output_and_code`]; a non-zero exit is an error.
+    pub(crate) fn output(self) -> Result<String> {
+        let shown = self.shown.clone();
+        let (text, code) = self.output_and_code()?;
+        if code != 0 {
+            bail!("`{shown}` ended with exit code {code}");
+        }
+        Ok(text)
+    }
+
+    /// Asks quietly: `None` if it cannot be run or fails, otherwise stdout.
+    pub(crate) fn ask(mut self) -> Option<String> {
+        let output = self.command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
+    }
+
+    /// Runs it with `text` on its stdin.
+    pub(crate) fn run_with_input(mut self, text: &str) -> Result<()> {
+        eprintln!("$ {}", self.shown);
+        let mut child = self
+            .command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .with_context(|| format!("cannot run {}", self.shown))?;
+        if let Some(mut stdin) = child.stdin.take() {
+            stdin.write_all(text.as_bytes())?;
+        }
+        let status = child.wait()?;
+        if !status.success() {
+            bail!("`{}` ended with {status}", self.shown);
+        }
+        Ok(())
+    }
+}
+
+/// In single quotes where a shell would otherwise read it differently.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_shown_can_be_typed() {
+        let shell = Shell::new("printf").arg("%s").arg("it's here").env("A", "b c");
+        assert_eq!(shell.shown, r"A='b c' printf %s 'it'\''s here'");
+    }
+
+    #[test]
+    fn a_failing_program_is_an_error_that_names_it() {
+        let error = Shell::new("false").run().unwrap_err().to_string();
+        assert!(error.contains("false"), "{error}");
+        assert!(Shell::new("no-such-program-here").run().is_err());
+    }
+
+    #[test]
+    fn an_exit_code_is_a_result_where_asked_for() {
+        let (text, code) = Shell::new("sh").args(["-c", "echo out; exit 3"]).output_and_code().unwrap();
+        assert_eq!((text.as_str(), code), ("out\n", 3));
+    }
+}
