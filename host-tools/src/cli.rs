@@ -103,7 +103,7 @@ pub enum Speed {
 }
 
 /// Faults; each run is repeatable.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Faults (each may be given several times)")]
 pub struct FaultFlags {
     /// Power goes at the N-th 512-byte block write (torn: half of that block is old); the run ends there
@@ -175,8 +175,9 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
   hums decode 00042.hum -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
 
-Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl); otherwise a
-directory, in which each log has one of its own. `-o -` is standard output.
+Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl), unless it is a
+directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl and, for tables, OUT/LOG/ATTITUDE.csv and so on.
+`-o -` is standard output.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
 /// `hums decode`

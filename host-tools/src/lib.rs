@@ -3,16 +3,22 @@
 pub mod card;
 pub mod cli;
 pub mod decode;
+pub mod demo;
 pub mod endpoint;
+pub mod info;
 pub mod interrupt;
 pub mod logs;
 pub mod mavlink;
 pub mod outcome;
 pub mod output;
+pub mod pack;
 pub mod rng;
+pub mod run;
 pub mod sink;
 pub mod source;
+pub mod summary;
 pub mod utc;
+pub mod verify;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -37,6 +43,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 fn command(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Decode(args) => decode::run(args),
-        _ => Ok(Outcome::Done),
+        Command::Sim(args) => run::sim::run(args),
+        Command::Emulate(args) => run::emulate::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Verify(args) => verify::run(args),
+        Command::Pack(args) => pack::run(args),
+        Command::Demo(args) => demo::run(args),
     }
 }

@@ -59,5 +59,5 @@ impl Write for Stdout {
 
 /// Whether this error says that the reader of standard output has gone.
 pub fn is_reader_gone(error: &io::Error) -> bool {
-    error.get_ref().is_some_and(|inner| inner.is::<ReaderGone>())
+    error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<ReaderGone>)
 }

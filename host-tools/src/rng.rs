@@ -1,4 +1,4 @@
-//! SplitMix64 (Steele, Lea and Flood, 2014): repeatable chance for the fault flags, the same on every machine.
+//! `SplitMix64` (Steele, Lea and Flood, 2014): repeatable chance for the fault flags, the same on every machine.
 
 /// A generator; equal seeds give equal sequences.
 #[derive(Clone, Debug)]

@@ -16,7 +16,7 @@ const WRITE: Duration = Duration::from_secs(5);
 const DATAGRAM_BYTES_MAX: usize = 1200;
 
 /// Opens SINK.
-pub fn open(endpoint: &Endpoint) -> Result<Box<dyn Write>> {
+pub fn open(endpoint: &Endpoint) -> Result<Box<dyn Write + Send>> {
     let context = || format!("{endpoint}: cannot be opened for writing");
     Ok(match endpoint {
         Endpoint::File(path) => Box::new(BufWriter::new(File::create(path).with_context(context)?)),

@@ -7,13 +7,14 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_recorder::format::BLOCKS_MIN;
 
 use crate::outcome::usage;
 
 /// The size of an image that is made, in MiB, unless `--card-size` says otherwise.
 pub const SIZE_MIB: u64 = 256;
-/// FAT32 needs 65,525 clusters: nothing smaller can be formatted, in MiB.
-pub const SIZE_MIB_MIN: u64 = 33;
+/// Nothing smaller can be FAT32, in MiB.
+pub const SIZE_MIB_MIN: u64 = (BLOCKS_MIN as u64 * 512).div_ceil(1 << 20);
 /// Block numbers have 32 bits, in MiB.
 pub const SIZE_MIB_MAX: u64 = 2 * 1024 * 1024 - 1;
 

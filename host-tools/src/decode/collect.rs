@@ -160,14 +160,13 @@ impl<'a> Collected<'a> {
             out.push(b',');
             push_integer(out, u64::from(number));
         }
-        match known {
-            Some(payload) => push_csv_cells(out, payload),
-            None => {
-                out.push(b',');
-                push_integer(out, u64::from(frame.sequence));
-                out.push(b',');
-                push_hex(out, frame.payload);
-            }
+        if let Some(payload) = known {
+            push_csv_cells(out, payload)
+        } else {
+            out.push(b',');
+            push_integer(out, u64::from(frame.sequence));
+            out.push(b',');
+            push_hex(out, frame.payload);
         }
         out.push(b'\n');
     }
@@ -186,16 +185,13 @@ impl<'a> Collected<'a> {
             Some(message) => push_json_text(out, message.name.as_bytes()),
             None => push_json_text(out, format!("UNKNOWN_{}", frame.id).as_bytes()),
         }
-        match known {
-            Some(payload) => {
-                out.extend_from_slice(b",\"fields\":");
-                push_json_object(out, payload);
-            }
-            None => {
-                out.extend_from_slice(b",\"verified\":false,\"payload\":\"");
-                push_hex(out, frame.payload);
-                out.push(b'"');
-            }
+        if let Some(payload) = known {
+            out.extend_from_slice(b",\"fields\":");
+            push_json_object(out, payload);
+        } else {
+            out.extend_from_slice(b",\"verified\":false,\"payload\":\"");
+            push_hex(out, frame.payload);
+            out.push(b'"');
         }
         out.extend_from_slice(b"}\n");
     }

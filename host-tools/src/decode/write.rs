@@ -25,13 +25,8 @@ pub enum Destination {
     Standard,
     /// The one file has this name.
     File(PathBuf),
-    /// Files of this name, with an extension, in this directory.
-    Directory {
-        /// The directory.
-        dir: PathBuf,
-        /// The name without its extension.
-        stem: String,
-    },
+    /// Single files have this name with an extension; tables lie in a directory of this name.
+    Named(PathBuf),
 }
 
 impl Destination {
@@ -41,15 +36,19 @@ impl Destination {
         if logs == 1 && formats.is_single_file() && !says_directory {
             return Self::File(output.to_owned());
         }
-        let stem = log.name.rsplit('/').next().unwrap_or(&log.name).to_owned();
-        Self::Directory { dir: inside(output, &log.name), stem }
+        Self::Named(inside(output, &log.name))
     }
 
     fn open(&self, extension: &str) -> Result<(Box<dyn Write>, PathBuf)> {
         let path = match self {
             Self::Standard => return Ok((Box::new(BufWriter::new(Stdout::new())), PathBuf::from("-"))),
             Self::File(path) => path.clone(),
-            Self::Directory { dir, stem } => dir.join(format!("{stem}.{extension}")),
+            Self::Named(name) => {
+                // Appended, not replaced: a log's own name may have a dot in it.
+                let mut name = name.clone().into_os_string();
+                name.push(format!(".{extension}"));
+                PathBuf::from(name)
+            }
         };
         Ok((Box::new(create(&path)?), path))
     }
@@ -92,7 +91,7 @@ impl Writers {
     pub fn new(destination: Destination, formats: Formats, epoch_us: Option<u64>) -> Result<Self> {
         let open = |wanted: bool, extension| wanted.then(|| destination.open(extension)).transpose();
         let (tlog, jsonl) = (open(formats.tlog, "tlog")?, open(formats.jsonl, "jsonl")?);
-        if let (true, Destination::Directory { dir, .. }) = (formats.csv, &destination) {
+        if let (true, Destination::Named(dir)) = (formats.csv, &destination) {
             fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
         }
         Ok(Self {
@@ -129,7 +128,7 @@ impl Writers {
     }
 
     fn table(&mut self, table: Table, lines: &[u8]) -> Result<()> {
-        let Destination::Directory { dir, .. } = &self.destination else { return Ok(()) };
+        let Destination::Named(dir) = &self.destination else { return Ok(()) };
         let path = dir.join(format!("{}.csv", file_name(table)));
         if let Some(file) = self.tables.get_mut(&table) {
             return write(file, lines, &path);
@@ -152,7 +151,7 @@ impl Writers {
             settle(file.flush(), &path)?;
             lines.push(format!("{}: {} frames", path.display(), self.frames));
         }
-        if let (true, Destination::Directory { dir, .. }) = (self.formats.csv, &self.destination) {
+        if let (true, Destination::Named(dir)) = (self.formats.csv, &self.destination) {
             for (table, file) in &mut self.tables {
                 settle(file.flush(), &dir.join(file_name(*table)))?;
             }

@@ -156,7 +156,7 @@ fn whole_file(path: &Path) -> Result<Log> {
     let length = fs::metadata(path).with_context(|| format!("{}: cannot be read", path.display()))?.len();
     let stem = path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let piece = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
-    Ok(Log { name: stem, pieces: vec![piece], session: None })
+    Ok(Log { name: stem, files: vec![path.display().to_string()], pieces: vec![piece], session: None })
 }
 
 /// Walks a directory: segments of one session in one directory are one log.
@@ -188,11 +188,13 @@ fn directory(root: &Path, found: &mut Found) -> Result<()> {
             segments.sort();
             let name =
                 if prefix.is_empty() { format!("{session:05}") } else { format!("{prefix}/{session:05}") };
-            let mut pieces = Vec::new();
+            let mut log = Log { name, files: Vec::new(), pieces: Vec::new(), session: None };
             for (_, path) in segments {
-                pieces.extend(whole_file(&path)?.pieces);
+                let segment = whole_file(&path)?;
+                log.files.extend(segment.files);
+                log.pieces.extend(segment.pieces);
             }
-            found.logs.push(Log { name, pieces, session: None });
+            found.logs.push(log);
         }
     }
     Ok(())
@@ -230,6 +232,16 @@ fn segment_name(path: &Path) -> Option<LogName> {
     let name = path.file_name()?.to_str()?.to_ascii_uppercase();
     let (base, extension) = name.split_once('.')?;
     LogName::from_short(base.as_bytes(), extension.as_bytes())
+}
+
+/// The logs that a card's file system knows; none where it has none. No block is searched for more.
+pub fn on_card(path: &Path) -> Vec<Log> {
+    let read = || -> Result<Vec<Log>> {
+        let file = File::open(path)?;
+        let layout = Layout::read(&ReadOnlyImage::new(file.try_clone()?)?).ok().context("no file system")?;
+        Ok(sessions_of(path, &Volume::new(&file, layout)?.walk()?.files))
+    };
+    read().unwrap_or_default()
 }
 
 /// The logs on a card: by its file system, or where that does not tell, by looking at every block.
@@ -276,8 +288,9 @@ fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     let log = |(session, mut segments): (u32, Vec<(LogName, &CardFile)>)| {
         segments.sort_by_key(|(name, _)| *name);
         let extents = segments.iter().flat_map(|(_, file)| file.extents.iter().copied()).collect();
+        let files = segments.iter().map(|(_, file)| file.path.clone()).collect();
         let pieces = vec![Piece { path: path.to_owned(), extents }];
-        Log { name: format!("{session:05}"), pieces, session: None }
+        Log { name: format!("{session:05}"), files, pieces, session: None }
     };
     sessions.into_iter().map(log).collect()
 }
@@ -293,11 +306,11 @@ struct Run {
 /// Looks at every block of a card for sectors, and puts those of each session in order.
 fn scan(path: &Path, length: u64) -> Result<Vec<Log>> {
     let everything = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
-    let all = Log { name: String::new(), pieces: vec![everything], session: None };
+    let all = Log { name: String::new(), files: Vec::new(), pieces: vec![everything], session: None };
     let mut blocks: Blocks<'_> = all.blocks();
     let mut sessions: BTreeMap<u32, Vec<Run>> = BTreeMap::new();
     let (mut at, mut runs) = (0_u64, 0_usize);
-    while let Some(block) = blocks.next()? {
+    while let Some(block) = blocks.next_block()? {
         if let Ok(header) = Header::read(&block) {
             let session = sessions.entry(header.session).or_default();
             match session.last_mut() {
@@ -320,7 +333,8 @@ fn scan(path: &Path, length: u64) -> Result<Vec<Log>> {
         runs.sort_by_key(|run| (run.number, run.start));
         let extent = |run: &Run| Extent { start: run.start, length: run.blocks * BLOCK_BYTES as u64 };
         let piece = Piece { path: path.to_owned(), extents: runs.iter().map(extent).collect() };
-        Log { name: format!("session-{session:08x}"), pieces: vec![piece], session: Some(session) }
+        let files = vec![path.display().to_string()];
+        Log { name: format!("session-{session:08x}"), files, pieces: vec![piece], session: Some(session) }
     };
     Ok(sessions.into_iter().map(log).collect())
 }

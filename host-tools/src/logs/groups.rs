@@ -24,14 +24,13 @@ impl<'a> Groups<'a> {
     }
 
     /// The next group; `None` at the end.
-    pub fn next(&mut self) -> Result<Option<Group>> {
+    pub fn next_group(&mut self) -> Result<Option<Group>> {
         while !self.ended {
-            let step = match self.blocks.next()? {
-                Some(block) => self.assembler.feed(&block),
-                None => {
-                    self.ended = true;
-                    self.assembler.end()
-                }
+            let step = if let Some(block) = self.blocks.next_block()? {
+                self.assembler.feed(&block)
+            } else {
+                self.ended = true;
+                self.assembler.end()
             };
             let Some(step) = step else { continue };
             let full = self.group.len() >= GROUP_SECTORS;

@@ -28,6 +28,8 @@ pub struct Log {
     /// A name for directories and reports, unique within one call: `00042`, or `card/00042` where there are several
     /// inputs.
     pub name: String,
+    /// The names of its files: on the card for a card's, on this PC otherwise.
+    pub files: Vec<String>,
     /// Where it lies, in order.
     pub pieces: Vec<Piece>,
     /// What its sectors name as their session, where a scan told it; otherwise that of the first sector counts.
@@ -60,7 +62,7 @@ pub struct Blocks<'a> {
 
 impl Blocks<'_> {
     /// The next block; `None` at the end.
-    pub fn next(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
+    pub fn next_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
         loop {
             if let Some(block) = self.buffer.get(self.at..self.at + BLOCK_BYTES) {
                 self.at += BLOCK_BYTES;

@@ -65,7 +65,7 @@ pub fn read<C: Collect>(
     loop {
         let mut batch = Vec::with_capacity(batch_groups);
         while batch.len() < batch_groups {
-            match groups.next()? {
+            match groups.next_group()? {
                 Some(group) => batch.push(group),
                 None => break,
             }
@@ -242,7 +242,7 @@ pub fn epoch(log: &Log) -> Result<Option<u64>> {
     let mut groups = Groups::new(log);
     let mut decoder = Box::new(GroupDecoder::new());
     let (mut epoch, mut last) = (None, Vec::new());
-    while let Some(group) = groups.next()? {
+    while let Some(group) = groups.next_group()? {
         if let Some(first) = group.first() {
             // The preamble is plain: nothing is decoded here.
             if decoder.push(&first.header, &first.sector).is_ok() {

@@ -41,6 +41,16 @@ pub trait Source {
     /// The next chunk; `None` at the end.
     fn next(&mut self) -> io::Result<Option<Chunk>>;
 
+    /// UTC at the first byte, microseconds since 1970, where the input told it (known once a chunk was read).
+    fn utc_start_us(&self) -> Option<u64> {
+        None
+    }
+
+    /// Whether each chunk is a record of its own (a frame of a tlog), not just some bytes of a stream.
+    fn has_records(&self) -> bool {
+        false
+    }
+
     /// A sentence about what was strange in the input, once it has been read.
     fn remark(&self) -> Option<String> {
         None

@@ -33,6 +33,10 @@ impl<S: Source> Source for Noisy<S> {
         Ok(Some(chunk))
     }
 
+    fn utc_start_us(&self) -> Option<u64> {
+        self.inner.utc_start_us()
+    }
+
     fn remark(&self) -> Option<String> {
         self.inner.remark()
     }
@@ -41,6 +45,14 @@ impl<S: Source> Source for Noisy<S> {
 impl Source for Box<dyn Source> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         (**self).next()
+    }
+
+    fn utc_start_us(&self) -> Option<u64> {
+        (**self).utc_start_us()
+    }
+
+    fn has_records(&self) -> bool {
+        (**self).has_records()
     }
 
     fn remark(&self) -> Option<String> {

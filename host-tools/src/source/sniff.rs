@@ -130,6 +130,6 @@ mod tests {
     fn nothing_and_garbage() {
         assert_eq!(kind(b""), Kind::Empty);
         assert_eq!(kind(b"garbage"), Kind::Raw);
-        assert_eq!(kind(&[0xfd; 100_000]), Kind::Raw);
+        assert_eq!(kind(&vec![0xfd; 100_000]), Kind::Raw);
     }
 }

@@ -73,7 +73,7 @@ impl<R: Read> Records<R> {
     }
 
     /// The next record; `None` at the end.
-    pub fn next(&mut self) -> io::Result<Option<Record>> {
+    pub fn next_record(&mut self) -> io::Result<Option<Record>> {
         let mut noise = Vec::new();
         loop {
             self.fill()?;
@@ -151,25 +151,42 @@ pub struct Tlog<R> {
     records: Records<R>,
     arrival: Arrival,
     noise_bytes: u64,
+    utc_start_us: Option<u64>,
 }
+
+/// Recorded times before 2000 count from some power-on: they tell no UTC.
+const UTC_US_MIN: u64 = 946_684_800_000_000;
 
 impl<R: Read> Tlog<R> {
     /// Reads from `input`.
     pub fn new(input: R) -> Self {
-        Self { records: Records::new(input), arrival: Arrival::default(), noise_bytes: 0 }
+        Self { records: Records::new(input), arrival: Arrival::default(), noise_bytes: 0, utc_start_us: None }
     }
 }
 
 impl<R: Read> Source for Tlog<R> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
-        Ok(match self.records.next()? {
+        Ok(match self.records.next_record()? {
             None => None,
-            Some(Record::Frame { time_us, bytes }) => Some(Chunk { at_us: self.arrival.at(time_us), bytes }),
+            Some(Record::Frame { time_us, bytes }) => {
+                if self.arrival.last.is_none() {
+                    self.utc_start_us = Some(time_us).filter(|&time| time >= UTC_US_MIN);
+                }
+                Some(Chunk { at_us: self.arrival.at(time_us), bytes })
+            }
             Some(Record::Noise(bytes)) => {
                 self.noise_bytes += bytes.len() as u64;
                 Some(Chunk { at_us: self.arrival.now(), bytes })
             }
         })
+    }
+
+    fn utc_start_us(&self) -> Option<u64> {
+        self.utc_start_us
+    }
+
+    fn has_records(&self) -> bool {
+        true
     }
 
     fn remark(&self) -> Option<String> {

@@ -1,0 +1,106 @@
+//! `hums demo`: a recorded flight is recorded by the firmware (in the emulator, where there is one), the card is
+//! decoded, and what came of it is summed up.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::cli::{self, FaultFlags, Format};
+use crate::endpoint::Endpoint;
+use crate::logs;
+use crate::outcome::Outcome;
+use crate::output::line;
+use crate::run::{emulate, qemu, sim};
+use crate::summary::Overview;
+use crate::{decode, info};
+
+/// The flight that is shown, inside the source tree: a whole flight of a PX4 quadcopter.
+const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
+
+/// Runs `hums demo`.
+pub fn run(args: &cli::Demo) -> Result<Outcome> {
+    let flight = flight(args)?;
+    fs::create_dir_all(&args.dir).with_context(|| format!("{}: cannot be made", args.dir.display()))?;
+    let card = args.dir.join("card.img");
+    // Each demo begins with an empty card.
+    if card.exists() {
+        fs::remove_file(&card).with_context(|| format!("{}: cannot be replaced", card.display()))?;
+    }
+    let gs = args.dir.join("ground-station.bin");
+    line(&format!("1. {flight} goes in at the autopilot UART"))?;
+    let recorded = record(&flight, &card, &gs)?;
+    line("")?;
+    line("2. what was on the SD card")?;
+    let decoded = args.dir.join("decoded");
+    let arguments = cli::Decode {
+        inputs: vec![card.clone()],
+        output: decoded.clone(),
+        format: vec![Format::Tlog, Format::Csv],
+        from: None,
+        to: None,
+        message: Vec::new(),
+    };
+    let read = decode::run(&arguments)?;
+    line("")?;
+    line("3. what it says of the flight")?;
+    for log in &logs::find(std::slice::from_ref(&card))?.logs {
+        line(info::text(&Overview::of(log)?).trim_end())?;
+    }
+    line("")?;
+    line("4. where everything lies")?;
+    for (what, path) in [
+        ("the SD card's image", &card),
+        ("the decoded flight", &decoded),
+        ("what the ground station got", &gs),
+    ] {
+        line(&format!("   {what:<28} {}", shown(path)))?;
+    }
+    line("   try: hums info CARD, hums verify CARD, hums decode CARD -o OUT --format jsonl")?;
+    Ok(recorded.and(read))
+}
+
+fn shown(path: &Path) -> String {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string()
+}
+
+fn flight(args: &cli::Demo) -> Result<Endpoint> {
+    if let Some(input) = &args.input {
+        return Ok(input.clone());
+    }
+    let flight: Option<PathBuf> =
+        emulate::source_tree().map(|tree| tree.join(FLIGHT)).filter(|flight| flight.is_file());
+    match flight {
+        Some(flight) => Ok(Endpoint::File(flight)),
+        None => {
+            bail!("no flight to show: this is not inside the source tree of hums; name a tlog with --input")
+        }
+    }
+}
+
+/// By the firmware in the emulator; where there is none, by the same pipeline on this PC.
+fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
+    let run = cli::Run {
+        input: flight.clone(),
+        sd: card.to_owned(),
+        gs: Some(Endpoint::File(gs.to_owned())),
+        params: None,
+        speed: None,
+        json: false,
+        faults: FaultFlags::default(),
+    };
+    let here = |why: &anyhow::Error| -> Result<Outcome> {
+        eprintln!("hums: not in the emulator: {why:#}");
+        line("   recorded by the same pipeline on this PC")?;
+        sim::run(&cli::Sim { run: run.clone(), tap: None })
+    };
+    if let Err(why) = qemu::check() {
+        return here(&why);
+    }
+    let firmware = match emulate::firmware(None) {
+        Ok(firmware) => firmware,
+        Err(why) => return here(&why),
+    };
+    line("   recorded by the firmware itself, in QEMU")?;
+    emulate::run(&cli::Emulate { run, firmware: Some(firmware) })
+}

@@ -1,0 +1,168 @@
+//! `hums pack`: a recording becomes one log file, through the same framer and the same writer as on board, but without
+//! a card's file system, queues or checks. `hums decode` reads it back.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+
+use anyhow::{Context, Result};
+use hums_blackbox::record::{Clock, Loss, Lost, Note};
+use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
+use hums_core::time::Instant;
+use hums_link::{Check, Framer};
+
+use crate::cli;
+use crate::endpoint::Endpoint;
+use crate::outcome::{Outcome, usage};
+use crate::output;
+use crate::source::{self, Timing};
+
+/// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
+const FROM_RECORDING: u8 = 2;
+
+/// Runs `hums pack`.
+pub fn run(args: &cli::Pack) -> Result<Outcome> {
+    if args.input.is_live() {
+        return Err(usage(format!(
+            "{}: hums pack takes a file or `-`; hums sim records what comes live",
+            args.input
+        )));
+    }
+    let mut source = source::open(&args.input, Timing { line_rate: None })?;
+    let context = || format!("{}: cannot be written", args.output.display());
+    let file = BufWriter::new(File::create(&args.output).with_context(context)?);
+    let mut packer = Packer::new(file);
+    let mut last_us = 0;
+    while let Some(chunk) = source.next().with_context(|| format!("{}: cannot be read", args.input))? {
+        if packer.started.is_none() {
+            packer.start(source.utc_start_us())?;
+        }
+        packer.chunk(chunk.at_us, &chunk.bytes, source.has_records())?;
+        last_us = chunk.at_us;
+    }
+    let done = packer.finish(last_us).with_context(context)?;
+    if let Some(remark) = source.remark() {
+        eprintln!("hums: {}: {remark}", args.input);
+    }
+    let ratio = done.recording_bytes as f64 / done.log_bytes.max(1) as f64;
+    output::line(&format!(
+        "{}: {} frames, {} bytes, {ratio:.2} times smaller than as a tlog",
+        args.output.display(),
+        done.frames,
+        done.log_bytes
+    ))?;
+    if let Endpoint::File(_) | Endpoint::Standard = args.input
+        && done.bytes_not_frames > 0
+    {
+        eprintln!("hums: {} bytes of the recording are no frame and are only counted", done.bytes_not_frames);
+    }
+    Ok(Outcome::Done)
+}
+
+/// What packing did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Done {
+    frames: u64,
+    /// What the frames take as a tlog.
+    recording_bytes: u64,
+    log_bytes: u64,
+    bytes_not_frames: u64,
+}
+
+/// Finished sectors, until they are written out.
+#[derive(Default)]
+struct Finished(Vec<Sector>);
+
+impl SectorSink for Finished {
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+
+    fn put(&mut self, sector: &Sector) {
+        self.0.push(*sector);
+    }
+}
+
+struct Packer<W> {
+    file: W,
+    writer: Box<Writer>,
+    framer: Framer,
+    finished: Finished,
+    /// The session's number, once the first byte came: a log packed twice is the same to the byte.
+    started: Option<u32>,
+    log_bytes: u64,
+}
+
+impl<W: Write> Packer<W> {
+    fn new(file: W) -> Self {
+        let (writer, framer) = (Box::new(Writer::new()), Framer::new());
+        Self { file, writer, framer, finished: Finished::default(), started: None, log_bytes: 0 }
+    }
+
+    fn start(&mut self, utc_us: Option<u64>) -> Result<()> {
+        // Two recordings should not look like parts of one session: their first times differ.
+        let utc = utc_us.unwrap_or(0);
+        self.started = Some(((utc ^ (utc >> 32)) as u32) | 1);
+        let note = Record::Note(Note { severity: 6, text: "packed on a PC by hums pack" });
+        self.record(Instant::ZERO, &note)?;
+        if let Some(utc_micros) = utc_us {
+            let clock = Clock { boot: Instant::ZERO, utc_micros, source: FROM_RECORDING };
+            self.record(Instant::ZERO, &Record::Clock(clock))?;
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, at: Instant, record: &Record<'_>) -> Result<()> {
+        self.writer.record(at, record, &mut self.finished)?;
+        self.write_out()
+    }
+
+    /// Bytes that came together; a record of a tlog is a frame by itself, with silence around it.
+    fn chunk(&mut self, at_us: u64, bytes: &[u8], is_record: bool) -> Result<()> {
+        let Self { framer, writer, finished, .. } = self;
+        let mut result = Ok(());
+        let mut take = |frame: hums_link::Frame<'_>| {
+            let verified = frame.check() == Check::Verified;
+            let taken = writer.frame(Instant::from_micros(at_us), frame.bytes(), verified, finished);
+            result = std::mem::replace(&mut result, Ok(())).and(taken);
+        };
+        framer.push(bytes, &mut take);
+        if is_record {
+            framer.idle(&mut take);
+        }
+        result.map_err(|full: Full| anyhow::anyhow!("the log writer refused a frame: {full}"))?;
+        self.write_out()
+    }
+
+    fn finish(mut self, last_us: u64) -> Result<Done> {
+        self.chunk(last_us, &[], true)?;
+        let counts = self.framer.counts();
+        if counts.bytes_not_frames > 0 {
+            let loss = Loss {
+                what: Lost::NotFrames,
+                count: counts.bytes_not_frames,
+                from: Instant::ZERO,
+                to: Instant::from_micros(last_us),
+            };
+            self.record(Instant::from_micros(last_us), &Record::Loss(loss))?;
+        }
+        self.writer.finish(&mut self.finished);
+        self.write_out()?;
+        self.file.flush()?;
+        let counters = self.writer.counters();
+        Ok(Done {
+            frames: counters.frames,
+            recording_bytes: counters.frame_bytes + 8 * counters.frames,
+            log_bytes: self.log_bytes,
+            bytes_not_frames: counts.bytes_not_frames,
+        })
+    }
+
+    fn write_out(&mut self) -> Result<()> {
+        for mut sector in self.finished.0.drain(..) {
+            sector.seal(self.started.unwrap_or(1));
+            self.file.write_all(sector.bytes())?;
+            self.log_bytes += sector.bytes().len() as u64;
+        }
+        Ok(())
+    }
+}

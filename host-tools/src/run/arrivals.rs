@@ -1,0 +1,93 @@
+//! What arrives at the autopilot UART, and when: the source, noise and all, cut into pieces that every machine takes.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use crate::cli::Run;
+use crate::source::noise::Noisy;
+use crate::source::{self, Chunk, Source, Timing};
+
+/// The most bytes that arrive at once: what the emulated board hands to reception in one call. `sim` cuts alike, so
+/// that both machines' logs agree.
+pub const CHUNK_BYTES_MAX: usize = 2048;
+
+/// The stream of arrivals.
+pub struct Arrivals {
+    source: Noisy<Box<dyn Source>>,
+    name: String,
+    waiting: VecDeque<Chunk>,
+    tap: Option<BufWriter<File>>,
+    bytes: u64,
+}
+
+impl Arrivals {
+    /// As the command line says it; `tap` gets a copy of the bytes. `prepare` is what else must be ready: done after a
+    /// stored input was found good, so that a slip leaves nothing behind, and before a live one, which waits for nobody.
+    pub fn open<T>(run: &Run, tap: Option<&Path>, prepare: impl FnOnce() -> Result<T>) -> Result<(Self, T)> {
+        if run.input.is_live() {
+            let prepared = prepare()?;
+            return Ok((Self::new(run, tap)?, prepared));
+        }
+        let arrivals = Self::new(run, tap)?;
+        Ok((arrivals, prepare()?))
+    }
+
+    fn new(run: &Run, tap: Option<&Path>) -> Result<Self> {
+        let source = source::open(&run.input, Timing { line_rate: run.faults.line_rate })?;
+        let create = |path: &Path| {
+            File::create(path)
+                .map(BufWriter::new)
+                .with_context(|| format!("{}: cannot be written", path.display()))
+        };
+        Ok(Self {
+            source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
+            name: run.input.to_string(),
+            waiting: VecDeque::new(),
+            tap: tap.map(create).transpose()?,
+            bytes: 0,
+        })
+    }
+
+    /// The next arrival; `None` at the end.
+    pub fn next_arrival(&mut self) -> Result<Option<Chunk>> {
+        if let Some(chunk) = self.waiting.pop_front() {
+            return Ok(Some(chunk));
+        }
+        let context = || format!("{}: cannot be read", self.name);
+        let Some(chunk) = self.source.next().with_context(context)? else {
+            if let Some(tap) = &mut self.tap {
+                tap.flush().context("--tap: cannot be written")?;
+            }
+            return Ok(None);
+        };
+        self.bytes += chunk.bytes.len() as u64;
+        if let Some(tap) = &mut self.tap {
+            tap.write_all(&chunk.bytes).context("--tap: cannot be written")?;
+        }
+        if chunk.bytes.len() <= CHUNK_BYTES_MAX {
+            return Ok(Some(chunk));
+        }
+        let piece = |bytes: &[u8]| Chunk { at_us: chunk.at_us, bytes: bytes.to_vec() };
+        self.waiting.extend(chunk.bytes.chunks(CHUNK_BYTES_MAX).map(piece));
+        Ok(self.waiting.pop_front())
+    }
+
+    /// The machine did not take this one: its power went before.
+    pub fn put_back(&mut self, chunk: Chunk) {
+        self.waiting.push_front(chunk);
+    }
+
+    /// Bytes that have arrived.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// What was strange in the input.
+    pub fn remark(&self) -> Option<String> {
+        self.source.remark().map(|remark| format!("{}: {remark}", self.name))
+    }
+}

@@ -1,0 +1,170 @@
+//! `hums emulate`: the firmware image of the emulated board, in QEMU.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use serde::Deserialize;
+
+use super::qemu::{self, Qemu};
+use super::report::Report;
+use super::{Machine, arrivals::Arrivals, check_standard_output, drive, open_sink, pace, prepare_card};
+use crate::cli;
+use crate::endpoint::Endpoint;
+use crate::logs;
+use crate::outcome::{Outcome, usage};
+use crate::source::Chunk;
+
+/// The environment variable that names the image as `--firmware` does.
+const FIRMWARE_VARIABLE: &str = "HUMS_FIRMWARE";
+/// Where a build in the source tree leaves the image.
+const IMAGES: [&str; 2] =
+    ["target/firmware/hums-emulated.elf", "target/thumbv7em-none-eabihf/firmware/hums-firmware"];
+
+/// Runs `hums emulate`.
+pub fn run(args: &cli::Emulate) -> Result<Outcome> {
+    let run = &args.run;
+    check_flags(run)?;
+    check_standard_output(run)?;
+    let (speed, live) = pace(run)?;
+    qemu::check()?;
+    let firmware = firmware(args.firmware.as_deref())?;
+    let mut arrivals =
+        Arrivals::open(run, None, || prepare_card(&run.sd, run.faults.card_size, run.faults.seed))?.0;
+    let earlier = logs::on_card(&run.sd).len();
+    let mut qemu = Qemu::start(&firmware, &run.sd, open_sink(run.gs.as_ref())?)?;
+    drive(&mut arrivals, speed, live, Instant::now(), &mut qemu)?;
+    let json = qemu.finish()?;
+    if let Some(remark) = arrivals.remark() {
+        eprintln!("hums: {remark}");
+    }
+    let counters: Counters = serde_json::from_str(&json)
+        .with_context(|| format!("the firmware's counters are not understood: {json}"))?;
+    let mut report = counters.into_report();
+    report.read_card(&run.sd, earlier)?;
+    report.print(run.json, run.gs == Some(Endpoint::Standard))
+}
+
+impl Machine for Qemu {
+    fn arrive(&mut self, chunk: &Chunk) -> Result<bool> {
+        Qemu::arrive(self, chunk.at_us, &chunk.bytes)?;
+        Ok(true)
+    }
+}
+
+/// Faults of the card are the simulated card's: the emulated board writes to the image file itself.
+fn check_flags(run: &cli::Run) -> Result<()> {
+    let faults = &run.faults;
+    let given = [
+        ("--cut-after-writes", !faults.cut_after_writes.is_empty()),
+        ("--stall", !faults.stall.is_empty()),
+        ("--card-out", !faults.card_out.is_empty()),
+        ("--write-error", faults.write_error.is_some()),
+        ("--reboot-at", !faults.reboot_at.is_empty()),
+    ];
+    for (flag, given) in given {
+        if given {
+            return Err(usage(format!(
+                "{flag} works with hums sim only: the emulated board writes to the image file itself"
+            )));
+        }
+    }
+    if run.params.is_some() {
+        return Err(usage(
+            "--params works with hums sim only: the emulated board starts with its own parameters",
+        ));
+    }
+    Ok(())
+}
+
+/// The image: as named, as built, or built now.
+pub(crate) fn firmware(named: Option<&Path>) -> Result<PathBuf> {
+    let variable = std::env::var_os(FIRMWARE_VARIABLE).map(PathBuf::from);
+    if let Some(path) = named.map(Path::to_owned).or(variable) {
+        if !path.is_file() {
+            bail!(
+                "{}: there is no such firmware image; `cargo xtask firmware --board emulated` builds one",
+                path.display()
+            );
+        }
+        return Ok(std::path::absolute(path)?);
+    }
+    let Some(tree) = source_tree() else {
+        bail!(
+            "no firmware image: this is not inside the source tree of hums. There, type\n  \
+             cargo xtask firmware --board emulated\nand name what it prints here with --firmware"
+        );
+    };
+    if let Some(image) = IMAGES.iter().map(|image| tree.join(image)).find(|image| image.is_file()) {
+        return Ok(image);
+    }
+    build(&tree)
+}
+
+fn build(tree: &Path) -> Result<PathBuf> {
+    eprintln!("hums: no firmware image yet: building it (cargo xtask firmware --board emulated)");
+    let output = Command::new("cargo")
+        .args(["xtask", "firmware", "--board", "emulated"])
+        .current_dir(tree)
+        .stdin(Stdio::null())
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cargo cannot be started")?;
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let image = printed.lines().last().map(PathBuf::from).filter(|image| image.is_file());
+    match image {
+        Some(image) if output.status.success() => Ok(image),
+        _ => bail!("the firmware was not built; see what `cargo xtask firmware --board emulated` says above"),
+    }
+}
+
+/// The source tree around the working directory or around this program.
+pub fn source_tree() -> Option<PathBuf> {
+    let here = std::env::current_dir().ok();
+    let program = std::env::current_exe().ok();
+    let starts = here.iter().chain(&program);
+    let is_tree =
+        |dir: &&Path| dir.join("firmware/app/Cargo.toml").is_file() && dir.join("xtask/Cargo.toml").is_file();
+    starts.flat_map(|start| start.ancestors()).find(is_tree).map(Path::to_owned)
+}
+
+/// What the firmware prints at its end. What it does not know is zero.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Counters {
+    frames_in: u64,
+    frames_logged: u64,
+    frames_lost: u64,
+    bytes_in: u64,
+    bytes_not_frames: u64,
+    bytes_logged: u64,
+    blocks_written: u64,
+    queue_bytes_max: u64,
+    queue_bytes_capacity: u64,
+    sd_stall_ms_max: u64,
+    gs_frames: u64,
+    gs_bytes: u64,
+    instructions: Option<serde_json::Value>,
+}
+
+impl Counters {
+    fn into_report(self) -> Report {
+        Report {
+            frames_in: self.frames_in,
+            frames_logged: self.frames_logged,
+            frames_lost: self.frames_lost,
+            bytes_in: self.bytes_in,
+            bytes_not_frames: self.bytes_not_frames,
+            bytes_logged: self.bytes_logged,
+            blocks_written: self.blocks_written,
+            queue_bytes_max: self.queue_bytes_max,
+            queue_bytes_capacity: self.queue_bytes_capacity,
+            sd_stall_ms_max: self.sd_stall_ms_max,
+            gs_frames: self.gs_frames,
+            gs_bytes: self.gs_bytes,
+            instructions: self.instructions,
+            ..Report::default()
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! `hums sim` and `hums emulate`: a recording goes in at the UART and comes out on a card.
+//!
+//! Both get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]); what differs is the machine:
+//! [`sim`] runs the tasks' bodies on this PC, [`emulate`] the firmware itself in QEMU.
+
+pub mod arrivals;
+pub mod emulate;
+pub mod qemu;
+pub mod report;
+pub mod sim;
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+
+use crate::card::image::{self, Found};
+use crate::card::{Faults, SimCard};
+use crate::cli::{Run, Speed};
+use crate::endpoint::Endpoint;
+use crate::interrupt;
+use crate::outcome::usage;
+use crate::source::Chunk;
+use arrivals::Arrivals;
+
+/// In real time the machine's clock goes on at least this often, also while nothing arrives.
+const STEP: Duration = Duration::from_millis(20);
+
+/// What bytes are given to.
+pub trait Machine {
+    /// Time goes on to the chunk's, then its bytes are there. `false`: the run is over (power went).
+    fn arrive(&mut self, chunk: &Chunk) -> Result<bool>;
+}
+
+/// Gives everything that arrives to the machine, in the time that was asked for. `false`: power went.
+fn drive(
+    arrivals: &mut Arrivals,
+    speed: Speed,
+    live: bool,
+    start: Instant,
+    machine: &mut impl Machine,
+) -> Result<bool> {
+    let pace = speed == Speed::Real && !live;
+    if pace {
+        interrupt::watch();
+    }
+    let mut now_us = 0;
+    while let Some(chunk) = arrivals.next_arrival()? {
+        let due = Duration::from_micros(chunk.at_us);
+        while pace && !interrupt::requested() {
+            let elapsed = start.elapsed();
+            if elapsed >= due {
+                break;
+            }
+            std::thread::sleep(STEP.min(due.saturating_sub(elapsed)));
+            now_us =
+                chunk.at_us.min(u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX)).max(now_us);
+            if !machine.arrive(&Chunk { at_us: now_us, bytes: Vec::new() })? {
+                arrivals.put_back(chunk);
+                return Ok(false);
+            }
+        }
+        if pace && interrupt::requested() {
+            return Ok(true);
+        }
+        now_us = chunk.at_us;
+        if !machine.arrive(&chunk)? {
+            arrivals.put_back(chunk);
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// How fast a run goes, and whether its input is live.
+fn pace(run: &Run) -> Result<(Speed, bool)> {
+    let live = run.input.is_live();
+    match run.speed {
+        Some(Speed::Max) if live => Err(usage(format!("--speed max: {} comes in its own time", run.input))),
+        Some(speed) => Ok((speed, live)),
+        None => Ok((if live { Speed::Real } else { Speed::Max }, live)),
+    }
+}
+
+/// Makes the card image where it is missing, and gives it for reading and writing.
+fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
+    let (file, found) = image::open_or_make(path, size_mib)?;
+    if found == Found::Made {
+        let context = || format!("{}: cannot be formatted", path.display());
+        let card =
+            SimCard::new(file.try_clone().with_context(context)?, Faults::default()).with_context(context)?;
+        // A run is repeatable to the byte, the volume's number included.
+        let volume_id = (seed as u32).wrapping_mul(0x9e37_79b9) ^ 0x4855_4d53;
+        if let Err(error) = hums_recorder::format::format(&card, volume_id) {
+            let why = card.take_image_error().map_or_else(|| format!("{error:?}"), |error| error.to_string());
+            return Err(anyhow::anyhow!("{}: cannot be formatted: {why}", path.display()));
+        }
+    }
+    Ok(file)
+}
+
+/// A place for bytes that nobody asked for.
+fn open_sink(gs: Option<&Endpoint>) -> Result<Box<dyn Write + Send>> {
+    match gs {
+        Some(endpoint) => crate::sink::open(endpoint),
+        None => Ok(Box::new(std::io::sink())),
+    }
+}
+
+/// Two kinds of output cannot share standard output.
+fn check_standard_output(run: &Run) -> Result<()> {
+    if run.gs == Some(Endpoint::Standard) && run.json {
+        return Err(usage("--gs - and --json both want standard output; give --gs a file"));
+    }
+    Ok(())
+}

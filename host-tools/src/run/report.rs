@@ -1,0 +1,164 @@
+//! What `sim` and `emulate` print: counters of the run, and what the card's newest logs say was found.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use hums_blackbox::record::Stats;
+use serde::Serialize;
+
+use crate::logs;
+use crate::outcome::Outcome;
+use crate::output;
+use crate::summary::Overview;
+
+/// The object of `--json`; its names are a contract.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Frames that came in.
+    pub frames_in: u64,
+    /// Frames that are on the card.
+    pub frames_logged: u64,
+    /// Frames that came in and are not.
+    pub frames_lost: u64,
+    /// Bytes that came in.
+    pub bytes_in: u64,
+    /// Bytes of them that belong to no frame.
+    pub bytes_not_frames: u64,
+    /// Bytes of log on the card.
+    pub bytes_logged: u64,
+    /// 512-byte blocks written, file system included.
+    pub blocks_written: u64,
+    /// The fullest the sector queue was.
+    pub queue_bytes_max: u64,
+    /// What it holds.
+    pub queue_bytes_capacity: u64,
+    /// The longest the card took for one call.
+    pub sd_stall_ms_max: u64,
+    /// Frames sent to the ground station.
+    pub gs_frames: u64,
+    /// Bytes sent to the ground station.
+    pub gs_bytes: u64,
+    /// Changes of level, in order.
+    pub findings: Vec<Finding>,
+    /// Usage counters, units in their names.
+    pub usage: serde_json::Map<String, serde_json::Value>,
+    /// The run's log files on the card.
+    pub log_files: Vec<String>,
+    /// Power went at a block write that the command line chose.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub power_cut: bool,
+    /// Instructions by stage, where measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instructions: Option<serde_json::Value>,
+}
+
+/// A change of level.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// The part of the vehicle.
+    pub subsystem: String,
+    /// The check.
+    pub check: String,
+    /// Which one of several.
+    pub instance: u8,
+    /// The new level.
+    pub level: String,
+    /// Seconds since the first input byte.
+    pub time_s: f64,
+    /// What decided; `null` where the input stopped.
+    pub value: Option<f64>,
+    /// Its unit.
+    pub unit: String,
+}
+
+impl Report {
+    /// Takes over the recorder's own counters.
+    pub fn set_stats(&mut self, stats: &Stats) {
+        self.frames_in = stats.frames_in;
+        self.frames_logged = stats.frames_logged;
+        self.frames_lost = stats.frames_lost;
+        self.bytes_in = stats.bytes_in;
+        self.bytes_not_frames = stats.bytes_not_frames;
+        self.bytes_logged = stats.bytes_logged;
+        self.blocks_written = stats.blocks_written;
+        self.queue_bytes_max = stats.queue_bytes_max;
+        self.queue_bytes_capacity = stats.queue_bytes_capacity;
+        self.sd_stall_ms_max = stats.sd_stall_ms_max;
+        self.gs_frames = stats.gs_frames;
+        self.gs_bytes = stats.gs_bytes;
+    }
+
+    /// Adds what the card's logs of this run say (those beyond the first `earlier` ones); gives their frames.
+    pub fn read_card(&mut self, card: &Path, earlier: usize) -> Result<u64> {
+        let mut frames = 0;
+        // A card that cannot be read has no log to tell of; the counters say what was lost.
+        for log in logs::on_card(card).iter().skip(earlier) {
+            let overview = Overview::of(log)?;
+            frames += overview.contents.frames();
+            self.log_files.extend(log.files.iter().cloned());
+            self.usage =
+                overview.contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
+            for finding in &overview.contents.findings {
+                let value = f64::from(finding.value);
+                self.findings.push(Finding {
+                    subsystem: finding.subsystem.to_owned(),
+                    check: finding.check.clone(),
+                    instance: finding.instance,
+                    level: finding.level.to_owned(),
+                    time_s: finding.at.as_secs_f64(),
+                    value: value.is_finite().then_some(value),
+                    unit: finding.unit.clone(),
+                });
+            }
+        }
+        Ok(frames)
+    }
+
+    /// Prints it, and says how the run ended: what was lost because power was cut on purpose is no loss of the recorder.
+    pub fn print(&self, json: bool, quiet: bool) -> Result<Outcome> {
+        if json {
+            output::json(self)?;
+        } else if quiet {
+            eprintln!("{}", self.text());
+        } else {
+            output::line(&self.text())?;
+        }
+        Ok(Outcome::lossy(self.frames_lost > 0))
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "frames   {} in, {} logged, {} lost",
+            self.frames_in, self.frames_logged, self.frames_lost
+        );
+        let _ = writeln!(text, "bytes    {} in, {} of no frame", self.bytes_in, self.bytes_not_frames);
+        let _ = writeln!(
+            text,
+            "card     {} bytes of log, {} blocks written",
+            self.bytes_logged, self.blocks_written
+        );
+        let (most, capacity) = (self.queue_bytes_max, self.queue_bytes_capacity);
+        let _ = writeln!(
+            text,
+            "queue    {most} of {capacity} bytes at most; card slowest {} ms",
+            self.sd_stall_ms_max
+        );
+        let _ = writeln!(text, "ground   {} frames, {} bytes", self.gs_frames, self.gs_bytes);
+        if self.power_cut {
+            let _ = writeln!(text, "power    was cut at a block write, as asked");
+        }
+        for finding in &self.findings {
+            let Finding { subsystem, check, instance, level, time_s, .. } = finding;
+            let _ = writeln!(text, "finding  {time_s:>9.3} s  {level:<8}  {subsystem} {check}[{instance}]");
+        }
+        for (name, value) in &self.usage {
+            let _ = writeln!(text, "usage    {name} {value}");
+        }
+        let _ = write!(text, "files    {}", self.log_files.join(", "));
+        text
+    }
+}

@@ -1,0 +1,306 @@
+//! What is in a log, in one pass: for `info`, `verify` and `demo`.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use hums_blackbox::record::{Loss, Moment, Stats, UsageValue, Vehicle};
+use hums_blackbox::{Cause, Entry, Gap, Record};
+use hums_core::time::Instant;
+
+use crate::decode::collect::lost;
+use crate::decode::{progress_bar, usage};
+use crate::logs::reader::{Collect, Deliver, Summary, read};
+use crate::logs::{Log, reader};
+use crate::mavlink::frame::{Check, Peek, peek};
+
+/// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
+pub const LISTED_MAX: usize = 10_000;
+
+/// Frames of one message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MessageCount {
+    /// How many.
+    pub frames: u64,
+    /// Their bytes.
+    pub bytes: u64,
+}
+
+/// A check's change of level.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FindingLine {
+    /// When, on the monitor's clock.
+    pub at: Instant,
+    /// The part of the vehicle.
+    pub subsystem: &'static str,
+    /// The check.
+    pub check: String,
+    /// Which one of several.
+    pub instance: u8,
+    /// The new level.
+    pub level: &'static str,
+    /// The one before.
+    pub previous: &'static str,
+    /// What decided.
+    pub value: f32,
+    /// What it crossed.
+    pub limit: f32,
+    /// The unit of both.
+    pub unit: String,
+}
+
+/// How the monitor started.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BootLine {
+    /// The product's version.
+    pub version: String,
+    /// The commit it was built from.
+    pub git: String,
+    /// The board.
+    pub board: String,
+    /// Why it started.
+    pub reset: String,
+    /// Power-ons so far.
+    pub boots: u32,
+}
+
+/// All that a log holds, counted.
+#[derive(Clone, Debug, Default)]
+pub struct Contents {
+    /// By message id, and whether the checksum is that of the definition known on board.
+    pub messages: BTreeMap<(u32, bool), MessageCount>,
+    /// Records of the monitor's own.
+    pub records: u64,
+    /// The first boot record.
+    pub boot: Option<BootLine>,
+    /// The last vehicle record.
+    pub vehicle: Option<Vehicle>,
+    /// UTC at power-on, microseconds since 1970.
+    pub epoch_us: Option<u64>,
+    /// Changes of level, in order, up to [`LISTED_MAX`].
+    pub findings: Vec<FindingLine>,
+    /// How many there are.
+    pub findings_count: u64,
+    /// The latest values of the usage counters.
+    pub usage: BTreeMap<String, f64>,
+    /// Losses by what was lost: how many, the first and the last time.
+    pub losses: BTreeMap<&'static str, Loss>,
+    /// What of these counts as lost by the recorder.
+    pub lost: u64,
+    /// The recorder's last statistics.
+    pub stats: Option<Stats>,
+    /// Gaps, in order, up to [`LISTED_MAX`].
+    pub gaps: Vec<Gap>,
+    /// Entries that are no frame at all.
+    pub not_frames: u64,
+    /// Frames that were verified on board, whose checksum fails here.
+    pub bad_frames: u64,
+    /// Entries whose time is before the entry before, within a group.
+    pub times_fell: u64,
+    last_at: Option<Instant>,
+}
+
+impl Contents {
+    /// Frames of all messages.
+    pub fn frames(&self) -> u64 {
+        self.messages.values().map(|count| count.frames).sum()
+    }
+
+    /// Bytes of all frames.
+    pub fn frame_bytes(&self) -> u64 {
+        self.messages.values().map(|count| count.bytes).sum()
+    }
+
+    /// Bytes that the frames take in a tlog.
+    pub fn tlog_bytes(&self) -> u64 {
+        self.frame_bytes() + 8 * self.frames()
+    }
+
+    /// The name of a message in reports.
+    pub fn message_name(id: u32, verified: bool) -> String {
+        match (hums_dialect::message(id), verified) {
+            (Some(message), true) => message.name.to_owned(),
+            (Some(message), false) => format!("{} (unverified)", message.name),
+            (None, _) => format!("UNKNOWN_{id}"),
+        }
+    }
+
+    fn frame(&mut self, bytes: &[u8], verified: bool) {
+        let Peek::Frame(frame) = peek(bytes) else {
+            self.not_frames += 1;
+            return;
+        };
+        self.not_frames += u64::from(frame.bytes.len() != bytes.len());
+        self.bad_frames += u64::from(verified && frame.check == Check::Bad);
+        let count = self.messages.entry((frame.id, verified)).or_default();
+        count.frames += 1;
+        count.bytes += bytes.len() as u64;
+    }
+
+    fn record(&mut self, record: &Record<'_>) {
+        self.records += 1;
+        match record {
+            Record::Boot(boot) => {
+                self.boot.get_or_insert_with(|| BootLine {
+                    version: boot.version.to_owned(),
+                    git: boot.git.to_owned(),
+                    board: boot.board.to_owned(),
+                    reset: boot.reset_name.to_owned(),
+                    boots: boot.boots,
+                });
+            }
+            Record::Vehicle(vehicle) => self.vehicle = Some(*vehicle),
+            Record::Clock(clock) => self.epoch_us = Some(clock.epoch_micros()),
+            Record::Finding(finding) => {
+                self.findings_count += 1;
+                if self.findings.len() < LISTED_MAX {
+                    self.findings.push(FindingLine {
+                        at: finding.at,
+                        subsystem: finding.subsystem.name(),
+                        check: finding.check.to_owned(),
+                        instance: finding.instance,
+                        level: finding.level.name(),
+                        previous: finding.previous.name(),
+                        value: finding.value,
+                        limit: finding.limit,
+                        unit: finding.unit.to_owned(),
+                    });
+                }
+            }
+            // The counters at the start are those of the sessions before.
+            Record::Usage(snapshot) if snapshot.moment != Moment::Start || self.usage.is_empty() => {
+                for (number, value) in snapshot.iter() {
+                    let value = match value {
+                        UsageValue::Real(value) => value,
+                        UsageValue::Count(value) => value as f64,
+                    };
+                    self.usage.insert(usage::name(number), value);
+                }
+            }
+            Record::Loss(loss) => {
+                self.lost += lost(loss);
+                add_loss(&mut self.losses, loss);
+            }
+            Record::Stats(stats) => self.stats = Some(*stats),
+            _ => {}
+        }
+    }
+
+    /// Adds what the next group held.
+    fn add(&mut self, next: Self) {
+        for (key, count) in next.messages {
+            let sum = self.messages.entry(key).or_default();
+            sum.frames += count.frames;
+            sum.bytes += count.bytes;
+        }
+        self.records += next.records;
+        self.boot = self.boot.take().or(next.boot);
+        self.vehicle = next.vehicle.or(self.vehicle);
+        self.epoch_us = next.epoch_us.or(self.epoch_us);
+        self.findings_count += next.findings_count;
+        let room = LISTED_MAX.saturating_sub(self.findings.len());
+        self.findings.extend(next.findings.into_iter().take(room));
+        self.usage.extend(next.usage);
+        for loss in next.losses.values() {
+            add_loss(&mut self.losses, loss);
+        }
+        self.lost += next.lost;
+        self.stats = next.stats.or(self.stats);
+        self.not_frames += next.not_frames;
+        self.bad_frames += next.bad_frames;
+        self.times_fell += next.times_fell;
+    }
+}
+
+fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {
+    let sum = losses.entry(loss.what.name()).or_insert(Loss { count: 0, ..*loss });
+    sum.count += loss.count;
+    sum.from = sum.from.min(loss.from);
+    sum.to = sum.to.max(loss.to);
+}
+
+impl Collect for Contents {
+    fn entry(&mut self, entry: &Entry<'_>) {
+        let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = *entry;
+        self.times_fell += u64::from(self.last_at.is_some_and(|last| at < last));
+        self.last_at = Some(at);
+        match entry {
+            Entry::Frame { bytes, verified, .. } => self.frame(bytes, *verified),
+            Entry::Record { record, .. } => self.record(record),
+        }
+    }
+}
+
+impl Deliver<Self> for Contents {
+    fn gap(&mut self, gap: &Gap) -> Result<()> {
+        if self.gaps.len() < LISTED_MAX {
+            self.gaps.push(*gap);
+        }
+        Ok(())
+    }
+
+    fn group(&mut self, collected: Self) -> Result<()> {
+        self.add(collected);
+        Ok(())
+    }
+}
+
+/// A log, read through.
+#[derive(Clone, Debug)]
+pub struct Overview {
+    /// Its name.
+    pub name: String,
+    /// The files that hold it.
+    pub files: Vec<String>,
+    /// Bytes of these files that are set aside for it.
+    pub bytes_on_card: u64,
+    /// What the reader saw.
+    pub summary: Summary,
+    /// What is in it.
+    pub contents: Contents,
+}
+
+impl Overview {
+    /// Reads a log through.
+    pub fn of(log: &Log) -> Result<Self> {
+        let bar = progress_bar(log);
+        let mut contents = Contents::default();
+        let summary = read(log, Contents::default, &mut contents, |blocks| bar.set_position(blocks * 512))?;
+        bar.finish_and_clear();
+        if contents.epoch_us.is_none() {
+            // The clock record itself may be in a part that cannot be read; group starts repeat it.
+            contents.epoch_us = reader::epoch(log)?;
+        }
+        let files = log.files.clone();
+        Ok(Self { name: log.name.clone(), files, bytes_on_card: log.bytes(), summary, contents })
+    }
+
+    /// Whether anything was lost or damaged.
+    pub fn is_lossy(&self) -> bool {
+        self.summary.gaps > 0 || self.summary.blocks.damaged > 0 || self.contents.lost > 0
+    }
+
+    /// UTC at this time, where it is known.
+    pub fn utc_us(&self, at: Instant) -> Option<u64> {
+        self.contents.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()))
+    }
+
+    /// Bytes that the log takes: its sectors, without what is set aside.
+    pub fn log_bytes(&self) -> u64 {
+        self.summary.blocks.sectors * 512
+    }
+
+    /// How many times smaller than the same frames as a tlog.
+    pub fn ratio(&self) -> f64 {
+        self.contents.tlog_bytes() as f64 / self.log_bytes().max(1) as f64
+    }
+
+    /// How the session ended, as a sentence.
+    pub fn ending(&self) -> &'static str {
+        if self.summary.closed { "ended in order" } else { "ended by power-off" }
+    }
+
+    /// Whether a group could not be read because this program is too old for it.
+    pub fn needs_newer_program(&self) -> bool {
+        self.contents.gaps.iter().any(|gap| matches!(gap.cause, Cause::UnknownLayouts(_)))
+    }
+}

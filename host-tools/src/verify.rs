@@ -1,0 +1,158 @@
+//! `hums verify`: every check there is, each with what it looked at and what failed.
+
+use anyhow::Result;
+use serde::Serialize;
+
+use crate::cli;
+use crate::info::{ImageJson, images_json};
+use crate::logs::{self, find::Image};
+use crate::outcome::Outcome;
+use crate::output;
+use crate::summary::Overview;
+
+/// Runs `hums verify`.
+pub fn run(args: &cli::Verify) -> Result<Outcome> {
+    let found = logs::find(&args.inputs)?;
+    for remark in &found.remarks {
+        eprintln!("hums: {remark}");
+    }
+    let mut json = VerifyJson { ok: true, images: images_json(&found), logs: Vec::new() };
+    for image in &found.images {
+        let check = file_system(image);
+        json.ok &= check.failed == 0;
+        if !args.json {
+            output::line(&format!("Card {}", image.path.display()))?;
+            print(&[check])?;
+        }
+    }
+    for log in &found.logs {
+        let overview = Overview::of(log)?;
+        let log = LogJson::new(&overview);
+        json.ok &= log.ok;
+        if !args.json {
+            output::line(&format!("Session {} ({})", log.name, overview.files.join(", ")))?;
+            print(&log.checks)?;
+        }
+        json.logs.push(log);
+    }
+    let ok = json.ok;
+    if args.json {
+        output::json(&json)?;
+    } else {
+        let logs = json.logs.len();
+        let verdict = if ok { "everything holds" } else { "damage or losses: see above" };
+        output::line(&format!("{logs} sessions: {verdict}"))?;
+    }
+    Ok(Outcome::lossy(!ok))
+}
+
+fn print(checks: &[Check]) -> Result<()> {
+    for check in checks {
+        let verdict = if check.failed == 0 { "ok     " } else { "FAILED " };
+        let detail = if check.detail.is_empty() { String::new() } else { format!("; {}", check.detail) };
+        output::line(&format!(
+            "  {verdict} {:<18} {} checked, {} failed{detail}",
+            check.name, check.checked, check.failed
+        ))?;
+    }
+    Ok(())
+}
+
+#[derive(Debug, Serialize)]
+struct VerifyJson {
+    ok: bool,
+    images: Vec<ImageJson>,
+    logs: Vec<LogJson>,
+}
+
+#[derive(Debug, Serialize)]
+struct LogJson {
+    name: String,
+    ok: bool,
+    /// The session ended in order; otherwise by power-off, which is no damage.
+    closed: bool,
+    checks: Vec<Check>,
+}
+
+/// One kind of check.
+#[derive(Debug, Serialize)]
+struct Check {
+    name: &'static str,
+    checked: u64,
+    failed: u64,
+    detail: String,
+}
+
+fn file_system(image: &Image) -> Check {
+    let mut detail = image.damage.clone();
+    if image.lost_clusters > 0 {
+        // What a cut leaves behind by design: space, no data.
+        detail.push(format!("{} clusters belong to no file (lost space, no data)", image.lost_clusters));
+    }
+    Check { name: "file system", checked: 1, failed: image.damage.len() as u64, detail: detail.join("; ") }
+}
+
+impl LogJson {
+    fn new(log: &Overview) -> Self {
+        let (summary, contents) = (&log.summary, &log.contents);
+        let blocks = summary.blocks;
+        let check = |name, checked, failed, detail: String| Check { name, checked, failed, detail };
+        let unverified: u64 = contents
+            .messages
+            .iter()
+            .filter(|((_, verified), _)| !verified)
+            .map(|(_, count)| count.frames)
+            .sum();
+        let missing: u64 = contents.gaps.iter().map(|gap| u64::from(gap.sectors_lost)).sum();
+        let useless: u64 = contents.gaps.iter().map(|gap| u64::from(gap.sectors_skipped)).sum();
+        let checks = vec![
+            check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, String::new()),
+            check("sector sequence", blocks.sectors, missing, gaps_detail(log)),
+            check("group decoding", summary.groups, useless, newer(log)),
+            check("frames complete", contents.frames(), contents.not_frames, String::new()),
+            check(
+                "frame checksums",
+                contents.frames() - unverified,
+                contents.bad_frames,
+                format!(
+                    "{unverified} frames of definitions that the monitor does not know are kept as they came"
+                ),
+            ),
+            check(
+                "frames missing",
+                contents.frames() + summary.frames_missing,
+                summary.frames_missing,
+                String::new(),
+            ),
+            check(
+                "times in order",
+                contents.frames() + contents.records,
+                contents.times_fell + summary.times_fell,
+                String::new(),
+            ),
+            check("recorder losses", contents.frames() + contents.lost, contents.lost, losses_detail(log)),
+        ];
+        let ok = checks.iter().all(|check| check.failed == 0) && !log.is_lossy();
+        Self { name: log.name.clone(), ok, closed: summary.closed, checks }
+    }
+}
+
+fn gaps_detail(log: &Overview) -> String {
+    match log.summary.gaps {
+        0 => log.ending().to_owned(),
+        gaps => format!("{gaps} gaps; {}", log.ending()),
+    }
+}
+
+fn newer(log: &Overview) -> String {
+    let other = log.summary.blocks.other_version;
+    if other > 0 {
+        return format!("{other} sectors are of a newer format version: take a newer hums");
+    }
+    if log.needs_newer_program() { "some need a newer hums".to_owned() } else { String::new() }
+}
+
+fn losses_detail(log: &Overview) -> String {
+    let losses = log.contents.losses.values();
+    losses.map(|loss| format!("{} {}", loss.count, loss.what.name())).collect::<Vec<_>>().join(", ")
+}
