@@ -80,6 +80,9 @@ pub struct Check {
     pub stale_after: Option<Span>,
     /// How many there may be.
     pub instances: u8,
+    /// Its silence says nothing: a flag that is not set, a restart that did not happen. Such a check can make its part
+    /// of the vehicle worse, and never by itself make it healthy.
+    pub alarm_only: bool,
     /// Reads the value; `None` while it has never been measured.
     pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,
 }
@@ -234,6 +237,7 @@ mod tests {
         when: When::Always,
         stale_after: Some(Span::from_secs(1)),
         instances: 1,
+        alarm_only: false,
         read: |_, _| None,
     };
 

@@ -21,6 +21,7 @@ const ESC: Check = Check {
     when: When::Armed,
     stale_after: None,
     instances: MOTORS_MAX as u8,
+    alarm_only: false,
     read: |inputs, motor| inputs.derived.esc_silence(inputs, motor),
 };
 
@@ -48,6 +49,7 @@ pub(super) const CHECKS: &[Check] = &[
         critical: Some(Param::EscFailCrit),
         stale_after: STALE_SLOW,
         when: When::Always,
+        alarm_only: true,
         read: failure_rank,
         ..ESC
     },
