@@ -88,7 +88,9 @@ pub(crate) fn take() -> Parts {
     line.baudrate = AUTOPILOT_BAUD;
     let autopilot = match UartRx::new_blocking(p.USART1, p.PA10, line) {
         Ok(port) => AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs)),
-        Err(error) => defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error)),
+        Err(error) => {
+            defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error))
+        }
     };
     line.baudrate = GS_BAUD;
     let gs = match UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line) {
@@ -231,7 +233,9 @@ impl Card {
         }
         self.set_clock(CARD_IDENTIFICATION);
         // At least 74 clocks with the card not selected wake it up (SD specification, 6.4.1).
-        self.driver.spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10])).map_err(|_| SdCardError::Transport)?;
+        self.driver
+            .spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10]))
+            .map_err(|_| SdCardError::Transport)?;
         self.driver.num_bytes()?;
         self.set_clock(CARD_TRANSFER);
         self.identified.set(true);
