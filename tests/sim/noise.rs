@@ -40,7 +40,10 @@ impl Clean {
         let whole: Vec<&[u8]> = self
             .frames
             .iter()
-            .filter(|range| noisy[(*range).clone()] == self.stream[(*range).clone()])
+            .filter(|range| {
+                let covered = range.start..range.start + covered(&self.stream[(*range).clone()]);
+                noisy[covered.clone()] == self.stream[covered]
+            })
             .map(|range| &noisy[range.clone()])
             .collect();
         assert!(
@@ -69,10 +72,17 @@ impl Clean {
             whole.len()
         );
         let invented = output.len() - whole.len();
-        assert!(invented <= whole.len() / 1000, "{invented} frames came out that never went in whole");
+        assert!(invented <= whole.len() / 2000, "{invented} frames came out that never went in whole");
         let framed: usize = output.iter().map(|frame| frame.bytes.len()).sum();
         assert_eq!(recording.number("bytes_not_frames"), (noisy.len() - framed) as u64, "damage is counted");
     }
+}
+
+/// How many bytes of a frame its checksum covers, itself included. Damage to the signature that may follow can be seen
+/// only by who has the key, and such a frame is a frame.
+fn covered(frame: &[u8]) -> usize {
+    let signed = frame[0] == 0xFD && frame[2] & 1 == 1;
+    if signed { frame.len() - 13 } else { frame.len() }
 }
 
 /// The bytes are damaged here, so nothing depends on the program's own noise.

@@ -234,6 +234,16 @@ fn segment_name(path: &Path) -> Option<LogName> {
     LogName::from_short(base.as_bytes(), extension.as_bytes())
 }
 
+/// The logs that a card's file system knows; none where it has none. No block is searched for more.
+pub fn on_card(path: &Path) -> Vec<Log> {
+    let read = || -> Result<Vec<Log>> {
+        let file = File::open(path)?;
+        let layout = Layout::read(&ReadOnlyImage::new(file.try_clone()?)?).ok().context("no file system")?;
+        Ok(sessions_of(path, &Volume::new(&file, layout)?.walk()?.files))
+    };
+    read().unwrap_or_default()
+}
+
 /// The logs on a card: by its file system, or where that does not tell, by looking at every block.
 fn image(path: &Path, found: &mut Found) -> Result<()> {
     let context = || format!("{}: cannot be read", path.display());

@@ -10,5 +10,5 @@ pub mod groups;
 pub mod places;
 pub mod reader;
 
-pub use find::{Content, Found, find};
+pub use find::{Content, Found, find, on_card};
 pub use places::{Log, Piece};

@@ -25,8 +25,18 @@ pub struct Arrivals {
 }
 
 impl Arrivals {
-    /// As the command line says it; `tap` gets a copy of the bytes.
-    pub fn open(run: &Run, tap: Option<&Path>) -> Result<Self> {
+    /// As the command line says it; `tap` gets a copy of the bytes. `prepare` is what else must be ready: done after a
+    /// stored input was found good, so that a slip leaves nothing behind, and before a live one, which waits for nobody.
+    pub fn open<T>(run: &Run, tap: Option<&Path>, prepare: impl FnOnce() -> Result<T>) -> Result<(Self, T)> {
+        if run.input.is_live() {
+            let prepared = prepare()?;
+            return Ok((Self::new(run, tap)?, prepared));
+        }
+        let arrivals = Self::new(run, tap)?;
+        Ok((arrivals, prepare()?))
+    }
+
+    fn new(run: &Run, tap: Option<&Path>) -> Result<Self> {
         let source = source::open(&run.input, Timing { line_rate: run.faults.line_rate })?;
         let create = |path: &Path| {
             File::create(path)

@@ -30,9 +30,9 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let (speed, live) = pace(run)?;
     qemu::check()?;
     let firmware = firmware(args.firmware.as_deref())?;
-    let mut arrivals = Arrivals::open(run, None)?;
-    prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
-    let earlier = logs_on(&run.sd);
+    let mut arrivals =
+        Arrivals::open(run, None, || prepare_card(&run.sd, run.faults.card_size, run.faults.seed))?.0;
+    let earlier = logs::on_card(&run.sd).len();
     let mut qemu = Qemu::start(&firmware, &run.sd, open_sink(run.gs.as_ref())?)?;
     drive(&mut arrivals, speed, live, Instant::now(), &mut qemu)?;
     let json = qemu.finish()?;
@@ -51,11 +51,6 @@ impl Machine for Qemu {
         Qemu::arrive(self, chunk.at_us, &chunk.bytes)?;
         Ok(true)
     }
-}
-
-/// How many logs are on the card before the run.
-pub(super) fn logs_on(card: &Path) -> usize {
-    logs::find(&[card.to_owned()]).map_or(0, |found| found.logs.len())
 }
 
 /// Faults of the card are the simulated card's: the emulated board writes to the image file itself.

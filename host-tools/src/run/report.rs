@@ -91,10 +91,9 @@ impl Report {
 
     /// Adds what the card's logs of this run say (those beyond the first `earlier` ones); gives their frames.
     pub fn read_card(&mut self, card: &Path, earlier: usize) -> Result<u64> {
-        // A card that cannot be read has no log to tell of; the counters say what was lost.
-        let Ok(found) = logs::find(&[card.to_owned()]) else { return Ok(0) };
         let mut frames = 0;
-        for log in found.logs.iter().skip(earlier) {
+        // A card that cannot be read has no log to tell of; the counters say what was lost.
+        for log in logs::on_card(card).iter().skip(earlier) {
             let overview = Overview::of(log)?;
             frames += overview.contents.frames();
             self.log_files.extend(log.files.iter().cloned());

@@ -26,11 +26,12 @@ use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
 
 use super::arrivals::Arrivals;
 use super::report::{Finding, Report};
-use super::{Machine, check_standard_output, drive, emulate::logs_on, open_sink, pace, prepare_card};
+use super::{Machine, check_standard_output, drive, open_sink, pace, prepare_card};
 use crate::card::sim::CardError;
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
+use crate::logs;
 use crate::outcome::{Outcome, usage};
 use crate::source::Chunk;
 
@@ -49,9 +50,10 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     check_standard_output(run)?;
     let (speed, live) = pace(run)?;
     let params = read_params(run.params.as_deref())?;
-    let mut arrivals = Arrivals::open(run, args.tap.as_deref())?;
-    let image = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
-    let earlier = logs_on(&run.sd);
+    let (mut arrivals, image) = Arrivals::open(run, args.tap.as_deref(), || {
+        prepare_card(&run.sd, run.faults.card_size, run.faults.seed)
+    })?;
+    let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
     let mut world = World {
         card: &card,
