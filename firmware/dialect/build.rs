@@ -24,6 +24,8 @@ struct Field {
     /// `None` for a scalar.
     array: Option<usize>,
     extension: bool,
+    /// The variant of `Role`.
+    role: &'static str,
     units: String,
     enumeration: String,
 }
@@ -144,9 +146,21 @@ fn read_field(node: Node, extension: bool) -> Result<Field> {
         size,
         array,
         extension,
+        role: role(node),
         units: node.attribute("units").unwrap_or_default().to_owned(),
         enumeration: node.attribute("enum").unwrap_or_default().to_owned(),
     })
+}
+
+/// What the recorder's prediction needs to know of a field beyond its type.
+fn role(node: Node) -> &'static str {
+    let time = node.attribute("name").is_some_and(|name| name.starts_with("time"));
+    match node.attribute("units") {
+        _ if node.attribute("instance") == Some("true") => "Instance",
+        Some("ms") if time => "Millis",
+        Some("us") if time => "Micros",
+        _ => "Plain",
+    }
 }
 
 /// CRC-16/MCRF4XX, one byte.
@@ -193,10 +207,11 @@ fn render(messages: &BTreeMap<u32, Message>) -> Result<String> {
         for field in &message.fields {
             writeln!(
                 out,
-                "        Field {{ kind: Kind::{}, array: {}, #[cfg(feature = \"names\")] name: {:?}, \
+                "        Field {{ kind: Kind::{}, array: {}, role: Role::{}, #[cfg(feature = \"names\")] name: {:?}, \
                  #[cfg(feature = \"names\")] units: {:?}, #[cfg(feature = \"names\")] enumeration: {:?} }},",
                 field.kind,
                 field.array.unwrap_or(0),
+                field.role,
                 field.name,
                 field.units,
                 field.enumeration

@@ -1,1 +1,21 @@
-fn main() {}
+//! End to end with the real firmware image on the emulated STM32F405: the same promises as on this PC, and both machines
+//! leave the same log.
+//!
+//! The emulated UART takes some 13 kB/s, so a flight takes a minute or a few. Without the feature `emulator` nothing of
+//! this is built: `cargo xtask test` turns it on.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+#[cfg(feature = "emulator")]
+mod flights;
+
+/// Said past the test harness, which would keep it to itself: what was not tested is no success.
+#[cfg(not(feature = "emulator"))]
+#[test]
+fn notice_that_the_emulators_tests_are_left_out() {
+    use std::io::Write as _;
+    writeln!(
+        std::io::stderr(),
+        "LEFT OUT: all tests of the firmware in the emulator; `cargo xtask test` runs them"
+    )
+    .unwrap();
+}

@@ -1,4 +1,4 @@
-//! The file system of a card's image, looked at with dosfstools.
+//! The file system of a card's image, looked at with dosfstools and mtools.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -41,6 +41,19 @@ pub fn assert_clean(image: &Path) {
         outcome.code,
         outcome.stderr
     );
+}
+
+/// Copies all files of the card into `folder` with mtools, as any other computer would.
+///
+/// # Panics
+/// If mtools cannot.
+#[track_caller]
+pub fn copy_files(image: &Path, folder: &Path) {
+    let (start, _) = partition(&mut File::open(image).unwrap());
+    let mut command = Command::new("mcopy");
+    command.args(["-s", "-n", "-i"]).arg(format!("{}@@{start}", image.display())).arg("::/").arg(folder);
+    let outcome = child::run(&mut command, Duration::from_mins(1));
+    assert_eq!(outcome.code, Some(0), "mcopy: {}", outcome.stderr);
 }
 
 fn harmless(line: &str) -> bool {

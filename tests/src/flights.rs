@@ -62,6 +62,8 @@ pub struct Found {
     pub frames: u64,
     /// The same per message id.
     pub frames_by_id: BTreeMap<u32, u64>,
+    /// Bytes that belong to no frame and, in a tlog, to no time of one.
+    pub bytes_other: u64,
     /// SHA-256 over the bytes of those frames, in their order.
     pub sha256: String,
 }
@@ -84,6 +86,7 @@ impl Manifest {
                 is_tlog: flight["kind"] == "tlog",
                 frames: flight["frames"].as_u64().expect("frames"),
                 frames_by_id: numbers(&flight["frames_by_id"]),
+                bytes_other: flight["bytes_other"].as_u64().expect("bytes_other"),
                 sha256: flight["sha256"].as_str().expect("sha256").to_owned(),
             };
             (name.clone(), found)

@@ -39,6 +39,14 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
+/// The firmware of the emulated board: `HUMS_FIRMWARE` names it, otherwise it is where xtask leaves it.
+fn firmware() -> PathBuf {
+    let built = || root().join("target/firmware/hums-emulated.elf");
+    let path = std::env::var_os("HUMS_FIRMWARE").map_or_else(built, PathBuf::from);
+    assert!(path.is_file(), "{} is missing: `cargo xtask firmware --board emulated`", path.display());
+    path
+}
+
 /// `hums` with these arguments, not yet run.
 pub fn command<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(path());
@@ -81,9 +89,10 @@ impl Recording {
         let mut command = command([name, "--json", "--input"]);
         command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.arg("--gs").arg(dir.path().join("gs.bin")).args(flags);
-        if machine == Machine::Sim {
-            command.args(["--speed", "max"]);
-        }
+        match machine {
+            Machine::Sim => command.args(["--speed", "max"]),
+            Machine::Emulated => command.arg("--firmware").arg(firmware()),
+        };
         let outcome = child::run(&mut command, limit);
         Self { dir, outcome }
     }
@@ -91,8 +100,14 @@ impl Recording {
     /// Records `input`; exit code 0 is expected.
     #[track_caller]
     pub fn make(machine: Machine, input: &Path, flags: &[&str]) -> Self {
-        let made = Self::attempt(machine, input, flags);
-        Self { outcome: made.outcome.expect_code(&[0]), ..made }
+        Self::attempt(machine, input, flags).expect_code(&[0])
+    }
+
+    /// It ended with one of these codes.
+    #[track_caller]
+    #[must_use]
+    pub fn expect_code(self, codes: &[i32]) -> Self {
+        Self { outcome: self.outcome.expect_code(codes), ..self }
     }
 
     /// The card's image.
@@ -135,12 +150,12 @@ impl Decoded {
     #[track_caller]
     pub fn of(source: &Path, codes: &[i32]) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let mut command =
-            command(["decode".as_ref(), source.as_os_str(), "-o".as_ref(), dir.path().as_os_str()]);
+        // A file where there is one log, a folder where there are several.
+        let out = dir.path().join("out");
+        let mut command = command(["decode".as_ref(), source.as_os_str(), "-o".as_ref(), out.as_os_str()]);
         child::run(command.args(["--format", "tlog"]), LIMIT).expect_code(codes);
-        let mut files: Vec<PathBuf> =
-            fs::read_dir(dir.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
-        files.retain(|file| file.extension().is_some_and(|kind| kind == "tlog"));
+        let mut files = Vec::new();
+        collect(&out, &mut files);
         files.sort();
         Self { tlogs: files.iter().map(|file| fs::read(file).unwrap()).collect() }
     }
@@ -153,5 +168,14 @@ impl Decoded {
     /// The files themselves.
     pub fn tlogs(&self) -> &[Vec<u8>] {
         &self.tlogs
+    }
+}
+
+/// The files at or below `path`, which may not be there at all.
+fn collect(path: &Path, files: &mut Vec<PathBuf>) {
+    if path.is_file() {
+        files.push(path.to_owned());
+    } else if let Ok(entries) = fs::read_dir(path) {
+        entries.for_each(|entry| collect(&entry.unwrap().path(), files));
     }
 }

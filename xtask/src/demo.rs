@@ -69,7 +69,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let (card, gs, figures) = (folder.join("card.img"), folder.join("gs.bin"), folder.join("run.json"));
     let mut hums = Shell::new(repo::hums());
     if emulated {
-        hums = hums.env("HUMS_FIRMWARE", firmware::build(Board::Emulated)?).arg("emulate");
+        hums = hums.arg("emulate").arg("--firmware").arg(firmware::build(Board::Emulated)?);
     } else {
         hums = hums.arg("sim");
     }

@@ -55,7 +55,7 @@ impl Board {
 /// Builds the firmware for `board` and returns where its ELF file lies.
 pub(crate) fn build(board: Board) -> Result<PathBuf> {
     Shell::cargo().arg("build").args(board.cargo_arguments()).run()?;
-    let built = repo::target().join(FIRMWARE_TARGET).join("firmware/hums-app");
+    let built = repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware");
     let image = board.image();
     copy_if_different(&built, &image)
         .with_context(|| format!("cannot copy {} to {}", built.display(), image.display()))?;

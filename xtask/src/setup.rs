@@ -194,7 +194,8 @@ fn apt_install(packages: &[&str], suite: Option<&str>, install: bool) {
                 .args(["DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-y", "-qq"])
                 .args(["--no-install-recommends", "-o", "DPkg::Lock::Timeout=300"])
                 .args(&suite)
-                .args(packages),
+                .args(packages)
+                .quiet(),
         );
     } else {
         let words: Vec<&str> = ["sudo apt-get install -y --no-install-recommends"]
@@ -279,7 +280,7 @@ fn qemu_major() -> Option<u32> {
 }
 
 /// Where a program lies. The system folders are looked at too: a user's `PATH` on Debian leaves them out.
-pub(crate) fn find_program(name: &str) -> Option<PathBuf> {
+fn find_program(name: &str) -> Option<PathBuf> {
     let path = env::var_os("PATH").unwrap_or_default();
     let system = ["/usr/sbin", "/sbin"].map(PathBuf::from);
     env::split_paths(&path).chain(system).map(|dir| dir.join(name)).find(|file| file.is_file())

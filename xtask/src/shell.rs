@@ -50,6 +50,12 @@ impl Shell {
         self
     }
 
+    /// Without what it writes to stdout, for programs that say much and mean little.
+    pub(crate) fn quiet(mut self) -> Self {
+        self.command.stdout(Stdio::null());
+        self
+    }
+
     /// Runs it with our own stdout and stderr; a non-zero exit is an error.
     pub(crate) fn run(mut self) -> Result<()> {
         eprintln!("$ {}", self.shown);

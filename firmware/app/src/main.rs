@@ -1,1 +1,80 @@
-fn main() {}
+//! The firmware: puts the board's ports and the bodies of `hums_onboard` together.
+//!
+//! ```text
+//! AutopilotRx -> reception -> monitor -> storage -> card
+//!                                    \-> downlink -> GsTx
+//! ```
+//! Everything is allocated here and once: queues, the codec, the tasks. What the tasks do is in `hums_onboard`, where
+//! it is tested on a PC; what the machine does is in `boards`.
+#![no_std]
+#![no_main]
+
+mod boards;
+mod costs;
+mod executors;
+mod fault;
+mod links;
+mod memory;
+mod report;
+mod tasks;
+
+use embassy_executor::SpawnToken;
+use hums_blackbox::Writer;
+use hums_blackbox::record::Boot;
+use hums_core::Monitor;
+use hums_core::params::Params;
+use hums_onboard::Monitoring;
+use hums_onboard::queues::{Ends, Queues};
+use static_cell::{ConstStaticCell, StaticCell};
+
+use boards::board;
+use tasks::monitor;
+
+static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
+/// In CCM: the hottest data there is, and no DMA reads it (see `memory.x`).
+#[unsafe(link_section = ".ccm.writer")]
+static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
+static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
+static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    // SAFETY: this is the program's first statement: nobody has touched CCM, no interrupt is unmasked.
+    unsafe { memory::init() };
+    let fault = fault::take();
+    let boots = fault::count_start();
+    let parts = board::take();
+    defmt::info!("start {=u32}, {}, id {=[u8]:02x}", boots, parts.boot.cause, parts.boot.id);
+    if let Some(fault) = &fault {
+        defmt::error!("before this start: {}", defmt::Display2Format(fault));
+    }
+
+    let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out } = QUEUES.take().split();
+    let identity = Boot {
+        version: env!("CARGO_PKG_VERSION"),
+        git: env!("HUMS_GIT"),
+        board: board::NAME,
+        reset: parts.boot.cause_register,
+        reset_name: parts.boot.cause.name(),
+        uid: parts.boot.id,
+        boots,
+    };
+    let monitoring = MONITORING.init_with(|| {
+        Monitoring::new(MONITOR.take(), WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+    });
+
+    let on = executors::start();
+    on.reception.spawn(once(tasks::reception::run(parts.autopilot, frames_in)));
+    let ends = monitor::Ends { frames: frames_out, sectors: sectors_in, gs: gs_in };
+    on.monitor.spawn(once(monitor::run(monitoring, ends, fault, parts.watchdog, parts.led)));
+    on.downlink.spawn(once(tasks::downlink::run(parts.gs, gs_out)));
+    on.storage.spawn(once(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out)));
+    let mut idle = parts.idle;
+    idle.run()
+}
+
+/// A task that is spawned for the first and only time has its place.
+fn once<S, E: core::fmt::Debug>(token: Result<SpawnToken<S>, E>) -> SpawnToken<S> {
+    let Ok(token) = token else { defmt::panic!("a task was spawned twice") };
+    token
+}

@@ -60,7 +60,7 @@ impl Encoder {
         Self { low: 0, range: u32::MAX }
     }
 
-    /// A symbol that takes `size` of `1 << bits` parts from part `start` on; `bits <= 15`, `size >= 1`.
+    /// A symbol that takes `size` of `1 << bits` parts from part `start` on; `bits <= 16`, `size >= 1`.
     #[inline]
     pub(crate) fn put<const N: usize>(&mut self, start: u32, size: u32, bits: u32, out: &mut Scratch<N>) {
         let part = self.range >> bits;
@@ -89,6 +89,225 @@ impl Encoder {
         let value = self.low.wrapping_add(BOTTOM - 1) & !(BOTTOM - 1);
         let bytes = value.to_be_bytes();
         ([bytes[0], bytes[1]], FLUSH_MAX)
+    }
+}
+
+/// Bits of a probability.
+const PROBABILITY_BITS: u32 = 15;
+
+/// A distribution over 16 symbols that adapts to those it codes: quickly at first, then ever more slowly.
+///
+/// Place `i` (1 to 15) holds the probability, of 2^15, that the symbol is less than `i`; place 0 how often it was
+/// used, as far as the speed of adaptation depends on it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cdf([i16; 16]);
+
+/// How often a distribution is used until it adapts no more slowly.
+const USES_MAX: i16 = 40;
+
+/// The speed of adaptation by uses, of 2^16: about `1 / (uses + 2)`.
+const RATES: [i16; USES_MAX as usize + 1] = rates();
+
+const fn rates() -> [i16; USES_MAX as usize + 1] {
+    let mut rates = [0; USES_MAX as usize + 1];
+    let mut uses = 0;
+    while uses < rates.len() {
+        rates[uses] = (65_535 / (uses as u32 + 2)) as i16;
+        uses += 1;
+    }
+    rates
+}
+
+impl Cdf {
+    /// All symbols alike.
+    pub(crate) const FLAT: Self = Self::from_sizes([1; 16]);
+
+    /// From the symbols' relative sizes.
+    pub(crate) const fn from_sizes(sizes: [u16; 16]) -> Self {
+        let mut total = 0_u32;
+        let mut index = 0;
+        while index < 16 {
+            total += sizes[index] as u32;
+            index += 1;
+        }
+        let mut places = [0; 16];
+        let mut below = 0_u32;
+        index = 1;
+        while index < 16 {
+            below += sizes[index - 1] as u32;
+            places[index] = ((below * 32_767) / total) as i16;
+            index += 1;
+        }
+        Self(places)
+    }
+
+    /// The same distribution, ready to adapt quickly.
+    pub(crate) fn renewed(mut self) -> Self {
+        self.0[0] = self.0[0].min(3);
+        self
+    }
+
+    /// Where symbol `index` begins, of 2^15: no symbol is smaller than 8, whatever was learned.
+    #[inline]
+    fn start(&self, index: usize) -> u32 {
+        match self.0.get(index) {
+            _ if index == 0 => 0,
+            Some(&place) => {
+                let place = i32::from(place);
+                (place - (place >> 8) + 8 * index as i32) as u32
+            }
+            None => 1 << PROBABILITY_BITS,
+        }
+    }
+
+    /// The symbol that holds this part.
+    #[inline]
+    fn symbol_at(&self, part: u32) -> usize {
+        let mut symbol = 0;
+        for (index, &place) in self.0.iter().enumerate().skip(1) {
+            let place = i32::from(place);
+            symbol += usize::from(place - (place >> 8) + 8 * index as i32 <= part as i32);
+        }
+        symbol
+    }
+
+    /// Adapts to a symbol that was coded elsewhere.
+    pub(crate) fn learn(&mut self, symbol: usize) {
+        self.adapt(symbol);
+    }
+
+    #[inline]
+    fn adapt(&mut self, symbol: usize) {
+        let uses = self.0[0];
+        let rate = RATES[uses.clamp(0, USES_MAX) as usize];
+        for (index, place) in self.0.iter_mut().enumerate() {
+            let target: i16 = if index as i16 > symbol as i16 { i16::MAX } else { 0 };
+            *place += ((i32::from(target - *place) * i32::from(rate)) >> 16) as i16;
+        }
+        self.0[0] = (uses + 1).min(USES_MAX);
+    }
+}
+
+/// A binary probability that adapts likewise: bits 4..=15 that the bit is one, bits 0..=3 the uses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell(u16);
+
+impl Cell {
+    pub(crate) const EVEN: Self = Self(0x8000);
+
+    /// Uses so far, up to 15.
+    pub(crate) const fn uses(self) -> u32 {
+        self.0 as u32 & 15
+    }
+
+    /// The probability of a one, of 2^12.
+    pub(crate) const fn one(self) -> u32 {
+        self.0 as u32 >> 4
+    }
+
+    pub(crate) fn adapt(&mut self, bit: bool) {
+        let uses = self.uses();
+        let rate = i32::from(RATES[uses as usize]);
+        let one = self.one() as i32;
+        let target = if bit { 4_095 } else { 0 };
+        let one = (one + (((target - one) * rate) >> 16)) as u32;
+        self.0 = (one << 4 | (uses + 1).min(15)) as u16;
+    }
+}
+
+/// One end of the coder. Writer and reader run the same code over it: what is given is written by the one and made
+/// up by the other, which gives back what it read.
+pub(crate) trait Coder {
+    /// Whether what is given counts.
+    const WRITES: bool;
+
+    /// A symbol below 16.
+    fn symbol(&mut self, cdf: &mut Cdf, symbol: usize) -> usize;
+
+    /// A number of up to 16 bits, each as likely as any.
+    fn bits16(&mut self, value: u32, bits: u32) -> u32;
+
+    /// A bit that is one with probability `one` of 2^12, 1 to 4095.
+    fn bit(&mut self, one: u32, bit: bool) -> bool;
+
+    /// A number of up to 32 bits, each as likely as any.
+    #[inline]
+    fn bits(&mut self, value: u32, bits: u32) -> u32 {
+        if bits <= 16 {
+            return self.bits16(value, bits);
+        }
+        let low = self.bits16(value & 0xffff, 16);
+        self.bits16(value >> 16, bits - 16) << 16 | low
+    }
+}
+
+/// The writing end of the coder.
+pub(crate) struct Writing<'a, const N: usize> {
+    pub(crate) encoder: &'a mut Encoder,
+    pub(crate) out: &'a mut Scratch<N>,
+}
+
+impl<const N: usize> Coder for Writing<'_, N> {
+    const WRITES: bool = true;
+
+    #[inline]
+    fn symbol(&mut self, cdf: &mut Cdf, symbol: usize) -> usize {
+        let start = cdf.start(symbol);
+        self.encoder.put(start, cdf.start(symbol + 1) - start, PROBABILITY_BITS, self.out);
+        cdf.adapt(symbol);
+        symbol
+    }
+
+    #[inline]
+    fn bits16(&mut self, value: u32, bits: u32) -> u32 {
+        if bits > 0 {
+            self.encoder.put(value, 1, bits, self.out);
+        }
+        value
+    }
+
+    #[inline]
+    fn bit(&mut self, one: u32, bit: bool) -> bool {
+        let (start, size) = if bit { (0, one) } else { (one, 4_096 - one) };
+        self.encoder.put(start, size, 12, self.out);
+        bit
+    }
+}
+
+/// The reading end of the coder.
+pub(crate) struct Reading<'a> {
+    pub(crate) decoder: &'a mut Decoder,
+    pub(crate) input: &'a [u8],
+}
+
+impl Coder for Reading<'_> {
+    const WRITES: bool = false;
+
+    #[inline]
+    fn symbol(&mut self, cdf: &mut Cdf, _: usize) -> usize {
+        let symbol = cdf.symbol_at(self.decoder.part(PROBABILITY_BITS));
+        let start = cdf.start(symbol);
+        self.decoder.take(start, cdf.start(symbol + 1) - start, self.input);
+        cdf.adapt(symbol);
+        symbol
+    }
+
+    #[inline]
+    fn bits16(&mut self, _: u32, bits: u32) -> u32 {
+        if bits == 0 {
+            return 0;
+        }
+        let value = self.decoder.part(bits);
+        self.decoder.take(value, 1, self.input);
+        value
+    }
+
+    #[inline]
+    fn bit(&mut self, one: u32, _: bool) -> bool {
+        let bit = self.decoder.part(12) < one;
+        let (start, size) = if bit { (0, one) } else { (one, 4_096 - one) };
+        self.decoder.take(start, size, self.input);
+        bit
     }
 }
 

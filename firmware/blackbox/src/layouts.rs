@@ -5,12 +5,13 @@
 //!
 //! ```text
 //! message: id u24, checksum seed u8, payload bytes without extensions u8, fields u8, then for each field in wire
-//!          order: kind u8 (0 u8, 1 i8, 2 char, 3 u16, 4 i16, 5 u32, 6 i32, 7 f32, 8 u64, 9 i64, 10 f64),
+//!          order: u8 with the kind in bits 0..=3 (0 u8, 1 i8, 2 char, 3 u16, 4 i16, 5 u32, 6 i32, 7 f32, 8 u64,
+//!          9 i64, 10 f64) and the role in bits 4..=5 (0 plain, 1 instance, 2 milliseconds, 3 microseconds),
 //!          elements u8 (0: a scalar)
 //! ```
 //! The hash is the CRC-32C of the stored form.
 
-use hums_dialect::{Kind, Message};
+use hums_dialect::{Kind, Message, Role};
 
 use crate::crc::Crc32c;
 
@@ -32,7 +33,7 @@ pub fn store(mut out: impl FnMut(&[u8])) {
         let [low, middle, high, _] = message.id.to_le_bytes();
         out(&[low, middle, high, message.crc_extra, message.len_base, message.fields.len() as u8]);
         for field in message.fields {
-            out(&[field.kind as u8, field.array]);
+            out(&[field.kind as u8 | (field.role as u8) << 4, field.array]);
         }
     }
 }
@@ -45,6 +46,10 @@ pub(crate) enum Layouts {
     /// One in stored form.
     Stored(&'static [u8]),
 }
+
+/// Where in a table a message's layout is: small, to be kept for each slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place(u16);
 
 /// One message's layout.
 #[derive(Clone, Copy, Debug)]
@@ -63,10 +68,21 @@ impl Layouts {
         STORED.iter().find(|table| hash_of(table) == hash).map(|table| Self::Stored(table))
     }
 
-    pub(crate) fn find(self, id: u32) -> Option<Layout> {
+    /// The place of a message in the table.
+    pub(crate) fn find(self, id: u32) -> Option<Place> {
+        let place = match self {
+            Self::Current => hums_dialect::messages().binary_search_by_key(&id, |message| message.id).ok()?,
+            Self::Stored(table) => find_stored(table, id)?,
+        };
+        u16::try_from(place).ok().map(Place)
+    }
+
+    /// The layout at a place that `find` gave.
+    pub(crate) fn at(self, place: Place) -> Option<Layout> {
+        let place = usize::from(place.0);
         match self {
-            Self::Current => hums_dialect::message(id).map(Layout::Current),
-            Self::Stored(table) => find_stored(table, id).map(Layout::Stored),
+            Self::Current => hums_dialect::messages().get(place).map(Layout::Current),
+            Self::Stored(table) => table.get(place..).map(Layout::Stored),
         }
     }
 }
@@ -77,13 +93,13 @@ fn hash_of(table: &[u8]) -> u32 {
     crc.value()
 }
 
-fn find_stored(table: &'static [u8], id: u32) -> Option<&'static [u8]> {
-    let mut rest = table;
-    while let [low, middle, high, _, _, fields, ..] = rest {
+fn find_stored(table: &'static [u8], id: u32) -> Option<usize> {
+    let mut at = 0;
+    while let [low, middle, high, _, _, fields, ..] = table.get(at..)? {
         if u32::from_le_bytes([*low, *middle, *high, 0]) == id {
-            return Some(rest);
+            return Some(at);
         }
-        rest = rest.get(MESSAGE_HEAD_BYTES + 2 * usize::from(*fields)..)?;
+        at += MESSAGE_HEAD_BYTES + 2 * usize::from(*fields);
     }
     None
 }
@@ -105,20 +121,48 @@ impl Layout {
         })
     }
 
-    /// A field's kind and its number of elements, 0 for a scalar; `None` after the last one.
-    pub(crate) fn field(self, index: usize) -> Option<(Kind, u8)> {
+    /// A field; `None` after the last one.
+    pub(crate) fn field(self, index: usize) -> Option<FieldLayout> {
         match self {
-            Self::Current(message) => message.fields.get(index).map(|field| (field.kind, field.array)),
+            Self::Current(message) => message.fields.get(index).map(|field| FieldLayout {
+                kind: field.kind,
+                role: field.role,
+                count: field.array.max(1),
+            }),
             Self::Stored(bytes) => {
                 if index >= usize::from(*bytes.get(5)?) {
                     return None;
                 }
                 let at = MESSAGE_HEAD_BYTES + 2 * index;
-                Some((KINDS.get(usize::from(*bytes.get(at)?)).copied()?, *bytes.get(at + 1)?))
+                let (number, count) = (*bytes.get(at)?, *bytes.get(at + 1)?);
+                Some(FieldLayout {
+                    kind: *KINDS.get(usize::from(number & 0x0f))?,
+                    role: ROLES[usize::from(number >> 4 & 3)],
+                    count: count.max(1),
+                })
             }
         }
     }
 }
+
+/// One field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FieldLayout {
+    pub(crate) kind: Kind,
+    pub(crate) role: Role,
+    /// Elements: 1 for a scalar.
+    pub(crate) count: u8,
+}
+
+impl FieldLayout {
+    /// Bytes on the wire.
+    pub(crate) const fn size(self) -> usize {
+        self.kind.size() * self.count as usize
+    }
+}
+
+/// The roles by their stored number.
+const ROLES: [Role; 4] = [Role::Plain, Role::Instance, Role::Millis, Role::Micros];
 
 /// The kinds by their stored number.
 const KINDS: [Kind; 11] = [
@@ -156,9 +200,10 @@ mod tests {
         let table = STORED[STORED.len() - 1];
         for message in hums_dialect::messages() {
             let (a, b) = (
-                Layouts::Current.find(message.id).expect("in this build"),
-                Layouts::Stored(table).find(message.id).expect("stored"),
+                Layouts::Current.find(message.id).and_then(|place| Layouts::Current.at(place)),
+                Layouts::Stored(table).find(message.id).and_then(|place| Layouts::Stored(table).at(place)),
             );
+            let (a, b) = (a.expect("in this build"), b.expect("stored"));
             assert_eq!((a.crc_extra(), a.len_base()), (b.crc_extra(), b.len_base()));
             for index in 0..=message.fields.len() {
                 assert_eq!(a.field(index), b.field(index), "message {} field {index}", message.id);

@@ -18,6 +18,9 @@ use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
 /// with the preamble before it.
 pub const ENTRY_SECTORS_MAX: usize = 1 + (PREAMBLE_BYTES + CODED_BYTES_MAX + FLUSH_MAX).div_ceil(BODY_BYTES);
 
+/// A sector in the middle of a group has so many bytes at least: it is closed when no stream could end in it.
+const BODY_CLOSED_MIN: usize = BODY_BYTES + 1 - FLUSH_MAX;
+
 /// Where finished sectors go: a bounded queue.
 pub trait SectorSink {
     /// How many sectors it takes now.
@@ -210,29 +213,31 @@ impl Writer {
         let entry = Entry { kind, at_ms: self.last_ms, bytes };
         if !self.in_group {
             self.begin_group(entry.at_ms);
-        } else if self.append(&entry, sink) {
+        } else if self.append(&entry, false, sink) {
             return Ok(());
         } else {
             self.end_group(false, sink);
             self.begin_group(entry.at_ms);
         }
-        if !self.append(&entry, sink) {
-            // Cannot be: a fresh group has room for `ENTRY_SECTORS_MAX`, and a fresh model's longest entry fits.
-            self.counters.refused += 1;
-            return Err(Full::TooLong);
+        if !self.append(&entry, false, sink) {
+            // The model makes it longer than it is: its bytes as they are always fit.
+            self.begin_group(entry.at_ms);
+            self.append(&entry, true, sink);
         }
         Ok(())
     }
 
     /// Encodes an entry and adds its bytes; `false` (the model is then spoilt, the stream is not) where the group
     /// has no room for it or its code is too long.
-    fn append(&mut self, entry: &Entry<'_>, sink: &mut impl SectorSink) -> bool {
+    fn append(&mut self, entry: &Entry<'_>, plain: bool, sink: &mut impl SectorSink) -> bool {
         let before = self.coder;
         self.scratch.clear();
-        self.model.encode(entry, &mut self.coder, &mut self.scratch);
+        self.model.encode(entry, plain, &mut self.coder, &mut self.scratch);
         let sectors_after = GROUP_SECTORS - 1 - usize::from(self.header.since_first);
         let room = sectors_after * BODY_BYTES + (BODY_BYTES - self.header.body_bytes);
-        let Some(len) = self.scratch.bytes().map(<[u8]>::len).filter(|len| len + LOOKAHEAD <= room) else {
+        let Some(len) =
+            self.scratch.bytes().map(<[u8]>::len).filter(|len| len + LOOKAHEAD + FLUSH_MAX <= room)
+        else {
             self.coder = before;
             return false;
         };
@@ -267,7 +272,7 @@ impl Writer {
 
     /// An entry is complete in the sector in which the decoder finds all bytes that it reads for it.
     fn count(&mut self, kind: Kind) {
-        let complete = self.header.body_bytes + LOOKAHEAD <= BODY_BYTES;
+        let complete = self.header.body_bytes + LOOKAHEAD <= BODY_CLOSED_MIN;
         match (kind, complete) {
             (Kind::Frame { .. }, true) => self.header.frames = self.header.frames.saturating_add(1),
             (Kind::Frame { .. }, false) => self.ended.frames = self.ended.frames.saturating_add(1),

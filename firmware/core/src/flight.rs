@@ -69,7 +69,7 @@ impl Flight {
             self.armed_since = Some(now);
             self.armed_height_m = height_m;
         }
-        let says = self.autopilot_says(now, vehicle);
+        let says = Self::autopilot_says(now, vehicle);
         let debounce = match (says, self.airborne()) {
             (Some(_), _) => Span::ZERO,
             (None, false) => TAKEOFF_DEBOUNCE,
@@ -90,12 +90,13 @@ impl Flight {
         Some(if flies { FlightEvent::TakeOff } else { FlightEvent::Landing })
     }
 
-    fn autopilot_says(&self, now: Instant, vehicle: &Vehicle) -> Option<bool> {
+    fn autopilot_says(now: Instant, vehicle: &Vehicle) -> Option<bool> {
         match vehicle.landed.within(now, LANDED_STATE_AGE)? {
             LandedState::Unknown => None,
             LandedState::OnGround => Some(false),
-            // A taking-off state is also sent while the motors spool up on the ground.
-            LandedState::TakingOff => Some(self.airborne()),
+            // Sent from the spooling up of the motors on the ground until the height that was asked for is reached:
+            // the height decides.
+            LandedState::TakingOff => None,
             LandedState::InAir | LandedState::Landing => Some(true),
         }
     }

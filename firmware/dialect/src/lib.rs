@@ -45,6 +45,20 @@ impl Kind {
     }
 }
 
+/// What a field is for, as far as the recorder's prediction makes use of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Role {
+    /// Anything else.
+    Plain,
+    /// Tells several sources of one message apart, for instance a battery's id.
+    Instance,
+    /// A time that advances with the clock, in milliseconds.
+    Millis,
+    /// A time that advances with the clock, in microseconds.
+    Micros,
+}
+
 /// One field of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
@@ -52,6 +66,8 @@ pub struct Field {
     pub kind: Kind,
     /// The number of elements of an array; 0 for a scalar.
     pub array: u8,
+    /// What it is for.
+    pub role: Role,
     /// As in the definition, for instance `time_boot_ms`.
     #[cfg(feature = "names")]
     pub name: &'static str,
@@ -126,6 +142,15 @@ mod tests {
         assert_eq!((heartbeat.len_base, heartbeat.len_max), (9, 9));
         let gps = message(24).expect("GPS_RAW_INT");
         assert_eq!((gps.len_base, gps.len_max), (30, 52));
+    }
+
+    #[test]
+    fn roles_come_from_the_definitions() {
+        let role = |id: u32, index: usize| message(id).map(|message| message.fields[index].role);
+        assert_eq!(role(30, 0), Some(Role::Millis));
+        assert_eq!(role(24, 0), Some(Role::Micros));
+        assert_eq!(role(251, 2), Some(Role::Instance));
+        assert_eq!(role(30, 1), Some(Role::Plain));
     }
 
     #[test]

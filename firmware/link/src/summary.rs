@@ -17,7 +17,7 @@ use crate::frame::Frame;
 
 /// Forwarded messages: id and the least time between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
-    (0, 1_000),      // HEARTBEAT
+    (0, 500),        // HEARTBEAT: each of a sender's one a second, early ones too
     (1, 2_000),      // SYS_STATUS
     (2, 5_000),      // SYSTEM_TIME
     (24, 1_000),     // GPS_RAW_INT

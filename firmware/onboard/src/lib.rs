@@ -16,8 +16,10 @@ pub mod port;
 pub mod queues;
 pub mod reception;
 pub mod storage;
+pub mod supervisor;
 
 pub use monitoring::{Identity, Monitoring};
 pub use port::PortStatus;
 pub use reception::Reception;
 pub use storage::{Service, Storage};
+pub use supervisor::{Supervisor, Task};

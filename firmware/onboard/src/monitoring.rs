@@ -5,12 +5,11 @@
 //! what time alone asks for.
 
 use hums_blackbox::record::{
-    Boot, Clock, Event, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX, Usage,
+    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX, Usage,
     UsageValue, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
-use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, monitor};
@@ -50,7 +49,8 @@ struct Sums {
 
 /// The pipeline between the frame queue and the queues of sectors and of GS frames.
 pub struct Monitoring<'a> {
-    monitor: Monitor,
+    /// Lent, as the writer is: either is too large to be moved over the firmware's stack.
+    monitor: &'a mut Monitor,
     writer: &'a mut Writer,
     summary: Summary,
     sequences: Sequences,
@@ -76,15 +76,15 @@ pub struct Monitoring<'a> {
 impl<'a> Monitoring<'a> {
     /// Before the first frame.
     pub fn new(
-        params: Params,
+        monitor: &'a mut Monitor,
         writer: &'a mut Writer,
         identity: Identity<'a>,
         card: &'a CardStatus,
         port: &'a PortStatus,
     ) -> Self {
         Self {
-            summary: Summary::new(&params),
-            monitor: Monitor::new(params),
+            summary: Summary::new(monitor.params()),
+            monitor,
             writer,
             sequences: Sequences::new(),
             card,
@@ -120,10 +120,15 @@ impl<'a> Monitoring<'a> {
         self.record_usage(now, Moment::Start, sectors);
     }
 
+    /// Records how the boot before this one ended. To be called after [`Self::start`].
+    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, sectors: &mut SectorsIn) {
+        self.record(now, &Record::Fault(*fault), sectors);
+    }
+
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
     pub fn drain(&mut self, frames: &mut FramesOut, sectors: &mut SectorsIn, gs: &mut GsIn) -> bool {
         frames.take(|at_micros, verified, bytes| {
-            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs)
+            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs);
         })
     }
 
@@ -167,7 +172,7 @@ impl<'a> Monitoring<'a> {
             self.record_usage(now, Moment::Periodic, sectors);
         }
         self.partial(now, sectors);
-        self.summary.tick(now, &self.monitor, &mut |bytes| gs.put(bytes));
+        self.summary.tick(now, self.monitor, &mut |bytes| gs.put(bytes));
     }
 
     /// Ends the record in order: everything that is still open is written. The queues then hold what storage has to
@@ -183,7 +188,7 @@ impl<'a> Monitoring<'a> {
 
     /// What the monitor knows.
     pub const fn monitor(&self) -> &Monitor {
-        &self.monitor
+        self.monitor
     }
 
     /// The pipeline's figures since power-on.

@@ -9,7 +9,7 @@
 use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use heapless::spsc;
-use hums_blackbox::{ENTRY_SECTORS_MAX, SECTOR_BYTES, Sector, SectorSink};
+use hums_blackbox::{ENTRY_SECTORS_MAX, Header, SECTOR_BYTES, Sector, SectorSink};
 
 /// 80 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes a fraction.
 pub const FRAME_QUEUE_BYTES: usize = 8 * 1024;
@@ -175,6 +175,20 @@ impl SectorsOut<'_> {
     /// Takes the oldest sector out.
     pub fn drop_oldest(&mut self) {
         let _ = self.0.dequeue();
+    }
+
+    /// Empties the queue because there is no card to write to; how many frames are lost with it. Copies of a sector in
+    /// progress hold no frames of their own.
+    pub fn abandon(&mut self) -> u64 {
+        let mut frames = 0;
+        while let Some(mut sector) = self.0.dequeue() {
+            // Only a sealed sector's header can be read; which session it names does not matter here.
+            sector.seal(0);
+            if let Ok(header) = Header::read(sector.bytes()) {
+                frames += if header.partial { 0 } else { u64::from(header.frames) };
+            }
+        }
+        frames
     }
 
     /// Sectors waiting.

@@ -3,12 +3,15 @@
 //! The most urgent task: the port's ring holds 44 ms at 921,600 baud. It does nothing but find frames, about ten
 //! instructions a byte, and never waits.
 
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use hums_link::frame::{Check, Frame};
 use hums_link::framer::Framer;
 
 use crate::port::{PortReading, PortStatus};
 use crate::queues::FramesIn;
+
+/// A line that is silent for this long will not finish the frame it began: [`Reception::idle`] is due.
+pub const SILENCE: Span = Span::from_millis(20);
 
 /// The autopilot port's framer, and what it lost.
 pub struct Reception<'a> {

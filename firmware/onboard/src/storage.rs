@@ -3,11 +3,14 @@
 //! The least urgent task, because its library waits for the card: nothing else may wait with it. What waits for it is
 //! the sector queue, sized for a card that stands still for 2.5 s.
 
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use hums_recorder::recorder::Written;
 use hums_recorder::{CardDevice, CardStatus, Recorder};
 
 use crate::queues::SectorsOut;
+
+/// How soon to call again after [`Service::NoCard`].
+pub const NO_CARD_RETRY: Span = Span::from_millis(100);
 
 /// What one call did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

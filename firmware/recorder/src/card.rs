@@ -174,14 +174,14 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         self.close();
         let made = self.allocate(name, bytes);
-        let gate = |manager: &Manager<'a, D>| match &made {
-            Ok(()) => manager.device(|gate| gate.commit()),
-            Err(_) => {
-                manager.device(|gate| gate.abort());
+        let committed = self.manager()?.device(|gate| {
+            if made.is_ok() {
+                gate.commit()
+            } else {
+                gate.abort();
                 Ok(())
             }
-        };
-        let committed = gate(self.manager()?);
+        });
         self.reopen()?;
         made?;
         committed?;

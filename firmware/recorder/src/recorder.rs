@@ -47,6 +47,8 @@ pub struct Recorder<'a, D: CardDevice> {
     finished: bool,
 }
 
+// One of these exists, in a static: the size of the largest variant is the budget.
+#[allow(clippy::large_enum_variant)]
 enum Slot<'a, D: CardDevice> {
     /// The device, while no usable card is in it.
     Waiting(D),
@@ -208,25 +210,24 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     fn begin(&mut self) -> Result<(), CardError<D::Error>> {
         let volume_id = self.mounted()?.layout().volume_id;
         let newest = self.survey(LogName { session: 0, segment: 0 })?.newest;
-        let log = match self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name)) {
-            Some(log) => log,
-            None => {
-                let name = newest.map_or(Some(LogName { session: 1, segment: 0 }), LogName::next_session);
-                // The numbers end at 99,999; the last session number then goes on with its segments.
-                let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
-                let session = mix(mix(volume_id, name.session), self.entropy);
-                Log { name, session, volume_id, base: None, partial_further: true }
-            }
-        };
-        let resumed = self.log.is_some();
-        let fresh = Some(log.name) != newest;
-        self.log = Some(log);
-        if fresh {
-            self.open_segment(log.name)?
+        let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
+        let log = if let Some(log) = resumed {
+            log
         } else {
-            self.next_segment()?
+            let name = newest.map_or(Some(LogName { session: 1, segment: 0 }), LogName::next_session);
+            // The numbers end at 99,999; the last session number then goes on with its segments.
+            let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
+            let session = mix(mix(volume_id, name.session), self.entropy);
+            Log { name, session, volume_id, base: None, partial_further: true }
+        };
+        let before = self.log.replace(log);
+        if Some(log.name) == newest {
+            self.next_segment()?;
+        } else {
+            self.open_segment(log.name)?;
         }
-        if resumed {
+        if let Some(before) = before {
+            self.await_group = before.session != log.session;
             self.status.want_group();
         }
         Ok(())

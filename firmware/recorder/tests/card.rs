@@ -1,87 +1,13 @@
 //! The card layer against a card in memory that remembers every block write, so that power can be cut at each of them.
 
-use std::cell::{Cell, RefCell};
-use std::collections::BTreeMap;
-use std::rc::Rc;
+mod common;
 
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use common::{Broken, MIB_BLOCKS, MemCard};
 use hums_recorder::card::{Card, CardError, LogEntry};
 use hums_recorder::format::{BLOCKS_MIN, FormatError, format};
 use hums_recorder::layout::LayoutError;
-use hums_recorder::{CardDevice, CardState, CardStatus, LogName};
+use hums_recorder::{CardState, CardStatus, LogName};
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Broken;
-
-impl std::fmt::Display for Broken {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("broken")
-    }
-}
-
-impl std::error::Error for Broken {}
-
-type Blocks = BTreeMap<u32, [u8; 512]>;
-
-/// A sparse card that keeps a journal of its writes.
-#[derive(Clone)]
-struct MemCard {
-    size: u32,
-    blocks: Rc<RefCell<Blocks>>,
-    journal: Rc<RefCell<Vec<(u32, [u8; 512])>>>,
-    broken: Rc<Cell<bool>>,
-}
-
-impl MemCard {
-    fn new(size: u32) -> Self {
-        Self::with(size, Blocks::new())
-    }
-
-    fn with(size: u32, blocks: Blocks) -> Self {
-        let blocks = Rc::new(RefCell::new(blocks));
-        Self { size, blocks, journal: Rc::default(), broken: Rc::default() }
-    }
-
-    fn formatted(size: u32) -> Self {
-        let card = Self::new(size);
-        format(&card, 0x1234_5678).expect("a card of this size can be formatted");
-        card.journal.borrow_mut().clear();
-        card
-    }
-}
-
-impl BlockDevice for MemCard {
-    type Error = Broken;
-
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Broken> {
-        for (at, block) in (start.0..).zip(blocks) {
-            if self.broken.get() || at >= self.size {
-                return Err(Broken);
-            }
-            block.contents = self.blocks.borrow().get(&at).copied().unwrap_or([0; 512]);
-        }
-        Ok(())
-    }
-
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), Broken> {
-        for (at, block) in (start.0..).zip(blocks) {
-            if self.broken.get() || at >= self.size {
-                return Err(Broken);
-            }
-            self.journal.borrow_mut().push((at, block.contents));
-            self.blocks.borrow_mut().insert(at, block.contents);
-        }
-        Ok(())
-    }
-
-    fn num_blocks(&self) -> Result<BlockCount, Broken> {
-        Ok(BlockCount(self.size))
-    }
-}
-
-impl CardDevice for MemCard {}
-
-const MIB_BLOCKS: u32 = 2048;
 const FIRST: LogName = LogName { session: 1, segment: 0 };
 const SECOND: LogName = LogName { session: 2, segment: 0 };
 
@@ -174,23 +100,24 @@ fn a_cut_at_any_write_leaves_the_card_in_order() {
             }
             let mut after = blocks.clone();
             after.insert(*at, block);
-            check_in_order(MemCard::with(device.size, after), cut);
+            check_in_order(&MemCard::with(device.size, after), cut);
         }
         blocks.insert(*at, *new);
     }
 }
 
-fn check_in_order(device: MemCard, cut: usize) {
+fn check_in_order(device: &MemCard, cut: usize) {
     let status = CardStatus::new();
-    let mut card = mount(&device, &status);
+    let mut card = mount(device, &status);
     let found = logs(&card);
     assert!(!found.is_empty() && found.len() <= 2, "cut {cut}: {found:?}");
     for log in found {
-        card.open(log.name).unwrap_or_else(|error| panic!("cut {cut}: {}: {error}", log.name));
+        card.open(log.name).map_err(|error| format!("cut {cut}: {}: {error}", log.name)).expect("it opens");
         let mut block = [0; 512];
         for index in 0..card.open_blocks() {
             card.read(index, &mut block)
-                .unwrap_or_else(|error| panic!("cut {cut}: {} {index}: {error}", log.name));
+                .map_err(|error| format!("cut {cut}: {} {index}: {error}", log.name))
+                .expect("it reads");
             if log.name == FIRST && index == 7 {
                 assert_eq!(block, pattern(7), "cut {cut}");
             }

@@ -15,6 +15,7 @@ use anyhow::{Context, Result, bail};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_blackbox::record::{Boot, Stats};
 use hums_blackbox::{Header, Writer};
+use hums_core::Monitor;
 use hums_core::params::{ParamError, Params};
 use hums_core::time::{Instant, Span};
 use hums_onboard::monitoring::TICK;
@@ -149,6 +150,7 @@ impl World<'_> {
         let (card_status, port_status) = (CardStatus::new(), PortStatus::new());
         let mut queues = Box::new(Queues::new());
         let mut writer = Box::new(Writer::new());
+        let mut monitor = Box::new(Monitor::new(params));
         let identity = Boot {
             version: env!("CARGO_PKG_VERSION"),
             board: "sim",
@@ -163,7 +165,7 @@ impl World<'_> {
             slot_status: &card_status,
             ends: queues.split(),
             reception: Reception::new(&port_status),
-            monitoring: Monitoring::new(params, &mut writer, identity, &card_status, &port_status),
+            monitoring: Monitoring::new(&mut monitor, &mut writer, identity, &card_status, &port_status),
             storage: Storage::new(Slot(self.card), &card_status, entropy),
             gs: &mut *self.gs,
             findings: &mut self.report.findings,

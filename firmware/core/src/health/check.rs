@@ -110,6 +110,8 @@ pub struct State {
     bad: Timer,
     very_bad: Timer,
     better: Timer,
+    /// When the value was measured last.
+    seen_at: Option<Instant>,
 }
 
 /// A change of level.
@@ -128,7 +130,7 @@ pub struct Change {
 impl State {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { level: None, bad: Timer(None), very_bad: Timer(None), better: Timer(None) }
+        Self { level: None, bad: Timer(None), very_bad: Timer(None), better: Timer(None), seen_at: None }
     }
 
     /// The level, or `None` while the check has had nothing to say.
@@ -146,19 +148,25 @@ impl State {
         params: &Params,
     ) -> Option<Change> {
         if !applies {
-            *self = Self { level: self.level, ..Self::new() };
-            // What no longer applies is no longer bad.
-            return self
-                .level
-                .filter(|level| *level != Level::Ok)
-                .and_then(|_| self.go(Level::Ok, f32::NAN, f32::NAN));
+            // What no longer applies is no longer bad, but it is not known to be good either: it has no level.
+            let previous = self.level.filter(|level| *level != Level::Ok);
+            *self = Self::new();
+            return previous.map(|previous| Change {
+                level: Level::Ok,
+                previous,
+                value: f32::NAN,
+                limit: f32::NAN,
+            });
         }
-        let reading = reading.filter(|reading| reading.value.is_finite())?;
-        if check.stale_after.is_some_and(|limit| now.since(reading.at) > limit) {
-            *self = Self { level: self.level, ..Self::new() };
+        let reading = reading.filter(|reading| reading.value.is_finite());
+        self.seen_at = reading.map_or(self.seen_at, |reading| Some(reading.at));
+        // A value that was measured once and no longer is grows old like one whose message stops.
+        let old = |limit: Span| self.seen_at.is_some_and(|at| now.since(at) > limit);
+        if check.stale_after.is_some_and(old) {
+            *self = Self { level: self.level, seen_at: self.seen_at, ..Self::new() };
             return self.go(Level::Stale, f32::NAN, f32::NAN);
         }
-        self.judge(check, now, reading.value, params)
+        self.judge(check, now, reading?.value, params)
     }
 
     fn judge(&mut self, check: &Check, now: Instant, value: f32, params: &Params) -> Option<Change> {
@@ -171,7 +179,10 @@ impl State {
             Side::Below => value < limit + margin,
         };
         let very_bad = self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical);
-        let bad = self.bad.run(beyond(warn, 0.0) || beyond(critical, 0.0), now, check.debounce_warn);
+        // Without a warning limit there is no warning on the way to critical.
+        let warned = beyond(warn, 0.0) || (!warn.is_nan() && beyond(critical, 0.0));
+        let bad = self.bad.run(warned, now, check.debounce_warn);
+        let undecided = self.bad.0.is_some() || self.very_bad.0.is_some();
 
         let held = match level {
             Level::Critical => beyond(critical, check.hysteresis),
@@ -183,6 +194,9 @@ impl State {
             Level::Critical
         } else if bad || (level == Level::Warning && !better) {
             Level::Warning
+        } else if undecided && matches!(self.level, None | Some(Level::Stale)) {
+            // Bad, not yet for long enough, and nothing good is known from before.
+            return None;
         } else {
             Level::Ok
         };
@@ -298,6 +312,48 @@ mod tests {
             assert_eq!(state.step(&CHECK, Instant::ZERO, reading, true, &params), None);
         }
         assert_eq!(state.step(&CHECK, Instant::ZERO, None, true, &params), None);
+        assert_eq!(state.level(), None);
+    }
+
+    #[test]
+    fn a_value_that_is_no_longer_given_grows_stale_and_bad_news_after_that_is_never_ok() {
+        let params = Params::defaults();
+        let mut state = State::new();
+        let mut levels = Vec::new();
+        for now_ms in (0..5_000).step_by(50) {
+            let now = Instant::from_millis(now_ms);
+            let value = if now_ms < 1_000 { Some(10.0) } else { (now_ms >= 3_000).then_some(70.0) };
+            let reading = value.map(|value| Reading { at: now, value });
+            let change = state.step(&CHECK, now, reading, true, &params);
+            levels.extend(change.map(|change| (now_ms, change.level)));
+        }
+        assert_eq!(levels, [(2_000, Level::Stale), (3_200, Level::Critical)]);
+    }
+
+    #[test]
+    fn a_first_value_that_is_bad_is_not_ok_while_it_is_debounced() {
+        let params = Params::defaults();
+        let mut state = State::new();
+        let reading = Some(Reading { at: Instant::ZERO, value: 50.0 });
+        assert_eq!(state.step(&CHECK, Instant::ZERO, reading, true, &params), None);
+        assert_eq!(state.level(), None);
+    }
+
+    #[test]
+    fn a_check_without_a_warning_limit_never_warns() {
+        let check = Check { warn: None, debounce_critical: Span::from_secs(60), ..CHECK };
+        let changes = run(&check, &[(1_000, 10.0), (62_000, 70.0)]);
+        assert_eq!(changes, [(61_000, Level::Critical)]);
+    }
+
+    #[test]
+    fn what_does_not_apply_has_no_level() {
+        let params = Params::defaults();
+        let mut state = State::new();
+        let reading = Some(Reading { at: Instant::ZERO, value: 10.0 });
+        state.step(&CHECK, Instant::ZERO, reading, true, &params);
+        assert_eq!(state.level(), Some(Level::Ok));
+        assert_eq!(state.step(&CHECK, Instant::ZERO, reading, false, &params), None);
         assert_eq!(state.level(), None);
     }
 

@@ -1,0 +1,277 @@
+//! QEMU's `netduinoplus2`: the same chip, without what QEMU does not model (clocks, GPIO, DMA, watchdog, SPI card).
+//! So `embassy_stm32::init` is never called here; the USARTs are driven by their registers.
+//!
+//! Time is virtual ([`clock`]): idle moves it, to the next alarm or to the next arrival of the [`feed`], whichever is
+//! earlier, alarms first where both fall together. Tasks take no time, so that runs repeat to the byte.
+//!
+//! Arguments (of the semihosting command line, `key=value`, each in double quotes):
+//!
+//! | key | value |
+//! |---|---|
+//! | `feed` | when the input's bytes arrive; a file or a FIFO (see [`feed`]). Its end ends the run |
+//! | `sd` | the card's image, opened for writing in place; without it the slot is empty |
+//! | `log` | where defmt's messages go |
+//! | `seed` | a number that stands for the true random number of a real board |
+//! | `cost` | `1`: tell the instructions of each stage; QEMU must run with `-icount shift=3` |
+//!
+//! Exit codes: 0 done, 2 no feed, 101 a fault, 102 all tasks wait for ever.
+
+mod card;
+mod clock;
+mod feed;
+mod log;
+mod uart;
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use cortex_m::peripheral::syst::SystClkSource;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use heapless::CString;
+use semihosting::experimental::env;
+use semihosting::fs::File;
+use semihosting::{println, process};
+
+pub(crate) use card::ImageCard as Card;
+use feed::Feed;
+pub(crate) use uart::{AutopilotRx, GsTx};
+
+use super::{Boot, ResetCause};
+use crate::costs::Stage;
+use crate::fault;
+use crate::report::Report;
+
+/// The board's name.
+pub(crate) const NAME: &str = "emulated";
+
+/// `SysTick`'s 24 bits.
+const SYSTICK_MAX: u32 = 0x00FF_FFFF;
+/// Nobody fed the watchdog for this long in virtual time: as on the real board.
+const WATCHDOG_MS: u32 = 1_000;
+/// Bytes of all arguments together.
+const ARGUMENTS_BYTES: usize = 1024;
+/// Bytes of a path.
+const PATH_BYTES: usize = 512;
+
+/// There was no feed, or it cannot be opened.
+const EXIT_NO_FEED: i32 = 2;
+/// As Rust programs end that panic.
+const EXIT_FAULT: i32 = 101;
+/// All tasks wait, and nothing will ever come.
+const EXIT_STUCK: i32 = 102;
+
+/// The input has ended.
+static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// Whether `done` tells the instructions.
+static TELL_COSTS: AtomicBool = AtomicBool::new(false);
+/// When the watchdog bites, in virtual milliseconds; before it is fed first, never.
+static BITES_AT_MS: AtomicU32 = AtomicU32::new(u32::MAX);
+
+/// What the app gets.
+pub(crate) struct Parts {
+    pub(crate) autopilot: AutopilotRx,
+    pub(crate) gs: GsTx,
+    pub(crate) card: Card,
+    pub(crate) led: Led,
+    pub(crate) watchdog: Watchdog,
+    pub(crate) idle: Idle,
+    pub(crate) boot: Boot,
+}
+
+/// What the command line says.
+#[derive(Default)]
+struct Arguments {
+    feed: CString<PATH_BYTES>,
+    card: CString<PATH_BYTES>,
+    log: CString<PATH_BYTES>,
+    seed: u32,
+    tell_costs: bool,
+}
+
+/// Reads the arguments, opens what they name and switches the ports on.
+pub(crate) fn take() -> Parts {
+    start_systick();
+    let arguments = Arguments::read();
+    TELL_COSTS.store(arguments.tell_costs, Ordering::Relaxed);
+    log::open(File::create(arguments.log.as_c_str()).ok());
+    let image = File::options().read(true).write(true).open(arguments.card.as_c_str());
+    let (autopilot, gs) = uart::init();
+    // From here on no byte is lost. Whoever feeds us waits for this line.
+    println!("ready");
+    let Ok(feed) = File::open(arguments.feed.as_c_str()) else {
+        println!("no feed: the argument feed=PATH is missing or cannot be opened");
+        process::exit(EXIT_NO_FEED);
+    };
+    Parts {
+        autopilot,
+        gs,
+        card: Card::new(image.ok()),
+        led: Led(()),
+        watchdog: Watchdog(()),
+        idle: Idle { feed: Feed::new(feed) },
+        boot: Boot {
+            id: [0; 12],
+            cause: ResetCause::PowerOn,
+            cause_register: 0,
+            entropy: arguments.seed.wrapping_add(1),
+        },
+    }
+}
+
+impl Arguments {
+    fn read() -> Self {
+        let mut arguments = Self::default();
+        let Ok(words) = env::args::<ARGUMENTS_BYTES>() else { return arguments };
+        for (key, value) in words.flatten().filter_map(|word| word.split_once('=')) {
+            match key {
+                "feed" => set_path(&mut arguments.feed, value),
+                "sd" => set_path(&mut arguments.card, value),
+                "log" => set_path(&mut arguments.log, value),
+                "seed" => arguments.seed = value.parse().unwrap_or_default(),
+                "cost" => arguments.tell_costs = value == "1",
+                _ => println!("unknown argument: {}", key),
+            }
+        }
+        arguments
+    }
+}
+
+/// A path that is too long stays empty, and an empty path cannot be opened.
+fn set_path(path: &mut CString<PATH_BYTES>, value: &str) {
+    if path.extend_from_bytes(value.as_bytes()).is_err() {
+        println!("a path of more than {} bytes: {}", PATH_BYTES, value);
+        *path = CString::new();
+    }
+}
+
+/// The processor's own clock, free running: under `-icount` it counts instructions.
+fn start_systick() {
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        core.SYST.set_clock_source(SystClkSource::Core);
+        core.SYST.set_reload(SYSTICK_MAX);
+        core.SYST.clear_current();
+        core.SYST.enable_counter();
+    }
+}
+
+/// There is none.
+pub(crate) struct Led(());
+
+impl Led {
+    #[expect(clippy::unused_self, reason = "on a real board there is a pin")]
+    pub(crate) fn set(&mut self, _lit: bool) {}
+}
+
+/// In virtual time: idle looks whether it bites.
+pub(crate) struct Watchdog(());
+
+impl Watchdog {
+    #[expect(clippy::unused_self, reason = "on a real board there is a timer")]
+    pub(crate) fn feed(&mut self) {
+        BITES_AT_MS.store(now_ms().saturating_add(WATCHDOG_MS), Ordering::Relaxed);
+    }
+}
+
+fn now_ms() -> u32 {
+    embassy_time::Instant::now().as_millis() as u32
+}
+
+/// Moves the time.
+pub(crate) struct Idle {
+    feed: Feed,
+}
+
+impl Idle {
+    /// All tasks wait whenever this runs: it is thread mode, and they are interrupts.
+    pub(crate) fn run(&mut self) -> ! {
+        let mut ended = false;
+        loop {
+            let alarm_us = clock::next_alarm();
+            match self.feed.peek() {
+                Some(arrival) if arrival.time_us.max(clock::now_us()) < alarm_us => {
+                    clock::advance(arrival.time_us);
+                    uart::receive(arrival.bytes);
+                    self.feed.take();
+                }
+                None if !ended => {
+                    ended = true;
+                    // What is still to be done is bounded, and the monitor does not feed it any more.
+                    BITES_AT_MS.store(u32::MAX, Ordering::Relaxed);
+                    ENDED.signal(());
+                }
+                None if alarm_us == u64::MAX => {
+                    println!("fault: all tasks wait for ever");
+                    process::exit(EXIT_STUCK);
+                }
+                _ => clock::advance(alarm_us),
+            }
+            if now_ms() > BITES_AT_MS.load(Ordering::Relaxed) {
+                println!("the watchdog bites");
+                restart();
+            }
+        }
+    }
+}
+
+/// Waits for the end of the feed.
+pub(crate) async fn ended() {
+    ENDED.wait().await;
+}
+
+/// Counts up where `SysTick` counts down.
+pub(crate) fn cycles() -> u32 {
+    SYSTICK_MAX - cortex_m::peripheral::SYST::get_current()
+}
+
+/// Prints the figures of the run as one line of JSON, and ends the emulator.
+pub(crate) fn done(report: &Report) {
+    let Report { stats, frames_left, costs, stack: (stack_used, stack_all) } = report;
+    println!(
+        "{{\"frames_in\":{},\"frames_logged\":{},\"frames_lost\":{},\"bytes_in\":{},\"bytes_not_frames\":{},\
+         \"bytes_logged\":{},\"blocks_written\":{},\"queue_bytes_max\":{},\"queue_bytes_capacity\":{},\
+         \"sd_stall_ms_max\":{},\"gs_frames\":{},\"gs_bytes\":{},\"stack_bytes_max\":{},\"stack_bytes\":{}{}}}",
+        stats.frames_in,
+        stats.frames_logged.saturating_sub(*frames_left),
+        stats.frames_lost + frames_left,
+        stats.bytes_in,
+        stats.bytes_not_frames,
+        stats.bytes_logged,
+        stats.blocks_written,
+        stats.queue_bytes_max,
+        stats.queue_bytes_capacity,
+        stats.sd_stall_ms_max,
+        stats.gs_frames,
+        stats.gs_bytes,
+        stack_used,
+        stack_all,
+        Costs(costs),
+    );
+    process::exit(0);
+}
+
+/// The member `instructions` of the report.
+struct Costs<'a>(&'a [u64]);
+
+impl core::fmt::Display for Costs<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        /// With `-icount shift=3` an instruction takes 8 ns, and `SysTick` counts 168 MHz: 168 / 125 ticks.
+        const TICKS: (u64, u64) = (168, 125);
+        if !TELL_COSTS.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        f.write_str(",\"instructions\":{")?;
+        for (index, ((_, name), ticks)) in Stage::NAMES.iter().zip(self.0).enumerate() {
+            let comma = if index == 0 { "" } else { "," };
+            write!(f, "{comma}\"{name}\":{}", ticks * TICKS.1 / TICKS.0)?;
+        }
+        f.write_str("}")
+    }
+}
+
+/// Ends the emulator and says why: the host's files are as they were, so a start anew would not be one.
+pub(crate) fn restart() -> ! {
+    if let Some(fault) = fault::take() {
+        println!("fault: {fault}");
+    }
+    process::exit(EXIT_FAULT);
+}

@@ -1,0 +1,325 @@
+//! STM32F405RG with an 8 MHz crystal: the Olimex STM32-H405 as it is, or any board with the same pins.
+//!
+//! | pin | what | remark |
+//! |---|---|---|
+//! | PA10 | USART1 RX, from the autopilot's TELEM TX | DMA2 stream 2, ring of [`RING_BYTES`] |
+//! | PA9 | USART1 TX, to the autopilot's TELEM RX | |
+//! | PA2 | USART2 TX, to the ground station's radio | DMA1 stream 6 |
+//! | PA3 | USART2 RX, from the radio | |
+//! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz |
+//! | PC12 | LED, lit when low | |
+//!
+//! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
+//! is for the checksum to find), so that not one good byte is thrown away with a bad one.
+
+use core::cell::Cell;
+
+use cortex_m::peripheral::DWT;
+use embassy_stm32::dma::{self, ReadableRingBuffer, TransferOptions};
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::mode::{Async, Blocking};
+use embassy_stm32::peripherals::{DMA1_CH6, DMA2_CH2, IWDG, RNG};
+use embassy_stm32::rng::{self, Rng};
+use embassy_stm32::spi::{self, Spi, mode::Master};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::usart::{self, UartRx, UartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, pac, rcc};
+use embassy_time::{Delay, Duration, Timer};
+use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx, SdCard, SdCardError};
+use hums_recorder::CardDevice;
+use static_cell::ConstStaticCell;
+
+use super::{Boot, Overrun, Receive, ResetCause, Transmit};
+use crate::report::Report;
+
+use defmt_rtt as _;
+
+/// The board's name.
+pub(crate) const NAME: &str = "f405";
+
+/// The crystal.
+const HSE: Hertz = Hertz(8_000_000);
+/// Baud rate of the autopilot's port; a parameter will set it.
+const AUTOPILOT_BAUD: u32 = 921_600;
+/// Baud rate of the ground station's port: the radios' usual one.
+const GS_BAUD: u32 = 57_600;
+/// 44 ms at 921,600 baud, where reception comes every millisecond: it may be kept away 40 times as long.
+const RING_BYTES: usize = 4_096;
+/// How often reception looks into the ring: the resolution of arrival times in the log.
+const FETCH_EVERY: Duration = Duration::from_millis(1);
+/// What a card must be able to take before it is identified (SD specification, 4.2.1).
+const CARD_IDENTIFICATION: Hertz = Hertz(400_000);
+/// What every card takes afterwards: default speed is 25 MHz at most, the next slower clock of this chip is 21.
+const CARD_TRANSFER: Hertz = Hertz(21_000_000);
+/// The watchdog's time. The monitor feeds it every 50 ms.
+const WATCHDOG_US: u32 = 1_000_000;
+
+bind_interrupts!(struct Irqs {
+    DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
+    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    HASH_RNG => rng::InterruptHandler<RNG>;
+});
+
+static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
+
+/// What the app gets.
+pub(crate) struct Parts {
+    pub(crate) autopilot: AutopilotRx,
+    pub(crate) gs: GsTx,
+    pub(crate) card: Card,
+    pub(crate) led: Led,
+    pub(crate) watchdog: Watchdog,
+    pub(crate) idle: Idle,
+    pub(crate) boot: Boot,
+}
+
+/// Starts clocks, ports and card. The watchdog runs from its first feeding on.
+pub(crate) fn take() -> Parts {
+    let (cause, cause_register) = reset_cause();
+    let p = embassy_stm32::init(clocks());
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+    }
+
+    let mut line = usart::Config::default();
+    line.baudrate = AUTOPILOT_BAUD;
+    let autopilot = match UartRx::new_blocking(p.USART1, p.PA10, line) {
+        Ok(port) => AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs)),
+        Err(error) => defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error)),
+    };
+    line.baudrate = GS_BAUD;
+    let gs = match UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line) {
+        Ok(port) => GsTx(port),
+        Err(error) => defmt::panic!("USART2 refuses {} baud: {}", GS_BAUD, defmt::Debug2Format(&error)),
+    };
+
+    let mut bus = spi::Config::default();
+    bus.frequency = CARD_IDENTIFICATION;
+    let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
+    let select = Output::new(p.PA4, Level::High, Speed::VeryHigh);
+    let Ok(spi) = ExclusiveDevice::new_no_delay(bus, select);
+
+    Parts {
+        autopilot,
+        gs,
+        card: Card { driver: SdCard::new(spi, Delay), identified: Cell::new(false) },
+        led: Led(Output::new(p.PC12, Level::High, Speed::Low)),
+        watchdog: Watchdog { timer: IndependentWatchdog::new(p.IWDG, WATCHDOG_US), running: false },
+        idle: Idle(()),
+        boot: Boot {
+            id: embassy_stm32::uid::uid(),
+            cause,
+            cause_register,
+            entropy: Rng::new(p.RNG, Irqs).next_u32(),
+        },
+    }
+}
+
+/// 168 MHz from the crystal: 8 / 4 * 168 / 2; the peripheral buses at 42 and 84 MHz.
+fn clocks() -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
+    config.rcc.hse = Some(rcc::Hse { freq: HSE, mode: rcc::HseMode::Oscillator });
+    config.rcc.pll_src = rcc::PllSource::HSE;
+    config.rcc.pll = Some(rcc::Pll {
+        prediv: rcc::PllPreDiv::DIV4,
+        mul: rcc::PllMul::MUL168,
+        divp: Some(rcc::PllPDiv::DIV2),
+        divq: Some(rcc::PllQDiv::DIV7),
+        divr: None,
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_P;
+    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = rcc::APBPrescaler::DIV4;
+    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
+    config
+}
+
+/// Reads why the machine started, and clears it for the next time.
+fn reset_cause() -> (ResetCause, u32) {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    // Several flags are set together; the most telling one first.
+    let cause = if flags.wdgrstf() || flags.wwdgrstf() {
+        ResetCause::Watchdog
+    } else if flags.sftrstf() {
+        ResetCause::Software
+    } else if flags.porrstf() {
+        ResetCause::PowerOn
+    } else if flags.borrstf() || flags.lpwrrstf() {
+        ResetCause::BrownOut
+    } else {
+        ResetCause::Pin
+    };
+    (cause, flags.0)
+}
+
+/// Reception of the autopilot's bytes: a DMA ring.
+pub(crate) struct AutopilotRx {
+    /// Keeps the pin and the port's clock.
+    _port: UartRx<'static, Blocking>,
+    ring: ReadableRingBuffer<'static, u8>,
+}
+
+impl AutopilotRx {
+    fn new(port: UartRx<'static, Blocking>, channel: dma::Channel<'static>) -> Self {
+        /// USART1_RX is channel 4 of DMA2's stream 2 (RM0090, table 43).
+        const USART1_RX: dma::Request = 4;
+        let from = pac::USART1.dr().as_ptr().cast::<u8>();
+        // SAFETY: `from` is the port's data register, `RING` is a static in RAM that DMA reaches and that nobody else
+        // has (it can be taken once), and the channel is owned by the ring from here on.
+        let mut ring = unsafe {
+            ReadableRingBuffer::new(channel, USART1_RX, from, RING.take(), TransferOptions::default())
+        };
+        ring.start();
+        pac::USART1.cr3().modify(|w| w.set_dmar(true));
+        Self { _port: port, ring }
+    }
+}
+
+impl Receive for AutopilotRx {
+    async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
+        loop {
+            match self.ring.read(buffer) {
+                Ok((0, _)) => Timer::after(FETCH_EVERY).await,
+                Ok((count, _)) => return Ok(count),
+                Err(_) => {
+                    self.ring.clear();
+                    return Err(Overrun);
+                }
+            }
+        }
+    }
+}
+
+/// Transmission to the ground station.
+pub(crate) struct GsTx(UartTx<'static, Async>);
+
+impl Transmit for GsTx {
+    async fn transmit(&mut self, bytes: &[u8]) {
+        if let Err(error) = self.0.write(bytes).await {
+            defmt::warn!("GS port: {}", defmt::Debug2Format(&error));
+        }
+    }
+}
+
+type CardSpi = ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, NoDelay>;
+
+/// The microSD card. Its driver waits for the card with the processor: only the least urgent task may use it.
+pub(crate) struct Card {
+    driver: SdCard<CardSpi, Delay>,
+    /// Whether the card is identified, so that the fast clock may be used.
+    identified: Cell<bool>,
+}
+
+impl Card {
+    fn set_clock(&self, frequency: Hertz) {
+        self.driver.spi(|device| {
+            let mut config = device.bus().get_current_config();
+            config.frequency = frequency;
+            // Cannot fail: both clocks are within what the bus can divide down to.
+            let _ = device.bus_mut().set_config(&config);
+        });
+    }
+
+    /// Identifies the card at the slow clock if that is still to be done.
+    fn ready(&self) -> Result<(), SdCardError> {
+        if self.identified.get() {
+            return Ok(());
+        }
+        self.set_clock(CARD_IDENTIFICATION);
+        // At least 74 clocks with the card not selected wake it up (SD specification, 6.4.1).
+        self.driver.spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10])).map_err(|_| SdCardError::Transport)?;
+        self.driver.num_bytes()?;
+        self.set_clock(CARD_TRANSFER);
+        self.identified.set(true);
+        Ok(())
+    }
+}
+
+impl BlockDevice for Card {
+    type Error = SdCardError;
+
+    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), SdCardError> {
+        self.ready()?;
+        self.driver.read(blocks, start)
+    }
+
+    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), SdCardError> {
+        self.ready()?;
+        self.driver.write(blocks, start)
+    }
+
+    fn num_blocks(&self) -> Result<BlockCount, SdCardError> {
+        self.ready()?;
+        self.driver.num_blocks()
+    }
+}
+
+impl CardDevice for Card {
+    fn reset(&self) {
+        self.driver.mark_card_uninit();
+        self.identified.set(false);
+    }
+}
+
+/// The LED.
+pub(crate) struct Led(Output<'static>);
+
+impl Led {
+    pub(crate) fn set(&mut self, lit: bool) {
+        self.0.set_level(Level::from(!lit));
+    }
+}
+
+/// The independent watchdog: its own oscillator, and once it runs nothing stops it.
+pub(crate) struct Watchdog {
+    timer: IndependentWatchdog<'static, IWDG>,
+    running: bool,
+}
+
+impl Watchdog {
+    pub(crate) fn feed(&mut self) {
+        if self.running {
+            self.timer.pet();
+        } else {
+            self.timer.unleash();
+            self.running = true;
+        }
+    }
+}
+
+/// Sleeps between interrupts.
+pub(crate) struct Idle(());
+
+impl Idle {
+    pub(crate) fn run(&mut self) -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+}
+
+/// A vehicle's input has no end: the power goes.
+pub(crate) async fn ended() {
+    core::future::pending().await
+}
+
+/// Processor cycles.
+pub(crate) fn cycles() -> u32 {
+    DWT::cycle_count()
+}
+
+/// The log is closed: the card can be pulled.
+pub(crate) fn done(report: &Report) {
+    let Report { stats, frames_left, costs, stack } = report;
+    defmt::info!("log closed: {=u64} frames in, {=u64} without a card", stats.frames_in, frames_left);
+    defmt::info!("cycles {=[u64]}, stack {}", costs, stack);
+}
+
+/// Starts anew.
+pub(crate) fn restart() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}

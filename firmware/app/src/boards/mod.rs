@@ -1,0 +1,92 @@
+//! The boards: what the app needs of a machine, and one file a board that provides it.
+//!
+//! Nothing above this module knows which board it runs on. A feature of this crate chooses it: `board-f405` the real
+//! one, `board-emulated` QEMU's `netduinoplus2`. A board module has
+//!
+//! | name | what |
+//! |---|---|
+//! | `NAME` | the board's name |
+//! | `take() -> Parts` | starts the machine; to be called once, first |
+//! | `Parts` | `autopilot` ([`Receive`]), `gs` ([`Transmit`]), `card` (`CardDevice`), `led`, `watchdog`, `idle`, `boot` ([`Boot`]) |
+//! | `Idle::run()` | what the processor does while all tasks wait; never returns |
+//! | `ended()` | waits for the end of the input; for ever on a board that flies |
+//! | `cycles()` | a free running counter of [`CYCLE_BITS`] bits, for measuring |
+//! | `done(&Report)` | the log is closed after `ended()` |
+//! | `restart()` | after a fault |
+
+#[cfg(feature = "board-emulated")]
+pub(crate) mod emulated;
+#[cfg(feature = "board-emulated")]
+pub(crate) use emulated as board;
+
+#[cfg(feature = "board-f405")]
+pub(crate) mod f405;
+#[cfg(feature = "board-f405")]
+pub(crate) use f405 as board;
+
+#[cfg(all(feature = "board-f405", feature = "board-emulated"))]
+compile_error!("one board at a time: choose `board-f405` or `board-emulated`");
+#[cfg(not(any(feature = "board-f405", feature = "board-emulated")))]
+compile_error!("no board: build with `--features board-f405` or `--features board-emulated`");
+
+/// Bits of `cycles()` that count: `SysTick` has 24, and the cycle counter is read as if it had no more.
+pub(crate) const CYCLE_BITS: u32 = 24;
+
+/// Bytes were lost before the reception task could fetch them: it came too late and the receive buffer ran over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+pub(crate) struct Overrun;
+
+/// The receiving half of a port.
+pub(crate) trait Receive {
+    /// Waits for bytes and gives as many as have come and fit, at least one. Damaged bytes are given like others: the
+    /// frame's checksum finds them.
+    async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun>;
+}
+
+/// The sending half of a port.
+pub(crate) trait Transmit {
+    /// Sends all of `bytes`; returns when the port has taken the last.
+    async fn transmit(&mut self, bytes: &[u8]);
+}
+
+/// Why the machine started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[cfg_attr(feature = "board-emulated", expect(dead_code, reason = "the emulator knows only how to be started"))]
+pub(crate) enum ResetCause {
+    /// Power came.
+    PowerOn,
+    /// The supply sagged.
+    BrownOut,
+    /// The reset button or the debugger.
+    Pin,
+    /// The firmware itself, after a fault.
+    Software,
+    /// The watchdog was not fed.
+    Watchdog,
+}
+
+impl ResetCause {
+    /// As the log names it.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::PowerOn => "power-on",
+            Self::BrownOut => "brown-out",
+            Self::Pin => "pin",
+            Self::Software => "software",
+            Self::Watchdog => "watchdog",
+        }
+    }
+}
+
+/// What is known about this machine and this start of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Boot {
+    /// The processor's own number, the same for ever.
+    pub(crate) id: [u8; 12],
+    /// Why it started.
+    pub(crate) cause: ResetCause,
+    /// The register that says so.
+    pub(crate) cause_register: u32,
+    /// Differs from one start to the next.
+    pub(crate) entropy: u32,
+}

@@ -1,0 +1,76 @@
+//! What each stage costs: cycles of the processor, or, in the emulator under `-icount`, instructions.
+//!
+//! Stages interrupt each other, so time is charged to the stage that runs: entering one stops the clock of the one it
+//! interrupts. Idle is a stage too; what it leaves of the whole is the load.
+
+use core::cell::RefCell;
+
+use critical_section::Mutex;
+
+use crate::boards::{CYCLE_BITS, board};
+
+/// The parts that are measured apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// Nothing else; also the executors and interrupts themselves.
+    Idle,
+    /// Bytes to frames.
+    Framer,
+    /// Frames to observations, health, usage and encoded sectors.
+    Monitor,
+    /// What happens by the clock: checks for silence, the summary.
+    Tick,
+    /// Sectors to the card.
+    Storage,
+}
+
+/// Number of stages.
+pub(crate) const STAGES: usize = 5;
+
+impl Stage {
+    /// All of them, in the order of [`totals`], with their names.
+    pub(crate) const NAMES: [(Self, &str); STAGES] = [
+        (Self::Idle, "idle"),
+        (Self::Framer, "framer"),
+        (Self::Monitor, "monitor"),
+        (Self::Tick, "tick"),
+        (Self::Storage, "storage"),
+    ];
+}
+
+struct Meter {
+    current: Stage,
+    since: u32,
+    totals: [u64; STAGES],
+}
+
+static METER: Mutex<RefCell<Meter>> =
+    Mutex::new(RefCell::new(Meter { current: Stage::Idle, since: 0, totals: [0; STAGES] }));
+
+/// Runs `work` on the account of `stage`. Longer than 2^24 cycles (0.1 s) in one go counts modulo that.
+pub(crate) fn measure<R>(stage: Stage, work: impl FnOnce() -> R) -> R {
+    let interrupted = switch_to(stage);
+    let result = work();
+    switch_to(interrupted);
+    result
+}
+
+/// Cycles of each stage since power-on, in the order of [`Stage::NAMES`].
+pub(crate) fn totals() -> [u64; STAGES] {
+    critical_section::with(|cs| METER.borrow_ref(cs).totals)
+}
+
+fn switch_to(stage: Stage) -> Stage {
+    critical_section::with(|cs| {
+        let mut meter = METER.borrow_ref_mut(cs);
+        let now = board::cycles();
+        let spent = now.wrapping_sub(meter.since) & ((1 << CYCLE_BITS) - 1);
+        meter.since = now;
+        let before = meter.current;
+        meter.current = stage;
+        if let Some(total) = meter.totals.get_mut(before as usize) {
+            *total = total.wrapping_add(u64::from(spent));
+        }
+        before
+    })
+}

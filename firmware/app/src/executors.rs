@@ -1,0 +1,97 @@
+//! Who may interrupt whom. One executor a task, each on an interrupt that the board does not use otherwise; thread mode
+//! is idle, and runs only when every task waits.
+//!
+//! | urgency | what | why |
+//! |---|---|---|
+//! | 1 | the port's interrupts | moves bytes, microseconds |
+//! | 2 | the clock's interrupt | wakes tasks |
+//! | 3 | reception | the ring holds 44 ms |
+//! | 5 | monitor | the frame queue holds 80 ms |
+//! | 7 | downlink | an alert has 50 ms |
+//! | 9 | storage | the sector queue holds 2.5 s; its library waits for the card with the processor |
+
+use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::scb::VectActive;
+use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+
+static RECEPTION: InterruptExecutor = InterruptExecutor::new();
+static MONITOR: InterruptExecutor = InterruptExecutor::new();
+static DOWNLINK: InterruptExecutor = InterruptExecutor::new();
+static STORAGE: InterruptExecutor = InterruptExecutor::new();
+
+/// Where to spawn each task.
+pub(crate) struct Spawners {
+    pub(crate) reception: SendSpawner,
+    pub(crate) monitor: SendSpawner,
+    pub(crate) downlink: SendSpawner,
+    pub(crate) storage: SendSpawner,
+}
+
+/// Starts all executors. To be called once.
+pub(crate) fn start() -> Spawners {
+    interrupt::USART1.set_priority(Priority::P1);
+    interrupt::DMA2_STREAM2.set_priority(Priority::P1);
+    interrupt::DMA1_STREAM6.set_priority(Priority::P1);
+    interrupt::TIM2.set_priority(Priority::P2);
+    interrupt::CAN1_TX.set_priority(Priority::P3);
+    interrupt::CAN1_RX0.set_priority(Priority::P5);
+    interrupt::CAN1_RX1.set_priority(Priority::P7);
+    interrupt::CAN1_SCE.set_priority(Priority::P9);
+    Spawners {
+        reception: RECEPTION.start(interrupt::CAN1_TX),
+        monitor: MONITOR.start(interrupt::CAN1_RX0),
+        downlink: DOWNLINK.start(interrupt::CAN1_RX1),
+        storage: STORAGE.start(interrupt::CAN1_SCE),
+    }
+}
+
+/// The number of the exception that runs; 0 is thread mode.
+pub(crate) fn running() -> u16 {
+    match SCB::vect_active() {
+        VectActive::ThreadMode => 0,
+        VectActive::Exception(exception) => (16 + i16::from(exception.irqn())) as u16,
+        VectActive::Interrupt { irqn } => 16 + u16::from(irqn),
+    }
+}
+
+/// What runs as an exception, by its number.
+pub(crate) fn task_of(number: u16) -> &'static str {
+    const NAMES: [(interrupt::Interrupt, &str); 4] = [
+        (interrupt::CAN1_TX, "reception"),
+        (interrupt::CAN1_RX0, "monitor"),
+        (interrupt::CAN1_RX1, "downlink"),
+        (interrupt::CAN1_SCE, "storage"),
+    ];
+    match number {
+        0 => "idle",
+        1..16 => "exception",
+        _ => NAMES
+            .into_iter()
+            .find(|(interrupt, _)| 16 + *interrupt as u16 == number)
+            .map_or("interrupt", |(_, name)| name),
+    }
+}
+
+// SAFETY (all four): only the interrupt that the executor was started with calls it, and that interrupt is unmasked by
+// its start.
+#[interrupt]
+unsafe fn CAN1_TX() {
+    unsafe { RECEPTION.on_interrupt() }
+}
+
+#[interrupt]
+unsafe fn CAN1_RX0() {
+    unsafe { MONITOR.on_interrupt() }
+}
+
+#[interrupt]
+unsafe fn CAN1_RX1() {
+    unsafe { DOWNLINK.on_interrupt() }
+}
+
+#[interrupt]
+unsafe fn CAN1_SCE() {
+    unsafe { STORAGE.on_interrupt() }
+}

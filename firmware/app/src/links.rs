@@ -1,0 +1,33 @@
+//! Who wakes whom. The data itself goes through the queues of `hums_onboard::queues`; a signal only says «look».
+//! Signals coalesce, so nobody waits to give one.
+
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use hums_core::time::Instant;
+
+type Link<T = ()> = Signal<CriticalSectionRawMutex, T>;
+
+/// Reception to monitor: there may be frames.
+pub(crate) static FRAMES: Link = Signal::new();
+/// Monitor to storage: there may be sectors, or the end of them.
+pub(crate) static SECTORS: Link = Signal::new();
+/// Monitor to downlink: there may be frames for the ground station.
+pub(crate) static GS: Link = Signal::new();
+/// Reception to monitor: the input has ended, its last frame is queued.
+pub(crate) static INPUT_ENDED: Link = Signal::new();
+/// Monitor to storage: the last sector is queued. Looked at, not waited for: `SECTORS` wakes.
+pub(crate) static RECORD_ENDED: Link = Signal::new();
+/// Storage to monitor: the log is closed; how many frames found no card.
+pub(crate) static LOG_CLOSED: Link<u64> = Signal::new();
+/// Downlink to monitor: everything is sent.
+pub(crate) static GS_EMPTY: Link = Signal::new();
+
+/// The board's clock, as everything below the app counts time.
+pub(crate) fn now() -> Instant {
+    Instant::from_micros(embassy_time::Instant::now().as_micros())
+}
+
+/// A span of ours as the executor counts time.
+pub(crate) const fn wait(span: hums_core::time::Span) -> embassy_time::Duration {
+    embassy_time::Duration::from_micros(span.as_micros())
+}

@@ -1,0 +1,112 @@
+//! Monitor: frames to records, findings and the summary. Also the one that feeds the watchdog, because it goes round
+//! every 50 ms whatever happens, and the one that works the LED.
+
+use embassy_futures::select::{Either3, select3};
+use embassy_time::Ticker;
+use hums_onboard::monitoring::{Monitoring, TICK};
+use hums_onboard::queues::{FramesOut, GsIn, SectorsIn};
+use hums_onboard::Task;
+use hums_recorder::CardState;
+
+use super::{CARD_STATUS, SUPERVISOR};
+use crate::boards::board;
+use crate::costs::{self, Stage, measure};
+use crate::fault::{self, Fault};
+use crate::links::{self, now};
+use crate::memory;
+use crate::report::Report;
+
+/// Ticks of one half of the LED's blinking while the card records: 0.5 s.
+const BLINK_RECORDING: u32 = 10;
+/// The same while it does not: 0.1 s.
+const BLINK_TROUBLE: u32 = 2;
+
+/// The monitor's ends of the queues.
+pub(crate) struct Ends {
+    pub(crate) frames: FramesOut<'static>,
+    pub(crate) sectors: SectorsIn<'static>,
+    pub(crate) gs: GsIn<'static>,
+}
+
+#[embassy_executor::task]
+pub(crate) async fn run(
+    body: &'static mut Monitoring<'static>,
+    mut ends: Ends,
+    fault: Option<Fault>,
+    mut watchdog: board::Watchdog,
+    mut led: board::Led,
+) -> ! {
+    body.start(now(), &mut ends.sectors);
+    if let Some(fault) = fault {
+        body.fault(now(), &fault.record(), &mut ends.sectors);
+    }
+    wake_others();
+    let mut ticker = Ticker::every(links::wait(TICK));
+    let mut ticks: u32 = 0;
+    loop {
+        SUPERVISOR.report(Task::Monitor, now());
+        // Frames first where both are due: they came before this tick.
+        match select3(links::FRAMES.wait(), ticker.next(), links::INPUT_ENDED.wait()).await {
+            Either3::First(()) => drain(body, &mut ends),
+            Either3::Second(()) => {
+                tick(body, &mut ends);
+                ticks = ticks.wrapping_add(1);
+                led.set(lit(ticks));
+                match SUPERVISOR.silent(now()) {
+                    None => watchdog.feed(),
+                    // Not fed: the watchdog does what is to be done.
+                    Some(task) => fault::silent(task),
+                }
+            }
+            Either3::Third(()) => break,
+        }
+        wake_others();
+    }
+    drain(body, &mut ends);
+    body.finish(now(), &mut ends.sectors, &ends.gs);
+    links::RECORD_ENDED.signal(());
+    links::GS_EMPTY.reset();
+    wake_others();
+    let frames_left = links::LOG_CLOSED.wait().await;
+    links::GS_EMPTY.wait().await;
+    let stats = body.stats(&ends.gs);
+    board::done(&Report { stats, frames_left, costs: costs::totals(), stack: memory::stack_used() });
+    loop {
+        core::future::pending::<()>().await;
+    }
+}
+
+fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
+    let Ends { frames, sectors, gs } = ends;
+    while measure(Stage::Monitor, || body.drain(frames, sectors, gs)) {}
+}
+
+fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {
+    let Ends { sectors, gs, .. } = ends;
+    measure(Stage::Tick, || {
+        body.tick(now(), sectors, gs, &mut |finding| {
+            defmt::info!(
+                "{=str} {=str} {=str} {=f32} {=str}",
+                finding.subsystem.name(),
+                finding.check,
+                finding.level.name(),
+                finding.value,
+                finding.unit
+            );
+        });
+    });
+}
+
+fn wake_others() {
+    links::GS.signal(());
+    links::SECTORS.signal(());
+}
+
+/// Slow blinking: recording. Fast: no card, or one that cannot be used.
+fn lit(ticks: u32) -> bool {
+    let half = match CARD_STATUS.read().state {
+        CardState::Recording => BLINK_RECORDING,
+        _ => BLINK_TROUBLE,
+    };
+    (ticks / half).is_multiple_of(2)
+}

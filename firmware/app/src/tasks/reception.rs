@@ -1,0 +1,41 @@
+//! Reception: the autopilot's bytes to frames. The most urgent task, because bytes wait nowhere but in the port's ring.
+
+use embassy_futures::select::{Either, select};
+use embassy_time::with_timeout;
+use hums_onboard::queues::FramesIn;
+use hums_onboard::reception::{Reception, SILENCE};
+use hums_onboard::Task;
+
+use super::{PORT_STATUS, SUPERVISOR};
+use crate::boards::{Receive, board};
+use crate::costs::{Stage, measure};
+use crate::links::{self, now};
+
+/// Bytes fetched at a time: 22 ms at 921,600 baud, half of the port's ring.
+pub(crate) const FETCH_BYTES: usize = 2_048;
+
+#[embassy_executor::task]
+pub(crate) async fn run(mut port: board::AutopilotRx, mut frames: FramesIn<'static>) -> ! {
+    let mut body = Reception::new(&PORT_STATUS);
+    let mut bytes = [0; FETCH_BYTES];
+    loop {
+        SUPERVISOR.report(Task::Reception, now());
+        let received = with_timeout(links::wait(SILENCE), port.receive(&mut bytes));
+        match select(received, board::ended()).await {
+            Either::First(Ok(Ok(count))) => {
+                let bytes = bytes.get(..count).unwrap_or_default();
+                measure(Stage::Framer, || body.bytes(now(), bytes, &mut frames));
+            }
+            Either::First(Ok(Err(_overrun))) => PORT_STATUS.count_overrun(),
+            Either::First(Err(_silence)) => body.idle(now(), &mut frames),
+            Either::Second(()) => break,
+        }
+        links::FRAMES.signal(());
+    }
+    body.idle(now(), &mut frames);
+    links::INPUT_ENDED.signal(());
+    loop {
+        // The supervisor is not asked any more.
+        core::future::pending::<()>().await;
+    }
+}

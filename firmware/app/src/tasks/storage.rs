@@ -1,0 +1,55 @@
+//! Storage: sectors onto the card. The least urgent task: the card's driver waits with the processor, and so may delay
+//! nobody but idle.
+
+use embassy_time::{Duration, Timer, with_timeout};
+use hums_core::time::Span;
+use hums_onboard::queues::SectorsOut;
+use hums_onboard::storage::NO_CARD_RETRY;
+use hums_onboard::{Service, Storage, Task};
+
+use super::{CARD_STATUS, SUPERVISOR};
+use crate::boards::board;
+use crate::costs::{Stage, measure};
+use crate::links::{self, now};
+
+/// How often it reports in while there is nothing to write.
+const REPORT: Duration = Duration::from_secs(1);
+/// How long the end waits for a card that is out, before what waits for it is lost.
+const CARD_PATIENCE: Span = Span::from_secs(5);
+
+#[embassy_executor::task]
+pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut<'static>) -> ! {
+    let mut body = Storage::new(card, &CARD_STATUS, entropy);
+    let mut ended_at = None;
+    loop {
+        SUPERVISOR.report(Task::Storage, now());
+        let begun = now();
+        let service = measure(Stage::Storage, || body.service(begun, &mut sectors));
+        CARD_STATUS.note_stall_ms(now().since(begun).as_millis() as u32);
+        if ended_at.is_none() && links::RECORD_ENDED.signaled() {
+            ended_at = Some(begun);
+        }
+        match service {
+            Service::Wrote => {}
+            Service::Idle if !sectors.is_empty() => {}
+            Service::Idle if ended_at.is_some() => break,
+            Service::Idle => wait_for_work(&sectors).await,
+            Service::NoCard if ended_at.is_some_and(|at| now().since(at) > CARD_PATIENCE) => break,
+            Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
+        }
+    }
+    body.finish();
+    links::LOG_CLOSED.signal(sectors.abandon());
+    loop {
+        core::future::pending::<()>().await;
+    }
+}
+
+/// Returns when there is a sector, or no more to come.
+async fn wait_for_work(sectors: &SectorsOut<'_>) {
+    while sectors.is_empty() && !links::RECORD_ENDED.signaled() {
+        SUPERVISOR.report(Task::Storage, now());
+        // Either way it looks again.
+        let _ = with_timeout(REPORT, links::SECTORS.wait()).await;
+    }
+}

@@ -1,0 +1,151 @@
+//! A MAVLink frame taken apart and put together again. What does not come out as it went in is no frame here and is
+//! coded as plain bytes.
+
+use super::FRAME_BYTES_MAX;
+
+pub(crate) const PAYLOAD_BYTES_MAX: usize = 255;
+pub(crate) const SIGNATURE_BYTES: usize = 13;
+const MAGIC_V1: u8 = 0xfe;
+const MAGIC_V2: u8 = 0xfd;
+/// The incompatibility flag of a signed frame.
+const SIGNED: u8 = 1;
+
+/// A frame's parts.
+pub(crate) struct Frame {
+    pub(crate) v2: bool,
+    pub(crate) incompat: u8,
+    pub(crate) compat: u8,
+    pub(crate) sequence: u8,
+    pub(crate) system: u8,
+    pub(crate) component: u8,
+    pub(crate) id: u32,
+    pub(crate) len: usize,
+    /// Zeros beyond `len`; room to read the widest element anywhere.
+    pub(crate) payload: [u8; PAYLOAD_BYTES_MAX + 9],
+    pub(crate) checksum: u16,
+    pub(crate) signature: [u8; SIGNATURE_BYTES],
+}
+
+impl Frame {
+    pub(crate) const fn empty() -> Self {
+        Self {
+            v2: true,
+            incompat: 0,
+            compat: 0,
+            sequence: 0,
+            system: 0,
+            component: 0,
+            id: 0,
+            len: 0,
+            payload: [0; PAYLOAD_BYTES_MAX + 9],
+            checksum: 0,
+            signature: [0; SIGNATURE_BYTES],
+        }
+    }
+
+    pub(crate) const fn signed(&self) -> bool {
+        self.v2 && self.incompat & SIGNED != 0
+    }
+
+    /// Takes a frame apart; `None` where the bytes are not exactly one.
+    pub(crate) fn parse(bytes: &[u8]) -> Option<Self> {
+        let mut frame = Self::empty();
+        let rest;
+        match *bytes {
+            [MAGIC_V1, len, sequence, system, component, id, ref tail @ ..] => {
+                frame.v2 = false;
+                (frame.len, frame.sequence) = (usize::from(len), sequence);
+                (frame.system, frame.component, frame.id) = (system, component, u32::from(id));
+                rest = tail;
+            }
+            [MAGIC_V2, len, incompat, compat, sequence, system, component, a, b, c, ref tail @ ..] => {
+                (frame.incompat, frame.compat) = (incompat, compat);
+                (frame.len, frame.sequence) = (usize::from(len), sequence);
+                (frame.system, frame.component, frame.id) =
+                    (system, component, u32::from_le_bytes([a, b, c, 0]));
+                rest = tail;
+            }
+            _ => return None,
+        }
+        let (payload, rest) = rest.split_at_checked(frame.len)?;
+        frame.payload[..frame.len].copy_from_slice(payload);
+        let (checksum, signature) = rest.split_first_chunk()?;
+        frame.checksum = u16::from_le_bytes(*checksum);
+        if frame.signed() {
+            frame.signature = *signature.as_array()?;
+        } else if !signature.is_empty() {
+            return None;
+        }
+        Some(frame)
+    }
+
+    /// Puts the frame together; gives its length.
+    pub(crate) fn assemble(&self, out: &mut [u8; FRAME_BYTES_MAX]) -> usize {
+        let head = self.head();
+        let head = &head[..if self.v2 { 10 } else { 6 }];
+        let payload = &self.payload[..self.len.min(PAYLOAD_BYTES_MAX)];
+        let signature: &[u8] = if self.signed() { &self.signature } else { &[] };
+        let mut at = 0;
+        for part in [head, payload, &self.checksum.to_le_bytes(), signature] {
+            out[at..at + part.len()].copy_from_slice(part);
+            at += part.len();
+        }
+        at
+    }
+
+    fn head(&self) -> [u8; 10] {
+        let [a, b, c, _] = self.id.to_le_bytes();
+        let len = self.len as u8;
+        if self.v2 {
+            let (incompat, compat) = (self.incompat, self.compat);
+            [MAGIC_V2, len, incompat, compat, self.sequence, self.system, self.component, a, b, c]
+        } else {
+            [MAGIC_V1, len, self.sequence, self.system, self.component, a, 0, 0, 0, 0]
+        }
+    }
+
+    /// The checksum before the seed goes in: CRC-16/MCRF4XX over header and payload.
+    pub(crate) fn checksum_before_seed(&self) -> u16 {
+        let head = self.head();
+        let head = &head[1..if self.v2 { 10 } else { 6 }];
+        let payload = &self.payload[..self.len.min(PAYLOAD_BYTES_MAX)];
+        head.iter().chain(payload).fold(0xffff, |crc, &byte| crc_add(crc, byte))
+    }
+
+    /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it.
+    pub(crate) fn trimmed(&self, full: usize) -> usize {
+        let payload = &self.payload[..full.min(PAYLOAD_BYTES_MAX)];
+        payload.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1)
+    }
+}
+
+pub(crate) const fn crc_add(crc: u16, byte: u8) -> u16 {
+    let mut x = byte ^ crc as u8;
+    x ^= x << 4;
+    let x = x as u16;
+    (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
+}
+
+/// The seed that turns `before` into `checksum`, if there is one.
+pub(crate) fn seed_for(before: u16, checksum: u16) -> Option<u8> {
+    // The low byte of `before` only changes which seed it is; try what the high byte allows.
+    (0..=u8::MAX).find(|&seed| crc_add(before, seed) == checksum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_come_apart_and_together() {
+        let heartbeat = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
+        let frame = Frame::parse(&heartbeat).expect("a frame");
+        assert_eq!(crc_add(frame.checksum_before_seed(), 50), frame.checksum);
+        assert_eq!(seed_for(frame.checksum_before_seed(), frame.checksum), Some(50));
+        let mut out = [0; FRAME_BYTES_MAX];
+        let len = frame.assemble(&mut out);
+        assert_eq!(&out[..len], heartbeat);
+        assert!(Frame::parse(&heartbeat[..16]).is_none());
+        assert!(Frame::parse(&[0xfd; 12]).is_none());
+    }
+}

@@ -1,0 +1,302 @@
+//! Slots: each stream of one message from one sender (and one instance, where the message tells several apart). A
+//! slot remembers what its last frame looked like, and which slot came after which.
+
+use super::links;
+use crate::coder::{Cdf, Cell, Coder};
+use crate::layouts::{Layout, Place};
+
+/// Slots at most. What comes beyond is coded as plain bytes.
+pub(crate) const SLOTS: usize = 112;
+
+/// Senders (system, component) at most.
+pub(crate) const SENDERS: usize = 16;
+
+/// The longest instance field: a name of 10 characters.
+pub(crate) const INSTANCE_BYTES: usize = 10;
+
+/// What names a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Key {
+    pub(crate) id: u32,
+    pub(crate) v2: bool,
+    pub(crate) sender: u8,
+    pub(crate) instance: [u8; INSTANCE_BYTES],
+}
+
+/// How a slot's frames get their length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Length {
+    /// Without the zeros at the end.
+    Trimmed,
+    /// As the last one.
+    Fixed(u8),
+}
+
+/// One slot.
+#[derive(Clone, Copy)]
+pub(crate) struct Slot {
+    pub(crate) key: Key,
+    pub(crate) layout: Option<Place>,
+    /// Its first element.
+    pub(crate) elements: u16,
+    /// The distribution of the times before its frames; 0: none yet.
+    pub(crate) times: u16,
+    pub(crate) at_ms: u32,
+    pub(crate) seed: u8,
+    pub(crate) verified: bool,
+    pub(crate) incompat: u8,
+    pub(crate) compat: u8,
+    pub(crate) length: Length,
+    /// Payload bytes that the layout describes.
+    pub(crate) described: u8,
+    /// How the header of its last frame was coded.
+    pub(crate) header: u8,
+    pub(crate) links: u8,
+    /// Whether the quiet elements stayed as they are.
+    pub(crate) calm: Cell,
+    /// Frames so far, up to 255.
+    pub(crate) frames: u8,
+    /// The slots that followed last, the latest first; `NONE`.
+    next: [u8; 2],
+}
+
+pub(crate) const NONE: u8 = u8::MAX;
+
+impl Slot {
+    const NEW: Self = Self {
+        key: Key { id: 0, v2: false, sender: 0, instance: [0; INSTANCE_BYTES] },
+        layout: None,
+        elements: 0,
+        times: 0,
+        at_ms: 0,
+        seed: 0,
+        verified: true,
+        incompat: 0,
+        compat: 0,
+        length: Length::Trimmed,
+        described: 0,
+        header: 0,
+        links: 0,
+        calm: Cell::EVEN,
+        frames: 0,
+        next: [NONE; 2],
+    };
+
+    /// A slot before its first frame.
+    pub(crate) fn new(
+        key: Key,
+        place: Option<Place>,
+        layout: Option<Layout>,
+        elements: u16,
+        described: usize,
+    ) -> Self {
+        let len_base = layout.map_or(0, Layout::len_base);
+        Self {
+            key,
+            layout: place,
+            elements,
+            described: described as u8,
+            seed: layout.map_or(0, Layout::crc_extra),
+            verified: layout.is_some(),
+            length: if key.v2 && layout.is_some() { Length::Trimmed } else { Length::Fixed(len_base as u8) },
+            links: links::first(key.id),
+            ..Self::NEW
+        }
+    }
+}
+
+/// A sender's state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sender {
+    pub(crate) system: u8,
+    pub(crate) component: u8,
+    /// The next frame's sequence number.
+    pub(crate) sequence: u8,
+    pub(crate) signature_link: u8,
+    pub(crate) signature_time: u64,
+}
+
+/// What comes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Next {
+    Slot(u8),
+    NewSlot,
+    Plain,
+    Record,
+}
+
+const FIRST_GUESS: usize = 0;
+const SECOND_GUESS: usize = 1;
+const OTHER_SLOT: usize = 2;
+const NEW_SLOT: usize = 3;
+const PLAIN: usize = 4;
+const RECORD: usize = 5;
+
+/// Successions of three and of two slots, hashed.
+const ORDER_3: usize = 512;
+const ORDER_2: usize = 256;
+
+/// A guess and how often it was right in a row, up to 3.
+#[derive(Clone, Copy)]
+struct Guess {
+    slot: u8,
+    sure: u8,
+}
+
+const NO_GUESS: Guess = Guess { slot: NONE, sure: 0 };
+
+/// All slots and senders, and the order in which they speak.
+pub(crate) struct Slots {
+    pub(crate) list: [Slot; SLOTS],
+    used: u8,
+    pub(crate) senders: [Sender; SENDERS],
+    senders_used: u8,
+    order_3: [Guess; ORDER_3],
+    order_2: [Guess; ORDER_2],
+    /// The last three slots, the latest first.
+    past: [u8; 3],
+    kind: [Cdf; 16],
+    high: Cdf,
+    low: [Cdf; SLOTS / 16],
+}
+
+impl Slots {
+    pub(crate) const fn new() -> Self {
+        Self {
+            list: [Slot::NEW; SLOTS],
+            used: 0,
+            senders: [Sender { system: 0, component: 0, sequence: 0, signature_link: 0, signature_time: 0 };
+                SENDERS],
+            senders_used: 0,
+            order_3: [NO_GUESS; ORDER_3],
+            order_2: [NO_GUESS; ORDER_2],
+            past: [NONE; 3],
+            kind: [KIND; 16],
+            high: Cdf::FLAT,
+            low: [Cdf::FLAT; SLOTS / 16],
+        }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        self.used = 0;
+        self.senders_used = 0;
+        self.order_3 = [NO_GUESS; ORDER_3];
+        self.order_2 = [NO_GUESS; ORDER_2];
+        self.past = [NONE; 3];
+        self.kind = [KIND; 16];
+        self.high = Cdf::FLAT;
+        self.low = [Cdf::FLAT; SLOTS / 16];
+    }
+
+    /// The sender's number; a new one where there is room.
+    pub(crate) fn sender(&mut self, system: u8, component: u8) -> Option<u8> {
+        let used = usize::from(self.senders_used);
+        let known = self.senders.get(..used)?;
+        let found = known.iter().position(|s| s.system == system && s.component == component);
+        if let Some(found) = found {
+            return Some(found as u8);
+        }
+        let place = self.senders.get_mut(used)?;
+        *place = Sender { system, component, sequence: 0, signature_link: 0, signature_time: 0 };
+        self.senders_used += 1;
+        Some(used as u8)
+    }
+
+    /// Whether a further slot fits.
+    pub(crate) fn has_room(&self) -> bool {
+        usize::from(self.used) < SLOTS
+    }
+
+    /// The slot of this key, guessed ones first.
+    pub(crate) fn find(&self, key: &Key) -> Option<u8> {
+        let (first, second, _) = self.guesses();
+        let known = self.list.get(..usize::from(self.used))?;
+        for guess in [first, second] {
+            if known.get(usize::from(guess)).is_some_and(|slot| slot.key == *key) {
+                return Some(guess);
+            }
+        }
+        known.iter().position(|slot| slot.key == *key).map(|index| index as u8)
+    }
+
+    pub(crate) fn add(&mut self, slot: Slot) -> Option<u8> {
+        let place = self.list.get_mut(usize::from(self.used))?;
+        *place = slot;
+        self.used += 1;
+        Some(self.used - 1)
+    }
+
+    fn places(&self) -> (usize, usize) {
+        let [a, b, c] = self.past.map(u32::from);
+        let two = (a << 8 | b).wrapping_mul(0x9e37_79b1);
+        let three = (a << 16 | b << 8 | c).wrapping_mul(0x85eb_ca6b);
+        (three as usize >> 16 & (ORDER_3 - 1), two as usize >> 16 & (ORDER_2 - 1))
+    }
+
+    /// The two slots that are likeliest to come, and how sure the first one is.
+    fn guesses(&self) -> (u8, u8, usize) {
+        let (three, two) = self.places();
+        let (three, two) = (self.order_3[three], self.order_2[two]);
+        let one = self.list.get(usize::from(self.past[0])).map_or([NONE; 2], |slot| slot.next);
+        let (first, sure) = if three.slot != NONE {
+            (three.slot, 4 + usize::from(three.sure))
+        } else if two.slot != NONE {
+            (two.slot, 8 + usize::from(two.sure))
+        } else {
+            (one[0], if one[0] == NONE { 0 } else { 1 })
+        };
+        let second = [two.slot, one[0], one[1]].into_iter().find(|&slot| slot != first && slot != NONE);
+        // All three agree: an own context.
+        let agree = first == two.slot && first == one[0];
+        (first, second.unwrap_or(NONE), if agree && sure >= 7 { 12 + (sure & 3) } else { sure })
+    }
+
+    /// Codes what comes next.
+    pub(crate) fn next<C: Coder>(&mut self, coder: &mut C, next: Next) -> Option<Next> {
+        let (first, second, context) = self.guesses();
+        let symbol = match next {
+            Next::Slot(slot) if slot == first => FIRST_GUESS,
+            Next::Slot(slot) if slot == second => SECOND_GUESS,
+            Next::Slot(_) => OTHER_SLOT,
+            Next::NewSlot => NEW_SLOT,
+            Next::Plain => PLAIN,
+            Next::Record => RECORD,
+        };
+        let symbol = coder.symbol(&mut self.kind[context.min(15)], symbol);
+        let slot = match symbol {
+            FIRST_GUESS => first,
+            SECOND_GUESS => second,
+            OTHER_SLOT => {
+                let slot = if let Next::Slot(slot) = next { usize::from(slot) } else { 0 };
+                let high = coder.symbol(&mut self.high, slot >> 4);
+                let low = coder.symbol(self.low.get_mut(high)?, slot & 15);
+                (high << 4 | low) as u8
+            }
+            NEW_SLOT => return Some(Next::NewSlot),
+            PLAIN => return Some(Next::Plain),
+            RECORD => return Some(Next::Record),
+            _ => return None,
+        };
+        (slot < self.used).then_some(Next::Slot(slot))
+    }
+
+    /// Remembers that this slot came.
+    pub(crate) fn passed(&mut self, slot: u8) {
+        let (three, two) = self.places();
+        for guess in [&mut self.order_3[three], &mut self.order_2[two]] {
+            if guess.slot == slot {
+                guess.sure = (guess.sure + 1).min(3);
+            } else {
+                *guess = Guess { slot, sure: 0 };
+            }
+        }
+        if let Some(last) = self.list.get_mut(usize::from(self.past[0]))
+            && last.next[0] != slot
+        {
+            last.next = [slot, last.next[0]];
+        }
+        self.past = [slot, self.past[0], self.past[1]];
+    }
+}
+
+const KIND: Cdf = Cdf::from_sizes([60, 12, 12, 8, 1, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);

@@ -1,0 +1,87 @@
+//! A card in memory.
+// Each test file uses its own part of this.
+#![allow(dead_code, missing_docs, unreachable_pub)]
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_recorder::CardDevice;
+use hums_recorder::format::format;
+
+/// Blocks of a mebibyte.
+pub const MIB_BLOCKS: u32 = 2048;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Broken;
+
+impl std::fmt::Display for Broken {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("broken")
+    }
+}
+
+impl std::error::Error for Broken {}
+
+pub type Blocks = BTreeMap<u32, [u8; 512]>;
+
+type Write = (u32, [u8; 512]);
+
+/// A sparse card that keeps a journal of its writes.
+#[derive(Clone)]
+pub struct MemCard {
+    pub size: u32,
+    pub blocks: Rc<RefCell<Blocks>>,
+    pub journal: Rc<RefCell<Vec<Write>>>,
+    pub broken: Rc<Cell<bool>>,
+}
+
+impl MemCard {
+    pub fn new(size: u32) -> Self {
+        Self::with(size, Blocks::new())
+    }
+
+    pub fn with(size: u32, blocks: Blocks) -> Self {
+        let blocks = Rc::new(RefCell::new(blocks));
+        Self { size, blocks, journal: Rc::default(), broken: Rc::default() }
+    }
+
+    pub fn formatted(size: u32) -> Self {
+        let card = Self::new(size);
+        format(&card, 0x1234_5678).expect("a card of this size can be formatted");
+        card.journal.borrow_mut().clear();
+        card
+    }
+}
+
+impl BlockDevice for MemCard {
+    type Error = Broken;
+
+    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Broken> {
+        for (at, block) in (start.0..).zip(blocks) {
+            if self.broken.get() || at >= self.size {
+                return Err(Broken);
+            }
+            block.contents = self.blocks.borrow().get(&at).copied().unwrap_or([0; 512]);
+        }
+        Ok(())
+    }
+
+    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), Broken> {
+        for (at, block) in (start.0..).zip(blocks) {
+            if self.broken.get() || at >= self.size {
+                return Err(Broken);
+            }
+            self.journal.borrow_mut().push((at, block.contents));
+            self.blocks.borrow_mut().insert(at, block.contents);
+        }
+        Ok(())
+    }
+
+    fn num_blocks(&self) -> Result<BlockCount, Broken> {
+        Ok(BlockCount(self.size))
+    }
+}
+
+impl CardDevice for MemCard {}

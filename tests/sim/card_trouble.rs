@@ -1,0 +1,95 @@
+//! A card that is missing, full, slow or failing costs at most counted frames.
+
+use hums_tests::fat;
+use hums_tests::flights::{Manifest, own};
+use hums_tests::program::{Decoded, Machine, Recording};
+
+const FLIGHT: &str = "px4_hil_quad_low.tlog";
+
+/// Records with these flags and expects that each frame is either in the log or counted as lost, and that what is in the
+/// log is the flight's, in its order.
+#[track_caller]
+fn assert_accounted(flags: &[&str]) -> (Recording, u64) {
+    let recording = Recording::attempt(Machine::Sim, &own(FLIGHT), flags).expect_code(&[0, 3]);
+    let manifest = Manifest::own();
+    let frames_in = recording.number("frames_in");
+    assert_eq!(frames_in, manifest.found(&own(FLIGHT)).frames, "the port goes on whatever the card does");
+    let (logged, lost) = (recording.number("frames_logged"), recording.number("frames_lost"));
+    assert_eq!(logged + lost, frames_in, "each frame is logged or counted as lost");
+    let expected_code = if lost == 0 { 0 } else { 3 };
+    assert_eq!(recording.outcome.code, Some(expected_code), "{lost} frames lost");
+
+    let data = std::fs::read(own(FLIGHT)).unwrap();
+    let mut originals = manifest.frames_of(&own(FLIGHT), &data).into_iter();
+    let decoded = Decoded::of(&recording.image(), &[0, 1, 3]);
+    let output = decoded.frames(&manifest.seeds);
+    assert!(
+        output.iter().all(|frame| originals.any(|original| original.bytes == frame.bytes)),
+        "a foreign frame"
+    );
+    assert_eq!(output.len() as u64, logged, "frames in the log");
+    (recording, lost)
+}
+
+#[test]
+fn a_card_that_is_missing_throughout_loses_counted_frames_and_no_more() {
+    let recording =
+        Recording::attempt(Machine::Sim, &own(FLIGHT), &["--card-out", "0..100000"]).expect_code(&[3]);
+    let frames = Manifest::own().found(&own(FLIGHT)).frames;
+    assert_eq!(recording.number("frames_in"), frames);
+    assert_eq!((recording.number("frames_logged"), recording.number("frames_lost")), (0, frames));
+    assert!(recording.number("gs_frames") > 100, "the ground station is served all the same");
+}
+
+#[test]
+fn a_card_that_comes_late_gets_the_rest() {
+    let (recording, lost) = assert_accounted(&["--card-out", "0..60", "--card-size", "64"]);
+    assert!(lost > 0 && recording.number("frames_logged") > 0);
+    fat::assert_clean(&recording.image());
+}
+
+#[test]
+fn a_card_that_is_taken_out_and_put_back_misses_only_that_time() {
+    let (recording, lost) = assert_accounted(&["--card-out", "100..130", "--card-size", "64"]);
+    let frames = recording.number("frames_in");
+    assert!(lost > 0 && lost < frames / 2, "{lost} of {frames} lost in 30 of 251 s");
+    fat::assert_clean(&recording.image());
+}
+
+#[test]
+fn a_stall_of_a_second_loses_nothing() {
+    let (recording, lost) = assert_accounted(&["--stall", "1000@50", "--stall", "1000@120"]);
+    assert_eq!(lost, 0);
+    assert!(recording.number("sd_stall_ms_max") >= 1000);
+    assert!(recording.number("queue_bytes_max") <= recording.number("queue_bytes_capacity"));
+}
+
+#[test]
+fn a_stall_longer_than_the_queue_loses_counted_frames() {
+    let (_, lost) = assert_accounted(&["--stall", "100000@50"]);
+    assert!(lost > 0);
+}
+
+#[test]
+fn write_errors_are_retried_and_what_stays_is_counted() {
+    let (recording, _) = assert_accounted(&["--write-error", "0.01", "--seed", "4", "--card-size", "64"]);
+    fat::assert_clean(&recording.image());
+}
+
+#[test]
+fn a_card_that_fails_every_write_loses_everything_and_says_so() {
+    let recording = Recording::attempt(Machine::Sim, &own(FLIGHT), &["--write-error", "1", "--seed", "4"])
+        .expect_code(&[1, 3]);
+    if recording.outcome.code == Some(3) {
+        assert_eq!(recording.number("frames_lost"), recording.number("frames_in"));
+    }
+}
+
+/// The smallest card of FAT32 is some 33 MiB, and a flight's log is far smaller: it is filled by flight after flight.
+#[test]
+fn a_small_card_takes_the_newest_data_and_stays_a_good_file_system() {
+    let recording = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &["--card-size", "34"]);
+    fat::assert_clean(&recording.image());
+    let lost = recording.number("frames_lost");
+    assert_eq!(lost, 0);
+}

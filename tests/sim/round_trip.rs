@@ -1,0 +1,178 @@
+//! Every valid frame of a recording comes out of the card bit for bit, in order, and as if at the time it arrived.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use hums_tests::flights::{Manifest, assert_found, own, stream};
+use hums_tests::frames::{self, Frame, build_v2};
+use hums_tests::program::{self, Decoded, LIMIT, Machine, Recording};
+use hums_tests::{child, fat};
+
+/// Records and decodes one flight and compares all that can be compared.
+#[track_caller]
+fn round_trip(path: &Path, manifest: &Manifest) {
+    let data = fs::read(path).unwrap();
+    let input = manifest.frames_of(path, &data);
+    let found = manifest.found(path);
+    assert_found(found, &input);
+
+    let recording = Recording::make(Machine::Sim, path, &[]);
+    let decoded = recording.decode(&[0]);
+    let output = decoded.frames(&manifest.seeds);
+    let bytes = stream(found.is_tlog, &data, &input);
+    frames::assert_same(&input, &output, &bytes);
+    assert_found(found, &output);
+
+    assert_eq!(recording.number("frames_lost"), 0);
+    assert_eq!(recording.number("frames_logged"), output.len() as u64, "logged, and found in the log");
+    assert_eq!(recording.number("frames_in"), output.len() as u64);
+    assert_eq!(recording.number("bytes_in"), bytes.len() as u64);
+    let framed: usize = output.iter().map(|frame| frame.bytes.len()).sum();
+    assert_eq!(
+        recording.number("bytes_not_frames"),
+        (bytes.len() - framed) as u64,
+        "each byte is accounted for"
+    );
+    assert!(recording.number("queue_bytes_max") <= recording.number("queue_bytes_capacity"));
+    assert_times_kept(&input, &output);
+}
+
+/// The times between frames are those of the recording, to 1 ms (and 1 ms for rounding at either end). A recording whose
+/// clock was set back has no such times: from there on only the order can be compared.
+#[track_caller]
+fn assert_times_kept(input: &[Frame<'_>], output: &[Frame<'_>]) {
+    let times = |frames: &[Frame<'_>]| -> Option<Vec<u64>> {
+        frames.iter().filter(|frame| frame.verified).map(|frame| frame.time_us).collect()
+    };
+    let (Some(before), Some(after)) = (times(input), times(output)) else { return };
+    let monotonic = before.windows(2).take_while(|pair| pair[0] <= pair[1]).count();
+    let Some((first_before, first_after)) = before.first().zip(after.first()) else { return };
+    for index in 0..monotonic {
+        let (elapsed_before, elapsed_after) =
+            (before[index] - first_before, after[index].wrapping_sub(*first_after));
+        let difference = elapsed_before.abs_diff(elapsed_after);
+        assert!(difference <= 2_000, "frame {index}: {elapsed_before} us became {elapsed_after} us");
+    }
+}
+
+#[test]
+fn an_ardupilot_flight_comes_out_bit_for_bit() {
+    round_trip(&own("ap_quad_guided.tlog"), Manifest::own());
+}
+
+#[test]
+fn a_signed_ardupilot_flight_with_boot_text_comes_out_bit_for_bit() {
+    round_trip(&own("ap_quad_signed.raw"), Manifest::own());
+}
+
+#[test]
+fn an_ardupilot_flight_with_faults_comes_out_bit_for_bit() {
+    round_trip(&own("ap_quad_faults.tlog"), Manifest::own());
+}
+
+#[test]
+fn a_px4_flight_comes_out_bit_for_bit() {
+    round_trip(&own("px4_hil_quad_low.tlog"), Manifest::own());
+}
+
+#[cfg(feature = "oracle")]
+#[test]
+fn every_further_recording_comes_out_bit_for_bit() {
+    let files = hums_tests::flights::more();
+    if files.is_empty() {
+        return;
+    }
+    let manifest = hums_tests::oracle::manifest(&files);
+    for file in files {
+        eprintln!("{}", file.display());
+        round_trip(&file, &manifest);
+    }
+}
+
+/// The checked-in manifest is what pymavlink finds today.
+#[cfg(feature = "oracle")]
+#[test]
+fn the_manifest_is_what_pymavlink_finds() {
+    let files: Vec<_> = hums_tests::flights::OWN.into_iter().map(own).collect();
+    let fresh = hums_tests::oracle::manifest(&files);
+    for file in &files {
+        assert_eq!(fresh.found(file), Manifest::own().found(file), "{}", file.display());
+    }
+    assert_eq!(fresh.seeds, Manifest::own().seeds);
+}
+
+#[test]
+fn two_runs_are_the_same_to_the_byte() {
+    let flight = own("px4_hil_quad_low.tlog");
+    let flags = ["--noise", "0.0005", "--seed", "7"];
+    let [first, second] = [(); 2].map(|()| Recording::make(Machine::Sim, &flight, &flags));
+    assert_eq!(first.outcome.text(), second.outcome.text(), "--json");
+    assert!(fs::read(first.image()).unwrap() == fs::read(second.image()).unwrap(), "the images differ");
+    assert!(
+        fs::read(first.gs()).unwrap() == fs::read(second.gs()).unwrap(),
+        "the ground station's bytes differ"
+    );
+}
+
+#[test]
+fn a_recording_on_stdin_is_the_same_as_from_its_file() {
+    let flight = own("px4_hil_quad_low.tlog");
+    let dir = tempfile::tempdir().unwrap();
+    let image = dir.path().join("card.img");
+    let mut command = program::command(["sim", "--input", "-", "--speed", "max", "--sd"]);
+    let input = File::open(&flight).unwrap();
+    child::run_with_input(command.arg(&image), Some(input), LIMIT).expect_code(&[0]);
+    let seeds = &Manifest::own().seeds;
+    let (from_stdin, from_file) =
+        (Decoded::of(&image, &[0]), Recording::make(Machine::Sim, &flight, &[]).decode(&[0]));
+    assert_eq!(from_stdin.frames(seeds), from_file.frames(seeds));
+}
+
+#[test]
+fn a_second_flight_on_the_same_card_leaves_the_first_as_it_was() {
+    let dir = tempfile::tempdir().unwrap();
+    let image = dir.path().join("card.img");
+    for flight in ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"] {
+        let mut command = program::command(["sim", "--speed", "max", "--input"]);
+        child::run(command.arg(own(flight)).arg("--sd").arg(&image), LIMIT).expect_code(&[0]);
+    }
+    let manifest = Manifest::own();
+    let decoded = Decoded::of(&image, &[0]);
+    let all = decoded.frames(&manifest.seeds);
+    let first = manifest.found(&own("px4_hil_quad_low.tlog"));
+    let second = manifest.found(&own("ap_quad_guided.tlog"));
+    assert_eq!(all.len() as u64, first.frames + second.frames);
+    assert_found(first, &all[..first.frames as usize]);
+    assert_found(second, &all[first.frames as usize..]);
+}
+
+#[test]
+fn the_files_that_another_computer_copies_off_the_card_are_the_same_log() {
+    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &[]);
+    fat::assert_clean(&recording.image());
+    let dir = tempfile::tempdir().unwrap();
+    fat::copy_files(&recording.image(), dir.path());
+    let seeds = &Manifest::own().seeds;
+    let (copied, image) = (Decoded::of(dir.path(), &[0]), recording.decode(&[0]));
+    assert!(!copied.frames(seeds).is_empty());
+    assert_eq!(copied.frames(seeds), image.frames(seeds));
+}
+
+#[test]
+fn ids_that_no_dialect_knows_come_out_among_those_that_it_knows() {
+    let seeds = &Manifest::own().seeds;
+    assert!(!seeds.contains_key(&0x00AB_CDEF));
+    let mut data = Vec::new();
+    for sequence in 0..200_u8 {
+        data.extend(build_v2(sequence, 0, &[4, 0, 0, 0, 2, 3, 0x51, 4, 3], seeds[&0]));
+        data.extend(build_v2(sequence, 0x00AB_CDEF, &[sequence; 40], 99));
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("unknown.raw");
+    fs::write(&file, &data).unwrap();
+    let recording = Recording::make(Machine::Sim, &file, &[]);
+    let decoded = recording.decode(&[0]);
+    let output: Vec<u8> = decoded.frames(seeds).iter().flat_map(|frame| frame.bytes).copied().collect();
+    assert!(output == data, "{} of {} bytes came out", output.len(), data.len());
+    assert_eq!(recording.number("bytes_not_frames"), 0);
+}
