@@ -92,11 +92,10 @@ impl Flight {
 
     fn autopilot_says(now: Instant, vehicle: &Vehicle) -> Option<bool> {
         match vehicle.landed.within(now, LANDED_STATE_AGE)? {
-            LandedState::Unknown => None,
             LandedState::OnGround => Some(false),
             // Sent from the spooling up of the motors on the ground until the height that was asked for is reached:
             // the height decides.
-            LandedState::TakingOff => None,
+            LandedState::TakingOff | LandedState::Unknown => None,
             LandedState::InAir | LandedState::Landing => Some(true),
         }
     }

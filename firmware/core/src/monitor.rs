@@ -45,7 +45,7 @@ impl Monitor {
             return false;
         }
         self.derived.observe(at, &self.vehicle, observation);
-        self.usage.observe(&self.vehicle, &self.flight, &self.derived, observation);
+        self.usage.observe(at, &self.vehicle, &self.flight, &self.derived, observation);
         true
     }
 
