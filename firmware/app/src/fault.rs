@@ -135,7 +135,9 @@ impl Note {
     fn sum_now(&self) -> u32 {
         let words = [&self.kind, &self.task].into_iter().chain(&self.registers);
         let words = words.chain(&self.place.0).chain(&self.message.0);
-        words.fold(MARK, |sum, word| sum.rotate_left(5) ^ word.load(Ordering::Relaxed).wrapping_mul(0x9E37_79B1))
+        words.fold(MARK, |sum, word| {
+            sum.rotate_left(5) ^ word.load(Ordering::Relaxed).wrapping_mul(0x9E37_79B1)
+        })
     }
 }
 
@@ -191,7 +193,11 @@ fn panic(info: &PanicInfo) -> ! {
         // The end of a long path says more than its beginning.
         Some(place) => {
             let file = place.file().rsplit("firmware/").next().unwrap_or_default();
-            NOTE.keep(Kind::Panic, format_args!("{file}:{}", place.line()), format_args!("{}", info.message()));
+            NOTE.keep(
+                Kind::Panic,
+                format_args!("{file}:{}", place.line()),
+                format_args!("{}", info.message()),
+            );
         }
         None => NOTE.keep(Kind::Panic, format_args!("?"), format_args!("{}", info.message())),
     }

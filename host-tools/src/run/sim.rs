@@ -22,7 +22,7 @@ use hums_onboard::monitoring::TICK;
 use hums_onboard::port::PortReading;
 use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
 use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
-use hums_recorder::{CardDevice, CardStatus};
+use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
 
 use super::arrivals::Arrivals;
 use super::report::{Finding, Report};
@@ -148,6 +148,7 @@ impl World<'_> {
     ) -> Result<bool> {
         self.boots += 1;
         let (card_status, port_status) = (CardStatus::new(), PortStatus::new());
+        let held = HeldBlocks::new();
         let mut queues = Box::new(Queues::new());
         let mut writer = Box::new(Writer::new());
         let mut monitor = Box::new(Monitor::new(params));
@@ -166,7 +167,7 @@ impl World<'_> {
             ends: queues.split(),
             reception: Reception::new(&port_status),
             monitoring: Monitoring::new(&mut monitor, &mut writer, identity, &card_status, &port_status),
-            storage: Storage::new(Slot(self.card), &card_status, entropy),
+            storage: Storage::new(Slot(self.card), &card_status, &held, entropy),
             gs: &mut *self.gs,
             findings: &mut self.report.findings,
             power_on_us: self.power_on_us,

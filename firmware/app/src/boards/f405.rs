@@ -32,6 +32,7 @@ use hums_recorder::CardDevice;
 use static_cell::ConstStaticCell;
 
 use super::{Boot, Overrun, Receive, ResetCause, Transmit};
+use crate::costs::Stage;
 use crate::report::Report;
 
 use defmt_rtt as _;
@@ -59,7 +60,7 @@ const WATCHDOG_US: u32 = 1_000_000;
 bind_interrupts!(struct Irqs {
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
-    HASH_RNG => rng::InterruptHandler<RNG>;
+    RNG => rng::InterruptHandler<RNG>;
 });
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
@@ -88,7 +89,9 @@ pub(crate) fn take() -> Parts {
     line.baudrate = AUTOPILOT_BAUD;
     let autopilot = match UartRx::new_blocking(p.USART1, p.PA10, line) {
         Ok(port) => AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs)),
-        Err(error) => defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error)),
+        Err(error) => {
+            defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error))
+        }
     };
     line.baudrate = GS_BAUD;
     let gs = match UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line) {
@@ -165,7 +168,7 @@ pub(crate) struct AutopilotRx {
 
 impl AutopilotRx {
     fn new(port: UartRx<'static, Blocking>, channel: dma::Channel<'static>) -> Self {
-        /// USART1_RX is channel 4 of DMA2's stream 2 (RM0090, table 43).
+        /// `USART1_RX` is channel 4 of DMA2's stream 2 (RM0090, table 43).
         const USART1_RX: dma::Request = 4;
         let from = pac::USART1.dr().as_ptr().cast::<u8>();
         // SAFETY: `from` is the port's data register, `RING` is a static in RAM that DMA reaches and that nobody else
@@ -231,7 +234,9 @@ impl Card {
         }
         self.set_clock(CARD_IDENTIFICATION);
         // At least 74 clocks with the card not selected wake it up (SD specification, 6.4.1).
-        self.driver.spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10])).map_err(|_| SdCardError::Transport)?;
+        self.driver
+            .spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10]))
+            .map_err(|_| SdCardError::Transport)?;
         self.driver.num_bytes()?;
         self.set_clock(CARD_TRANSFER);
         self.identified.set(true);
@@ -295,6 +300,7 @@ impl Watchdog {
 pub(crate) struct Idle(());
 
 impl Idle {
+    #[expect(clippy::unused_self, reason = "on the emulated board idle reads the feed")]
     pub(crate) fn run(&mut self) -> ! {
         loop {
             cortex_m::asm::wfi();
@@ -304,7 +310,7 @@ impl Idle {
 
 /// A vehicle's input has no end: the power goes.
 pub(crate) async fn ended() {
-    core::future::pending().await
+    core::future::pending::<()>().await;
 }
 
 /// Processor cycles.
@@ -316,7 +322,10 @@ pub(crate) fn cycles() -> u32 {
 pub(crate) fn done(report: &Report) {
     let Report { stats, frames_left, costs, stack } = report;
     defmt::info!("log closed: {=u64} frames in, {=u64} without a card", stats.frames_in, frames_left);
-    defmt::info!("cycles {=[u64]}, stack {}", costs, stack);
+    for ((_, name), cycles) in Stage::NAMES.iter().zip(costs) {
+        defmt::info!("{=str}: {=u64} cycles", name, cycles);
+    }
+    defmt::info!("stack: {=usize} of {=usize} bytes", stack.0, stack.1);
 }
 
 /// Starts anew.

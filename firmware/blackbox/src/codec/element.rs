@@ -4,9 +4,6 @@
 //! distribution, then sign and lower bits as they are: in a flight they are noise. Which of several predictions counts
 //! is decided by what each would have cost lately.
 
-use hums_dialect::{Kind, Role};
-
-use super::links;
 use crate::coder::{Cdf, Coder};
 
 /// Elements at most: a copter with all streams has 430, a PX4 510.
@@ -38,6 +35,28 @@ const RANDOM: u8 = 192;
 /// What a prediction costs before it is known.
 const UNKNOWN: u8 = 100;
 
+/// How an element is coded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum What {
+    /// 1, 2 or 4 bytes.
+    Integer1,
+    Integer2,
+    Integer4,
+    /// Times of 4 bytes.
+    Millis,
+    Micros,
+    Float,
+    /// 8 bytes; the next element is their upper half.
+    Wide,
+    WideTime,
+    Upper,
+    /// Text or data, `size` bytes.
+    Text,
+    /// The slot says it, `size` bytes.
+    Instance,
+}
+
 /// What is known of one element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Element {
@@ -51,36 +70,85 @@ pub(crate) struct Element {
     block: u16,
     other: u16,
     costs: [u8; PREDICTIONS],
-    /// How surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more.
+    pub(crate) what: What,
+    /// Bytes on the wire.
+    pub(crate) size: u8,
+    /// How surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bit 7: `step` is in
+    /// hundredths.
     decimal: u8,
-    /// `step` is in hundredths.
-    step_decimal: bool,
-    /// The exponent that the classes of a random float are counted from.
-    exponent: u8,
-    /// Frames since it changed.
-    pub(crate) quiet: u8,
-    /// Whether there is a last value.
-    pub(crate) known: bool,
+    /// The exponent that the classes of a random float are counted from. Of an integer with links: 1 if signed.
+    pub(crate) exponent: u8,
+    /// Frames since it changed, up to 63; bit 7: it has a last value; bit 6: it has links.
+    quiet: u8,
 }
 
-impl Element {
-    pub(crate) const NEW: Self = Self {
-        last: 0,
-        step: 0,
-        aux: 0,
-        block: 0,
-        other: 0,
-        costs: [0, 0, 0, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN],
-        decimal: 0,
-        step_decimal: false,
-        exponent: 120,
-        quiet: 0,
-        known: false,
-    };
+const KNOWN: u8 = 0x80;
+const LINKED_FIELD: u8 = 0x40;
+const QUIET_MAX: u8 = 0x3f;
+const STEP_DECIMAL: u8 = 0x80;
 
+impl Element {
+    const NEW: Self = Self::new(What::Integer1, 1, false);
+
+    pub(crate) const fn new(what: What, size: u8, links: bool) -> Self {
+        Self {
+            last: 0,
+            step: 0,
+            aux: 0,
+            block: 0,
+            other: 0,
+            costs: [0, 0, 0, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN],
+            what,
+            size,
+            decimal: 0,
+            exponent: 120,
+            quiet: if links { LINKED_FIELD } else { 0 },
+        }
+    }
+
+    /// Whether it has a last value.
+    #[inline]
+    pub(crate) const fn known(&self) -> bool {
+        self.quiet & KNOWN != 0
+    }
+
+    /// Whether it has not changed for long.
+    #[inline]
+    pub(crate) const fn is_quiet(&self) -> bool {
+        self.quiet & QUIET_MAX >= QUIET
+    }
+
+    /// Whether the table of links names it.
+    #[inline]
+    pub(crate) const fn has_links(&self) -> bool {
+        self.quiet & LINKED_FIELD != 0
+    }
+
+    #[inline]
     pub(crate) fn note(&mut self, same: bool) {
-        self.quiet = if same { self.quiet.saturating_add(1) } else { 0 };
-        self.known = true;
+        let count = if same { (self.quiet & QUIET_MAX).saturating_add(1).min(QUIET_MAX) } else { 0 };
+        self.quiet = self.quiet & LINKED_FIELD | KNOWN | count;
+    }
+
+    /// The last value as a number.
+    pub(crate) fn number(&self) -> f32 {
+        match (self.what, self.exponent) {
+            (What::Float, _) => f32::from_bits(self.last),
+            (What::Integer2, 1) => f32::from(self.last as i16),
+            (What::Integer4, 1) => self.last as i32 as f32,
+            _ => self.last as f32,
+        }
+    }
+
+    fn decimals(&self) -> u8 {
+        self.decimal & !STEP_DECIMAL
+    }
+
+    /// Learns whether the value is a decimal.
+    fn weigh_decimal(&mut self, is: bool) {
+        let decimals = self.decimals();
+        let decimals = if is { (decimals + 1).min(6) } else { decimals.saturating_sub(2) };
+        self.decimal = self.decimal & STEP_DECIMAL | decimals;
     }
 }
 
@@ -100,8 +168,13 @@ pub(crate) struct Context {
 pub(crate) struct Elements {
     pub(crate) list: [Element; ELEMENTS],
     pub(crate) used: u16,
+    pub(crate) distributions: Distributions,
+}
+
+/// The distributions of classes.
+pub(crate) struct Distributions {
     blocks: [Cdf; BLOCKS],
-    blocks_used: u16,
+    used: u16,
     /// For elements without their own: by class of kind.
     calm: [Cdf; KINDS],
     /// What a new distribution begins as.
@@ -124,138 +197,133 @@ const CALM: Cdf = Cdf::from_sizes([600, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 
 
 impl Elements {
     pub(crate) const fn new() -> Self {
+        Self { list: [Element::NEW; ELEMENTS], used: 0, distributions: Distributions::new() }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        self.used = 0;
+        self.distributions.reset();
+    }
+
+    /// Room for `count` elements.
+    pub(crate) fn claim(&mut self, count: usize) -> Option<u16> {
+        let first = self.used;
+        if usize::from(first) + count > ELEMENTS {
+            return None;
+        }
+        self.used += count as u16;
+        Some(first)
+    }
+}
+
+impl Distributions {
+    const fn new() -> Self {
         Self {
-            list: [Element::NEW; ELEMENTS],
-            used: 0,
             blocks: [Cdf::FLAT; BLOCKS],
-            blocks_used: 0,
+            used: 0,
             calm: [CALM; KINDS],
             young: [Cdf::FLAT; KINDS],
             first: [Cdf::FLAT; KINDS],
         }
     }
 
-    pub(crate) fn reset(&mut self) {
+    fn reset(&mut self) {
         self.used = 0;
-        self.blocks_used = 0;
         self.calm = [CALM; KINDS];
         self.young = [Cdf::FLAT; KINDS];
         self.first = [Cdf::FLAT; KINDS];
     }
 
-    /// Room for `count` elements, new ones.
-    pub(crate) fn claim(&mut self, count: usize) -> Option<u16> {
-        let first = self.used;
-        let places = self.list.get_mut(usize::from(first)..usize::from(first) + count)?;
-        places.fill(Element::NEW);
-        self.used += count as u16;
-        Some(first)
-    }
-
-    /// A new distribution, for something of this kind; 0 where there is none left.
-    fn claim_block(&mut self, from: Cdf) -> u16 {
-        let index = usize::from(self.blocks_used);
-        let Some(block) = self.blocks.get_mut(index) else { return 0 };
+    /// A new distribution; 0 where there is none left.
+    pub(crate) fn claim(&mut self, from: Cdf) -> u16 {
+        let Some(block) = self.blocks.get_mut(usize::from(self.used)) else { return 0 };
         *block = from;
-        self.blocks_used += 1;
-        self.blocks_used
-    }
-
-    /// A distribution outside any element (the times of a slot).
-    pub(crate) fn claim_cdf(&mut self, from: Cdf) -> u16 {
-        self.claim_block(from)
+        self.used += 1;
+        self.used
     }
 
     /// That distribution.
-    pub(crate) fn cdf(&mut self, number: u16) -> Option<&mut Cdf> {
-        self.blocks.get_mut(usize::from(number).checked_sub(1)?)
+    #[inline]
+    pub(crate) fn get(&mut self, number: u16) -> Option<&mut Cdf> {
+        self.blocks.get_mut(usize::from(number).wrapping_sub(1))
     }
 
-    /// Codes a class with the element's distribution; what it had none for makes it one.
+    /// Codes a class with the element's distribution; what had none and changes gets one.
     #[inline]
-    fn class<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        block: &mut u16,
-        known: bool,
-        kind: usize,
-        symbol: usize,
-    ) -> usize {
-        if !known {
-            return coder.symbol(&mut self.first[kind], symbol);
-        }
-        if let Some(cdf) = usize::from(*block).checked_sub(1).and_then(|index| self.blocks.get_mut(index)) {
+    fn class<C: Coder>(&mut self, coder: &mut C, block: &mut u16, kind: usize, symbol: usize) -> usize {
+        if let Some(cdf) = self.get(*block) {
             return coder.symbol(cdf, symbol);
         }
         let symbol = coder.symbol(&mut self.calm[kind], symbol);
         if symbol != 0 {
             let mut cdf = self.young[kind].renewed();
-            cdf.learn(symbol);
-            self.young[kind].learn(symbol);
-            *block = self.claim_block(cdf);
+            cdf.adapt(symbol);
+            self.young[kind].adapt(symbol);
+            *block = self.claim(cdf);
         }
         symbol
     }
 
+    /// The same for a value that may be the first one.
+    #[inline]
+    fn class_or_first<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        element: &mut Element,
+        kind: usize,
+        symbol: usize,
+    ) -> usize {
+        if element.known() {
+            self.class(coder, &mut element.block, kind, symbol)
+        } else {
+            coder.symbol(&mut self.first[kind], symbol)
+        }
+    }
+
     /// An integer of 1, 2 or 4 bytes.
+    #[inline]
     pub(crate) fn integer<C: Coder>(
         &mut self,
         coder: &mut C,
-        index: usize,
-        kind: Kind,
-        role: Role,
+        element: &mut Element,
         value: u32,
         context: &Context,
     ) -> u32 {
-        let Some(&element) = self.list.get(index) else { return 0 };
-        let mut element = element;
-        let spare = 32 - 8 * kind.size() as u32;
+        let (spare, kind, count) = match element.what {
+            What::Integer1 => (24, SMALL, HALF + 1),
+            What::Integer2 => (16, MIDDLE, HALF + 1),
+            What::Integer4 => (0, LARGE, HALF + 1),
+            _ => (0, TIME, SAME_CLOCK + 1),
+        };
         let fold = |difference: u32| ((difference << spare) as i32) >> spare;
-        let timed = role == Role::Millis || role == Role::Micros;
         let last = element.last;
-        let mut guesses = [last; PREDICTIONS];
+        let mut guesses = [last; SAME_CLOCK + 1];
         guesses[LINEAR] = last.wrapping_add(element.step as u32);
         guesses[HALF] = last.wrapping_add((element.step / 2) as u32);
-        if timed {
+        if kind == TIME {
             let elapsed_us = context.clock_us.wrapping_sub(element.aux);
-            (guesses[BY_ARRIVAL], guesses[BY_CLOCK]) = if role == Role::Millis {
+            (guesses[BY_ARRIVAL], guesses[BY_CLOCK]) = if element.what == What::Millis {
                 (last.wrapping_add(context.elapsed_ms), last.wrapping_add(thousandth(elapsed_us)))
             } else {
                 let arrival = context.elapsed_ms.wrapping_mul(1_000);
                 (last.wrapping_add(arrival), last.wrapping_add(elapsed_us))
             };
             guesses[SAME_CLOCK] = context.clock_ms;
+            element.aux = context.clock_us;
         }
-        let count = if timed { SAME_CLOCK + 1 } else { HALF + 1 };
-        let guess = if element.known { guesses[cheapest(&element.costs, count)] } else { 0 };
-        let class_kind = match (timed, kind.size()) {
-            (true, _) => TIME,
-            (_, 1) => SMALL,
-            (_, 2) => MIDDLE,
-            _ => LARGE,
-        };
+        let known = element.known();
+        let guess = if known { guesses[cheapest(&element.costs, count)] } else { 0 };
         let difference = fold(value.wrapping_sub(guess));
-        let symbol = self.class(
-            coder,
-            &mut element.block,
-            element.known,
-            class_kind,
-            integer_class(difference.unsigned_abs()),
-        );
+        let class = integer_class(difference.unsigned_abs());
+        let symbol = self.class_or_first(coder, element, kind, class);
         let difference = integer_rest(coder, symbol, difference);
         let value = guess.wrapping_add(difference as u32) & (u32::MAX >> spare);
         for (cost, guess) in element.costs.iter_mut().zip(guesses).take(count) {
             charge(cost, fold(value.wrapping_sub(guess)).unsigned_abs());
         }
-        if element.known {
-            element.step = fold(value.wrapping_sub(last));
-        }
-        element.aux = context.clock_us;
+        element.step = if known { fold(value.wrapping_sub(last)) } else { 0 };
         element.note(value == last);
         element.last = value;
-        if let Some(place) = self.list.get_mut(index) {
-            *place = element;
-        }
         value
     }
 
@@ -263,61 +331,50 @@ impl Elements {
     pub(crate) fn float<C: Coder>(
         &mut self,
         coder: &mut C,
-        index: usize,
+        element: &mut Element,
         value: u32,
         context: &Context,
         link: Option<f32>,
     ) -> u32 {
-        let Some(&element) = self.list.get(index) else { return 0 };
-        let mut element = element;
         let last = element.last;
         let mut coded = None;
         let mut step = None;
-        if element.decimal >= 3
+        if element.decimals() >= 3
             && let Some(hundredths) = hundredths(last)
         {
-            (coded, step) = self.decimal(coder, &mut element, hundredths, value);
+            (coded, step) = self.decimal(coder, element, hundredths, value);
         }
-        let (last_order, mut guesses) = (order(last), [order(last); PREDICTIONS]);
-        let last_step = if element.step_decimal { 0 } else { element.step };
+        let last_order = order(last);
+        let last_step = if element.decimal & STEP_DECIMAL != 0 { 0 } else { element.step };
+        let mut guesses = [last_order; PREDICTIONS];
         guesses[LINEAR] = last_order.wrapping_add(last_step);
         guesses[HALF] = last_order.wrapping_add(last_step / 2);
         let number = f32::from_bits(last);
-        let mut mask = 0b111_u32;
         if let Some((now, before)) = context.neighbour {
             guesses[AS_NEIGHBOUR] = order_or(number + (now - before), last_order);
             guesses[NEIGHBOUR] = order_or(now, last_order);
-            mask |= 1 << AS_NEIGHBOUR | 1 << NEIGHBOUR;
         }
         if let Some(linked) = link {
             guesses[AS_LINK] = order_or(number + (linked - f32::from_bits(element.aux)), last_order);
             guesses[LINKED] = order_or(linked, last_order);
-            mask |= 1 << AS_LINK | 1 << LINKED;
             element.aux = linked.to_bits();
         }
+        let count = if link.is_some() { PREDICTIONS } else { NEIGHBOUR + 1 };
         let value = match coded {
             Some(value) => value,
-            None => self.difference(coder, &mut element, &guesses, mask, value),
+            None => self.difference(coder, element, &guesses, count, value),
         };
         let now = order(value);
-        for (prediction, cost) in element.costs.iter_mut().enumerate() {
-            if mask >> prediction & 1 != 0 {
-                charge(cost, now.wrapping_sub(guesses[prediction]).unsigned_abs());
-            }
+        for (cost, guess) in element.costs.iter_mut().zip(guesses).take(count) {
+            charge(cost, now.wrapping_sub(guess).unsigned_abs());
         }
         element.step = step.unwrap_or_else(|| now.wrapping_sub(last_order));
-        element.step_decimal = step.is_some();
+        element.decimal = element.decimals() | if step.is_some() { STEP_DECIMAL } else { 0 };
         if value != 0 {
-            element.decimal = match hundredths(value) {
-                Some(_) => (element.decimal + 1).min(6),
-                None => element.decimal.saturating_sub(2),
-            };
+            element.weigh_decimal(hundredths(value).is_some());
         }
         element.note(value == last);
         element.last = value;
-        if let Some(place) = self.list.get_mut(index) {
-            *place = element;
-        }
         value
     }
 
@@ -329,14 +386,13 @@ impl Elements {
         last: i32,
         value: u32,
     ) -> (Option<u32>, Option<i32>) {
-        let linear = element.step_decimal && element.costs[LINEAR] < element.costs[LAST];
+        let linear =
+            element.decimal & STEP_DECIMAL != 0 && element.costs[LINEAR] < element.costs[LAST];
         let guess = if linear { last.wrapping_add(element.step) } else { last };
         let now = if C::WRITES { hundredths(value) } else { None };
         let difference = now.map_or(0, |now| now.wrapping_sub(guess));
         let symbol = if now.is_some() { integer_class(difference.unsigned_abs()) } else { ESCAPE };
-        let mut other = element.other;
-        let symbol = self.class(coder, &mut other, true, DECIMAL, symbol);
-        element.other = other;
+        let symbol = self.class(coder, &mut element.other, DECIMAL, symbol);
         if symbol == ESCAPE && coder.bits16(u32::from(now.is_none()), 1) != 0 {
             return (None, None);
         }
@@ -349,24 +405,18 @@ impl Elements {
         coder: &mut C,
         element: &mut Element,
         guesses: &[i32; PREDICTIONS],
-        mask: u32,
+        count: usize,
         value: u32,
     ) -> u32 {
-        let mut best = LAST;
-        for prediction in LINEAR..PREDICTIONS {
-            if mask >> prediction & 1 != 0 && element.costs[prediction] < element.costs[best] {
-                best = prediction;
-            }
-        }
-        if element.known && element.costs[best] >= RANDOM {
+        let best = cheapest(&element.costs, count);
+        let known = element.known();
+        if known && element.costs[best] >= RANDOM {
             return self.random(coder, element, value);
         }
-        let guess = if element.known { guesses[best] } else { 0 };
+        let guess = if known { guesses[best] } else { 0 };
         let difference = order(value).wrapping_sub(guess);
         let class = float_class(difference.unsigned_abs());
-        let mut block = element.block;
-        let symbol = self.class(coder, &mut block, element.known, FLOAT, class);
-        element.block = block;
+        let symbol = self.class_or_first(coder, element, FLOAT, class);
         unorder(guess.wrapping_add(float_rest(coder, symbol, difference)))
     }
 
@@ -379,9 +429,7 @@ impl Elements {
             1..=14 => offset as usize,
             _ => ESCAPE,
         };
-        let mut other = element.other;
-        let symbol = self.class(coder, &mut other, true, RANDOM_FLOAT, symbol);
-        element.other = other;
+        let symbol = self.class(coder, &mut element.other, RANDOM_FLOAT, symbol);
         match symbol {
             0 => element.last,
             ESCAPE => {
@@ -402,18 +450,14 @@ impl Elements {
     pub(crate) fn wide<C: Coder>(
         &mut self,
         coder: &mut C,
-        index: usize,
-        role: Role,
+        element: &mut Element,
+        upper: &mut Element,
         value: u64,
         context: &Context,
     ) -> u64 {
-        let (Some(&element), Some(&upper)) = (self.list.get(index), self.list.get(index + 1)) else {
-            return 0;
-        };
-        let mut element = element;
         let last = u64::from(upper.last) << 32 | u64::from(element.last);
-        let quantum = if element.decimal >= 3 && times_1000(last) { 1_000 } else { 1 };
-        let timed = role == Role::Millis || role == Role::Micros;
+        let quantum = if element.decimals() >= 3 && times_1000(last) { 1_000 } else { 1 };
+        let timed = element.what == What::WideTime;
         let mut guesses = [last; PREDICTIONS];
         guesses[LINEAR] = last.wrapping_add_signed(i64::from(element.step));
         guesses[HALF] = guesses[LINEAR];
@@ -423,7 +467,8 @@ impl Elements {
             guesses[BY_CLOCK] = last.wrapping_add_signed(i64::from(elapsed_us));
         }
         let count = if timed { BY_CLOCK + 1 } else { LINEAR + 1 };
-        let mut guess = if element.known { guesses[cheapest(&element.costs, count)] } else { 0 };
+        let known = element.known();
+        let mut guess = if known { guesses[cheapest(&element.costs, count)] } else { 0 };
         let mut now = value;
         if quantum == 1_000 {
             // In thousands, as long as the value is one; the escape below tells otherwise.
@@ -434,9 +479,7 @@ impl Elements {
         let difference = now.wrapping_sub(guess) as i64;
         let fits = whole && i32::try_from(difference).is_ok();
         let class = if fits { integer_class(difference.unsigned_abs() as u32) } else { ESCAPE };
-        let mut block = element.block;
-        let symbol = self.class(coder, &mut block, element.known, TIME, class);
-        element.block = block;
+        let symbol = self.class_or_first(coder, element, TIME, class);
         let value = if symbol == ESCAPE && coder.bits16(u32::from(!fits), 1) != 0 {
             let low = coder.bits(value as u32, 32);
             u64::from(coder.bits((value >> 32) as u32, 32)) << 32 | u64::from(low)
@@ -452,27 +495,15 @@ impl Elements {
             charge(cost, distance(guess));
         }
         let step = value.wrapping_sub(last) as i64;
-        element.step = if element.known { i32::try_from(step).unwrap_or(0) } else { 0 };
-        element.decimal = match (times_1000(value), value) {
-            (_, 0) => element.decimal,
-            (true, _) => (element.decimal + 1).min(6),
-            (false, _) => element.decimal.saturating_sub(2),
-        };
+        element.step = if known { i32::try_from(step).unwrap_or(0) } else { 0 };
+        if value != 0 {
+            element.weigh_decimal(times_1000(value));
+        }
         element.aux = context.clock_us;
         element.note(value == last);
         element.last = value as u32;
-        if let Some([low, high]) = self.list.get_mut(index..index + 2) {
-            *low = element;
-            high.last = (value >> 32) as u32;
-            high.quiet = element.quiet;
-            high.known = true;
-        }
+        upper.last = (value >> 32) as u32;
         value
-    }
-
-    /// What an element published to a register is as a number.
-    pub(crate) fn number(&self, index: usize, kind: Kind) -> f32 {
-        self.list.get(index).map_or(0.0, |element| links::number(kind, element.last))
     }
 }
 

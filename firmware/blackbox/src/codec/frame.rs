@@ -1,7 +1,7 @@
 //! A MAVLink frame taken apart and put together again. What does not come out as it went in is no frame here and is
 //! coded as plain bytes.
 
-use super::FRAME_BYTES_MAX;
+use super::ENTRY_BYTES_MAX;
 
 pub(crate) const PAYLOAD_BYTES_MAX: usize = 255;
 pub(crate) const SIGNATURE_BYTES: usize = 13;
@@ -80,7 +80,7 @@ impl Frame {
     }
 
     /// Puts the frame together; gives its length.
-    pub(crate) fn assemble(&self, out: &mut [u8; FRAME_BYTES_MAX]) -> usize {
+    pub(crate) fn assemble(&self, out: &mut [u8; ENTRY_BYTES_MAX]) -> usize {
         let head = self.head();
         let head = &head[..if self.v2 { 10 } else { 6 }];
         let payload = &self.payload[..self.len.min(PAYLOAD_BYTES_MAX)];
@@ -109,7 +109,8 @@ impl Frame {
         let head = self.head();
         let head = &head[1..if self.v2 { 10 } else { 6 }];
         let payload = &self.payload[..self.len.min(PAYLOAD_BYTES_MAX)];
-        head.iter().chain(payload).fold(0xffff, |crc, &byte| crc_add(crc, byte))
+        let crc = head.iter().fold(0xffff, |crc, &byte| crc_add(crc, byte));
+        payload.iter().fold(crc, |crc, &byte| crc_add(crc, byte))
     }
 
     /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it.
@@ -119,11 +120,25 @@ impl Frame {
     }
 }
 
-pub(crate) const fn crc_add(crc: u16, byte: u8) -> u16 {
-    let mut x = byte ^ crc as u8;
-    x ^= x << 4;
-    let x = x as u16;
-    (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
+/// CRC-16/MCRF4XX by bytes.
+static CHECKSUMS: [u16; 256] = checksums();
+
+const fn checksums() -> [u16; 256] {
+    let mut table = [0; 256];
+    let mut index = 0;
+    while index < 256 {
+        let mut x = index as u8;
+        x ^= x << 4;
+        let x = x as u16;
+        table[index] = (x << 8) ^ (x << 3) ^ (x >> 4);
+        index += 1;
+    }
+    table
+}
+
+#[inline]
+pub(crate) fn crc_add(crc: u16, byte: u8) -> u16 {
+    crc >> 8 ^ CHECKSUMS[usize::from(byte ^ crc as u8)]
 }
 
 /// The seed that turns `before` into `checksum`, if there is one.
@@ -142,7 +157,7 @@ mod tests {
         let frame = Frame::parse(&heartbeat).expect("a frame");
         assert_eq!(crc_add(frame.checksum_before_seed(), 50), frame.checksum);
         assert_eq!(seed_for(frame.checksum_before_seed(), frame.checksum), Some(50));
-        let mut out = [0; FRAME_BYTES_MAX];
+        let mut out = [0; ENTRY_BYTES_MAX];
         let len = frame.assemble(&mut out);
         assert_eq!(&out[..len], heartbeat);
         assert!(Frame::parse(&heartbeat[..16]).is_none());

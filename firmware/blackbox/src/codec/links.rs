@@ -4,8 +4,6 @@
 //! The table is part of format version 1. It names fields by message id and byte offset; where a layout has something
 //! else there, the prediction is bad, but writer and reader still agree.
 
-use hums_dialect::Kind;
-
 /// Quantities kept.
 pub(crate) const REGISTERS: usize = 22;
 
@@ -99,19 +97,6 @@ pub(crate) static LINKS: [Link; 57] = [
 /// Where the links of a message begin in the table.
 pub(crate) fn first(id: u32) -> u8 {
     LINKS.partition_point(|link| link.id < id) as u8
-}
-
-/// A field's value as a number, from its bits.
-pub(crate) fn number(kind: Kind, bits: u32) -> f32 {
-    match kind {
-        Kind::F32 => f32::from_bits(bits),
-        Kind::U8 | Kind::Char => f32::from(bits as u8),
-        Kind::I8 => f32::from(bits as i8),
-        Kind::U16 => f32::from(bits as u16),
-        Kind::I16 => f32::from(bits as i16),
-        Kind::U32 => bits as f32,
-        _ => bits as i32 as f32,
-    }
 }
 
 #[cfg(test)]

@@ -146,10 +146,6 @@ impl Model {
     /// Writes an entry. `plain`: as it is, because the model makes it too long.
     pub(crate) fn encode(&mut self, entry: &Entry<'_>, plain: bool, encoder: &mut Encoder, out: &mut Out) {
         let coder = &mut Writing { encoder, out };
-        let mut buffer = [0; ENTRY_BYTES_MAX];
-        let len = entry.bytes.len().min(ENTRY_BYTES_MAX);
-        buffer[..len].copy_from_slice(&entry.bytes[..len]);
-        let decoded = Decoded { kind: entry.kind, at_ms: entry.at_ms, len };
         let frame = match entry.kind {
             Kind::Frame { verified } if !plain => Frame::parse(entry.bytes).map(|frame| (frame, verified)),
             _ => None,
@@ -164,6 +160,10 @@ impl Model {
         }
         let next = if entry.kind == Kind::Record { Next::Record } else { Next::Plain };
         self.slots.next(coder, next);
+        let mut buffer = [0; ENTRY_BYTES_MAX];
+        let len = entry.bytes.len().min(ENTRY_BYTES_MAX);
+        buffer[..len].copy_from_slice(&entry.bytes[..len]);
+        let decoded = Decoded { kind: entry.kind, at_ms: entry.at_ms, len };
         self.plain(coder, decoded, &mut buffer, plain);
     }
 
@@ -183,9 +183,7 @@ impl Model {
         }
         let mut frame = Frame::empty();
         let (verified, at_ms) = self.frame(coder, next, NO_KEY, &mut frame, false, 0).ok_or(Corrupt)?;
-        let mut out = [0; FRAME_BYTES_MAX];
-        let len = frame.assemble(&mut out);
-        buffer[..FRAME_BYTES_MAX].copy_from_slice(&out);
+        let len = frame.assemble(buffer);
         Ok(Decoded { kind: Kind::Frame { verified }, at_ms, len })
     }
 
@@ -243,9 +241,9 @@ impl Model {
         let cdf = match slot {
             Some(slot) => {
                 if slot.times == 0 && slot.frames > 0 {
-                    slot.times = self.elements.claim_cdf(self.times.renewed());
+                    slot.times = self.elements.distributions.claim(self.times.renewed());
                 }
-                self.elements.cdf(slot.times).unwrap_or(&mut self.times)
+                self.elements.distributions.get(slot.times).unwrap_or(&mut self.times)
             }
             None => &mut self.times,
         };

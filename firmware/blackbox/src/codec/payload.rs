@@ -1,12 +1,14 @@
-//! A frame's payload, field by field, by its layout.
+//! A frame's payload, element by element, by its layout.
+
+use core::ops::Range;
 
 use hums_dialect::{Kind, Role};
 
-use super::element::{Context, Element, QUIET};
+use super::element::{Context, ELEMENTS, Element, What};
 use super::frame::{Frame, PAYLOAD_BYTES_MAX};
-use super::links::LINKS;
+use super::links::{self, LINKS};
 use super::slots::{Key, Length, Slot};
-use super::{Model, TEXT_BYTES};
+use super::{INSTANCE_BYTES, Model, TEXT_BYTES};
 use crate::coder::Coder;
 use crate::layouts::{FieldLayout, Layout, Place};
 
@@ -22,54 +24,86 @@ pub(crate) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
     for index in 0.. {
         let field = layout.field(index)?;
         if field.role == Role::Instance {
-            return (field.size() <= super::INSTANCE_BYTES).then_some((offset, field.size()));
+            return (field.size() <= INSTANCE_BYTES).then_some((offset, field.size()));
         }
         offset += field.size();
     }
     None
 }
 
-/// Text and data are coded as a whole.
-fn is_text(field: FieldLayout) -> bool {
-    match field.kind {
-        Kind::Char => true,
-        Kind::U8 | Kind::I8 => field.count >= DATA_BYTES,
-        _ => false,
+/// How the elements of a field are coded, how many there are and how many bytes each has.
+fn elements_of(field: FieldLayout) -> (What, u8, u8) {
+    let whole = |what| (what, 1, field.size() as u8);
+    if field.role == Role::Instance && field.size() <= INSTANCE_BYTES {
+        return whole(What::Instance);
     }
-}
-
-/// Elements that a field takes: the instance none, as the slot says it; a text one; an element of 8 bytes two.
-fn elements_of(field: FieldLayout) -> usize {
-    match field.kind {
-        _ if field.role == Role::Instance => 0,
-        _ if is_text(field) => 1,
-        kind if kind.size() == 8 => 2 * usize::from(field.count),
-        _ => usize::from(field.count),
-    }
+    let what = match (field.kind, field.role) {
+        (Kind::Char, _) => return whole(What::Text),
+        (Kind::U8 | Kind::I8, _) if field.count >= DATA_BYTES => return whole(What::Text),
+        (Kind::U8 | Kind::I8, _) => What::Integer1,
+        (Kind::U16 | Kind::I16, _) => What::Integer2,
+        (Kind::F32, _) => What::Float,
+        (Kind::U32 | Kind::I32, Role::Millis) => What::Millis,
+        (Kind::U32 | Kind::I32, Role::Micros) => What::Micros,
+        (Kind::U32 | Kind::I32, _) => What::Integer4,
+        (_, Role::Millis | Role::Micros) => What::WideTime,
+        _ => What::Wide,
+    };
+    (what, field.count, field.kind.size() as u8)
 }
 
 impl Model {
     /// A new slot with its elements, or without a layout where there is no room for them.
     pub(crate) fn describe(&mut self, key: Key, place: Option<Place>) -> Slot {
         let layout = place.and_then(|place| self.layouts.at(place));
-        let mut count = 0;
-        let mut described = 0;
+        let (mut count, mut described) = (0, 0);
         let mut index = 0;
         while let Some(field) = layout.and_then(|layout| layout.field(index)) {
-            count += elements_of(field);
+            let (what, elements, _) = elements_of(field);
+            count += usize::from(elements) * if wide(what) { 2 } else { 1 };
             described += field.size();
             index += 1;
         }
-        let room = self.elements.claim(count);
-        let known = place.filter(|_| room.is_some() && described <= PAYLOAD_BYTES_MAX);
-        let kept = layout.filter(|_| known.is_some());
-        let mut slot =
-            Slot::new(key, known, kept, room.unwrap_or(0), if known.is_some() { described } else { 0 });
-        if known.is_none() {
+        let fits = count <= usize::from(u8::MAX) && described <= PAYLOAD_BYTES_MAX;
+        let room = layout.filter(|_| fits).and_then(|layout| Some((layout, self.elements.claim(count)?)));
+        let Some((layout, first)) = room else {
+            let mut slot = Slot::new(key, None, None, 0, 0);
             slot.seed = layout.map_or(0, Layout::crc_extra);
             slot.verified = layout.is_some();
-        }
+            return slot;
+        };
+        self.prepare(key.id, layout, usize::from(first));
+        let mut slot = Slot::new(key, place, Some(layout), first, described);
+        slot.elements_count = count as u8;
         slot
+    }
+
+    /// Sets up the elements of a layout.
+    fn prepare(&mut self, id: u32, layout: Layout, first: usize) {
+        let mut link = usize::from(links::first(id));
+        let (mut at, mut offset, mut index) = (first, 0, 0);
+        while let Some(field) = layout.field(index) {
+            let (what, count, size) = elements_of(field);
+            for _ in 0..count {
+                while LINKS.get(link).is_some_and(|link| link.id == id && usize::from(link.offset) < offset) {
+                    link += 1;
+                }
+                let linked =
+                    LINKS.get(link).is_some_and(|link| link.id == id && usize::from(link.offset) == offset);
+                let mut element = Element::new(what, size, linked && size <= 4);
+                if what == What::Integer2 || what == What::Integer4 {
+                    element.exponent = u8::from(matches!(field.kind, Kind::I16 | Kind::I32));
+                }
+                for (place, element) in
+                    self.elements.list.iter_mut().skip(at).zip([element, Element::new(What::Upper, 0, false)])
+                {
+                    *place = element;
+                }
+                at += if wide(what) { 2 } else { 1 };
+                offset += usize::from(size);
+            }
+            index += 1;
+        }
     }
 
     /// Whether the payload is that of the slot's last frame.
@@ -87,52 +121,35 @@ impl Model {
     /// Puts together the last payload from the elements; `false` where not all of it was kept.
     fn restore(&self, slot: u8, frame: &mut Frame) -> bool {
         let Some(slot) = self.slots.list.get(usize::from(slot)) else { return false };
-        let Some(layout) = slot.layout.and_then(|place| self.layouts.at(place)) else { return false };
-        let limit = self.limit(slot);
-        let (mut element, mut offset, mut index) = (usize::from(slot.elements), 0, 0);
-        while let Some(field) = layout.field(index) {
-            if offset + field.size() > limit {
+        if slot.layout.is_none() {
+            return false;
+        }
+        let limit = limit(slot);
+        let mut offset = 0;
+        let elements = self.elements.list.get(elements_in(slot)).unwrap_or_default();
+        for (index, element) in elements.iter().enumerate() {
+            let size = usize::from(element.size);
+            if offset + size > limit {
                 break;
             }
-            let place = &mut frame.payload[offset..offset + field.size()];
-            if field.role == Role::Instance {
-                place.copy_from_slice(&slot.key.instance[..field.size()]);
-            } else if is_text(field) {
-                let Some(text) = self.elements.list.get(element).and_then(|e| self.kept(e.aux, field.size()))
-                else {
-                    return false;
-                };
-                place.copy_from_slice(text);
-            } else {
-                let size = field.kind.size();
-                let per_element = if size == 8 { 2 } else { 1 };
-                for (count, place) in place.chunks_exact_mut(size).enumerate() {
-                    let at = element + count * per_element;
-                    let low = self.elements.list.get(at).map_or(0, |e| e.last);
-                    let high = self.elements.list.get(at + 1).map_or(0, |e| e.last);
-                    let value = if size == 8 { u64::from(high) << 32 } else { 0 } | u64::from(low);
-                    place.copy_from_slice(&value.to_le_bytes()[..size]);
+            let place = &mut frame.payload[offset..offset + size];
+            match element.what {
+                What::Instance => place.copy_from_slice(&slot.key.instance[..size]),
+                What::Text => match kept(&self.texts, element.aux, size) {
+                    Some(text) => place.copy_from_slice(text),
+                    None => return false,
+                },
+                What::Wide | What::WideTime => {
+                    let upper = elements.get(index + 1).map_or(0, |upper| upper.last);
+                    let value = u64::from(upper) << 32 | u64::from(element.last);
+                    place.copy_from_slice(&value.to_le_bytes());
                 }
+                _ => place.copy_from_slice(&element.last.to_le_bytes()[..size]),
             }
-            element += elements_of(field);
-            offset += field.size();
-            index += 1;
+            offset += size;
         }
         // What lies beyond the layout is not kept.
         frame.len <= offset || slot.length == Length::Trimmed
-    }
-
-    fn kept(&self, at: u32, size: usize) -> Option<&[u8]> {
-        let at = usize::try_from(at).ok()?;
-        self.texts.get(at..at.checked_add(size)?)
-    }
-
-    /// Bytes of the payload that are coded as fields: a MAVLink 1 payload may be shorter than its layout.
-    fn limit(&self, slot: &Slot) -> usize {
-        match slot.length {
-            Length::Fixed(len) if !slot.key.v2 => usize::from(len.min(slot.described)),
-            _ => usize::from(slot.described),
-        }
     }
 
     /// All of the payload.
@@ -146,8 +163,9 @@ impl Model {
         let slot_index = usize::from(slot);
         let slot = *self.slots.list.get(slot_index)?;
         let mut end = 0;
-        if let Some(layout) = slot.layout.and_then(|place| self.layouts.at(place)) {
-            end = self.fields(coder, slot_index, &slot, layout, frame, elapsed_ms)?;
+        if slot.layout.is_some() {
+            let calm = self.calm(coder, slot_index, &slot, frame)?;
+            end = self.fields(coder, &slot, frame, elapsed_ms, calm)?;
         }
         if let Length::Fixed(len) = slot.length {
             let mut before = 0;
@@ -161,176 +179,126 @@ impl Model {
         Some(())
     }
 
-    /// The fields that the layout describes; gives where they end.
+    /// The fields that the layout describes; gives where they end. `calm`: the quiet ones stay as they are.
     fn fields<C: Coder>(
         &mut self,
         coder: &mut C,
-        slot_index: usize,
         slot: &Slot,
-        layout: Layout,
         frame: &mut Frame,
         elapsed_ms: u32,
+        calm: bool,
     ) -> Option<usize> {
-        let calm = self.calm(coder, slot_index, slot, layout, frame)?;
-        let limit = self.limit(slot);
-        let mut link = usize::from(slot.links);
+        let limit = limit(slot);
         let mut context =
             Context { elapsed_ms, clock_us: self.clock_us, clock_ms: self.clock_ms, neighbour: None };
-        let (mut element, mut offset, mut index) = (usize::from(slot.elements), 0, 0);
-        while let Some(field) = layout.field(index) {
-            if offset + field.size() > limit {
+        let mut offset = 0;
+        let range = elements_in(slot);
+        let mut index = range.start;
+        while index < range.end {
+            let element = self.elements.list.get_mut(index)?;
+            let size = usize::from(element.size);
+            if offset + size > limit {
                 break;
             }
-            if field.role == Role::Instance {
-                frame.payload[offset..offset + field.size()]
-                    .copy_from_slice(&slot.key.instance[..field.size()]);
-                offset += field.size();
-            } else if is_text(field) {
-                self.text_field(coder, element, frame, offset, field.size(), calm)?;
-                element += 1;
-                offset += field.size();
+            let (last, aux, what) = (element.last, element.aux, element.what);
+            let place: &mut [u8; 8] = frame.payload.get_mut(offset..)?.first_chunk_mut()?;
+            if calm && element.is_quiet() && what != What::Text && !C::WRITES {
+                let upper = self.elements.list.get(index + 1).map_or(0, |upper| upper.last);
+                let value = u64::from(last) | if wide(what) { u64::from(upper) << 32 } else { 0 };
+                place.get_mut(..size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
+            } else if calm && element.is_quiet() && what != What::Text {
+                // Nothing to write.
             } else {
-                for _ in 0..field.count {
-                    let size = field.kind.size();
-                    let (mut linked, mut publishes) = (None, None);
-                    while let Some(entry) = LINKS
-                        .get(link)
-                        .filter(|entry| entry.id == slot.key.id && usize::from(entry.offset) <= offset)
-                    {
-                        let register = usize::from(entry.register);
-                        if usize::from(entry.offset) == offset && entry.publishes {
-                            publishes = Some((register, entry.scale));
-                        } else if usize::from(entry.offset) == offset {
-                            linked = Some(self.registers[register] * entry.scale);
-                        }
-                        link += 1;
+                match what {
+                    What::Integer1 | What::Integer2 | What::Integer4 | What::Millis | What::Micros => {
+                        let bits = word(place) & (u32::MAX >> (32 - 8 * size));
+                        let value = self.elements.distributions.integer(coder, element, bits, &context);
+                        place.get_mut(..size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
                     }
-                    self.one(coder, element, field, frame, offset, calm, &mut context, linked)?;
-                    if let Some((register, scale)) = publishes
-                        && size <= 4
-                    {
-                        self.registers[register] = self.elements.number(element, field.kind) * scale;
+                    What::Float => {
+                        let link = if element.has_links() {
+                            linked(&self.registers, slot.key.id, slot.links, offset)
+                        } else {
+                            None
+                        };
+                        let bits = word(place);
+                        let value = self.elements.distributions.float(coder, element, bits, &context, link);
+                        place.get_mut(..4)?.copy_from_slice(&value.to_le_bytes());
                     }
-                    element += if size == 8 { 2 } else { 1 };
-                    offset += size;
+                    What::Wide | What::WideTime => {
+                        let [element, upper] = self.elements.list.get_mut(index..index + 2)? else {
+                            return None;
+                        };
+                        let bits = u64::from_le_bytes(*place);
+                        let value = self.elements.distributions.wide(coder, element, upper, bits, &context);
+                        *place = value.to_le_bytes();
+                    }
+                    What::Text => self.text_field(coder, index, frame, offset, size, calm)?,
+                    What::Instance => {
+                        let instance = slot.key.instance.get(..size)?;
+                        frame.payload.get_mut(offset..offset + size)?.copy_from_slice(instance);
+                    }
+                    What::Upper => {}
                 }
             }
+            let element = self.elements.list.get(index)?;
+            match what {
+                What::Float => {
+                    context.neighbour = Some((f32::from_bits(element.last), f32::from_bits(last)));
+                }
+                What::Millis => {
+                    self.clock_ms = element.last;
+                    let step_us = element.last.wrapping_sub(last).wrapping_mul(1_000);
+                    self.clock_us = advanced(self.clock_us, aux.wrapping_add(step_us));
+                }
+                What::Micros | What::WideTime => {
+                    let step_us = element.last.wrapping_sub(last);
+                    self.clock_us = advanced(self.clock_us, aux.wrapping_add(step_us));
+                }
+                _ => {}
+            }
+            if element.has_links() {
+                let number = element.number();
+                publish(&mut self.registers, slot.key.id, slot.links, offset, number);
+            }
+            offset += size;
             index += 1;
         }
         Some(offset)
     }
 
-    /// One element of a number field.
-    #[expect(clippy::too_many_arguments, reason = "the loop's state")]
-    #[inline]
-    fn one<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        index: usize,
-        field: FieldLayout,
-        frame: &mut Frame,
-        offset: usize,
-        calm: bool,
-        context: &mut Context,
-        linked: Option<f32>,
-    ) -> Option<()> {
-        let size = field.kind.size();
-        let Element { quiet, last, aux, .. } = *self.elements.list.get(index)?;
-        let wide = u64::from_le_bytes(*frame.payload.get(offset..)?.first_chunk()?);
-        let value = if size == 8 {
-            if calm && quiet >= QUIET {
-                u64::from(self.elements.list.get(index + 1)?.last) << 32 | u64::from(last)
-            } else {
-                self.elements.wide(coder, index, field.role, wide, context)
-            }
-        } else {
-            let bits = wide as u32 & (u32::MAX >> (32 - 8 * size));
-            u64::from(if calm && quiet >= QUIET {
-                last
-            } else if field.kind == Kind::F32 {
-                self.elements.float(coder, index, bits, context, linked)
-            } else {
-                self.elements.integer(coder, index, field.kind, field.role, bits, context)
-            })
-        };
-        if field.kind == Kind::F32 {
-            context.neighbour = Some((f32::from_bits(value as u32), f32::from_bits(last)));
-        }
-        self.clocks(field.role, value as u32, last, aux, context);
-        if !C::WRITES {
-            frame.payload.get_mut(offset..offset + size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
-        }
-        Some(())
-    }
-
-    /// A time field moves the clocks on.
-    fn clocks(&mut self, role: Role, value: u32, last: u32, aux: u32, context: &mut Context) {
-        let step_us = match role {
-            Role::Millis => {
-                self.clock_ms = value;
-                value.wrapping_sub(last).wrapping_mul(1_000)
-            }
-            Role::Micros => value.wrapping_sub(last),
-            _ => return,
-        };
-        let proposed = aux.wrapping_add(step_us);
-        // Only forward, and not by more than ten seconds: otherwise it is no advance of a clock.
-        if proposed.wrapping_sub(self.clock_us) < 10_000_000 {
-            self.clock_us = proposed;
-        }
-        let _ = context;
-    }
-
-    /// Whether all quiet elements stay as they are: one bit for all of them.
-    fn calm<C: Coder>(
-        &mut self,
-        coder: &mut C,
-        slot_index: usize,
-        slot: &Slot,
-        layout: Layout,
-        frame: &Frame,
-    ) -> Option<bool> {
-        let limit = self.limit(slot);
-        let (mut element, mut offset, mut index) = (usize::from(slot.elements), 0, 0);
+    /// Whether all quiet elements stay as they are: one bit for all of them, if there are any.
+    fn calm<C: Coder>(&mut self, coder: &mut C, slot_index: usize, slot: &Slot, frame: &Frame) -> Option<bool> {
+        let limit = limit(slot);
         let (mut any, mut same) = (false, true);
-        while let Some(field) = layout.field(index) {
-            if offset + field.size() > limit {
+        let mut offset = 0;
+        let elements = self.elements.list.get(elements_in(slot))?;
+        for (index, element) in elements.iter().enumerate() {
+            let size = usize::from(element.size);
+            if offset + size > limit {
                 break;
             }
-            if field.role == Role::Instance {
-                offset += field.size();
-            } else if is_text(field) {
-                let Element { quiet, aux, .. } = *self.elements.list.get(element)?;
-                if quiet >= QUIET {
-                    any = true;
-                    if C::WRITES {
-                        same &=
-                            self.kept(aux, field.size()) == frame.payload.get(offset..offset + field.size());
-                    }
+            if element.is_quiet() {
+                any = true;
+                if !C::WRITES {
+                    break;
                 }
-                element += 1;
-                offset += field.size();
-            } else {
-                let size = field.kind.size();
-                for _ in 0..field.count {
-                    let Element { quiet, last, .. } = *self.elements.list.get(element)?;
-                    if quiet >= QUIET {
-                        any = true;
-                        if C::WRITES {
-                            let wide = u64::from_le_bytes(*frame.payload.get(offset..)?.first_chunk()?);
-                            same &= if size == 8 {
-                                wide as u32 == last
-                                    && (wide >> 32) as u32 == self.elements.list.get(element + 1)?.last
-                            } else {
-                                wide as u32 & (u32::MAX >> (32 - 8 * size)) == last
-                            };
-                        }
+                let place: &[u8; 8] = frame.payload.get(offset..)?.first_chunk()?;
+                same = match element.what {
+                    What::Text => {
+                        kept(&self.texts, element.aux, size) == frame.payload.get(offset..offset + size)
                     }
-                    element += if size == 8 { 2 } else { 1 };
-                    offset += size;
+                    What::Wide | What::WideTime => {
+                        let upper = elements.get(index + 1).map_or(0, |upper| upper.last);
+                        u64::from_le_bytes(*place) == u64::from(upper) << 32 | u64::from(element.last)
+                    }
+                    _ => word(place) & (u32::MAX >> (32 - 8 * size)) == element.last,
+                };
+                if !same {
+                    break;
                 }
             }
-            index += 1;
+            offset += size;
         }
         if !any {
             return Some(false);
@@ -352,7 +320,7 @@ impl Model {
         calm: bool,
     ) -> Option<()> {
         let mut element = *self.elements.list.get(index)?;
-        if !element.known {
+        if !element.known() {
             let at = usize::from(self.texts_used);
             element.aux = NOT_KEPT;
             if at + size <= TEXT_BYTES {
@@ -362,14 +330,14 @@ impl Model {
             }
         }
         let mut above = [0; PAYLOAD_BYTES_MAX];
-        let kept = self.kept(element.aux, size).is_some();
-        if let Some(text) = self.kept(element.aux, size) {
+        let is_kept = kept(&self.texts, element.aux, size).is_some();
+        if let Some(text) = kept(&self.texts, element.aux, size) {
             above[..size].copy_from_slice(text);
         }
         let text = frame.payload.get_mut(offset..offset + size)?;
-        let mut same = calm && element.quiet >= QUIET;
+        let mut same = calm && element.is_quiet();
         if !same {
-            same = kept && text[..] == above[..size];
+            same = is_kept && text[..] == above[..size];
             same = coder.symbol(&mut self.changes, usize::from(!same)) == 0;
         }
         if same {
@@ -387,11 +355,66 @@ impl Model {
             text.get_mut(len..)?.fill(0);
         }
         element.note(same);
-        if let (Ok(at), true) = (usize::try_from(element.aux), kept) {
+        if is_kept && let Ok(at) = usize::try_from(element.aux) {
             let text = frame.payload.get(offset..offset + size)?;
             self.texts.get_mut(at..at + size)?.copy_from_slice(text);
         }
         *self.elements.list.get_mut(index)? = element;
         Some(())
+    }
+}
+
+const fn wide(what: What) -> bool {
+    matches!(what, What::Wide | What::WideTime)
+}
+
+fn elements_in(slot: &Slot) -> Range<usize> {
+    let first = usize::from(slot.elements);
+    first..(first + usize::from(slot.elements_count)).min(ELEMENTS)
+}
+
+/// Bytes of the payload that are coded as fields: a MAVLink 1 payload may be shorter than its layout.
+fn limit(slot: &Slot) -> usize {
+    match slot.length {
+        Length::Fixed(len) if !slot.key.v2 => usize::from(len.min(slot.described)),
+        _ => usize::from(slot.described),
+    }
+}
+
+fn kept(texts: &[u8; TEXT_BYTES], at: u32, size: usize) -> Option<&[u8]> {
+    let at = usize::try_from(at).ok()?;
+    texts.get(at..at.checked_add(size)?)
+}
+
+#[inline]
+fn word(place: &[u8; 8]) -> u32 {
+    u32::from_le_bytes([place[0], place[1], place[2], place[3]])
+}
+
+/// A clock that a time field proposes to move: only forward, and not by more than ten seconds; anything else is no
+/// advance of a clock.
+fn advanced(clock_us: u32, proposed_us: u32) -> u32 {
+    if proposed_us.wrapping_sub(clock_us) < 10_000_000 { proposed_us } else { clock_us }
+}
+
+/// The links of the field at an offset.
+fn links_at(id: u32, first: u8, offset: usize) -> impl Iterator<Item = &'static links::Link> {
+    LINKS
+        .iter()
+        .skip(usize::from(first))
+        .take_while(move |link| link.id == id)
+        .filter(move |link| usize::from(link.offset) == offset)
+}
+
+fn linked(registers: &[f32; links::REGISTERS], id: u32, first: u8, offset: usize) -> Option<f32> {
+    let link = links_at(id, first, offset).find(|link| !link.publishes)?;
+    Some(registers.get(usize::from(link.register))? * link.scale)
+}
+
+fn publish(registers: &mut [f32; links::REGISTERS], id: u32, first: u8, offset: usize, number: f32) {
+    for link in links_at(id, first, offset).filter(|link| link.publishes) {
+        if let Some(register) = registers.get_mut(usize::from(link.register)) {
+            *register = number * link.scale;
+        }
     }
 }

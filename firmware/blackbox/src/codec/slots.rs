@@ -37,8 +37,9 @@ pub(crate) enum Length {
 pub(crate) struct Slot {
     pub(crate) key: Key,
     pub(crate) layout: Option<Place>,
-    /// Its first element.
+    /// Its first element, and how many there are.
     pub(crate) elements: u16,
+    pub(crate) elements_count: u8,
     /// The distribution of the times before its frames; 0: none yet.
     pub(crate) times: u16,
     pub(crate) at_ms: u32,
@@ -67,6 +68,7 @@ impl Slot {
         key: Key { id: 0, v2: false, sender: 0, instance: [0; INSTANCE_BYTES] },
         layout: None,
         elements: 0,
+        elements_count: 0,
         times: 0,
         at_ms: 0,
         seed: 0,
