@@ -87,17 +87,11 @@ pub(crate) fn take() -> Parts {
 
     let mut line = usart::Config::default();
     line.baudrate = AUTOPILOT_BAUD;
-    let autopilot = match UartRx::new_blocking(p.USART1, p.PA10, line) {
-        Ok(port) => AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs)),
-        Err(error) => {
-            defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error))
-        }
-    };
+    let port = UartRx::new_blocking(p.USART1, p.PA10, line).expect("the clocks allow this baud rate");
+    let autopilot = AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs));
     line.baudrate = GS_BAUD;
-    let gs = match UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line) {
-        Ok(port) => GsTx(port),
-        Err(error) => defmt::panic!("USART2 refuses {} baud: {}", GS_BAUD, defmt::Debug2Format(&error)),
-    };
+    let port = UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line).expect("the clocks allow this baud rate");
+    let gs = GsTx(port);
 
     let mut bus = spi::Config::default();
     bus.frequency = CARD_IDENTIFICATION;
