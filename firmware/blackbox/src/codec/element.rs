@@ -386,8 +386,7 @@ impl Distributions {
         last: i32,
         value: u32,
     ) -> (Option<u32>, Option<i32>) {
-        let linear =
-            element.decimal & STEP_DECIMAL != 0 && element.costs[LINEAR] < element.costs[LAST];
+        let linear = element.decimal & STEP_DECIMAL != 0 && element.costs[LINEAR] < element.costs[LAST];
         let guess = if linear { last.wrapping_add(element.step) } else { last };
         let now = if C::WRITES { hundredths(value) } else { None };
         let difference = now.map_or(0, |now| now.wrapping_sub(guess));

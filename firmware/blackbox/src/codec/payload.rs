@@ -268,7 +268,13 @@ impl Model {
     }
 
     /// Whether all quiet elements stay as they are: one bit for all of them, if there are any.
-    fn calm<C: Coder>(&mut self, coder: &mut C, slot_index: usize, slot: &Slot, frame: &Frame) -> Option<bool> {
+    fn calm<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        slot_index: usize,
+        slot: &Slot,
+        frame: &Frame,
+    ) -> Option<bool> {
         let limit = limit(slot);
         let (mut any, mut same) = (false, true);
         let mut offset = 0;

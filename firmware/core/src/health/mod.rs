@@ -98,7 +98,7 @@ pub struct Health {
     states: [State; STATES],
 }
 
-const _: () = assert!(size_of::<Health>() <= 12 * 1024);
+const _: () = assert!(size_of::<Health>() <= 4 * 1024);
 
 impl Default for Health {
     fn default() -> Self {

@@ -89,7 +89,8 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(3),
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
-        stale_after: STALE_SLOW,
+        // Only steady flight says something; ESCs that stop talking are `esc_silent`.
+        stale_after: None,
         read: |inputs, motor| inputs.derived.motor_imbalance(inputs, motor),
         ..ESC
     },
