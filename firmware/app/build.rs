@@ -8,6 +8,11 @@ use std::{env, fs};
 fn main() {
     println!("cargo::rerun-if-changed=../../memory.x");
     println!("cargo::rustc-env=HUMS_GIT={}", commit());
+    println!("cargo::rerun-if-env-changed=DEFMT_LOG");
+    if env::var_os("DEFMT_LOG").is_none() {
+        // defmt's own default is errors only.
+        println!("cargo::rustc-env=DEFMT_LOG=info");
+    }
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
@@ -29,6 +34,7 @@ fn commit() -> String {
 }
 
 fn git(arguments: &[&str]) -> Option<String> {
-    let output = Command::new("git").args(arguments).output().ok().filter(|output| output.status.success())?;
+    let output =
+        Command::new("git").args(arguments).output().ok().filter(|output| output.status.success())?;
     Some(String::from_utf8(output.stdout).ok()?.trim().to_owned())
 }

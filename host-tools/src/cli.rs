@@ -281,3 +281,36 @@ pub struct Demo {
     #[arg(long, value_name = "DIR", default_value = "hums-demo")]
     pub dir: PathBuf,
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn every_example_of_every_help_is_a_command_line() {
+        let mut examples = 0;
+        let mut root = Cli::command();
+        let helps: Vec<String> = std::iter::once(root.render_long_help().to_string())
+            .chain(Cli::command().get_subcommands_mut().map(|command| command.render_long_help().to_string()))
+            .collect();
+        for help in &helps {
+            assert!(help.contains("Examples:"), "{help}");
+            for line in help.lines().filter_map(|line| line.strip_prefix("  hums ")) {
+                // A remark stands after three spaces, and a pipe is the shell's.
+                let line =
+                    line.split("   ").next().unwrap_or_default().split(" | ").next().unwrap_or_default();
+                let words = std::iter::once("hums").chain(line.split_whitespace());
+                assert!(Cli::try_parse_from(words).is_ok(), "hums {line}");
+                examples += 1;
+            }
+        }
+        assert!(examples >= 20, "{examples} examples");
+    }
+
+    #[test]
+    fn the_definition_of_the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+}

@@ -4,9 +4,10 @@
 use crate::flight::FlightEvent;
 use crate::health::{Inputs, Reading};
 use crate::latest::Latest;
-use crate::observation::{Battery, CELLS_MAX, MOTORS_MAX, Observation};
+use crate::observation::{Battery, CELLS_MAX, EscGroup, MOTORS_MAX, Observation};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
+use crate::trend::{Rate, Resistance};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// Standard gravity, m/s2 (CGPM 1901).
@@ -27,6 +28,8 @@ const LOSS_MEMORY: Span = Span::from_secs(10);
 
 #[derive(Clone, Copy, Debug, Default)]
 struct MotorTrack {
+    /// Errors that its ESC counted lately.
+    errors: Option<Rate>,
     /// Smoothed interval between messages that carry speed or current, seconds; 0 before there are two.
     interval_s: f32,
     last: Option<Instant>,
@@ -38,6 +41,7 @@ struct MotorTrack {
 #[derive(Clone, Copy, Debug)]
 pub struct Derived {
     highest_pack_v: [f32; BATTERIES_MAX],
+    resistance: [Resistance; BATTERIES_MAX],
     motors: [MotorTrack; MOTORS_MAX],
     load_factor: Latest<f32>,
     had_fix: [bool; RECEIVERS_MAX],
@@ -57,9 +61,10 @@ impl Derived {
     /// Nothing seen yet.
     pub const fn new() -> Self {
         const MOTOR: MotorTrack =
-            MotorTrack { interval_s: 0.0, last: None, highest_rpm: 0.0, smooth_rpm: 0.0 };
+            MotorTrack { errors: None, interval_s: 0.0, last: None, highest_rpm: 0.0, smooth_rpm: 0.0 };
         Self {
             highest_pack_v: [0.0; BATTERIES_MAX],
+            resistance: [Resistance::new(); BATTERIES_MAX],
             motors: [MOTOR; MOTORS_MAX],
             load_factor: Latest::nothing(),
             had_fix: [false; RECEIVERS_MAX],
@@ -84,9 +89,17 @@ impl Derived {
                     *had_fix |= gnss.fix >= 3;
                 }
             }
-            Observation::Battery(_) | Observation::SystemStatus(_) => self.take_voltages(vehicle),
+            Observation::Battery(battery) => {
+                self.take_voltages(vehicle);
+                let same = |slot: &Latest<Battery>| slot.get().is_some_and(|known| known.id == battery.id);
+                if let Some(index) = vehicle.batteries.iter().position(same) {
+                    self.resistance[index].take(battery);
+                }
+            }
+            Observation::SystemStatus(_) => self.take_voltages(vehicle),
             Observation::Escs(group) => {
                 let first = usize::from(group.first);
+                self.take_errors(at, group);
                 for number in first..first.saturating_add(group.escs.len()).min(MOTORS_MAX) {
                     self.take_motor(at, vehicle, number);
                 }
@@ -99,6 +112,16 @@ impl Derived {
         for (battery, highest) in self.highest_pack_v.iter_mut().enumerate() {
             if let Some(pack_v) = pack_v(vehicle, battery).filter(|pack_v| pack_v.is_finite()) {
                 *highest = highest.max(pack_v);
+            }
+        }
+    }
+
+    fn take_errors(&mut self, at: Instant, group: &EscGroup) {
+        for (offset, esc) in group.escs.iter().enumerate() {
+            let errors = esc.and_then(|esc| esc.errors);
+            let track = self.motors.get_mut(usize::from(group.first) + offset);
+            if let (Some(errors), Some(track)) = (errors, track) {
+                track.errors.get_or_insert(Rate::new(at, errors)).take(at, errors);
             }
         }
     }
@@ -140,6 +163,17 @@ impl Derived {
         }
     }
 
+    /// What is known of a battery's internal resistance.
+    pub fn resistance(&self, battery: usize) -> Option<&Resistance> {
+        self.resistance.get(battery)
+    }
+
+    /// Errors a minute that a motor's ESC counts.
+    pub(crate) fn esc_errors(&self, motor: u8) -> Option<f32> {
+        let errors = self.motors.get(usize::from(motor))?.errors?;
+        Some(errors.per_minute() as f32)
+    }
+
     /// Cells of a battery: set, reported, or found from the highest voltage seen. 0 while nothing is known.
     pub fn cell_count(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> u8 {
         let set = params.get(Param::BatCells) as u8;
@@ -159,6 +193,9 @@ impl Derived {
     pub(crate) fn cell_voltage(&self, inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
         let index = usize::from(battery);
         let slot = inputs.vehicle.batteries.get(index)?;
+        if slot.get().is_some_and(|known| !known.lithium) {
+            return None;
+        }
         let at = if slot.get().is_some() { slot.at() } else { inputs.vehicle.system.at() };
         let lowest = slot
             .get()

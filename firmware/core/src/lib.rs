@@ -11,6 +11,7 @@ pub mod observation;
 pub mod params;
 pub mod status;
 pub mod time;
+pub mod trend;
 pub mod units;
 pub mod usage;
 pub mod vehicle;

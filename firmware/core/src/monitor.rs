@@ -24,7 +24,7 @@ pub struct Monitor {
     usage: Usage,
 }
 
-const _: () = assert!(size_of::<Monitor>() <= 14 * 1024);
+const _: () = assert!(size_of::<Monitor>() <= 9 * 1024);
 
 impl Monitor {
     /// Before the first observation.
@@ -45,7 +45,7 @@ impl Monitor {
             return false;
         }
         self.derived.observe(at, &self.vehicle, observation);
-        self.usage.observe(&self.vehicle, &self.flight, &self.derived, observation);
+        self.usage.observe(at, &self.vehicle, &self.flight, &self.derived, observation);
         true
     }
 

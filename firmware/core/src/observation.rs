@@ -159,6 +159,8 @@ pub struct Attitude {
     pub pitch: Radians,
     /// From north, clockwise.
     pub yaw: Radians,
+    /// Milliseconds since the autopilot's boot. Every autopilot sends it here; `SYSTEM_TIME` only some do.
+    pub boot_ms: Option<u32>,
 }
 
 /// Position and velocity from the local origin, north, east, down.
@@ -252,6 +254,8 @@ pub struct Battery {
     pub temperature: Option<Celsius>,
     /// `MAV_BATTERY_FAULT` bits.
     pub faults: u32,
+    /// Lithium polymer or lithium ion, or not said: what the limits of a cell's voltage are made for.
+    pub lithium: bool,
 }
 
 impl Default for Battery {
@@ -266,6 +270,7 @@ impl Default for Battery {
             remaining: None,
             temperature: None,
             faults: 0,
+            lithium: true,
         }
     }
 }

@@ -111,6 +111,15 @@ params! {
     GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated";
     GpsJamCrit "GPS_JAM_CRIT" "" 2.5 0.0 4.0 "GNSS_INTEGRITY: 3 is detected";
     Latch "HEALTH_LATCH" "" 0.0 0.0 1.0 "1: a warning stays until the vehicle disarms";
+    BatResWarn "BAT_RES_WARN" "%" 30.0 0.0 1000.0 "LogHat: internal resistance above its baseline";
+    BatResCrit "BAT_RES_CRIT" "%" 60.0 0.0 1000.0 "LogHat: internal resistance above its baseline";
+    BatFaultWarn "BAT_FAULT_WARN" "" 0.5 0.0 32.0 "any MAV_BATTERY_FAULT bit";
+    EscErrWarn "ESC_ERR_WARN" "1/min" 10.0 0.0 100_000.0 "ESC_INFO error count, rising";
+    MotLossCrit "MOT_LOSS_CRIT" "%" 10.0 0.0 100.0 "PX4 motor failure check: near-zero current above 0.2 throttle";
+    RadioRssiWarn "RADIO_RSSI_WARN" "" 0.0 0.0 254.0 "device scale; 0 is off";
+    RebootCrit "AP_REBOOT_CRIT" "" 0.5 0.0 100.0 "1: the autopilot restarted within 30 s";
+    StateCrit "AP_STATE_CRIT" "" 4.5 0.0 10.0 "MAV_STATE: 5 is critical, 6 emergency";
+    SensorsWarn "AP_SENSORS_WARN" "" 0.5 0.0 32.0 "sensors that SYS_STATUS calls unhealthy";
     GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
 }
 

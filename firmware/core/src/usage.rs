@@ -5,6 +5,7 @@ use crate::derived::Derived;
 use crate::flight::{Flight, FlightEvent, ground_speed_mps};
 use crate::observation::{MOTORS_MAX, Observation};
 use crate::time::{Instant, Span};
+use crate::units::{Amperes, Volts};
 use crate::vehicle::Vehicle;
 
 macro_rules! counters {
@@ -49,11 +50,11 @@ counters! {
     SpeedMax = 7 "speed_max_m_s";
     /// The greatest load factor in the air, units of gravity.
     LoadFactorMax = 8 "load_factor_max_g";
-    /// Charge taken from the first battery, ampere hours.
+    /// Charge taken from all batteries, ampere hours.
     Charge = 9 "charge_ah";
-    /// Energy taken from the first battery, watt hours.
+    /// Energy taken from all batteries, watt hours.
     Energy = 10 "energy_wh";
-    /// The highest battery current, amperes.
+    /// The highest current of all batteries together, amperes.
     CurrentMax = 11 "current_max_a";
     /// The lowest battery voltage while armed, volts.
     VoltageMin = 12 "voltage_min_v";
@@ -94,6 +95,12 @@ pub fn counter_name(number: u8) -> Option<CounterName> {
 
 /// Integration steps longer than this are gaps: nothing is known of what happened in them.
 const STEP_MAX: Span = Span::from_secs(2);
+/// What no vehicle here has: beyond it a value is garbage.
+const VOLTS_MAX: f32 = 1_000.0;
+const AMPERES_MAX: f32 = 10_000.0;
+const RPM_MAX: f32 = 1e6;
+const HEIGHT_MAX_M: f32 = 100_000.0;
+const ACCELERATION_MAX: f32 = 10_000.0;
 /// A battery figure holds this long.
 const BATTERY_AGE: Span = Span::from_secs(5);
 /// A motor speed holds this long.
@@ -152,6 +159,7 @@ impl Usage {
     /// Takes an observation's extremes, which a step could miss.
     pub fn observe(
         &mut self,
+        at: Instant,
         vehicle: &Vehicle,
         flight: &Flight,
         derived: &Derived,
@@ -160,34 +168,39 @@ impl Usage {
         match observation {
             Observation::Vibration(vibration) if vehicle.armed() => {
                 let highest = vibration.levels.into_iter().flatten().fold(0.0, f32::max);
-                self.vibration_max = greater(self.vibration_max, highest);
+                self.vibration_max = greater(self.vibration_max, highest, ACCELERATION_MAX);
             }
             Observation::Imu(_) | Observation::ImuAndAir(..) if flight.airborne() => {
                 let load_factor_g = derived.load_factor_g().unwrap_or(0.0);
-                self.load_factor_max_g = greater(self.load_factor_max_g, load_factor_g);
+                self.load_factor_max_g = greater(self.load_factor_max_g, load_factor_g, ACCELERATION_MAX);
             }
             Observation::GlobalPosition(global) if flight.airborne() => {
-                self.height_max_m = greater(self.height_max_m, global.relative_altitude.0);
+                self.height_max_m = greater(self.height_max_m, global.relative_altitude.0, HEIGHT_MAX_M);
             }
             Observation::Battery(_) | Observation::SystemStatus(_) if vehicle.armed() => {
-                self.take_battery(vehicle);
+                self.take_battery(at, vehicle);
             }
             _ => {}
         }
     }
 
-    fn take_battery(&mut self, vehicle: &Vehicle) {
-        let (voltage_v, current_a) = power(vehicle);
+    fn take_battery(&mut self, at: Instant, vehicle: &Vehicle) {
+        let Drawn { voltage_v, current_a, .. } = drawn(at, vehicle);
         if let Some(voltage_v) = voltage_v.filter(|voltage_v| *voltage_v > 0.0) {
             self.voltage_min_v = Some(self.voltage_min_v.map_or(voltage_v, |lowest| lowest.min(voltage_v)));
         }
-        self.current_max_a = greater(self.current_max_a, current_a.unwrap_or(0.0));
+        self.current_max_a = self.current_max_a.max(current_a.unwrap_or(0.0));
     }
 
     /// One step, at least every 50 ms, after the flight's own.
     pub fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, event: Option<FlightEvent>) {
         match event {
-            Some(FlightEvent::TakeOff) => self.flights += 1,
+            Some(FlightEvent::TakeOff) => {
+                self.flights += 1;
+                // It was seen a moment after it happened.
+                let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
+                self.flight_s += f64::from(late.as_secs_f32());
+            }
             Some(FlightEvent::Landing) => self.landings += 1,
             None => {}
         }
@@ -205,7 +218,7 @@ impl Usage {
             self.flight_s += step_s;
             if let Some(speed_mps) = ground_speed_mps(now, vehicle) {
                 self.distance_m += f64::from(speed_mps) * step_s;
-                self.speed_max_mps = greater(self.speed_max_mps, speed_mps);
+                self.speed_max_mps = self.speed_max_mps.max(speed_mps);
             }
         }
         self.step_battery(now, vehicle, step_s);
@@ -213,16 +226,9 @@ impl Usage {
     }
 
     fn step_battery(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
-        let at = vehicle.batteries[0].at().or(vehicle.system.at());
-        if at.is_none_or(|at| now.since(at) > BATTERY_AGE) {
-            return;
-        }
-        let (voltage_v, current_a) = power(vehicle);
-        let Some(current_a) = current_a else { return };
-        self.charge_ah += f64::from(current_a) * step_s / 3_600.0;
-        if let Some(voltage_v) = voltage_v {
-            self.energy_wh += f64::from(voltage_v * current_a) * step_s / 3_600.0;
-        }
+        let drawn = drawn(now, vehicle);
+        self.charge_ah += f64::from(drawn.current_a.unwrap_or(0.0)) * step_s / 3_600.0;
+        self.energy_wh += f64::from(drawn.power_w) * step_s / 3_600.0;
     }
 
     fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
@@ -230,7 +236,7 @@ impl Usage {
             let motor = &vehicle.motors[number];
             let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
             if fresh && Derived::turns(vehicle, number) {
-                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs());
+                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(RPM_MAX));
                 usage.seconds += step_s;
                 usage.revolutions += f64::from(rpm) * step_s / 60.0;
             }
@@ -274,21 +280,51 @@ impl Usage {
     }
 }
 
-/// The larger one; what is no number or no sensible size is left out.
-fn greater(highest: f32, value: f32) -> f32 {
-    if value.is_finite() { highest.max(value) } else { highest }
+/// The larger one; what is no number, or beyond what there can be, is left out.
+fn greater(highest: f32, value: f32, limit: f32) -> f32 {
+    if value <= limit { highest.max(value) } else { highest }
 }
 
-/// Voltage and discharge current of the first battery, or the autopilot's figures where none reports itself.
-fn power(vehicle: &Vehicle) -> (Option<f32>, Option<f32>) {
-    let (voltage, current) = match (vehicle.batteries[0].get(), vehicle.system.get()) {
-        (Some(battery), _) => (battery.voltage, battery.current),
-        (None, Some(system)) => (system.voltage, system.current),
-        (None, None) => (None, None),
-    };
-    let finite = |value: f32| value.is_finite().then_some(value);
-    let current = current.and_then(|current| finite(current.0)).map(|current| current.max(0.0));
-    (voltage.and_then(|voltage| finite(voltage.0)), current)
+/// The first battery's voltage, or the autopilot's figure where none reports itself; the discharge current and the power
+/// of all batteries together, or of all ESCs where no battery knows its current (PX4 in simulation).
+#[derive(Clone, Copy, Debug, Default)]
+struct Drawn {
+    voltage_v: Option<f32>,
+    current_a: Option<f32>,
+    power_w: f32,
+}
+
+fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
+    let mut drawn = Drawn::default();
+    let batteries = vehicle.batteries.iter();
+    for battery in batteries.clone().filter_map(|slot| slot.within(now, BATTERY_AGE)) {
+        drawn.add(battery.voltage, battery.current);
+    }
+    let none_reported = batteries.clone().all(|slot| slot.get().is_none());
+    if let Some(system) = vehicle.system.within(now, BATTERY_AGE).filter(|_| none_reported) {
+        drawn.add(system.voltage, system.current);
+    }
+    if drawn.current_a.is_none() {
+        let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
+        for motor in vehicle.motors.iter().filter(|motor| fresh(motor.moved_at)) {
+            drawn.add(motor.esc.voltage, motor.esc.current);
+        }
+    }
+    drawn
+}
+
+impl Drawn {
+    /// Garbage is left out: it must not get into sums that are kept for good.
+    fn add(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
+        let voltage_v = voltage.map(|voltage| voltage.0).filter(|volts| (0.0..=VOLTS_MAX).contains(volts));
+        let current_a = current.map(|current| current.0).filter(|amperes| amperes.abs() <= AMPERES_MAX);
+        self.voltage_v = self.voltage_v.or(voltage_v);
+        if let Some(current_a) = current_a {
+            let discharge_a = current_a.max(0.0);
+            self.current_a = Some(self.current_a.unwrap_or(0.0) + discharge_a);
+            self.power_w += voltage_v.unwrap_or(0.0) * discharge_a;
+        }
+    }
 }
 
 #[cfg(test)]

@@ -18,7 +18,9 @@ pub const BATTERIES_MAX: usize = 4;
 /// GNSS receivers that are monitored.
 pub const RECEIVERS_MAX: usize = 2;
 /// A boot time that falls by more than this is a reboot, not reordering.
-const REBOOT_MS: u32 = 1_000;
+const REBOOT_MS: u32 = 3_000;
+/// A fall from here is the end of the counter's range.
+const BOOT_END_MS: u32 = u32::MAX - 60_000;
 
 /// One motor, put together from whichever ESC messages the vehicle sends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -84,6 +86,10 @@ pub struct Vehicle {
     pub command_ack: Latest<CommandAck>,
     /// How often the autopilot has rebooted since our power-on.
     pub reboots: u32,
+    /// When it did last.
+    pub rebooted_at: Option<Instant>,
+    /// The highest boot time since its last boot, milliseconds.
+    boot_ms: Option<u32>,
 }
 
 impl Default for Vehicle {
@@ -132,6 +138,8 @@ impl Vehicle {
             identity: Latest::nothing(),
             command_ack: Latest::nothing(),
             reboots: 0,
+            rebooted_at: None,
+            boot_ms: None,
         }
     }
 
@@ -178,7 +186,12 @@ impl Vehicle {
                 self.take_imu(at, imu);
                 self.air.set(at, air);
             }
-            Observation::Attitude(attitude) => self.attitude.set(at, attitude),
+            Observation::Attitude(attitude) => {
+                if let Some(boot_ms) = attitude.boot_ms {
+                    self.take_boot_time(at, boot_ms);
+                }
+                self.attitude.set(at, attitude);
+            }
             Observation::LocalPosition(local) => self.local.set(at, local),
             Observation::GlobalPosition(global) => self.global.set(at, global),
             Observation::Hud(hud) => self.hud.set(at, hud),
@@ -202,12 +215,23 @@ impl Vehicle {
     }
 
     fn take_time(&mut self, at: Instant, time: SystemTime) {
-        if let Some(before) = self.time.get()
-            && time.boot_ms.saturating_add(REBOOT_MS) < before.boot_ms
-        {
-            self.reboots = self.reboots.saturating_add(1);
-        }
+        self.take_boot_time(at, time.boot_ms);
         self.time.set(at, time);
+    }
+
+    /// A boot time that falls is a reboot. Messages overtake each other a little, and 32 bits of milliseconds end after
+    /// 49.7 days: neither is one.
+    fn take_boot_time(&mut self, at: Instant, boot_ms: u32) {
+        let before = self.boot_ms.unwrap_or(0);
+        if before >= BOOT_END_MS {
+            self.boot_ms = Some(boot_ms);
+        } else if boot_ms.saturating_add(REBOOT_MS) < before {
+            self.reboots = self.reboots.saturating_add(1);
+            self.rebooted_at = Some(at);
+            self.boot_ms = Some(boot_ms);
+        } else {
+            self.boot_ms = Some(before.max(boot_ms));
+        }
     }
 
     /// The first sensor's figures serve; the others measure the same thing.
@@ -309,5 +333,15 @@ mod tests {
             vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::SystemTime(time));
         }
         assert_eq!(vehicle.reboots, 1);
+    }
+
+    #[test]
+    fn attitude_alone_tells_a_reboot_and_the_end_of_the_counter_is_none() {
+        let mut vehicle = known();
+        for boot_ms in [u32::MAX - 10, 5, 90_000, 90_400, 90_100, 1_000] {
+            let attitude = Attitude { boot_ms: Some(boot_ms), ..Attitude::default() };
+            vehicle.observe(Instant::from_millis(7), AUTOPILOT, &Observation::Attitude(attitude));
+        }
+        assert_eq!((vehicle.reboots, vehicle.rebooted_at), (1, Some(Instant::from_millis(7))));
     }
 }

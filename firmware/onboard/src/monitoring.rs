@@ -5,8 +5,8 @@
 //! what time alone asks for.
 
 use hums_blackbox::record::{
-    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX, Usage,
-    UsageValue, Vehicle as VehicleRecord,
+    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX,
+    Usage, UsageValue, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};

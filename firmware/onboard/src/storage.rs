@@ -5,7 +5,7 @@
 
 use hums_core::time::{Instant, Span};
 use hums_recorder::recorder::Written;
-use hums_recorder::{CardDevice, CardStatus, Recorder};
+use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Recorder};
 
 use crate::queues::SectorsOut;
 
@@ -30,8 +30,8 @@ pub struct Storage<'a, D: CardDevice> {
 
 impl<'a, D: CardDevice> Storage<'a, D> {
     /// For the card in `device`; see [`Recorder::new`].
-    pub const fn new(device: D, status: &'a CardStatus, entropy: u32) -> Self {
-        Self { recorder: Recorder::new(device, status, entropy) }
+    pub const fn new(device: D, status: &'a CardStatus, held: &'a HeldBlocks, entropy: u32) -> Self {
+        Self { recorder: Recorder::new(device, status, held, entropy) }
     }
 
     /// Writes at most one sector.

@@ -8,12 +8,12 @@ use embedded_sdmmc::{
     VolumeManager,
 };
 
-use crate::gate::{Gate, GateError};
+use crate::gate::{Gate, GateError, HeldBlocks};
 use crate::layout::{Layout, LayoutError};
 use crate::name::{EXTENSION, LogName};
 use crate::status::{CardStatus, FatClock};
 
-type Manager<'a, D> = VolumeManager<Gate<D>, FatClock<'a>, 1, 1, 1>;
+type Manager<'a, D> = VolumeManager<Gate<'a, D>, FatClock<'a>, 1, 1, 1>;
 
 /// Directory blocks that a root directory may have before it counts as going in circles: 64 K entries.
 const DIRECTORY_BLOCKS_MAX: u32 = 4_096;
@@ -98,22 +98,27 @@ pub struct Card<'a, D: BlockDevice> {
     root: RawDirectory,
     layout: Layout,
     clock: FatClock<'a>,
+    held: &'a HeldBlocks,
     open: Option<Open>,
 }
 
 impl<'a, D: BlockDevice> Card<'a, D> {
     /// Checks and opens a card. On failure the device comes back with the reason.
-    pub fn mount(device: D, status: &'a CardStatus) -> Result<Self, (D, CardError<D::Error>)> {
+    pub fn mount(
+        device: D,
+        status: &'a CardStatus,
+        held: &'a HeldBlocks,
+    ) -> Result<Self, (D, CardError<D::Error>)> {
         let layout = match Layout::read(&device) {
             Ok(layout) => layout,
             Err(LayoutError::Device(error)) => return Err((device, CardError::Device(error))),
             Err(why) => return Err((device, CardError::Foreign(why))),
         };
         let clock = FatClock(status);
-        let manager = VolumeManager::new_with_limits(Gate::new(device, layout), clock, 1);
+        let manager = VolumeManager::new_with_limits(Gate::new(device, layout, held), clock, 1);
         match Self::open_root(&manager) {
             Ok((volume, root)) => {
-                Ok(Self { manager: Some(manager), volume, root, layout, clock, open: None })
+                Ok(Self { manager: Some(manager), volume, root, layout, clock, held, open: None })
             }
             Err(error) => Err((manager.free().0.into_device(), error)),
         }
@@ -149,7 +154,8 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         self.open = None;
         let manager = self.manager.take().ok_or(CardError::Damaged)?;
         let device = manager.free().0.into_device();
-        let manager = VolumeManager::new_with_limits(Gate::new(device, self.layout), self.clock, 1);
+        let manager =
+            VolumeManager::new_with_limits(Gate::new(device, self.layout, self.held), self.clock, 1);
         let opened = Self::open_root(&manager);
         self.manager = Some(manager);
         (self.volume, self.root) = opened?;
@@ -277,7 +283,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
 
 /// Fails with [`CardError::Full`] unless that many clusters are free. Asked first, so that a segment that does not fit
 /// leaves no half of a chain behind.
-fn has_free_clusters<D: BlockDevice>(gate: &Gate<D>, wanted: u32) -> Result<(), CardError<D::Error>> {
+fn has_free_clusters<D: BlockDevice>(gate: &Gate<'_, D>, wanted: u32) -> Result<(), CardError<D::Error>> {
     let layout = gate.layout();
     let mut block = [Block::new()];
     let mut free = 0;

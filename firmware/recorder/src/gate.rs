@@ -66,26 +66,40 @@ struct Held {
     kind: Kind,
 }
 
+/// Room for the blocks that are held back. Lent to the gate, because the gate is moved with the card and this, 6 KiB,
+/// would come along on the firmware's stack each time.
+#[derive(Default)]
+pub struct HeldBlocks(RefCell<Vec<Held, HELD_BLOCKS>>);
+
+impl HeldBlocks {
+    /// Nothing held.
+    pub const fn new() -> Self {
+        Self(RefCell::new(Vec::new()))
+    }
+}
+
 /// The gate. Its methods take `&self` because the library owns it and hands out only shared references.
-pub struct Gate<D> {
+pub struct Gate<'a, D> {
     device: D,
     layout: Layout,
     transaction: Cell<bool>,
     discard: Cell<bool>,
     reads_left: Cell<u32>,
-    held: RefCell<Vec<Held, HELD_BLOCKS>>,
+    held: &'a RefCell<Vec<Held, HELD_BLOCKS>>,
 }
 
-impl<D: BlockDevice> Gate<D> {
+impl<'a, D: BlockDevice> Gate<'a, D> {
     /// A gate for a card whose layout was checked.
-    pub const fn new(device: D, layout: Layout) -> Self {
+    pub fn new(device: D, layout: Layout, held: &'a HeldBlocks) -> Self {
+        // What another gate left there is about another mount.
+        held.0.borrow_mut().clear();
         Self {
             device,
             layout,
             transaction: Cell::new(false),
             discard: Cell::new(false),
             reads_left: Cell::new(0),
-            held: RefCell::new(Vec::new()),
+            held: &held.0,
         }
     }
 
@@ -247,7 +261,7 @@ impl<D: BlockDevice> Gate<D> {
     }
 }
 
-impl<D: BlockDevice> BlockDevice for Gate<D> {
+impl<D: BlockDevice> BlockDevice for Gate<'_, D> {
     type Error = GateError<D::Error>;
 
     fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Self::Error> {

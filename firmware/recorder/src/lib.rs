@@ -22,6 +22,7 @@ pub mod recorder;
 pub mod status;
 
 pub use card::{Card, CardError};
+pub use gate::HeldBlocks;
 pub use name::LogName;
 pub use recorder::{Recorder, Written};
 pub use status::{CardState, CardStatus};

@@ -12,6 +12,7 @@ use hums_core::time::{Instant, Span};
 
 use crate::CardDevice;
 use crate::card::{Card, CardError, LogEntry};
+use crate::gate::HeldBlocks;
 use crate::name::LogName;
 use crate::status::{CardState, CardStatus};
 
@@ -36,6 +37,7 @@ pub enum Written {
 /// The storage task's state.
 pub struct Recorder<'a, D: CardDevice> {
     status: &'a CardStatus,
+    held: &'a HeldBlocks,
     /// Any number that differs from one power-on to the next.
     entropy: u32,
     slot: Slot<'a, D>,
@@ -73,10 +75,11 @@ struct Log {
 impl<'a, D: CardDevice> Recorder<'a, D> {
     /// A recorder for the card in `device`. `entropy` keeps sessions of equal number on equal cards apart: random
     /// where the board has a random number generator, else any number that changes from one power-on to the next.
-    pub const fn new(device: D, status: &'a CardStatus, entropy: u32) -> Self {
+    pub const fn new(device: D, status: &'a CardStatus, held: &'a HeldBlocks, entropy: u32) -> Self {
         let slot = Slot::Waiting(device);
         Self {
             status,
+            held,
             entropy,
             slot,
             retry_at: Instant::ZERO,
@@ -97,7 +100,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.retry_at = now + RETRY;
         let Slot::Waiting(device) = core::mem::replace(&mut self.slot, Slot::Moving) else { return false };
         device.reset();
-        match Card::mount(device, self.status) {
+        match Card::mount(device, self.status, self.held) {
             Ok(card) => self.slot = Slot::Mounted(card),
             Err((device, error)) => {
                 self.slot = Slot::Waiting(device);

@@ -5,7 +5,7 @@ mod common;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use common::{MIB_BLOCKS, MemCard};
+use common::{MIB_BLOCKS, MemCard, held};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector, SectorSink, Writer};
 use hums_core::time::Instant;
 use hums_recorder::card::Card;
@@ -43,7 +43,8 @@ fn sectors(count: u32) -> Vec<Sector> {
 /// The sectors of one session that a card holds: (number, place) in the order of segments and blocks.
 fn stored(device: &MemCard) -> Vec<(LogName, u32, Header)> {
     let status = CardStatus::new();
-    let mut card = Card::mount(device.clone(), &status).map_err(|(_, error)| error).expect("it mounts");
+    let mut card =
+        Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
     let mut names = Vec::new();
     card.logs(|entry| names.push(entry.name)).expect("it lists");
     names.sort_unstable();
@@ -73,7 +74,7 @@ fn numbers(device: &MemCard) -> Vec<u32> {
 fn a_card_that_comes_back_goes_on_where_it_was() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, 7);
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
     let all = sectors(2_000);
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
@@ -100,7 +101,7 @@ fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
     hums_recorder::format::format(&second, 99).expect("it formats");
     let slot = Slot(Rc::new(RefCell::new(first.clone())));
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(slot.clone(), &status, 7);
+    let mut recorder = Recorder::new(slot.clone(), &status, held(), 7);
     let all = sectors(2_000);
     for sector in &all[..100] {
         assert_eq!(recorder.write(Instant::ZERO, &mut sector.clone()), Written::Done);
@@ -153,7 +154,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     let status = CardStatus::new();
     let sessions = 40;
     for session in 0..sessions {
-        let mut recorder = Recorder::new(device.clone(), &status, session);
+        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
         for sector in sectors(100) {
             assert_eq!(recorder.write(Instant::ZERO, &mut sector.clone()), Written::Done);
         }
@@ -169,14 +170,15 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
 fn a_card_without_room_or_logs_is_told_full() {
     let device = MemCard::formatted(40 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut card = Card::mount(device.clone(), &status).map_err(|(_, error)| error).expect("it mounts");
+    let mut card =
+        Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
     // Fill the card with a log, then make it somebody else's file.
     let name = LogName { session: 5, segment: 0 };
     card.create(name, (card.layout().data_bytes() - 1_024) as u32).expect("it fits");
     let root = card.layout().data_start;
     drop(card);
     device.blocks.borrow_mut().get_mut(&root).expect("the directory")[8..11].copy_from_slice(b"JPG");
-    let mut recorder = Recorder::new(device.clone(), &status, 1);
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
     assert_eq!(recorder.write(Instant::ZERO, &mut sectors(10)[0].clone()), Written::Later);
     assert_eq!(status.read().state, CardState::Full);
 }
@@ -185,7 +187,7 @@ fn a_card_without_room_or_logs_is_told_full() {
 fn a_torn_partial_never_takes_the_older_copy_with_it() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, 1);
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
     let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
     let mut places = Vec::new();
     for copy in 0..4 {

@@ -161,7 +161,7 @@ impl<'a> Collected<'a> {
             push_integer(out, u64::from(number));
         }
         if let Some(payload) = known {
-            push_csv_cells(out, payload)
+            push_csv_cells(out, payload);
         } else {
             out.push(b',');
             push_integer(out, u64::from(frame.sequence));

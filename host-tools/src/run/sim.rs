@@ -22,7 +22,7 @@ use hums_onboard::monitoring::TICK;
 use hums_onboard::port::PortReading;
 use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
 use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
-use hums_recorder::{CardDevice, CardStatus};
+use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
 
 use super::arrivals::Arrivals;
 use super::report::{Finding, Report};
@@ -69,7 +69,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     world.reboots.sort_unstable();
     let start = WallClock::now();
     while world
-        .power_on(&mut arrivals, params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
+        .power_on(&mut arrivals, &params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
     {
     }
     if let Some(error) = card.take_image_error() {
@@ -143,14 +143,15 @@ impl World<'_> {
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
-        params: Params,
+        params: &Params,
         drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
         let (card_status, port_status) = (CardStatus::new(), PortStatus::new());
+        let held = HeldBlocks::new();
         let mut queues = Box::new(Queues::new());
         let mut writer = Box::new(Writer::new());
-        let mut monitor = Box::new(Monitor::new(params));
+        let mut monitor = Box::new(Monitor::new(*params));
         let identity = Boot {
             version: env!("CARGO_PKG_VERSION"),
             board: "sim",
@@ -166,7 +167,7 @@ impl World<'_> {
             ends: queues.split(),
             reception: Reception::new(&port_status),
             monitoring: Monitoring::new(&mut monitor, &mut writer, identity, &card_status, &port_status),
-            storage: Storage::new(Slot(self.card), &card_status, entropy),
+            storage: Storage::new(Slot(self.card), &card_status, &held, entropy),
             gs: &mut *self.gs,
             findings: &mut self.report.findings,
             power_on_us: self.power_on_us,

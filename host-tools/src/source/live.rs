@@ -2,6 +2,9 @@
 //!
 //! A live source ends when its peer closes it or on Ctrl-C (see [`crate::interrupt`]); silence is handed on as chunks
 //! without bytes, so that the pipeline's clock goes on.
+//!
+//! A network delivers in bursts what no UART could: bytes count as arriving at 921,600 baud at most, the fastest rate of
+//! the monitor's port.
 
 use std::io::{self, ErrorKind, Read};
 use std::net::{TcpStream, UdpSocket};
@@ -18,6 +21,10 @@ const SILENCE: Duration = Duration::from_millis(50);
 const CONNECT: Duration = Duration::from_secs(10);
 /// The largest UDP datagram.
 const BUFFER_BYTES: usize = 65_536;
+/// The fastest rate of the monitor's port, in bytes a second: 921,600 baud, ten bits a byte.
+const BYTES_PER_SECOND_MAX: u64 = 92_160;
+/// What is taken from a stream at once: 11 ms of the fastest port.
+const STREAM_BYTES: usize = 1024;
 
 /// Anything that reads with a time limit.
 trait Port {
@@ -28,7 +35,8 @@ struct Stream<R>(R);
 
 impl<R: Read> Port for Stream<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.0.read(buffer)
+        let end = buffer.len().min(STREAM_BYTES);
+        self.0.read(buffer.get_mut(..end).unwrap_or_default())
     }
 }
 
@@ -51,6 +59,7 @@ impl Port for Datagrams {
 struct Live {
     port: Box<dyn Port>,
     first: Option<Instant>,
+    last_us: u64,
     buffer: Vec<u8>,
 }
 
@@ -85,7 +94,7 @@ pub(super) fn open(endpoint: &Endpoint) -> Result<Box<dyn Source>> {
         Endpoint::File(_) | Endpoint::Standard => bail!("{endpoint} is not a live source"),
     };
     interrupt::watch();
-    Ok(Box::new(Live { port, first: None, buffer: vec![0; BUFFER_BYTES] }))
+    Ok(Box::new(Live { port, first: None, last_us: 0, buffer: vec![0; BUFFER_BYTES] }))
 }
 
 impl Source for Live {
@@ -106,7 +115,9 @@ impl Source for Live {
             }
             let now = Instant::now();
             let first = *self.first.get_or_insert(now);
-            let at_us = u64::try_from(now.duration_since(first).as_micros()).unwrap_or(u64::MAX);
+            let clock_us = u64::try_from(now.duration_since(first).as_micros()).unwrap_or(u64::MAX);
+            let at_us = clock_us.max(self.last_us + got as u64 * 1_000_000 / BYTES_PER_SECOND_MAX);
+            self.last_us = at_us;
             let bytes = self.buffer.get(..got).unwrap_or_default().to_vec();
             return Ok(Some(Chunk { at_us, bytes }));
         }

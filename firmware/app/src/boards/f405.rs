@@ -3,10 +3,10 @@
 //! | pin | what | remark |
 //! |---|---|---|
 //! | PA10 | USART1 RX, from the autopilot's TELEM TX | DMA2 stream 2, ring of [`RING_BYTES`] |
-//! | PA9 | USART1 TX, to the autopilot's TELEM RX | |
+//! | PA9 | USART1 TX, to the autopilot's TELEM RX | kept for it, not driven yet |
 //! | PA2 | USART2 TX, to the ground station's radio | DMA1 stream 6 |
-//! | PA3 | USART2 RX, from the radio | |
-//! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz |
+//! | PA3 | USART2 RX, from the radio | kept for it, not read yet |
+//! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz; MISO pulled up |
 //! | PC12 | LED, lit when low | |
 //!
 //! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
@@ -16,7 +16,7 @@ use core::cell::Cell;
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::dma::{self, ReadableRingBuffer, TransferOptions};
-use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::{Async, Blocking};
 use embassy_stm32::peripherals::{DMA1_CH6, DMA2_CH2, IWDG, RNG};
 use embassy_stm32::rng::{self, Rng};
@@ -32,6 +32,7 @@ use hums_recorder::CardDevice;
 use static_cell::ConstStaticCell;
 
 use super::{Boot, Overrun, Receive, ResetCause, Transmit};
+use crate::costs::Stage;
 use crate::report::Report;
 
 use defmt_rtt as _;
@@ -59,7 +60,7 @@ const WATCHDOG_US: u32 = 1_000_000;
 bind_interrupts!(struct Irqs {
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
-    HASH_RNG => rng::InterruptHandler<RNG>;
+    RNG => rng::InterruptHandler<RNG>;
 });
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
@@ -86,18 +87,15 @@ pub(crate) fn take() -> Parts {
 
     let mut line = usart::Config::default();
     line.baudrate = AUTOPILOT_BAUD;
-    let autopilot = match UartRx::new_blocking(p.USART1, p.PA10, line) {
-        Ok(port) => AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs)),
-        Err(error) => defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error)),
-    };
+    let port = UartRx::new_blocking(p.USART1, p.PA10, line).expect("the clocks allow this baud rate");
+    let autopilot = AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs));
     line.baudrate = GS_BAUD;
-    let gs = match UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line) {
-        Ok(port) => GsTx(port),
-        Err(error) => defmt::panic!("USART2 refuses {} baud: {}", GS_BAUD, defmt::Debug2Format(&error)),
-    };
+    let port = UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line).expect("the clocks allow this baud rate");
+    let gs = GsTx(port);
 
     let mut bus = spi::Config::default();
     bus.frequency = CARD_IDENTIFICATION;
+    bus.miso_pull = Pull::Up;
     let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
     let select = Output::new(p.PA4, Level::High, Speed::VeryHigh);
     let Ok(spi) = ExclusiveDevice::new_no_delay(bus, select);
@@ -165,7 +163,7 @@ pub(crate) struct AutopilotRx {
 
 impl AutopilotRx {
     fn new(port: UartRx<'static, Blocking>, channel: dma::Channel<'static>) -> Self {
-        /// USART1_RX is channel 4 of DMA2's stream 2 (RM0090, table 43).
+        /// `USART1_RX` is channel 4 of DMA2's stream 2 (RM0090, table 43).
         const USART1_RX: dma::Request = 4;
         let from = pac::USART1.dr().as_ptr().cast::<u8>();
         // SAFETY: `from` is the port's data register, `RING` is a static in RAM that DMA reaches and that nobody else
@@ -231,7 +229,9 @@ impl Card {
         }
         self.set_clock(CARD_IDENTIFICATION);
         // At least 74 clocks with the card not selected wake it up (SD specification, 6.4.1).
-        self.driver.spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10])).map_err(|_| SdCardError::Transport)?;
+        self.driver
+            .spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10]))
+            .map_err(|_| SdCardError::Transport)?;
         self.driver.num_bytes()?;
         self.set_clock(CARD_TRANSFER);
         self.identified.set(true);
@@ -295,6 +295,7 @@ impl Watchdog {
 pub(crate) struct Idle(());
 
 impl Idle {
+    #[expect(clippy::unused_self, reason = "on the emulated board idle reads the feed")]
     pub(crate) fn run(&mut self) -> ! {
         loop {
             cortex_m::asm::wfi();
@@ -304,7 +305,7 @@ impl Idle {
 
 /// A vehicle's input has no end: the power goes.
 pub(crate) async fn ended() {
-    core::future::pending().await
+    core::future::pending::<()>().await;
 }
 
 /// Processor cycles.
@@ -316,7 +317,10 @@ pub(crate) fn cycles() -> u32 {
 pub(crate) fn done(report: &Report) {
     let Report { stats, frames_left, costs, stack } = report;
     defmt::info!("log closed: {=u64} frames in, {=u64} without a card", stats.frames_in, frames_left);
-    defmt::info!("cycles {=[u64]}, stack {}", costs, stack);
+    for ((_, name), cycles) in Stage::NAMES.iter().zip(costs) {
+        defmt::info!("{=str}: {=u64} cycles", name, cycles);
+    }
+    defmt::info!("stack: {=usize} of {=usize} bytes", stack.0, stack.1);
 }
 
 /// Starts anew.

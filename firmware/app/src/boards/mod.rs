@@ -51,7 +51,10 @@ pub(crate) trait Transmit {
 
 /// Why the machine started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-#[cfg_attr(feature = "board-emulated", expect(dead_code, reason = "the emulator knows only how to be started"))]
+#[cfg_attr(
+    feature = "board-emulated",
+    expect(dead_code, reason = "the emulator knows only how to be started")
+)]
 pub(crate) enum ResetCause {
     /// Power came.
     PowerOn,

@@ -3,9 +3,9 @@
 
 use embassy_futures::select::{Either3, select3};
 use embassy_time::Ticker;
+use hums_onboard::Task;
 use hums_onboard::monitoring::{Monitoring, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn};
-use hums_onboard::Task;
 use hums_recorder::CardState;
 
 use super::{CARD_STATUS, SUPERVISOR};

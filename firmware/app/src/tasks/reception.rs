@@ -2,9 +2,9 @@
 
 use embassy_futures::select::{Either, select};
 use embassy_time::with_timeout;
+use hums_onboard::Task;
 use hums_onboard::queues::FramesIn;
 use hums_onboard::reception::{Reception, SILENCE};
-use hums_onboard::Task;
 
 use super::{PORT_STATUS, SUPERVISOR};
 use crate::boards::{Receive, board};

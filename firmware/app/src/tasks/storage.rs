@@ -8,6 +8,8 @@ use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Service, Storage, Task};
 
 use super::{CARD_STATUS, SUPERVISOR};
+use hums_recorder::HeldBlocks;
+
 use crate::boards::board;
 use crate::costs::{Stage, measure};
 use crate::links::{self, now};
@@ -19,7 +21,8 @@ const CARD_PATIENCE: Span = Span::from_secs(5);
 
 #[embassy_executor::task]
 pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut<'static>) -> ! {
-    let mut body = Storage::new(card, &CARD_STATUS, entropy);
+    let held = HeldBlocks::new();
+    let mut body = Storage::new(card, &CARD_STATUS, &held, entropy);
     let mut ended_at = None;
     loop {
         SUPERVISOR.report(Task::Storage, now());

@@ -19,6 +19,7 @@ const LOAD: Check = Check {
     when: When::Always,
     stale_after: STALE,
     instances: 1,
+    alarm_only: false,
     read: load_percent,
 };
 
@@ -33,11 +34,67 @@ pub(super) const CHECKS: &[Check] = &[
         read: temperature_c,
         ..LOAD
     },
+    Check {
+        name: "autopilot_reboot",
+        words: "autopilot reboot",
+        unit: "",
+        warn: None,
+        critical: Some(Param::RebootCrit),
+        hysteresis: 0.0,
+        debounce_critical: Span::ZERO,
+        stale_after: None,
+        alarm_only: true,
+        read: restarted,
+        ..LOAD
+    },
+    Check {
+        name: "autopilot_state",
+        words: "autopilot failsafe",
+        unit: "",
+        warn: None,
+        critical: Some(Param::StateCrit),
+        hysteresis: 0.0,
+        debounce_critical: Span::from_millis(500),
+        when: When::Armed,
+        alarm_only: true,
+        read: |inputs, _| {
+            let slot = &inputs.vehicle.heartbeat;
+            Reading::new(slot.at(), slot.get().map(|heartbeat| f32::from(heartbeat.state)))
+        },
+        ..LOAD
+    },
+    Check {
+        name: "sensors",
+        words: "sensors unhealthy",
+        unit: "",
+        warn: Some(Param::SensorsWarn),
+        critical: None,
+        hysteresis: 0.0,
+        when: When::Armed,
+        alarm_only: true,
+        read: unhealthy_sensors,
+        ..LOAD
+    },
 ];
 
 fn load_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let slot = &inputs.vehicle.system;
     Reading::new(slot.at(), slot.get()?.load.map(|load| load.0 * 100.0))
+}
+
+/// 1 for half a minute after a restart.
+fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    inputs.vehicle.heartbeat.get()?;
+    let recently = |at| inputs.now.since(at) <= Span::from_secs(30);
+    let value = f32::from(u8::from(inputs.vehicle.rebooted_at.is_some_and(recently)));
+    Some(Reading { at: inputs.now, value })
+}
+
+/// How many. The bits for the pre-arm checks (28) and the receiver (16) say nothing about a sensor.
+fn unhealthy_sensors(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    const NOT_SENSORS: u32 = 1 << 28 | 1 << 16;
+    let slot = &inputs.vehicle.system;
+    Reading::new(slot.at(), slot.get().map(|system| (system.unhealthy & !NOT_SENSORS).count_ones() as f32))
 }
 
 fn temperature_c(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

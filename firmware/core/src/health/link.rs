@@ -19,6 +19,7 @@ const HEARTBEAT: Check = Check {
     when: When::Always,
     stale_after: None,
     instances: 1,
+    alarm_only: false,
     read: heartbeat_age_s,
 };
 
@@ -53,6 +54,18 @@ pub(super) const CHECKS: &[Check] = &[
         ..HEARTBEAT
     },
     RADIO,
+    Check {
+        name: "radio_rssi",
+        words: "radio signal",
+        warn: Some(Param::RadioRssiWarn),
+        critical: None,
+        read: |inputs, _| {
+            let slot = &inputs.vehicle.radio;
+            let ends = slot.get().map(|radio| [radio.rssi, radio.remote_rssi]).into_iter().flatten();
+            Reading::new(slot.at(), ends.flatten().map(f32::from).reduce(f32::min))
+        },
+        ..RADIO
+    },
     Check {
         name: "radio_margin",
         words: "radio margin",

@@ -60,6 +60,9 @@ const TABLES: [&[Check]; 9] = [
     recorder::CHECKS,
 ];
 
+/// Subsystems that every vehicle has, in the air and on the ground.
+pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsystem::Computer];
+
 const STATES: usize = {
     let mut states = 0;
     let mut table = 0;
@@ -95,7 +98,7 @@ pub struct Health {
     states: [State; STATES],
 }
 
-const _: () = assert!(size_of::<Health>() <= 12 * 1024);
+const _: () = assert!(size_of::<Health>() <= 4 * 1024);
 
 impl Default for Health {
     fn default() -> Self {
@@ -160,12 +163,18 @@ impl Health {
 
     /// A subsystem's level: its worst known part; stale where nothing is known.
     pub fn subsystem(&self, subsystem: Subsystem) -> Level {
-        worst(self.levels().filter(|(check, ..)| check.subsystem == subsystem).map(|(.., level)| level))
+        let part = self.levels().filter(|(check, ..)| check.subsystem == subsystem);
+        worst(
+            part.filter(|(check, _, level)| !check.alarm_only || *level != Level::Ok)
+                .map(|(.., level)| level),
+        )
     }
 
-    /// The whole vehicle's level: its worst known part; stale where nothing is known.
+    /// The whole vehicle's level: its worst known part. It is not healthy while nothing is known of a subsystem that
+    /// every vehicle has ([`EXPECTED`]).
     pub fn overall(&self) -> Level {
-        worst(self.levels().map(|(.., level)| level))
+        let unknown = EXPECTED.into_iter().any(|subsystem| self.subsystem(subsystem) == Level::Stale);
+        worst(self.levels().map(|(.., level)| level).chain(unknown.then_some(Level::Stale)))
     }
 }
 

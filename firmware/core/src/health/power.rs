@@ -19,9 +19,10 @@ const BATTERY: Check = Check {
     hysteresis: 1.0,
     debounce_warn: Span::from_secs(2),
     debounce_critical: Span::from_secs(2),
-    when: When::Armed,
+    when: When::Always,
     stale_after: STALE_SLOW,
     instances: BATTERIES,
+    alarm_only: false,
     read: remaining_percent,
 };
 
@@ -38,6 +39,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(10),
         debounce_critical: Span::from_secs(5),
         read: |inputs, battery| inputs.derived.cell_voltage(inputs, battery),
+        when: When::Armed,
         ..BATTERY
     },
     Check {
@@ -51,6 +53,49 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(10),
         debounce_critical: Span::from_secs(10),
         read: cell_deviation_v,
+        when: When::Armed,
+        ..BATTERY
+    },
+    Check {
+        name: "cell_dev_lasting",
+        words: "cells uneven",
+        side: Side::Above,
+        unit: "V",
+        warn: None,
+        critical: Some(Param::CellDevWarn),
+        hysteresis: 0.01,
+        // AirData: above the warning's limit for a minute is as bad as far above it.
+        debounce_critical: Span::from_secs(60),
+        read: cell_deviation_v,
+        when: When::Armed,
+        ..BATTERY
+    },
+    Check {
+        name: "batt_resistance",
+        words: "battery ageing",
+        side: Side::Above,
+        warn: Some(Param::BatResWarn),
+        critical: Some(Param::BatResCrit),
+        hysteresis: 5.0,
+        debounce_warn: Span::from_secs(10),
+        debounce_critical: Span::from_secs(10),
+        when: When::InFlight,
+        // A trend holds until the next figure.
+        stale_after: None,
+        read: resistance_rise_percent,
+        ..BATTERY
+    },
+    Check {
+        name: "batt_fault",
+        words: "battery fault",
+        unit: "",
+        side: Side::Above,
+        warn: Some(Param::BatFaultWarn),
+        critical: None,
+        hysteresis: 0.0,
+        when: When::Always,
+        alarm_only: true,
+        read: faults,
         ..BATTERY
     },
     Check {
@@ -114,6 +159,17 @@ fn cell_deviation_v(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
     let lowest = cells.clone().fold(f32::INFINITY, f32::min);
     let highest = cells.fold(f32::NEG_INFINITY, f32::max);
     Reading::new(slot.at(), Some(highest - lowest))
+}
+
+fn resistance_rise_percent(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
+    let index = usize::from(battery);
+    let slot = inputs.vehicle.batteries.get(index)?;
+    Reading::new(slot.at(), inputs.derived.resistance(index)?.rise_percent())
+}
+
+fn faults(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
+    let slot = inputs.vehicle.batteries.get(usize::from(battery))?;
+    Reading::new(slot.at(), Some(slot.get()?.faults.count_ones() as f32))
 }
 
 fn temperature_c(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {

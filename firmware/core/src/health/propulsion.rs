@@ -21,6 +21,7 @@ const ESC: Check = Check {
     when: When::Armed,
     stale_after: None,
     instances: MOTORS_MAX as u8,
+    alarm_only: false,
     read: |inputs, motor| inputs.derived.esc_silence(inputs, motor),
 };
 
@@ -48,7 +49,34 @@ pub(super) const CHECKS: &[Check] = &[
         critical: Some(Param::EscFailCrit),
         stale_after: STALE_SLOW,
         when: When::Always,
+        alarm_only: true,
         read: failure_rank,
+        ..ESC
+    },
+    Check {
+        name: "esc_errors",
+        words: "ESC errors",
+        unit: "1/min",
+        warn: Some(Param::EscErrWarn),
+        critical: None,
+        hysteresis: 2.0,
+        debounce_warn: Span::from_secs(1),
+        when: When::Armed,
+        stale_after: STALE_SLOW,
+        read: errors_per_minute,
+        ..ESC
+    },
+    Check {
+        name: "motor_loss",
+        words: "motor lost",
+        unit: "%",
+        side: Side::Below,
+        warn: None,
+        critical: Some(Param::MotLossCrit),
+        hysteresis: 5.0,
+        debounce_critical: Span::from_millis(500),
+        when: When::InFlight,
+        read: current_percent,
         ..ESC
     },
     Check {
@@ -61,7 +89,8 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(3),
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
-        stale_after: STALE_SLOW,
+        // Only steady flight says something; ESCs that stop talking are `esc_silent`.
+        stale_after: None,
         read: |inputs, motor| inputs.derived.motor_imbalance(inputs, motor),
         ..ESC
     },
@@ -69,6 +98,30 @@ pub(super) const CHECKS: &[Check] = &[
 
 fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {
     inputs.vehicle.motors.get(usize::from(motor)).copied()
+}
+
+fn errors_per_minute(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
+    Reading::new(motor(inputs, number)?.at, inputs.derived.esc_errors(number))
+}
+
+/// A motor's current in percent of the mean of the others, while the throttle asks for thrust. ESCs that do not measure
+/// current say zero for all, and then nothing follows.
+fn current_percent(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
+    const FRESH: Span = Span::from_secs(2);
+    const CURRENT_MIN_A: f32 = 0.5;
+    const THROTTLE_MIN: f32 = 0.2;
+    let current = |number: usize| {
+        let motor = inputs.vehicle.motors.get(number)?;
+        let fresh = motor.moved_at.is_some_and(|at| inputs.now.since(at) <= FRESH);
+        motor.esc.current.map(|current| current.0).filter(|current| fresh && current.is_finite())
+    };
+    let own = current(usize::from(number))?;
+    let others = (0..MOTORS_MAX).filter(|other| *other != usize::from(number)).filter_map(current);
+    let (sum, count) = others.fold((0.0, 0_u8), |(sum, count), current| (sum + current, count + 1));
+    let mean = sum / f32::from(count);
+    let throttle = inputs.vehicle.hud.within(inputs.now, FRESH)?.throttle?.0;
+    let asked = count >= 2 && mean > CURRENT_MIN_A && throttle > THROTTLE_MIN;
+    asked.then(|| Reading { at: inputs.now, value: own / mean * 100.0 })
 }
 
 fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {

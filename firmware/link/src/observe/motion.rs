@@ -149,7 +149,7 @@ pub(super) fn air(payload: &[u8]) -> Option<Air> {
 pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
     let attitude = read::<ap::ATTITUDE_DATA>(payload, &[])?;
     let [roll, pitch, yaw] = vector([attitude.roll, attitude.pitch, attitude.yaw])?.map(Radians);
-    Some(Attitude { roll, pitch, yaw })
+    Some(Attitude { roll, pitch, yaw, boot_ms: Some(attitude.time_boot_ms) })
 }
 
 pub(super) fn local_position(payload: &[u8]) -> Option<LocalPosition> {

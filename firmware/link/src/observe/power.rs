@@ -9,6 +9,10 @@ use super::system::{current, percent, voltage};
 
 /// No lithium cell is charged above this, mV: what says more is the sum of several.
 const CELL_MAX_MV: u16 = 5_000;
+/// `MAV_BATTERY_TYPE_LIFE`.
+const LITHIUM_IRON: u8 = 2;
+/// `MAV_BATTERY_TYPE_NIMH`.
+const NICKEL: u8 = 4;
 
 pub(super) fn rails(payload: &[u8]) -> Option<Rails> {
     let rails = read::<ap::POWER_STATUS_DATA>(payload, &[])?;
@@ -31,6 +35,7 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
         temperature: (battery.temperature != i16::MAX)
             .then(|| Celsius(f32::from(battery.temperature) / 100.0)),
         faults: battery.fault_bitmask.bits(),
+        lithium: battery.mavtype as u8 != LITHIUM_IRON && battery.mavtype as u8 != NICKEL,
     })
 }
 

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_recorder::CardDevice;
 use hums_recorder::format::format;
+use hums_recorder::{CardDevice, HeldBlocks};
 
 /// Blocks of a mebibyte.
 pub const MIB_BLOCKS: u32 = 2048;
@@ -85,3 +85,8 @@ impl BlockDevice for MemCard {
 }
 
 impl CardDevice for MemCard {}
+
+/// Room for a gate to hold blocks back in, for as long as the test runs.
+pub fn held() -> &'static HeldBlocks {
+    Box::leak(Box::default())
+}

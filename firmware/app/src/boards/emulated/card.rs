@@ -41,7 +41,11 @@ impl ImageCard {
         Self { image: RefCell::new(image) }
     }
 
-    fn at<T>(&self, index: BlockIdx, act: impl FnOnce(&mut File) -> Result<T, CardError>) -> Result<T, CardError> {
+    fn at<T>(
+        &self,
+        index: BlockIdx,
+        act: impl FnOnce(&mut File) -> Result<T, CardError>,
+    ) -> Result<T, CardError> {
         let mut image = self.image.try_borrow_mut().map_err(|_| CardError::Io)?;
         let file = image.as_mut().ok_or(CardError::NoCard)?;
         if u64::from(index.0) >= BLOCKS_MAX {

@@ -1,0 +1,205 @@
+//! Slow figures: a battery's internal resistance against its own past, and rates of counters that wrap.
+
+use crate::observation::Battery;
+use crate::time::{Instant, Span};
+
+/// A battery's internal resistance: the slope of its voltage over its current, from means that forget slowly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resistance {
+    current_a: f32,
+    voltage_v: f32,
+    variance_a2: f32,
+    variance_v2: f32,
+    covariance_va: f32,
+    samples: u16,
+    /// What later figures are compared with, ohm; 0 before there is one.
+    baseline_ohm: f32,
+}
+
+impl Resistance {
+    /// Weight of a new sample in the means: they look back about 60 samples.
+    const WEIGHT: f32 = 1.0 / 60.0;
+    /// Below this spread of the current the slope says nothing, A2.
+    const VARIANCE_MIN_A2: f32 = 0.5;
+    /// This part of the voltage's variance the current must explain: a voltage that falls for another reason (an empty
+    /// battery, a cell that fails) says nothing about resistance.
+    const EXPLAINED_MIN: f32 = 0.7;
+    /// Samples before there is a figure.
+    const SAMPLES_MIN: u16 = 120;
+    /// Samples before the figure is the baseline of this session.
+    const SAMPLES_BASELINE: u16 = 480;
+
+    /// Nothing known.
+    pub const fn new() -> Self {
+        Self {
+            current_a: 0.0,
+            voltage_v: 0.0,
+            variance_a2: 0.0,
+            variance_v2: 0.0,
+            covariance_va: 0.0,
+            samples: 0,
+            baseline_ohm: 0.0,
+        }
+    }
+
+    /// Takes what the battery says.
+    pub fn take(&mut self, battery: &Battery) {
+        let (Some(voltage), Some(current)) = (battery.voltage, battery.current) else { return };
+        let (voltage_v, current_a) = (voltage.0, current.0);
+        if !voltage_v.is_finite() || !current_a.is_finite() {
+            return;
+        }
+        if self.samples == 0 {
+            (self.current_a, self.voltage_v) = (current_a, voltage_v);
+        }
+        let (from_mean_a, from_mean_v) = (current_a - self.current_a, voltage_v - self.voltage_v);
+        self.current_a += Self::WEIGHT * from_mean_a;
+        self.voltage_v += Self::WEIGHT * from_mean_v;
+        let old = 1.0 - Self::WEIGHT;
+        self.variance_a2 = old * (self.variance_a2 + Self::WEIGHT * from_mean_a * from_mean_a);
+        self.variance_v2 = old * (self.variance_v2 + Self::WEIGHT * from_mean_v * from_mean_v);
+        self.covariance_va = old * (self.covariance_va + Self::WEIGHT * from_mean_a * from_mean_v);
+        self.samples = self.samples.saturating_add(1);
+        if self.baseline_ohm == 0.0 && self.samples >= Self::SAMPLES_BASELINE {
+            self.baseline_ohm = self.ohm().unwrap_or(0.0);
+        }
+    }
+
+    /// In ohm; `None` while the current has not varied enough to tell.
+    pub fn ohm(&self) -> Option<f32> {
+        let enough = self.samples >= Self::SAMPLES_MIN
+            && self.variance_a2 >= Self::VARIANCE_MIN_A2
+            && self.covariance_va * self.covariance_va
+                >= Self::EXPLAINED_MIN * self.variance_a2 * self.variance_v2;
+        let ohm = -self.covariance_va / self.variance_a2;
+        // Less than a milliohm, or more than one ohm, is no battery that flies.
+        (enough && ohm > 0.001 && ohm < 1.0).then_some(ohm)
+    }
+
+    /// Sets the baseline that earlier flights found, ohm.
+    pub fn set_baseline(&mut self, ohm: f32) {
+        if ohm.is_finite() && ohm > 0.0 {
+            self.baseline_ohm = ohm;
+        }
+    }
+
+    /// How far it is above its baseline, percent.
+    pub fn rise_percent(&self) -> Option<f32> {
+        let ohm = self.ohm()?;
+        (self.baseline_ohm > 0.0).then(|| (ohm / self.baseline_ohm - 1.0) * 100.0)
+    }
+}
+
+impl Default for Resistance {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Events of the last half to whole minute, of a counter that may wrap or start again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    count: u32,
+    /// Of this half minute and of the one before.
+    events: [u32; 2],
+    half_began: Instant,
+}
+
+impl Rate {
+    const HALF: Span = Span::from_secs(30);
+    /// A larger step is a counter that started again.
+    const STEP_MAX: u32 = 10_000;
+
+    /// From the first value of the counter.
+    pub const fn new(at: Instant, count: u32) -> Self {
+        Self { count, events: [0; 2], half_began: at }
+    }
+
+    /// Takes the counter's value.
+    pub fn take(&mut self, at: Instant, count: u32) {
+        let age = at.since(self.half_began);
+        if age >= Self::HALF {
+            let recent = age < Self::HALF + Self::HALF;
+            self.events = [0, if recent { self.events[0] } else { 0 }];
+            self.half_began = at;
+        }
+        let step = count.wrapping_sub(self.count);
+        self.count = count;
+        if step <= Self::STEP_MAX {
+            self.events[0] = self.events[0].saturating_add(step);
+        }
+    }
+
+    /// Events in the time looked back on.
+    pub fn per_minute(&self) -> u32 {
+        self.events[0].saturating_add(self.events[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{Amperes, Volts};
+
+    /// A battery of `ohm` whose current swings between 10 and 20 A, for `samples`.
+    fn load(resistance: &mut Resistance, ohm: f32, samples: u32) {
+        for sample in 0..samples {
+            let current = if sample / 5 % 2 == 0 { 10.0 } else { 20.0 };
+            let voltage = 16.0 - ohm * current - 0.0005 * sample as f32;
+            let battery = Battery {
+                voltage: Some(Volts(voltage)),
+                current: Some(Amperes(current)),
+                ..Battery::default()
+            };
+            resistance.take(&battery);
+        }
+    }
+
+    #[test]
+    fn resistance_is_found_under_a_changing_load_and_its_rise_against_the_baseline() {
+        let mut resistance = Resistance::new();
+        load(&mut resistance, 0.020, 600);
+        assert!((resistance.ohm().expect("known") - 0.020).abs() < 0.001, "{resistance:?}");
+        assert!(resistance.rise_percent().expect("known").abs() < 5.0);
+        load(&mut resistance, 0.030, 600);
+        assert!((resistance.rise_percent().expect("known") - 50.0).abs() < 6.0, "{resistance:?}");
+    }
+
+    #[test]
+    fn a_steady_current_says_nothing_about_resistance() {
+        let mut resistance = Resistance::new();
+        let battery =
+            Battery { voltage: Some(Volts(15.0)), current: Some(Amperes(12.0)), ..Battery::default() };
+        (0..1_000).for_each(|_| resistance.take(&battery));
+        assert_eq!((resistance.ohm(), resistance.rise_percent()), (None, None));
+    }
+
+    #[test]
+    fn a_voltage_that_falls_by_itself_is_no_resistance() {
+        let mut resistance = Resistance::new();
+        for sample in 0..1_000_u16 {
+            let current = 12.0 + f32::from(sample * 7 % 10);
+            let voltage = if sample < 600 { 12.6 } else { 11.0 };
+            let battery = Battery {
+                voltage: Some(Volts(voltage)),
+                current: Some(Amperes(current)),
+                ..Battery::default()
+            };
+            resistance.take(&battery);
+            assert_eq!(resistance.rise_percent(), None, "sample {sample}");
+        }
+    }
+
+    #[test]
+    fn a_counter_that_wraps_goes_on_and_one_that_starts_again_counts_nothing() {
+        let mut rate = Rate::new(Instant::ZERO, u32::MAX - 1);
+        rate.take(Instant::from_millis(1_000), 3);
+        assert_eq!(rate.per_minute(), 5);
+        rate.take(Instant::from_millis(2_000), 0);
+        assert_eq!(rate.per_minute(), 5, "a step back is a restart");
+        rate.take(Instant::from_millis(31_000), 1);
+        assert_eq!(rate.per_minute(), 6);
+        rate.take(Instant::from_millis(200_000), 1);
+        assert_eq!(rate.per_minute(), 0, "long ago");
+    }
+}

@@ -1,0 +1,261 @@
+//! Reading: every format, filters, damage and what is no log at all.
+
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+
+use crate::support::{flight, frames, frames_of, json, px4, recorded, run, text};
+
+/// A packed log of the PX4 flight.
+fn packed(dir: &Path) {
+    run(dir, "pack PX4 -o flight.hum", 0);
+}
+
+#[test]
+fn a_packed_recording_comes_back_frame_for_frame() {
+    let dir = tempfile::tempdir().expect("directory");
+    for name in ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"] {
+        let input = flight(name);
+        run(dir.path(), &format!("pack {} -o log.hum", input.display()), 0);
+        run(dir.path(), "decode log.hum -o back.tlog --format tlog", 0);
+        assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&input), "{name}");
+    }
+}
+
+#[test]
+fn recorded_times_come_back_to_the_millisecond() {
+    let dir = tempfile::tempdir().expect("directory");
+    packed(dir.path());
+    run(dir.path(), "decode flight.hum -o back.tlog --format tlog", 0);
+    let times = |path: &Path| -> Vec<u64> {
+        let bytes = fs::read(path).expect("a tlog");
+        let mut at = 0;
+        let mut times = Vec::new();
+        for frame in frames(&bytes) {
+            times.push(u64::from_be_bytes(bytes[at..at + 8].try_into().expect("eight")));
+            at += 8 + frame.len();
+        }
+        times
+    };
+    let (before, after) = (times(&px4()), times(&dir.path().join("back.tlog")));
+    assert!(before.iter().zip(&after).all(|(before, after)| before.abs_diff(*after) < 1000));
+}
+
+#[test]
+fn tables_have_a_row_for_each_frame_and_both_times() {
+    let dir = recorded();
+    run(dir.path(), "decode card.img -o out --format csv", 0);
+    let table = |name: &str| fs::read_to_string(dir.path().join("out/00001").join(name)).expect(name);
+    let attitude = table("ATTITUDE.csv");
+    let mut lines = attitude.lines();
+    let header = lines.next().expect("a header");
+    assert!(
+        header.starts_with("time_boot[s],time_utc,system,component,time_boot_ms[ms],roll[rad],"),
+        "{header}"
+    );
+    let row = lines.next().expect("a row");
+    assert_eq!(row.split(',').count(), header.split(',').count(), "{row}");
+    let info = json(&run(dir.path(), "info card.img --json", 0));
+    for message in info["logs"][0]["messages"].as_array().expect("messages") {
+        let name = message["name"].as_str().expect("a name");
+        let rows = table(&format!("{name}.csv")).lines().count() as u64 - 1;
+        // A text may have a line break of its own.
+        assert!(message["frames"] == rows || name == "STATUSTEXT", "{name}: {rows}");
+    }
+    assert!(table("HUMS_USAGE.csv").contains("flight_time_s"));
+    assert!(table("HUMS_BOOT.csv").contains("sim"));
+}
+
+#[test]
+fn each_line_is_an_object_and_they_are_in_order() {
+    let dir = recorded();
+    let output = run(dir.path(), "decode card.img -o - --format jsonl", 0);
+    let (mut frames, mut last) = (0, 0.0);
+    for line in text(&output).lines() {
+        let object: serde_json::Value = serde_json::from_str(line).expect(line);
+        frames += u64::from(object["message"].is_string());
+        let at = object["time_boot"].as_f64().expect("a time");
+        assert!(at >= last, "{line}");
+        last = at;
+    }
+    assert_eq!(frames, 16_645);
+}
+
+#[test]
+fn filters_choose_by_time_and_by_message() {
+    // A packed recording knows UTC; this vehicle's own frames tell none.
+    let dir = tempfile::tempdir().expect("directory");
+    packed(dir.path());
+    let decode = |more: &str| {
+        text(&run(dir.path(), &format!("decode flight.hum -o - --format jsonl --message ATTITUDE {more}"), 0))
+    };
+    let all = decode("");
+    let part = decode("--from 100 --to 110.5");
+    let expected: Vec<&str> = all
+        .lines()
+        .filter(|line| {
+            let object: serde_json::Value = serde_json::from_str(line).expect(line);
+            object["time_boot"].as_f64().is_some_and(|at| (100.0..=110.5).contains(&at))
+        })
+        .collect();
+    assert_eq!(part.lines().collect::<Vec<_>>(), expected);
+    let first: serde_json::Value = serde_json::from_str(expected.first().expect("some")).expect("an object");
+    let utc = first["time_utc"].as_str().expect("UTC");
+    assert_eq!(decode(&format!("--from {utc} --to 110.5")), part);
+    run(dir.path(), "decode flight.hum -o - --format jsonl --message ATITUDE", 2);
+    run(dir.path(), "decode flight.hum -o - --format jsonl --from yesterday", 2);
+}
+
+#[test]
+fn where_files_go_depends_on_how_many_there_are() {
+    let dir = recorded();
+    let at = dir.path();
+    run(at, "decode card.img -o one.tlog --format tlog", 0);
+    assert!(at.join("one.tlog").is_file());
+    run(at, "decode card.img -o both --format tlog,csv", 0);
+    assert!(at.join("both/00001.tlog").is_file() && at.join("both/00001/ATTITUDE.csv").is_file());
+    run(at, "sim --input PX4 --sd card.img", 0);
+    run(at, "decode card.img -o two --format tlog", 0);
+    assert!(at.join("two/00001.tlog").is_file() && at.join("two/00002.tlog").is_file());
+    run(at, "decode card.img -o - --format tlog", 2);
+    run(at, "pack PX4 -o cards.hum", 0);
+    run(at, "decode card.img cards.hum -o all --format jsonl", 0);
+    assert!(at.join("all/card/00001.jsonl").is_file() && at.join("all/cards.jsonl").is_file());
+}
+
+#[test]
+fn a_bit_flipped_in_any_group_costs_that_group_and_is_told() {
+    let dir = tempfile::tempdir().expect("directory");
+    packed(dir.path());
+    let log = fs::read(dir.path().join("flight.hum")).expect("a log");
+    let clean = frames_of(&px4());
+    for sector in [0, 1, 63, 64, log.len() / 1024, log.len() / 512 - 1] {
+        let mut damaged = log.clone();
+        damaged[sector * 512 + 100] ^= 0x04;
+        fs::write(dir.path().join("bad.hum"), damaged).expect("written");
+        run(dir.path(), "decode bad.hum -o bad --format tlog,csv,jsonl", 3);
+        let back = frames_of(&dir.path().join("bad/bad.tlog"));
+        let group = clean.len() * 64 * 512 / log.len() + 500;
+        assert!(back.len() + group >= clean.len(), "sector {sector}: {} of {}", back.len(), clean.len());
+        let mut rest = clean.iter();
+        assert!(back.iter().all(|frame| rest.any(|other| other == frame)), "sector {sector}: a wrong frame");
+        let read = |name: &str| fs::read_to_string(dir.path().join("bad").join(name)).expect(name);
+        assert_eq!(read("bad/HUMS_GAP.csv").lines().count(), 2, "sector {sector}");
+        assert!(read("bad.jsonl").contains("HUMS_GAP"), "sector {sector}");
+        let verify = json(&run(dir.path(), "verify bad.hum --json", 3));
+        assert_eq!(verify["ok"], false);
+        let info = json(&run(dir.path(), "info bad.hum --json", 3));
+        assert_eq!(info["logs"][0]["gaps_count"], 1, "sector {sector}: {}", info["logs"][0]["gaps"]);
+        fs::remove_dir_all(dir.path().join("bad")).expect("removed");
+    }
+}
+
+#[test]
+fn a_cut_log_gives_what_it_has() {
+    let dir = tempfile::tempdir().expect("directory");
+    packed(dir.path());
+    let log = fs::read(dir.path().join("flight.hum")).expect("a log");
+    for length in [512, 700, 32 * 512, 65 * 512 + 1, log.len() / 2, log.len() - 512] {
+        fs::write(dir.path().join("cut.hum"), &log[..length]).expect("written");
+        let code = if length % 512 == 0 { 0 } else { 3 };
+        run(dir.path(), "decode cut.hum -o cut.tlog --format tlog", code);
+        let back = frames_of(&dir.path().join("cut.tlog"));
+        assert!(frames_of(&px4()).starts_with(&back), "{length} bytes");
+        assert!(back.len() * 3 > length / 512 * 10, "{length} bytes: {} frames", back.len());
+    }
+}
+
+#[test]
+fn a_card_without_its_file_system_is_read_block_by_block() {
+    let dir = recorded();
+    let path = dir.path().join("card.img");
+    let mut image = fs::read(&path).expect("an image");
+    // Partition table, boot sector, FAT and the directory's beginning.
+    let end = image.windows(3).position(|bytes| bytes == b"HUM").expect("a directory entry") + 512;
+    image[..end / 512 * 512].fill(0);
+    fs::write(&path, &image).expect("written");
+    run(dir.path(), "decode card.img -o back.tlog --format tlog", 3);
+    assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&px4()));
+}
+
+#[test]
+fn segments_copied_off_a_card_are_a_log() {
+    let dir = recorded();
+    let image = fs::read(dir.path().join("card.img")).expect("an image");
+    // The first sector of the log, wherever the card has it; segments are allocated in one piece on an empty card.
+    let start =
+        image.chunks(512).position(|block| block[0] == b'H' && block[1] >> 4 == 0xb).expect("a sector") * 512;
+    let folder = dir.path().join("copied/box7");
+    fs::create_dir_all(&folder).expect("made");
+    fs::write(folder.join("00001_00.hum"), &image[start..start + (8 << 20)]).expect("written");
+    fs::write(folder.join("notes.txt"), "not a log").expect("written");
+    run(dir.path(), "decode copied -o back.tlog --format tlog", 0);
+    assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&px4()));
+}
+
+#[test]
+fn what_is_no_log_is_told_apart() {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = dir.path();
+    fs::write(at.join("empty"), b"").expect("written");
+    fs::write(at.join("text"), "hello").expect("written");
+    fs::write(at.join("zeros"), vec![0; 3 << 20]).expect("written");
+    fs::create_dir(at.join("folder")).expect("made");
+    for (input, said) in [
+        ("empty", "is empty"),
+        ("text", "neither a log"),
+        ("zeros", "no partition table"),
+        ("folder", "no log"),
+        ("missing", "cannot be read"),
+        ("PX4", "hums pack"),
+    ] {
+        for command in ["info", "verify", "decode -o out --format csv"] {
+            let output = run(at, &format!("{command} {input}"), 1);
+            let error = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(error.contains(said), "{command} {input}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_reader_that_goes_away_ends_it_quietly() {
+    let dir = tempfile::tempdir().expect("directory");
+    packed(dir.path());
+    let program = assert_cmd::cargo::cargo_bin("hums");
+    for line in ["decode flight.hum -o - --format jsonl", "info flight.hum --json", "decode --help"] {
+        let mut child = std::process::Command::new(&program)
+            .current_dir(dir.path())
+            .args(line.split(' '))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it runs");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]), "hums {line}");
+    }
+}
+
+#[test]
+fn slips_of_the_command_line_are_usage_errors() {
+    let dir = tempfile::tempdir().expect("directory");
+    for line in [
+        "",
+        "fly",
+        "sim",
+        "sim --input PX4",
+        "sim --input udp:1.2.3.4:5 --sd c.img",
+        "sim --input PX4 --sd c.img --stall 5",
+        "sim --input PX4 --sd c.img --noise 2",
+        "sim --input PX4 --sd c.img --card-size 5",
+        "sim --input PX4 --sd c.img --gs - --json",
+        "sim --input udpin:127.0.0.1:1 --sd c.img --speed max",
+        "emulate --input PX4 --sd c.img --card-out 1..2",
+        "decode c.img -o out --format xml",
+        "pack tcp:127.0.0.1:1 -o out.hum",
+    ] {
+        let output = run(dir.path(), line, 2);
+        assert!(output.stdout.is_empty() && !output.stderr.is_empty(), "hums {line}");
+    }
+    assert!(!dir.path().join("c.img").exists(), "a slip left an image behind");
+}

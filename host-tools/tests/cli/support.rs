@@ -1,0 +1,77 @@
+//! What the tests of the program share.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+/// A recording of the repository.
+pub(crate) fn flight(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name)
+}
+
+/// The shortest whole flight.
+pub(crate) fn px4() -> PathBuf {
+    flight("px4_hil_quad_low.tlog")
+}
+
+/// The program; nothing may take a minute.
+pub(crate) fn hums() -> Command {
+    let mut command = Command::cargo_bin("hums").expect("the program");
+    command.timeout(std::time::Duration::from_mins(1));
+    command
+}
+
+/// Runs it in `dir` and gives its output; the exit code must be this one.
+#[track_caller]
+pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
+    let arguments = line.split_whitespace().map(|word| match word {
+        "PX4" => px4().display().to_string(),
+        word => word.to_owned(),
+    });
+    let output = hums().current_dir(dir).args(arguments).output().expect("it runs");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "hums {line}\n{error}");
+    assert!(!error.contains("panicked"), "hums {line}\n{error}");
+    output
+}
+
+/// Standard output as text.
+pub(crate) fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The object that `--json` printed.
+pub(crate) fn json(output: &Output) -> serde_json::Value {
+    serde_json::from_slice(&output.stdout).expect("one JSON object")
+}
+
+/// A directory with a card on which the PX4 flight was recorded.
+pub(crate) fn recorded() -> TempDir {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "sim --input PX4 --sd card.img", 0);
+    dir
+}
+
+/// The frames of a tlog, without their times.
+pub(crate) fn frames(tlog: &[u8]) -> Vec<Vec<u8>> {
+    let mut frames = Vec::new();
+    let mut at = 0;
+    while let Some(rest) = tlog.get(at + 8..).filter(|rest| rest.len() > 3) {
+        let length = match rest[0] {
+            0xfe => usize::from(rest[1]) + 8,
+            0xfd => usize::from(rest[1]) + 12 + if rest[2] & 1 == 0 { 0 } else { 13 },
+            other => panic!("no frame at byte {at}: {other:#x}"),
+        };
+        frames.push(rest[..length].to_vec());
+        at += 8 + length;
+    }
+    frames
+}
+
+/// The frames of a recording of the repository.
+pub(crate) fn frames_of(path: &Path) -> Vec<Vec<u8>> {
+    frames(&fs::read(path).expect("a recording"))
+}
