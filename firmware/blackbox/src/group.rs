@@ -2,7 +2,7 @@
 
 use hums_core::time::Instant;
 
-use crate::codec::{Decoded, ENTRY_BYTES_MAX, Kind, Model};
+use crate::codec::{Decoded, ENTRY_BYTES_MAX, Frame, Kind, Model};
 use crate::coder::{Decoder, LOOKAHEAD};
 use crate::layouts::Layouts;
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
@@ -58,6 +58,7 @@ impl core::error::Error for GroupError {}
 /// The decoder of one group; `begin` makes it ready for the next one. It is large (see `size_of`): box it.
 pub struct GroupDecoder {
     model: Model,
+    frame: Frame,
     decoder: Decoder,
     input: [u8; GROUP_SECTORS * BODY_BYTES],
     filled: usize,
@@ -83,6 +84,7 @@ impl GroupDecoder {
     pub fn new() -> Self {
         Self {
             model: Model::new(),
+            frame: Frame::empty(),
             decoder: Decoder::new(&[], 0),
             input: [0; GROUP_SECTORS * BODY_BYTES],
             filled: 0,
@@ -156,7 +158,7 @@ impl GroupDecoder {
         }
         self.due -= 1;
         let input = self.input.get(..self.filled).unwrap_or_default();
-        match self.model.decode(&mut self.decoder, input, &mut self.entry) {
+        match self.model.decode(&mut self.decoder, input, &mut self.frame, &mut self.entry) {
             // Reading on beyond the end is only right where the stream ends.
             Ok(decoded) if self.decoder.position() <= input.len() + LOOKAHEAD => {
                 self.frames += u32::from(decoded.kind != Kind::Record);

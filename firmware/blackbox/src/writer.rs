@@ -7,7 +7,7 @@
 
 use hums_core::time::Instant;
 
-use crate::codec::{CODED_BYTES_MAX, Entry, FRAME_BYTES_MAX, Kind, Model, Out};
+use crate::codec::{CODED_BYTES_MAX, Entry, FRAME_BYTES_MAX, Frame, Kind, Model, Out};
 use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
 use crate::layouts::{self, Layouts};
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
@@ -69,6 +69,7 @@ pub struct Counters {
 /// The writer with the model, the sector in progress and room for one coded entry.
 pub struct Writer {
     model: Model,
+    frame: Frame,
     coder: Encoder,
     scratch: Out,
     sector: Sector,
@@ -101,6 +102,7 @@ impl Writer {
     pub const fn new() -> Self {
         Self {
             model: Model::new(),
+            frame: Frame::empty(),
             coder: Encoder::new(),
             scratch: Out::new(),
             sector: Sector::zeroed(),
@@ -232,7 +234,7 @@ impl Writer {
     fn append(&mut self, entry: &Entry<'_>, plain: bool, sink: &mut impl SectorSink) -> bool {
         let before = self.coder;
         self.scratch.clear();
-        self.model.encode(entry, plain, &mut self.coder, &mut self.scratch);
+        self.model.encode(entry, plain, &mut self.frame, &mut self.coder, &mut self.scratch);
         let sectors_after = GROUP_SECTORS - 1 - usize::from(self.header.since_first);
         let room = sectors_after * BODY_BYTES + (BODY_BYTES - self.header.body_bytes);
         let Some(len) =

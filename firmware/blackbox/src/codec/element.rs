@@ -280,48 +280,74 @@ impl Distributions {
         }
     }
 
-    /// An integer of 1, 2 or 4 bytes.
+    /// An integer of 1, 2 or 4 bytes that is no time.
     #[inline]
-    pub(crate) fn integer<C: Coder>(
+    pub(crate) fn integer<C: Coder>(&mut self, coder: &mut C, element: &mut Element, value: u32) -> u32 {
+        let (spare, kind) = match element.what {
+            What::Integer1 => (24, SMALL),
+            What::Integer2 => (16, MIDDLE),
+            _ => (0, LARGE),
+        };
+        let fold = |difference: u32| ((difference << spare) as i32) >> spare;
+        let (last, step) = (element.last, element.step);
+        let known = element.known();
+        // From the last value: as it is, with the last step, with half of it.
+        let [as_is, linear, half, ..] = &mut element.costs;
+        let mut ahead = 0;
+        if *linear < *as_is {
+            ahead = step;
+        }
+        if *half < (*linear).min(*as_is) {
+            ahead = step / 2;
+        }
+        let guess = if known { last.wrapping_add(ahead as u32) } else { 0 };
+        let difference = fold(value.wrapping_sub(guess));
+        let class = integer_class(difference.unsigned_abs());
+        let symbol = self.class_or_first(coder, element, kind, class);
+        let difference = integer_rest(coder, symbol, difference);
+        let value = guess.wrapping_add(difference as u32) & (u32::MAX >> spare);
+        let change = value.wrapping_sub(last);
+        let [as_is, linear, half, ..] = &mut element.costs;
+        charge(as_is, fold(change).unsigned_abs());
+        charge(linear, fold(change.wrapping_sub(step as u32)).unsigned_abs());
+        charge(half, fold(change.wrapping_sub((step / 2) as u32)).unsigned_abs());
+        element.step = if known { fold(change) } else { 0 };
+        element.note(change == 0);
+        element.last = value;
+        value
+    }
+
+    /// A time of 4 bytes.
+    pub(crate) fn time<C: Coder>(
         &mut self,
         coder: &mut C,
         element: &mut Element,
         value: u32,
         context: &Context,
     ) -> u32 {
-        let (spare, kind, count) = match element.what {
-            What::Integer1 => (24, SMALL, HALF + 1),
-            What::Integer2 => (16, MIDDLE, HALF + 1),
-            What::Integer4 => (0, LARGE, HALF + 1),
-            _ => (0, TIME, SAME_CLOCK + 1),
-        };
-        let fold = |difference: u32| ((difference << spare) as i32) >> spare;
         let last = element.last;
         let mut guesses = [last; SAME_CLOCK + 1];
         guesses[LINEAR] = last.wrapping_add(element.step as u32);
         guesses[HALF] = last.wrapping_add((element.step / 2) as u32);
-        if kind == TIME {
-            let elapsed_us = context.clock_us.wrapping_sub(element.aux);
-            (guesses[BY_ARRIVAL], guesses[BY_CLOCK]) = if element.what == What::Millis {
-                (last.wrapping_add(context.elapsed_ms), last.wrapping_add(thousandth(elapsed_us)))
-            } else {
-                let arrival = context.elapsed_ms.wrapping_mul(1_000);
-                (last.wrapping_add(arrival), last.wrapping_add(elapsed_us))
-            };
-            guesses[SAME_CLOCK] = context.clock_ms;
-            element.aux = context.clock_us;
-        }
+        let elapsed_us = context.clock_us.wrapping_sub(element.aux);
+        (guesses[BY_ARRIVAL], guesses[BY_CLOCK]) = if element.what == What::Millis {
+            (last.wrapping_add(context.elapsed_ms), last.wrapping_add(thousandth(elapsed_us)))
+        } else {
+            let arrival = context.elapsed_ms.wrapping_mul(1_000);
+            (last.wrapping_add(arrival), last.wrapping_add(elapsed_us))
+        };
+        guesses[SAME_CLOCK] = context.clock_ms;
+        element.aux = context.clock_us;
         let known = element.known();
-        let guess = if known { guesses[cheapest(&element.costs, count)] } else { 0 };
-        let difference = fold(value.wrapping_sub(guess));
+        let guess = if known { guesses[cheapest(&element.costs, SAME_CLOCK + 1)] } else { 0 };
+        let difference = value.wrapping_sub(guess) as i32;
         let class = integer_class(difference.unsigned_abs());
-        let symbol = self.class_or_first(coder, element, kind, class);
-        let difference = integer_rest(coder, symbol, difference);
-        let value = guess.wrapping_add(difference as u32) & (u32::MAX >> spare);
-        for (cost, guess) in element.costs.iter_mut().zip(guesses).take(count) {
-            charge(cost, fold(value.wrapping_sub(guess)).unsigned_abs());
+        let symbol = self.class_or_first(coder, element, TIME, class);
+        let value = guess.wrapping_add(integer_rest(coder, symbol, difference) as u32);
+        for (cost, guess) in element.costs.iter_mut().zip(guesses) {
+            charge(cost, (value.wrapping_sub(guess) as i32).unsigned_abs());
         }
-        element.step = if known { fold(value.wrapping_sub(last)) } else { 0 };
+        element.step = if known { value.wrapping_sub(last) as i32 } else { 0 };
         element.note(value == last);
         element.last = value;
         value

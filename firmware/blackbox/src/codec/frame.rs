@@ -24,6 +24,8 @@ pub(crate) struct Frame {
     pub(crate) payload: [u8; PAYLOAD_BYTES_MAX + 9],
     pub(crate) checksum: u16,
     pub(crate) signature: [u8; SIGNATURE_BYTES],
+    /// Bytes of `payload` that may not be zero.
+    used: usize,
 }
 
 impl Frame {
@@ -40,6 +42,7 @@ impl Frame {
             payload: [0; PAYLOAD_BYTES_MAX + 9],
             checksum: 0,
             signature: [0; SIGNATURE_BYTES],
+            used: 0,
         }
     }
 
@@ -47,19 +50,35 @@ impl Frame {
         self.v2 && self.incompat & SIGNED != 0
     }
 
+    /// Nothing in it, as a frame to be read begins.
+    pub(crate) fn clear(&mut self) {
+        self.clear_payload(0);
+        self.len = 0;
+    }
+
+    /// Keeps `len` bytes of the payload; clears what a frame before left beyond.
+    fn clear_payload(&mut self, len: usize) {
+        if let Some(beyond) = self.payload.get_mut(len..self.used.max(len)) {
+            beyond.fill(0);
+        }
+        // Whoever fills it in says less.
+        self.used = PAYLOAD_BYTES_MAX + 9;
+    }
+
     /// Takes a frame apart; `None` where the bytes are not exactly one.
-    pub(crate) fn parse(bytes: &[u8]) -> Option<Self> {
-        let mut frame = Self::empty();
+    pub(crate) fn parse(&mut self, bytes: &[u8]) -> Option<()> {
+        let frame = self;
         let rest;
         match *bytes {
             [MAGIC_V1, len, sequence, system, component, id, ref tail @ ..] => {
                 frame.v2 = false;
+                (frame.incompat, frame.compat) = (0, 0);
                 (frame.len, frame.sequence) = (usize::from(len), sequence);
                 (frame.system, frame.component, frame.id) = (system, component, u32::from(id));
                 rest = tail;
             }
             [MAGIC_V2, len, incompat, compat, sequence, system, component, a, b, c, ref tail @ ..] => {
-                (frame.incompat, frame.compat) = (incompat, compat);
+                (frame.v2, frame.incompat, frame.compat) = (true, incompat, compat);
                 (frame.len, frame.sequence) = (usize::from(len), sequence);
                 (frame.system, frame.component, frame.id) =
                     (system, component, u32::from_le_bytes([a, b, c, 0]));
@@ -69,6 +88,8 @@ impl Frame {
         }
         let (payload, rest) = rest.split_at_checked(frame.len)?;
         frame.payload[..frame.len].copy_from_slice(payload);
+        frame.clear_payload(frame.len);
+        frame.used = frame.len;
         let (checksum, signature) = rest.split_first_chunk()?;
         frame.checksum = u16::from_le_bytes(*checksum);
         if frame.signed() {
@@ -76,7 +97,7 @@ impl Frame {
         } else if !signature.is_empty() {
             return None;
         }
-        Some(frame)
+        Some(())
     }
 
     /// Puts the frame together; gives its length.
@@ -154,13 +175,14 @@ mod tests {
     #[test]
     fn frames_come_apart_and_together() {
         let heartbeat = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
-        let frame = Frame::parse(&heartbeat).expect("a frame");
+        let mut frame = Frame::empty();
+        frame.parse(&heartbeat).expect("a frame");
         assert_eq!(crc_add(frame.checksum_before_seed(), 50), frame.checksum);
         assert_eq!(seed_for(frame.checksum_before_seed(), frame.checksum), Some(50));
         let mut out = [0; ENTRY_BYTES_MAX];
         let len = frame.assemble(&mut out);
         assert_eq!(&out[..len], heartbeat);
-        assert!(Frame::parse(&heartbeat[..16]).is_none());
-        assert!(Frame::parse(&[0xfd; 12]).is_none());
+        assert!(frame.parse(&heartbeat[..16]).is_none());
+        assert!(frame.parse(&[0xfd; 12]).is_none());
     }
 }

@@ -11,7 +11,8 @@ mod slots;
 mod text;
 
 use element::Elements;
-use frame::{Frame, SIGNATURE_BYTES};
+pub(crate) use frame::Frame;
+use frame::SIGNATURE_BYTES;
 use links::REGISTERS;
 use slots::{INSTANCE_BYTES, Key, Length, Next, Slot, Slots};
 use text::TextModel;
@@ -144,17 +145,22 @@ impl Model {
     }
 
     /// Writes an entry. `plain`: as it is, because the model makes it too long.
-    pub(crate) fn encode(&mut self, entry: &Entry<'_>, plain: bool, encoder: &mut Encoder, out: &mut Out) {
+    pub(crate) fn encode(
+        &mut self,
+        entry: &Entry<'_>,
+        plain: bool,
+        frame: &mut Frame,
+        encoder: &mut Encoder,
+        out: &mut Out,
+    ) {
         let coder = &mut Writing { encoder, out };
-        let frame = match entry.kind {
-            Kind::Frame { verified } if !plain => Frame::parse(entry.bytes).map(|frame| (frame, verified)),
-            _ => None,
-        };
-        if let Some((mut frame, verified)) = frame
-            && let Some((next, key)) = self.route(&frame)
+        if let Kind::Frame { verified } = entry.kind
+            && !plain
+            && frame.parse(entry.bytes).is_some()
+            && let Some((next, key)) = self.route(frame)
         {
             if self.slots.next(coder, next).is_some() {
-                self.frame(coder, next, key, &mut frame, verified, entry.at_ms);
+                self.frame(coder, next, key, frame, verified, entry.at_ms);
             }
             return;
         }
@@ -172,6 +178,7 @@ impl Model {
         &mut self,
         decoder: &mut Decoder,
         input: &[u8],
+        frame: &mut Frame,
         buffer: &mut [u8; ENTRY_BYTES_MAX],
     ) -> Result<Decoded, Corrupt> {
         let coder = &mut Reading { decoder, input };
@@ -181,8 +188,8 @@ impl Model {
             let kind = if next == Next::Record { Kind::Record } else { verified };
             return self.plain(coder, Decoded { kind, at_ms: 0, len: 0 }, buffer, false).ok_or(Corrupt);
         }
-        let mut frame = Frame::empty();
-        let (verified, at_ms) = self.frame(coder, next, NO_KEY, &mut frame, false, 0).ok_or(Corrupt)?;
+        frame.clear();
+        let (verified, at_ms) = self.frame(coder, next, NO_KEY, frame, false, 0).ok_or(Corrupt)?;
         let len = frame.assemble(buffer);
         Ok(Decoded { kind: Kind::Frame { verified }, at_ms, len })
     }

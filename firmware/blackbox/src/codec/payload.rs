@@ -6,7 +6,7 @@ use hums_dialect::{Kind, Role};
 
 use super::element::{Context, ELEMENTS, Element, What};
 use super::frame::{Frame, PAYLOAD_BYTES_MAX};
-use super::links::{self, LINKS};
+use super::links::{self, LINKS, Link};
 use super::slots::{Key, Length, Slot};
 use super::{INSTANCE_BYTES, Model, TEXT_BYTES};
 use crate::coder::Coder;
@@ -194,6 +194,7 @@ impl Model {
         let mut offset = 0;
         let range = elements_in(slot);
         let mut index = range.start;
+        let mut link = usize::from(slot.links);
         while index < range.end {
             let element = self.elements.list.get_mut(index)?;
             let size = usize::from(element.size);
@@ -201,28 +202,47 @@ impl Model {
                 break;
             }
             let (last, aux, what) = (element.last, element.aux, element.what);
+            if calm && element.is_quiet() && what != What::Text {
+                if what == What::Float {
+                    context.neighbour = Some((f32::from_bits(last), f32::from_bits(last)));
+                }
+                if !C::WRITES {
+                    let upper = self.elements.list.get(index + 1).map_or(0, |upper| upper.last);
+                    let value = u64::from(last) | if wide(what) { u64::from(upper) << 32 } else { 0 };
+                    frame
+                        .payload
+                        .get_mut(offset..offset + size)?
+                        .copy_from_slice(value.to_le_bytes().get(..size)?);
+                }
+                offset += size;
+                index += 1;
+                continue;
+            }
+            let mut links = (None, None);
+            if element.has_links() {
+                links = links_at(&mut link, slot.key.id, offset);
+            }
             let place: &mut [u8; 8] = frame.payload.get_mut(offset..)?.first_chunk_mut()?;
-            if calm && element.is_quiet() && what != What::Text && !C::WRITES {
-                let upper = self.elements.list.get(index + 1).map_or(0, |upper| upper.last);
-                let value = u64::from(last) | if wide(what) { u64::from(upper) << 32 } else { 0 };
-                place.get_mut(..size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
-            } else if calm && element.is_quiet() && what != What::Text {
-                // Nothing to write.
-            } else {
+            {
                 match what {
-                    What::Integer1 | What::Integer2 | What::Integer4 | What::Millis | What::Micros => {
+                    What::Integer1 | What::Integer2 | What::Integer4 => {
                         let bits = word(place) & (u32::MAX >> (32 - 8 * size));
-                        let value = self.elements.distributions.integer(coder, element, bits, &context);
-                        place.get_mut(..size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
+                        let value = self.elements.distributions.integer(coder, element, bits);
+                        if !C::WRITES {
+                            place.get_mut(..size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
+                        }
+                    }
+                    What::Millis | What::Micros => {
+                        let bits = word(place);
+                        let value = self.elements.distributions.time(coder, element, bits, &context);
+                        place.get_mut(..4)?.copy_from_slice(&value.to_le_bytes());
                     }
                     What::Float => {
-                        let link = if element.has_links() {
-                            linked(&self.registers, slot.key.id, slot.links, offset)
-                        } else {
-                            None
-                        };
+                        let linked = links.0.and_then(|link| {
+                            Some(self.registers.get(usize::from(link.register))? * link.scale)
+                        });
                         let bits = word(place);
-                        let value = self.elements.distributions.float(coder, element, bits, &context, link);
+                        let value = self.elements.distributions.float(coder, element, bits, &context, linked);
                         place.get_mut(..4)?.copy_from_slice(&value.to_le_bytes());
                     }
                     What::Wide | What::WideTime => {
@@ -257,9 +277,10 @@ impl Model {
                 }
                 _ => {}
             }
-            if element.has_links() {
-                let number = element.number();
-                publish(&mut self.registers, slot.key.id, slot.links, offset, number);
+            if let Some(link) = links.1
+                && let Some(register) = self.registers.get_mut(usize::from(link.register))
+            {
+                *register = element.number() * link.scale;
             }
             offset += size;
             index += 1;
@@ -403,24 +424,14 @@ fn advanced(clock_us: u32, proposed_us: u32) -> u32 {
     if proposed_us.wrapping_sub(clock_us) < 10_000_000 { proposed_us } else { clock_us }
 }
 
-/// The links of the field at an offset.
-fn links_at(id: u32, first: u8, offset: usize) -> impl Iterator<Item = &'static links::Link> {
-    LINKS
-        .iter()
-        .skip(usize::from(first))
-        .take_while(move |link| link.id == id)
-        .filter(move |link| usize::from(link.offset) == offset)
-}
-
-fn linked(registers: &[f32; links::REGISTERS], id: u32, first: u8, offset: usize) -> Option<f32> {
-    let link = links_at(id, first, offset).find(|link| !link.publishes)?;
-    Some(registers.get(usize::from(link.register))? * link.scale)
-}
-
-fn publish(registers: &mut [f32; links::REGISTERS], id: u32, first: u8, offset: usize, number: f32) {
-    for link in links_at(id, first, offset).filter(|link| link.publishes) {
-        if let Some(register) = registers.get_mut(usize::from(link.register)) {
-            *register = number * link.scale;
+/// The links of the field at an offset, the one to consult and the one to publish; moves on to them.
+fn links_at(at: &mut usize, id: u32, offset: usize) -> (Option<&'static Link>, Option<&'static Link>) {
+    let mut found = (None, None);
+    while let Some(link) = LINKS.get(*at).filter(|link| link.id == id && usize::from(link.offset) <= offset) {
+        if usize::from(link.offset) == offset {
+            *(if link.publishes { &mut found.1 } else { &mut found.0 }) = Some(link);
         }
+        *at += 1;
     }
+    found
 }
