@@ -162,7 +162,7 @@ impl Cdf {
         if index == 0 {
             return 0;
         }
-        let place = self.0[index / 2 & 7] >> (16 * (index & 1)) & 0x7fff;
+        let place = (self.0[(index / 2) & 7] >> (16 * (index & 1))) & 0x7fff;
         place - (place >> 8) + 8 * index as u32
     }
 

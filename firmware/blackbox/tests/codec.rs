@@ -1,4 +1,5 @@
 //! The codec, from outside: whatever a link carries comes back bit for bit, with its times.
+#![allow(clippy::panic, reason = "that is how a test fails")]
 
 use hums_blackbox::record::{Clock, Note};
 use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, SectorSink, Writer};

@@ -69,7 +69,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     world.reboots.sort_unstable();
     let start = WallClock::now();
     while world
-        .power_on(&mut arrivals, params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
+        .power_on(&mut arrivals, &params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
     {
     }
     if let Some(error) = card.take_image_error() {
@@ -143,7 +143,7 @@ impl World<'_> {
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
-        params: Params,
+        params: &Params,
         drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
@@ -151,7 +151,7 @@ impl World<'_> {
         let held = HeldBlocks::new();
         let mut queues = Box::new(Queues::new());
         let mut writer = Box::new(Writer::new());
-        let mut monitor = Box::new(Monitor::new(params));
+        let mut monitor = Box::new(Monitor::new(*params));
         let identity = Boot {
             version: env!("CARGO_PKG_VERSION"),
             board: "sim",

@@ -605,8 +605,7 @@ fn order_or(number: f32, otherwise: i32) -> i32 {
 #[inline]
 fn hundredths(bits: u32) -> Option<i32> {
     let scaled = f32::from_bits(bits) * 100.0;
-    // False for a not-a-number, too.
-    if !(scaled.abs() < 8_388_608.0) {
+    if scaled.is_nan() || scaled.abs() >= 8_388_608.0 {
         return None;
     }
     let n = (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i32;
