@@ -12,8 +12,8 @@ use crate::setup::{self, Need};
 use crate::shell::Shell;
 use crate::test::build_hums;
 
-/// A whole flight of a PX4 quadcopter at the rates of a telemetry port: the shortest that has everything.
-const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
+/// A quadcopter's flight with faults that the monitor finds: vibration, satellites lost, GPS jammed, a battery that sags.
+const FLIGHT: &str = "tests/flights/ap_quad_faults.tlog";
 
 /// `hums` did all it could, and there are losses to report.
 const DONE_WITH_LOSSES: i32 = 3;

@@ -15,6 +15,7 @@ use cortex_m::peripheral::scb::VectActive;
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use hums_onboard::Task;
 
 static RECEPTION: InterruptExecutor = InterruptExecutor::new();
 static MONITOR: InterruptExecutor = InterruptExecutor::new();
@@ -56,21 +57,27 @@ pub(crate) fn running() -> u16 {
     }
 }
 
+/// The number of the exception that a task runs as.
+pub(crate) fn number_of(task: Task) -> u16 {
+    let interrupt = match task {
+        Task::Reception => interrupt::CAN1_TX,
+        Task::Monitor => interrupt::CAN1_RX0,
+        Task::Downlink => interrupt::CAN1_RX1,
+        Task::Storage => interrupt::CAN1_SCE,
+    };
+    16 + interrupt as u16
+}
+
 /// What runs as an exception, by its number.
 pub(crate) fn task_of(number: u16) -> &'static str {
-    const NAMES: [(interrupt::Interrupt, &str); 4] = [
-        (interrupt::CAN1_TX, "reception"),
-        (interrupt::CAN1_RX0, "monitor"),
-        (interrupt::CAN1_RX1, "downlink"),
-        (interrupt::CAN1_SCE, "storage"),
-    ];
-    match number {
-        0 => "idle",
-        1..16 => "exception",
-        _ => NAMES
-            .into_iter()
-            .find(|(interrupt, _)| 16 + *interrupt as u16 == number)
-            .map_or("interrupt", |(_, name)| name),
+    match Task::ALL.into_iter().find(|task| number_of(*task) == number) {
+        Some(Task::Reception) => "reception",
+        Some(Task::Monitor) => "monitor",
+        Some(Task::Downlink) => "downlink",
+        Some(Task::Storage) => "storage",
+        None if number == 0 => "idle",
+        None if number < 16 => "exception",
+        None => "interrupt",
     }
 }
 

@@ -18,6 +18,8 @@ use crate::executors;
 
 /// Bytes of the place that are kept: a file of ours and its line.
 const PLACE_BYTES: usize = 64;
+/// Bytes of the file's path within the place: the rest is for the line.
+const FILE_BYTES: usize = PLACE_BYTES - 8;
 /// Bytes of the message that are kept.
 const MESSAGE_BYTES: usize = 128;
 /// Registers of a processor fault, in the order of [`record::Fault::registers`].
@@ -118,13 +120,13 @@ pub(crate) fn count_start() -> u32 {
 
 /// A task has been silent for too long: says so to whoever starts after the watchdog.
 pub(crate) fn silent(task: hums_onboard::Task) {
-    NOTE.keep(Kind::Watchdog, format_args!("watchdog"), format_args!("{task:?} is silent"));
+    NOTE.keep(Kind::Watchdog, executors::number_of(task), format_args!("watchdog"), format_args!("silent"));
 }
 
 impl Note {
-    fn keep(&self, kind: Kind, place: fmt::Arguments, message: fmt::Arguments) {
+    fn keep(&self, kind: Kind, running: u16, place: fmt::Arguments, message: fmt::Arguments) {
         self.kind.store(kind as u32, Ordering::Relaxed);
-        self.task.store(u32::from(executors::running()), Ordering::Relaxed);
+        self.task.store(u32::from(running), Ordering::Relaxed);
         self.place.write(place);
         self.message.write(message);
         self.sum.store(self.sum_now(), Ordering::Relaxed);
@@ -190,16 +192,19 @@ fn panic(info: &PanicInfo) -> ! {
         register.store(0, Ordering::Relaxed);
     }
     match info.location() {
-        // The end of a long path says more than its beginning.
         Some(place) => {
-            let file = place.file().rsplit("firmware/").next().unwrap_or_default();
-            NOTE.keep(
-                Kind::Panic,
-                format_args!("{file}:{}", place.line()),
-                format_args!("{}", info.message()),
-            );
+            // The end of a long path says more than its beginning.
+            let file = place.file();
+            let file = file.get(file.len().saturating_sub(FILE_BYTES)..).unwrap_or(file);
+            let place = format_args!("{file}:{}", place.line());
+            NOTE.keep(Kind::Panic, executors::running(), place, format_args!("{}", info.message()));
         }
-        None => NOTE.keep(Kind::Panic, format_args!("?"), format_args!("{}", info.message())),
+        None => NOTE.keep(
+            Kind::Panic,
+            executors::running(),
+            format_args!("?"),
+            format_args!("{}", info.message()),
+        ),
     }
     board::restart();
 }
@@ -217,6 +222,8 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     for (register, value) in NOTE.registers.iter().zip(stacked.into_iter().chain(status)) {
         register.store(value, Ordering::Relaxed);
     }
-    NOTE.keep(Kind::HardFault, format_args!("pc {:08x}", f.pc()), format_args!("processor fault"));
+    // What ran before this exception is in the stacked status.
+    let running = (f.xpsr() & 0x1FF) as u16;
+    NOTE.keep(Kind::HardFault, running, format_args!("pc {:08x}", f.pc()), format_args!("processor fault"));
     board::restart();
 }

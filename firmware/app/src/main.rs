@@ -18,7 +18,6 @@ mod memory;
 mod report;
 mod tasks;
 
-use embassy_executor::SpawnToken;
 use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
@@ -36,6 +35,9 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
+
+/// What a second spawning of a task would be told.
+const ONCE: &str = "each task is spawned once";
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -64,17 +66,11 @@ fn main() -> ! {
     });
 
     let on = executors::start();
-    on.reception.spawn(once(tasks::reception::run(parts.autopilot, frames_in)));
+    on.reception.spawn(tasks::reception::run(parts.autopilot, frames_in).expect(ONCE));
     let ends = monitor::Ends { frames: frames_out, sectors: sectors_in, gs: gs_in };
-    on.monitor.spawn(once(monitor::run(monitoring, ends, fault, parts.watchdog, parts.led)));
-    on.downlink.spawn(once(tasks::downlink::run(parts.gs, gs_out)));
-    on.storage.spawn(once(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out)));
+    on.monitor.spawn(monitor::run(monitoring, ends, fault, parts.watchdog, parts.led).expect(ONCE));
+    on.downlink.spawn(tasks::downlink::run(parts.gs, gs_out).expect(ONCE));
+    on.storage.spawn(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out).expect(ONCE));
     let mut idle = parts.idle;
     idle.run()
-}
-
-/// A task that is spawned for the first and only time has its place.
-fn once<S, E: core::fmt::Debug>(token: Result<SpawnToken<S>, E>) -> SpawnToken<S> {
-    let Ok(token) = token else { defmt::panic!("a task was spawned twice") };
-    token
 }

@@ -52,7 +52,8 @@ fn main() -> Result<()> {
         "gzip -d"
     );
     let (mut ratios, mut against_xz, mut count) = (0.0_f64, 0.0_f64, 0.0_f64);
-    let (options, paths): (Vec<_>, Vec<_>) = std::env::args().skip(1).partition(|word| word.starts_with("--"));
+    let (options, paths): (Vec<_>, Vec<_>) =
+        std::env::args().skip(1).partition(|word| word.starts_with("--"));
     let quick = options.iter().any(|option| option == "--quick");
     for path in paths {
         let tlog = std::fs::read(&path)?;

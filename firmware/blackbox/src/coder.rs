@@ -107,8 +107,7 @@ pub(crate) struct Cdf([u32; 8]);
 const USES_MAX: u32 = 20;
 
 /// The speed of adaptation by uses: a step goes `1 / 2^n` of the way.
-const SPEEDS: [u8; USES_MAX as usize + 1] =
-    [1, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5];
+const SPEEDS: [u8; USES_MAX as usize + 1] = [1, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5];
 
 /// Where the places go when a symbol was coded: those above it to one, the others to nothing.
 static TARGETS: [[u32; 8]; 16] = targets();
@@ -163,7 +162,7 @@ impl Cdf {
         if index == 0 {
             return 0;
         }
-        let place = self.0[index / 2 & 7] >> (16 * (index & 1)) & 0x7fff;
+        let place = (self.0[(index / 2) & 7] >> (16 * (index & 1))) & 0x7fff;
         place - (place >> 8) + 8 * index as u32
     }
 

@@ -79,6 +79,7 @@ impl Default for GroupDecoder {
 
 impl GroupDecoder {
     /// A decoder that waits for a group.
+    #[expect(clippy::large_stack_arrays, reason = "it is boxed by whoever makes one")]
     pub fn new() -> Self {
         Self {
             model: Model::new(),

@@ -8,9 +8,8 @@
 //! * A *group* of up to 64 sectors (32 KiB) starts the model afresh: reading can start there, damage ends there.
 //! * A *sector* says what it is and is checked.
 //!
-//! `docs/log-format.md` describes the format completely. Everything here is bounded and, but for the feature `std`,
-//! needs no allocation.
-#![cfg_attr(not(any(test, feature = "std")), no_std)]
+//! `docs/log-format.md` describes the format completely. Everything here is bounded and needs no allocation.
+#![cfg_attr(not(test), no_std)]
 
 mod assemble;
 mod bytes;

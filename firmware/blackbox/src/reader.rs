@@ -123,6 +123,8 @@ pub struct LogReader {
     /// Frames of the session up to here, while the count is unbroken.
     frames_expected: Option<u32>,
     epoch_micros: Option<u64>,
+    /// Damaged blocks after the last sector, until they are given out as a gap.
+    damaged_at_end: u32,
     summary: Summary,
     state: State,
 }
@@ -161,6 +163,7 @@ impl LogReader {
             last_at: None,
             frames_expected: None,
             epoch_micros: None,
+            damaged_at_end: 0,
             summary: Summary::default(),
             state: State::Reading,
         }
@@ -192,6 +195,7 @@ impl LogReader {
         if let Some(step) = self.assembler.end() {
             self.step(&step);
         }
+        self.damaged_at_end = self.assembler.damaged_since();
         self.state = State::Ending;
     }
 
@@ -211,7 +215,7 @@ impl LogReader {
         if self.state != State::Ending {
             return None;
         }
-        let damaged = self.assembler.damaged_since();
+        let damaged = core::mem::take(&mut self.damaged_at_end);
         if damaged > 0 && self.open_gap.is_none() {
             self.open(Cause::Damaged).sectors_lost = damaged;
         }

@@ -192,7 +192,9 @@ fn partial_copies_in_both_places_are_superseded_or_complete_the_log() {
 fn stale_sectors_and_zeros_after_the_end_are_no_part_of_the_log() {
     let (old, new) = (frames(300, 5), frames(100, 6));
     let mut old = write(&old, true);
-    old.iter_mut().for_each(|sector| sector.seal(7));
+    for sector in &mut old {
+        sector.seal(7);
+    }
     let mut blocks = bytes(&write(&new, true));
     blocks.push([0; 512]);
     blocks.extend(bytes(&old));
@@ -224,7 +226,9 @@ fn a_full_queue_refuses_without_harm() {
     card.append(&mut queue.sectors);
     assert!(writer.finish(&mut queue));
     card.append(&mut queue.sectors);
-    card.iter_mut().for_each(|sector| sector.seal(SESSION));
+    for sector in &mut card {
+        sector.seal(SESSION);
+    }
     assert!(refused > 0);
     let log = read(&bytes(&card));
     assert_eq!(log.frames, taken);

@@ -11,6 +11,8 @@ use crate::vehicle::Vehicle;
 const TAKEOFF_HEIGHT_M: f32 = 1.0;
 const LANDED_HEIGHT_M: f32 = 0.5;
 const PLANE_FLYING_MPS: f32 = 8.0;
+/// Nothing that is watched here is faster: garbage, which must not get into sums and maxima.
+const SPEED_MAX_MPS: f32 = 1_000.0;
 const STILL_MPS: f32 = 0.5;
 const TAKEOFF_DEBOUNCE: Span = Span::from_millis(500);
 const LANDING_DEBOUNCE: Span = Span::from_secs(2);
@@ -124,7 +126,7 @@ pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let local =
         || vehicle.local.within(now, MOTION_AGE).map(|local| norm(local.velocity[0].0, local.velocity[1].0));
     let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.groundspeed).map(|speed| speed.0);
-    global.or_else(local).or_else(hud).filter(|speed| speed.is_finite())
+    global.or_else(local).or_else(hud).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ pub struct Monitor {
     usage: Usage,
 }
 
-const _: () = assert!(size_of::<Monitor>() <= 14 * 1024);
+const _: () = assert!(size_of::<Monitor>() <= 9 * 1024);
 
 impl Monitor {
     /// Before the first observation.

@@ -95,6 +95,12 @@ pub fn counter_name(number: u8) -> Option<CounterName> {
 
 /// Integration steps longer than this are gaps: nothing is known of what happened in them.
 const STEP_MAX: Span = Span::from_secs(2);
+/// What no vehicle here has: beyond it a value is garbage.
+const VOLTS_MAX: f32 = 1_000.0;
+const AMPERES_MAX: f32 = 10_000.0;
+const RPM_MAX: f32 = 1e6;
+const HEIGHT_MAX_M: f32 = 100_000.0;
+const ACCELERATION_MAX: f32 = 10_000.0;
 /// A battery figure holds this long.
 const BATTERY_AGE: Span = Span::from_secs(5);
 /// A motor speed holds this long.
@@ -162,14 +168,14 @@ impl Usage {
         match observation {
             Observation::Vibration(vibration) if vehicle.armed() => {
                 let highest = vibration.levels.into_iter().flatten().fold(0.0, f32::max);
-                self.vibration_max = greater(self.vibration_max, highest);
+                self.vibration_max = greater(self.vibration_max, highest, ACCELERATION_MAX);
             }
             Observation::Imu(_) | Observation::ImuAndAir(..) if flight.airborne() => {
                 let load_factor_g = derived.load_factor_g().unwrap_or(0.0);
-                self.load_factor_max_g = greater(self.load_factor_max_g, load_factor_g);
+                self.load_factor_max_g = greater(self.load_factor_max_g, load_factor_g, ACCELERATION_MAX);
             }
             Observation::GlobalPosition(global) if flight.airborne() => {
-                self.height_max_m = greater(self.height_max_m, global.relative_altitude.0);
+                self.height_max_m = greater(self.height_max_m, global.relative_altitude.0, HEIGHT_MAX_M);
             }
             Observation::Battery(_) | Observation::SystemStatus(_) if vehicle.armed() => {
                 self.take_battery(at, vehicle);
@@ -183,7 +189,7 @@ impl Usage {
         if let Some(voltage_v) = voltage_v.filter(|voltage_v| *voltage_v > 0.0) {
             self.voltage_min_v = Some(self.voltage_min_v.map_or(voltage_v, |lowest| lowest.min(voltage_v)));
         }
-        self.current_max_a = greater(self.current_max_a, current_a.unwrap_or(0.0));
+        self.current_max_a = self.current_max_a.max(current_a.unwrap_or(0.0));
     }
 
     /// One step, at least every 50 ms, after the flight's own.
@@ -212,7 +218,7 @@ impl Usage {
             self.flight_s += step_s;
             if let Some(speed_mps) = ground_speed_mps(now, vehicle) {
                 self.distance_m += f64::from(speed_mps) * step_s;
-                self.speed_max_mps = greater(self.speed_max_mps, speed_mps);
+                self.speed_max_mps = self.speed_max_mps.max(speed_mps);
             }
         }
         self.step_battery(now, vehicle, step_s);
@@ -230,7 +236,7 @@ impl Usage {
             let motor = &vehicle.motors[number];
             let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
             if fresh && Derived::turns(vehicle, number) {
-                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs());
+                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(RPM_MAX));
                 usage.seconds += step_s;
                 usage.revolutions += f64::from(rpm) * step_s / 60.0;
             }
@@ -274,9 +280,9 @@ impl Usage {
     }
 }
 
-/// The larger one; what is no number or no sensible size is left out.
-fn greater(highest: f32, value: f32) -> f32 {
-    if value.is_finite() { highest.max(value) } else { highest }
+/// The larger one; what is no number, or beyond what there can be, is left out.
+fn greater(highest: f32, value: f32, limit: f32) -> f32 {
+    if value <= limit { highest.max(value) } else { highest }
 }
 
 /// The first battery's voltage, or the autopilot's figure where none reports itself; the discharge current and the power
@@ -289,36 +295,36 @@ struct Drawn {
 }
 
 fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
-    let finite = |value: f32| value.is_finite().then_some(value);
     let mut drawn = Drawn::default();
-    let mut add = |voltage: Option<Volts>, current: Option<Amperes>| {
-        let voltage_v = voltage.and_then(|voltage| finite(voltage.0));
-        drawn.voltage_v = drawn.voltage_v.or(voltage_v);
-        if let Some(current_a) = current.and_then(|current| finite(current.0)).map(|current| current.max(0.0))
-        {
-            drawn.current_a = Some(drawn.current_a.unwrap_or(0.0) + current_a);
-            drawn.power_w += voltage_v.unwrap_or(0.0) * current_a;
-        }
-    };
-    for battery in vehicle.batteries.iter().filter_map(|slot| slot.within(now, BATTERY_AGE)) {
-        add(battery.voltage, battery.current);
+    let batteries = vehicle.batteries.iter();
+    for battery in batteries.clone().filter_map(|slot| slot.within(now, BATTERY_AGE)) {
+        drawn.add(battery.voltage, battery.current);
     }
-    let none_reported = vehicle.batteries.iter().all(|slot| slot.get().is_none());
+    let none_reported = batteries.clone().all(|slot| slot.get().is_none());
     if let Some(system) = vehicle.system.within(now, BATTERY_AGE).filter(|_| none_reported) {
-        add(system.voltage, system.current);
+        drawn.add(system.voltage, system.current);
     }
     if drawn.current_a.is_none() {
         let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
         for motor in vehicle.motors.iter().filter(|motor| fresh(motor.moved_at)) {
-            let current_a = motor.esc.current.and_then(|current| finite(current.0));
-            if let Some(current_a) = current_a.map(|current| current.max(0.0)) {
-                drawn.current_a = Some(drawn.current_a.unwrap_or(0.0) + current_a);
-                drawn.power_w +=
-                    motor.esc.voltage.and_then(|voltage| finite(voltage.0)).unwrap_or(0.0) * current_a;
-            }
+            drawn.add(motor.esc.voltage, motor.esc.current);
         }
     }
     drawn
+}
+
+impl Drawn {
+    /// Garbage is left out: it must not get into sums that are kept for good.
+    fn add(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
+        let voltage_v = voltage.map(|voltage| voltage.0).filter(|volts| (0.0..=VOLTS_MAX).contains(volts));
+        let current_a = current.map(|current| current.0).filter(|amperes| amperes.abs() <= AMPERES_MAX);
+        self.voltage_v = self.voltage_v.or(voltage_v);
+        if let Some(current_a) = current_a {
+            let discharge_a = current_a.max(0.0);
+            self.current_a = Some(self.current_a.unwrap_or(0.0) + discharge_a);
+            self.power_w += voltage_v.unwrap_or(0.0) * discharge_a;
+        }
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod observe;
 mod seen;
 pub mod sequence;
 pub mod summary;
+pub mod text;
 
 pub use frame::{Check, Frame};
 pub use framer::{Framer, FramerCounts};

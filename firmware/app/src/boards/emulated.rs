@@ -12,6 +12,7 @@
 //! | `sd` | the card's image, opened for writing in place; without it the slot is empty |
 //! | `log` | where defmt's messages go |
 //! | `seed` | a number that stands for the true random number of a real board |
+//! | `provoke` | `panic`, `bus-fault` or `silence`: that fault, when the downlink sends first (see [`provoke`]) |
 //! | `cost` | `1`: tell the instructions of each stage; QEMU must run with `-icount shift=3` |
 //!
 //! Exit codes: 0 done, 2 no feed, 101 a fault, 102 all tasks wait for ever.
@@ -20,6 +21,7 @@ mod card;
 mod clock;
 mod feed;
 mod log;
+mod provoke;
 mod uart;
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -86,6 +88,7 @@ struct Arguments {
     log: CString<PATH_BYTES>,
     seed: u32,
     tell_costs: bool,
+    provoked: provoke::Fault,
 }
 
 /// Reads the arguments, opens what they name and switches the ports on.
@@ -93,6 +96,7 @@ pub(crate) fn take() -> Parts {
     start_systick();
     let arguments = Arguments::read();
     TELL_COSTS.store(arguments.tell_costs, Ordering::Relaxed);
+    provoke::arm(arguments.provoked);
     log::open(File::create(arguments.log.as_c_str()).ok());
     let image = File::options().read(true).write(true).open(arguments.card.as_c_str());
     let (autopilot, gs) = uart::init();
@@ -129,6 +133,7 @@ impl Arguments {
                 "log" => set_path(&mut arguments.log, value),
                 "seed" => arguments.seed = value.parse().unwrap_or_default(),
                 "cost" => arguments.tell_costs = value == "1",
+                "provoke" => arguments.provoked = provoke::Fault::named(value).unwrap_or_default(),
                 _ => println!("unknown argument: {}", key),
             }
         }
@@ -260,7 +265,9 @@ impl core::fmt::Display for Costs<'_> {
             return Ok(());
         }
         f.write_str(",\"instructions\":{")?;
-        for (index, ((_, name), ticks)) in Stage::NAMES.iter().zip(self.0).enumerate() {
+        // Idle is left out: it sleeps, and no instruction says how long.
+        let busy = Stage::NAMES.iter().zip(self.0).filter(|((stage, _), _)| *stage != Stage::Idle);
+        for (index, ((_, name), ticks)) in busy.enumerate() {
             let comma = if index == 0 { "" } else { "," };
             write!(f, "{comma}\"{name}\":{}", ticks * TICKS.1 / TICKS.0)?;
         }

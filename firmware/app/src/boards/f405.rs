@@ -3,10 +3,10 @@
 //! | pin | what | remark |
 //! |---|---|---|
 //! | PA10 | USART1 RX, from the autopilot's TELEM TX | DMA2 stream 2, ring of [`RING_BYTES`] |
-//! | PA9 | USART1 TX, to the autopilot's TELEM RX | |
+//! | PA9 | USART1 TX, to the autopilot's TELEM RX | kept for it, not driven yet |
 //! | PA2 | USART2 TX, to the ground station's radio | DMA1 stream 6 |
-//! | PA3 | USART2 RX, from the radio | |
-//! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz |
+//! | PA3 | USART2 RX, from the radio | kept for it, not read yet |
+//! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz; MISO pulled up |
 //! | PC12 | LED, lit when low | |
 //!
 //! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
@@ -16,7 +16,7 @@ use core::cell::Cell;
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::dma::{self, ReadableRingBuffer, TransferOptions};
-use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::{Async, Blocking};
 use embassy_stm32::peripherals::{DMA1_CH6, DMA2_CH2, IWDG, RNG};
 use embassy_stm32::rng::{self, Rng};
@@ -87,20 +87,15 @@ pub(crate) fn take() -> Parts {
 
     let mut line = usart::Config::default();
     line.baudrate = AUTOPILOT_BAUD;
-    let autopilot = match UartRx::new_blocking(p.USART1, p.PA10, line) {
-        Ok(port) => AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs)),
-        Err(error) => {
-            defmt::panic!("USART1 refuses {} baud: {}", AUTOPILOT_BAUD, defmt::Debug2Format(&error))
-        }
-    };
+    let port = UartRx::new_blocking(p.USART1, p.PA10, line).expect("the clocks allow this baud rate");
+    let autopilot = AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs));
     line.baudrate = GS_BAUD;
-    let gs = match UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line) {
-        Ok(port) => GsTx(port),
-        Err(error) => defmt::panic!("USART2 refuses {} baud: {}", GS_BAUD, defmt::Debug2Format(&error)),
-    };
+    let port = UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line).expect("the clocks allow this baud rate");
+    let gs = GsTx(port);
 
     let mut bus = spi::Config::default();
     bus.frequency = CARD_IDENTIFICATION;
+    bus.miso_pull = Pull::Up;
     let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
     let select = Output::new(p.PA4, Level::High, Speed::VeryHigh);
     let Ok(spi) = ExclusiveDevice::new_no_delay(bus, select);

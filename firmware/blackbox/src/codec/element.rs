@@ -386,8 +386,7 @@ impl Distributions {
         last: i32,
         value: u32,
     ) -> (Option<u32>, Option<i32>) {
-        let linear =
-            element.decimal & STEP_DECIMAL != 0 && element.costs[LINEAR] < element.costs[LAST];
+        let linear = element.decimal & STEP_DECIMAL != 0 && element.costs[LINEAR] < element.costs[LAST];
         let guess = if linear { last.wrapping_add(element.step) } else { last };
         let now = if C::WRITES { hundredths(value) } else { None };
         let difference = now.map_or(0, |now| now.wrapping_sub(guess));
@@ -606,8 +605,7 @@ fn order_or(number: f32, otherwise: i32) -> i32 {
 #[inline]
 fn hundredths(bits: u32) -> Option<i32> {
     let scaled = f32::from_bits(bits) * 100.0;
-    // False for a not-a-number, too.
-    if !(scaled.abs() < 8_388_608.0) {
+    if scaled.is_nan() || scaled.abs() >= 8_388_608.0 {
         return None;
     }
     let n = (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i32;

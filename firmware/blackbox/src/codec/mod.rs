@@ -285,7 +285,7 @@ impl Model {
         (frame.id, frame.v2) = (slot.key.id, slot.key.v2);
         let expected = sender.sequence;
         let before_seed = if C::WRITES { frame.checksum_before_seed() } else { 0 };
-        let plan = self.header(coder, &mut slot, frame, verified, expected, before_seed, index)?;
+        let plan = self.header(coder, &mut slot, frame, verified, expected, before_seed, index);
         self.slots.senders[usize::from(slot.key.sender)].sequence = frame.sequence.wrapping_add(1);
         let elapsed_ms = (at_ms as u32).wrapping_sub(slot.at_ms);
         slot.at_ms = at_ms as u32;
@@ -324,7 +324,7 @@ impl Model {
         expected: u8,
         before_seed: u16,
         index: u8,
-    ) -> Option<Plan> {
+    ) -> Plan {
         let mut symbol = AS_EXPECTED;
         if C::WRITES {
             let usual = frame.incompat == slot.incompat
@@ -382,7 +382,7 @@ impl Model {
                 frame.len = usize::from(len);
             }
         }
-        Some(plan)
+        plan
     }
 
     /// A slot's first frame: who sends what.
@@ -411,8 +411,8 @@ impl Model {
 
     fn signature<C: Coder>(&mut self, coder: &mut C, sender: u8, frame: &mut Frame) -> Option<()> {
         let sender = self.slots.senders.get_mut(usize::from(sender))?;
-        let [link, time @ .., a, b, c, d, e, f] = &mut frame.signature;
-        let _: &[u8; SIGNATURE_BYTES - 7] = time;
+        let (link, rest) = frame.signature.split_first_mut()?;
+        let (time, hash) = rest.split_at_mut(SIGNATURE_BYTES - 7);
         let same = coder.bits16(u32::from(*link == sender.signature_link), 1) != 0;
         *link = if same { sender.signature_link } else { coder.bits16(u32::from(*link), 8) as u8 };
         sender.signature_link = *link;
@@ -438,7 +438,7 @@ impl Model {
         let now = now & 0xffff_ffff_ffff;
         sender.signature_time = now;
         time.copy_from_slice(&now.to_le_bytes()[..6]);
-        for byte in [a, b, c, d, e, f] {
+        for byte in hash {
             *byte = coder.bits16(u32::from(*byte), 8) as u8;
         }
         Some(())

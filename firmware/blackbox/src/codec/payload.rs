@@ -64,7 +64,7 @@ impl Model {
             described += field.size();
             index += 1;
         }
-        let fits = count <= usize::from(u8::MAX) && described <= PAYLOAD_BYTES_MAX;
+        let fits = u8::try_from(count).is_ok() && described <= PAYLOAD_BYTES_MAX;
         let room = layout.filter(|_| fits).and_then(|layout| Some((layout, self.elements.claim(count)?)));
         let Some((layout, first)) = room else {
             let mut slot = Slot::new(key, None, None, 0, 0);
@@ -268,7 +268,13 @@ impl Model {
     }
 
     /// Whether all quiet elements stay as they are: one bit for all of them, if there are any.
-    fn calm<C: Coder>(&mut self, coder: &mut C, slot_index: usize, slot: &Slot, frame: &Frame) -> Option<bool> {
+    fn calm<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        slot_index: usize,
+        slot: &Slot,
+        frame: &Frame,
+    ) -> Option<bool> {
         let limit = limit(slot);
         let (mut any, mut same) = (false, true);
         let mut offset = 0;

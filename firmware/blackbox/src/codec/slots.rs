@@ -245,7 +245,7 @@ impl Slots {
         } else if two.slot != NONE {
             (two.slot, 8 + usize::from(two.sure))
         } else {
-            (one[0], if one[0] == NONE { 0 } else { 1 })
+            (one[0], usize::from(one[0] != NONE))
         };
         let second = [two.slot, one[0], one[1]].into_iter().find(|&slot| slot != first && slot != NONE);
         // All three agree: an own context.

@@ -38,7 +38,7 @@ impl TextModel {
         let mut node = 1_u32;
         for _ in 0..8 {
             let bit = byte >> 7 != 0;
-            let bit = if C::WRITES { (byte >> (7 - (31 - node.leading_zeros()))) & 1 != 0 } else { bit };
+            let bit = if C::WRITES { (byte >> (7 - node.ilog2())) & 1 != 0 } else { bit };
             let places = seeds.map(|seed| (hash(seed ^ node, 0x9e37_79b1) >> 20) as usize % CELLS);
             let one = mix(places.map(|place| self.cells[place]));
             let bit = coder.bit(one, bit);

@@ -22,6 +22,7 @@ const ROLL: Check = Check {
     when: When::InFlight,
     stale_after: STALE,
     instances: 1,
+    alarm_only: false,
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll),
 };
 

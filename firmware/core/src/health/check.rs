@@ -11,6 +11,8 @@
 //!       \-----------------------------------------------------------/
 //! ```
 
+use core::num::NonZeroU32;
+
 use crate::health::{Inputs, Level, Subsystem};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
@@ -80,6 +82,9 @@ pub struct Check {
     pub stale_after: Option<Span>,
     /// How many there may be.
     pub instances: u8,
+    /// Its silence says nothing: a flag that is not set, a restart that did not happen. Such a check can make its part
+    /// of the vehicle worse, and never by itself make it healthy.
+    pub alarm_only: bool,
     /// Reads the value; `None` while it has never been measured.
     pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,
 }
@@ -87,18 +92,45 @@ pub struct Check {
 /// How long a value must be good before the level falls, so that a value at its limit does not flicker.
 pub const CLEAR: Span = Span::from_secs(2);
 
-/// Since when something has been so.
+/// A point in time in four bytes, because there are some 140 states: milliseconds modulo 2^32, and never zero. What is
+/// measured from it is far shorter than the 49.7 days after which it would be mistaken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Timer(Option<Instant>);
+struct Stamp(Option<NonZeroU32>);
 
-impl Timer {
+impl Stamp {
+    const NONE: Self = Self(None);
+
+    const fn at(at: Instant) -> Self {
+        match NonZeroU32::new(at.as_millis() as u32) {
+            Some(millis) => Self(Some(millis)),
+            // A millisecond earlier.
+            None => Self(Some(NonZeroU32::MAX)),
+        }
+    }
+
+    const fn is_set(self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Whether it is set and more than `span` ago.
+    fn older_than(self, now: Instant, span: Span) -> bool {
+        self.age_ms(now).is_some_and(|age_ms| age_ms > span.as_millis())
+    }
+
+    fn age_ms(self, now: Instant) -> Option<u64> {
+        Some(u64::from((now.as_millis() as u32).wrapping_sub(self.0?.get())))
+    }
+
     /// Runs while `on`; whether it has run for `span`.
     fn run(&mut self, on: bool, now: Instant, span: Span) -> bool {
         if !on {
-            self.0 = None;
+            *self = Self::NONE;
             return false;
         }
-        now.since(*self.0.get_or_insert(now)) >= span
+        if !self.is_set() {
+            *self = Self::at(now);
+        }
+        self.age_ms(now).is_some_and(|age_ms| age_ms >= span.as_millis())
     }
 }
 
@@ -107,11 +139,11 @@ impl Timer {
 pub struct State {
     /// `None` until the value has been seen while the check applied.
     level: Option<Level>,
-    bad: Timer,
-    very_bad: Timer,
-    better: Timer,
+    bad: Stamp,
+    very_bad: Stamp,
+    better: Stamp,
     /// When the value was measured last.
-    seen_at: Option<Instant>,
+    seen: Stamp,
 }
 
 /// A change of level.
@@ -130,7 +162,7 @@ pub struct Change {
 impl State {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { level: None, bad: Timer(None), very_bad: Timer(None), better: Timer(None), seen_at: None }
+        Self { level: None, bad: Stamp::NONE, very_bad: Stamp::NONE, better: Stamp::NONE, seen: Stamp::NONE }
     }
 
     /// The level, or `None` while the check has had nothing to say.
@@ -159,11 +191,10 @@ impl State {
             });
         }
         let reading = reading.filter(|reading| reading.value.is_finite());
-        self.seen_at = reading.map_or(self.seen_at, |reading| Some(reading.at));
+        self.seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.min(now)));
         // A value that was measured once and no longer is grows old like one whose message stops.
-        let old = |limit: Span| self.seen_at.is_some_and(|at| now.since(at) > limit);
-        if check.stale_after.is_some_and(old) {
-            *self = Self { level: self.level, seen_at: self.seen_at, ..Self::new() };
+        if check.stale_after.is_some_and(|limit| self.seen.older_than(now, limit)) {
+            *self = Self { level: self.level, seen: self.seen, ..Self::new() };
             return self.go(Level::Stale, f32::NAN, f32::NAN);
         }
         self.judge(check, now, reading?.value, params)
@@ -182,7 +213,7 @@ impl State {
         // Without a warning limit there is no warning on the way to critical.
         let warned = beyond(warn, 0.0) || (!warn.is_nan() && beyond(critical, 0.0));
         let bad = self.bad.run(warned, now, check.debounce_warn);
-        let undecided = self.bad.0.is_some() || self.very_bad.0.is_some();
+        let undecided = self.bad.is_set() || self.very_bad.is_set();
 
         let held = match level {
             Level::Critical => beyond(critical, check.hysteresis),
@@ -211,7 +242,7 @@ impl State {
         if previous == level {
             return None;
         }
-        self.better = Timer(None);
+        self.better = Stamp::NONE;
         Some(Change { level, previous, value, limit })
     }
 }
@@ -219,6 +250,8 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const _: () = assert!(size_of::<State>() <= 20);
 
     const CHECK: Check = Check {
         name: "tilt",
@@ -234,6 +267,7 @@ mod tests {
         when: When::Always,
         stale_after: Some(Span::from_secs(1)),
         instances: 1,
+        alarm_only: false,
         read: |_, _| None,
     };
 
@@ -337,6 +371,31 @@ mod tests {
         let reading = Some(Reading { at: Instant::ZERO, value: 50.0 });
         assert_eq!(state.step(&CHECK, Instant::ZERO, reading, true, &params), None);
         assert_eq!(state.level(), None);
+    }
+
+    #[test]
+    fn debounce_and_staleness_hold_across_the_end_of_the_counter_of_milliseconds() {
+        let params = Params::defaults();
+        let mut state = State::new();
+        let mut levels = Vec::new();
+        let start_ms = u64::from(u32::MAX) - 1_050;
+        for after_ms in (0..5_000).step_by(50) {
+            let now = Instant::from_millis(start_ms + after_ms);
+            let value = if after_ms < 500 { 10.0 } else { 50.0 };
+            let reading = (after_ms < 2_000).then_some(Reading { at: now, value });
+            let change = state.step(&CHECK, now, reading, true, &params);
+            levels.extend(change.map(|change| (after_ms, change.level)));
+        }
+        assert_eq!(levels, [(1_000, Level::Warning), (3_000, Level::Stale)]);
+    }
+
+    #[test]
+    fn a_value_that_came_after_the_step_began_is_fresh() {
+        let params = Params::defaults();
+        let mut state = State::new();
+        let reading = Some(Reading { at: Instant::from_millis(70), value: 10.0 });
+        assert_eq!(state.step(&CHECK, Instant::from_millis(50), reading, true, &params), None);
+        assert_eq!(state.level(), Some(Level::Ok));
     }
 
     #[test]

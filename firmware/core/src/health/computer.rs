@@ -19,6 +19,7 @@ const LOAD: Check = Check {
     when: When::Always,
     stale_after: STALE,
     instances: 1,
+    alarm_only: false,
     read: load_percent,
 };
 
@@ -42,6 +43,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.0,
         debounce_critical: Span::ZERO,
         stale_after: None,
+        alarm_only: true,
         read: restarted,
         ..LOAD
     },
@@ -54,6 +56,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 0.0,
         debounce_critical: Span::from_millis(500),
         when: When::Armed,
+        alarm_only: true,
         read: |inputs, _| {
             let slot = &inputs.vehicle.heartbeat;
             Reading::new(slot.at(), slot.get().map(|heartbeat| f32::from(heartbeat.state)))
@@ -68,6 +71,7 @@ pub(super) const CHECKS: &[Check] = &[
         critical: None,
         hysteresis: 0.0,
         when: When::Armed,
+        alarm_only: true,
         read: unhealthy_sensors,
         ..LOAD
     },

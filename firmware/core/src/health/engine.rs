@@ -21,6 +21,7 @@ const ENGINE: Check = Check {
     when: When::Always,
     stale_after: STALE,
     instances: 1,
+    alarm_only: false,
     read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
 };
 

@@ -19,6 +19,7 @@ const HEARTBEAT: Check = Check {
     when: When::Always,
     stale_after: None,
     instances: 1,
+    alarm_only: false,
     read: heartbeat_age_s,
 };
 

@@ -98,7 +98,7 @@ pub struct Health {
     states: [State; STATES],
 }
 
-const _: () = assert!(size_of::<Health>() <= 12 * 1024);
+const _: () = assert!(size_of::<Health>() <= 4 * 1024);
 
 impl Default for Health {
     fn default() -> Self {
@@ -163,7 +163,11 @@ impl Health {
 
     /// A subsystem's level: its worst known part; stale where nothing is known.
     pub fn subsystem(&self, subsystem: Subsystem) -> Level {
-        worst(self.levels().filter(|(check, ..)| check.subsystem == subsystem).map(|(.., level)| level))
+        let part = self.levels().filter(|(check, ..)| check.subsystem == subsystem);
+        worst(
+            part.filter(|(check, _, level)| !check.alarm_only || *level != Level::Ok)
+                .map(|(.., level)| level),
+        )
     }
 
     /// The whole vehicle's level: its worst known part. It is not healthy while nothing is known of a subsystem that

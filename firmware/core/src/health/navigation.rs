@@ -21,6 +21,7 @@ const ESTIMATOR: Check = Check {
     when: When::InFlight,
     stale_after: STALE,
     instances: 1,
+    alarm_only: false,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
 };
 

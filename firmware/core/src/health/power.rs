@@ -22,6 +22,7 @@ const BATTERY: Check = Check {
     when: When::Always,
     stale_after: STALE_SLOW,
     instances: BATTERIES,
+    alarm_only: false,
     read: remaining_percent,
 };
 
@@ -93,6 +94,7 @@ pub(super) const CHECKS: &[Check] = &[
         critical: None,
         hysteresis: 0.0,
         when: When::Always,
+        alarm_only: true,
         read: faults,
         ..BATTERY
     },

@@ -21,6 +21,7 @@ const ESC: Check = Check {
     when: When::Armed,
     stale_after: None,
     instances: MOTORS_MAX as u8,
+    alarm_only: false,
     read: |inputs, motor| inputs.derived.esc_silence(inputs, motor),
 };
 
@@ -48,6 +49,7 @@ pub(super) const CHECKS: &[Check] = &[
         critical: Some(Param::EscFailCrit),
         stale_after: STALE_SLOW,
         when: When::Always,
+        alarm_only: true,
         read: failure_rank,
         ..ESC
     },
@@ -87,7 +89,8 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(3),
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
-        stale_after: STALE_SLOW,
+        // Only steady flight says something; ESCs that stop talking are `esc_silent`.
+        stale_after: None,
         read: |inputs, motor| inputs.derived.motor_imbalance(inputs, motor),
         ..ESC
     },

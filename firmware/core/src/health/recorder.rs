@@ -20,6 +20,7 @@ const STATE: Check = Check {
     when: When::Always,
     stale_after: None,
     instances: 1,
+    alarm_only: false,
     read: stopped_rank,
 };
 

@@ -20,6 +20,7 @@ const VIBRATION: Check = Check {
     when: When::Armed,
     stale_after: STALE,
     instances: 1,
+    alarm_only: false,
     read: per_axis,
 };
 

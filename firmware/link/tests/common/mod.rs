@@ -8,12 +8,13 @@ pub fn excerpt(name: &str) -> Recording {
     Recording::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name))
 }
 
-/// A whole flight of the folder that the environment variable `HUMS_FLIGHTS` names; `None` where there is none.
+/// A whole flight: of the folder that the environment variable `HUMS_FLIGHTS` names, or of the repository; `None` for
+/// those that are in neither.
 pub fn flight(name: &str) -> Option<Recording> {
-    let root = PathBuf::from(std::env::var_os("HUMS_FLIGHTS")?);
-    let path =
-        ["own", "public", "."].map(|sub| root.join(sub).join(name)).into_iter().find(|p| p.exists())?;
-    Some(Recording::read(&path))
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/flights");
+    let folders = std::env::var_os("HUMS_FLIGHTS").map(PathBuf::from).into_iter().chain([repository]);
+    let mut paths = folders.flat_map(|root| ["own", "public", "."].map(|sub| root.join(sub).join(name)));
+    Some(Recording::read(&paths.find(|path| path.exists())?))
 }
 
 /// The bytes of the line, and for a tlog where each frame begins and when it came.

@@ -52,7 +52,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     world.reboots.sort_unstable();
     let start = WallClock::now();
     while world
-        .power_on(&mut arrivals, params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
+        .power_on(&mut arrivals, &params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
     {
     }
     if let Some(error) = card.take_image_error() {
@@ -126,7 +126,7 @@ impl World<'_> {
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
-        params: Params,
+        params: &Params,
         drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
@@ -145,7 +145,8 @@ impl World<'_> {
             power_on_us: self.power_on_us,
             reboot_at_us: self.reboots.first().copied(),
         };
-        let mut pipeline = Pipeline::new(outside, &mut memory, identity, self.entropy.wrapping_add(self.boots));
+        let mut pipeline =
+            Pipeline::new(outside, &mut memory, identity, self.entropy.wrapping_add(self.boots));
         pipeline.start()?;
         let ended = drive(arrivals, &mut pipeline)?;
         let mut lost = 0;

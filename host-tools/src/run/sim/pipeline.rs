@@ -41,14 +41,14 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    pub(super) fn new(params: Params) -> Self {
+    pub(super) fn new(params: &Params) -> Self {
         Self {
             card_status: CardStatus::new(),
             port_status: PortStatus::new(),
             held: HeldBlocks::new(),
             queues: Box::new(Queues::new()),
             writer: Box::new(Writer::new()),
-            monitor: Box::new(Monitor::new(params)),
+            monitor: Box::new(Monitor::new(*params)),
         }
     }
 }
@@ -132,7 +132,12 @@ impl Machine for Pipeline<'_, '_> {
 }
 
 impl<'a, 'w> Pipeline<'a, 'w> {
-    pub(super) fn new(outside: Outside<'a, 'w>, memory: &'a mut Memory, identity: Boot<'a>, entropy: u32) -> Self {
+    pub(super) fn new(
+        outside: Outside<'a, 'w>,
+        memory: &'a mut Memory,
+        identity: Boot<'a>,
+        entropy: u32,
+    ) -> Self {
         let Memory { card_status, port_status, held, queues, writer, monitor } = memory;
         Self {
             slot_status: card_status,

@@ -17,6 +17,7 @@ use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::Timer;
 use heapless::Vec;
 
+use super::provoke;
 use crate::boards::{Overrun, Receive, Transmit};
 use crate::tasks::reception::FETCH_BYTES;
 
@@ -119,6 +120,7 @@ impl Receive for AutopilotRx {
 
 impl Transmit for GsTx {
     async fn transmit(&mut self, bytes: &[u8]) {
+        provoke::here().await;
         for &byte in bytes {
             // The emulated port takes a byte at once; there is no TXE to wait for.
             pac::USART2.dr().write(|w| w.set_dr(u16::from(byte)));

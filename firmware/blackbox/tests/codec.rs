@@ -1,0 +1,322 @@
+//! The codec, from outside: whatever a link carries comes back bit for bit, with its times.
+#![allow(clippy::panic, reason = "that is how a test fails")]
+
+use hums_blackbox::record::{Clock, Note};
+use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, SectorSink, Writer};
+use hums_core::time::Instant;
+use proptest::prelude::*;
+
+#[derive(Default)]
+struct Card(Vec<Sector>);
+
+impl SectorSink for Card {
+    fn room(&self) -> usize {
+        usize::MAX
+    }
+
+    fn put(&mut self, sector: &Sector) {
+        let mut sector = *sector;
+        sector.seal(42);
+        self.0.push(sector);
+    }
+}
+
+type Frame = (u64, Vec<u8>, bool);
+
+fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {
+    let mut reader = Box::new(LogReader::new());
+    let (mut frames, mut notes) = (Vec::new(), Vec::new());
+    let mut sectors = sectors.iter();
+    loop {
+        match sectors.next() {
+            Some(sector) => reader.feed(sector.bytes()),
+            None => reader.end(),
+        }
+        while let Some(item) = reader.next() {
+            match item {
+                Item::Frame { at, bytes, verified, .. } => {
+                    frames.push((at.as_millis(), bytes.to_vec(), verified));
+                }
+                Item::Record { record: Record::Note(note), .. } => notes.push(note.text.to_owned()),
+                Item::Record { .. } => {}
+                Item::Gap(gap) => panic!("{gap:?}"),
+                Item::End(_) => return (frames, notes),
+            }
+        }
+    }
+}
+
+/// Writes the frames, reads them back, compares; gives the log's bytes.
+fn round_trip(frames: &[Frame]) -> usize {
+    let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
+    for (at, bytes, verified) in frames {
+        writer.frame(Instant::from_millis(*at), bytes, *verified, &mut card).expect("room");
+    }
+    writer.finish(&mut card);
+    let (found, _) = read(&card.0);
+    assert_eq!(found.len(), frames.len());
+    for (index, (found, expected)) in found.iter().zip(frames).enumerate() {
+        assert_eq!(found, expected, "frame {index}");
+    }
+    card.0.len() * SECTOR_BYTES
+}
+
+/// A small generator of numbers (xorshift), so that streams are repeatable.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    fn below(&mut self, limit: usize) -> usize {
+        (self.next() >> 16) as usize % limit
+    }
+
+    fn chance(&mut self, one_in: usize) -> bool {
+        self.below(one_in) == 0
+    }
+}
+
+fn checksum(bytes: &[u8], seed: u8) -> u16 {
+    bytes.iter().chain([&seed]).fold(0xffff, |crc, &byte| {
+        let mut x = byte ^ crc as u8;
+        x ^= x << 4;
+        let x = u16::from(x);
+        (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
+    })
+}
+
+/// How rough a link is.
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    messages: usize,
+    /// One frame in so many is odd in one of many ways; 0: none.
+    odd_one_in: usize,
+    signed: bool,
+}
+
+/// A stream as a link carries it: messages of the dialect whose fields wander, both versions, some signed, some odd.
+fn stream(seed: u64, count: usize, link: Link) -> Vec<Frame> {
+    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let all = hums_dialect::messages();
+    let ids: Vec<_> = (0..link.messages).map(|_| &all[random.below(all.len())]).collect();
+    let mut payloads: Vec<Vec<u8>> =
+        ids.iter().map(|message| vec![0; usize::from(message.len_max)]).collect();
+    let (mut sequence, mut at, mut signature_time) = (0_u8, 1_000_u64, 1 << 40_u64);
+    let mut frames: Vec<Frame> = Vec::new();
+    for _ in 0..count {
+        let which = random.below(ids.len());
+        let (message, payload) = (ids[which], &mut payloads[which]);
+        for _ in 0..random.below(4) {
+            if let Some(place) = (!payload.is_empty()).then(|| random.below(payload.len())) {
+                payload[place] = match random.below(3) {
+                    0 => payload[place].wrapping_add(1),
+                    1 => 0,
+                    _ => random.next() as u8,
+                };
+            }
+        }
+        let odd = link.odd_one_in > 0 && random.chance(link.odd_one_in);
+        let kind = if odd { 1 + random.below(9) } else { 0 };
+        at += if random.chance(4) { random.next() % 400 } else { 0 };
+        if kind == 1 {
+            sequence = sequence.wrapping_add(random.next() as u8);
+        }
+        let id = if kind == 2 { 0x0080_0000 | message.id } else { message.id };
+        let v1 = kind == 3 && id < 256;
+        let mut body = payload.clone();
+        match kind {
+            4 => body.truncate(body.len() / 2),
+            5 => body.resize(255, random.next() as u8),
+            _ => {}
+        }
+        if v1 {
+            body.truncate(usize::from(message.len_base));
+        } else if kind != 6 {
+            let len = body.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1);
+            body.resize(len, 0);
+        }
+        let system = if kind == 7 { random.next() as u8 } else { 1 };
+        let [a, b, c, _] = id.to_le_bytes();
+        let mut bytes = if v1 {
+            vec![0xfe, body.len() as u8, sequence, system, 1, a]
+        } else {
+            vec![0xfd, body.len() as u8, u8::from(link.signed), 0, sequence, system, 1, a, b, c]
+        };
+        bytes.extend_from_slice(&body);
+        let bad = kind == 8;
+        let crc = if bad { random.next() as u16 } else { checksum(&bytes[1..], message.crc_extra) };
+        let verified = !bad && id == message.id;
+        bytes.extend_from_slice(&crc.to_le_bytes());
+        if link.signed && !v1 {
+            signature_time += random.next() % 3_000;
+            bytes.push(7);
+            bytes.extend_from_slice(&u64::to_le_bytes(signature_time)[..6]);
+            bytes.extend_from_slice(&random.next().to_le_bytes()[..6]);
+        }
+        if kind == 9
+            && let Some((_, last, verified)) = frames.last().cloned()
+        {
+            frames.push((at, last, verified));
+            continue;
+        }
+        sequence = sequence.wrapping_add(1);
+        frames.push((at, bytes, verified));
+    }
+    frames
+}
+
+#[test]
+fn a_calm_link_is_small_and_comes_back() {
+    let frames = stream(7, 20_000, Link { messages: 30, odd_one_in: 0, signed: false });
+    let bytes: usize = frames.iter().map(|frame| frame.1.len() + 8).sum();
+    let log = round_trip(&frames);
+    assert!(log * 4 < bytes, "{log} of {bytes}");
+}
+
+#[test]
+fn a_rough_link_comes_back() {
+    round_trip(&stream(8, 20_000, Link { messages: 60, odd_one_in: 5, signed: false }));
+}
+
+#[test]
+fn signed_frames_come_back() {
+    round_trip(&stream(9, 10_000, Link { messages: 20, odd_one_in: 20, signed: true }));
+}
+
+#[test]
+fn more_messages_and_senders_than_the_model_holds_come_back() {
+    let link = Link { messages: 400, odd_one_in: 2, signed: false };
+    round_trip(&stream(10, 20_000, link));
+}
+
+#[test]
+fn the_longest_frames_without_any_pattern_come_back() {
+    let mut random = Random(11);
+    let frames: Vec<Frame> = (0..500)
+        .map(|index| {
+            let mut bytes: Vec<u8> = (0..FRAME_BYTES_MAX).map(|_| random.next() as u8).collect();
+            if index % 2 == 0 {
+                bytes[..3].copy_from_slice(&[0xfd, 255, 1]);
+            }
+            (index * 40_000_000_000, bytes, index % 3 == 0)
+        })
+        .take_while(|frame| frame.0 < 1 << 48)
+        .collect();
+    round_trip(&frames);
+}
+
+#[test]
+fn records_among_frames_come_back_in_order() {
+    let frames = stream(12, 3_000, Link { messages: 20, odd_one_in: 10, signed: false });
+    let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
+    let clock = Clock { boot: Instant::ZERO, utc_micros: 1_700_000_000_000_000, source: 1 };
+    writer.record(Instant::ZERO, &Record::Clock(clock), &mut card).expect("room");
+    for (index, (at, bytes, verified)) in frames.iter().enumerate() {
+        let at = Instant::from_millis(*at);
+        writer.frame(at, bytes, *verified, &mut card).expect("room");
+        if index % 10 == 0 {
+            let text = format!("note {index}");
+            writer.record(at, &Record::Note(Note { severity: 5, text: &text }), &mut card).expect("room");
+        }
+    }
+    writer.finish(&mut card);
+    let (found, notes) = read(&card.0);
+    assert_eq!(found, frames);
+    assert_eq!(notes.len(), 300);
+    assert_eq!(notes[299], "note 2990");
+}
+
+#[test]
+fn recorded_flights_come_back() {
+    // The repository's own recordings; `HUMS_FLIGHTS` names further folders, separated by colons.
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/flights").to_owned();
+    let more = std::env::var("HUMS_FLIGHTS").unwrap_or_default();
+    let mut flights = 0;
+    for folder in std::iter::once(own.as_str()).chain(more.split(':').filter(|folder| !folder.is_empty())) {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.extension().is_some_and(|extension| extension == "tlog") {
+                let tlog = std::fs::read(&path).expect("readable");
+                let frames = frames_of(&tlog);
+                let log = round_trip(&frames);
+                println!("{}: {} -> {log}", path.display(), tlog.len());
+                assert!(log * 4 < tlog.len(), "{}", path.display());
+                flights += 1;
+            }
+        }
+    }
+    println!("{flights} recordings; the made-up streams above stand in where there are none");
+}
+
+fn frames_of(tlog: &[u8]) -> Vec<Frame> {
+    let (mut frames, mut rest, mut start, mut latest) = (Vec::new(), tlog, None, 0);
+    while let Some((time, tail)) = rest.split_first_chunk::<8>() {
+        let len = match *tail {
+            [0xfe, len, ..] => usize::from(len) + 8,
+            [0xfd, len, flags, ..] => usize::from(len) + 12 + if flags & 1 == 1 { 13 } else { 0 },
+            _ => break,
+        };
+        let Some((frame, tail)) = tail.split_at_checked(len) else { break };
+        let time = u64::from_be_bytes(*time);
+        let start = *start.get_or_insert(time);
+        latest = time.saturating_sub(start).max(latest);
+        frames.push((latest / 1_000, frame.to_vec(), true));
+        rest = tail;
+    }
+    frames
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn any_stream_comes_back(
+        seed in any::<u64>(),
+        messages in 1_usize..120,
+        odd_one_in in 0_usize..6,
+        signed in any::<bool>(),
+    ) {
+        round_trip(&stream(seed, 600, Link { messages, odd_one_in, signed }));
+    }
+
+    #[test]
+    fn damage_never_makes_up_a_frame(seed in any::<u64>(), bit in any::<prop::sample::Index>(), burst in 1_usize..64) {
+        let frames = stream(seed, 1_500, Link { messages: 40, odd_one_in: 9, signed: false });
+        let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
+        for (at, bytes, verified) in &frames {
+            writer.frame(Instant::from_millis(*at), bytes, *verified, &mut card).expect("room");
+        }
+        writer.finish(&mut card);
+        let mut log: Vec<u8> = card.0.iter().flat_map(|sector| *sector.bytes()).collect();
+        let first = bit.index(log.len() * 8 - burst);
+        for bit in first..first + burst {
+            log[bit / 8] ^= 1 << (bit % 8);
+        }
+        let mut reader = Box::new(LogReader::new());
+        let (mut gaps, mut at) = (0, 0);
+        let mut check = |reader: &mut LogReader| {
+            while let Some(item) = reader.next() {
+                match item {
+                    Item::Frame { bytes, .. } => {
+                        let found = frames[at..].iter().position(|frame| frame.1 == bytes);
+                        at += found.expect("a frame of the stream, in order") + 1;
+                    }
+                    Item::Gap(_) => gaps += 1,
+                    _ => {}
+                }
+            }
+        };
+        for block in log.as_chunks::<SECTOR_BYTES>().0 {
+            reader.feed(block);
+            check(&mut reader);
+        }
+        reader.end();
+        check(&mut reader);
+        prop_assert!(gaps >= 1);
+    }
+}

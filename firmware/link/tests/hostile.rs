@@ -1,0 +1,118 @@
+//! Nothing that a line can carry may panic, overflow, or make a vehicle that nobody knows look healthy.
+#![allow(clippy::panic, clippy::unwrap_used)]
+
+use hums_core::Monitor;
+use hums_core::health::Level;
+use hums_core::params::Params;
+use hums_core::status::{LinkReading, RecorderStatus};
+use hums_core::time::Instant;
+use hums_link::sequence::Sequences;
+use hums_link::{Framer, observe};
+use proptest::prelude::*;
+
+/// The messages that become observations.
+const USED: [u32; 39] = [
+    0, 1, 2, 24, 26, 27, 29, 30, 32, 33, 42, 46, 65, 74, 77, 105, 109, 116, 124, 125, 129, 137, 143, 147,
+    148, 193, 225, 226, 230, 241, 245, 253, 264, 290, 291, 339, 441, 11_030, 11_039,
+];
+
+/// A frame of version 2 with a right checksum, from the vehicle.
+fn frame(id: u32, sequence: u8, payload: &[u8]) -> Vec<u8> {
+    let [id0, id1, id2, _] = id.to_le_bytes();
+    let mut bytes = vec![0xfd, payload.len() as u8, 0, 0, sequence, 1, 1, id0, id1, id2];
+    bytes.extend_from_slice(payload);
+    let extra = hums_dialect::message(id).map_or(0, |message| message.crc_extra);
+    let crc = bytes[1..].iter().copied().chain([extra]).fold(0xffff_u16, |mut crc, byte| {
+        crc ^= u16::from(byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { (crc >> 1) ^ 0x8408 } else { crc >> 1 };
+        }
+        crc
+    });
+    bytes.extend_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+fn heartbeat(armed: bool, autopilot: u8) -> Vec<u8> {
+    vec![0, 0, 0, 0, 2, autopilot, if armed { 0x81 } else { 1 }, 4, 3]
+}
+
+/// Payloads that hurt: NaN, infinities, the ends of every integer, and anything at all.
+fn payload() -> impl Strategy<Value = Vec<u8>> {
+    let repeated =
+        |pattern: [u8; 4]| (0..=64_usize).prop_map(move |words| pattern.repeat(words)[..].to_vec());
+    prop_oneof![
+        prop::collection::vec(any::<u8>(), 0..=255),
+        repeated(f32::NAN.to_le_bytes()),
+        repeated(f32::INFINITY.to_le_bytes()),
+        repeated(f32::NEG_INFINITY.to_le_bytes()),
+        repeated(f32::MAX.to_le_bytes()),
+        repeated(f32::MIN_POSITIVE.to_le_bytes()),
+        repeated([0xff; 4]),
+        repeated([0; 4]),
+        repeated([0, 0x80, 0, 0x80]),
+        repeated([0xff, 0x7f, 0xff, 0x7f]),
+    ]
+    .prop_map(|mut payload| {
+        payload.truncate(255);
+        payload
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn no_order_gap_repeat_or_value_of_any_message_panics_or_spoils_the_figures(
+        messages in prop::collection::vec((0..USED.len(), payload(), 0..5_000_u64, any::<u8>()), 1..80),
+        armed in any::<bool>(),
+        autopilot in prop::sample::select(vec![3_u8, 12, 0]),
+    ) {
+        let mut framer = Framer::new();
+        let mut sequences = Sequences::new();
+        let mut monitor = Monitor::new(Params::defaults());
+        let mut now_ms = 0;
+        let first = frame(0, 0, &heartbeat(armed, autopilot));
+        for bytes in std::iter::once((first, 0)).chain(
+            messages.iter().map(|(at, payload, gap_ms, sequence)| (frame(USED[*at], *sequence, payload), *gap_ms)),
+        ) {
+            now_ms += bytes.1;
+            let now = Instant::from_millis(now_ms);
+            framer.push(&bytes.0, &mut |frame| {
+                sequences.frame(now, &frame);
+                if let Some((source, observation)) = observe(&frame) {
+                    monitor.observe(now, source, &observation);
+                }
+            });
+            let link = sequences.reading(now, monitor.vehicle().source);
+            monitor.tick(now, &link, &RecorderStatus::default(), &mut |finding| {
+                assert!(finding.level != finding.previous, "{finding:?}");
+            });
+            monitor.usage().for_each(|counter, value| {
+                assert!(value.is_finite() && value >= 0.0, "counter {counter} is {value}");
+            });
+        }
+    }
+
+    #[test]
+    fn a_vehicle_of_which_only_the_heartbeat_is_known_is_never_healthy(
+        beats in 1..50_u8,
+        unknown in prop::sample::select(vec![1_u32, 147, 24, 193, 230, 241, 30, 290, 291]),
+    ) {
+        let mut monitor = Monitor::new(Params::defaults());
+        let mut framer = Framer::new();
+        for beat in 0..beats {
+            let now = Instant::from_millis(u64::from(beat) * 500);
+            let mut bytes = frame(0, beat, &heartbeat(beat % 2 == 0, 3));
+            // Every integer at the value that says unknown, every float not a number.
+            bytes.extend(frame(unknown, beat, &[0xff; 100]));
+            framer.push(&bytes, &mut |frame| {
+                if let Some((source, observation)) = observe(&frame) {
+                    monitor.observe(now, source, &observation);
+                }
+            });
+            monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
+            assert_ne!(monitor.health().overall(), Level::Ok);
+        }
+    }
+}
