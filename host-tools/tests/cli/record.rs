@@ -87,6 +87,17 @@ fn a_card_that_is_away_costs_a_counted_loss_and_comes_back() {
 }
 
 #[test]
+fn a_card_that_never_comes_back_holds_what_the_counters_say() {
+    let dir = tempfile::tempdir().expect("directory");
+    let json = json(&run(dir.path(), "sim --input PX4 --sd card.img --json --card-out 60..", 3));
+    run(dir.path(), "decode card.img -o back.tlog --format tlog", 0);
+    let back = frames(&fs::read(dir.path().join("back.tlog")).expect("decoded"));
+    assert_eq!(json["frames_logged"].as_u64(), Some(back.len() as u64));
+    assert_eq!(json["frames_lost"].as_u64(), Some(16_645 - back.len() as u64));
+    assert!(json["findings"].to_string().contains("recording"), "a stopped recorder is told: {json}");
+}
+
+#[test]
 fn a_reboot_is_a_new_session_on_the_same_card() {
     let dir = tempfile::tempdir().expect("directory");
     let output = run(dir.path(), "sim --input PX4 --sd card.img --json --reboot-at 100 --reboot-at 200", 3);

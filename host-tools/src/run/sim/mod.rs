@@ -115,7 +115,7 @@ struct World<'a> {
     boots: u32,
     entropy: u32,
     power_on_us: u64,
-    /// The writer's counts tell what is on the card: every power-on ended in order.
+    /// The writer's counts tell what is on the card: every power-on ended in order and with an empty queue.
     frames_on_card: bool,
     /// Old segments were overwritten, so that the card no longer holds all that was logged.
     overwritten: bool,
@@ -158,7 +158,8 @@ impl World<'_> {
         self.add(&stats, lost);
         let cut = self.card.is_dead();
         self.report.power_cut |= cut;
-        self.frames_on_card &= ended && !cut;
+        // A sector in the queue may be on the card in part: only the card tells how much of it.
+        self.frames_on_card &= ended && !cut && lost == 0;
         if ended || cut {
             return Ok(false);
         }
@@ -190,7 +191,7 @@ impl World<'_> {
         // What the monitor said at the time, also where the card did not take it.
         report.findings = findings;
         if !self.frames_on_card && !self.overwritten {
-            // Power went while frames were in memory: only the card tells which made it.
+            // Frames were left in memory: only the card tells which made it.
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;
         }
