@@ -186,6 +186,10 @@ impl Cdf {
     pub(crate) fn adapt(&mut self, symbol: usize) {
         let uses = (self.0[0] & 0xffff).min(USES_MAX);
         let speed = u32::from(SPEEDS[uses as usize]);
+        if symbol == 0 && uses == USES_MAX && (0x7fff - (self.0[0] >> 16)) >> speed == 0 {
+            // As sure of it as it gets: no step would move a place.
+            return;
+        }
         let mask = (0x7fff >> speed) * 0x0001_0001;
         for (word, target) in self.0.iter_mut().zip(&TARGETS[symbol & 15]) {
             // The distance that is left, in both halves; a step takes its part of it.

@@ -197,13 +197,16 @@ impl Model {
     /// Which slot a frame belongs to; `None` where there is no room for it in the model.
     fn route(&mut self, frame: &Frame) -> Option<(Next, Key)> {
         let sender = self.slots.sender(frame.system, frame.component)?;
+        if let Some(slot) = self.slots.find_guessed(frame, sender) {
+            return Some((Next::Slot(slot), NO_KEY));
+        }
         let mut key = Key { id: frame.id, v2: frame.v2, sender, instance: [0; INSTANCE_BYTES] };
         let layout = self.layouts.find(key.id).and_then(|place| self.layouts.at(place));
         if let Some((offset, size)) = layout.and_then(payload::instance_of) {
             key.instance[..size].copy_from_slice(frame.payload.get(offset..offset + size)?);
         }
         if let Some(slot) = self.slots.find(&key) {
-            return Some((Next::Slot(slot), key));
+            return Some((Next::Slot(slot), NO_KEY));
         }
         self.slots.has_room().then_some((Next::NewSlot, key))
     }
@@ -302,7 +305,7 @@ impl Model {
         if plan.header == REPEATED {
             self.repeat(index, frame);
         } else {
-            self.payload(coder, index, frame, elapsed_ms)?;
+            self.payload(coder, index, &slot, frame, elapsed_ms)?;
         }
         if !C::WRITES {
             if plan.length.is_none() {
@@ -405,14 +408,15 @@ impl Model {
         let mut key = Key { id, v2, sender, instance: key.instance };
         let place = self.layouts.find(key.id);
         let layout = place.and_then(|place| self.layouts.at(place));
-        let instance = layout.and_then(payload::instance_of).map_or(0, |(_, size)| size);
+        let (instance_at, instance) = layout.and_then(payload::instance_of).unwrap_or((0, 0));
         for place in key.instance.get_mut(..instance)? {
             *place = coder.bits16(u32::from(*place), 8) as u8;
         }
         if !C::WRITES {
             key.instance[instance..].fill(0);
         }
-        let slot = self.describe(key, place);
+        let mut slot = self.describe(key, place);
+        (slot.instance_at, slot.instance_size) = (instance_at as u8, instance as u8);
         self.slots.add(slot)
     }
 

@@ -156,16 +156,15 @@ impl Model {
     pub(crate) fn payload<C: Coder>(
         &mut self,
         coder: &mut C,
-        slot: u8,
+        index: u8,
+        slot: &Slot,
         frame: &mut Frame,
         elapsed_ms: u32,
     ) -> Option<()> {
-        let slot_index = usize::from(slot);
-        let slot = *self.slots.list.get(slot_index)?;
         let mut end = 0;
         if slot.layout.is_some() {
-            let calm = self.calm(coder, slot_index, &slot, frame)?;
-            end = self.fields(coder, &slot, frame, elapsed_ms, calm)?;
+            let calm = self.calm(coder, usize::from(index), slot, frame)?;
+            end = self.fields(coder, slot, frame, elapsed_ms, calm)?;
         }
         if let Length::Fixed(len) = slot.length {
             let mut before = 0;

@@ -1,6 +1,7 @@
 //! Slots: each stream of one message from one sender (and one instance, where the message tells several apart). A
 //! slot remembers what its last frame looked like, and which slot came after which.
 
+use super::frame::Frame;
 use super::links;
 use crate::coder::{Cdf, Cell, Coder};
 use crate::layouts::{Layout, Place};
@@ -53,6 +54,9 @@ pub(crate) struct Slot {
     /// How the header of its last frame was coded.
     pub(crate) header: u8,
     pub(crate) links: u8,
+    /// Where the instance field is, and its size; 0 where there is none.
+    pub(crate) instance_at: u8,
+    pub(crate) instance_size: u8,
     /// Whether the quiet elements stayed as they are.
     pub(crate) calm: Cell,
     /// Frames so far, up to 255.
@@ -79,6 +83,8 @@ impl Slot {
         described: 0,
         header: 0,
         links: 0,
+        instance_at: 0,
+        instance_size: 0,
         calm: Cell::EVEN,
         frames: 0,
         next: [NONE; 2],
@@ -157,6 +163,8 @@ pub(crate) struct Slots {
     order_2: [Guess; ORDER_2],
     /// The last three slots, the latest first.
     past: [u8; 3],
+    /// What they let expect: the two likeliest slots, and how sure the first one is.
+    guesses: (u8, u8, u8),
     kind: [Cdf; 16],
     high: Cdf,
     low: [Cdf; SLOTS / 16],
@@ -173,6 +181,7 @@ impl Slots {
             order_3: [NO_GUESS; ORDER_3],
             order_2: [NO_GUESS; ORDER_2],
             past: [NONE; 3],
+            guesses: (NONE, NONE, 0),
             kind: [KIND; 16],
             high: Cdf::FLAT,
             low: [Cdf::FLAT; SLOTS / 16],
@@ -185,6 +194,7 @@ impl Slots {
         self.order_3 = [NO_GUESS; ORDER_3];
         self.order_2 = [NO_GUESS; ORDER_2];
         self.past = [NONE; 3];
+        self.guesses = (NONE, NONE, 0);
         self.kind = [KIND; 16];
         self.high = Cdf::FLAT;
         self.low = [Cdf::FLAT; SLOTS / 16];
@@ -209,15 +219,25 @@ impl Slots {
         usize::from(self.used) < SLOTS
     }
 
-    /// The slot of this key, guessed ones first.
+    /// The slot of this frame, if it is one of those guessed: spares most frames the search.
+    pub(crate) fn find_guessed(&self, frame: &Frame, sender: u8) -> Option<u8> {
+        let (first, second, _) = self.guesses;
+        [first, second].into_iter().find(|&guess| {
+            self.list.get(..usize::from(self.used)).and_then(|list| list.get(usize::from(guess))).is_some_and(
+                |slot| {
+                    let (at, size) = (usize::from(slot.instance_at), usize::from(slot.instance_size));
+                    slot.key.id == frame.id
+                        && slot.key.v2 == frame.v2
+                        && slot.key.sender == sender
+                        && (size == 0 || slot.key.instance.get(..size) == frame.payload.get(at..at + size))
+                },
+            )
+        })
+    }
+
+    /// The slot of this key.
     pub(crate) fn find(&self, key: &Key) -> Option<u8> {
-        let (first, second, _) = self.guesses();
         let known = self.list.get(..usize::from(self.used))?;
-        for guess in [first, second] {
-            if known.get(usize::from(guess)).is_some_and(|slot| slot.key == *key) {
-                return Some(guess);
-            }
-        }
         known.iter().position(|slot| slot.key == *key).map(|index| index as u8)
     }
 
@@ -236,16 +256,16 @@ impl Slots {
     }
 
     /// The two slots that are likeliest to come, and how sure the first one is.
-    fn guesses(&self) -> (u8, u8, usize) {
+    fn guess(&self) -> (u8, u8, u8) {
         let (three, two) = self.places();
         let (three, two) = (self.order_3[three], self.order_2[two]);
         let one = self.list.get(usize::from(self.past[0])).map_or([NONE; 2], |slot| slot.next);
         let (first, sure) = if three.slot != NONE {
-            (three.slot, 4 + usize::from(three.sure))
+            (three.slot, 4 + three.sure)
         } else if two.slot != NONE {
-            (two.slot, 8 + usize::from(two.sure))
+            (two.slot, 8 + two.sure)
         } else {
-            (one[0], usize::from(one[0] != NONE))
+            (one[0], u8::from(one[0] != NONE))
         };
         let second = [two.slot, one[0], one[1]].into_iter().find(|&slot| slot != first && slot != NONE);
         // All three agree: an own context.
@@ -255,7 +275,7 @@ impl Slots {
 
     /// Codes what comes next.
     pub(crate) fn next<C: Coder>(&mut self, coder: &mut C, next: Next) -> Option<Next> {
-        let (first, second, context) = self.guesses();
+        let (first, second, context) = self.guesses;
         let symbol = match next {
             Next::Slot(slot) if slot == first => FIRST_GUESS,
             Next::Slot(slot) if slot == second => SECOND_GUESS,
@@ -264,7 +284,7 @@ impl Slots {
             Next::Plain => PLAIN,
             Next::Record => RECORD,
         };
-        let symbol = coder.symbol(&mut self.kind[context.min(15)], symbol);
+        let symbol = coder.symbol(&mut self.kind[usize::from(context & 15)], symbol);
         let slot = match symbol {
             FIRST_GUESS => first,
             SECOND_GUESS => second,
@@ -298,6 +318,7 @@ impl Slots {
             last.next = [slot, last.next[0]];
         }
         self.past = [slot, self.past[0], self.past[1]];
+        self.guesses = self.guess();
     }
 }
 
