@@ -46,7 +46,7 @@ fn stream() -> Vec<(u64, Vec<u8>, bool)> {
         let hud: Vec<u8> = [12.25_f32, 12.5, (index / 7) as f32 * 0.01, noise]
             .into_iter()
             .flat_map(f32::to_le_bytes)
-            .chain([(index % 360) as u8, (index % 360 >> 8) as u8, 55, 0])
+            .chain([(index % 360) as u8, ((index % 360) >> 8) as u8, 55, 0])
             .collect();
         let mut named = time_ms.to_le_bytes().to_vec();
         named.extend_from_slice(&(index as f32).to_le_bytes());
