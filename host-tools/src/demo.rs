@@ -45,7 +45,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     line("")?;
     line("3. what it says of the flight")?;
     for log in &logs::find(std::slice::from_ref(&card))?.logs {
-        line(info::text(&Overview::of(log)?).trim_end())?;
+        line(info::text::text(&Overview::of(log)?).trim_end())?;
     }
     line("")?;
     line("4. where everything lies")?;

@@ -4,7 +4,7 @@ use anyhow::Result;
 use serde::Serialize;
 
 use crate::cli;
-use crate::info::{ImageJson, images_json};
+use crate::info::json::{ImageJson, images_json};
 use crate::logs::{self, find::Image};
 use crate::outcome::Outcome;
 use crate::output;

@@ -26,11 +26,12 @@ fn round_trip(path: &Path, manifest: &Manifest) {
     assert_eq!(recording.number("frames_lost"), 0);
     assert_eq!(recording.number("frames_logged"), output.len() as u64, "logged, and found in the log");
     assert_eq!(recording.number("frames_in"), output.len() as u64);
-    assert_eq!(recording.number("bytes_in"), bytes.len() as u64);
-    let framed: usize = output.iter().map(|frame| frame.bytes.len()).sum();
+    // What of a damaged tlog belongs to no record arrives as well, as bytes that are no frame.
+    assert!(recording.number("bytes_in") >= bytes.len() as u64, "every byte arrives");
+    let framed: u64 = output.iter().map(|frame| frame.bytes.len() as u64).sum();
     assert_eq!(
-        recording.number("bytes_not_frames"),
-        (bytes.len() - framed) as u64,
+        recording.number("bytes_in"),
+        framed + recording.number("bytes_not_frames"),
         "each byte is accounted for"
     );
     assert!(recording.number("queue_bytes_max") <= recording.number("queue_bytes_capacity"));

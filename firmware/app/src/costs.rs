@@ -16,8 +16,14 @@ pub(crate) enum Stage {
     Idle,
     /// Bytes to frames.
     Framer,
-    /// Frames to observations, health, usage and encoded sectors.
+    /// Frames out of their queue.
     Monitor,
+    /// Frames to sectors.
+    Encode,
+    /// Frames to observations, and those to what the monitor knows.
+    Observe,
+    /// Frames on to the ground station.
+    Summary,
     /// What happens by the clock: checks for silence, the summary.
     Tick,
     /// Sectors to the card.
@@ -25,7 +31,7 @@ pub(crate) enum Stage {
 }
 
 /// Number of stages.
-pub(crate) const STAGES: usize = 5;
+pub(crate) const STAGES: usize = 8;
 
 impl Stage {
     /// All of them, in the order of [`totals`], with their names.
@@ -33,6 +39,9 @@ impl Stage {
         (Self::Idle, "idle"),
         (Self::Framer, "framer"),
         (Self::Monitor, "monitor"),
+        (Self::Encode, "encode"),
+        (Self::Observe, "observe"),
+        (Self::Summary, "summary"),
         (Self::Tick, "tick"),
         (Self::Storage, "storage"),
     ];
@@ -53,6 +62,11 @@ pub(crate) fn measure<R>(stage: Stage, work: impl FnOnce() -> R) -> R {
     let result = work();
     switch_to(interrupted);
     result
+}
+
+/// Within `measure`: what follows is on the account of `stage`.
+pub(crate) fn enter(stage: Stage) {
+    switch_to(stage);
 }
 
 /// Cycles of each stage since power-on, in the order of [`Stage::NAMES`].

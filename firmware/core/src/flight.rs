@@ -21,6 +21,32 @@ const LANDED_STATE_AGE: Span = Span::from_secs(5);
 /// Positions and speeds older than this decide nothing.
 const MOTION_AGE: Span = Span::from_secs(3);
 
+/// What the vehicle is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// On the ground.
+    Ground,
+    /// The first metres up.
+    TakeOff,
+    /// Standing in the air.
+    Hover,
+    /// Going up.
+    Climb,
+    /// Going somewhere.
+    Cruise,
+    /// Going down.
+    Descent,
+    /// The last metres down.
+    Landing,
+}
+
+/// Vertical speed from which it is a climb or a descent; half of it near the ground.
+const VERTICAL_MPS: f32 = 0.7;
+/// Speed over ground from which it is a cruise.
+const CRUISE_MPS: f32 = 1.5;
+/// Below this height above the place of arming it takes off or lands.
+const NEAR_GROUND_M: f32 = 3.0;
+
 /// A change between ground and air.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlightEvent {
@@ -92,6 +118,30 @@ impl Flight {
         Some(if flies { FlightEvent::TakeOff } else { FlightEvent::Landing })
     }
 
+    /// What the vehicle is doing now.
+    pub fn phase(&self, now: Instant, vehicle: &Vehicle) -> Phase {
+        if !self.airborne() {
+            return Phase::Ground;
+        }
+        let climb_mps = climb_mps(now, vehicle).unwrap_or(0.0);
+        let height_m = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
+        let height_m = height_m.map(|height_m| height_m - self.armed_height_m.unwrap_or(0.0));
+        let near_ground = height_m.is_some_and(|height_m| height_m < NEAR_GROUND_M);
+        if near_ground && climb_mps > VERTICAL_MPS / 2.0 {
+            Phase::TakeOff
+        } else if near_ground && climb_mps < -VERTICAL_MPS / 2.0 {
+            Phase::Landing
+        } else if climb_mps > VERTICAL_MPS {
+            Phase::Climb
+        } else if climb_mps < -VERTICAL_MPS {
+            Phase::Descent
+        } else if ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > CRUISE_MPS) {
+            Phase::Cruise
+        } else {
+            Phase::Hover
+        }
+    }
+
     fn autopilot_says(now: Instant, vehicle: &Vehicle) -> Option<bool> {
         match vehicle.landed.within(now, LANDED_STATE_AGE)? {
             LandedState::OnGround => Some(false),
@@ -116,6 +166,14 @@ impl Flight {
         height_m.is_some_and(|height_m| height_m > TAKEOFF_HEIGHT_M)
             || (plane && speed_mps > PLANE_FLYING_MPS)
     }
+}
+
+/// Speed upwards from the best source that is fresh, in m/s.
+pub fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+    let global = vehicle.global.within(now, MOTION_AGE).map(|global| -global.velocity[2].0);
+    let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.velocity[2].0);
+    let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.climb).map(|climb| climb.0);
+    global.or_else(local).or_else(hud).filter(|climb| climb.abs() <= SPEED_MAX_MPS)
 }
 
 /// Speed over ground from the best source that is fresh, in m/s.

@@ -9,6 +9,7 @@ pub mod latest;
 pub mod monitor;
 pub mod observation;
 pub mod params;
+pub mod rainflow;
 pub mod status;
 pub mod time;
 pub mod trend;

@@ -59,7 +59,7 @@ impl Monitor {
     ) {
         let event = self.flight.step(now, &self.vehicle);
         self.derived.step(now, &self.vehicle, event, recorder.frames_lost);
-        self.usage.step(now, &self.vehicle, &self.flight, event);
+        self.usage.step(now, &self.vehicle, &self.flight, event, &self.params);
         let inputs = Inputs {
             now,
             vehicle: &self.vehicle,

@@ -2,8 +2,10 @@
 //! unit.
 
 use crate::derived::Derived;
-use crate::flight::{Flight, FlightEvent, ground_speed_mps};
+use crate::flight::{Flight, FlightEvent, Phase, climb_mps, ground_speed_mps};
 use crate::observation::{MOTORS_MAX, Observation};
+use crate::params::{Param, Params};
+use crate::rainflow::Rainflow;
 use crate::time::{Instant, Span};
 use crate::units::{Amperes, Volts};
 use crate::vehicle::Vehicle;
@@ -62,6 +64,40 @@ counters! {
     VibrationMax = 13 "vibration_max_m_s2";
     /// Reboots of the autopilot.
     AutopilotReboots = 14 "autopilot_reboots";
+    /// Landings faster than the limit of a hard one.
+    HardLandings = 15 "hard_landings";
+    /// The fastest touchdown, m/s downwards.
+    TouchdownMax = 16 "touchdown_max_m_s";
+    /// Full discharges of all batteries together that the charge taken makes.
+    BatteryCycles = 17 "battery_cycles";
+    /// Seconds on the ground with an autopilot that is heard.
+    Ground = 20 "ground_time_s";
+    /// Seconds in the first metres up.
+    TakeOff = 21 "take_off_time_s";
+    /// Seconds standing in the air.
+    Hover = 22 "hover_time_s";
+    /// Seconds going up.
+    Climb = 23 "climb_time_s";
+    /// Seconds going somewhere.
+    Cruise = 24 "cruise_time_s";
+    /// Seconds going down.
+    Descent = 25 "descent_time_s";
+    /// Seconds in the last metres down.
+    Landing = 26 "landing_time_s";
+    /// Rainflow cycles of the load factor in the air, ranges from 0.25 g.
+    LoadCycles0 = 30 "load_cycles_from_0_25_g";
+    /// Ranges from 0.5 g.
+    LoadCycles1 = 31 "load_cycles_from_0_5_g";
+    /// Ranges from 1 g.
+    LoadCycles2 = 32 "load_cycles_from_1_g";
+    /// Ranges from 1.5 g.
+    LoadCycles3 = 33 "load_cycles_from_1_5_g";
+    /// Ranges from 2 g.
+    LoadCycles4 = 34 "load_cycles_from_2_g";
+    /// Ranges from 3 g.
+    LoadCycles5 = 35 "load_cycles_from_3_g";
+    /// Ranges from 4 g.
+    LoadCycles6 = 36 "load_cycles_from_4_g";
 }
 
 /// Counters one a motor: run time in seconds from this number on, motor by motor.
@@ -113,7 +149,7 @@ struct MotorUsage {
 }
 
 /// Usage since power-on.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Usage {
     last: Option<Instant>,
     armed_s: f64,
@@ -130,7 +166,28 @@ pub struct Usage {
     voltage_min_v: Option<f32>,
     vibration_max: f32,
     reboots: u32,
+    hard_landings: u32,
+    touchdown_max_mps: f32,
+    /// The fastest descent near the ground of this second and of the three before.
+    sinks_mps: [f32; 4],
+    sinks_second: u64,
+    capacity_ah: f32,
+    phases_s: [f64; 7],
+    load_cycles: Rainflow<7>,
     motors: [MotorUsage; MOTORS_MAX],
+}
+
+/// Lowest ranges of the load factor's cycles, g.
+const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// A load factor that turns back by less has not turned: that much is vibration and noise.
+const LOAD_TURN_G: f32 = 0.1;
+/// An autopilot that was not heard for so long is not known to be powered.
+const HEARD: Span = Span::from_secs(5);
+
+impl Default for Usage {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl Usage {
@@ -152,6 +209,13 @@ impl Usage {
             voltage_min_v: None,
             vibration_max: 0.0,
             reboots: 0,
+            hard_landings: 0,
+            touchdown_max_mps: 0.0,
+            sinks_mps: [0.0; 4],
+            sinks_second: 0,
+            capacity_ah: 0.0,
+            phases_s: [0.0; 7],
+            load_cycles: Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
             motors: [MotorUsage { seconds: 0.0, revolutions: 0.0 }; MOTORS_MAX],
         }
     }
@@ -173,6 +237,9 @@ impl Usage {
             Observation::Imu(_) | Observation::ImuAndAir(..) if flight.airborne() => {
                 let load_factor_g = derived.load_factor_g().unwrap_or(0.0);
                 self.load_factor_max_g = greater(self.load_factor_max_g, load_factor_g, ACCELERATION_MAX);
+                if load_factor_g <= ACCELERATION_MAX {
+                    self.load_cycles.take(load_factor_g);
+                }
             }
             Observation::GlobalPosition(global) if flight.airborne() => {
                 self.height_max_m = greater(self.height_max_m, global.relative_altitude.0, HEIGHT_MAX_M);
@@ -193,7 +260,14 @@ impl Usage {
     }
 
     /// One step, at least every 50 ms, after the flight's own.
-    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, event: Option<FlightEvent>) {
+    pub fn step(
+        &mut self,
+        now: Instant,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        event: Option<FlightEvent>,
+        params: &Params,
+    ) {
         match event {
             Some(FlightEvent::TakeOff) => {
                 self.flights += 1;
@@ -201,10 +275,12 @@ impl Usage {
                 let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
                 self.flight_s += f64::from(late.as_secs_f32());
             }
-            Some(FlightEvent::Landing) => self.landings += 1,
+            Some(FlightEvent::Landing) => self.land(params),
             None => {}
         }
         self.reboots = vehicle.reboots;
+        self.capacity_ah = params.get(Param::BatCapacity);
+        self.note_sink(now, vehicle, flight);
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
         self.last = Some(now);
         if step > STEP_MAX {
@@ -213,6 +289,9 @@ impl Usage {
         let step_s = f64::from(step.as_secs_f32());
         if vehicle.armed() {
             self.armed_s += step_s;
+        }
+        if vehicle.heartbeat.within(now, HEARD).is_some() {
+            self.phases_s[flight.phase(now, vehicle) as usize] += step_s;
         }
         if flight.airborne() {
             self.flight_s += step_s;
@@ -229,6 +308,28 @@ impl Usage {
         let drawn = drawn(now, vehicle);
         self.charge_ah += f64::from(drawn.current_a.unwrap_or(0.0)) * step_s / 3_600.0;
         self.energy_wh += f64::from(drawn.power_w) * step_s / 3_600.0;
+    }
+
+    /// The autopilot says that it has landed a second or two after it touched down.
+    fn land(&mut self, params: &Params) {
+        self.landings += 1;
+        let touchdown_mps = self.sinks_mps.into_iter().fold(0.0, f32::max);
+        self.touchdown_max_mps = self.touchdown_max_mps.max(touchdown_mps);
+        if touchdown_mps >= params.get(Param::HardLanding) {
+            self.hard_landings += 1;
+        }
+    }
+
+    fn note_sink(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
+        let second = now.as_millis() / 1_000;
+        if second != self.sinks_second {
+            self.sinks_second = second;
+            self.sinks_mps = [0.0, self.sinks_mps[0], self.sinks_mps[1], self.sinks_mps[2]];
+        }
+        if flight.phase(now, vehicle) == Phase::Landing {
+            let sink_mps = -climb_mps(now, vehicle).unwrap_or(0.0);
+            self.sinks_mps[0] = self.sinks_mps[0].max(sink_mps);
+        }
     }
 
     fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
@@ -276,6 +377,29 @@ impl Usage {
             UsageCounter::VoltageMin => f64::from(self.voltage_min_v?),
             UsageCounter::VibrationMax => f64::from(self.vibration_max),
             UsageCounter::AutopilotReboots => f64::from(self.reboots),
+            UsageCounter::HardLandings => f64::from(self.hard_landings),
+            UsageCounter::TouchdownMax => f64::from(self.touchdown_max_mps),
+            UsageCounter::BatteryCycles if self.capacity_ah > 0.0 => {
+                self.charge_ah / f64::from(self.capacity_ah)
+            }
+            // Without a capacity nobody knows.
+            UsageCounter::BatteryCycles => return None,
+            UsageCounter::Ground
+            | UsageCounter::TakeOff
+            | UsageCounter::Hover
+            | UsageCounter::Climb
+            | UsageCounter::Cruise
+            | UsageCounter::Descent
+            | UsageCounter::Landing => self.phases_s[counter as usize - UsageCounter::Ground as usize],
+            UsageCounter::LoadCycles0
+            | UsageCounter::LoadCycles1
+            | UsageCounter::LoadCycles2
+            | UsageCounter::LoadCycles3
+            | UsageCounter::LoadCycles4
+            | UsageCounter::LoadCycles5
+            | UsageCounter::LoadCycles6 => {
+                self.load_cycles.cycles(counter as usize - UsageCounter::LoadCycles0 as usize)
+            }
         })
     }
 }

@@ -176,6 +176,36 @@ fn usage_agrees_with_an_independent_computation_within_one_percent() {
 }
 
 #[test]
+fn the_parts_of_a_flight_add_up_to_it() {
+    for expected in EXPECTED {
+        let Some(recording) = flight(expected.name) else { continue };
+        let outcome = watch(&recording);
+        let value = |counter| outcome.monitor.usage().value(counter).unwrap();
+        let parts = [
+            UsageCounter::TakeOff,
+            UsageCounter::Hover,
+            UsageCounter::Climb,
+            UsageCounter::Cruise,
+            UsageCounter::Descent,
+            UsageCounter::Landing,
+        ];
+        let sum: f64 = parts.into_iter().map(value).sum();
+        // The half second before a take-off is seen counts as flight, and is of no part.
+        let unseen_s = 0.55 * expected.flights;
+        assert!((value(UsageCounter::Flight) - sum).abs() <= unseen_s + 1.0, "{}: {sum}", expected.name);
+    }
+}
+
+#[test]
+fn the_touchdown_of_the_simulated_quad_is_as_fast_as_the_simulator_says() {
+    // "SIM Hit ground at 0.501037 m/s".
+    let outcome = watch(&flight("ap_quad_faults.tlog").expect("in the repository"));
+    let touchdown = outcome.monitor.usage().value(UsageCounter::TouchdownMax).unwrap();
+    assert!((0.4..0.7).contains(&touchdown), "{touchdown}");
+    assert_eq!(outcome.monitor.usage().value(UsageCounter::HardLandings), Some(0.0));
+}
+
+#[test]
 fn healthy_flights_have_no_critical_finding() {
     for name in [
         "ap_quad_guided.tlog",

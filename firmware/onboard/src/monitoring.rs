@@ -47,6 +47,17 @@ struct Sums {
     frames_lost: u64,
 }
 
+/// What happens to a frame, one after the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Into the record.
+    Encode,
+    /// Into what the monitor knows.
+    Observe,
+    /// On to the ground station, where it is its turn.
+    Summary,
+}
+
 /// The pipeline between the frame queue and the queues of sectors and of GS frames.
 pub struct Monitoring<'a> {
     /// Lent, as the writer is: either is too large to be moved over the firmware's stack.
@@ -127,16 +138,37 @@ impl<'a> Monitoring<'a> {
 
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
     pub fn drain(&mut self, frames: &mut FramesOut, sectors: &mut SectorsIn, gs: &mut GsIn) -> bool {
+        self.drain_in_steps(frames, sectors, gs, &mut |_| {})
+    }
+
+    /// As [`Self::drain`], and says which step begins, for whoever measures what each costs.
+    pub fn drain_in_steps(
+        &mut self,
+        frames: &mut FramesOut,
+        sectors: &mut SectorsIn,
+        gs: &mut GsIn,
+        begin: &mut impl FnMut(Step),
+    ) -> bool {
         frames.take(|at_micros, verified, bytes| {
-            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs);
+            self.frame(Instant::from_micros(at_micros), verified, bytes, sectors, gs, begin);
         })
     }
 
-    fn frame(&mut self, at: Instant, verified: bool, bytes: &[u8], sectors: &mut SectorsIn, gs: &mut GsIn) {
+    fn frame(
+        &mut self,
+        at: Instant,
+        verified: bool,
+        bytes: &[u8],
+        sectors: &mut SectorsIn,
+        gs: &mut GsIn,
+        begin: &mut impl FnMut(Step),
+    ) {
+        begin(Step::Encode);
         if self.writer.frame(at, bytes, verified, sectors).is_err() {
             self.refused += 1;
             self.losses.count(at, Lost::QueueFull, 1);
         }
+        begin(Step::Observe);
         // What is not ours by its checksum is recorded but not believed.
         let check = if verified { Check::Verified } else { Check::Unverified };
         let Some(frame) = Frame::again(bytes, check).filter(|_| verified) else { return };
@@ -144,6 +176,7 @@ impl<'a> Monitoring<'a> {
         if let Some((source, observation)) = hums_link::observe(&frame) {
             self.monitor.observe(at, source, &observation);
         }
+        begin(Step::Summary);
         self.summary.frame(at, &frame, &mut |bytes| gs.put(bytes));
     }
 

@@ -1,5 +1,7 @@
 //! `hums emulate`: the firmware image of the emulated board, in QEMU.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -88,6 +90,9 @@ pub(crate) fn firmware(named: Option<&Path>) -> Result<PathBuf> {
                 path.display()
             );
         }
+        if !is_arm_elf(&path) {
+            bail!("{}: is no firmware image (an ELF file for ARM)", path.display());
+        }
         return Ok(std::path::absolute(path)?);
     }
     let Some(tree) = source_tree() else {
@@ -100,6 +105,13 @@ pub(crate) fn firmware(named: Option<&Path>) -> Result<PathBuf> {
         return Ok(image);
     }
     build(&tree)
+}
+
+fn is_arm_elf(path: &Path) -> bool {
+    let mut head = [0; 20];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut head));
+    // Magic, and the machine's number at offset 18: 40 is ARM.
+    read.is_ok() && head.starts_with(b"\x7fELF") && head.ends_with(&[40, 0])
 }
 
 fn build(tree: &Path) -> Result<PathBuf> {

@@ -5,6 +5,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::fs::symlink;
 use std::os::unix::net::UnixStream;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -186,10 +187,10 @@ impl Qemu {
             None => ": it was killed".to_owned(),
         };
         let complaints = std::mem::replace(&mut self.complaints, std::thread::spawn(String::new));
-        if let Ok(complaints) = complaints.join()
-            && !complaints.trim().is_empty()
-        {
-            let _ = write!(why, "\n{}", complaints.trim());
+        let complaints = complaints.join().unwrap_or_default();
+        // What it says in passing is no complaint, and a register dump is for the few who can read it.
+        for line in complaints.lines().filter(|line| line.starts_with("qemu") && !line.contains(": info: ")) {
+            let _ = write!(why, "\n{line}");
         }
         Ok(why)
     }
@@ -219,7 +220,9 @@ fn command(firmware: &Path, dir: &Path) -> Command {
         .args(["-chardev", &socket("ap", "wait=off,mux=on"), "-serial", "chardev:ap", "-echr", "256"])
         .args(["-chardev", &socket("gs", "wait=on"), "-serial", "chardev:gs"])
         .args(["-semihosting-config", &arguments])
-        .current_dir(dir);
+        .current_dir(dir)
+        // Ctrl-C is for this program, which then lets the firmware close its log.
+        .process_group(0);
     command
 }
 

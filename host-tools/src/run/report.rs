@@ -156,7 +156,7 @@ impl Report {
             let _ = writeln!(text, "finding  {time_s:>9.3} s  {level:<8}  {subsystem} {check}[{instance}]");
         }
         for (name, value) in &self.usage {
-            let _ = writeln!(text, "usage    {name} {value}");
+            let _ = writeln!(text, "usage    {name:<24} {:>12.3}", value.as_f64().unwrap_or_default());
         }
         let _ = write!(text, "files    {}", self.log_files.join(", "));
         text

@@ -4,7 +4,7 @@
 use embassy_futures::select::{Either3, select3};
 use embassy_time::Ticker;
 use hums_onboard::Task;
-use hums_onboard::monitoring::{Monitoring, TICK};
+use hums_onboard::monitoring::{Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn};
 use hums_recorder::CardState;
 
@@ -78,7 +78,14 @@ pub(crate) async fn run(
 
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
     let Ends { frames, sectors, gs } = ends;
-    while measure(Stage::Monitor, || body.drain(frames, sectors, gs)) {}
+    let mut begin = |step| {
+        costs::enter(match step {
+            Step::Encode => Stage::Encode,
+            Step::Observe => Stage::Observe,
+            Step::Summary => Stage::Summary,
+        });
+    };
+    while measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin)) {}
 }
 
 fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {

@@ -1,0 +1,282 @@
+//! What `hums info --json` prints. Names carry their units; times are seconds since the monitor's power-on or UTC.
+
+use hums_core::time::Instant;
+use serde::Serialize;
+
+use crate::logs::{self, Found};
+use crate::summary::{Contents, Overview};
+use crate::utc::iso8601;
+
+/// What `info --json` prints.
+#[derive(Debug, Serialize)]
+pub struct InfoJson {
+    /// The card images.
+    pub images: Vec<ImageJson>,
+    /// Their logs, and those that are files of their own.
+    pub logs: Vec<LogJson>,
+}
+
+/// A card image's file system.
+#[derive(Debug, Serialize)]
+pub struct ImageJson {
+    path: String,
+    damage: Vec<String>,
+    lost_clusters: u64,
+    found_by_scan: bool,
+}
+
+/// The images of a run as JSON.
+pub fn images_json(found: &Found) -> Vec<ImageJson> {
+    let json = |image: &logs::find::Image| ImageJson {
+        path: image.path.display().to_string(),
+        damage: image.damage.clone(),
+        lost_clusters: image.lost_clusters,
+        found_by_scan: image.scanned,
+    };
+    found.images.iter().map(json).collect()
+}
+
+/// One log.
+#[derive(Debug, Serialize)]
+pub struct LogJson {
+    name: String,
+    files: Vec<String>,
+    /// As its sectors name it, hexadecimal.
+    session: Option<String>,
+    closed: bool,
+    start_utc: Option<String>,
+    end_utc: Option<String>,
+    /// Seconds since the monitor's power-on.
+    start_s: Option<f64>,
+    end_s: Option<f64>,
+    duration_s: f64,
+    monitor: Option<MonitorJson>,
+    vehicle: Option<VehicleJson>,
+    frames: u64,
+    frame_bytes: u64,
+    records: u64,
+    messages: Vec<MessageJson>,
+    gaps_count: u64,
+    frames_missing: u64,
+    gaps: Vec<GapJson>,
+    losses: Vec<LossJson>,
+    findings_count: u64,
+    findings: Vec<FindingJson>,
+    usage: serde_json::Map<String, serde_json::Value>,
+    log_bytes: u64,
+    tlog_bytes: u64,
+    ratio: f64,
+    bytes_on_card: u64,
+    sectors: u64,
+    sectors_damaged: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct MonitorJson {
+    version: String,
+    git: String,
+    board: String,
+    reset: String,
+    boots: u32,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct VehicleJson {
+    pub(super) system: u8,
+    pub(super) component: u8,
+    pub(super) autopilot: String,
+    pub(super) r#type: String,
+    pub(super) firmware: Option<String>,
+    pub(super) uid: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct MessageJson {
+    id: u32,
+    name: String,
+    verified: bool,
+    frames: u64,
+    bytes: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct GapJson {
+    from_s: Option<f64>,
+    to_s: Option<f64>,
+    cause: &'static str,
+    sectors_lost: u32,
+    sectors_skipped: u32,
+    frames_missing: Option<u32>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct LossJson {
+    pub(super) what: &'static str,
+    pub(super) count: u64,
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct FindingJson {
+    subsystem: &'static str,
+    check: String,
+    instance: u8,
+    level: &'static str,
+    previous: &'static str,
+    time_s: f64,
+    time_utc: Option<String>,
+    /// `null` where the input stopped.
+    value: Option<f32>,
+    limit: Option<f32>,
+    unit: String,
+}
+
+pub(super) fn finite(value: f32) -> Option<f32> {
+    value.is_finite().then_some(value)
+}
+
+impl LogJson {
+    /// A log that was read through.
+    pub fn new(log: &Overview) -> Self {
+        let (summary, contents) = (&log.summary, &log.contents);
+        let utc = |at: Option<Instant>| at.and_then(|at| log.utc_us(at)).map(iso8601);
+        let seconds = |at: Instant| at.as_secs_f64();
+        Self {
+            name: log.name.clone(),
+            files: log.files.clone(),
+            session: summary.session.map(|session| format!("{session:08x}")),
+            closed: summary.closed,
+            start_utc: utc(summary.first),
+            end_utc: utc(summary.last),
+            start_s: summary.first.map(seconds),
+            end_s: summary.last.map(seconds),
+            duration_s: duration_s(log),
+            monitor: contents.boot.as_ref().map(|boot| MonitorJson {
+                version: boot.version.clone(),
+                git: boot.git.clone(),
+                board: boot.board.clone(),
+                reset: boot.reset.clone(),
+                boots: boot.boots,
+            }),
+            vehicle: vehicle(log),
+            frames: contents.frames(),
+            frame_bytes: contents.frame_bytes(),
+            records: contents.records,
+            messages: messages(contents),
+            gaps_count: summary.gaps,
+            frames_missing: summary.frames_missing,
+            gaps: gaps(contents),
+            losses: losses(contents),
+            findings_count: contents.findings_count,
+            findings: findings(log),
+            usage: contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),
+            log_bytes: log.log_bytes(),
+            tlog_bytes: contents.tlog_bytes(),
+            ratio: log.ratio(),
+            bytes_on_card: log.bytes_on_card,
+            sectors: summary.blocks.sectors,
+            sectors_damaged: summary.blocks.damaged,
+        }
+    }
+}
+
+fn messages(contents: &Contents) -> Vec<MessageJson> {
+    let json = |(&(id, verified), count): (&(u32, bool), &crate::summary::MessageCount)| MessageJson {
+        id,
+        name: Contents::message_name(id, true),
+        verified,
+        frames: count.frames,
+        bytes: count.bytes,
+    };
+    contents.messages.iter().map(json).collect()
+}
+
+fn gaps(contents: &Contents) -> Vec<GapJson> {
+    let json = |gap: &hums_blackbox::Gap| GapJson {
+        from_s: gap.from.map(Instant::as_secs_f64),
+        to_s: gap.to.map(Instant::as_secs_f64),
+        cause: gap.cause.name(),
+        sectors_lost: gap.sectors_lost,
+        sectors_skipped: gap.sectors_skipped,
+        frames_missing: gap.frames,
+    };
+    contents.gaps.iter().map(json).collect()
+}
+
+pub(super) fn losses(contents: &Contents) -> Vec<LossJson> {
+    let json = |loss: &hums_blackbox::record::Loss| LossJson {
+        what: loss.what.name(),
+        count: loss.count,
+        from_s: loss.from.as_secs_f64(),
+        to_s: loss.to.as_secs_f64(),
+    };
+    contents.losses.values().map(json).collect()
+}
+
+fn findings(log: &Overview) -> Vec<FindingJson> {
+    let json = |finding: &crate::summary::FindingLine| FindingJson {
+        subsystem: finding.subsystem,
+        check: finding.check.clone(),
+        instance: finding.instance,
+        level: finding.level,
+        previous: finding.previous,
+        time_s: finding.at.as_secs_f64(),
+        time_utc: log.utc_us(finding.at).map(iso8601),
+        value: finite(finding.value),
+        limit: finite(finding.limit),
+        unit: finding.unit.clone(),
+    };
+    log.contents.findings.iter().map(json).collect()
+}
+
+pub(super) fn duration_s(log: &Overview) -> f64 {
+    match (log.summary.first, log.summary.last) {
+        (Some(first), Some(last)) => last.since(first).as_micros() as f64 / 1e6,
+        _ => 0.0,
+    }
+}
+
+pub(super) fn vehicle(log: &Overview) -> Option<VehicleJson> {
+    let vehicle = log.contents.vehicle?;
+    let [major, minor, patch, _] = vehicle.firmware.to_be_bytes();
+    Some(VehicleJson {
+        system: vehicle.system,
+        component: vehicle.component,
+        autopilot: autopilot_name(vehicle.autopilot),
+        r#type: type_name(vehicle.vehicle_type),
+        firmware: (vehicle.firmware != 0).then(|| format!("{major}.{minor}.{patch}")),
+        uid: (vehicle.uid != 0).then(|| format!("{:016x}", vehicle.uid)),
+    })
+}
+
+/// The names of `MAV_AUTOPILOT` that are met in the field.
+fn autopilot_name(number: u8) -> String {
+    match number {
+        0 => "generic".into(),
+        3 => "ArduPilot".into(),
+        12 => "PX4".into(),
+        other => format!("MAV_AUTOPILOT {other}"),
+    }
+}
+
+/// The names of `MAV_TYPE` that are met in the field.
+fn type_name(number: u8) -> String {
+    let name = match number {
+        0 => "generic",
+        1 => "fixed wing",
+        2 => "quadrotor",
+        3 => "coaxial helicopter",
+        4 => "helicopter",
+        10 => "ground rover",
+        11 => "surface boat",
+        12 => "submarine",
+        13 => "hexarotor",
+        14 => "octorotor",
+        15 => "tricopter",
+        19..=25 => "VTOL",
+        29 => "dodecarotor",
+        _ => return format!("MAV_TYPE {number}"),
+    };
+    name.into()
+}

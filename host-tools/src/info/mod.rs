@@ -1,0 +1,45 @@
+//! `hums info`: what is in a log, for people and as JSON.
+
+pub mod json;
+pub mod text;
+
+use anyhow::Result;
+
+use crate::cli;
+use crate::logs;
+use crate::outcome::Outcome;
+use crate::output;
+use crate::summary::Overview;
+use json::{InfoJson, LogJson, images_json};
+use text::{image_text, text};
+
+/// Runs `hums info`.
+pub fn run(args: &cli::Info) -> Result<Outcome> {
+    let found = logs::find(&args.inputs)?;
+    for remark in &found.remarks {
+        eprintln!("hums: {remark}");
+    }
+    let mut logs = Vec::new();
+    let mut outcome = Outcome::lossy(found.images.iter().any(|image| !image.damage.is_empty()));
+    if !args.json {
+        for image in &found.images {
+            output::line(&image_text(image))?;
+        }
+    }
+    for log in &found.logs {
+        let overview = Overview::of(log)?;
+        outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
+        if args.json {
+            logs.push(LogJson::new(&overview));
+        } else {
+            output::line(text(&overview).trim_end())?;
+            output::line("")?;
+        }
+    }
+    if args.json {
+        output::json(&InfoJson { images: images_json(&found), logs })?;
+    } else if found.logs.is_empty() {
+        output::line("no log is on it")?;
+    }
+    Ok(outcome)
+}

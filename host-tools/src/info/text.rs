@@ -1,0 +1,185 @@
+//! What `hums info` prints for people.
+//!
+//! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
+
+use std::fmt::Write as _;
+
+use hums_core::time::Instant;
+
+use super::json::{duration_s, finite, losses, vehicle};
+use crate::logs;
+use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
+use crate::utc::iso8601;
+
+/// Findings and gaps that people are shown; the rest is counted, and is in `--json` and `hums decode`.
+const SHOWN_MAX: usize = 40;
+
+/// A card for people to read.
+pub fn image_text(image: &logs::find::Image) -> String {
+    let mut text = format!("Card {}", image.path.display());
+    for damage in &image.damage {
+        let _ = write!(text, "\n  damaged: {damage}");
+    }
+    if image.scanned {
+        text.push_str("\n  the logs were found by looking at every block");
+    }
+    if image.lost_clusters > 0 {
+        let _ = write!(text, "\n  {} clusters belong to no file (lost space, no data)", image.lost_clusters);
+    }
+    text
+}
+
+/// A log for people to read.
+pub fn text(log: &Overview) -> String {
+    let mut text = String::new();
+    heading(&mut text, log);
+    findings_text(&mut text, log);
+    gaps_text(&mut text, log);
+    usage_text(&mut text, log);
+    messages_text(&mut text, log);
+    text
+}
+
+fn heading(text: &mut String, log: &Overview) {
+    let (summary, contents) = (&log.summary, &log.contents);
+    let _ = writeln!(text, "Session {} ({}), {}", log.name, log.files.join(", "), log.ending());
+    match (summary.first, summary.last) {
+        (Some(first), Some(last)) => {
+            let utc = |at| {
+                log.utc_us(at).map_or_else(|| "UTC unknown".to_owned(), |utc| iso8601(utc / 1000 * 1000))
+            };
+            let _ = writeln!(text, "  from     {:>10.3} s  {}", first.as_secs_f64(), utc(first));
+            let _ = writeln!(text, "  to       {:>10.3} s  {}", last.as_secs_f64(), utc(last));
+        }
+        _ => text.push_str("  nothing in it can be read\n"),
+    }
+    if let Some(vehicle) = vehicle(log) {
+        let firmware = vehicle.firmware.map_or_else(String::new, |version| format!(" {version}"));
+        let uid = vehicle.uid.map_or_else(String::new, |uid| format!(", uid {uid}"));
+        let (autopilot, kind) = (vehicle.autopilot, vehicle.r#type);
+        let _ = writeln!(text, "  vehicle  system {}, {autopilot}{firmware}, {kind}{uid}", vehicle.system);
+    }
+    if let Some(boot) = &contents.boot {
+        let _ = writeln!(
+            text,
+            "  monitor  {} {} on {}, started by {}",
+            boot.version, boot.git, boot.board, boot.reset
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  frames   {} in {} bytes, {} records; as a tlog {} bytes: {:.2} times smaller",
+        contents.frames(),
+        log.log_bytes(),
+        contents.records,
+        contents.tlog_bytes(),
+        log.ratio()
+    );
+}
+
+fn findings_text(text: &mut String, log: &Overview) {
+    let contents = &log.contents;
+    if contents.findings_count == 0 {
+        text.push_str("  findings none\n");
+        return;
+    }
+    let _ = writeln!(text, "  findings {}", contents.findings_count);
+    for finding in contents.findings.iter().take(SHOWN_MAX) {
+        let FindingNumbers { value, limit } = finding_numbers(finding);
+        let _ = writeln!(
+            text,
+            "    {:>9.3} s  {:<8}  {} {}[{}]  was {}{value}{limit}",
+            finding.at.as_secs_f64(),
+            finding.level,
+            finding.subsystem,
+            finding.check,
+            finding.instance,
+            finding.previous
+        );
+    }
+    more(text, contents.findings_count, contents.findings.len());
+}
+
+struct FindingNumbers {
+    value: String,
+    limit: String,
+}
+
+fn finding_numbers(finding: &FindingLine) -> FindingNumbers {
+    let unit = &finding.unit;
+    let number = |before: &str, value: f32| match finite(value) {
+        Some(value) => format!(", {before}{value:.6} {unit}").trim_end().to_owned(),
+        None => String::new(),
+    };
+    FindingNumbers { value: number("", finding.value), limit: number("limit ", finding.limit) }
+}
+
+fn more(text: &mut String, count: u64, listed: usize) {
+    let shown = listed.min(SHOWN_MAX) as u64;
+    if count > shown {
+        let _ = writeln!(
+            text,
+            "    … and {} more (see --json, up to {LISTED_MAX}, or hums decode)",
+            count - shown
+        );
+    }
+}
+
+fn gaps_text(text: &mut String, log: &Overview) {
+    let (summary, contents) = (&log.summary, &log.contents);
+    if summary.gaps == 0 && summary.blocks.damaged == 0 {
+        text.push_str("  gaps     none\n");
+    } else {
+        let (missing, damaged) = (summary.frames_missing, summary.blocks.damaged);
+        let _ = writeln!(
+            text,
+            "  gaps     {}, {missing} frames missing, {damaged} damaged sectors",
+            summary.gaps
+        );
+    }
+    for gap in contents.gaps.iter().take(SHOWN_MAX) {
+        let time = |at: Option<Instant>, none: &str| {
+            at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
+        };
+        let frames =
+            gap.frames.map_or_else(|| "an unknown number of".to_owned(), |frames| frames.to_string());
+        let _ = writeln!(
+            text,
+            "    from {} to {}: {}, {} sectors lost, {} more of no use, {frames} frames missing",
+            time(gap.from, "the beginning"),
+            time(gap.to, "the end"),
+            gap.cause.name(),
+            gap.sectors_lost,
+            gap.sectors_skipped
+        );
+    }
+    more(text, summary.gaps, contents.gaps.len());
+    for loss in losses(contents) {
+        let _ = writeln!(
+            text,
+            "  lost     {} {} between {:.3} and {:.3} s",
+            loss.count, loss.what, loss.from_s, loss.to_s
+        );
+    }
+}
+
+fn usage_text(text: &mut String, log: &Overview) {
+    if !log.contents.usage.is_empty() {
+        text.push_str("  usage\n");
+    }
+    for (name, value) in &log.contents.usage {
+        let number = if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.3}") };
+        let _ = writeln!(text, "    {name:<28} {number:>14}");
+    }
+}
+
+fn messages_text(text: &mut String, log: &Overview) {
+    let contents = &log.contents;
+    let seconds = duration_s(log);
+    text.push_str("  messages                                   frames     per s      bytes\n");
+    for (&(id, verified), count) in &contents.messages {
+        let rate = if seconds > 0.0 { count.frames as f64 / seconds } else { 0.0 };
+        let name = Contents::message_name(id, verified);
+        let _ = writeln!(text, "    {name:<36} {:>10} {rate:>9.2} {:>10}", count.frames, count.bytes);
+    }
+}

@@ -1,0 +1,200 @@
+//! `hums sim`: the bodies of the firmware's tasks on this PC, in virtual time.
+//!
+//! A discrete-event simulation: time jumps from one event to the next. At equal times the more urgent task goes first,
+//! as on the board: reception and monitor, then the downlink, then storage. Only the card takes time (see
+//! [`crate::card::sim`]): while it is busy everything else goes on, and the sector queue fills.
+//!
+//! Power-on is the moment of the first input byte.
+
+mod pipeline;
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant as WallClock;
+
+use anyhow::{Context, Result, bail};
+use hums_blackbox::record::{Boot, Stats};
+use hums_core::params::{ParamError, Params};
+use pipeline::{Memory, Outside, Pipeline};
+
+use super::arrivals::Arrivals;
+use super::report::Report;
+use super::{check_standard_output, drive, open_sink, pace, prepare_card};
+use crate::card::{Faults, SimCard};
+use crate::cli;
+use crate::endpoint::Endpoint;
+use crate::logs;
+use crate::outcome::{Outcome, usage};
+
+/// Runs `hums sim`.
+pub fn run(args: &cli::Sim) -> Result<Outcome> {
+    let run = &args.run;
+    check_standard_output(run)?;
+    let (speed, live) = pace(run)?;
+    let params = read_params(run.params.as_deref())?;
+    let (mut arrivals, image) = Arrivals::open(run, args.tap.as_deref(), || {
+        prepare_card(&run.sd, run.faults.card_size, run.faults.seed)
+    })?;
+    let earlier = logs::on_card(&run.sd).len();
+    let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
+    let mut world = World {
+        card: &card,
+        gs: open_sink(run.gs.as_ref())?,
+        report: Report::default(),
+        reboots: run.faults.reboot_at.clone(),
+        boots: 0,
+        entropy: run.faults.seed as u32,
+        power_on_us: 0,
+        frames_on_card: true,
+        overwritten: false,
+    };
+    world.reboots.sort_unstable();
+    let start = WallClock::now();
+    while world
+        .power_on(&mut arrivals, &params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
+    {
+    }
+    if let Some(error) = card.take_image_error() {
+        bail!("{}: {error}", run.sd.display());
+    }
+    world.gs.flush().context("--gs: cannot be written")?;
+    if let Some(remark) = arrivals.remark() {
+        eprintln!("hums: {remark}");
+    }
+    let report = world.settle(&run.sd, earlier)?;
+    report.print(run.json, run.gs == Some(Endpoint::Standard))
+}
+
+fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
+    let faults = Faults {
+        cuts: flags.cut_after_writes.clone(),
+        stalls: flags.stall.clone(),
+        outs: flags.card_out.clone(),
+        write_error: flags.write_error.unwrap_or(0.0),
+        seed: flags.seed,
+    };
+    SimCard::new(image, faults)
+}
+
+/// Parameters from a file of `NAME VALUE` lines; commas and tabs separate as well, `#` begins a comment.
+fn read_params(path: Option<&Path>) -> Result<Params> {
+    let mut params = Params::defaults();
+    let Some(path) = path else { return Ok(params) };
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("--params {}: cannot be read", path.display()))?;
+    for (index, line) in text.lines().enumerate() {
+        let place = format!("--params {}, line {}", path.display(), index + 1);
+        let line = line.split('#').next().unwrap_or_default();
+        let mut words = line.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
+        let Some(name) = words.next() else { continue };
+        let value = words.next().and_then(|word| word.parse().ok());
+        let (Some(value), None) = (value, words.next()) else {
+            return Err(usage(format!("{place}: wants NAME VALUE, for instance CELL_WARN 3.6")));
+        };
+        match params.set(name, value) {
+            Ok(()) => {}
+            Err(ParamError::UnknownName) => {
+                return Err(usage(format!("{place}: there is no parameter {name}")));
+            }
+            Err(ParamError::OutOfRange { min, max }) => {
+                return Err(usage(format!("{place}: {name} takes {min} to {max}, not {value}")));
+            }
+        }
+    }
+    Ok(params)
+}
+
+/// What outlives a power-on: the card, the ground station, and what is told at the end.
+struct World<'a> {
+    card: &'a SimCard,
+    gs: Box<dyn Write + Send>,
+    report: Report,
+    /// When our own power goes for a moment, sorted.
+    reboots: Vec<u64>,
+    boots: u32,
+    entropy: u32,
+    power_on_us: u64,
+    /// The writer's counts tell what is on the card: every power-on ended in order and with an empty queue.
+    frames_on_card: bool,
+    /// Old segments were overwritten, so that the card no longer holds all that was logged.
+    overwritten: bool,
+}
+
+impl World<'_> {
+    /// One power-on, until the input ends or power goes; whether there is another one after it.
+    fn power_on(
+        &mut self,
+        arrivals: &mut Arrivals,
+        params: &Params,
+        drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
+    ) -> Result<bool> {
+        self.boots += 1;
+        let mut memory = Memory::new(params);
+        let identity = Boot {
+            version: env!("CARGO_PKG_VERSION"),
+            board: "sim",
+            reset_name: "power-on",
+            boots: self.boots,
+            ..Boot::default()
+        };
+        let outside = Outside {
+            card: self.card,
+            gs: &mut *self.gs,
+            findings: &mut self.report.findings,
+            power_on_us: self.power_on_us,
+            reboot_at_us: self.reboots.first().copied(),
+        };
+        let mut pipeline =
+            Pipeline::new(outside, &mut memory, identity, self.entropy.wrapping_add(self.boots));
+        pipeline.start()?;
+        let ended = drive(arrivals, &mut pipeline)?;
+        let mut lost = 0;
+        if ended {
+            lost = pipeline.finish()?;
+        }
+        let stats = pipeline.stats();
+        self.overwritten |= pipeline.has_overwritten();
+        self.add(&stats, lost);
+        let cut = self.card.is_dead();
+        self.report.power_cut |= cut;
+        // A sector in the queue may be on the card in part: only the card tells how much of it.
+        self.frames_on_card &= ended && !cut && lost == 0;
+        if ended || cut {
+            return Ok(false);
+        }
+        self.power_on_us = self.reboots.remove(0);
+        Ok(true)
+    }
+
+    fn add(&mut self, stats: &Stats, lost: u64) {
+        let report = &mut self.report;
+        report.frames_in += stats.frames_in;
+        report.frames_logged += stats.frames_logged.saturating_sub(lost);
+        report.frames_lost += stats.frames_lost + lost;
+        report.bytes_in += stats.bytes_in;
+        report.bytes_not_frames += stats.bytes_not_frames;
+        report.bytes_logged += stats.bytes_logged;
+        report.queue_bytes_max = report.queue_bytes_max.max(stats.queue_bytes_max);
+        report.queue_bytes_capacity = stats.queue_bytes_capacity;
+        report.sd_stall_ms_max = report.sd_stall_ms_max.max(stats.sd_stall_ms_max);
+        report.gs_frames += stats.gs_frames;
+        report.gs_bytes += stats.gs_bytes;
+    }
+
+    /// The report, with what the card itself tells.
+    fn settle(self, card: &Path, earlier: usize) -> Result<Report> {
+        let mut report = self.report;
+        report.blocks_written = self.card.writes();
+        let findings = std::mem::take(&mut report.findings);
+        let frames = report.read_card(card, earlier)?;
+        // What the monitor said at the time, also where the card did not take it.
+        report.findings = findings;
+        if !self.frames_on_card && !self.overwritten {
+            // Frames were left in memory: only the card tells which made it.
+            report.frames_logged = frames.min(report.frames_in);
+            report.frames_lost = report.frames_in - report.frames_logged;
+        }
+        Ok(report)
+    }
+}

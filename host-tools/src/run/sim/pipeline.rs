@@ -1,0 +1,329 @@
+//! The tasks of one power-on, and the events that move them.
+
+use std::io::Write;
+
+use anyhow::{Context, Result};
+use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_blackbox::record::{Boot, Stats};
+use hums_blackbox::{Header, Writer};
+use hums_core::Monitor;
+use hums_core::params::Params;
+use hums_core::time::{Instant, Span};
+use hums_onboard::monitoring::TICK;
+use hums_onboard::port::PortReading;
+use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
+use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
+use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
+
+use crate::card::SimCard;
+use crate::card::sim::CardError;
+use crate::run::Machine;
+use crate::run::report::Finding;
+use crate::source::Chunk;
+
+/// The ground station's port, in baud: a telemetry radio.
+const GS_BAUD: u64 = 57_600;
+/// A line that is silent for this long will not finish the frame it began.
+const SILENCE: Span = Span::from_millis(20);
+/// How soon storage looks again after it found no card.
+const NO_CARD_RETRY: Span = Span::from_millis(100);
+/// How long the end of a run waits for a card that is out, before what waits for it is lost.
+const CARD_PATIENCE: Span = Span::from_secs(5);
+
+/// What a power-on begins with empty: all that is static on the board.
+pub(super) struct Memory {
+    card_status: CardStatus,
+    port_status: PortStatus,
+    held: HeldBlocks,
+    queues: Box<Queues>,
+    writer: Box<Writer>,
+    monitor: Box<Monitor>,
+}
+
+impl Memory {
+    pub(super) fn new(params: &Params) -> Self {
+        Self {
+            card_status: CardStatus::new(),
+            port_status: PortStatus::new(),
+            held: HeldBlocks::new(),
+            queues: Box::new(Queues::new()),
+            writer: Box::new(Writer::new()),
+            monitor: Box::new(Monitor::new(*params)),
+        }
+    }
+}
+
+/// What is around the board.
+pub(super) struct Outside<'a, 'w> {
+    pub(super) card: &'a SimCard,
+    pub(super) gs: &'w mut (dyn Write + Send),
+    pub(super) findings: &'w mut Vec<Finding>,
+    /// When this power-on is, in microseconds since the first input byte.
+    pub(super) power_on_us: u64,
+    /// When our own power goes for a moment, in the same.
+    pub(super) reboot_at_us: Option<u64>,
+}
+
+/// The slot that the card is in, as the recorder sees it.
+struct Slot<'a>(&'a SimCard);
+
+impl BlockDevice for Slot<'_> {
+    type Error = CardError;
+
+    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {
+        self.0.read(blocks, start)
+    }
+
+    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
+        self.0.write(blocks, start)
+    }
+
+    fn num_blocks(&self) -> Result<BlockCount, CardError> {
+        self.0.num_blocks()
+    }
+}
+
+impl CardDevice for Slot<'_> {}
+
+/// The tasks of one power-on.
+pub(super) struct Pipeline<'a, 'w> {
+    outside: Outside<'a, 'w>,
+    slot_status: &'a CardStatus,
+    port_status: &'a PortStatus,
+    ends: Ends<'a>,
+    reception: Reception<'a>,
+    monitoring: Monitoring<'a>,
+    storage: Storage<'a, Slot<'a>>,
+    /// Since this power-on, as all that follow.
+    now: Instant,
+    tick_at: Instant,
+    /// When storage goes on; `None` while it waits for a sector.
+    storage_at: Option<Instant>,
+    /// When the GS port can take the next frame.
+    gs_at: Instant,
+    /// When the line counts as silent.
+    silent_at: Option<Instant>,
+}
+
+/// What happens next.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Event {
+    Silence,
+    Tick,
+    Storage,
+}
+
+impl Machine for Pipeline<'_, '_> {
+    fn arrive(&mut self, chunk: &Chunk) -> Result<bool> {
+        if self.outside.reboot_at_us.is_some_and(|at| chunk.at_us >= at) {
+            return Ok(false);
+        }
+        let at = Instant::from_micros(chunk.at_us.saturating_sub(self.outside.power_on_us));
+        if !self.advance(at)? {
+            return Ok(false);
+        }
+        if !chunk.bytes.is_empty() {
+            self.reception.bytes(self.now, &chunk.bytes, &mut self.ends.frames_in);
+            self.silent_at = Some(self.now + SILENCE);
+            self.drain()?;
+        }
+        Ok(!self.outside.card.is_dead())
+    }
+}
+
+impl<'a, 'w> Pipeline<'a, 'w> {
+    pub(super) fn new(
+        outside: Outside<'a, 'w>,
+        memory: &'a mut Memory,
+        identity: Boot<'a>,
+        entropy: u32,
+    ) -> Self {
+        let Memory { card_status, port_status, held, queues, writer, monitor } = memory;
+        Self {
+            slot_status: card_status,
+            port_status,
+            ends: queues.split(),
+            reception: Reception::new(port_status),
+            monitoring: Monitoring::new(monitor, writer, identity, card_status, port_status),
+            storage: Storage::new(Slot(outside.card), card_status, held, entropy),
+            outside,
+            now: Instant::ZERO,
+            tick_at: Instant::ZERO + TICK,
+            storage_at: Some(Instant::ZERO),
+            gs_at: Instant::ZERO,
+            silent_at: None,
+        }
+    }
+
+    pub(super) fn start(&mut self) -> Result<()> {
+        self.monitoring.start(self.now, &mut self.ends.sectors_in);
+        self.after_monitor()
+    }
+
+    /// Lets time go on to `to`, with everything that happens on the way, and at `to` itself. `false`: power went.
+    fn advance(&mut self, to: Instant) -> Result<bool> {
+        while let Some((at, event)) = self.next_event().filter(|(at, _)| *at <= to) {
+            self.now = self.now.max(at);
+            match event {
+                Event::Silence => {
+                    self.silent_at = None;
+                    self.reception.idle(self.now, &mut self.ends.frames_in);
+                    self.drain()?;
+                }
+                Event::Tick => {
+                    self.tick_at = self.tick_at + TICK;
+                    self.tick()?;
+                }
+                Event::Storage => self.storage(),
+            }
+            if self.outside.card.is_dead() {
+                return Ok(false);
+            }
+        }
+        self.now = self.now.max(to);
+        self.send_gs()?;
+        Ok(true)
+    }
+
+    /// The next event; of several at once the most urgent.
+    fn next_event(&self) -> Option<(Instant, Event)> {
+        let silence = self.silent_at.map(|at| (at, Event::Silence));
+        let storage = self.storage_at.map(|at| (at, Event::Storage));
+        let events = [silence, Some((self.tick_at, Event::Tick)), storage];
+        // `min_by_key` keeps the first of equals.
+        events.into_iter().flatten().min_by_key(|(at, _)| *at)
+    }
+
+    fn drain(&mut self) -> Result<()> {
+        let Ends { frames_out, sectors_in, gs_in, .. } = &mut self.ends;
+        while self.monitoring.drain(frames_out, sectors_in, gs_in) {}
+        self.after_monitor()
+    }
+
+    fn tick(&mut self) -> Result<()> {
+        let Self { monitoring, ends, outside, now, .. } = self;
+        let Outside { findings, power_on_us, .. } = outside;
+        monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
+            let value = f64::from(finding.value);
+            findings.push(Finding {
+                subsystem: finding.subsystem.name().to_owned(),
+                check: finding.check.to_owned(),
+                instance: finding.instance,
+                level: finding.level.name().to_owned(),
+                time_s: (power_on_us.saturating_add(finding.at.as_micros())) as f64 / 1e6,
+                value: value.is_finite().then_some(value),
+                unit: finding.unit.to_owned(),
+            });
+        });
+        self.after_monitor()
+    }
+
+    /// The monitor may have left work for the others.
+    fn after_monitor(&mut self) -> Result<()> {
+        if self.storage_at.is_none() && !self.ends.sectors_out.is_empty() {
+            self.storage_at = Some(self.now);
+        }
+        self.send_gs()
+    }
+
+    /// What the GS port can have sent by now.
+    fn send_gs(&mut self) -> Result<()> {
+        let mut frame = [0; GS_FRAME_BYTES_MAX];
+        while self.gs_at <= self.now {
+            let Some(length) = self.ends.gs_out.take(&mut frame) else { break };
+            let bits = length as u64 * 10;
+            self.gs_at = self.now.max(self.gs_at) + Span::from_micros(bits * 1_000_000 / GS_BAUD);
+            let bytes = frame.get(..length).unwrap_or_default();
+            if let Err(error) = self.outside.gs.write_all(bytes).and_then(|()| self.outside.gs.flush()) {
+                if crate::output::is_reader_gone(&error) {
+                    return Err(crate::outcome::ReaderGone.into());
+                }
+                return Err(error).context("--gs: cannot be written");
+            }
+        }
+        Ok(())
+    }
+
+    /// Storage does one thing, and is busy for as long as the card took.
+    fn storage(&mut self) {
+        let begin_us = self.outside.power_on_us.saturating_add(self.now.as_micros());
+        self.outside.card.set_clock(begin_us);
+        let service = self.storage.service(self.now, &mut self.ends.sectors_out);
+        let took = Span::from_micros(self.outside.card.clock().saturating_sub(begin_us));
+        self.slot_status.note_stall_ms(u32::try_from(took.as_millis()).unwrap_or(u32::MAX));
+        self.storage_at = match service {
+            Service::Idle if self.ends.sectors_out.is_empty() => None,
+            Service::Wrote | Service::Idle => Some(self.now + took),
+            Service::NoCard => Some(self.now + took + NO_CARD_RETRY),
+        };
+    }
+
+    /// The input has ended: the record is closed and written out. Gives the frames that found no card.
+    pub(super) fn finish(&mut self) -> Result<u64> {
+        self.reception.idle(self.now, &mut self.ends.frames_in);
+        self.drain()?;
+        let Ends { sectors_in, gs_in, .. } = &mut self.ends;
+        self.monitoring.finish(self.now, sectors_in, gs_in);
+        let patience = self.now + CARD_PATIENCE;
+        while !self.ends.sectors_out.is_empty() && !self.outside.card.is_dead() {
+            let at = self.storage_at.unwrap_or(self.now).max(self.now);
+            if at > patience && !self.ends.sectors_out.is_empty() && self.slot_is_empty() {
+                break;
+            }
+            self.now = at;
+            self.storage();
+        }
+        self.storage.finish();
+        // The port sends what it has, at its pace.
+        self.now = self.now.max(self.gs_at);
+        for _ in 0..1000 {
+            self.send_gs()?;
+            self.now = self.now.max(self.gs_at);
+        }
+        Ok(self.left_in_queue())
+    }
+
+    fn slot_is_empty(&self) -> bool {
+        self.slot_status.read().state != hums_recorder::CardState::Recording
+    }
+
+    /// Frames in sectors that are still queued; copies of a sector in progress hold none of their own.
+    fn left_in_queue(&mut self) -> u64 {
+        let mut frames = 0;
+        while let Some(sector) = self.ends.sectors_out.oldest() {
+            let mut sealed = *sector;
+            sealed.seal(0);
+            if let Ok(header) = Header::read(sealed.bytes())
+                && !header.partial
+            {
+                frames += u64::from(header.frames);
+            }
+            self.ends.sectors_out.drop_oldest();
+        }
+        frames
+    }
+
+    /// The figures of this power-on.
+    pub(super) fn stats(&self) -> Stats {
+        let mut stats = self.monitoring.stats(&self.ends.gs_in);
+        catch_up(&mut stats, self.port_status.read());
+        stats
+    }
+
+    /// Whether old segments were overwritten.
+    pub(super) fn has_overwritten(&self) -> bool {
+        self.slot_status.read().segments_overwritten > 0
+    }
+}
+
+/// The monitor adds up the port's counters at each tick; power may have gone since the last one.
+fn catch_up(stats: &mut Stats, port: PortReading) {
+    for (sum, counter) in [
+        (&mut stats.frames_in, port.frames),
+        (&mut stats.bytes_in, port.bytes),
+        (&mut stats.bytes_not_frames, port.bytes_not_frames),
+    ] {
+        // The counter is the sum modulo 2^32, and ahead of it.
+        *sum += u64::from(counter.wrapping_sub(*sum as u32));
+    }
+}
