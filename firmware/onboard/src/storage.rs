@@ -26,16 +26,18 @@ pub enum Service {
 /// The recorder with its queue's other side.
 pub struct Storage<'a, D: CardDevice> {
     recorder: Recorder<'a, D>,
+    status: &'a CardStatus,
 }
 
 impl<'a, D: CardDevice> Storage<'a, D> {
     /// For the card in `device`; see [`Recorder::new`].
     pub const fn new(device: D, status: &'a CardStatus, held: &'a HeldBlocks, entropy: u32) -> Self {
-        Self { recorder: Recorder::new(device, status, held, entropy) }
+        Self { recorder: Recorder::new(device, status, held, entropy), status }
     }
 
-    /// Writes at most one sector.
+    /// Writes at most one sector. The caller tells [`CardStatus::end_service`] afterwards how long it took.
     pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
+        self.status.begin_service(now);
         let Some(sector) = sectors.oldest() else {
             // So that the card's state is known, and a session open, before there is anything to write.
             return if self.recorder.ready(now) { Service::Idle } else { Service::NoCard };

@@ -3,6 +3,12 @@
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use embedded_sdmmc::{TimeSource, Timestamp};
+use hums_core::time::{Instant, Span};
+
+/// No service of the card is going on.
+const IDLE: u32 = u32::MAX;
+/// How much room there is was not counted yet.
+const UNCOUNTED: u32 = u32::MAX;
 
 /// What the card is doing. The numbers are stored in logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +58,10 @@ pub struct CardStatus {
     frames_lost: AtomicU32,
     sectors_lost: AtomicU32,
     stall_ms_max: AtomicU32,
+    /// When the service of the card that is going on began, milliseconds modulo 2^32; [`IDLE`] between services.
+    busy_since_ms: AtomicU32,
+    /// Thousandths of the card that logs can have.
+    room: AtomicU32,
     queue_sectors_max: AtomicU32,
     group_wanted: AtomicBool,
     fat_time: AtomicU32,
@@ -78,6 +88,9 @@ pub struct CardReading {
     pub sectors_lost: u32,
     /// The longest time that one service of the card took, in milliseconds.
     pub stall_ms_max: u32,
+    /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
+    /// file allocation table was counted, which takes a while on a large card.
+    pub room_permille: Option<u32>,
     /// The most sectors that waited at once.
     pub queue_sectors_max: u32,
 }
@@ -101,6 +114,8 @@ impl CardStatus {
             frames_lost: AtomicU32::new(0),
             sectors_lost: AtomicU32::new(0),
             stall_ms_max: AtomicU32::new(0),
+            busy_since_ms: AtomicU32::new(IDLE),
+            room: AtomicU32::new(UNCOUNTED),
             queue_sectors_max: AtomicU32::new(0),
             group_wanted: AtomicBool::new(false),
             fat_time: AtomicU32::new(0),
@@ -119,6 +134,7 @@ impl CardStatus {
             frames_lost: self.frames_lost.load(Ordering::Relaxed),
             sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
             stall_ms_max: self.stall_ms_max.load(Ordering::Relaxed),
+            room_permille: Some(self.room.load(Ordering::Relaxed)).filter(|room| *room != UNCOUNTED),
             queue_sectors_max: self.queue_sectors_max.load(Ordering::Relaxed),
         }
     }
@@ -146,9 +162,29 @@ impl CardStatus {
         self.frames_lost.fetch_add(frames, Ordering::Relaxed);
     }
 
-    /// Notes how long one service of the card took.
-    pub fn note_stall_ms(&self, stall_ms: u32) {
-        self.stall_ms_max.fetch_max(stall_ms, Ordering::Relaxed);
+    /// Notes how much of the card logs can have, in thousandths; `None`: not counted.
+    pub fn set_room_permille(&self, room: Option<u32>) {
+        self.room.store(room.unwrap_or(UNCOUNTED), Ordering::Relaxed);
+    }
+
+    /// A service of the card begins; [`Self::end_service`] is to follow.
+    pub fn begin_service(&self, now: Instant) {
+        self.busy_since_ms.store((now.as_millis() as u32).min(IDLE - 1), Ordering::Relaxed);
+    }
+
+    /// The service of the card has ended; it took this long, in milliseconds.
+    pub fn end_service(&self, took_ms: u32) {
+        self.busy_since_ms.store(IDLE, Ordering::Relaxed);
+        self.stall_ms_max.fetch_max(took_ms, Ordering::Relaxed);
+    }
+
+    /// How long the service of the card that is going on has taken by now; zero between services.
+    pub fn stall(&self, now: Instant) -> Span {
+        match self.busy_since_ms.load(Ordering::Relaxed) {
+            IDLE => Span::ZERO,
+            // A service is far shorter than the 49 days after which the number repeats.
+            since => Span::from_millis(u64::from((now.as_millis() as u32).wrapping_sub(since))),
+        }
     }
 
     /// Notes how many sectors wait.
@@ -213,6 +249,17 @@ mod tests {
         let leap_day = timestamp(1_709_210_096); // 2024-02-29T12:34:56Z
         assert_eq!(leap_day.to_string(), "2024-02-29 12:34:56");
         assert_eq!(timestamp(0).to_string(), "1980-01-01 00:00:00");
+    }
+
+    #[test]
+    fn a_service_that_goes_on_is_seen_until_it_ends() {
+        let status = CardStatus::new();
+        assert_eq!(status.stall(Instant::from_millis(5_000)), Span::ZERO);
+        status.begin_service(Instant::from_millis(5_000));
+        assert_eq!(status.stall(Instant::from_millis(7_500)), Span::from_millis(2_500));
+        status.end_service(2_600);
+        assert_eq!(status.stall(Instant::from_millis(8_000)), Span::ZERO);
+        assert_eq!(status.read().stall_ms_max, 2_600);
     }
 
     #[test]
