@@ -5,6 +5,8 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embedded_sdmmc::{TimeSource, Timestamp};
 use hums_core::time::{Instant, Span};
 
+/// Every sector is kept: what [`CardStatus`] says while a recording is to stay.
+const KEEP_ALL: u32 = u32::MAX;
 /// No service of the card is going on.
 const IDLE: u32 = u32::MAX;
 /// How much room there is was not counted yet.
@@ -54,6 +56,7 @@ pub struct CardStatus {
     segments: AtomicU32,
     segments_overwritten: AtomicU32,
     blocks_written: AtomicU32,
+    writes: AtomicU32,
     write_errors: AtomicU32,
     frames_lost: AtomicU32,
     sectors_lost: AtomicU32,
@@ -64,6 +67,10 @@ pub struct CardStatus {
     room: AtomicU32,
     queue_sectors_max: AtomicU32,
     group_wanted: AtomicBool,
+    /// From this sector on only the latest are kept; [`KEEP_ALL`]: all are.
+    waiting_from: AtomicU32,
+    /// How much of them, in milliseconds.
+    waiting_ms: AtomicU32,
     fat_time: AtomicU32,
 }
 
@@ -80,6 +87,8 @@ pub struct CardReading {
     pub segments_overwritten: u32,
     /// Blocks of 512 bytes of log data that the card took.
     pub blocks_written: u32,
+    /// Write commands that took them: fewer, because sectors that wait together are written together.
+    pub writes: u32,
     /// Writes that failed, retries included.
     pub write_errors: u32,
     /// Frames in sectors that could not be written.
@@ -110,6 +119,7 @@ impl CardStatus {
             segments: AtomicU32::new(0),
             segments_overwritten: AtomicU32::new(0),
             blocks_written: AtomicU32::new(0),
+            writes: AtomicU32::new(0),
             write_errors: AtomicU32::new(0),
             frames_lost: AtomicU32::new(0),
             sectors_lost: AtomicU32::new(0),
@@ -118,6 +128,8 @@ impl CardStatus {
             room: AtomicU32::new(UNCOUNTED),
             queue_sectors_max: AtomicU32::new(0),
             group_wanted: AtomicBool::new(false),
+            waiting_from: AtomicU32::new(KEEP_ALL),
+            waiting_ms: AtomicU32::new(0),
             fat_time: AtomicU32::new(0),
         }
     }
@@ -130,6 +142,7 @@ impl CardStatus {
             segments: self.segments.load(Ordering::Relaxed),
             segments_overwritten: self.segments_overwritten.load(Ordering::Relaxed),
             blocks_written: self.blocks_written.load(Ordering::Relaxed),
+            writes: self.writes.load(Ordering::Relaxed),
             write_errors: self.write_errors.load(Ordering::Relaxed),
             frames_lost: self.frames_lost.load(Ordering::Relaxed),
             sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
@@ -149,8 +162,9 @@ impl CardStatus {
         self.segments_overwritten.fetch_add(u32::from(overwrote), Ordering::Relaxed);
     }
 
-    pub(crate) fn count_block(&self) {
-        self.blocks_written.fetch_add(1, Ordering::Relaxed);
+    pub(crate) fn count_blocks(&self, blocks: u32) {
+        self.blocks_written.fetch_add(blocks, Ordering::Relaxed);
+        self.writes.fetch_add(1, Ordering::Relaxed);
     }
 
     pub(crate) fn count_write_error(&self) {
@@ -200,6 +214,25 @@ impl CardStatus {
     /// Whether storage asked for a new group since the last call.
     pub fn take_group_wanted(&self) -> bool {
         self.group_wanted.swap(false, Ordering::Acquire)
+    }
+
+    /// From sector `number` on, at the next group, only the last `keep` are kept: the vehicle is disarmed, and is
+    /// recorded by arming. What is older is overwritten.
+    pub fn wait_from(&self, number: u32, keep: Span) {
+        self.waiting_ms.store(keep.as_millis().min(u64::from(u32::MAX)) as u32, Ordering::Relaxed);
+        self.waiting_from.store(number.min(KEEP_ALL - 1), Ordering::Release);
+    }
+
+    /// Everything that is on the card now and all that comes is kept.
+    pub fn keep_all(&self) {
+        self.waiting_from.store(KEEP_ALL, Ordering::Release);
+    }
+
+    /// From which sector on how much is kept; `None`: everything.
+    pub(crate) fn waiting(&self) -> Option<(u32, Span)> {
+        let from = self.waiting_from.load(Ordering::Acquire);
+        let keep = Span::from_millis(u64::from(self.waiting_ms.load(Ordering::Relaxed)));
+        (from != KEEP_ALL).then_some((from, keep))
     }
 
     /// Tells the date for directory entries, in seconds since 1970 UTC.

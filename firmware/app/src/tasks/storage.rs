@@ -42,7 +42,7 @@ pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut
         }
     }
     body.finish();
-    links::LOG_CLOSED.signal(sectors.abandon());
+    links::LOG_CLOSED.signal(body.abandon(&mut sectors));
     loop {
         core::future::pending::<()>().await;
     }

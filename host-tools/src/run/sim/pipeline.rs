@@ -4,8 +4,8 @@ use std::io::Write;
 
 use anyhow::{Context, Result};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_blackbox::Writer;
 use hums_blackbox::record::{Boot, Stats};
-use hums_blackbox::{Header, Writer};
 use hums_core::Monitor;
 use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
@@ -277,9 +277,9 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
         self.monitoring.finish(self.now, sectors_in, gs_in);
         let patience = self.now + CARD_PATIENCE;
-        while !self.ends.sectors_out.is_empty() && !self.outside.card.is_dead() {
+        while !self.storage.is_done(&self.ends.sectors_out) && !self.outside.card.is_dead() {
             let at = self.storage_at.unwrap_or(self.now).max(self.now);
-            if at > patience && !self.ends.sectors_out.is_empty() && self.slot_is_empty() {
+            if at > patience && self.slot_is_empty() {
                 break;
             }
             self.now = at;
@@ -296,27 +296,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             self.send_gs()?;
             self.now = self.now.max(self.gs_at);
         }
-        Ok(self.left_in_queue())
+        Ok(self.storage.abandon(&mut self.ends.sectors_out))
     }
 
     fn slot_is_empty(&self) -> bool {
         self.slot_status.read().state != hums_recorder::CardState::Recording
-    }
-
-    /// Frames in sectors that are still queued; copies of a sector in progress hold none of their own.
-    fn left_in_queue(&mut self) -> u64 {
-        let mut frames = 0;
-        while let Some(sector) = self.ends.sectors_out.oldest() {
-            let mut sealed = *sector;
-            sealed.seal(0);
-            if let Ok(header) = Header::read(sealed.bytes())
-                && !header.partial
-            {
-                frames += u64::from(header.frames);
-            }
-            self.ends.sectors_out.drop_oldest();
-        }
-        frames
     }
 
     /// The figures of this power-on.
