@@ -272,7 +272,8 @@ impl<'a> Monitoring<'a> {
     }
 
     fn recorder_status(&self, now: Instant, sectors: &SectorsIn) -> RecorderStatus {
-        let recording = match self.card.read().state {
+        let card = self.card.read();
+        let recording = match card.state {
             CardState::Recording => Recording::Running,
             CardState::Unknown if now.since(Instant::ZERO) < START => Recording::Starting,
             CardState::Finished => Recording::Starting,
@@ -281,7 +282,10 @@ impl<'a> Monitoring<'a> {
         RecorderStatus {
             recording,
             queue: sectors.len() as f32 / SECTOR_QUEUE_SECTORS as f32,
-            frames_lost: self.sums.frames_lost + self.refused + u64::from(self.card.read().frames_lost),
+            frames_lost: self.sums.frames_lost + self.refused + u64::from(card.frames_lost),
+            stall: self.card.stall(now),
+            write_errors: u64::from(card.write_errors),
+            room: card.room_permille.map(|permille| permille as f32 / 1000.0),
         }
     }
 

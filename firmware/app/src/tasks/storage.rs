@@ -28,7 +28,7 @@ pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut
         SUPERVISOR.report(Task::Storage, now());
         let begun = now();
         let service = measure(Stage::Storage, || body.service(begun, &mut sectors));
-        CARD_STATUS.note_stall_ms(now().since(begun).as_millis() as u32);
+        CARD_STATUS.end_service(now().since(begun).as_millis() as u32);
         if ended_at.is_none() && links::RECORD_ENDED.signaled() {
             ended_at = Some(begun);
         }
@@ -42,7 +42,7 @@ pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut
         }
     }
     body.finish();
-    links::LOG_CLOSED.signal(sectors.abandon());
+    links::LOG_CLOSED.signal(body.abandon(&mut sectors));
     loop {
         core::future::pending::<()>().await;
     }
