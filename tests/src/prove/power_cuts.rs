@@ -26,6 +26,9 @@ use crate::flights::own;
 /// What a cut may cost at most.
 const LOSS_MAX_US: u64 = 200_000;
 
+/// A card that is back is found within a second, and has what waited for it within half of one.
+const CATCH_UP_US: u64 = 1_500_000;
+
 /// What is recorded before and when power goes.
 struct Scenario {
     name: &'static str,
@@ -153,6 +156,8 @@ struct Session {
     arrivals_us: Vec<u64>,
     hashes: Vec<u64>,
     data_start: u32,
+    /// From when until when the card was out and what waited for it was written, in microseconds.
+    out_us: Option<(u64, u64)>,
 }
 
 impl Session {
@@ -208,6 +213,7 @@ impl Session {
             arrivals_us: stream.arrivals_us(),
             hashes: stream.hashes(),
             data_start: layout.data_start,
+            out_us: out.map(|out| (out.from_us, out.to_us + CATCH_UP_US)),
             trace,
             card,
         };
@@ -292,7 +298,10 @@ impl Session {
         let cut_us = self.trace[cut].at_us;
         let given = self.arrivals_us.partition_point(|at| *at <= cut_us);
         let given_us = given.checked_sub(1).map_or(0, |last| self.arrivals_us[last]);
-        let loss_us = given_us.saturating_sub(known_us);
+        // What waits for a card that is out is in memory only, and power takes it along.
+        let out = self.out_us.filter(|(from, to)| (*from..*to).contains(&cut_us));
+        let due_us = out.map_or(given_us, |(from, _)| given_us.min(from));
+        let loss_us = due_us.saturating_sub(known_us);
         outcome.loss_us_max = outcome.loss_us_max.max(loss_us);
         ensure!(
             loss_us <= LOSS_MAX_US,
