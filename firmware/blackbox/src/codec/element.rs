@@ -4,7 +4,8 @@
 //! distribution, then sign and lower bits as they are: in a flight they are noise. Which of several predictions counts
 //! is decided by what each would have cost lately.
 
-use crate::coder::{Cdf, Coder};
+use crate::coder::Coder;
+use crate::distribution::Cdf;
 
 /// Elements at most: a copter with all streams has 430, a PX4 510.
 pub(crate) const ELEMENTS: usize = 544;

@@ -17,7 +17,8 @@ use links::REGISTERS;
 use slots::{INSTANCE_BYTES, Key, Length, Next, Slot, Slots};
 use text::TextModel;
 
-use crate::coder::{Cdf, Coder, Decoder, Encoder, Reading, Scratch, Writing};
+use crate::coder::{Coder, Decoder, Encoder, Reading, Scratch, Writing};
+use crate::distribution::Cdf;
 use crate::layouts::Layouts;
 use crate::record::RECORD_BYTES_MAX;
 

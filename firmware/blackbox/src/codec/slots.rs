@@ -3,7 +3,8 @@
 
 use super::frame::Frame;
 use super::links;
-use crate::coder::{Cdf, Cell, Coder};
+use crate::coder::Coder;
+use crate::distribution::{Cdf, Cell};
 use crate::layouts::{Layout, Place};
 
 /// Slots at most. What comes beyond is coded as plain bytes.
