@@ -48,11 +48,13 @@ impl Key {
         self.0 & Self::PARAM != 0
     }
 
-    pub(crate) const fn stored(self) -> u32 {
+    /// The stored form.
+    pub const fn stored(self) -> u32 {
         self.0
     }
 
-    pub(crate) const fn from_stored(key: u32) -> Self {
+    /// The key of a stored form, whatever it is.
+    pub const fn from_stored(key: u32) -> Self {
         Self(key)
     }
 
