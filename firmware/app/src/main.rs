@@ -35,6 +35,8 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
+static KEEPER: StaticCell<Keeper<'static, board::StoreFlash>> = StaticCell::new();
+static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
 /// What a second spawning of a task would be told.
 const ONCE: &str = "each task is spawned once";
@@ -63,12 +65,12 @@ fn main() -> ! {
     };
     let monitor = MONITOR.take();
     let (items_in, items_out) = tasks::MAILBOX.split();
-    let mut keeper = Keeper::mount(parts.store, items_out, &tasks::STORE_STATUS);
+    let keeper = KEEPER.init_with(|| Keeper::mount(parts.store, items_out, &tasks::STORE_STATUS));
     if !parts.boot.cause.may_be_in_flight() {
         keeper.turn_ahead();
     }
     keeper.load(monitor);
-    let handover = Handover::new(items_in, &tasks::STORE_STATUS, monitor.params());
+    let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor.params()));
     let monitoring = MONITORING.init_with(|| {
         Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
     });

@@ -32,7 +32,7 @@ pub(crate) struct Ends {
 pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
     mut ends: Ends,
-    mut handover: Handover<'static>,
+    handover: &'static mut Handover<'static>,
     fault: Option<Fault>,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
@@ -50,7 +50,7 @@ pub(crate) async fn run(
         match select3(links::FRAMES.wait(), ticker.next(), links::INPUT_ENDED.wait()).await {
             Either3::First(()) => drain(body, &mut ends),
             Either3::Second(()) => {
-                tick(body, &mut ends, &mut handover);
+                tick(body, &mut ends, handover);
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
                 match SUPERVISOR.silent(now()) {
@@ -64,7 +64,7 @@ pub(crate) async fn run(
         wake_others();
     }
     drain(body, &mut ends);
-    save_all(body, &mut ends, &mut handover).await;
+    save_all(body, &mut ends, handover).await;
     body.finish(now(), &mut ends.sectors, &ends.gs);
     links::RECORD_ENDED.signal(());
     links::GS_EMPTY.reset();

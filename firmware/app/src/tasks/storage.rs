@@ -25,7 +25,7 @@ pub(crate) async fn run(
     card: board::Card,
     entropy: u32,
     mut sectors: SectorsOut<'static>,
-    mut keeper: Keeper<'static, board::StoreFlash>,
+    keeper: &'static mut Keeper<'static, board::StoreFlash>,
 ) -> ! {
     let held = HeldBlocks::new();
     let mut body = Storage::new(card, &CARD_STATUS, &held, entropy);
@@ -35,7 +35,7 @@ pub(crate) async fn run(
         let begun = now();
         let service = measure(Stage::Storage, || body.service(begun, &mut sectors));
         CARD_STATUS.end_service(now().since(begun).as_millis() as u32);
-        keep(&mut keeper);
+        keep(keeper);
         if ended_at.is_none() && links::RECORD_ENDED.signaled() {
             ended_at = Some(begun);
         }
@@ -43,12 +43,12 @@ pub(crate) async fn run(
             Service::Wrote => {}
             Service::Idle if !sectors.is_empty() => {}
             Service::Idle if ended_at.is_some() => break,
-            Service::Idle => wait_for_work(&sectors, &mut keeper).await,
+            Service::Idle => wait_for_work(&sectors, keeper).await,
             Service::NoCard if ended_at.is_some_and(|at| now().since(at) > CARD_PATIENCE) => break,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
     }
-    while keep(&mut keeper) == Kept::Took {}
+    while keep(keeper) == Kept::Took {}
     body.finish();
     links::LOG_CLOSED.signal(body.abandon(&mut sectors));
     loop {
