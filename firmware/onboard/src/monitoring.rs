@@ -5,8 +5,8 @@
 //! what time alone asks for.
 
 use hums_blackbox::record::{
-    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX,
-    Usage, UsageValue, Vehicle as VehicleRecord,
+    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Stats,
+    USAGE_ENTRIES_MAX, Usage, UsageValue, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
@@ -222,6 +222,16 @@ impl<'a> Monitoring<'a> {
     /// What the monitor knows.
     pub const fn monitor(&self) -> &Monitor {
         self.monitor
+    }
+
+    /// What the monitor knows, to be changed: what is restored, saved, set.
+    pub const fn monitor_mut(&mut self) -> &mut Monitor {
+        self.monitor
+    }
+
+    /// Records a text of our own; `severity` is a `MAV_SEVERITY`.
+    pub fn note(&mut self, now: Instant, severity: u8, text: &str, sectors: &mut SectorsIn) {
+        self.record(now, &Record::Note(Note { severity, text }), sectors);
     }
 
     /// The pipeline's figures since power-on.
