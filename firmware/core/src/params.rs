@@ -123,6 +123,14 @@ params! {
     HardLanding "HARD_LANDING" "m/s" 2.0 0.1 20.0 "four times ArduPilot's LAND_SPEED of 0.5 m/s";
     BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: not known";
     GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
+    GsPath "GS_PATH" "" 1.0 0.0 2.0 "0: no summary, 1: a radio at the GS port, 2: through the autopilot";
+    GsBaud "GS_BAUD" "baud" 57_600.0 9_600.0 921_600.0 "what SiK radios come with";
+    GsPass "GS_PASS" "" 0.0 0.0 1.0 "1: what is not for us passes between ground station and autopilot";
+    GsSign "GS_SIGN" "" 0.0 0.0 2.0 "1: our frames are signed, 2: and unsigned settings and commands refused";
+    ApBaud "AP_BAUD" "baud" 921_600.0 9_600.0 921_600.0 "PX4 TELEM2, ArduPilot SERIAL2 for companions";
+    ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "what we send to the autopilot, answers it carries on included";
+    ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "1: ask the autopilot for the messages that the checks need";
+    ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot";
 }
 
 impl Default for Params {
