@@ -1,11 +1,11 @@
 //! Monitor: frames to records, findings and the summary. Also the one that feeds the watchdog, because it goes round
 //! every 50 ms whatever happens, and the one that works the LED.
 
-use embassy_futures::select::{Either3, select3};
+use embassy_futures::select::{Either4, select4};
 use embassy_time::Ticker;
 use hums_onboard::Task;
 use hums_onboard::monitoring::{Monitoring, Step, TICK};
-use hums_onboard::queues::{FramesOut, GsIn, SectorsIn};
+use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
 use hums_recorder::CardState;
 
 use super::{CARD_STATUS, SUPERVISOR};
@@ -24,6 +24,7 @@ const BLINK_TROUBLE: u32 = 2;
 /// The monitor's ends of the queues.
 pub(crate) struct Ends {
     pub(crate) frames: FramesOut<'static>,
+    pub(crate) uplink: UplinkOut<'static>,
     pub(crate) sectors: SectorsIn<'static>,
     pub(crate) gs: GsIn<'static>,
 }
@@ -46,9 +47,11 @@ pub(crate) async fn run(
     loop {
         SUPERVISOR.report(Task::Monitor, now());
         // Frames first where both are due: they came before this tick.
-        match select3(links::FRAMES.wait(), ticker.next(), links::INPUT_ENDED.wait()).await {
-            Either3::First(()) => drain(body, &mut ends),
-            Either3::Second(()) => {
+        let work = (links::FRAMES.wait(), ticker.next(), links::UPLINK.wait(), links::INPUT_ENDED.wait());
+        match select4(work.0, work.1, work.2, work.3).await {
+            Either4::First(()) => drain(body, &mut ends),
+            Either4::Third(()) => uplink(body, &mut ends),
+            Either4::Second(()) => {
                 tick(body, &mut ends);
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
@@ -58,7 +61,7 @@ pub(crate) async fn run(
                     Some(task) => fault::silent(task),
                 }
             }
-            Either3::Third(()) => break,
+            Either4::Fourth(()) => break,
         }
         wake_others();
     }
@@ -77,7 +80,7 @@ pub(crate) async fn run(
 }
 
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
-    let Ends { frames, sectors, gs } = ends;
+    let Ends { frames, sectors, gs, .. } = ends;
     let mut begin = |step| {
         costs::enter(match step {
             Step::Encode => Stage::Encode,
@@ -86,6 +89,11 @@ fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
         });
     };
     while measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin)) {}
+}
+
+fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
+    let Ends { uplink, sectors, gs, .. } = ends;
+    while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
 }
 
 fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {
@@ -106,6 +114,7 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {
 
 fn wake_others() {
     links::GS.signal(());
+    links::AUTOPILOT.signal(());
     links::SECTORS.signal(());
 }
 
