@@ -19,8 +19,9 @@ use hums_core::params::{ParamError, Params};
 use pipeline::{Memory, Outside, Pipeline};
 
 use super::arrivals::Arrivals;
+use super::ground::{self, Ground};
 use super::report::Report;
-use super::{check_standard_output, drive, open_sink, pace, prepare_card};
+use super::{check_standard_output, drive, pace, prepare_card};
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -38,9 +39,11 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     })?;
     let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
+    let (mut ground, gs) = ground::open(run)?;
     let mut world = World {
         card: &card,
-        gs: open_sink(run.gs.as_ref())?,
+        gs,
+        autopilot: arrivals.take_autopilot(),
         report: Report::default(),
         reboots: run.faults.reboot_at.clone(),
         boots: 0,
@@ -51,10 +54,9 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     };
     world.reboots.sort_unstable();
     let start = WallClock::now();
-    while world
-        .power_on(&mut arrivals, &params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
-    {
-    }
+    while world.power_on(&mut arrivals, &mut ground, &params, |arrivals, ground, machine| {
+        drive(arrivals, ground, speed, live, start, machine)
+    })? {}
     if let Some(error) = card.take_image_error() {
         bail!("{}: {error}", run.sd.display());
     }
@@ -109,6 +111,7 @@ fn read_params(path: Option<&Path>) -> Result<Params> {
 struct World<'a> {
     card: &'a SimCard,
     gs: Box<dyn Write + Send>,
+    autopilot: Box<dyn Write + Send>,
     report: Report,
     /// When our own power goes for a moment, sorted.
     reboots: Vec<u64>,
@@ -126,8 +129,9 @@ impl World<'_> {
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
+        ground: &mut Ground,
         params: &Params,
-        drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
+        drive: impl FnOnce(&mut Arrivals, &mut Ground, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
         let mut memory = Memory::new(params);
@@ -141,6 +145,7 @@ impl World<'_> {
         let outside = Outside {
             card: self.card,
             gs: &mut *self.gs,
+            autopilot: &mut *self.autopilot,
             findings: &mut self.report.findings,
             power_on_us: self.power_on_us,
             reboot_at_us: self.reboots.first().copied(),
@@ -148,7 +153,7 @@ impl World<'_> {
         let mut pipeline =
             Pipeline::new(outside, &mut memory, identity, self.entropy.wrapping_add(self.boots));
         pipeline.start()?;
-        let ended = drive(arrivals, &mut pipeline)?;
+        let ended = drive(arrivals, ground, &mut pipeline)?;
         let mut lost = 0;
         if ended {
             lost = pipeline.finish()?;
