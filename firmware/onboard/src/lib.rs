@@ -13,6 +13,7 @@
 mod companion;
 mod loss;
 pub mod monitoring;
+pub mod persist;
 pub mod port;
 pub mod queues;
 pub mod reception;
@@ -21,6 +22,7 @@ pub mod supervisor;
 pub mod uplink;
 
 pub use monitoring::{Identity, Monitoring};
+pub use persist::{Handover, Keeper, Mailbox, StoreStatus};
 pub use port::PortStatus;
 pub use reception::Reception;
 pub use storage::{Service, Storage};

@@ -5,8 +5,8 @@
 //! what time alone asks for.
 
 use hums_blackbox::record::{
-    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Stats, USAGE_ENTRIES_MAX,
-    Usage, UsageValue, Vehicle as VehicleRecord,
+    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Stats,
+    USAGE_ENTRIES_MAX, Usage, UsageValue, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
@@ -229,6 +229,16 @@ impl<'a> Monitoring<'a> {
         self.monitor
     }
 
+    /// What the monitor knows, to be changed: what is restored, saved, set.
+    pub const fn monitor_mut(&mut self) -> &mut Monitor {
+        self.monitor
+    }
+
+    /// Records a text of our own; `severity` is a `MAV_SEVERITY`.
+    pub fn note(&mut self, now: Instant, severity: u8, text: &str, sectors: &mut SectorsIn) {
+        self.record(now, &Record::Note(Note { severity, text }), sectors);
+    }
+
     /// The pipeline's figures since power-on.
     pub fn stats(&self, gs: &GsIn) -> Stats {
         let card = self.card.read();
@@ -277,7 +287,8 @@ impl<'a> Monitoring<'a> {
     }
 
     fn recorder_status(&self, now: Instant, sectors: &SectorsIn) -> RecorderStatus {
-        let recording = match self.card.read().state {
+        let card = self.card.read();
+        let recording = match card.state {
             _ if self.companion.stopped => Recording::Stopped,
             CardState::Recording => Recording::Running,
             CardState::Unknown if now.since(Instant::ZERO) < START => Recording::Starting,
@@ -287,7 +298,10 @@ impl<'a> Monitoring<'a> {
         RecorderStatus {
             recording,
             queue: sectors.len() as f32 / SECTOR_QUEUE_SECTORS as f32,
-            frames_lost: self.sums.frames_lost + self.refused + u64::from(self.card.read().frames_lost),
+            frames_lost: self.sums.frames_lost + self.refused + u64::from(card.frames_lost),
+            stall: self.card.stall(now),
+            write_errors: u64::from(card.write_errors),
+            room: card.room_permille.map(|permille| permille as f32 / 1000.0),
         }
     }
 

@@ -36,7 +36,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
         Arrivals::open(run, None, || prepare_card(&run.sd, run.faults.card_size, run.faults.seed))?.0;
     let earlier = logs::on_card(&run.sd).len();
     let (mut ground, gs) = ground::open(run)?;
-    let mut qemu = Qemu::start(&firmware, &run.sd, gs, arrivals.take_autopilot())?;
+    let mut qemu = Qemu::start(&firmware, &run.sd, gs, arrivals.take_autopilot(), args.costs)?;
     drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut qemu)?;
     let json = qemu.finish()?;
     if let Some(remark) = arrivals.remark() {
