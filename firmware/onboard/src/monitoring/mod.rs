@@ -19,6 +19,7 @@ use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
 use hums_recorder::status::{CardReading, CardStatus};
 
+use crate::companion::Companion;
 use crate::loss::Losses;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::{FramesOut, GsIn, SectorsIn};
@@ -50,13 +51,14 @@ pub enum Step {
 /// The pipeline between the frame queue and the queues of sectors and of GS frames.
 pub struct Monitoring<'a> {
     /// Lent, as the writer is: either is too large to be moved over the firmware's stack.
-    monitor: &'a mut Monitor,
+    pub(crate) monitor: &'a mut Monitor,
     writer: &'a mut Writer,
-    summary: Summary,
+    pub(crate) summary: Summary,
+    pub(crate) companion: Companion,
     sequences: Sequences,
     card: &'a CardStatus,
     port: &'a PortStatus,
-    identity: Identity<'a>,
+    pub(crate) identity: Identity<'a>,
     /// The vehicle as it was recorded last.
     vehicle: VehicleRecord,
     /// UTC of power-on as it was recorded last, microseconds since 1970.
@@ -84,6 +86,7 @@ impl<'a> Monitoring<'a> {
     ) -> Self {
         Self {
             summary: Summary::new(monitor.params()),
+            companion: Companion::new(monitor.params()),
             monitor,
             writer,
             sequences: Sequences::new(),
@@ -153,7 +156,7 @@ impl<'a> Monitoring<'a> {
         begin: &mut impl FnMut(Step),
     ) {
         begin(Step::Encode);
-        if self.writer.frame(at, bytes, verified, sectors).is_err() {
+        if !self.companion.stopped && self.writer.frame(at, bytes, verified, sectors).is_err() {
             self.refused += 1;
             self.losses.count(at, Lost::QueueFull, 1);
         }
@@ -165,8 +168,9 @@ impl<'a> Monitoring<'a> {
         if let Some((source, observation)) = hums_link::observe(&frame) {
             self.monitor.observe(at, source, &observation);
         }
+        self.heard(at, &frame, sectors);
         begin(Step::Summary);
-        self.summary.frame(at, &frame, &mut |bytes| gs.put(bytes));
+        self.summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
     }
 
     /// What time alone asks for, every [`TICK`]. Each finding is recorded, told to the GS, and given to `findings`.
@@ -194,7 +198,8 @@ impl<'a> Monitoring<'a> {
             self.record_usage(now, Moment::Periodic, sectors);
         }
         self.partial(now, sectors);
-        self.summary.tick(now, self.monitor, &mut |bytes| gs.put(bytes));
+        self.summary.tick(now, self.monitor, &mut |bytes| gs.tell(bytes));
+        self.converse(now, sectors, gs);
     }
 
     /// Ends the record in order: everything that is still open is written. The queues then hold what storage has to
@@ -240,7 +245,7 @@ impl<'a> Monitoring<'a> {
                 let event = Record::Event(Event { number: 1, text: finding.check });
                 let _ = sectors.with_reserve(|sink| writer.record(now, &event, sink));
             }
-            summary.finding(now, finding, &mut |bytes| gs.put(bytes));
+            summary.finding(now, finding, &mut |bytes| gs.tell(bytes));
             findings(finding);
         });
     }
@@ -253,7 +258,7 @@ impl<'a> Monitoring<'a> {
     }
 
     /// Writes a record, from the reserve if need be; a record that still finds no room is a counted loss.
-    fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
+    pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
         write(now, record, self.writer, &mut self.losses, sectors)
     }
 
