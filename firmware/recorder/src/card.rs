@@ -196,6 +196,11 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(())
     }
 
+    /// Whether [`CardError::Full`] means that only a part of the card was searched: to try again searches more of it.
+    pub const fn may_have_room(&self) -> bool {
+        self.free.searched > 0
+    }
+
     /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
@@ -344,15 +349,22 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     }
 }
 
-/// Where free clusters were found last, and what is known of how many there are.
+/// FAT blocks that are looked through for one new segment beside its own: 64 ms of a usual card. All of a large card's FAT takes
+/// seconds, and frames wait meanwhile.
+const SEARCH_BLOCKS: u32 = 128;
+
+/// The search for free clusters, which goes on from segment to segment, and what is known of how many there are.
 #[derive(Clone, Copy, Debug)]
 struct FreeSearch {
-    /// The FAT block where the last search ended.
-    next: u32,
-    /// So many clusters, and so none more than that, were not there when they were last looked for: nothing but
-    /// another computer makes clusters free.
+    /// The FAT block to look at next; `None`: where the information sector says.
+    next: Option<u32>,
+    /// FAT blocks looked through since some were found, and what free clusters they told of.
+    searched: u32,
+    found: u32,
+    /// So many clusters, and so no more than that, were not there in all of the FAT: nothing but another computer
+    /// makes clusters free.
     too_many: u32,
-    /// FAT blocks whose free entries are counted.
+    /// FAT blocks whose free entries are counted, for how much room there is in all.
     counted: u32,
     /// Free clusters counted.
     clusters: u32,
@@ -360,31 +372,46 @@ struct FreeSearch {
 
 impl FreeSearch {
     const fn new() -> Self {
-        Self { next: 0, too_many: u32::MAX, counted: 0, clusters: 0 }
+        Self { next: None, searched: 0, found: 0, too_many: u32::MAX, counted: 0, clusters: 0 }
     }
 
-    /// Fails with [`CardError::Full`] unless that many clusters are free. Asked first, so that a segment that does not
-    /// fit leaves no half of a chain behind. It goes on where it found some the last time: on a large card that is half
-    /// full, to look at all of the FAT takes seconds.
+    /// Fails with [`CardError::Full`] unless that many clusters were found free. Asked before a segment is made, so
+    /// that one that does not fit leaves no half of a chain behind.
     fn find<D: BlockDevice>(&mut self, gate: &Gate<'_, D>, wanted: u32) -> Result<(), CardError<D::Error>> {
         if wanted >= self.too_many {
             return Err(CardError::Full);
         }
-        let (fat_blocks, mut free) = (gate.layout().fat_blocks, 0);
-        gate.allow_reads(fat_blocks);
-        for step in 0..fat_blocks {
-            let index = (self.next + step) % fat_blocks;
-            free += free_in_block(gate, index)?;
-            if free >= wanted {
-                self.next = (self.next + step) % fat_blocks;
-                // What is counted changes under the count.
-                (self.counted, self.clusters) = (0, 0);
+        let fat_blocks = gate.layout().fat_blocks;
+        let mut next = match self.next {
+            Some(next) => next,
+            None => hint(gate)? / ENTRIES,
+        };
+        for _ in 0..SEARCH_BLOCKS + wanted / ENTRIES {
+            next %= fat_blocks;
+            self.found += free_in_block(gate, next)?;
+            if self.found >= wanted {
+                // This block may have some left for the next segment. What is counted changes under the count.
+                *self = Self { next: Some(next), too_many: self.too_many, ..Self::new() };
                 return Ok(());
             }
+            next += 1;
+            self.next = Some(next);
+            self.searched += 1;
+            if self.searched >= fat_blocks {
+                (self.searched, self.found, self.too_many) = (0, 0, wanted);
+                break;
+            }
         }
-        self.too_many = wanted;
         Err(CardError::Full)
     }
+}
+
+/// The cluster from which on a search is to begin, as the information sector says; the first one where it does not.
+fn hint<D: BlockDevice>(gate: &Gate<'_, D>) -> Result<u32, GateError<D::Error>> {
+    let mut block = [Block::new()];
+    gate.read(&mut block, BlockIdx(gate.layout().info))?;
+    let hint = block[0].get(492..496).and_then(|hint| hint.try_into().ok()).map_or(0, u32::from_le_bytes);
+    Ok(if hint < gate.layout().clusters + 2 { hint } else { 0 })
 }
 
 /// FAT entries of a block.

@@ -382,17 +382,21 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     fn create_or_overwrite(&mut self, name: LogName) -> Result<bool, CardError<D::Error>> {
         let bytes_max = if self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
-        let card = self.mounted()?;
-        let bytes = (card.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(bytes_max)) as u32;
-        match card.create(name, bytes) {
-            Ok(()) => Ok(false),
-            Err(CardError::Full) => {
-                let oldest = self.survey(name)?.oldest.ok_or(CardError::Full)?;
+        let bytes = (self.mounted()?.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(bytes_max)) as u32;
+        loop {
+            match self.mounted()?.create(name, bytes) {
+                Ok(()) => return Ok(false),
+                Err(CardError::Full) => {}
+                Err(error) => return Err(error),
+            }
+            if let Some(oldest) = self.survey(name)?.oldest {
                 self.ring.forget(oldest.name);
                 self.mounted()?.recycle(&oldest, name)?;
-                Ok(true)
+                return Ok(true);
             }
-            Err(error) => Err(error),
+            if !self.mounted()?.may_have_room() {
+                return Err(CardError::Full);
+            }
         }
     }
 

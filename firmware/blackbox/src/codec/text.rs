@@ -1,7 +1,8 @@
 //! Bytes without a layout: text, payloads of unknown messages, records. Each bit is coded in two contexts, the bytes
 //! before it and the same place of the text before it, and the one that knows more decides.
 
-use crate::coder::{Cell, Coder};
+use crate::coder::Coder;
+use crate::distribution::Cell;
 
 /// Contexts, hashed without check.
 const CELLS: usize = 2_048;

@@ -1,13 +1,13 @@
 //! Which item is to be saved, and when: soon after power-on (the boot itself counts), at landing and disarming, every
-//! minute while it changes, and at once where somebody did something by hand.
+//! quarter of an hour while it changes, and at once where somebody did something by hand.
 
 use super::ItemKey;
 use crate::time::{Instant, Span};
 
 /// The first save: late enough for the store to be ready and the vehicle to be heard.
 const FIRST: Span = Span::from_secs(10);
-/// What a power cut may cost at most.
-pub const EVERY: Span = Span::from_secs(60);
+/// What a power cut may cost at most; flash sets it: `hums_onboard::persist` has the sums.
+pub const EVERY: Span = Span::from_secs(15 * 60);
 
 /// What waits to be saved.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_change_waits_for_its_minute_and_a_hand_does_not() {
+    fn a_change_waits_for_its_time_and_a_hand_does_not() {
         let mut saving = Saving::new();
         saving.change(ItemKey::Lifetime);
         assert_eq!(saving.due(Instant::from_millis(9_999)), None);
@@ -89,7 +89,7 @@ mod tests {
         saving.hurry(ItemKey::Component(3));
         assert_eq!(saving.due(Instant::from_millis(20_000)), Some(ItemKey::Component(3)));
         saving.saved(ItemKey::Component(3));
-        assert_eq!(saving.due(Instant::from_millis(69_999)), None);
-        assert_eq!(saving.due(Instant::from_millis(70_000)), Some(ItemKey::Lifetime));
+        assert_eq!(saving.due(Instant::from_millis(909_999)), None);
+        assert_eq!(saving.due(Instant::from_millis(910_000)), Some(ItemKey::Lifetime));
     }
 }

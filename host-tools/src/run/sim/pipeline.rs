@@ -13,6 +13,7 @@ use hums_onboard::monitoring::TICK;
 use hums_onboard::port::PortReading;
 use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
 use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
+use hums_recorder::status::CardReading;
 use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
 
 use crate::card::SimCard;
@@ -50,6 +51,13 @@ impl Memory {
             writer: Box::new(Writer::new()),
             monitor: Box::new(Monitor::new(*params)),
         }
+    }
+}
+
+impl Memory {
+    /// What storage says of the card.
+    pub(super) fn card_reading(&self) -> CardReading {
+        self.card_status.read()
     }
 }
 
