@@ -173,6 +173,9 @@ params! {
     Cmp8Flights "CMP8_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
     Cmp8Cycles "CMP8_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
     Cmp8MotorHours "CMP8_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
+    RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED: 0 from power-on, 1 by arming";
+    RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before";
+    RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)";
 }
 
 impl Default for Params {

@@ -10,6 +10,7 @@
 //! [`queues`] is the home of all queues, with their capacities and what happens when each is full.
 #![cfg_attr(not(test), no_std)]
 
+mod keeping;
 mod loss;
 pub mod monitoring;
 pub mod persist;

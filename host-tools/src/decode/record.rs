@@ -172,6 +172,14 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Note(note) => {
             one("HUMS_NOTE", vec![("severity", count(note.severity)), ("text", text(note.text))])
         }
+        Record::Keep(keep) => one(
+            "HUMS_KEEP",
+            vec![
+                ("all", count(u8::from(keep.all))),
+                ("from_sector", count(keep.from)),
+                ("seconds", count(keep.seconds)),
+            ],
+        ),
         Record::Unknown { kind, version, bytes } => one(
             "HUMS_UNKNOWN",
             vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],

@@ -6,6 +6,7 @@
 
 mod boot;
 mod finding;
+mod keep;
 mod loss;
 mod usage;
 mod vehicle;
@@ -14,6 +15,7 @@ use core::fmt;
 
 pub use boot::{Boot, Fault};
 pub use finding::{Event, FindingRecord, Note};
+pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
 pub use usage::{Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
 pub use vehicle::{Clock, Parameter, Vehicle};
@@ -59,6 +61,8 @@ pub enum Record<'a> {
     Event(Event<'a>),
     /// Kind 11: free text.
     Note(Note<'a>),
+    /// Kind 12: what of the session is kept, where not all of it is.
+    Keep(Keep),
     /// A kind that this reader does not know.
     Unknown {
         /// The stored kind.
@@ -98,6 +102,7 @@ impl<'a> Record<'a> {
             Self::Fault(fault) => fault.store(&mut sink),
             Self::Event(event) => event.store(&mut sink),
             Self::Note(note) => note.store(&mut sink),
+            Self::Keep(keep) => keep.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
                 sink.u8(*kind).u8(*version).bytes(bytes);
             }
@@ -123,6 +128,7 @@ impl<'a> Record<'a> {
             9 => Self::Fault(Fault::read(fields)),
             10 => Self::Event(Event::read(fields)),
             11 => Self::Note(Note::read(fields)),
+            12 => Self::Keep(Keep::read(fields)),
             _ => unknown,
         }
     }
@@ -196,6 +202,7 @@ mod tests {
         }));
         reads_back(Record::Event(Event { number: 5, text: "look" }));
         reads_back(Record::Note(Note { severity: 6, text: "grüß" }));
+        reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }));
         reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });
     }
 
