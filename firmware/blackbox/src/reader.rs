@@ -55,6 +55,8 @@ pub enum Cause {
     UnknownLayouts(u32),
     /// Sound sectors whose content is not what a writer makes.
     Corrupt,
+    /// The vehicle was disarmed and is recorded by arming: sectors were not kept, on purpose, and a record says so.
+    Disarmed,
 }
 
 impl Cause {
@@ -65,6 +67,7 @@ impl Cause {
             Self::Damaged => "damaged",
             Self::UnknownLayouts(_) => "unknown_layouts",
             Self::Corrupt => "corrupt",
+            Self::Disarmed => "disarmed",
         }
     }
 }

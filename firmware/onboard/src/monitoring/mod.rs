@@ -20,6 +20,7 @@ use hums_link::summary::Summary;
 use hums_recorder::status::{CardReading, CardStatus};
 
 use crate::companion::Companion;
+use crate::keeping::Keeping;
 use crate::loss::Losses;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::{FramesOut, GsIn, SectorsIn};
@@ -64,6 +65,7 @@ pub struct Monitoring<'a> {
     /// UTC of power-on as it was recorded last, microseconds since 1970.
     epoch_micros: Option<u64>,
     losses: Losses,
+    keeping: Keeping,
     port_before: PortReading,
     card_before: CardReading,
     sums: Sums,
@@ -96,6 +98,7 @@ impl<'a> Monitoring<'a> {
             vehicle: VehicleRecord::default(),
             epoch_micros: None,
             losses: Losses::new(),
+            keeping: Keeping::new(),
             port_before: PortReading::default(),
             card_before: card.read(),
             sums: Sums::default(),
@@ -109,6 +112,14 @@ impl<'a> Monitoring<'a> {
 
     /// Writes what a log begins with: who records, and every parameter that is not at its default.
     pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        self.keep(now, sectors);
+        self.heading(now, sectors);
+        self.record_usage(now, Moment::Start, sectors);
+    }
+
+    /// What each file of a log says of itself: one that is read alone, because those before it made room, misses
+    /// nothing but their time.
+    fn heading(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let boot = Record::Boot(self.identity);
         self.record(now, &boot, sectors);
         let params = *self.monitor.params();
@@ -120,7 +131,18 @@ impl<'a> Monitoring<'a> {
                 self.record(now, &Record::Parameter(parameter), sectors);
             }
         }
-        self.record_usage(now, Moment::Start, sectors);
+        self.vehicle = VehicleRecord::default();
+    }
+
+    /// What of the record is to be kept, by whether the vehicle is armed.
+    fn keep(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        let Self { keeping, monitor, card, writer, .. } = self;
+        let armed = monitor.vehicle().armed();
+        keeping.tick(now, monitor.params(), armed, card, writer, sectors);
+        if self.keeping.takes_new_file(self.card) {
+            self.heading(now, sectors);
+            self.record_usage(now, Moment::Periodic, sectors);
+        }
     }
 
     /// Records how the boot before this one ended. To be called after [`Self::start`].
@@ -184,6 +206,7 @@ impl<'a> Monitoring<'a> {
         if self.card.take_group_wanted() && !self.writer.restart(sectors) {
             self.card.want_group();
         }
+        self.keep(now, sectors);
         self.count_losses(now, sectors);
         self.check(now, sectors, gs, findings);
         self.record_vehicle(now, sectors);

@@ -357,9 +357,10 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         stats
     }
 
-    /// Whether old segments were overwritten.
+    /// Whether the card no longer holds all that was logged: old segments were overwritten.
     pub(super) fn has_overwritten(&self) -> bool {
-        self.slot_status.read().segments_overwritten > 0
+        let card = self.slot_status.read();
+        card.segments_overwritten + card.segments_released > 0
     }
 }
 
