@@ -66,7 +66,8 @@ fn shape(line: &str) -> String {
         out.push('N');
         let decimals = rest.strip_prefix('.').map_or(0, digits);
         if decimals > 0 {
-            out += &format!(".{decimals}");
+            out.push('.');
+            out += &decimals.to_string();
             rest = &rest[1 + decimals..];
         }
     }

@@ -177,33 +177,53 @@ pub fn cell_data_type(name: &str, cell: CellType) -> DataType {
 /// Cells as an array of this type; a cell that is not of it is null.
 pub fn cell_array<'a>(data_type: &DataType, cells: impl Iterator<Item = Option<&'a Cell>>) -> ArrayRef {
     match data_type {
-        DataType::UInt64 => Arc::new(UInt64Array::from_iter(cells.map(|cell| match cell {
-            Some(Cell::Count(value)) => Some(*value),
-            _ => None,
-        }))),
-        DataType::Float32 => Arc::new(Float32Array::from_iter(cells.map(|cell| match cell {
-            Some(Cell::Single(value)) => Some(*value),
-            _ => None,
-        }))),
-        DataType::Float64 => Arc::new(Float64Array::from_iter(cells.map(|cell| match cell {
-            Some(Cell::Double(value)) => Some(*value),
-            Some(Cell::Single(value)) => Some(f64::from(*value)),
-            Some(Cell::Count(value)) => Some(*value as f64),
-            Some(Cell::Time(at)) => Some(at.as_secs_f64()),
-            _ => None,
-        }))),
-        DataType::Boolean => Arc::new(BooleanArray::from_iter(cells.map(|cell| match cell {
-            Some(Cell::Flag(value)) => Some(*value),
-            _ => None,
-        }))),
-        _ => Arc::new(StringArray::from_iter(cells.map(|cell| match cell {
-            Some(Cell::Text(text)) => Some(text.clone()),
-            Some(cell @ Cell::Hex(_)) => {
-                let mut hex = Vec::new();
-                cell.push_csv(&mut hex);
-                Some(String::from_utf8_lossy(&hex).into_owned())
-            }
-            _ => None,
-        }))),
+        DataType::UInt64 => Arc::new(
+            cells
+                .map(|cell| match cell {
+                    Some(Cell::Count(value)) => Some(*value),
+                    _ => None,
+                })
+                .collect::<UInt64Array>(),
+        ),
+        DataType::Float32 => Arc::new(
+            cells
+                .map(|cell| match cell {
+                    Some(Cell::Single(value)) => Some(*value),
+                    _ => None,
+                })
+                .collect::<Float32Array>(),
+        ),
+        DataType::Float64 => Arc::new(
+            cells
+                .map(|cell| match cell {
+                    Some(Cell::Double(value)) => Some(*value),
+                    Some(Cell::Single(value)) => Some(f64::from(*value)),
+                    Some(Cell::Count(value)) => Some(*value as f64),
+                    Some(Cell::Time(at)) => Some(at.as_secs_f64()),
+                    _ => None,
+                })
+                .collect::<Float64Array>(),
+        ),
+        DataType::Boolean => Arc::new(
+            cells
+                .map(|cell| match cell {
+                    Some(Cell::Flag(value)) => Some(*value),
+                    _ => None,
+                })
+                .collect::<BooleanArray>(),
+        ),
+        _ => Arc::new(
+            cells
+                .map(|cell| match cell {
+                    Some(Cell::Text(text)) => Some(text.clone()),
+                    Some(cell @ Cell::Hex(_)) => {
+                        let mut hex = Vec::new();
+                        cell.push_csv(&mut hex);
+                        Some(String::from_utf8_lossy(&hex).into_owned())
+                    }
+                    _ => None,
+                })
+                .collect::<StringArray>(),
+        ),
     }
 }

@@ -1,4 +1,4 @@
-//! The line protocol of InfluxDB, VictoriaMetrics, QuestDB and Telegraf: `measurement,tags fields nanoseconds`.
+//! The line protocol of `InfluxDB`, `VictoriaMetrics`, `QuestDB` and Telegraf: `measurement,tags fields nanoseconds`.
 //!
 //! * `HUMS`: the reference system's measurement with its field names, so that its dashboards keep working. A point for
 //!   each message that tells one of its quantities; an ESC's points carry the tag `motor`. All fields are floats.
@@ -96,15 +96,14 @@ impl Lines {
         push_integer(&mut self.text, u64::from(frame.system));
         tags.push_vehicle(&mut self.text);
         let mut fields = Fields::of(&mut self.text);
-        match known {
-            Some(payload) => payload.fields().for_each(|(field, value)| fields.value(field, value)),
-            None => {
-                fields.name("sequence").integer(i64::from(frame.sequence));
-                let out = fields.name("payload").out();
-                out.push(b'"');
-                push_hex(out, frame.payload);
-                out.push(b'"');
-            }
+        if let Some(payload) = known {
+            payload.fields().for_each(|(field, value)| fields.value(field, value));
+        } else {
+            fields.name("sequence").integer(i64::from(frame.sequence));
+            let out = fields.name("payload").out();
+            out.push(b'"');
+            push_hex(out, frame.payload);
+            out.push(b'"');
         }
         let count = fields.count;
         self.end(start, at, count);

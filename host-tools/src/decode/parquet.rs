@@ -248,12 +248,11 @@ impl ParquetTables {
         for (table, batch) in batches.finish() {
             let batch = batch.with_context(|| format!("{}: its columns do not fit", table.file_name()))?;
             self.pending_bytes += batch.get_array_memory_size();
-            match self.tables.get_mut(&table) {
-                Some(file) => file.pending.push(batch),
-                None => {
-                    let file = TableFile::create(&self.dir, table, batch, &self.properties)?;
-                    self.tables.insert(table, file);
-                }
+            if let Some(file) = self.tables.get_mut(&table) {
+                file.pending.push(batch);
+            } else {
+                let file = TableFile::create(&self.dir, table, batch, &self.properties)?;
+                self.tables.insert(table, file);
             }
         }
         if self.pending_bytes > PENDING_MAX { self.encode() } else { Ok(()) }

@@ -281,10 +281,9 @@ impl<'a> Writers<'a> {
     pub fn finish(mut self) -> Result<Written> {
         let mut lines = Vec::new();
         let (frames, records) = (self.frames, self.records);
-        for file in [self.tlog.take(), self.jsonl.take(), self.influx.take().map(|influx| influx.file)] {
-            if let Some(file) = file {
-                lines.push(format!("{}: {frames} frames", file.finish()?.display()));
-            }
+        let singles = [self.tlog.take(), self.jsonl.take(), self.influx.take().map(|influx| influx.file)];
+        for file in singles.into_iter().flatten() {
+            lines.push(format!("{}: {frames} frames", file.finish()?.display()));
         }
         if let Some(file) = self.gaps.take() {
             lines.push(format!("{}: gaps", file.finish()?.display()));

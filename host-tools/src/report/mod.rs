@@ -72,13 +72,13 @@ fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
     let says_directory =
         args.output.is_dir() || args.output.as_os_str().to_string_lossy().ends_with(['/', '\\']);
     let sessions = match &args.session {
-        Some(name) => match logs.iter().position(|log| log.name == *name) {
-            Some(index) => vec![index],
-            None => {
+        Some(name) => {
+            let Some(index) = logs.iter().position(|log| log.name == *name) else {
                 let names: Vec<&str> = logs.iter().map(|log| log.name.as_str()).collect();
                 bail!("there is no session {name}; there is {}", names.join(", "));
-            }
-        },
+            };
+            vec![index]
+        }
         None if says_directory => (0..logs.len()).collect(),
         None => vec![last],
     };

@@ -113,7 +113,8 @@ pub struct TrackPoint {
 pub struct Text {
     at_s: f64,
     severity: u8,
-    text: String,
+    #[serde(rename = "text")]
+    words: String,
     /// Of a text in several parts.
     #[serde(skip)]
     id: u64,
@@ -379,9 +380,9 @@ impl Replay {
     /// Long texts come in parts of one number.
     fn take_text(&mut self, next: Text) {
         if let Some(text) = &mut self.text {
-            let goes_on = next.id != 0 && text.id == next.id && text.text.len() < 1_000;
+            let goes_on = next.id != 0 && text.id == next.id && text.words.len() < 1_000;
             if goes_on {
-                text.text.push_str(&next.text);
+                text.words.push_str(&next.words);
                 return;
             }
         }
@@ -463,7 +464,7 @@ impl Collect for Told {
 
 fn text(at: Instant, source: Source, payload: &[u8]) -> Option<Text> {
     let payload = Payload::new(hums_dialect::message(STATUSTEXT)?, payload);
-    let text = payload.fields().find_map(|(_, value)| match value {
+    let words = payload.fields().find_map(|(_, value)| match value {
         Value::Text(text) => Some(String::from_utf8_lossy(text).into_owned()),
         _ => None,
     })?;
@@ -472,7 +473,7 @@ fn text(at: Instant, source: Source, payload: &[u8]) -> Option<Text> {
     let sender = u64::from(source.system) << 8 | u64::from(source.component);
     let id = if number == 0 { 0 } else { number << 16 | sender };
     let severity = payload.number("severity").unwrap_or(0.0) as u8;
-    Some(Text { at_s: at.as_secs_f64(), severity, text, id })
+    Some(Text { at_s: at.as_secs_f64(), severity, words, id })
 }
 
 impl Deliver<Told> for Replay {

@@ -24,7 +24,7 @@
   const group = (text) => text.replace(/\B(?=(\d{3})+(?!\d))/g, "\u202f");
   const whole = (value) => group(String(Math.round(value)));
   const fixed = (value, decimals) => {
-    const [before, after] = Number(value).toFixed(decimals).split(".");
+    const [before, after] = Number(value).toFixed(decimals).replace(/^-(?=[0.]*$)/, "").split(".");
     return group(before) + (after ? "." + after : "");
   };
   const span = (seconds) => {
@@ -319,7 +319,7 @@
     };
     made.resize = () => made.plot?.setSize({ width: Math.max(body.clientWidth, 240), height: made.plot.height });
     charts.push(made);
-    made.draw();
+    return made;
   };
   // Room above and below; a line that hardly moves is not blown up to a storm.
   const limits = (u, low, high) => {
@@ -538,7 +538,8 @@
     const of = data.plots.filter((p) => p.group === title);
     const box = el("div", { class: of.length > 1 ? "plots two" : "plots" });
     host.append(box);
-    for (const plot of of) chart(plot, box);
+    // Drawn when all are there: how wide each is depends on how many there are.
+    for (const made of of.map((plot) => chart(plot, box))) made.draw();
   }
 
   // Usage.
@@ -647,13 +648,12 @@
   const fit = () => { for (const chart of charts) chart.resize(); drawStrip(); drawMap(); };
   drawStrip();
   drawMap();
-  let width = innerWidth, timer = null;
-  addEventListener("resize", () => {
-    if (innerWidth === width) return;
-    width = innerWidth;
-    clearTimeout(timer);
-    timer = setTimeout(fit, 100);
-  });
+  let width = main.clientWidth;
+  new ResizeObserver(() => {
+    if (main.clientWidth === width) return;
+    width = main.clientWidth;
+    fit();
+  }).observe(main);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   addEventListener("beforeprint", () => { root.classList.add("printing"); redraw(); fit(); });
   addEventListener("afterprint", () => { root.classList.remove("printing"); redraw(); });
