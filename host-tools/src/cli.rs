@@ -169,6 +169,9 @@ pub struct Emulate {
     /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
     #[arg(long, value_name = "ELF")]
     pub firmware: Option<PathBuf>,
+    /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
+    #[arg(long)]
+    pub costs: bool,
 }
 
 const DECODE_EXAMPLES: &str = "Examples:

@@ -102,5 +102,5 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         Err(why) => return here(&why),
     };
     line("   recorded by the firmware itself, in QEMU")?;
-    emulate::run(&cli::Emulate { run, firmware: Some(firmware) })
+    emulate::run(&cli::Emulate { run, firmware: Some(firmware), costs: false })
 }

@@ -19,6 +19,10 @@ pub(crate) static INPUT_ENDED: Link = Signal::new();
 pub(crate) static RECORD_ENDED: Link = Signal::new();
 /// Storage to monitor: the log is closed; how many frames found no card.
 pub(crate) static LOG_CLOSED: Link<u64> = Signal::new();
+/// Monitor to storage: the session ends, so an erase does no harm. Looked at, not waited for.
+pub(crate) static ENDING: Link = Signal::new();
+/// Storage to monitor: the store took something, so that there is room for more. Listened to at the end only.
+pub(crate) static STORED: Link = Signal::new();
 /// Downlink to monitor: everything is sent.
 pub(crate) static GS_EMPTY: Link = Signal::new();
 

@@ -22,8 +22,8 @@ use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::params::Params;
-use hums_onboard::Monitoring;
 use hums_onboard::queues::{Ends, Queues};
+use hums_onboard::{Handover, Keeper, Monitoring};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use boards::board;
@@ -35,6 +35,8 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
+static KEEPER: StaticCell<Keeper<'static, board::StoreFlash>> = StaticCell::new();
+static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
 /// What a second spawning of a task would be told.
 const ONCE: &str = "each task is spawned once";
@@ -61,16 +63,24 @@ fn main() -> ! {
         uid: parts.boot.id,
         boots,
     };
+    let monitor = MONITOR.take();
+    let (items_in, items_out) = tasks::MAILBOX.split();
+    let keeper = KEEPER.init_with(|| Keeper::mount(parts.store, items_out, &tasks::STORE_STATUS));
+    if !parts.boot.cause.may_be_in_flight() {
+        keeper.turn_ahead();
+    }
+    keeper.load(monitor);
+    let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor.params()));
     let monitoring = MONITORING.init_with(|| {
-        Monitoring::new(MONITOR.take(), WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+        Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
     });
 
     let on = executors::start();
     on.reception.spawn(tasks::reception::run(parts.autopilot, frames_in).expect(ONCE));
     let ends = monitor::Ends { frames: frames_out, sectors: sectors_in, gs: gs_in };
-    on.monitor.spawn(monitor::run(monitoring, ends, fault, parts.watchdog, parts.led).expect(ONCE));
+    on.monitor.spawn(monitor::run(monitoring, ends, handover, fault, parts.watchdog, parts.led).expect(ONCE));
     on.downlink.spawn(tasks::downlink::run(parts.gs, gs_out).expect(ONCE));
-    on.storage.spawn(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out).expect(ONCE));
+    on.storage.spawn(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out, keeper).expect(ONCE));
     let mut idle = parts.idle;
     idle.run()
 }

@@ -4,7 +4,9 @@
 //! on the card. All arithmetic is in 32 bits; writing needs no division.
 //!
 //! *State:* the interval `[low, low + range)` of 32-bit numbers that begin with what has not been given out yet.
-//! After each step `range >= 2^16`, so a symbol may have a probability down to 2^-15.
+//! After each step `range >= 2^16`, so a symbol may have a probability down to 2^-16.
+
+use crate::distribution::{Cdf, PROBABILITY_BITS};
 
 /// A top byte is settled when both ends of the interval share it.
 const TOP: u32 = 1 << 24;
@@ -16,6 +18,19 @@ pub(crate) const LOOKAHEAD: usize = 4;
 
 /// Bytes that end a stream at most: enough to name one number within the interval, as `range >= 2^16`.
 pub(crate) const FLUSH_MAX: usize = 2;
+
+/// The range with which the interval's top byte is settled, if it is: cut where the interval got too small without
+/// that.
+#[inline]
+const fn cut(low: u32, range: u32) -> Option<u32> {
+    if (low ^ low.wrapping_add(range)) < TOP {
+        Some(range)
+    } else if range < BOTTOM {
+        Some(low.wrapping_neg() & (BOTTOM - 1))
+    } else {
+        None
+    }
+}
 
 /// Where the encoder's bytes go for one entry.
 pub(crate) struct Scratch<const N: usize> {
@@ -66,13 +81,10 @@ impl Encoder {
         let part = self.range >> bits;
         self.low = self.low.wrapping_add(part.wrapping_mul(start));
         self.range = part.wrapping_mul(size);
-        while (self.low ^ self.low.wrapping_add(self.range)) < TOP || self.range < BOTTOM {
-            if (self.low ^ self.low.wrapping_add(self.range)) >= TOP {
-                self.range = self.low.wrapping_neg() & (BOTTOM - 1);
-            }
+        while let Some(range) = cut(self.low, self.range) {
             out.push((self.low >> 24) as u8);
             self.low <<= 8;
-            self.range <<= 8;
+            self.range = range << 8;
         }
     }
 
@@ -89,162 +101,6 @@ impl Encoder {
         let value = self.low.wrapping_add(BOTTOM - 1) & !(BOTTOM - 1);
         let bytes = value.to_be_bytes();
         ([bytes[0], bytes[1]], FLUSH_MAX)
-    }
-}
-
-/// Bits of a probability.
-const PROBABILITY_BITS: u32 = 15;
-
-/// A distribution over 16 symbols that adapts to those it codes: quickly at first, then ever more slowly.
-///
-/// Place `i` (1 to 15) holds the probability, of 2^15, that the symbol is less than `i`; place 0 how often it was
-/// used, as far as the speed of adaptation depends on it. Two places share a word, the even one in the lower half, so
-/// that both adapt in one step: most of the writer's time goes here.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Cdf([u32; 8]);
-
-/// How often a distribution is used until it adapts no more slowly.
-const USES_MAX: u32 = 20;
-
-/// The speed of adaptation by uses: a step goes `1 / 2^n` of the way.
-const SPEEDS: [u8; USES_MAX as usize + 1] = [1, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5];
-
-/// Where the places go when a symbol was coded: those above it to one, the others to nothing.
-static TARGETS: [[u32; 8]; 16] = targets();
-
-const fn targets() -> [[u32; 8]; 16] {
-    let mut targets = [[0; 8]; 16];
-    let mut symbol = 0;
-    while symbol < 16 {
-        let mut place = symbol + 1;
-        while place < 16 {
-            targets[symbol][place / 2] |= 0x7fff << (16 * (place % 2));
-            place += 1;
-        }
-        symbol += 1;
-    }
-    targets
-}
-
-impl Cdf {
-    /// All symbols alike.
-    pub(crate) const FLAT: Self = Self::from_sizes([1; 16]);
-
-    /// From the symbols' relative sizes.
-    pub(crate) const fn from_sizes(sizes: [u16; 16]) -> Self {
-        let mut total = 0_u32;
-        let mut index = 0;
-        while index < 16 {
-            total += sizes[index] as u32;
-            index += 1;
-        }
-        let mut words = [0; 8];
-        let mut below = 0_u32;
-        index = 1;
-        while index < 16 {
-            below += sizes[index - 1] as u32;
-            words[index / 2] |= ((below * 32_767) / total) << (16 * (index % 2));
-            index += 1;
-        }
-        Self(words)
-    }
-
-    /// The same distribution, ready to adapt quickly.
-    pub(crate) fn renewed(mut self) -> Self {
-        let uses = self.0[0] & 0xffff;
-        self.0[0] = self.0[0] & 0xffff_0000 | uses.min(RENEWED);
-        self
-    }
-
-    /// Where symbol `index` (below 16) begins, of 2^15: no symbol is smaller than 8, whatever was learned.
-    #[inline]
-    fn start(&self, index: usize) -> u32 {
-        if index == 0 {
-            return 0;
-        }
-        let place = (self.0[(index / 2) & 7] >> (16 * (index & 1))) & 0x7fff;
-        place - (place >> 8) + 8 * index as u32
-    }
-
-    #[inline]
-    fn end(&self, symbol: usize) -> u32 {
-        if symbol >= 15 { 1 << PROBABILITY_BITS } else { self.start(symbol + 1) }
-    }
-
-    /// The symbol that holds this part.
-    #[inline]
-    fn symbol_at(&self, part: u32) -> usize {
-        let mut symbol = 0;
-        for step in [8, 4, 2, 1] {
-            symbol += if self.start(symbol + step) <= part { step } else { 0 };
-        }
-        symbol
-    }
-
-    /// Moves towards a symbol.
-    #[inline]
-    pub(crate) fn adapt(&mut self, symbol: usize) {
-        // As sure of the first symbol as it gets: no step would move a place.
-        let [first, ..] = self.0;
-        let sure = first & 0xffff == USES_MAX && first >> 16 >= 0x7fff - 0x1f;
-        if symbol != 0 || !sure {
-            self.step(symbol);
-        }
-    }
-
-    fn step(&mut self, symbol: usize) {
-        let uses = (self.0[0] & 0xffff).min(USES_MAX);
-        let speed = u32::from(SPEEDS[uses as usize]);
-        let mask = (0x7fff >> speed) * 0x0001_0001;
-        for (word, target) in self.0.iter_mut().zip(&TARGETS[symbol & 15]) {
-            // The distance that is left, in both halves; a step takes its part of it.
-            let distance = *word ^ target;
-            *word = target ^ (distance - ((distance >> speed) & mask));
-        }
-        self.0[0] = (self.0[0] & 0xffff_0000) | (uses + 1).min(USES_MAX);
-    }
-}
-
-/// Uses that a distribution made from another one counts at most.
-const RENEWED: u32 = 2;
-
-/// The speed of adaptation of a cell by uses, of 2^16: about `1 / (uses + 2)`.
-const RATES: [i16; 16] = rates();
-
-const fn rates() -> [i16; 16] {
-    let mut rates = [0; 16];
-    let mut uses = 0;
-    while uses < rates.len() {
-        rates[uses] = (65_535 / (uses as u32 + 2)) as i16;
-        uses += 1;
-    }
-    rates
-}
-
-/// A binary probability that adapts likewise: bits 4..=15 that the bit is one, bits 0..=3 the uses.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Cell(u16);
-
-impl Cell {
-    pub(crate) const EVEN: Self = Self(0x8000);
-
-    /// Uses so far, up to 15.
-    pub(crate) const fn uses(self) -> u32 {
-        self.0 as u32 & 15
-    }
-
-    /// The probability of a one, of 2^12.
-    pub(crate) const fn one(self) -> u32 {
-        self.0 as u32 >> 4
-    }
-
-    pub(crate) fn adapt(&mut self, bit: bool) {
-        let uses = self.uses();
-        let rate = i32::from(RATES[uses as usize]);
-        let one = self.one() as i32;
-        let target = if bit { 4_095 } else { 0 };
-        let one = (one + (((target - one) * rate) >> 16)) as u32;
-        self.0 = (one << 4 | (uses + 1).min(15)) as u16;
     }
 }
 
@@ -283,11 +139,10 @@ pub(crate) struct Writing<'a, const N: usize> {
 impl<const N: usize> Coder for Writing<'_, N> {
     const WRITES: bool = true;
 
-    #[inline]
+    #[inline(never)]
     fn symbol(&mut self, cdf: &mut Cdf, symbol: usize) -> usize {
-        let symbol = symbol & 15;
-        let start = cdf.start(symbol);
-        self.encoder.put(start, cdf.end(symbol) - start, PROBABILITY_BITS, self.out);
+        let (start, size) = cdf.part_of(symbol);
+        self.encoder.put(start, size, PROBABILITY_BITS, self.out);
         cdf.adapt(symbol);
         symbol
     }
@@ -320,8 +175,8 @@ impl Coder for Reading<'_> {
     #[inline]
     fn symbol(&mut self, cdf: &mut Cdf, _: usize) -> usize {
         let symbol = cdf.symbol_at(self.decoder.part(PROBABILITY_BITS));
-        let start = cdf.start(symbol);
-        self.decoder.take(start, cdf.end(symbol) - start, self.input);
+        let (start, size) = cdf.part_of(symbol);
+        self.decoder.take(start, size, self.input);
         cdf.adapt(symbol);
         symbol
     }
@@ -382,13 +237,10 @@ impl Decoder {
     pub(crate) fn take(&mut self, start: u32, size: u32, input: &[u8]) {
         self.low = self.low.wrapping_add(self.range.wrapping_mul(start));
         self.range = self.range.wrapping_mul(size);
-        while (self.low ^ self.low.wrapping_add(self.range)) < TOP || self.range < BOTTOM {
-            if (self.low ^ self.low.wrapping_add(self.range)) >= TOP {
-                self.range = self.low.wrapping_neg() & (BOTTOM - 1);
-            }
+        while let Some(range) = cut(self.low, self.range) {
             self.code = self.code << 8 | self.byte(input);
             self.low <<= 8;
-            self.range <<= 8;
+            self.range = range << 8;
         }
     }
 
@@ -401,37 +253,6 @@ impl Decoder {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The plain form of what `Cdf::adapt` does in pairs and sometimes spares.
-    fn adapted(places: [u32; 16], uses: u32, symbol: usize) -> [u32; 16] {
-        let speed = u32::from(SPEEDS[uses as usize]);
-        let mut after = places;
-        for (index, place) in after.iter_mut().enumerate().skip(1) {
-            let ahead = 0x7fff - *place;
-            *place =
-                if index > symbol { 0x7fff - (ahead - (ahead >> speed)) } else { *place - (*place >> speed) };
-        }
-        after
-    }
-
-    #[test]
-    fn distributions_adapt_as_described_and_stay_in_order() {
-        let mut cdf = Cdf::FLAT;
-        let mut state = 7_u32;
-        for round in 0..20_000 {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            // Long runs of the first symbol, so that it becomes as sure as it gets.
-            let symbol = if round % 1_000 < 700 { 0 } else { (state >> 20) as usize % 16 };
-            let place = |cdf: &Cdf, index: usize| cdf.0[index / 2] >> (16 * (index % 2)) & 0x7fff;
-            let before = core::array::from_fn(|index| if index == 0 { 0 } else { place(&cdf, index) });
-            let expected = adapted(before, cdf.0[0] & 0xffff, symbol);
-            cdf.adapt(symbol);
-            for (index, expected) in expected.into_iter().enumerate().skip(1) {
-                assert_eq!(place(&cdf, index), expected, "round {round} place {index}");
-                assert!(cdf.end(index) > cdf.start(index));
-            }
-        }
-    }
 
     #[test]
     fn what_is_put_comes_out_also_after_a_flush_anywhere() {

@@ -16,6 +16,7 @@ mod bytes;
 mod codec;
 mod coder;
 mod crc;
+mod distribution;
 mod group;
 pub mod layouts;
 mod preamble;

@@ -12,6 +12,7 @@
 
 mod loss;
 pub mod monitoring;
+pub mod persist;
 pub mod port;
 pub mod queues;
 pub mod reception;
@@ -19,6 +20,7 @@ pub mod storage;
 pub mod supervisor;
 
 pub use monitoring::{Identity, Monitoring};
+pub use persist::{Handover, Keeper, Mailbox, StoreStatus};
 pub use port::PortStatus;
 pub use reception::Reception;
 pub use storage::{Service, Storage};

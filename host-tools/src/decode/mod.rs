@@ -25,6 +25,7 @@ pub mod side_by_side;
 pub mod text;
 pub mod thesis;
 pub mod usage;
+mod wear;
 pub mod write;
 
 use std::collections::BTreeSet;

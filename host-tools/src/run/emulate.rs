@@ -35,7 +35,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let mut arrivals =
         Arrivals::open(run, None, || prepare_card(&run.sd, run.faults.card_size, run.faults.seed))?.0;
     let earlier = logs::on_card(&run.sd).len();
-    let mut qemu = Qemu::start(&firmware, &run.sd, open_sink(run.gs.as_ref())?)?;
+    let mut qemu = Qemu::start(&firmware, &run.sd, open_sink(run.gs.as_ref())?, args.costs)?;
     drive(&mut arrivals, speed, live, Instant::now(), &mut qemu)?;
     let json = qemu.finish()?;
     if let Some(remark) = arrivals.remark() {

@@ -76,15 +76,15 @@ pub struct Qemu {
 }
 
 impl Qemu {
-    /// Starts the firmware and waits until it listens.
-    pub fn start(firmware: &Path, card: &Path, gs: Box<dyn Write + Send>) -> Result<Self> {
+    /// Starts the firmware and waits until it listens. `costs`: it counts the instructions of each stage.
+    pub fn start(firmware: &Path, card: &Path, gs: Box<dyn Write + Send>, costs: bool) -> Result<Self> {
         let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
         let at = |name: &str| dir.path().join(name);
         // Links keep the paths in QEMU's argument short and free of characters that it would read.
         let card = std::path::absolute(card)?;
         symlink(&card, at("card")).with_context(|| format!("{}: cannot be linked", card.display()))?;
         make_fifo(&at("feed"))?;
-        let mut child = command(firmware, dir.path())
+        let mut child = command(firmware, dir.path(), costs)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -204,13 +204,14 @@ impl Drop for Qemu {
     }
 }
 
-fn command(firmware: &Path, dir: &Path) -> Command {
+fn command(firmware: &Path, dir: &Path, costs: bool) -> Command {
     let socket =
         |id: &str, more: &str| format!("socket,id={id},path={},server=on,{more}", escaped(&dir.join(id)));
     let arguments = format!(
-        "enable=on,target=native,arg=\"sd={}\" \"feed={}\"",
+        "enable=on,target=native,arg=\"sd={}\" \"feed={}\" \"cost={}\"",
         escaped(&dir.join("card")),
-        escaped(&dir.join("feed"))
+        escaped(&dir.join("feed")),
+        u8::from(costs)
     );
     let mut command = Command::new(PROGRAM);
     command
@@ -221,6 +222,8 @@ fn command(firmware: &Path, dir: &Path) -> Command {
         .args(["-chardev", &socket("gs", "wait=on"), "-serial", "chardev:gs"])
         .args(["-semihosting-config", &arguments])
         .current_dir(dir)
+        // With this its clock counts instructions, as the firmware takes it for granted when it counts costs.
+        .args(if costs { &["-icount", "shift=3"][..] } else { &[] })
         // Ctrl-C is for this program, which then lets the firmware close its log.
         .process_group(0);
     command

@@ -12,10 +12,13 @@
 //! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
 //! is for the checksum to find), so that not one good byte is thrown away with a bad one.
 
+mod flash;
+
 use core::cell::Cell;
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::dma::{self, ReadableRingBuffer, TransferOptions};
+use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::{Async, Blocking};
 use embassy_stm32::peripherals::{DMA1_CH6, DMA2_CH2, IWDG, RNG};
@@ -34,6 +37,8 @@ use static_cell::ConstStaticCell;
 use super::{Boot, Overrun, Receive, ResetCause, Transmit};
 use crate::costs::Stage;
 use crate::report::Report;
+
+pub(crate) use flash::StoreFlash;
 
 use defmt_rtt as _;
 
@@ -70,6 +75,7 @@ pub(crate) struct Parts {
     pub(crate) autopilot: AutopilotRx,
     pub(crate) gs: GsTx,
     pub(crate) card: Card,
+    pub(crate) store: Option<StoreFlash>,
     pub(crate) led: Led,
     pub(crate) watchdog: Watchdog,
     pub(crate) idle: Idle,
@@ -104,6 +110,7 @@ pub(crate) fn take() -> Parts {
         autopilot,
         gs,
         card: Card { driver: SdCard::new(spi, Delay), identified: Cell::new(false) },
+        store: Some(StoreFlash::new(Flash::new_blocking(p.FLASH))),
         led: Led(Output::new(p.PC12, Level::High, Speed::Low)),
         watchdog: Watchdog { timer: IndependentWatchdog::new(p.IWDG, WATCHDOG_US), running: false },
         idle: Idle(()),

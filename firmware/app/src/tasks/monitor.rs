@@ -3,12 +3,12 @@
 
 use embassy_futures::select::{Either3, select3};
 use embassy_time::Ticker;
-use hums_onboard::Task;
 use hums_onboard::monitoring::{Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn};
+use hums_onboard::{Handover, Task};
 use hums_recorder::CardState;
 
-use super::{CARD_STATUS, SUPERVISOR};
+use super::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
 use crate::boards::board;
 use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
@@ -32,6 +32,7 @@ pub(crate) struct Ends {
 pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
     mut ends: Ends,
+    handover: &'static mut Handover<'static>,
     fault: Option<Fault>,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
@@ -49,7 +50,7 @@ pub(crate) async fn run(
         match select3(links::FRAMES.wait(), ticker.next(), links::INPUT_ENDED.wait()).await {
             Either3::First(()) => drain(body, &mut ends),
             Either3::Second(()) => {
-                tick(body, &mut ends);
+                tick(body, &mut ends, handover);
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
                 match SUPERVISOR.silent(now()) {
@@ -63,6 +64,7 @@ pub(crate) async fn run(
         wake_others();
     }
     drain(body, &mut ends);
+    save_all(body, &mut ends, handover).await;
     body.finish(now(), &mut ends.sectors, &ends.gs);
     links::RECORD_ENDED.signal(());
     links::GS_EMPTY.reset();
@@ -88,7 +90,25 @@ fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
     while measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin)) {}
 }
 
-fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {
+/// Hands over everything that is to outlive power, as fast as the store takes it.
+async fn save_all(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+    links::ENDING.signal(());
+    while !handover.finish(now(), body.monitor_mut()) {
+        wake_others();
+        links::STORED.wait().await;
+    }
+    note(body, ends, handover);
+}
+
+/// Records what is new about the store.
+fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+    while let Some(news) = handover.news() {
+        defmt::info!("{=str}", news.text);
+        body.note(now(), news.severity, news.text, &mut ends.sectors);
+    }
+}
+
+fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     let Ends { sectors, gs, .. } = ends;
     measure(Stage::Tick, || {
         body.tick(now(), sectors, gs, &mut |finding| {
@@ -101,7 +121,9 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {
                 finding.unit
             );
         });
+        handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
     });
+    note(body, ends, handover);
 }
 
 fn wake_others() {

@@ -10,6 +10,8 @@ const MAGIC_V2: u8 = 0xfd;
 /// The incompatibility flag of a signed frame.
 const SIGNED: u8 = 1;
 
+const _: () = assert!(PAYLOAD_BYTES_MAX == 0xff);
+
 /// A frame's parts.
 pub(crate) struct Frame {
     pub(crate) v2: bool,
@@ -44,6 +46,13 @@ impl Frame {
             signature: [0; SIGNATURE_BYTES],
             used: 0,
         }
+    }
+
+    /// The payload from here (below 256) on: room for the widest element.
+    #[inline]
+    pub(crate) fn place(&mut self, offset: usize) -> &mut [u8; 8] {
+        let offset = offset & PAYLOAD_BYTES_MAX;
+        self.payload[offset..].first_chunk_mut().expect("the payload has room for it")
     }
 
     pub(crate) const fn signed(&self) -> bool {
@@ -87,7 +96,7 @@ impl Frame {
             _ => return None,
         }
         let (payload, rest) = rest.split_at_checked(frame.len)?;
-        frame.payload[..frame.len].copy_from_slice(payload);
+        copy(payload, &mut frame.payload);
         frame.clear_payload(frame.len);
         frame.used = frame.len;
         let (checksum, signature) = rest.split_first_chunk()?;
@@ -135,10 +144,36 @@ impl Frame {
         payload.iter().fold(head.iter().fold(0xffff, add), add) as u16
     }
 
+    /// Whether the payload ends as a MAVLink 2 sender ends it: not with a zero, unless that is all there is.
+    #[inline]
+    pub(crate) fn is_trimmed(&self) -> bool {
+        match self.len {
+            0 => false,
+            1 => true,
+            len => self.payload.get(len - 1).is_some_and(|&last| last != 0),
+        }
+    }
+
     /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it.
     pub(crate) fn trimmed(&self, full: usize) -> usize {
         let payload = &self.payload[..full.min(PAYLOAD_BYTES_MAX)];
         payload.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1)
+    }
+}
+
+/// Copies a payload, word by word: it is short, and seldom lies at a word's border.
+#[inline]
+fn copy(from: &[u8], to: &mut [u8; PAYLOAD_BYTES_MAX + 9]) {
+    let mut at = 0;
+    let (words, rest) = from.as_chunks::<4>();
+    for word in words {
+        if let Some(place) = to.get_mut(at..at + 4) {
+            place.copy_from_slice(word);
+        }
+        at += 4;
+    }
+    for (place, &byte) in to.iter_mut().skip(at).zip(rest) {
+        *place = byte;
     }
 }
 

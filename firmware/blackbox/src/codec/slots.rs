@@ -3,7 +3,8 @@
 
 use super::frame::Frame;
 use super::links;
-use crate::coder::{Cdf, Cell, Coder};
+use crate::coder::Coder;
+use crate::distribution::{Cdf, Cell};
 use crate::layouts::{Layout, Place};
 
 /// Slots at most. What comes beyond is coded as plain bytes.
@@ -45,6 +46,8 @@ pub(crate) struct Slot {
     pub(crate) times: u16,
     pub(crate) at_ms: u32,
     pub(crate) seed: u8,
+    /// The seed is that of our definition.
+    pub(crate) own_seed: bool,
     pub(crate) verified: bool,
     pub(crate) incompat: u8,
     pub(crate) compat: u8,
@@ -59,6 +62,8 @@ pub(crate) struct Slot {
     pub(crate) instance_size: u8,
     /// Whether the quiet elements stayed as they are.
     pub(crate) calm: Cell,
+    /// There were quiet elements after the last frame.
+    pub(crate) quiet: bool,
     /// Frames so far, up to 255.
     pub(crate) frames: u8,
     /// The slots that followed last, the latest first; `NONE`.
@@ -76,6 +81,7 @@ impl Slot {
         times: 0,
         at_ms: 0,
         seed: 0,
+        own_seed: false,
         verified: true,
         incompat: 0,
         compat: 0,
@@ -86,6 +92,7 @@ impl Slot {
         instance_at: 0,
         instance_size: 0,
         calm: Cell::EVEN,
+        quiet: false,
         frames: 0,
         next: [NONE; 2],
     };
@@ -105,11 +112,19 @@ impl Slot {
             elements,
             described: described as u8,
             seed: layout.map_or(0, Layout::crc_extra),
+            own_seed: layout.is_some(),
             verified: layout.is_some(),
             length: if key.v2 && layout.is_some() { Length::Trimmed } else { Length::Fixed(len_base as u8) },
             links: links::first(key.id),
             ..Self::NEW
         }
+    }
+}
+
+impl Slot {
+    fn is_instance(&self, frame: &Frame) -> bool {
+        let (at, size) = (usize::from(self.instance_at), usize::from(self.instance_size));
+        self.key.instance.get(..size) == frame.payload.get(at..at + size)
     }
 }
 
@@ -139,6 +154,11 @@ const OTHER_SLOT: usize = 2;
 const NEW_SLOT: usize = 3;
 const PLAIN: usize = 4;
 const RECORD: usize = 5;
+/// Added for a slot's frame whose header is not as expected.
+const UNEXPECTED: usize = 6;
+
+/// Distributions of the above: by how sure the first guess is, and whether the last frame's header was as expected.
+const KINDS: usize = 32;
 
 /// Successions of three and of two slots, hashed.
 const ORDER_3: usize = 512;
@@ -163,9 +183,11 @@ pub(crate) struct Slots {
     order_2: [Guess; ORDER_2],
     /// The last three slots, the latest first.
     past: [u8; 3],
+    /// Where what follows them is remembered, in `order_3` and `order_2`.
+    places: (u16, u16),
     /// What they let expect: the two likeliest slots, and how sure the first one is.
     guesses: (u8, u8, u8),
-    kind: [Cdf; 16],
+    kind: [Cdf; KINDS],
     high: Cdf,
     low: [Cdf; SLOTS / 16],
 }
@@ -181,8 +203,9 @@ impl Slots {
             order_3: [NO_GUESS; ORDER_3],
             order_2: [NO_GUESS; ORDER_2],
             past: [NONE; 3],
+            places: places([NONE; 3]),
             guesses: (NONE, NONE, 0),
-            kind: [KIND; 16],
+            kind: [KIND; KINDS],
             high: Cdf::FLAT,
             low: [Cdf::FLAT; SLOTS / 16],
         }
@@ -194,8 +217,9 @@ impl Slots {
         self.order_3 = [NO_GUESS; ORDER_3];
         self.order_2 = [NO_GUESS; ORDER_2];
         self.past = [NONE; 3];
+        self.places = places(self.past);
         self.guesses = (NONE, NONE, 0);
-        self.kind = [KIND; 16];
+        self.kind = [KIND; KINDS];
         self.high = Cdf::FLAT;
         self.low = [Cdf::FLAT; SLOTS / 16];
     }
@@ -220,19 +244,25 @@ impl Slots {
     }
 
     /// The slot of this frame, if it is one of those guessed: spares most frames the search.
-    pub(crate) fn find_guessed(&self, frame: &Frame, sender: u8) -> Option<u8> {
+    #[inline]
+    pub(crate) fn find_guessed(&self, frame: &Frame) -> Option<u8> {
         let (first, second, _) = self.guesses;
-        [first, second].into_iter().find(|&guess| {
-            self.list.get(..usize::from(self.used)).and_then(|list| list.get(usize::from(guess))).is_some_and(
-                |slot| {
-                    let (at, size) = (usize::from(slot.instance_at), usize::from(slot.instance_size));
-                    slot.key.id == frame.id
-                        && slot.key.v2 == frame.v2
-                        && slot.key.sender == sender
-                        && (size == 0 || slot.key.instance.get(..size) == frame.payload.get(at..at + size))
-                },
-            )
-        })
+        if self.is_of(first, frame) {
+            return Some(first);
+        }
+        self.is_of(second, frame).then_some(second)
+    }
+
+    /// Whether the frame is one of this slot (or of none that there is).
+    #[inline]
+    fn is_of(&self, slot: u8, frame: &Frame) -> bool {
+        let Some(slot) = self.list.get(usize::from(slot)) else { return false };
+        let Some(sender) = self.senders.get(usize::from(slot.key.sender)) else { return false };
+        slot.key.id == frame.id
+            && slot.key.v2 == frame.v2
+            && sender.system == frame.system
+            && sender.component == frame.component
+            && (slot.instance_size == 0 || slot.is_instance(frame))
     }
 
     /// The slot of this key.
@@ -248,17 +278,11 @@ impl Slots {
         Some(self.used - 1)
     }
 
-    fn places(&self) -> (usize, usize) {
-        let [a, b, c] = self.past.map(u32::from);
-        let two = (a << 8 | b).wrapping_mul(0x9e37_79b1);
-        let three = (a << 16 | b << 8 | c).wrapping_mul(0x85eb_ca6b);
-        (three as usize >> 16 & (ORDER_3 - 1), two as usize >> 16 & (ORDER_2 - 1))
-    }
-
     /// The two slots that are likeliest to come, and how sure the first one is.
     fn guess(&self) -> (u8, u8, u8) {
-        let (three, two) = self.places();
-        let (three, two) = (self.order_3[three], self.order_2[two]);
+        let (three, two) = self.places;
+        let three = self.order_3[usize::from(three) % ORDER_3];
+        let two = self.order_2[usize::from(two) % ORDER_2];
         let one = self.list.get(usize::from(self.past[0])).map_or([NONE; 2], |slot| slot.next);
         let (first, sure) = if three.slot != NONE {
             (three.slot, 4 + three.sure)
@@ -267,16 +291,32 @@ impl Slots {
         } else {
             (one[0], u8::from(one[0] != NONE))
         };
-        let second = [two.slot, one[0], one[1]].into_iter().find(|&slot| slot != first && slot != NONE);
+        let mut second = one[1];
+        if one[0] != first && one[0] != NONE {
+            second = one[0];
+        }
+        if two.slot != first && two.slot != NONE {
+            second = two.slot;
+        }
+        if second == first {
+            second = NONE;
+        }
         // All three agree: an own context.
         let agree = first == two.slot && first == one[0];
-        (first, second.unwrap_or(NONE), if agree && sure >= 7 { 12 + (sure & 3) } else { sure })
+        (first, second, if agree && sure >= 7 { 12 + (sure & 3) } else { sure })
     }
 
-    /// Codes what comes next.
-    pub(crate) fn next<C: Coder>(&mut self, coder: &mut C, next: Next) -> Option<Next> {
+    /// Codes what comes next, and of a slot's frame whether its header is as expected. `rough`: that of the last
+    /// frame was not.
+    pub(crate) fn next<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        next: Next,
+        expected: bool,
+        rough: bool,
+    ) -> Option<(Next, bool)> {
         let (first, second, context) = self.guesses;
-        let symbol = match next {
+        let mut symbol = match next {
             Next::Slot(slot) if slot == first => FIRST_GUESS,
             Next::Slot(slot) if slot == second => SECOND_GUESS,
             Next::Slot(_) => OTHER_SLOT,
@@ -284,8 +324,13 @@ impl Slots {
             Next::Plain => PLAIN,
             Next::Record => RECORD,
         };
-        let symbol = coder.symbol(&mut self.kind[usize::from(context & 15)], symbol);
-        let slot = match symbol {
+        if symbol <= OTHER_SLOT && !expected {
+            symbol += UNEXPECTED;
+        }
+        let context = usize::from(context & 15) + if rough { 16 } else { 0 };
+        symbol = coder.symbol(&mut self.kind[context % KINDS], symbol);
+        let expected = symbol < UNEXPECTED;
+        let slot = match if expected { symbol } else { symbol - UNEXPECTED } {
             FIRST_GUESS => first,
             SECOND_GUESS => second,
             OTHER_SLOT => {
@@ -294,18 +339,20 @@ impl Slots {
                 let low = coder.symbol(self.low.get_mut(high)?, slot & 15);
                 (high << 4 | low) as u8
             }
-            NEW_SLOT => return Some(Next::NewSlot),
-            PLAIN => return Some(Next::Plain),
-            RECORD => return Some(Next::Record),
+            NEW_SLOT if expected => return Some((Next::NewSlot, false)),
+            PLAIN if expected => return Some((Next::Plain, false)),
+            RECORD if expected => return Some((Next::Record, false)),
             _ => return None,
         };
-        (slot < self.used).then_some(Next::Slot(slot))
+        (slot < self.used).then_some((Next::Slot(slot), expected))
     }
 
     /// Remembers that this slot came.
     pub(crate) fn passed(&mut self, slot: u8) {
-        let (three, two) = self.places();
-        for guess in [&mut self.order_3[three], &mut self.order_2[two]] {
+        let (three, two) = self.places;
+        let three = &mut self.order_3[usize::from(three) % ORDER_3];
+        let two = &mut self.order_2[usize::from(two) % ORDER_2];
+        for guess in [three, two] {
             if guess.slot == slot {
                 guess.sure = (guess.sure + 1).min(3);
             } else {
@@ -318,8 +365,17 @@ impl Slots {
             last.next = [slot, last.next[0]];
         }
         self.past = [slot, self.past[0], self.past[1]];
+        self.places = places(self.past);
         self.guesses = self.guess();
     }
 }
 
-const KIND: Cdf = Cdf::from_sizes([60, 12, 12, 8, 1, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
+/// The places of what follows these three slots, or these two.
+const fn places([a, b, c]: [u8; 3]) -> (u16, u16) {
+    let (a, b, c) = (a as u32, b as u32, c as u32);
+    let two = (a << 8 | b).wrapping_mul(0x9e37_79b1) >> 16;
+    let three = (a << 16 | b << 8 | c).wrapping_mul(0x85eb_ca6b) >> 16;
+    (three as u16 % ORDER_3 as u16, two as u16 % ORDER_2 as u16)
+}
+
+const KIND: Cdf = Cdf::from_sizes([60, 12, 12, 8, 1, 2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1]);

@@ -4,8 +4,8 @@ use std::io::Write;
 
 use anyhow::{Context, Result};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_blackbox::Writer;
 use hums_blackbox::record::{Boot, Stats};
-use hums_blackbox::{Header, Writer};
 use hums_core::Monitor;
 use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
@@ -13,6 +13,7 @@ use hums_onboard::monitoring::TICK;
 use hums_onboard::port::PortReading;
 use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
 use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
+use hums_recorder::status::CardReading;
 use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
 
 use crate::card::SimCard;
@@ -50,6 +51,13 @@ impl Memory {
             writer: Box::new(Writer::new()),
             monitor: Box::new(Monitor::new(*params)),
         }
+    }
+}
+
+impl Memory {
+    /// What storage says of the card.
+    pub(super) fn card_reading(&self) -> CardReading {
+        self.card_status.read()
     }
 }
 
@@ -99,6 +107,8 @@ pub(super) struct Pipeline<'a, 'w> {
     tick_at: Instant,
     /// When storage goes on; `None` while it waits for a sector.
     storage_at: Option<Instant>,
+    /// Until when the card keeps storage, and how long that is in all: told to the others only when it is over.
+    busy: Option<(Instant, Span)>,
     /// When the GS port can take the next frame.
     gs_at: Instant,
     /// When the line counts as silent.
@@ -150,6 +160,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             now: Instant::ZERO,
             tick_at: Instant::ZERO + TICK,
             storage_at: Some(Instant::ZERO),
+            busy: None,
             gs_at: Instant::ZERO,
             silent_at: None,
         }
@@ -200,7 +211,15 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.after_monitor()
     }
 
+    /// Tells that the card is done with what it was asked, once it is.
+    fn end_service(&mut self) {
+        if let Some((_, took)) = self.busy.take_if(|(until, _)| *until <= self.now) {
+            self.slot_status.end_service(u32::try_from(took.as_millis()).unwrap_or(u32::MAX));
+        }
+    }
+
     fn tick(&mut self) -> Result<()> {
+        self.end_service();
         let Self { monitoring, ends, outside, now, .. } = self;
         let Outside { findings, power_on_us, .. } = outside;
         monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
@@ -247,10 +266,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     /// Storage does one thing, and is busy for as long as the card took.
     fn storage(&mut self) {
         let begin_us = self.outside.power_on_us.saturating_add(self.now.as_micros());
+        self.end_service();
         self.outside.card.set_clock(begin_us);
         let service = self.storage.service(self.now, &mut self.ends.sectors_out);
         let took = Span::from_micros(self.outside.card.clock().saturating_sub(begin_us));
-        self.slot_status.note_stall_ms(u32::try_from(took.as_millis()).unwrap_or(u32::MAX));
+        self.busy = Some((self.now + took, took));
         self.storage_at = match service {
             Service::Idle if self.ends.sectors_out.is_empty() => None,
             Service::Wrote | Service::Idle => Some(self.now + took),
@@ -265,13 +285,17 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
         self.monitoring.finish(self.now, sectors_in, gs_in);
         let patience = self.now + CARD_PATIENCE;
-        while !self.ends.sectors_out.is_empty() && !self.outside.card.is_dead() {
+        while !self.storage.is_done(&self.ends.sectors_out) && !self.outside.card.is_dead() {
             let at = self.storage_at.unwrap_or(self.now).max(self.now);
-            if at > patience && !self.ends.sectors_out.is_empty() && self.slot_is_empty() {
+            if at > patience && self.slot_is_empty() {
                 break;
             }
             self.now = at;
             self.storage();
+        }
+        if let Some((until, _)) = self.busy {
+            self.now = self.now.max(until);
+            self.end_service();
         }
         self.storage.finish();
         // The port sends what it has, at its pace.
@@ -280,27 +304,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             self.send_gs()?;
             self.now = self.now.max(self.gs_at);
         }
-        Ok(self.left_in_queue())
+        Ok(self.storage.abandon(&mut self.ends.sectors_out))
     }
 
     fn slot_is_empty(&self) -> bool {
         self.slot_status.read().state != hums_recorder::CardState::Recording
-    }
-
-    /// Frames in sectors that are still queued; copies of a sector in progress hold none of their own.
-    fn left_in_queue(&mut self) -> u64 {
-        let mut frames = 0;
-        while let Some(sector) = self.ends.sectors_out.oldest() {
-            let mut sealed = *sector;
-            sealed.seal(0);
-            if let Ok(header) = Header::read(sealed.bytes())
-                && !header.partial
-            {
-                frames += u64::from(header.frames);
-            }
-            self.ends.sectors_out.drop_oldest();
-        }
-        frames
     }
 
     /// The figures of this power-on.

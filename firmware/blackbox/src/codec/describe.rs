@@ -1,0 +1,102 @@
+//! From a message's layout to the elements of its slot.
+
+use hums_dialect::{Kind, Role};
+
+use super::body::Body;
+use super::element::{Element, What};
+use super::frame::PAYLOAD_BYTES_MAX;
+use super::links::{self, LINKS};
+use super::slots::{INSTANCE_BYTES, Key, Slot};
+use crate::layouts::{FieldLayout, Layout, Place};
+
+/// Arrays of so many bytes are data, not numbers.
+const DATA_BYTES: u8 = 16;
+
+/// Where a message's instance field is, and its size.
+pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
+    let mut offset = 0;
+    for index in 0.. {
+        let field = layout.field(index)?;
+        if field.role == Role::Instance {
+            return (field.size() <= INSTANCE_BYTES).then_some((offset, field.size()));
+        }
+        offset += field.size();
+    }
+    None
+}
+
+/// How the elements of a field are coded, how many there are and how many bytes each has.
+fn elements_of(field: FieldLayout) -> (What, u8, u8) {
+    let whole = |what| (what, 1, field.size() as u8);
+    if field.role == Role::Instance && field.size() <= INSTANCE_BYTES {
+        return whole(What::Instance);
+    }
+    let what = match (field.kind, field.role) {
+        (Kind::Char, _) => return whole(What::Text),
+        (Kind::U8 | Kind::I8, _) if field.count >= DATA_BYTES => return whole(What::Text),
+        (Kind::U8 | Kind::I8, _) => What::Integer1,
+        (Kind::U16 | Kind::I16, _) => What::Integer2,
+        (Kind::F32, _) => What::Float,
+        (Kind::U32 | Kind::I32, Role::Millis) => What::Millis,
+        (Kind::U32 | Kind::I32, Role::Micros) => What::Micros,
+        (Kind::U32 | Kind::I32, _) => What::Integer4,
+        (_, Role::Millis | Role::Micros) => What::WideTime,
+        _ => What::Wide,
+    };
+    (what, field.count, field.kind.size() as u8)
+}
+
+impl Body {
+    /// A new slot with its elements, or without a layout where there is no room for them.
+    pub(super) fn describe(&mut self, key: Key, place: Option<Place>, layout: Option<Layout>) -> Slot {
+        let (mut count, mut described) = (0, 0);
+        let mut index = 0;
+        while let Some(field) = layout.and_then(|layout| layout.field(index)) {
+            let (what, elements, _) = elements_of(field);
+            count += usize::from(elements) * if what.is_wide() { 2 } else { 1 };
+            described += field.size();
+            index += 1;
+        }
+        let fits = u8::try_from(count).is_ok() && described <= PAYLOAD_BYTES_MAX;
+        let room = layout.filter(|_| fits).and_then(|layout| Some((layout, self.elements.claim(count)?)));
+        let Some((layout, first)) = room else {
+            let mut slot = Slot::new(key, None, None, 0, 0);
+            if let Some(layout) = layout {
+                slot.seed = layout.crc_extra();
+                (slot.verified, slot.own_seed) = (true, true);
+            }
+            return slot;
+        };
+        self.prepare(key.id, layout, usize::from(first));
+        let mut slot = Slot::new(key, place, Some(layout), first, described);
+        slot.elements_count = count as u8;
+        slot
+    }
+
+    /// Sets up the elements of a layout.
+    fn prepare(&mut self, id: u32, layout: Layout, first: usize) {
+        let mut link = usize::from(links::first(id));
+        let (mut at, mut offset, mut index) = (first, 0, 0);
+        while let Some(field) = layout.field(index) {
+            let (what, count, size) = elements_of(field);
+            for _ in 0..count {
+                while LINKS.get(link).is_some_and(|link| link.id == id && usize::from(link.offset) < offset) {
+                    link += 1;
+                }
+                let linked =
+                    LINKS.get(link).is_some_and(|link| link.id == id && usize::from(link.offset) == offset);
+                let mut element = Element::new(what, size, linked && size <= 4);
+                if what == What::Integer2 || what == What::Integer4 {
+                    element.exponent = u8::from(matches!(field.kind, Kind::I16 | Kind::I32));
+                }
+                let upper = Element::new(What::Upper, 0, false);
+                for (place, element) in self.elements.list.iter_mut().skip(at).zip([element, upper]) {
+                    *place = element;
+                }
+                at += if what.is_wide() { 2 } else { 1 };
+                offset += usize::from(size);
+            }
+            index += 1;
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! The distributions of classes: an element gets its own when it first changes.
+
+use super::Element;
+use crate::coder::Coder;
+use crate::distribution::Cdf;
+
+/// Distributions of elements and of times at most.
+const BLOCKS: usize = 512;
+
+/// Kinds whose elements behave alike: integers of 1, 2 and 4 bytes, floats, decimal floats, random floats, times.
+const KINDS: usize = 7;
+pub(super) const INTEGER_1: usize = 0;
+pub(super) const INTEGER_2: usize = 1;
+pub(super) const INTEGER_4: usize = 2;
+pub(super) const FLOAT: usize = 3;
+pub(super) const DECIMAL: usize = 4;
+pub(super) const RANDOM_FLOAT: usize = 5;
+pub(super) const TIME: usize = 6;
+
+const CALM: Cdf = Cdf::from_sizes([600, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20]);
+
+/// The distributions of classes.
+pub(crate) struct Distributions {
+    blocks: [Cdf; BLOCKS],
+    used: u16,
+    /// For elements without their own: by kind.
+    calm: [Cdf; KINDS],
+    /// What a new distribution begins as.
+    young: [Cdf; KINDS],
+    /// First values.
+    first: [Cdf; KINDS],
+}
+
+impl Distributions {
+    pub(crate) const fn new() -> Self {
+        Self {
+            blocks: [Cdf::FLAT; BLOCKS],
+            used: 0,
+            calm: [CALM; KINDS],
+            young: [Cdf::FLAT; KINDS],
+            first: [Cdf::FLAT; KINDS],
+        }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        self.used = 0;
+        self.calm = [CALM; KINDS];
+        self.young = [Cdf::FLAT; KINDS];
+        self.first = [Cdf::FLAT; KINDS];
+    }
+
+    /// A new distribution; 0 where there is none left.
+    pub(crate) fn claim(&mut self, from: Cdf) -> u16 {
+        let Some(block) = self.blocks.get_mut(usize::from(self.used)) else { return 0 };
+        *block = from;
+        self.used += 1;
+        self.used
+    }
+
+    /// That distribution.
+    #[inline]
+    pub(crate) fn get(&mut self, number: u16) -> Option<&mut Cdf> {
+        self.blocks.get_mut(usize::from(number).wrapping_sub(1))
+    }
+
+    /// Codes a class with the element's distribution; what had none and changes gets one.
+    #[inline]
+    pub(super) fn class<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        block: &mut u16,
+        kind: usize,
+        symbol: usize,
+    ) -> usize {
+        match self.get(*block) {
+            Some(cdf) => coder.symbol(cdf, symbol),
+            None => self.class_of_calm(coder, block, kind, symbol),
+        }
+    }
+
+    #[inline(never)]
+    fn class_of_calm<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        block: &mut u16,
+        kind: usize,
+        symbol: usize,
+    ) -> usize {
+        let symbol = coder.symbol(&mut self.calm[kind % KINDS], symbol);
+        if symbol != 0 {
+            let young = &mut self.young[kind % KINDS];
+            let mut cdf = young.renewed();
+            cdf.adapt(symbol);
+            young.adapt(symbol);
+            *block = self.claim(cdf);
+        }
+        symbol
+    }
+
+    /// The same for a value that may be the first one.
+    #[inline]
+    pub(super) fn class_or_first<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        element: &mut Element,
+        kind: usize,
+        symbol: usize,
+    ) -> usize {
+        if element.known() {
+            self.class(coder, &mut element.block, kind, symbol)
+        } else {
+            self.class_of_first(coder, kind, symbol)
+        }
+    }
+
+    #[inline(never)]
+    fn class_of_first<C: Coder>(&mut self, coder: &mut C, kind: usize, symbol: usize) -> usize {
+        coder.symbol(&mut self.first[kind % KINDS], symbol)
+    }
+}

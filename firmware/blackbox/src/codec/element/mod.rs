@@ -1,0 +1,187 @@
+//! One element of a field: predicted from its past, and the difference coded.
+//!
+//! A difference becomes a *class* (about the length of its magnitude in bits), coded with the element's own adaptive
+//! distribution (`classes`), then sign and lower bits as they are (`rest`): in a flight they are noise. Which of
+//! several predictions counts is decided by what each would have cost lately (`costs`).
+
+mod classes;
+mod costs;
+mod floats;
+mod integers;
+mod rest;
+mod times;
+
+pub(crate) use classes::Distributions;
+use costs::Costs;
+
+/// Elements at most: a copter with all streams has 430, a PX4 510.
+pub(crate) const ELEMENTS: usize = 544;
+
+/// An element that has not changed for 8 frames is quiet: one of these bits of the count is set.
+const QUIET: u8 = 0x38;
+
+/// How an element is coded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum What {
+    /// 1, 2 or 4 bytes.
+    Integer1,
+    Integer2,
+    Integer4,
+    /// Times of 4 bytes.
+    Millis,
+    Micros,
+    Float,
+    /// 8 bytes; the next element is their upper half.
+    Wide,
+    WideTime,
+    Upper,
+    /// Text or data, `size` bytes.
+    Text,
+    /// The slot says it, `size` bytes.
+    Instance,
+}
+
+impl What {
+    /// Whether it takes two elements.
+    pub(crate) const fn is_wide(self) -> bool {
+        matches!(self, Self::Wide | Self::WideTime)
+    }
+}
+
+/// What is known of one element.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Element {
+    /// The last value's bits; of a 64-bit element the lower half.
+    pub(crate) last: u32,
+    /// The last difference.
+    step: i32,
+    /// The clock at the last value, or the linked number's bits; of a text, where it is kept.
+    pub(crate) aux: u32,
+    costs: Costs,
+    /// Its own distribution, and the one for its other mode; 0: none yet.
+    block: u16,
+    other: u16,
+    pub(crate) what: What,
+    /// Bytes on the wire.
+    pub(crate) size: u8,
+    /// How surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bit 7: `step` is in
+    /// hundredths.
+    decimal: u8,
+    /// The exponent that the classes of a random float are counted from. Of an integer with links: 1 if signed.
+    pub(crate) exponent: u8,
+    /// Frames since it changed, up to 63; bit 7: it has a last value; bit 6: it has links.
+    quiet: u8,
+}
+
+const KNOWN: u8 = 0x80;
+const LINKED_FIELD: u8 = 0x40;
+const QUIET_MAX: u8 = 0x3f;
+const STEP_DECIMAL: u8 = 0x80;
+
+impl Element {
+    const NEW: Self = Self::new(What::Integer1, 1, false);
+
+    pub(crate) const fn new(what: What, size: u8, links: bool) -> Self {
+        Self {
+            last: 0,
+            step: 0,
+            aux: 0,
+            costs: Costs::NEW,
+            block: 0,
+            other: 0,
+            what,
+            size,
+            decimal: 0,
+            exponent: 120,
+            quiet: if links { LINKED_FIELD } else { 0 },
+        }
+    }
+
+    /// Whether it has a last value.
+    #[inline]
+    pub(crate) const fn known(&self) -> bool {
+        self.quiet & KNOWN != 0
+    }
+
+    /// Whether it has not changed for long.
+    #[inline]
+    pub(crate) const fn is_quiet(&self) -> bool {
+        self.quiet & QUIET != 0
+    }
+
+    /// Whether the table of links names it.
+    #[inline]
+    pub(crate) const fn has_links(&self) -> bool {
+        self.quiet & LINKED_FIELD != 0
+    }
+
+    #[inline]
+    pub(crate) fn note(&mut self, same: bool) {
+        let counted = self.quiet + u8::from(self.quiet & QUIET_MAX < QUIET_MAX);
+        self.quiet = KNOWN | if same { counted } else { self.quiet & LINKED_FIELD };
+    }
+
+    /// The last value as a number.
+    pub(crate) fn number(&self) -> f32 {
+        match (self.what, self.exponent) {
+            (What::Float, _) => f32::from_bits(self.last),
+            (What::Integer2, 1) => f32::from(self.last as i16),
+            (What::Integer4, 1) => self.last as i32 as f32,
+            _ => self.last as f32,
+        }
+    }
+
+    #[inline]
+    fn decimals(&self) -> u8 {
+        self.decimal & !STEP_DECIMAL
+    }
+
+    /// Learns whether the value is a decimal.
+    #[inline]
+    fn weigh_decimal(&mut self, is: bool) {
+        let decimals = self.decimals();
+        let decimals = if is { (decimals + 1).min(6) } else { decimals.saturating_sub(2) };
+        self.decimal = self.decimal & STEP_DECIMAL | decimals;
+    }
+}
+
+/// What the frame knows.
+pub(crate) struct Context {
+    /// Milliseconds since the last frame of this slot.
+    pub(crate) elapsed_ms: u32,
+    /// The newest time that any message gave, in microseconds; only differences count.
+    pub(crate) clock_us: u32,
+    /// The newest time in milliseconds.
+    pub(crate) clock_ms: u32,
+    /// The float before in this frame: now and before.
+    pub(crate) neighbour: Option<(f32, f32)>,
+    /// What the linked register predicts for the float that comes now.
+    pub(crate) link: Option<f32>,
+}
+
+/// The elements of a group, in the order in which slots claimed them.
+pub(crate) struct Elements {
+    pub(crate) list: [Element; ELEMENTS],
+    used: u16,
+}
+
+impl Elements {
+    pub(crate) const fn new() -> Self {
+        Self { list: [Element::NEW; ELEMENTS], used: 0 }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        self.used = 0;
+    }
+
+    /// Room for `count` elements.
+    pub(crate) fn claim(&mut self, count: usize) -> Option<u16> {
+        let first = self.used;
+        if usize::from(first) + count > ELEMENTS {
+            return None;
+        }
+        self.used += count as u16;
+        Some(first)
+    }
+}

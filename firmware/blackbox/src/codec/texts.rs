@@ -1,0 +1,112 @@
+//! Text and data fields: the last text of each is kept, as far as there is room.
+
+use super::element::Element;
+use super::text::TextModel;
+use crate::coder::Coder;
+use crate::distribution::Cdf;
+
+/// Bytes kept of text fields.
+const TEXT_BYTES: usize = 1_024;
+
+/// The longest text: a payload.
+const TEXT_BYTES_MAX: usize = 255;
+
+/// A text that is not kept.
+const NOT_KEPT: u32 = u32::MAX;
+
+/// The last texts, and how texts change.
+pub(super) struct Texts {
+    pub(super) model: TextModel,
+    kept: [u8; TEXT_BYTES],
+    used: u16,
+    changes: Cdf,
+    lengths: [Cdf; 2],
+}
+
+impl Texts {
+    pub(super) const fn new() -> Self {
+        Self {
+            model: TextModel::new(),
+            kept: [0; TEXT_BYTES],
+            used: 0,
+            changes: Cdf::FLAT,
+            lengths: [Cdf::FLAT; 2],
+        }
+    }
+
+    pub(super) fn reset(&mut self) {
+        self.model.reset();
+        self.used = 0;
+        self.changes = Cdf::FLAT;
+        self.lengths = [Cdf::FLAT; 2];
+    }
+
+    /// The last text of an element.
+    pub(super) fn last(&self, element: &Element) -> Option<&[u8]> {
+        self.kept.get(range_of(element)?)
+    }
+
+    /// Codes a text. `calm`: it is the last one.
+    pub(super) fn code<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        element: &mut Element,
+        text: &mut [u8],
+        calm: bool,
+    ) -> Option<()> {
+        if !element.known() {
+            self.keep(element, text.len());
+        }
+        let mut above = [0; TEXT_BYTES_MAX];
+        let above = above.get_mut(..text.len())?;
+        let last = self.last(element);
+        if let Some(last) = last {
+            above.copy_from_slice(last);
+        }
+        let same = calm || {
+            let same = last.is_some_and(|last| last == text);
+            coder.symbol(&mut self.changes, usize::from(!same)) == 0
+        };
+        if same {
+            text.copy_from_slice(above);
+        } else {
+            self.changed(coder, text, above)?;
+        }
+        element.note(same);
+        if let Some(last) = range_of(element).and_then(|range| self.kept.get_mut(range)) {
+            last.copy_from_slice(text);
+        }
+        Some(())
+    }
+
+    /// Makes room for the last text of an element, if there is any.
+    fn keep(&mut self, element: &mut Element, size: usize) {
+        element.aux = NOT_KEPT;
+        let at = usize::from(self.used);
+        if let Some(place) = self.kept.get_mut(at..at + size) {
+            place.fill(0);
+            element.aux = at as u32;
+            self.used += size as u16;
+        }
+    }
+
+    fn changed<C: Coder>(&mut self, coder: &mut C, text: &mut [u8], above: &[u8]) -> Option<()> {
+        let len = text.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+        let high = coder.symbol(&mut self.lengths[0], len >> 4);
+        let len = high << 4 | coder.symbol(&mut self.lengths[1], len & 15);
+        let (mut before, mut matched) = (0, 0);
+        for (place, &above) in text.get_mut(..len)?.iter_mut().zip(above) {
+            *place = self.model.byte(coder, *place, before, above, matched);
+            matched = if *place == above { matched + 1 } else { 0 };
+            before = before << 8 | u32::from(*place);
+        }
+        text.get_mut(len..)?.fill(0);
+        Some(())
+    }
+}
+
+/// Where the last text of an element is kept.
+fn range_of(element: &Element) -> Option<core::ops::Range<usize>> {
+    let at = usize::try_from(element.aux).ok()?;
+    Some(at..at.checked_add(usize::from(element.size))?)
+}

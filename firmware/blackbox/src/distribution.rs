@@ -1,0 +1,231 @@
+//! What the coder's probabilities are learned in: distributions over 16 symbols, and cells for single bits.
+
+/// Symbols of a distribution.
+pub(crate) const SYMBOLS: usize = 16;
+
+/// Bits of a distribution's probabilities.
+pub(crate) const PROBABILITY_BITS: u32 = 16;
+
+/// A distribution over 16 symbols that adapts to those it codes: quickly at first, then ever more slowly.
+///
+/// Place `i` (0 to 14) is where symbol `i + 1` begins, of 2^16; place 15 counts how often the distribution was used,
+/// as far as the speed of adaptation depends on it. Two places are adapted in one step, as the halves of a word: most
+/// of the writer's time goes here.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(4))]
+pub(crate) struct Cdf([u16; SYMBOLS]);
+
+/// Where the uses are.
+const USES: usize = SYMBOLS - 1;
+
+/// How often a distribution is used until it adapts no more slowly.
+const USES_MAX: u16 = 20;
+
+/// Uses that a distribution made from another one counts at most.
+const USES_RENEWED: u16 = 2;
+
+/// The speed of adaptation by uses: a step goes `1 / 2^n` of the way.
+const SPEEDS: [u8; USES_MAX as usize] = [1, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4];
+
+/// The speed after that. The uses, in their place, are less than 2 to the power of it: so they stay as they are.
+const SPEED_LAST: u32 = 5;
+const _: () = assert!(USES_MAX >> SPEED_LAST == 0);
+
+/// As sure of the first symbol as it gets: where the first place stops.
+const SURE: u16 = (reach(SPEED_LAST) + 1) << SPEED_LAST;
+
+/// By symbol, what each place gains in a step at the last speed, two in a word.
+static GAINS: [[u32; SYMBOLS / 2]; SYMBOLS] = gains();
+
+/// How far a step at this speed goes for the places above the symbol, beside what every place gains.
+const fn reach(speed: u32) -> u16 {
+    (u16::MAX >> speed) - SYMBOLS as u16
+}
+
+/// What a place gains in a step: all gain a little, ever more, so that no symbol's share gets lost; those above the
+/// symbol gain the step.
+const fn gain(place: usize, symbol: usize, speed: u32) -> u16 {
+    place as u16 + 1 + if place >= symbol { reach(speed) } else { 0 }
+}
+
+const fn gains() -> [[u32; SYMBOLS / 2]; SYMBOLS] {
+    let mut gains = [[0; SYMBOLS / 2]; SYMBOLS];
+    let mut symbol = 0;
+    while symbol < SYMBOLS {
+        let mut place = 0;
+        while place < USES {
+            gains[symbol][place / 2] |= (gain(place, symbol, SPEED_LAST) as u32) << (16 * (place % 2));
+            place += 1;
+        }
+        symbol += 1;
+    }
+    gains
+}
+
+impl Cdf {
+    /// All symbols alike.
+    pub(crate) const FLAT: Self = Self::from_sizes([1; SYMBOLS]);
+
+    /// From the symbols' relative sizes.
+    pub(crate) const fn from_sizes(sizes: [u16; SYMBOLS]) -> Self {
+        let mut total = 0_u32;
+        let mut index = 0;
+        while index < SYMBOLS {
+            total += sizes[index] as u32;
+            index += 1;
+        }
+        let mut places = [0; SYMBOLS];
+        let mut below = 0_u32;
+        index = 0;
+        while index < USES {
+            below += sizes[index] as u32;
+            places[index] = (below * 65_535 / total) as u16;
+            index += 1;
+        }
+        Self(places)
+    }
+
+    /// The same distribution, ready to adapt quickly.
+    pub(crate) fn renewed(mut self) -> Self {
+        self.0[USES] = self.0[USES].min(USES_RENEWED);
+        self
+    }
+
+    /// Where a symbol (modulo 16) begins, and its size, of 2^16.
+    #[inline]
+    pub(crate) fn part_of(&self, symbol: usize) -> (u32, u32) {
+        let symbol = symbol % SYMBOLS;
+        let end = if symbol == SYMBOLS - 1 { 1 << PROBABILITY_BITS } else { u32::from(self.0[symbol]) };
+        let start = if symbol == 0 { 0 } else { u32::from(self.0[symbol - 1]) };
+        (start, end - start)
+    }
+
+    /// The symbol that holds this part.
+    #[inline]
+    pub(crate) fn symbol_at(&self, part: u32) -> usize {
+        let mut symbol = 0;
+        for step in [8, 4, 2, 1] {
+            symbol += if u32::from(self.0[symbol + step - 1]) <= part { step } else { 0 };
+        }
+        symbol
+    }
+
+    /// Moves towards a symbol (modulo 16).
+    #[inline(always)]
+    pub(crate) fn adapt(&mut self, symbol: usize) {
+        if self.0[USES] < USES_MAX {
+            self.adapt_young(symbol);
+        } else if symbol != 0 || self.0[0] < SURE {
+            self.step(&GAINS[symbol % SYMBOLS], SPEED_LAST);
+        }
+    }
+
+    #[inline(always)]
+    fn step(&mut self, gains: &[u32; SYMBOLS / 2], speed: u32) {
+        let mask = u32::from(u16::MAX >> speed) * 0x0001_0001;
+        for (pair, gain) in self.0.as_chunks_mut::<2>().0.iter_mut().zip(gains) {
+            let word = u32::from(pair[1]) << 16 | u32::from(pair[0]);
+            let word = word - ((word >> speed) & mask) + gain;
+            *pair = [word as u16, (word >> 16) as u16];
+        }
+    }
+
+    #[inline(never)]
+    fn adapt_young(&mut self, symbol: usize) {
+        let symbol = symbol % SYMBOLS;
+        let uses = self.0[USES];
+        let speed = u32::from(SPEEDS[usize::from(uses) % SPEEDS.len()]);
+        for (place, value) in self.0.iter_mut().enumerate() {
+            *value = *value - (*value >> speed) + gain(place, symbol, speed);
+        }
+        self.0[USES] = uses + 1;
+    }
+}
+
+/// The speed of adaptation of a cell by uses, of 2^16: about `1 / (uses + 2)`.
+const RATES: [i16; 16] = rates();
+
+const fn rates() -> [i16; 16] {
+    let mut rates = [0; 16];
+    let mut uses = 0;
+    while uses < rates.len() {
+        rates[uses] = (65_535 / (uses as u32 + 2)) as i16;
+        uses += 1;
+    }
+    rates
+}
+
+/// A binary probability that adapts likewise: bits 4..=15 that the bit is one, bits 0..=3 the uses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell(u16);
+
+impl Cell {
+    pub(crate) const EVEN: Self = Self(0x8000);
+
+    /// Uses so far, up to 15.
+    pub(crate) const fn uses(self) -> u32 {
+        self.0 as u32 & 15
+    }
+
+    /// The probability of a one, of 2^12.
+    pub(crate) const fn one(self) -> u32 {
+        self.0 as u32 >> 4
+    }
+
+    #[inline(always)]
+    pub(crate) fn adapt(&mut self, bit: bool) {
+        let uses = self.uses();
+        let rate = i32::from(RATES[uses as usize]);
+        let one = self.one() as i32;
+        let target = if bit { 4_095 } else { 0 };
+        let one = (one + (((target - one) * rate) >> 16)) as u32;
+        self.0 = (one << 4 | (uses + 1).min(15)) as u16;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distributions_adapt_as_described_and_no_symbol_gets_lost() {
+        let mut cdf = Cdf::FLAT;
+        let mut state = 7_u32;
+        for round in 0..20_000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Long runs of the first symbol, so that it becomes as sure as it gets, and of the last one.
+            let symbol = match round % 1_000 {
+                0..500 => 0,
+                500..700 => 15,
+                _ => (state >> 20) as usize % 16,
+            };
+            // The plain form of what is done in pairs and sometimes spared.
+            let mut expected = cdf.0;
+            let speed = SPEEDS.get(usize::from(cdf.0[USES])).map_or(SPEED_LAST, |&speed| u32::from(speed));
+            for (place, value) in expected.iter_mut().enumerate().take(USES) {
+                *value = *value - (*value >> speed) + gain(place, symbol, speed);
+            }
+            expected[USES] = (expected[USES] + 1).min(USES_MAX);
+            let sure = symbol == 0 && cdf.0[USES] == USES_MAX && cdf.0[0] >= SURE;
+            if sure {
+                expected = cdf.0;
+            }
+            cdf.adapt(symbol);
+            assert_eq!(cdf.0, expected, "round {round}");
+            assert!((0..SYMBOLS).all(|symbol| cdf.part_of(symbol).1 >= 1), "round {round}");
+        }
+    }
+
+    #[test]
+    fn the_symbol_at_a_part_is_the_one_that_owns_it() {
+        let mut cdf = Cdf::FLAT;
+        for symbol in [3, 3, 0, 15, 7, 7, 7] {
+            cdf.adapt(symbol);
+        }
+        for symbol in 0..SYMBOLS {
+            let (start, size) = cdf.part_of(symbol);
+            assert_eq!(cdf.symbol_at(start), symbol);
+            assert_eq!(cdf.symbol_at(start + size - 1), symbol);
+        }
+    }
+}

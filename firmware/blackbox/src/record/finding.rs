@@ -1,0 +1,106 @@
+//! What was found, and other moments worth a mark.
+
+use hums_core::health::{Finding, Level, Subsystem};
+use hums_core::time::Instant;
+
+use crate::bytes::{Fields, Sink};
+
+/// A check changed its level: `hums_core::health::Finding` with texts of any lifetime.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FindingRecord<'a> {
+    /// When, after the debounce.
+    pub at: Instant,
+    /// The part of the vehicle.
+    pub subsystem: Subsystem,
+    /// The check's stable name.
+    pub check: &'a str,
+    /// Which one, where there are several.
+    pub instance: u8,
+    /// The new level.
+    pub level: Level,
+    /// The level before.
+    pub previous: Level,
+    /// The value that decided, in `unit`.
+    pub value: f32,
+    /// The limit that it crossed, in `unit`.
+    pub limit: f32,
+    /// The unit of both.
+    pub unit: &'a str,
+}
+
+impl From<&Finding> for FindingRecord<'static> {
+    fn from(finding: &Finding) -> Self {
+        Self {
+            at: finding.at,
+            subsystem: finding.subsystem,
+            check: finding.check,
+            instance: finding.instance,
+            level: finding.level,
+            previous: finding.previous,
+            value: finding.value,
+            limit: finding.limit,
+            unit: finding.unit,
+        }
+    }
+}
+
+impl<'a> FindingRecord<'a> {
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(5).u64(self.at.as_micros()).u8(self.subsystem as u8).name(self.check).u8(self.instance);
+        sink.u8(self.level as u8).u8(self.previous as u8);
+        sink.u32(self.value.to_bits()).u32(self.limit.to_bits()).name(self.unit);
+    }
+
+    /// `None` where its subsystem or a level is one that this reader does not know.
+    pub(super) fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(Self {
+            at: fields.instant(),
+            subsystem: Subsystem::from_number(fields.u8())?,
+            check: fields.text(),
+            instance: fields.u8(),
+            level: Level::from_number(fields.u8())?,
+            previous: Level::from_number(fields.u8())?,
+            value: f32::from_bits(fields.u32()),
+            limit: f32::from_bits(fields.u32()),
+            unit: fields.text(),
+        })
+    }
+}
+
+/// A mark in time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Event<'a> {
+    /// Which event: 0 other, 1 armed, 2 disarmed, 3 take-off, 4 landing, 5 snapshot asked for, 6 card in, 7 card out.
+    pub number: u8,
+    /// More, where there is more to say.
+    pub text: &'a str,
+}
+
+impl<'a> Event<'a> {
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(10).u8(self.number).text(self.text);
+    }
+
+    pub(super) fn read(fields: &mut Fields<'a>) -> Self {
+        Self { number: fields.u8(), text: fields.text() }
+    }
+}
+
+/// Free text.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Note<'a> {
+    /// `MAV_SEVERITY`: 0 emergency to 7 debug.
+    pub severity: u8,
+    /// The text.
+    pub text: &'a str,
+}
+
+impl<'a> Note<'a> {
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(11).u8(self.severity).text(self.text);
+    }
+
+    pub(super) fn read(fields: &mut Fields<'a>) -> Self {
+        Self { severity: fields.u8(), text: fields.text() }
+    }
+}

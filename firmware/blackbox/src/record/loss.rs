@@ -1,0 +1,131 @@
+//! What is missing, and what the recorder counted.
+
+use hums_core::time::Instant;
+
+use crate::bytes::{Fields, Sink};
+
+/// What was lost. The numbers are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Lost {
+    /// Bytes that the UART received while nobody fetched them.
+    #[default]
+    UartOverrun = 0,
+    /// Bytes that are no frame.
+    NotFrames = 1,
+    /// Frames that were cut or damaged.
+    DamagedFrames = 2,
+    /// Frames for which the queue had no room.
+    QueueFull = 3,
+    /// Sectors that could not be written.
+    Card = 4,
+    /// Records for which there was no room.
+    Records = 5,
+    /// A cause that this reader does not know.
+    Other = 255,
+}
+
+impl Lost {
+    /// The name that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::UartOverrun => "uart_overrun",
+            Self::NotFrames => "bytes_not_frames",
+            Self::DamagedFrames => "damaged_frames",
+            Self::QueueFull => "queue_full",
+            Self::Card => "card",
+            Self::Records => "records",
+            Self::Other => "other",
+        }
+    }
+
+    const fn from_number(number: u8) -> Self {
+        match number {
+            0 => Self::UartOverrun,
+            1 => Self::NotFrames,
+            2 => Self::DamagedFrames,
+            3 => Self::QueueFull,
+            4 => Self::Card,
+            5 => Self::Records,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// Something was lost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Loss {
+    /// What and why.
+    pub what: Lost,
+    /// How many bytes, frames, sectors or records.
+    pub count: u64,
+    /// The first one.
+    pub from: Instant,
+    /// The last one.
+    pub to: Instant,
+}
+
+impl Loss {
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(7).u8(self.what as u8).u64(self.count);
+        sink.u64(self.from.as_micros()).u64(self.to.as_micros());
+    }
+
+    pub(super) fn read(fields: &mut Fields<'_>) -> Self {
+        Self {
+            what: Lost::from_number(fields.u8()),
+            count: fields.u64(),
+            from: fields.instant(),
+            to: fields.instant(),
+        }
+    }
+}
+
+/// The struct with its numbers in stored order, each named once. A further number goes to the end.
+macro_rules! statistics {
+    ($($(#[$doc:meta])+ $name:ident,)+) => {
+        /// The recorder's statistics since power-on.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct Stats {
+            $($(#[$doc])+ pub $name: u64,)+
+        }
+
+        impl Stats {
+            pub(super) fn store(&self, sink: &mut Sink<'_>) {
+                sink.head(8)$(.u64(self.$name))+;
+            }
+
+            pub(super) fn read(fields: &mut Fields<'_>) -> Self {
+                // Fields are read in the order in which they are written here.
+                Self { $($name: fields.u64(),)+ }
+            }
+        }
+    };
+}
+
+statistics! {
+    /// Frames received.
+    frames_in,
+    /// Frames encoded.
+    frames_logged,
+    /// Frames lost.
+    frames_lost,
+    /// Bytes received.
+    bytes_in,
+    /// Bytes that were no frame.
+    bytes_not_frames,
+    /// Bytes of the sectors made.
+    bytes_logged,
+    /// Blocks written to the card, file system included.
+    blocks_written,
+    /// The fullest the sector queue was, bytes.
+    queue_bytes_max,
+    /// What the sector queue holds, bytes.
+    queue_bytes_capacity,
+    /// The longest the card took for one call, milliseconds.
+    sd_stall_ms_max,
+    /// Frames sent to the ground station.
+    gs_frames,
+    /// Bytes sent to the ground station.
+    gs_bytes,
+}

@@ -1,0 +1,259 @@
+//! The monitor's own records: who recorded what, with which parameters, what it found, counted and lost.
+//!
+//! Stored form: `kind u8, version u8`, then the fields in the order below, little endian; a text is its length (u8)
+//! and its UTF-8 bytes. A later version may only append fields, so a reader of version n reads n + 1; a kind that it
+//! does not know is given out as `Record::Unknown` and stays decodable.
+
+mod boot;
+mod finding;
+mod loss;
+mod usage;
+mod vehicle;
+mod wear;
+
+use core::fmt;
+
+pub use boot::{Boot, Fault};
+pub use finding::{Event, FindingRecord, Note};
+pub use loss::{Loss, Lost, Stats};
+pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
+pub use vehicle::{Clock, Parameter, Vehicle};
+pub use wear::{Component, Exceedance, Why};
+
+use crate::bytes::{Fields, Sink};
+
+/// The longest stored record, kind and version included. A longer one is refused (`TooLong`).
+pub const RECORD_BYTES_MAX: usize = 512;
+
+/// The longest text (a message, a note) in a record; longer ones are cut at a character's border.
+pub const TEXT_BYTES_MAX: usize = 200;
+
+/// The longest name (a version, a parameter, a place in the source) in a record; longer ones are cut likewise.
+pub const NAME_BYTES_MAX: usize = 96;
+
+// The longest records: a boot and a fault.
+const _: () = assert!(2 + 4 * (1 + NAME_BYTES_MAX) + 4 + 12 + 4 <= RECORD_BYTES_MAX);
+const _: () = assert!(2 + 1 + 2 * (1 + NAME_BYTES_MAX) + 12 * 4 + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
+
+/// One record of the monitor itself. The numbers of the kinds are stored and never change meaning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Record<'a> {
+    /// Kind 1: the monitor started.
+    Boot(Boot<'a>),
+    /// Kind 2: the vehicle that is recorded, as far as it said.
+    Vehicle(Vehicle),
+    /// Kind 3: a parameter's value.
+    Parameter(Parameter<'a>),
+    /// Kind 4: the two clocks at one moment; the reader back-dates the session with it.
+    Clock(Clock),
+    /// Kind 5: a check changed its level.
+    Finding(FindingRecord<'a>),
+    /// Kind 6: usage counters.
+    Usage(Usage<'a>),
+    /// Kind 7: something was lost.
+    Loss(Loss),
+    /// Kind 8: the recorder's statistics so far.
+    Stats(Stats),
+    /// Kind 9: how the last boot ended.
+    Fault(Fault<'a>),
+    /// Kind 10: a mark in time, for instance a moment to look at later.
+    Event(Event<'a>),
+    /// Kind 11: free text.
+    Note(Note<'a>),
+    /// Kind 12: the airframe's life.
+    Lifetime(Lifetime<'a>),
+    /// Kind 13: limits of one check that were crossed.
+    Exceedance(Exceedance<'a>),
+    /// Kind 14: a part that wears.
+    Component(Component<'a>),
+    /// A kind that this reader does not know.
+    Unknown {
+        /// The stored kind.
+        kind: u8,
+        /// The stored version.
+        version: u8,
+        /// What follows.
+        bytes: &'a [u8],
+    },
+}
+
+/// The record is longer than `RECORD_BYTES_MAX`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooLong;
+
+impl fmt::Display for TooLong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a record may have {RECORD_BYTES_MAX} bytes at most")
+    }
+}
+
+impl core::error::Error for TooLong {}
+
+impl<'a> Record<'a> {
+    /// Writes the stored form; gives its length.
+    pub fn store(&self, out: &mut [u8; RECORD_BYTES_MAX]) -> Result<usize, TooLong> {
+        let mut sink = Sink::new(out);
+        match self {
+            Self::Boot(boot) => boot.store(&mut sink),
+            Self::Vehicle(vehicle) => vehicle.store(&mut sink),
+            Self::Parameter(parameter) => parameter.store(&mut sink),
+            Self::Clock(clock) => clock.store(&mut sink),
+            Self::Finding(finding) => finding.store(&mut sink),
+            Self::Usage(usage) => usage.store(&mut sink),
+            Self::Loss(loss) => loss.store(&mut sink),
+            Self::Stats(stats) => stats.store(&mut sink),
+            Self::Fault(fault) => fault.store(&mut sink),
+            Self::Event(event) => event.store(&mut sink),
+            Self::Note(note) => note.store(&mut sink),
+            Self::Lifetime(lifetime) => lifetime.store(&mut sink),
+            Self::Exceedance(exceedance) => exceedance.store(&mut sink),
+            Self::Component(component) => component.store(&mut sink),
+            Self::Unknown { kind, version, bytes } => {
+                sink.u8(*kind).u8(*version).bytes(bytes);
+            }
+        }
+        sink.len().ok_or(TooLong)
+    }
+
+    /// Reads the stored form. What is cut short reads as zeros and empty texts; what it does not know, as `Unknown`.
+    pub fn read(stored: &'a [u8]) -> Self {
+        let mut fields = Fields::new(stored);
+        let (kind, version) = (fields.u8(), fields.u8());
+        let fields = &mut fields;
+        let unknown = Self::Unknown { kind, version, bytes: stored.get(2..).unwrap_or_default() };
+        match kind {
+            1 => Self::Boot(Boot::read(fields)),
+            2 => Self::Vehicle(Vehicle::read(fields)),
+            3 => Self::Parameter(Parameter::read(fields)),
+            4 => Self::Clock(Clock::read(fields)),
+            5 => FindingRecord::read(fields).map_or(unknown, Self::Finding),
+            6 => Self::Usage(Usage::read(fields)),
+            7 => Self::Loss(Loss::read(fields)),
+            8 => Self::Stats(Stats::read(fields)),
+            9 => Self::Fault(Fault::read(fields)),
+            10 => Self::Event(Event::read(fields)),
+            11 => Self::Note(Note::read(fields)),
+            12 => Self::Lifetime(Lifetime::read(fields)),
+            13 => Self::Exceedance(Exceedance::read(fields)),
+            14 => Self::Component(Component::read(fields)),
+            _ => unknown,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::component::{Figures, Kind, Status};
+    use hums_core::exceedance::Crossings;
+    use hums_core::health::{Level, Subsystem};
+    use hums_core::time::Instant;
+
+    use super::*;
+
+    fn reads_back(record: Record<'_>) {
+        let mut stored = [0; RECORD_BYTES_MAX];
+        let len = record.store(&mut stored).expect("fits");
+        assert_eq!(Record::read(&stored[..len]), record);
+        for cut in 0..len {
+            let _ = Record::read(&stored[..cut]);
+        }
+    }
+
+    #[test]
+    fn every_kind_reads_back() {
+        let at = Instant::from_micros(1_234_567);
+        reads_back(Record::Boot(Boot {
+            version: "0.1.0",
+            git: "abcdef",
+            board: "f405",
+            reset: 7,
+            reset_name: "pin",
+            uid: *b"123456789012",
+            boots: 99,
+        }));
+        reads_back(Record::Vehicle(Vehicle {
+            system: 1,
+            component: 1,
+            autopilot: 12,
+            vehicle_type: 2,
+            firmware: 0x0401_0203,
+            uid: u64::MAX,
+        }));
+        reads_back(Record::Parameter(Parameter {
+            name: "REC_MODE",
+            value: -1.5,
+            changed: true,
+            by: (255, 190),
+        }));
+        reads_back(Record::Clock(Clock { boot: at, utc_micros: 1_700_000_000_000_000, source: 1 }));
+        reads_back(Record::Finding(FindingRecord {
+            at,
+            subsystem: Subsystem::Power,
+            check: "batt_remaining",
+            instance: 1,
+            level: Level::Warning,
+            previous: Level::Ok,
+            value: 19.5,
+            limit: 20.0,
+            unit: "%",
+        }));
+        let entries = [(1, UsageValue::Real(12.25)), (2, UsageValue::Count(u64::MAX))];
+        reads_back(Record::Usage(Usage::new(Moment::End, &entries)));
+        reads_back(Record::Loss(Loss { what: Lost::QueueFull, count: 3, from: Instant::ZERO, to: at }));
+        reads_back(Record::Stats(Stats { frames_in: 1, gs_bytes: 12, ..Stats::default() }));
+        let registers = core::array::from_fn(|index| index as u32);
+        reads_back(Record::Fault(Fault {
+            kind: 1,
+            task: "storage",
+            place: "card.rs:7",
+            registers,
+            message: "x",
+        }));
+        reads_back(Record::Event(Event { number: 5, text: "look" }));
+        reads_back(Record::Note(Note { severity: 6, text: "grüß" }));
+        let life = hums_core::lifetime::Lifetime { boots: 7, sessions: 5, ..Default::default() };
+        reads_back(Record::Lifetime(Lifetime::new(Moment::Start, &life, &entries)));
+        let crossings =
+            |peak| Crossings { warnings: 3, criticals: 1, warning_tenths: 99, critical_tenths: 12, peak };
+        reads_back(Record::Exceedance(Exceedance {
+            moment: Moment::End,
+            check: "vibration",
+            instance: 2,
+            unit: "m/s2",
+            session: crossings(61.5),
+            lifetime: crossings(70.25),
+        }));
+        reads_back(Record::Component(Component {
+            why: Why::Replaced,
+            place: 7,
+            kind: Kind::Propeller,
+            number: 4,
+            status: Status::Red,
+            replaced: 3,
+            name: "prop 4",
+            serial: "SN 1",
+            figures: Figures { flight_s: 3_600.5, flights: 12.0, ..Figures::ZERO },
+            used_percent: 101.0,
+            by: (255, 190),
+            new_serial: "SN 2",
+        }));
+        reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });
+    }
+
+    #[test]
+    fn a_later_version_with_more_fields_reads_as_far_as_it_is_known() {
+        let stored = [10, 2, 5, 1, b'a', 0xee, 0xee];
+        assert_eq!(Record::read(&stored), Record::Event(Event { number: 5, text: "a" }));
+    }
+
+    #[test]
+    fn long_texts_are_cut_at_a_characters_border() {
+        let long = "ä".repeat(300);
+        let mut stored = [0; RECORD_BYTES_MAX];
+        let len = Record::Note(Note { severity: 0, text: &long }).store(&mut stored).expect("fits");
+        assert_eq!(Record::read(&stored[..len]), Record::Note(Note { severity: 0, text: &"ä".repeat(100) }));
+        let fault = Fault { task: &long, place: &long, message: &long, ..Fault::default() };
+        assert!(Record::Fault(fault).store(&mut stored).is_ok());
+    }
+}
