@@ -12,6 +12,7 @@ pub mod collect;
 pub mod record;
 pub mod text;
 pub mod usage;
+mod wear;
 pub mod write;
 
 use std::path::{Path, PathBuf};

@@ -172,6 +172,9 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Note(note) => {
             one("HUMS_NOTE", vec![("severity", count(note.severity)), ("text", text(note.text))])
         }
+        Record::Lifetime(life) => super::wear::lifetime(life),
+        Record::Exceedance(exceedance) => super::wear::exceedance(exceedance),
+        Record::Component(component) => vec![super::wear::component(component)],
         Record::Keep(keep) => one(
             "HUMS_KEEP",
             vec![

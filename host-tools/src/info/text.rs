@@ -2,12 +2,14 @@
 //!
 //! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use hums_blackbox::Cause;
 use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
+use super::wear;
 use crate::logs;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
 use crate::utc::iso8601;
@@ -37,6 +39,7 @@ pub fn text(log: &Overview) -> String {
     findings_text(&mut text, log);
     gaps_text(&mut text, log);
     usage_text(&mut text, log);
+    wear::text(&mut text, log);
     messages_text(&mut text, log);
     text
 }
@@ -184,11 +187,18 @@ fn words(cause: Cause) -> &'static str {
 
 fn usage_text(text: &mut String, log: &Overview) {
     if !log.contents.usage.is_empty() {
-        text.push_str("  usage\n");
+        text.push_str("  usage                                     session           life\n");
     }
-    for (name, value) in &log.contents.usage {
-        let number = if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.3}") };
-        let _ = writeln!(text, "    {name:<28} {number:>14}");
+    let number = |value: Option<&f64>| match value {
+        None => String::new(),
+        Some(value) if value.fract() == 0.0 => format!("{value:.0}"),
+        Some(value) => format!("{value:.3}"),
+    };
+    let Contents { usage, lifetime, .. } = &log.contents;
+    let names: BTreeSet<_> = usage.keys().chain(lifetime.keys()).collect();
+    for name in names {
+        let (session, life) = (number(usage.get(name)), number(lifetime.get(name)));
+        let _ = writeln!(text, "{}", format!("    {name:<34} {session:>14} {life:>14}").trim_end());
     }
 }
 

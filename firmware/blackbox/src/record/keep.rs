@@ -17,7 +17,7 @@ pub struct Keep {
 
 impl Keep {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(12).u8(u8::from(self.all)).u32(self.from).u32(self.seconds);
+        sink.head(15).u8(u8::from(self.all)).u32(self.from).u32(self.seconds);
     }
 
     pub(super) fn read(fields: &mut Fields<'_>) -> Self {
