@@ -109,6 +109,8 @@ struct Decoded<C> {
     last: Option<Instant>,
     error: Option<GroupError>,
     ends_partial: bool,
+    /// Where it ends so: damaged blocks at that place, one of which may have been the whole sector.
+    damaged_partial: u32,
     closed: bool,
     /// What its records say of what is kept: the first and the last one.
     keeps: Option<(Keep, Keep)>,
@@ -152,6 +154,7 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
         last,
         error,
         ends_partial: group.last().is_some_and(|step| step.header.partial),
+        damaged_partial: group.last().filter(|step| step.header.partial).map_or(0, |step| step.damaged),
         closed: group.last().is_some_and(|step| step.header.closed),
         keeps,
     }
@@ -167,6 +170,7 @@ struct Stitch {
     /// The number of the sector that would follow.
     next_number: u32,
     cut: bool,
+    damaged_partial: u32,
     /// What the last record about it said is kept.
     keep: Option<Keep>,
 }
@@ -175,6 +179,7 @@ impl Stitch {
     fn take<C>(&mut self, group: Decoded<C>, deliver: &mut impl Deliver<C>) -> Result<()> {
         let begins_late = self.summary.groups == 0 && self.open.is_none() && group.number > 0;
         let cut = std::mem::replace(&mut self.cut, group.ends_partial);
+        self.damaged_partial = group.damaged_partial;
         if group.missing > 0 || cut || begins_late {
             let cause = match group.damaged {
                 true => Cause::Damaged,
@@ -251,6 +256,7 @@ impl Stitch {
     }
 
     fn end<C>(&mut self, damaged: u32, deliver: &mut impl Deliver<C>) -> Result<()> {
+        let damaged = damaged.saturating_add(self.damaged_partial);
         if damaged > 0 {
             let gap = self.gap(Cause::Damaged);
             gap.sectors_lost = gap.sectors_lost.saturating_add(damaged);
