@@ -5,6 +5,7 @@
 //! * [`program`] runs `hums` and reads what it left behind.
 //! * [`frames`] reads MAVLink frames with a few lines of its own and the checksum seeds of pymavlink.
 //! * [`flights`] knows the recordings and what pymavlink found in them; [`oracle`] asks it about others.
+//! * [`prove`] are the campaigns, thousands of cases each.
 //! * [`damage`] makes noise; [`fat`] checks a card's file system with the system's own tools.
 #![allow(
     clippy::missing_panics_doc,
@@ -20,3 +21,4 @@ pub mod flights;
 pub mod frames;
 pub mod oracle;
 pub mod program;
+pub mod prove;

@@ -70,8 +70,15 @@ const STEPS: [Step; 10] = [
 ];
 
 /// Crates of the firmware that must do without std, whatever builds them.
-const NO_STD: [&str; 6] =
-    ["hums-dialect", "hums-core", "hums-link", "hums-blackbox", "hums-recorder", "hums-onboard"];
+const NO_STD: [&str; 7] = [
+    "hums-dialect",
+    "hums-core",
+    "hums-link",
+    "hums-blackbox",
+    "hums-recorder",
+    "hums-store",
+    "hums-onboard",
+];
 
 pub(crate) fn list() {
     for step in &STEPS {

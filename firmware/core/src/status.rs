@@ -1,6 +1,6 @@
 //! What the checks need to know of the monitor itself: its port and its recording.
 
-use crate::time::Instant;
+use crate::time::{Instant, Span};
 
 /// The autopilot's port.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,4 +33,11 @@ pub struct RecorderStatus {
     pub queue: f32,
     /// Frames lost since power-on, wherever.
     pub frames_lost: u64,
+    /// How long the card has been keeping storage waiting, now; zero while it does not.
+    pub stall: Span,
+    /// Block writes that the card refused since power-on, retries included.
+    pub write_errors: u64,
+    /// The share of the card that logs can have, 0 to 1: free clusters and what logs have already, because the oldest
+    /// log makes room for the newest. What is missing to 1 are other files. `None` until it was counted.
+    pub room: Option<f32>,
 }

@@ -1,4 +1,4 @@
-//! The storage task's body: sectors from the queue onto the card, one at a call.
+//! The storage task's body: sectors from the queue onto the card, with one write command at a call.
 //!
 //! The least urgent task, because its library waits for the card: nothing else may wait with it. What waits for it is
 //! the sector queue, sized for a card that stands still for 2.5 s.
@@ -15,7 +15,7 @@ pub const NO_CARD_RETRY: Span = Span::from_millis(100);
 /// What one call did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Service {
-    /// A sector was written: call again at once.
+    /// Something was written: call again at once.
     Wrote,
     /// Nothing waits: call again when something does.
     Idle,
@@ -26,28 +26,44 @@ pub enum Service {
 /// The recorder with its queue's other side.
 pub struct Storage<'a, D: CardDevice> {
     recorder: Recorder<'a, D>,
+    status: &'a CardStatus,
 }
 
 impl<'a, D: CardDevice> Storage<'a, D> {
     /// For the card in `device`; see [`Recorder::new`].
     pub const fn new(device: D, status: &'a CardStatus, held: &'a HeldBlocks, entropy: u32) -> Self {
-        Self { recorder: Recorder::new(device, status, held, entropy) }
+        Self { recorder: Recorder::new(device, status, held, entropy), status }
     }
 
-    /// Writes at most one sector.
+    /// Writes what waits with at most one command. The caller tells [`CardStatus::end_service`] afterwards how long it
+    /// took.
     pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
-        let Some(sector) = sectors.oldest() else {
+        self.status.begin_service(now);
+        while sectors.oldest().is_some_and(|sector| self.recorder.take(sector)) {
+            sectors.drop_oldest();
+        }
+        if self.recorder.waiting() == 0 {
             // So that the card's state is known, and a session open, before there is anything to write.
-            return if self.recorder.ready(now) { Service::Idle } else { Service::NoCard };
-        };
-        let mut sector = *sector;
-        match self.recorder.write(now, &mut sector) {
-            Written::Done => {
-                sectors.drop_oldest();
-                Service::Wrote
+            if !self.recorder.ready(now) {
+                return Service::NoCard;
             }
+            self.recorder.idle();
+            return Service::Idle;
+        }
+        match self.recorder.write(now) {
+            Written::Done => Service::Wrote,
             Written::Later => Service::NoCard,
         }
+    }
+
+    /// Whether everything that was given to it is on the card.
+    pub fn is_done(&self, sectors: &SectorsOut) -> bool {
+        self.recorder.waiting() == 0 && sectors.is_empty()
+    }
+
+    /// Drops what waits because there is no card to write it to; how many frames are lost with it.
+    pub fn abandon(&mut self, sectors: &mut SectorsOut) -> u64 {
+        self.recorder.abandon() + sectors.abandon()
     }
 
     /// Ends the session after the last sector: the card can be pulled.

@@ -4,10 +4,11 @@ use core::fmt;
 use core::ops::ControlFlow;
 
 use embedded_sdmmc::{
-    Block, BlockDevice, BlockIdx, Error, Mode, RawDirectory, RawFile, RawVolume, ShortFileName, VolumeIdx,
+    Block, BlockDevice, BlockIdx, Error, Mode, RawDirectory, RawVolume, ShortFileName, VolumeIdx,
     VolumeManager,
 };
 
+use crate::chain::Chain;
 use crate::gate::{Gate, GateError, HeldBlocks};
 use crate::layout::{Layout, LayoutError};
 use crate::name::{EXTENSION, LogName};
@@ -84,10 +85,22 @@ pub struct LogEntry {
     offset: u32,
 }
 
-struct Open {
-    file: RawFile,
-    name: LogName,
-    bytes: u32,
+/// A segment's place on the card, for reading it and writing it in place. Good until the card is unmounted or the
+/// segment recycled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Its name.
+    pub name: LogName,
+    /// The file's length in bytes.
+    pub bytes: u32,
+    chain: Chain,
+}
+
+impl Segment {
+    /// How many whole blocks it has.
+    pub const fn blocks(&self) -> u32 {
+        self.bytes / Block::LEN_U32
+    }
 }
 
 /// A card whose first partition is FAT32, with at most one segment open.
@@ -99,7 +112,8 @@ pub struct Card<'a, D: BlockDevice> {
     layout: Layout,
     clock: FatClock<'a>,
     held: &'a HeldBlocks,
-    open: Option<Open>,
+    open: Option<Segment>,
+    free: FreeSearch,
 }
 
 impl<'a, D: BlockDevice> Card<'a, D> {
@@ -117,9 +131,16 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         let clock = FatClock(status);
         let manager = VolumeManager::new_with_limits(Gate::new(device, layout, held), clock, 1);
         match Self::open_root(&manager) {
-            Ok((volume, root)) => {
-                Ok(Self { manager: Some(manager), volume, root, layout, clock, held, open: None })
-            }
+            Ok((volume, root)) => Ok(Self {
+                manager: Some(manager),
+                volume,
+                root,
+                layout,
+                clock,
+                held,
+                open: None,
+                free: FreeSearch::new(),
+            }),
             Err(error) => Err((manager.free().0.into_device(), error)),
         }
     }
@@ -175,10 +196,15 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(())
     }
 
+    /// Whether [`CardError::Full`] means that only a part of the card was searched: to try again searches more of it.
+    pub const fn may_have_room(&self) -> bool {
+        self.free.searched > 0
+    }
+
     /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
-        self.close();
+        self.open = None;
         let made = self.allocate(name, bytes);
         let committed = self.manager()?.device(|gate| {
             if made.is_ok() {
@@ -194,10 +220,13 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         self.open(name)
     }
 
-    fn allocate(&self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
+    fn allocate(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
         let clusters = bytes.div_ceil(cluster_bytes).max(1);
-        self.manager()?.device(|gate| has_free_clusters(gate, clusters))?;
+        let mut free = self.free;
+        let found = self.manager()?.device(|gate| free.find(gate, clusters));
+        self.free = free;
+        found?;
         let manager = self.manager()?;
         manager.device(|gate| gate.begin());
         let file = manager.open_file_in_dir(self.root, short_name(name)?, Mode::ReadWriteCreate)?;
@@ -214,7 +243,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
 
     /// Gives an existing segment a new name in one block write, and opens it to be written anew.
     pub fn recycle(&mut self, old: &LogEntry, name: LogName) -> Result<(), CardError<D::Error>> {
-        self.close();
+        self.open = None;
         let short = name.short();
         let old_short = old.name.short();
         let at = old.offset as usize;
@@ -234,22 +263,29 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         self.open(name)
     }
 
-    /// Opens an existing segment for reading and for writing in place.
-    pub fn open(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
-        self.close();
-        let manager = self.manager()?;
-        let file = manager.open_file_in_dir(self.root, short_name(name)?, Mode::ReadWriteAppend)?;
-        let bytes = manager.file_length(file)?;
-        self.open = Some(Open { file, name, bytes });
-        Ok(())
+    /// Finds an existing segment.
+    pub fn segment(&self, name: LogName) -> Result<Segment, CardError<D::Error>> {
+        let mut found = None;
+        self.logs(|entry| {
+            if entry.name == name {
+                found = Some(entry);
+            }
+        })?;
+        let entry = found.ok_or(CardError::NotFound)?;
+        let mut block = [Block::new()];
+        self.manager()?.device(|gate| gate.read(&mut block, entry.block))?;
+        let at = entry.offset as usize;
+        let word =
+            |at: usize| Some(u32::from(u16::from_le_bytes([*block[0].get(at)?, *block[0].get(at + 1)?])));
+        let (Some(high), Some(low)) = (word(at + 20), word(at + 26)) else { return Err(CardError::Damaged) };
+        Ok(Segment { name, bytes: entry.bytes, chain: Chain::new((high << 16 | low) & 0x0FFF_FFFF) })
     }
 
-    /// Forgets the open segment. Nothing needs to be written for that: its length never changes.
-    fn close(&mut self) {
-        if self.open.take().is_some() {
-            // The handle is given up by opening the volume anew; a card that fails then fails at the next operation.
-            let _ = self.reopen();
-        }
+    /// Opens an existing segment for writing in place.
+    pub fn open(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
+        self.open = None;
+        self.open = Some(self.segment(name)?);
+        Ok(())
     }
 
     /// The open segment's name.
@@ -259,47 +295,136 @@ impl<'a, D: BlockDevice> Card<'a, D> {
 
     /// How many whole blocks the open segment has.
     pub fn open_blocks(&self) -> u32 {
-        self.open.as_ref().map_or(0, |open| open.bytes / Block::LEN_U32)
+        self.open.as_ref().map_or(0, Segment::blocks)
     }
 
-    /// Writes one block of the open segment in place.
-    pub fn write(&mut self, index: u32, block: &[u8; Block::LEN]) -> Result<(), CardError<D::Error>> {
-        let open = self.open.as_ref().filter(|_| index < self.open_blocks()).ok_or(CardError::NotOpen)?;
-        let manager = self.manager()?;
-        manager.file_seek_from_start(open.file, index * Block::LEN_U32)?;
-        manager.write(open.file, block)?;
-        Ok(())
+    /// Writes the first of `blocks` of the open segment in place, as many as lie in a row, with one command. How many
+    /// that were: at least one. After an error any of them may have been written.
+    pub fn write(&mut self, index: u32, blocks: &[Block]) -> Result<usize, CardError<D::Error>> {
+        let mut open = self.open.filter(|open| index < open.blocks()).ok_or(CardError::NotOpen)?;
+        let blocks_max = (open.blocks() - index) as usize;
+        let written = self.manager()?.device(|gate| {
+            let wanted = blocks.len().min(blocks_max);
+            let (start, in_row) = open.chain.locate(gate, index, wanted as u32)?;
+            let blocks = blocks.get(..wanted.min(in_row as usize)).unwrap_or_default();
+            gate.write_data(blocks, start).map(|()| blocks.len())
+        })?;
+        self.open = Some(open);
+        Ok(written)
     }
 
-    /// Reads one block of the open segment.
-    pub fn read(&self, index: u32, block: &mut [u8; Block::LEN]) -> Result<(), CardError<D::Error>> {
-        let open = self.open.as_ref().filter(|_| index < self.open_blocks()).ok_or(CardError::NotOpen)?;
-        let manager = self.manager()?;
-        manager.file_seek_from_start(open.file, index * Block::LEN_U32)?;
-        let read = manager.read(open.file, block)?;
-        if read == block.len() { Ok(()) } else { Err(CardError::Damaged) }
+    /// Reads one block of a segment.
+    pub fn read(
+        &self,
+        segment: &mut Segment,
+        index: u32,
+        block: &mut Block,
+    ) -> Result<(), CardError<D::Error>> {
+        if index >= segment.blocks() {
+            return Err(CardError::NotFound);
+        }
+        let read = self.manager()?.device(|gate| {
+            let (start, _) = segment.chain.locate(gate, index, 1)?;
+            gate.read(core::slice::from_mut(block), start)
+        });
+        Ok(read?)
+    }
+
+    /// Counts a little further how much of the card logs can have, one block of the FAT at a call; the share in
+    /// thousandths once all of it is counted.
+    pub fn count_room(&mut self) -> Result<Option<u32>, CardError<D::Error>> {
+        let mut free = self.free;
+        let mut log_clusters = 0;
+        let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
+        if free.counted < self.layout.fat_blocks {
+            let more = self.manager()?.device(|gate| free_in_block(gate, free.counted));
+            free.clusters += more?;
+            free.counted += 1;
+            self.free = free;
+            return Ok(None);
+        }
+        self.logs(|entry| log_clusters += entry.bytes.div_ceil(cluster_bytes))?;
+        let room = u64::from(free.clusters) + u64::from(log_clusters);
+        Ok(Some((room * 1000 / u64::from(self.layout.clusters)).min(1000) as u32))
     }
 }
 
-/// Fails with [`CardError::Full`] unless that many clusters are free. Asked first, so that a segment that does not fit
-/// leaves no half of a chain behind.
-fn has_free_clusters<D: BlockDevice>(gate: &Gate<'_, D>, wanted: u32) -> Result<(), CardError<D::Error>> {
+/// FAT blocks that are looked through for one new segment beside its own: 64 ms of a usual card. All of a large card's FAT takes
+/// seconds, and frames wait meanwhile.
+const SEARCH_BLOCKS: u32 = 128;
+
+/// The search for free clusters, which goes on from segment to segment, and what is known of how many there are.
+#[derive(Clone, Copy, Debug)]
+struct FreeSearch {
+    /// The FAT block to look at next; `None`: where the information sector says.
+    next: Option<u32>,
+    /// FAT blocks looked through since some were found, and what free clusters they told of.
+    searched: u32,
+    found: u32,
+    /// So many clusters, and so no more than that, were not there in all of the FAT: nothing but another computer
+    /// makes clusters free.
+    too_many: u32,
+    /// FAT blocks whose free entries are counted, for how much room there is in all.
+    counted: u32,
+    /// Free clusters counted.
+    clusters: u32,
+}
+
+impl FreeSearch {
+    const fn new() -> Self {
+        Self { next: None, searched: 0, found: 0, too_many: u32::MAX, counted: 0, clusters: 0 }
+    }
+
+    /// Fails with [`CardError::Full`] unless that many clusters were found free. Asked before a segment is made, so
+    /// that one that does not fit leaves no half of a chain behind.
+    fn find<D: BlockDevice>(&mut self, gate: &Gate<'_, D>, wanted: u32) -> Result<(), CardError<D::Error>> {
+        if wanted >= self.too_many {
+            return Err(CardError::Full);
+        }
+        let fat_blocks = gate.layout().fat_blocks;
+        let mut next = match self.next {
+            Some(next) => next,
+            None => hint(gate)? / ENTRIES,
+        };
+        for _ in 0..SEARCH_BLOCKS + wanted / ENTRIES {
+            next %= fat_blocks;
+            self.found += free_in_block(gate, next)?;
+            if self.found >= wanted {
+                // This block may have some left for the next segment. What is counted changes under the count.
+                *self = Self { next: Some(next), too_many: self.too_many, ..Self::new() };
+                return Ok(());
+            }
+            next += 1;
+            self.next = Some(next);
+            self.searched += 1;
+            if self.searched >= fat_blocks {
+                (self.searched, self.found, self.too_many) = (0, 0, wanted);
+                break;
+            }
+        }
+        Err(CardError::Full)
+    }
+}
+
+/// The cluster from which on a search is to begin, as the information sector says; the first one where it does not.
+fn hint<D: BlockDevice>(gate: &Gate<'_, D>) -> Result<u32, GateError<D::Error>> {
+    let mut block = [Block::new()];
+    gate.read(&mut block, BlockIdx(gate.layout().info))?;
+    let hint = block[0].get(492..496).and_then(|hint| hint.try_into().ok()).map_or(0, u32::from_le_bytes);
+    Ok(if hint < gate.layout().clusters + 2 { hint } else { 0 })
+}
+
+/// FAT entries of a block.
+const ENTRIES: u32 = 128;
+
+/// Free clusters that one block of the FAT tells of.
+fn free_in_block<D: BlockDevice>(gate: &Gate<'_, D>, index: u32) -> Result<u32, GateError<D::Error>> {
     let layout = gate.layout();
     let mut block = [Block::new()];
-    let mut free = 0;
-    let mut entries_left = layout.clusters + 2;
-    for index in 0..layout.fat_blocks {
-        gate.read(&mut block, BlockIdx(layout.fat_start + index))?;
-        let entries = block[0].chunks_exact(4).take(entries_left as usize);
-        free += entries
-            .filter(|entry| u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3] & 0x0F]) == 0)
-            .count();
-        if free >= wanted as usize {
-            return Ok(());
-        }
-        entries_left = entries_left.saturating_sub(128);
-    }
-    Err(CardError::Full)
+    gate.read(&mut block, BlockIdx(layout.fat_start + index))?;
+    let entries = (layout.clusters + 2).saturating_sub(index * ENTRIES).min(ENTRIES);
+    let is_free = |entry: &&[u8]| u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3] & 0x0F]) == 0;
+    Ok(block[0].chunks_exact(4).take(entries as usize).filter(is_free).count() as u32)
 }
 
 fn short_name<E>(name: LogName) -> Result<ShortFileName, CardError<E>> {

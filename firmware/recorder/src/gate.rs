@@ -66,15 +66,21 @@ struct Held {
     kind: Kind,
 }
 
-/// Room for the blocks that are held back. Lent to the gate, because the gate is moved with the card and this, 6 KiB,
-/// would come along on the firmware's stack each time.
+/// Blocks of log that are written with one command at most: the gain of more is small, and they take RAM.
+pub const BATCH_BLOCKS: usize = 8;
+
+/// Room for the blocks that are held back, and for the sectors that are being written. Lent, because gate and recorder
+/// are moved with the card and this, 10 KiB, would come along on the firmware's stack each time.
 #[derive(Default)]
-pub struct HeldBlocks(RefCell<Vec<Held, HELD_BLOCKS>>);
+pub struct HeldBlocks {
+    metadata: RefCell<Vec<Held, HELD_BLOCKS>>,
+    pub(crate) batch: RefCell<Vec<Block, BATCH_BLOCKS>>,
+}
 
 impl HeldBlocks {
     /// Nothing held.
     pub const fn new() -> Self {
-        Self(RefCell::new(Vec::new()))
+        Self { metadata: RefCell::new(Vec::new()), batch: RefCell::new(Vec::new()) }
     }
 }
 
@@ -92,14 +98,14 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     /// A gate for a card whose layout was checked.
     pub fn new(device: D, layout: Layout, held: &'a HeldBlocks) -> Self {
         // What another gate left there is about another mount.
-        held.0.borrow_mut().clear();
+        held.metadata.borrow_mut().clear();
         Self {
             device,
             layout,
             transaction: Cell::new(false),
             discard: Cell::new(false),
             reads_left: Cell::new(0),
-            held: &held.0,
+            held: &held.metadata,
         }
     }
 
@@ -153,6 +159,15 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         self.transaction.set(false);
         self.discard.set(false);
         self.held.borrow_mut().clear();
+    }
+
+    /// Writes blocks of a file in place, in one command. Not for use within a transaction.
+    pub fn write_data(&self, blocks: &[Block], start: BlockIdx) -> Result<(), GateError<D::Error>> {
+        let last = start.0.saturating_add((blocks.len() as u32).saturating_sub(1));
+        if self.transaction.get() || !self.layout.is_data(start.0) || !self.layout.is_data(last) {
+            return Err(GateError::Refused);
+        }
+        self.device.write(blocks, start).map_err(GateError::Device)
     }
 
     fn write_device(&self, block: &Block, at: u32) -> Result<(), GateError<D::Error>> {

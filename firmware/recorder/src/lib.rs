@@ -9,16 +9,22 @@
 //!   between leaves unused clusters, nothing else.
 //! * When the card is full the oldest segment is renamed, one block write, and written anew ([`card::Card::recycle`]).
 //!
+//! * Sectors that wait together and lie in a row are written with one command ([`chain::Chain`]).
+//! * Of a vehicle that is recorded by arming, while it is disarmed, only the last while is kept: small segments that are
+//!   renamed and overwritten in turn.
+//!
 //! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before `embedded-sdmmc` sees the card, and
 //! [`gate::Gate`] checks what it reads of the FAT and bounds how much it may read.
 #![cfg_attr(not(test), no_std)]
 
 pub mod card;
+pub mod chain;
 pub mod format;
 pub mod gate;
 pub mod layout;
 pub mod name;
 pub mod recorder;
+mod ring;
 pub mod status;
 
 pub use card::{Card, CardError};

@@ -4,9 +4,14 @@
 //! first group that no longer fits, so that each file can be read by itself. A *partial* sector (one still in progress)
 //! is written alternately at its own place and at the next one, so that a torn write never takes the older copy with it.
 //!
+//! Of what a disarmed vehicle sends, when it is recorded by arming, only the last while is kept: small segments in a
+//! ring, of which the oldest is renamed and written anew once those after it hold enough. The monitor says when
+//! ([`CardStatus::wait_from`]) and says so in the record.
+//!
 //! What fails is tried again, then given a new segment, then the card is given up and looked for once a second. A
 //! sector is only counted lost when it can never be written: the caller keeps it until then.
 
+use embedded_sdmmc::Block;
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES, Sector};
 use hums_core::time::{Instant, Span};
 
@@ -14,6 +19,7 @@ use crate::CardDevice;
 use crate::card::{Card, CardError, LogEntry};
 use crate::gate::HeldBlocks;
 use crate::name::LogName;
+use crate::ring::{self, Ring};
 use crate::status::{CardState, CardStatus};
 
 /// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
@@ -46,6 +52,10 @@ pub struct Recorder<'a, D: CardDevice> {
     /// The card in the slot is another one than the group's beginning was written to: nothing is readable on it before
     /// the next group.
     await_group: bool,
+    /// The segments of a disarmed vehicle.
+    ring: Ring,
+    /// How much room this card has was counted.
+    room_known: bool,
     finished: bool,
 }
 
@@ -85,6 +95,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             retry_at: Instant::ZERO,
             log: None,
             await_group: false,
+            ring: Ring::new(),
+            room_known: false,
             finished: false,
         }
     }
@@ -108,7 +120,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
                 return false;
             }
         }
-        match self.begin() {
+        self.room_known = false;
+        self.status.set_room_permille(None);
+        match self.begin(now) {
             Ok(()) => true,
             Err(error) => {
                 self.give_up(now, &error);
@@ -117,20 +131,44 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// Writes a sector at its place.
-    pub fn write(&mut self, now: Instant, sector: &mut Sector) -> Written {
+    /// Takes a sector to be written; `false`: there is no room for more, [`Self::write`] makes some.
+    pub fn take(&mut self, sector: &Sector) -> bool {
+        let mut block = Block::new();
+        block.contents = *sector.bytes();
+        self.held.batch.borrow_mut().push(block).is_ok()
+    }
+
+    /// Sectors that were taken and are not on the card yet.
+    pub fn waiting(&self) -> usize {
+        self.held.batch.borrow().len()
+    }
+
+    /// Forgets them, because there is no card; how many frames are lost with them.
+    pub fn abandon(&mut self) -> u64 {
+        let mut batch = self.held.batch.borrow_mut();
+        let frames = batch.iter().map(sector_of).filter(|sector| !sector.is_partial());
+        let frames = frames.map(|sector| u64::from(sector.frames())).sum();
+        batch.clear();
+        frames
+    }
+
+    /// Writes sectors that were taken: the oldest, and with the same command those after it that belong right behind
+    /// it. With none taken there is nothing to do, which is [`Written::Done`].
+    pub fn write(&mut self, now: Instant) -> Written {
         if !self.ready(now) {
             return Written::Later;
         }
-        self.await_group &= !sector.starts_group();
+        let Some(first) = self.sector(0) else { return Written::Done };
+        self.await_group &= !first.starts_group();
         if self.await_group {
-            if !sector.is_partial() {
-                self.status.count_lost_sector(u32::from(sector.frames()));
+            if !first.is_partial() {
+                self.status.count_lost_sector(u32::from(first.frames()));
             }
+            self.drop_written(1);
             return Written::Done;
         }
         for _ in 0..WRITE_TRIES {
-            match self.try_write(sector) {
+            match self.try_write(now, &first) {
                 Ok(()) => return Written::Done,
                 Err(CardError::Full) => {
                     self.give_up(now, &CardError::Full);
@@ -140,9 +178,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             }
         }
         // A new segment may lie where the card still works.
-        let moved = self.next_segment().and_then(|()| {
+        let moved = self.next_segment(now).and_then(|()| {
             self.status.want_group();
-            self.try_write(sector)
+            self.try_write(now, &first)
         });
         match moved {
             Ok(()) => Written::Done,
@@ -150,6 +188,23 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
                 self.give_up(now, &error);
                 Written::Later
             }
+        }
+    }
+
+    /// With nothing to write: counts a little further how much room there is on the card.
+    pub fn idle(&mut self) {
+        if self.room_known {
+            return;
+        }
+        let Slot::Mounted(card) = &mut self.slot else { return };
+        match card.count_room() {
+            Ok(None) => {}
+            Ok(room) => {
+                self.status.set_room_permille(room);
+                self.room_known = true;
+            }
+            // The next write meets the same trouble and deals with it.
+            Err(_) => self.room_known = true,
         }
     }
 
@@ -178,39 +233,87 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         if let Slot::Waiting(device) = self.slot { Some(device) } else { None }
     }
 
-    fn try_write(&mut self, sector: &mut Sector) -> Result<(), CardError<D::Error>> {
-        let Some(mut log) = self.log else { return Err(CardError::NotOpen) };
-        let blocks = self.mounted()?.open_blocks();
-        let number = sector.number();
-        let base = *log.base.get_or_insert(number);
-        let mut at = number.wrapping_sub(base);
-        // Also a number from before this segment (a restarted count) gets a segment of its own.
-        let no_room_for_group =
-            sector.starts_group() && at > 0 && at.saturating_add(GROUP_SECTORS as u32) > blocks;
-        if at >= blocks || no_room_for_group {
-            self.next_segment()?;
-            log = self.log.ok_or(CardError::NotOpen)?;
-            log.base = Some(number);
-            at = 0;
+    fn try_write(&mut self, now: Instant, first: &Sector) -> Result<(), CardError<D::Error>> {
+        let number = first.number();
+        let keep = self.status.waiting().filter(|(from, _)| number >= *from).map(|(_, keep)| keep);
+        self.ring.keep(keep);
+        if self.must_move(now, first)? {
+            self.next_segment(now)?;
         }
-        if sector.is_partial() {
-            if log.partial_further && at + 1 < self.mounted()?.open_blocks() {
+        let mut log = self.log.ok_or(CardError::NotOpen)?;
+        if self.ring.is_empty() {
+            // The segment of the power-on is the first that may go.
+            self.ring.begin(log.name, now);
+        }
+        let mut at = number.wrapping_sub(*log.base.get_or_insert(number));
+        let blocks = self.mounted()?.open_blocks();
+        let count = if first.is_partial() {
+            if log.partial_further && at + 1 < blocks {
                 at += 1;
             }
             log.partial_further = !log.partial_further;
+            1
         } else {
             log.partial_further = true;
-        }
-        sector.seal(log.session);
-        self.mounted()?.write(at, sector.bytes())?;
-        self.status.count_block();
+            self.count_in_row(number, (blocks - at) as usize)
+        };
+        let written = self.write_sealed(&log, at, count)?;
+        self.status.count_blocks(written as u32);
         self.log = Some(log);
+        self.drop_written(written);
         Ok(())
+    }
+
+    fn write_sealed(&mut self, log: &Log, at: u32, count: usize) -> Result<usize, CardError<D::Error>> {
+        let mut batch = self.held.batch.borrow_mut();
+        let batch = batch.get_mut(..count).ok_or(CardError::NotOpen)?;
+        for block in batch.iter_mut() {
+            let mut sector = sector_of(block);
+            sector.seal(log.session);
+            block.contents = *sector.bytes();
+        }
+        self.mounted()?.write(at, batch)
+    }
+
+    /// Whether this sector belongs into a new segment.
+    fn must_move(&mut self, now: Instant, sector: &Sector) -> Result<bool, CardError<D::Error>> {
+        let Some(Log { base: Some(base), .. }) = self.log else { return Ok(false) };
+        let blocks = self.mounted()?.open_blocks();
+        let at = sector.number().wrapping_sub(base);
+        if at >= blocks {
+            // Also a number from before this segment (a restarted count) gets a segment of its own.
+            return Ok(true);
+        }
+        if self.ring.asks_for_group(now) {
+            self.status.want_group();
+        }
+        let fits = at.saturating_add(GROUP_SECTORS as u32) <= blocks;
+        Ok(sector.starts_group() && at > 0 && (!fits || self.ring.is_due(now)))
+    }
+
+    /// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
+    /// and only the first may begin a group, because a segment may end before the next.
+    fn count_in_row(&self, number: u32, max: usize) -> usize {
+        let batch = self.held.batch.borrow();
+        let follows = |(index, block): &(usize, &Block)| {
+            let sector = sector_of(block);
+            let in_order = sector.number() == number.wrapping_add(*index as u32);
+            *index == 0 || in_order && !sector.is_partial() && !sector.starts_group()
+        };
+        batch.iter().enumerate().take(max).take_while(follows).count()
+    }
+
+    fn sector(&self, index: usize) -> Option<Sector> {
+        self.held.batch.borrow().get(index).map(sector_of)
+    }
+
+    fn drop_written(&self, count: usize) {
+        self.held.batch.borrow_mut().drain(..count);
     }
 
     /// Opens a segment on a card just mounted: the session goes on where the same card came back, and is a new one on
     /// another card.
-    fn begin(&mut self) -> Result<(), CardError<D::Error>> {
+    fn begin(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
         let volume_id = self.mounted()?.layout().volume_id;
         let newest = self.survey(LogName { session: 0, segment: 0 })?.newest;
         let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
@@ -224,10 +327,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             Log { name, session, volume_id, base: None, partial_further: true }
         };
         let before = self.log.replace(log);
+        self.ring.clear();
         if Some(log.name) == newest {
-            self.next_segment()?;
+            self.next_segment(now)?;
         } else {
-            self.open_segment(log.name)?;
+            self.open_segment(now, log.name)?;
         }
         if let Some(before) = before {
             self.await_group = before.session != log.session;
@@ -236,32 +340,68 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(())
     }
 
-    fn next_segment(&mut self) -> Result<(), CardError<D::Error>> {
-        let name = self.log.and_then(|log| log.name.next_segment()).ok_or(CardError::Full)?;
-        self.open_segment(name)
+    fn next_segment(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
+        let log = self.log.ok_or(CardError::NotOpen)?;
+        // What is recorded around one arming is a log of its own.
+        let begins_waiting = self.ring.is_on() && self.ring.is_empty() && log.base.is_some();
+        let name = if begins_waiting { log.name.next_session() } else { log.name.next_segment() };
+        self.open_segment(now, name.ok_or(CardError::Full)?)
     }
 
-    /// Makes a segment, or overwrites the oldest one when the card has no room.
-    fn open_segment(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
-        let card = self.mounted()?;
-        let bytes = (card.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(SEGMENT_BYTES_MAX)) as u32;
-        let overwrote = match card.create(name, bytes) {
-            Ok(()) => false,
-            Err(CardError::Full) => {
-                let oldest = self.survey(name)?.oldest.ok_or(CardError::Full)?;
-                self.mounted()?.recycle(&oldest, name)?;
-                true
-            }
-            Err(error) => return Err(error),
+    /// Makes a segment, or overwrites the oldest one when the card has no room, or the oldest one of those that are
+    /// kept only for a while when that while is over.
+    fn open_segment(&mut self, now: Instant, name: LogName) -> Result<(), CardError<D::Error>> {
+        let overwrote = match self.ring.release(now) {
+            Some(old) => self.recycle(&old, name)?,
+            None => self.create_or_overwrite(name)?,
         };
         if let Some(log) = &mut self.log {
             log.name = name;
             log.base = None;
             log.partial_further = true;
         }
+        self.ring.begin(name, now);
         self.status.begin_segment(name.session, overwrote);
         self.status.set_state(CardState::Recording);
         Ok(())
+    }
+
+    /// Overwrites the segment `old`, which no longer counts; makes a new one where it is gone.
+    fn recycle(&mut self, old: &LogName, name: LogName) -> Result<bool, CardError<D::Error>> {
+        let mut found = None;
+        self.mounted()?.logs(|entry| {
+            if entry.name == *old {
+                found = Some(entry);
+            }
+        })?;
+        match found {
+            Some(entry) => {
+                self.mounted()?.recycle(&entry, name)?;
+                self.status.count_released();
+                Ok(false)
+            }
+            None => self.create_or_overwrite(name),
+        }
+    }
+
+    fn create_or_overwrite(&mut self, name: LogName) -> Result<bool, CardError<D::Error>> {
+        let bytes_max = if self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
+        let bytes = (self.mounted()?.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(bytes_max)) as u32;
+        loop {
+            match self.mounted()?.create(name, bytes) {
+                Ok(()) => return Ok(false),
+                Err(CardError::Full) => {}
+                Err(error) => return Err(error),
+            }
+            if let Some(oldest) = self.survey(name)?.oldest {
+                self.ring.forget(oldest.name);
+                self.mounted()?.recycle(&oldest, name)?;
+                return Ok(true);
+            }
+            if !self.mounted()?.may_have_room() {
+                return Err(CardError::Full);
+            }
+        }
     }
 
     /// The newest log on the card, and the oldest one that may be overwritten.
@@ -304,6 +444,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             CardError::NotFound | CardError::NotOpen => CardState::Failing,
         });
     }
+}
+
+fn sector_of(block: &Block) -> Sector {
+    Sector::from_bytes(block.contents)
 }
 
 struct Survey {

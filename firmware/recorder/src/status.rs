@@ -3,6 +3,14 @@
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use embedded_sdmmc::{TimeSource, Timestamp};
+use hums_core::time::{Instant, Span};
+
+/// Every sector is kept: what [`CardStatus`] says while a recording is to stay.
+const KEEP_ALL: u32 = u32::MAX;
+/// No service of the card is going on.
+const IDLE: u32 = u32::MAX;
+/// How much room there is was not counted yet.
+const UNCOUNTED: u32 = u32::MAX;
 
 /// What the card is doing. The numbers are stored in logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,13 +55,23 @@ pub struct CardStatus {
     session: AtomicU32,
     segments: AtomicU32,
     segments_overwritten: AtomicU32,
+    segments_released: AtomicU32,
     blocks_written: AtomicU32,
+    writes: AtomicU32,
     write_errors: AtomicU32,
     frames_lost: AtomicU32,
     sectors_lost: AtomicU32,
     stall_ms_max: AtomicU32,
+    /// When the service of the card that is going on began, milliseconds modulo 2^32; [`IDLE`] between services.
+    busy_since_ms: AtomicU32,
+    /// Thousandths of the card that logs can have.
+    room: AtomicU32,
     queue_sectors_max: AtomicU32,
     group_wanted: AtomicBool,
+    /// From this sector on only the latest are kept; [`KEEP_ALL`]: all are.
+    waiting_from: AtomicU32,
+    /// How much of them, in milliseconds.
+    waiting_ms: AtomicU32,
     fat_time: AtomicU32,
 }
 
@@ -68,8 +86,12 @@ pub struct CardReading {
     pub segments: u32,
     /// Segments of earlier sessions that were overwritten because the card is full.
     pub segments_overwritten: u32,
+    /// Segments of this session that were overwritten because the vehicle was disarmed and is recorded by arming.
+    pub segments_released: u32,
     /// Blocks of 512 bytes of log data that the card took.
     pub blocks_written: u32,
+    /// Write commands that took them: fewer, because sectors that wait together are written together.
+    pub writes: u32,
     /// Writes that failed, retries included.
     pub write_errors: u32,
     /// Frames in sectors that could not be written.
@@ -78,6 +100,9 @@ pub struct CardReading {
     pub sectors_lost: u32,
     /// The longest time that one service of the card took, in milliseconds.
     pub stall_ms_max: u32,
+    /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
+    /// file allocation table was counted, which takes a while on a large card.
+    pub room_permille: Option<u32>,
     /// The most sectors that waited at once.
     pub queue_sectors_max: u32,
 }
@@ -96,13 +121,19 @@ impl CardStatus {
             session: AtomicU32::new(0),
             segments: AtomicU32::new(0),
             segments_overwritten: AtomicU32::new(0),
+            segments_released: AtomicU32::new(0),
             blocks_written: AtomicU32::new(0),
+            writes: AtomicU32::new(0),
             write_errors: AtomicU32::new(0),
             frames_lost: AtomicU32::new(0),
             sectors_lost: AtomicU32::new(0),
             stall_ms_max: AtomicU32::new(0),
+            busy_since_ms: AtomicU32::new(IDLE),
+            room: AtomicU32::new(UNCOUNTED),
             queue_sectors_max: AtomicU32::new(0),
             group_wanted: AtomicBool::new(false),
+            waiting_from: AtomicU32::new(KEEP_ALL),
+            waiting_ms: AtomicU32::new(0),
             fat_time: AtomicU32::new(0),
         }
     }
@@ -114,11 +145,14 @@ impl CardStatus {
             session: self.session.load(Ordering::Relaxed),
             segments: self.segments.load(Ordering::Relaxed),
             segments_overwritten: self.segments_overwritten.load(Ordering::Relaxed),
+            segments_released: self.segments_released.load(Ordering::Relaxed),
             blocks_written: self.blocks_written.load(Ordering::Relaxed),
+            writes: self.writes.load(Ordering::Relaxed),
             write_errors: self.write_errors.load(Ordering::Relaxed),
             frames_lost: self.frames_lost.load(Ordering::Relaxed),
             sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
             stall_ms_max: self.stall_ms_max.load(Ordering::Relaxed),
+            room_permille: Some(self.room.load(Ordering::Relaxed)).filter(|room| *room != UNCOUNTED),
             queue_sectors_max: self.queue_sectors_max.load(Ordering::Relaxed),
         }
     }
@@ -133,8 +167,13 @@ impl CardStatus {
         self.segments_overwritten.fetch_add(u32::from(overwrote), Ordering::Relaxed);
     }
 
-    pub(crate) fn count_block(&self) {
-        self.blocks_written.fetch_add(1, Ordering::Relaxed);
+    pub(crate) fn count_released(&self) {
+        self.segments_released.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn count_blocks(&self, blocks: u32) {
+        self.blocks_written.fetch_add(blocks, Ordering::Relaxed);
+        self.writes.fetch_add(1, Ordering::Relaxed);
     }
 
     pub(crate) fn count_write_error(&self) {
@@ -146,9 +185,29 @@ impl CardStatus {
         self.frames_lost.fetch_add(frames, Ordering::Relaxed);
     }
 
-    /// Notes how long one service of the card took.
-    pub fn note_stall_ms(&self, stall_ms: u32) {
-        self.stall_ms_max.fetch_max(stall_ms, Ordering::Relaxed);
+    /// Notes how much of the card logs can have, in thousandths; `None`: not counted.
+    pub fn set_room_permille(&self, room: Option<u32>) {
+        self.room.store(room.unwrap_or(UNCOUNTED), Ordering::Relaxed);
+    }
+
+    /// A service of the card begins; [`Self::end_service`] is to follow.
+    pub fn begin_service(&self, now: Instant) {
+        self.busy_since_ms.store((now.as_millis() as u32).min(IDLE - 1), Ordering::Relaxed);
+    }
+
+    /// The service of the card has ended; it took this long, in milliseconds.
+    pub fn end_service(&self, took_ms: u32) {
+        self.busy_since_ms.store(IDLE, Ordering::Relaxed);
+        self.stall_ms_max.fetch_max(took_ms, Ordering::Relaxed);
+    }
+
+    /// How long the service of the card that is going on has taken by now; zero between services.
+    pub fn stall(&self, now: Instant) -> Span {
+        match self.busy_since_ms.load(Ordering::Relaxed) {
+            IDLE => Span::ZERO,
+            // A service is far shorter than the 49 days after which the number repeats.
+            since => Span::from_millis(u64::from((now.as_millis() as u32).wrapping_sub(since))),
+        }
     }
 
     /// Notes how many sectors wait.
@@ -164,6 +223,25 @@ impl CardStatus {
     /// Whether storage asked for a new group since the last call.
     pub fn take_group_wanted(&self) -> bool {
         self.group_wanted.swap(false, Ordering::Acquire)
+    }
+
+    /// From sector `number` on, at the next group, only the last `keep` are kept: the vehicle is disarmed, and is
+    /// recorded by arming. What is older is overwritten.
+    pub fn wait_from(&self, number: u32, keep: Span) {
+        self.waiting_ms.store(keep.as_millis().min(u64::from(u32::MAX)) as u32, Ordering::Relaxed);
+        self.waiting_from.store(number.min(KEEP_ALL - 1), Ordering::Release);
+    }
+
+    /// Everything that is on the card now and all that comes is kept.
+    pub fn keep_all(&self) {
+        self.waiting_from.store(KEEP_ALL, Ordering::Release);
+    }
+
+    /// From which sector on how much is kept; `None`: everything.
+    pub(crate) fn waiting(&self) -> Option<(u32, Span)> {
+        let from = self.waiting_from.load(Ordering::Acquire);
+        let keep = Span::from_millis(u64::from(self.waiting_ms.load(Ordering::Relaxed)));
+        (from != KEEP_ALL).then_some((from, keep))
     }
 
     /// Tells the date for directory entries, in seconds since 1970 UTC.
@@ -213,6 +291,17 @@ mod tests {
         let leap_day = timestamp(1_709_210_096); // 2024-02-29T12:34:56Z
         assert_eq!(leap_day.to_string(), "2024-02-29 12:34:56");
         assert_eq!(timestamp(0).to_string(), "1980-01-01 00:00:00");
+    }
+
+    #[test]
+    fn a_service_that_goes_on_is_seen_until_it_ends() {
+        let status = CardStatus::new();
+        assert_eq!(status.stall(Instant::from_millis(5_000)), Span::ZERO);
+        status.begin_service(Instant::from_millis(5_000));
+        assert_eq!(status.stall(Instant::from_millis(7_500)), Span::from_millis(2_500));
+        status.end_service(2_600);
+        assert_eq!(status.stall(Instant::from_millis(8_000)), Span::ZERO);
+        assert_eq!(status.read().stall_ms_max, 2_600);
     }
 
     #[test]

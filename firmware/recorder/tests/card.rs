@@ -3,6 +3,7 @@
 mod common;
 
 use common::{Broken, MIB_BLOCKS, MemCard, held};
+use embedded_sdmmc::Block;
 use hums_recorder::card::{Card, CardError, LogEntry};
 use hums_recorder::format::{BLOCKS_MIN, FormatError, format};
 use hums_recorder::layout::LayoutError;
@@ -21,8 +22,10 @@ fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
     logs
 }
 
-fn pattern(seed: u32) -> [u8; 512] {
-    std::array::from_fn(|index| (seed as usize * 31 + index) as u8)
+fn pattern(seed: u32) -> Block {
+    let mut block = Block::new();
+    block.contents = std::array::from_fn(|index| (seed as usize * 31 + index) as u8);
+    block
 }
 
 #[test]
@@ -33,18 +36,63 @@ fn a_segment_reads_back_after_a_remount() {
     card.create(FIRST, 1 << 20).expect("there is room");
     assert_eq!(card.open_blocks(), 2048);
     for index in (0..2048).rev() {
-        card.write(index, &pattern(index)).expect("in place");
+        card.write(index, &[pattern(index)]).expect("in place");
     }
     drop(card);
     let mut card = mount(&device, &status);
     assert_eq!(logs(&card).iter().map(|log| (log.name, log.bytes)).collect::<Vec<_>>(), [(FIRST, 1 << 20)]);
-    card.open(FIRST).expect("it is there");
-    let mut block = [0; 512];
+    let mut segment = card.segment(FIRST).expect("it is there");
+    let mut block = Block::new();
     for index in 0..2048 {
-        card.read(index, &mut block).expect("it reads");
-        assert_eq!(block, pattern(index), "block {index}");
+        card.read(&mut segment, index, &mut block).expect("it reads");
+        assert_eq!(block.contents, pattern(index).contents, "block {index}");
     }
-    assert_eq!(card.write(2048, &block), Err(CardError::NotOpen));
+    assert_eq!(card.read(&mut segment, 2048, &mut block), Err(CardError::NotFound));
+    card.open(FIRST).expect("it is there");
+    assert_eq!(card.write(2048, &[block]), Err(CardError::NotOpen));
+}
+
+/// Two segments that grew in turns lie in pieces: a write ends where its piece does, and says so.
+#[test]
+fn a_write_of_many_blocks_takes_one_command_for_each_row_of_clusters() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 64 * 1024).expect("there is room");
+    card.create(SECOND, 64 * 1024).expect("there is room");
+    let layout = *card.layout();
+    let cluster_of = |block: u32| (block - layout.data_start) / layout.cluster_blocks + 2;
+    let first_of = |card: &mut Card<'_, MemCard>, name| {
+        card.open(name).expect("it is there");
+        device.journal.borrow_mut().clear();
+        card.write(0, &[pattern(0)]).expect("in place");
+        cluster_of(device.journal.borrow()[0].0)
+    };
+    let (first, second) = (first_of(&mut card, FIRST), first_of(&mut card, SECOND));
+    drop(card);
+    // After its fifth cluster the first segment goes on in the second one's, and the other way round.
+    let link = |from: u32, to: u32| {
+        let (block, offset) = (layout.fat_start + from / 128, from as usize % 128 * 4);
+        device.blocks.borrow_mut().entry(block).or_insert([0; 512])[offset..offset + 4]
+            .copy_from_slice(&to.to_le_bytes());
+    };
+    link(first + 4, second + 5);
+    link(second + 4, first + 5);
+    let mut card = mount(&device, &status);
+    card.open(FIRST).expect("it is there");
+    device.journal.borrow_mut().clear();
+    device.writes.set(0);
+    let all: Vec<Block> = (0..64).map(pattern).collect();
+    let row = 5 * layout.cluster_blocks as usize;
+    assert_eq!(card.write(0, &all), Ok(row));
+    assert_eq!(card.write(row as u32, &all[row..]), Ok(64 - row));
+    assert_eq!((device.writes.get(), device.journal.borrow().len()), (2, 64));
+    let mut segment = card.segment(FIRST).expect("it is there");
+    for index in (0..64).rev() {
+        let mut block = Block::new();
+        card.read(&mut segment, index, &mut block).expect("it reads");
+        assert_eq!(block.contents, pattern(index).contents, "block {index}");
+    }
 }
 
 #[test]
@@ -55,7 +103,7 @@ fn writing_in_place_touches_neither_fat_nor_directory() {
     card.create(FIRST, 1 << 20).expect("there is room");
     device.journal.borrow_mut().clear();
     for index in 0..2048 {
-        card.write(index, &pattern(index)).expect("in place");
+        card.write(index, &[pattern(index)]).expect("in place");
     }
     assert_eq!(device.journal.borrow().len(), 2048);
     let layout = *card.layout();
@@ -77,14 +125,14 @@ fn a_cut_at_any_write_leaves_the_card_in_order() {
     let status = CardStatus::new();
     let mut card = mount(&device, &status);
     card.create(FIRST, 256 * 1024).expect("there is room");
-    card.write(7, &pattern(7)).expect("in place");
+    card.write(7, &[pattern(7)]).expect("in place");
     let before = device.blocks.borrow().clone();
     device.journal.borrow_mut().clear();
     card.create(SECOND, 4 << 20).expect("there is room");
-    card.write(0, &pattern(0)).expect("in place");
+    card.write(0, &[pattern(0)]).expect("in place");
     let oldest = logs(&card)[0];
     card.recycle(&oldest, LogName { session: 3, segment: 0 }).expect("it is there");
-    card.write(1, &pattern(1)).expect("in place");
+    card.write(1, &[pattern(1)]).expect("in place");
 
     let journal = device.journal.borrow().clone();
     assert!(journal.len() > 20 && journal.len() < 200, "{} writes", journal.len());
@@ -108,18 +156,19 @@ fn a_cut_at_any_write_leaves_the_card_in_order() {
 
 fn check_in_order(device: &MemCard, cut: usize) {
     let status = CardStatus::new();
-    let mut card = mount(device, &status);
+    let card = mount(device, &status);
     let found = logs(&card);
     assert!(!found.is_empty() && found.len() <= 2, "cut {cut}: {found:?}");
     for log in found {
-        card.open(log.name).map_err(|error| format!("cut {cut}: {}: {error}", log.name)).expect("it opens");
-        let mut block = [0; 512];
-        for index in 0..card.open_blocks() {
-            card.read(index, &mut block)
+        let opened = card.segment(log.name).map_err(|error| format!("cut {cut}: {}: {error}", log.name));
+        let mut segment = opened.expect("it is there");
+        let mut block = Block::new();
+        for index in 0..segment.blocks() {
+            card.read(&mut segment, index, &mut block)
                 .map_err(|error| format!("cut {cut}: {} {index}: {error}", log.name))
                 .expect("it reads");
             if log.name == FIRST && index == 7 {
-                assert_eq!(block, pattern(7), "cut {cut}");
+                assert_eq!(block.contents, pattern(7).contents, "cut {cut}");
             }
         }
     }
@@ -227,9 +276,12 @@ fn a_fat_full_of_nonsense_is_an_error_and_never_a_panic() {
             let _ = card.logs(|_| {});
             let _ = card.create(SECOND, 512 * 1024);
             let _ = card.open(FIRST);
-            let mut block = [0; 512];
-            for index in 0..card.open_blocks().min(5_000) {
-                if card.read(index, &mut block).is_err() || card.write(index, &block).is_err() {
+            let mut block = Block::new();
+            let Ok(mut segment) = card.segment(FIRST) else { continue };
+            for index in 0..segment.blocks().min(5_000) {
+                if card.read(&mut segment, index, &mut block).is_err()
+                    || card.write(index, &[block.clone()]).is_err()
+                {
                     break;
                 }
             }

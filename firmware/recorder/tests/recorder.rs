@@ -6,10 +6,11 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use common::{MIB_BLOCKS, MemCard, held};
-use hums_blackbox::{Header, SECTOR_BYTES, Sector, SectorSink, Writer};
-use hums_core::time::Instant;
+use embedded_sdmmc::Block;
+use hums_blackbox::{Header, Sector, SectorSink, Writer};
+use hums_core::time::{Instant, Span};
 use hums_recorder::card::Card;
-use hums_recorder::{CardState, CardStatus, LogName, Recorder, Written};
+use hums_recorder::{CardDevice, CardState, CardStatus, LogName, Recorder, Written};
 
 struct Sink(Vec<Sector>);
 
@@ -40,21 +41,26 @@ fn sectors(count: u32) -> Vec<Sector> {
     sink.0
 }
 
+/// Gives a sector to the recorder and lets it write.
+fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sector) -> Written {
+    assert!(recorder.waiting() > 0 || recorder.take(sector));
+    recorder.write(now)
+}
+
 /// The sectors of one session that a card holds: (number, place) in the order of segments and blocks.
 fn stored(device: &MemCard) -> Vec<(LogName, u32, Header)> {
     let status = CardStatus::new();
-    let mut card =
-        Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+    let card = Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
     let mut names = Vec::new();
     card.logs(|entry| names.push(entry.name)).expect("it lists");
     names.sort_unstable();
     let mut found = Vec::new();
     for name in names {
-        card.open(name).expect("it opens");
-        for at in 0..card.open_blocks() {
-            let mut block = [0; SECTOR_BYTES];
-            card.read(at, &mut block).expect("it reads");
-            if let Ok(header) = Header::read(&block) {
+        let mut segment = card.segment(name).expect("it is there");
+        for at in 0..segment.blocks() {
+            let mut block = Block::new();
+            card.read(&mut segment, at, &mut block).expect("it reads");
+            if let Ok(header) = Header::read(&block.contents) {
                 found.push((name, at, header));
             }
         }
@@ -79,8 +85,7 @@ fn a_card_that_comes_back_goes_on_where_it_was() {
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
         device.broken.set((100..110).contains(&index) && now_ms < 5_000);
-        let mut sector = *sector;
-        while recorder.write(Instant::from_millis(now_ms), &mut sector) == Written::Later {
+        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Written::Later {
             assert_ne!(status.read().state, CardState::Recording);
             now_ms += 100;
             device.broken.set(now_ms < 5_000);
@@ -104,13 +109,13 @@ fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
     let mut recorder = Recorder::new(slot.clone(), &status, held(), 7);
     let all = sectors(2_000);
     for sector in &all[..100] {
-        assert_eq!(recorder.write(Instant::ZERO, &mut sector.clone()), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
     }
     first.broken.set(true);
-    assert_eq!(recorder.write(Instant::from_millis(10), &mut all[100].clone()), Written::Later);
+    assert_eq!(put(&mut recorder, Instant::from_millis(10), &all[100]), Written::Later);
     *slot.0.borrow_mut() = second.clone();
     for sector in &all[100..] {
-        assert_eq!(recorder.write(Instant::from_millis(2_000), &mut sector.clone()), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::from_millis(2_000), sector), Written::Done);
     }
     first.broken.set(false);
     let (before, after) = (numbers(&first), numbers(&second));
@@ -156,7 +161,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     for session in 0..sessions {
         let mut recorder = Recorder::new(device.clone(), &status, held(), session);
         for sector in sectors(100) {
-            assert_eq!(recorder.write(Instant::ZERO, &mut sector.clone()), Written::Done);
+            assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Written::Done);
         }
         recorder.finish();
     }
@@ -179,7 +184,7 @@ fn a_card_without_room_or_logs_is_told_full() {
     drop(card);
     device.blocks.borrow_mut().get_mut(&root).expect("the directory")[8..11].copy_from_slice(b"JPG");
     let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
-    assert_eq!(recorder.write(Instant::ZERO, &mut sectors(10)[0].clone()), Written::Later);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Later);
     assert_eq!(status.read().state, CardState::Full);
 }
 
@@ -194,10 +199,92 @@ fn a_torn_partial_never_takes_the_older_copy_with_it() {
         writer.frame(Instant::from_millis(copy), &[0xFD; 30], false, &mut sink).expect("there is room");
         let mut partial = Sector::zeroed();
         assert!(writer.partial(&mut partial));
-        assert_eq!(recorder.write(Instant::ZERO, &mut partial), Written::Done);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &partial), Written::Done);
         places.push(device.journal.borrow().last().expect("a write").0);
     }
     assert!(sink.0.is_empty(), "the sector is still in progress");
     assert!(places.windows(2).all(|pair| pair[0].abs_diff(pair[1]) == 1), "{places:?}");
     assert_eq!(stored(&device).len(), 2, "the newest copy and the one before");
+}
+
+/// What waited while the card stood still is written with few commands.
+#[test]
+fn sectors_that_wait_together_are_written_together() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let all = sectors(2_000);
+    assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
+    device.writes.set(0);
+    let mut next = all.iter().peekable();
+    while next.peek().is_some() || recorder.waiting() > 0 {
+        while next.peek().is_some_and(|sector| recorder.take(sector)) {
+            next.next();
+        }
+        assert_eq!(recorder.write(Instant::ZERO), Written::Done);
+    }
+    assert_eq!(numbers(&device), (0..all.len() as u32).collect::<Vec<_>>());
+    let (blocks, commands) = (all.len() as u32, device.writes.get());
+    assert_eq!((status.read().blocks_written, status.read().writes), (blocks, commands));
+    println!("{blocks} blocks in {commands} commands");
+    assert!(commands * 7 < blocks, "{blocks} blocks in {commands} commands");
+}
+
+/// A card that fails in the middle of a command: what it took before is written again, at the same places.
+#[test]
+fn a_write_that_fails_half_way_is_repeated_whole() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let all = sectors(60);
+    assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
+    for sector in &all[..8] {
+        assert!(recorder.take(sector));
+    }
+    device.fail_after.set(Some(5));
+    assert_eq!(recorder.write(Instant::ZERO), Written::Done);
+    assert_eq!(numbers(&device), (0..8).collect::<Vec<_>>());
+    assert_eq!(status.read().write_errors, 1);
+    assert!(stored(&device).iter().all(|(name, ..)| name.segment == 0), "no new segment was needed");
+}
+
+/// Of a disarmed vehicle's record the last while is kept, in few segments; once all is kept, nothing goes any more.
+#[test]
+fn while_waiting_only_the_last_while_is_kept() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let keep = Span::from_secs(30);
+    status.wait_from(0, keep);
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    // 20 frames a second for 8 minutes, some 4 sectors a second; a group each time it is asked for.
+    let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
+    let (mut state, mut armed_from) = (1_u32, None);
+    for index in 0..9_600_u64 {
+        let now = Instant::from_millis(index * 50);
+        let noise: [u8; 100] = std::array::from_fn(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        });
+        if index == 6_000 {
+            status.keep_all();
+            armed_from = sink.0.last().map(Sector::number);
+        }
+        let before = sink.0.len();
+        if status.take_group_wanted() {
+            assert!(writer.restart(&mut sink));
+        }
+        writer.frame(now, &noise, false, &mut sink).expect("there is room");
+        for sector in &sink.0[before..] {
+            assert_eq!(put(&mut recorder, now, sector), Written::Done);
+        }
+    }
+    let found = numbers(&device);
+    let (first, last) = (found[0], *found.last().expect("sectors"));
+    assert!(found.iter().copied().eq(first..=last), "no hole");
+    let armed_from = armed_from.expect("it was armed");
+    let sectors_a_second = f64::from(last) / 480.0;
+    let before_s = f64::from(armed_from - first) / sectors_a_second;
+    assert!((30.0..100.0).contains(&before_s), "{before_s} s before arming are kept");
+    let segments = stored(&device).iter().map(|(name, ..)| *name).collect::<std::collections::BTreeSet<_>>();
+    assert!(segments.len() <= 5, "{segments:?}");
 }

@@ -51,6 +51,17 @@ impl std::fmt::Display for CardError {
 
 impl std::error::Error for CardError {}
 
+/// One block write, as it was done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The card's clock when the block was handed over, in microseconds.
+    pub at_us: u64,
+    /// Which block.
+    pub block: u32,
+    /// Its new content.
+    pub bytes: [u8; Block::LEN],
+}
+
 /// A card in an image file. The methods take `&self`, as the block device's do; one thread uses it.
 #[derive(Debug)]
 pub struct SimCard {
@@ -62,6 +73,7 @@ pub struct SimCard {
     writes: Cell<u64>,
     dead: Cell<bool>,
     image_error: RefCell<Option<io::Error>>,
+    trace: RefCell<Option<Vec<Written>>>,
 }
 
 impl SimCard {
@@ -78,6 +90,7 @@ impl SimCard {
             writes: Cell::new(0),
             dead: Cell::new(false),
             image_error: RefCell::new(None),
+            trace: RefCell::new(None),
         })
     }
 
@@ -94,6 +107,16 @@ impl SimCard {
     /// Block writes that reached the card, a torn one included.
     pub fn writes(&self) -> u64 {
         self.writes.get()
+    }
+
+    /// Keeps every block write from now on, for [`Self::take_trace`].
+    pub fn start_trace(&self) {
+        self.trace.replace(Some(Vec::new()));
+    }
+
+    /// The block writes since [`Self::start_trace`]; none are kept any more.
+    pub fn take_trace(&self) -> Vec<Written> {
+        self.trace.take().unwrap_or_default()
     }
 
     /// Whether power has gone.
@@ -132,19 +155,23 @@ impl SimCard {
     }
 
     /// One block write; false where power went with it.
-    fn write_block(&self, bytes: &[u8; Block::LEN], offset: u64) -> Result<(), CardError> {
+    fn write_block(&self, bytes: &[u8; Block::LEN], block: u32, at_us: u64) -> Result<(), CardError> {
         if self.rng.borrow_mut().chance(self.faults.write_error) {
             return Err(CardError::WriteRefused);
         }
         let count = self.writes.get() + 1;
         self.writes.set(count);
+        if let Some(trace) = self.trace.borrow_mut().as_mut() {
+            trace.push(Written { at_us, block, bytes: *bytes });
+        }
         let cut = self.faults.cuts.iter().filter(|cut| cut.write <= count).min_by_key(|cut| cut.write);
         let bytes = match cut {
             Some(Cut { torn: true, .. }) => bytes.get(..Block::LEN / 2).unwrap_or_default(),
             _ => &bytes[..],
         };
         let mut image = self.image.borrow_mut();
-        let result = image.seek(SeekFrom::Start(offset)).and_then(|_| image.write_all(bytes));
+        let result =
+            image.seek(SeekFrom::Start(BlockIdx(block).into_bytes())).and_then(|_| image.write_all(bytes));
         result.map_err(|error| self.keep(error))?;
         if cut.is_some() {
             self.dead.set(true);
@@ -182,10 +209,9 @@ impl BlockDevice for SimCard {
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
         self.begin(COMMAND_US + BLOCK_US * blocks.len() as u64)?;
         self.check_range(start, blocks.len())?;
-        let mut offset = start.into_bytes();
-        for block in blocks {
-            self.write_block(&block.contents, offset)?;
-            offset += Block::LEN as u64;
+        for (index, block) in (0..).zip(blocks) {
+            let before_end = BLOCK_US * (blocks.len() as u64 - u64::from(index));
+            self.write_block(&block.contents, start.0 + index, self.clock().saturating_sub(before_end))?;
         }
         Ok(())
     }

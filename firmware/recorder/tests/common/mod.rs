@@ -35,6 +35,10 @@ pub struct MemCard {
     pub blocks: Rc<RefCell<Blocks>>,
     pub journal: Rc<RefCell<Vec<Write>>>,
     pub broken: Rc<Cell<bool>>,
+    /// Write commands, of however many blocks.
+    pub writes: Rc<Cell<u32>>,
+    /// After so many more blocks one write fails.
+    pub fail_after: Rc<Cell<Option<u32>>>,
 }
 
 impl MemCard {
@@ -44,7 +48,14 @@ impl MemCard {
 
     pub fn with(size: u32, blocks: Blocks) -> Self {
         let blocks = Rc::new(RefCell::new(blocks));
-        Self { size, blocks, journal: Rc::default(), broken: Rc::default() }
+        Self {
+            size,
+            blocks,
+            journal: Rc::default(),
+            broken: Rc::default(),
+            writes: Rc::default(),
+            fail_after: Rc::default(),
+        }
     }
 
     pub fn formatted(size: u32) -> Self {
@@ -69,9 +80,17 @@ impl BlockDevice for MemCard {
     }
 
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), Broken> {
+        self.writes.set(self.writes.get() + 1);
         for (at, block) in (start.0..).zip(blocks) {
             if self.broken.get() || at >= self.size {
                 return Err(Broken);
+            }
+            match self.fail_after.get() {
+                Some(0) => {
+                    self.fail_after.set(None);
+                    return Err(Broken);
+                }
+                left => self.fail_after.set(left.map(|left| left - 1)),
             }
             self.journal.borrow_mut().push((at, block.contents));
             self.blocks.borrow_mut().insert(at, block.contents);

@@ -16,16 +16,20 @@ use std::time::Instant as WallClock;
 use anyhow::{Context, Result, bail};
 use hums_blackbox::record::{Boot, Stats};
 use hums_core::params::{ParamError, Params};
+use hums_recorder::status::CardReading;
 use pipeline::{Memory, Outside, Pipeline};
 
 use super::arrivals::Arrivals;
+use super::ground::{self, Ground};
 use super::report::Report;
-use super::{check_standard_output, drive, open_sink, pace, prepare_card};
+use super::{check_standard_output, drive, pace, prepare_card};
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::{Outcome, usage};
+use crate::run::Machine as _;
+use crate::source::Chunk;
 
 /// Runs `hums sim`.
 pub fn run(args: &cli::Sim) -> Result<Outcome> {
@@ -38,9 +42,11 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     })?;
     let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
+    let (mut ground, gs) = ground::open(run)?;
     let mut world = World {
         card: &card,
-        gs: open_sink(run.gs.as_ref())?,
+        gs,
+        autopilot: arrivals.take_autopilot(),
         report: Report::default(),
         reboots: run.faults.reboot_at.clone(),
         boots: 0,
@@ -51,10 +57,9 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     };
     world.reboots.sort_unstable();
     let start = WallClock::now();
-    while world
-        .power_on(&mut arrivals, &params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
-    {
-    }
+    while world.power_on(&mut arrivals, &mut ground, &params, |arrivals, ground, machine| {
+        drive(arrivals, ground, speed, live, start, machine)
+    })? {}
     if let Some(error) = card.take_image_error() {
         bail!("{}: {error}", run.sd.display());
     }
@@ -105,10 +110,70 @@ fn read_params(path: Option<&Path>) -> Result<Params> {
     Ok(params)
 }
 
+/// Records chunks until there are none, on a card that may hold anything, as one power-on: for those who ask more of
+/// the recorder than the command line does. `boots` tells one power-on on a card from another.
+///
+/// `moment` is called with each chunk before it arrives. A card whose power went ends it.
+pub fn power_on(
+    card: &SimCard,
+    params: &Params,
+    boots: u32,
+    chunks: impl IntoIterator<Item = Chunk>,
+    mut moment: impl FnMut(&Chunk) -> Result<()>,
+) -> Result<PowerOn> {
+    let mut memory = Memory::new(params);
+    let (mut findings, mut gs) = (Vec::new(), std::io::sink());
+    let mut autopilot = std::io::sink();
+    let outside = Outside {
+        card,
+        gs: &mut gs,
+        autopilot: &mut autopilot,
+        findings: &mut findings,
+        power_on_us: 0,
+        reboot_at_us: None,
+    };
+    let mut pipeline = Pipeline::new(outside, &mut memory, identity(boots), boots);
+    pipeline.start()?;
+    let mut ended = true;
+    for chunk in chunks {
+        moment(&chunk)?;
+        if !pipeline.arrive(&chunk)? {
+            ended = false;
+            break;
+        }
+    }
+    let frames_left = if ended { pipeline.finish()? } else { 0 };
+    let stats = pipeline.stats();
+    drop(pipeline);
+    Ok(PowerOn { stats, frames_left, card: memory.card_reading() })
+}
+
+/// What one power-on came to.
+#[derive(Clone, Copy, Debug)]
+pub struct PowerOn {
+    /// The pipeline's figures.
+    pub stats: Stats,
+    /// Frames that were still in memory when it ended.
+    pub frames_left: u64,
+    /// What storage says of the card.
+    pub card: CardReading,
+}
+
+fn identity(boots: u32) -> Boot<'static> {
+    Boot {
+        version: env!("CARGO_PKG_VERSION"),
+        board: "sim",
+        reset_name: "power-on",
+        boots,
+        ..Boot::default()
+    }
+}
+
 /// What outlives a power-on: the card, the ground station, and what is told at the end.
 struct World<'a> {
     card: &'a SimCard,
     gs: Box<dyn Write + Send>,
+    autopilot: Box<dyn Write + Send>,
     report: Report,
     /// When our own power goes for a moment, sorted.
     reboots: Vec<u64>,
@@ -126,29 +191,24 @@ impl World<'_> {
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
+        ground: &mut Ground,
         params: &Params,
-        drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
+        drive: impl FnOnce(&mut Arrivals, &mut Ground, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
         let mut memory = Memory::new(params);
-        let identity = Boot {
-            version: env!("CARGO_PKG_VERSION"),
-            board: "sim",
-            reset_name: "power-on",
-            boots: self.boots,
-            ..Boot::default()
-        };
         let outside = Outside {
             card: self.card,
             gs: &mut *self.gs,
+            autopilot: &mut *self.autopilot,
             findings: &mut self.report.findings,
             power_on_us: self.power_on_us,
             reboot_at_us: self.reboots.first().copied(),
         };
         let mut pipeline =
-            Pipeline::new(outside, &mut memory, identity, self.entropy.wrapping_add(self.boots));
+            Pipeline::new(outside, &mut memory, identity(self.boots), self.entropy.wrapping_add(self.boots));
         pipeline.start()?;
-        let ended = drive(arrivals, &mut pipeline)?;
+        let ended = drive(arrivals, ground, &mut pipeline)?;
         let mut lost = 0;
         if ended {
             lost = pipeline.finish()?;

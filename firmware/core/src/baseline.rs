@@ -1,0 +1,188 @@
+//! What is normal for this airframe: baselines that outlive power, learned from steady flight, slowly.
+//!
+//! A flight makes one figure of each quantity: the mean of samples once a second in steady flight, in which no sample
+//! weighs more than its closeness to the others deserves. At landing that figure moves the baseline: the first
+//! [`FLIGHTS_MIN`] flights make it, each later one moves it by a tenth of the difference at most, and one that is
+//! beyond the limit of a warning does not move it at all, so that a fault never becomes normal.
+
+use crate::lifetime::{Put, Take, Unreadable};
+use crate::observation::MOTORS_MAX;
+use crate::vehicle::BATTERIES_MAX;
+
+/// Flights that make a baseline; before, nothing is compared.
+pub const FLIGHTS_MIN: u16 = 3;
+/// Weight of a flight in a baseline that stands.
+const WEIGHT: f32 = 0.1;
+
+/// A quantity that has a baseline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Vibration in steady flight, on the autopilot's own scale.
+    Vibration,
+    /// Throttle in hover, 0 to 1.
+    HoverThrottle,
+    /// A battery's internal resistance, ohm, by its place.
+    Resistance(u8),
+    /// How far a motor's speed is from the mean of the others, percent of it, with its sign.
+    MotorSpeed(u8),
+}
+
+impl Quantity {
+    /// How many there are.
+    pub const COUNT: usize = 2 + BATTERIES_MAX + MOTORS_MAX;
+
+    /// The quantity of a place in the stored form.
+    pub const fn from_index(index: usize) -> Option<Self> {
+        const MOTORS: usize = 2 + BATTERIES_MAX;
+        match index {
+            0 => Some(Self::Vibration),
+            1 => Some(Self::HoverThrottle),
+            2..MOTORS => Some(Self::Resistance(index as u8 - 2)),
+            MOTORS..Self::COUNT => Some(Self::MotorSpeed((index - MOTORS) as u8)),
+            _ => None,
+        }
+    }
+
+    /// Its place in the stored form.
+    pub const fn index(self) -> usize {
+        match self {
+            Self::Vibration => 0,
+            Self::HoverThrottle => 1,
+            Self::Resistance(battery) => 2 + battery as usize,
+            Self::MotorSpeed(motor) => 2 + BATTERIES_MAX + motor as usize,
+        }
+    }
+}
+
+/// What is normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Baseline {
+    /// In the quantity's unit.
+    pub value: f32,
+    /// Flights that it was learned from; it holds from [`FLIGHTS_MIN`] on.
+    pub flights: u16,
+}
+
+impl Baseline {
+    /// Nothing learned.
+    pub const NONE: Self = Self { value: 0.0, flights: 0 };
+
+    /// The baseline, once enough flights made it.
+    pub fn known(&self) -> Option<f32> {
+        (self.flights >= FLIGHTS_MIN).then_some(self.value)
+    }
+
+    /// Learns from a flight's figure.
+    pub fn learn(&mut self, figure: f32) {
+        if !figure.is_finite() {
+            return;
+        }
+        let weight = (1.0 / (f32::from(self.flights) + 1.0)).max(WEIGHT);
+        self.value += weight * (figure - self.value);
+        self.flights = self.flights.saturating_add(1);
+    }
+}
+
+/// All baselines of an airframe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Baselines([Baseline; Quantity::COUNT]);
+
+const VERSION: u8 = 1;
+
+impl Default for Baselines {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Baselines {
+    /// Length of the stored form: version, then value (f32) and flights (u16) of each quantity by [`Quantity::index`].
+    pub const BYTES: usize = 1 + Quantity::COUNT * 6;
+
+    /// Nothing learned.
+    pub const fn new() -> Self {
+        Self([Baseline::NONE; Quantity::COUNT])
+    }
+
+    /// What is normal for a quantity.
+    pub fn get(&self, quantity: Quantity) -> Baseline {
+        self.0.get(quantity.index()).copied().unwrap_or(Baseline::NONE)
+    }
+
+    /// Learns from a flight's figure.
+    pub fn learn(&mut self, quantity: Quantity, figure: f32) {
+        if let Some(baseline) = self.0.get_mut(quantity.index()) {
+            baseline.learn(figure);
+        }
+    }
+
+    /// Forgets what was normal: the part is another one.
+    pub fn forget(&mut self, quantity: Quantity) {
+        if let Some(baseline) = self.0.get_mut(quantity.index()) {
+            *baseline = Baseline::NONE;
+        }
+    }
+
+    /// Writes the stored form.
+    pub fn encode(&self, out: &mut [u8; Self::BYTES]) {
+        let mut put = Put::new(out);
+        put.u8(VERSION);
+        for baseline in &self.0 {
+            put.f32(baseline.value).u16(baseline.flights);
+        }
+    }
+
+    /// Reads the stored form, of this version or a later one.
+    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
+        let mut take = Take::new(stored);
+        let mut baselines = Self::new();
+        if take.u8()? < VERSION {
+            return Err(Unreadable);
+        }
+        for baseline in &mut baselines.0 {
+            let stored = Baseline { value: take.f32()?, flights: take.u16()? };
+            *baseline = if stored.value.is_finite() { stored } else { Baseline::NONE };
+        }
+        Ok(baselines)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_place_is_one_quantitys() {
+        for index in 0..Quantity::COUNT {
+            assert_eq!(Quantity::from_index(index).map(Quantity::index), Some(index));
+        }
+        assert_eq!(Quantity::from_index(Quantity::COUNT), None);
+    }
+
+    #[test]
+    fn three_flights_make_a_baseline_and_later_ones_move_it_slowly() {
+        let mut baseline = Baseline::NONE;
+        for (figure, known) in [(9.0, None), (10.0, None), (11.0, Some(10.0))] {
+            baseline.learn(figure);
+            assert_eq!(baseline.known(), known);
+        }
+        baseline.flights = 100;
+        baseline.learn(20.0);
+        assert_eq!(baseline.known(), Some(11.0));
+        baseline.learn(f32::NAN);
+        assert_eq!(baseline.known(), Some(11.0));
+    }
+
+    #[test]
+    fn baselines_read_back_and_garbage_is_nothing_learned() {
+        let mut baselines = Baselines::new();
+        for motor in 0..MOTORS_MAX as u8 {
+            (0..=motor).for_each(|_| baselines.learn(Quantity::MotorSpeed(motor), -f32::from(motor)));
+        }
+        let mut stored = [0; Baselines::BYTES];
+        baselines.encode(&mut stored);
+        assert_eq!(Baselines::decode(&stored), Ok(baselines));
+        assert_eq!(Baselines::decode(&[0xFF; Baselines::BYTES]), Ok(Baselines::new()));
+        assert_eq!(Baselines::decode(&stored[1..]), Err(Unreadable));
+    }
+}

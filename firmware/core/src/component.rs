@@ -1,0 +1,472 @@
+//! Components: parts that wear and are replaced, each with its own hours, flights and cycles and its own limits.
+//!
+//! What a component is, and its limits, are parameters (`CMP1_KIND` and so on); its name and serial number, and what it
+//! has run, are an item that outlives power. It is green, from [`Param::CompYellow`] percent of whichever limit trips
+//! first yellow, and from [`Param::CompRed`] percent red. Replacing one is recorded with the old part's figures.
+
+use crate::health::Subsystem;
+use crate::lifetime::{Put, Take, Unreadable, amount, tenths};
+use crate::observation::MOTORS_MAX;
+use crate::params::{Param, Params};
+use crate::usage::{Totals, UsageCounter};
+
+/// Components at most.
+pub const COMPONENTS_MAX: usize = 8;
+/// The longest name, and the longest serial number, in bytes.
+pub const LABEL_BYTES: usize = 16;
+
+/// A short text: a name or a serial number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Label([u8; LABEL_BYTES]);
+
+impl Label {
+    /// No text.
+    pub const EMPTY: Self = Self([0; LABEL_BYTES]);
+
+    /// The first [`LABEL_BYTES`] printable ASCII characters of a text; others are left out.
+    pub fn new(text: &str) -> Self {
+        Self::of(text.bytes())
+    }
+
+    fn of(bytes: impl Iterator<Item = u8>) -> Self {
+        let mut label = Self::EMPTY;
+        let printable = bytes.filter(|byte| (b' '..=b'~').contains(byte));
+        for (place, byte) in label.0.iter_mut().zip(printable) {
+            *place = byte;
+        }
+        label
+    }
+
+    /// As text.
+    pub fn as_str(&self) -> &str {
+        let length = self.0.iter().position(|byte| *byte == 0).unwrap_or(LABEL_BYTES);
+        core::str::from_utf8(&self.0[..length]).unwrap_or_default()
+    }
+}
+
+/// What a component is. The numbers are those of `CMPn_KIND`, and are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// No component.
+    #[default]
+    None = 0,
+    /// The whole airframe.
+    Airframe = 1,
+    /// A battery, by its place.
+    Battery = 2,
+    /// A motor by its number, or all of them.
+    Motor = 3,
+    /// A propeller by its motor's number, or all of them.
+    Propeller = 4,
+    /// An ESC by its motor's number, or all of them.
+    Esc = 5,
+    /// The card that we record on.
+    Card = 6,
+    /// A combustion engine.
+    Engine = 7,
+    /// Anything else that wears with the hours powered.
+    Other = 8,
+}
+
+impl Kind {
+    /// All kinds, by number.
+    pub const ALL: [Self; 9] = [
+        Self::None,
+        Self::Airframe,
+        Self::Battery,
+        Self::Motor,
+        Self::Propeller,
+        Self::Esc,
+        Self::Card,
+        Self::Engine,
+        Self::Other,
+    ];
+
+    /// The kind of a number; [`Self::None`] for one that is not known.
+    pub fn from_number(number: u8) -> Self {
+        Self::ALL.get(usize::from(number)).copied().unwrap_or_default()
+    }
+
+    /// The name that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Airframe => "airframe",
+            Self::Battery => "battery",
+            Self::Motor => "motor",
+            Self::Propeller => "propeller",
+            Self::Esc => "esc",
+            Self::Card => "card",
+            Self::Engine => "engine",
+            Self::Other => "other",
+        }
+    }
+
+    /// The part of the vehicle whose health it is.
+    pub const fn subsystem(self) -> Option<Subsystem> {
+        match self {
+            Self::None => None,
+            Self::Battery => Some(Subsystem::Power),
+            Self::Motor | Self::Propeller | Self::Esc => Some(Subsystem::Propulsion),
+            Self::Engine => Some(Subsystem::Engine),
+            Self::Airframe | Self::Other => Some(Subsystem::Structure),
+            Self::Card => Some(Subsystem::Recorder),
+        }
+    }
+
+    const fn is_one_of_the_motors(self) -> bool {
+        matches!(self, Self::Motor | Self::Propeller | Self::Esc)
+    }
+
+    /// Whether its hours are those powered, and not those in the air.
+    const fn wears_while_powered(self) -> bool {
+        matches!(self, Self::Card | Self::Other)
+    }
+}
+
+/// What a component has run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figures {
+    /// Seconds powered.
+    pub powered_s: f64,
+    /// Seconds in the air.
+    pub flight_s: f64,
+    /// Seconds that its motor turned; of several, the one that turned longest.
+    pub motor_s: f64,
+    /// Take-offs.
+    pub flights: f64,
+    /// Full discharges of its battery; of several, of all together.
+    pub cycles: f64,
+}
+
+impl Figures {
+    /// Nothing run.
+    pub const ZERO: Self = Self { powered_s: 0.0, flight_s: 0.0, motor_s: 0.0, flights: 0.0, cycles: 0.0 };
+
+    fn zip(self, other: Self, with: fn(f64, f64) -> f64) -> Self {
+        Self {
+            powered_s: with(self.powered_s, other.powered_s),
+            flight_s: with(self.flight_s, other.flight_s),
+            motor_s: with(self.motor_s, other.motor_s),
+            flights: with(self.flights, other.flights),
+            cycles: with(self.cycles, other.cycles),
+        }
+    }
+
+    /// What a part of this kind and number has run in a session.
+    pub fn after(wear: &Wear<'_>, kind: Kind, number: u8) -> Self {
+        let total = |counter| wear.totals.value(counter).unwrap_or(0.0);
+        let motors = &wear.totals.motors;
+        let motor_s = match usize::from(number) {
+            number if kind.is_one_of_the_motors() && number > 0 => {
+                motors.get(number - 1).map_or(0.0, |motor| motor.seconds)
+            }
+            _ => motors.iter().fold(0.0, |longest: f64, motor| longest.max(motor.seconds)),
+        };
+        let cycles = match usize::from(number) {
+            number if kind == Kind::Battery && number > 0 => {
+                wear.battery_cycles.get(number - 1).copied().unwrap_or(0.0)
+            }
+            _ => total(UsageCounter::BatteryCycles),
+        };
+        Self {
+            powered_s: total(UsageCounter::Powered),
+            flight_s: total(UsageCounter::Flight),
+            motor_s,
+            flights: total(UsageCounter::Flights),
+            cycles,
+        }
+    }
+}
+
+/// What a session has counted, as far as components wear by it: its sums, not yet the cycles of the load factor.
+#[derive(Clone, Copy, Debug)]
+pub struct Wear<'a> {
+    /// The session's counters.
+    pub totals: &'a Totals,
+    /// Full discharges of each battery.
+    pub battery_cycles: &'a [f64],
+}
+
+/// Which parameters describe a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ComponentParams {
+    pub(crate) kind: Param,
+    pub(crate) number: Param,
+    hours: Param,
+    flights: Param,
+    cycles: Param,
+    motor_hours: Param,
+}
+
+macro_rules! component_params {
+    ($($kind:ident $number:ident $hours:ident $flights:ident $cycles:ident $motor_hours:ident;)*) => {
+        pub(crate) const PARAMS: [ComponentParams; COMPONENTS_MAX] = [$(ComponentParams {
+            kind: Param::$kind,
+            number: Param::$number,
+            hours: Param::$hours,
+            flights: Param::$flights,
+            cycles: Param::$cycles,
+            motor_hours: Param::$motor_hours,
+        },)*];
+    };
+}
+
+component_params! {
+    Cmp1Kind Cmp1Number Cmp1Hours Cmp1Flights Cmp1Cycles Cmp1MotorHours;
+    Cmp2Kind Cmp2Number Cmp2Hours Cmp2Flights Cmp2Cycles Cmp2MotorHours;
+    Cmp3Kind Cmp3Number Cmp3Hours Cmp3Flights Cmp3Cycles Cmp3MotorHours;
+    Cmp4Kind Cmp4Number Cmp4Hours Cmp4Flights Cmp4Cycles Cmp4MotorHours;
+    Cmp5Kind Cmp5Number Cmp5Hours Cmp5Flights Cmp5Cycles Cmp5MotorHours;
+    Cmp6Kind Cmp6Number Cmp6Hours Cmp6Flights Cmp6Cycles Cmp6MotorHours;
+    Cmp7Kind Cmp7Number Cmp7Hours Cmp7Flights Cmp7Cycles Cmp7MotorHours;
+    Cmp8Kind Cmp8Number Cmp8Hours Cmp8Flights Cmp8Cycles Cmp8MotorHours;
+}
+
+/// Whether a component may go on. The numbers are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Status {
+    /// Well within its limits, or without any.
+    Green = 0,
+    /// Soon due.
+    Yellow = 1,
+    /// Due.
+    Red = 2,
+}
+
+impl Status {
+    /// The status of a stored number.
+    pub const fn from_number(number: u8) -> Self {
+        match number {
+            0 => Self::Green,
+            1 => Self::Yellow,
+            _ => Self::Red,
+        }
+    }
+
+    /// The name that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Green => "green",
+            Self::Yellow => "yellow",
+            Self::Red => "red",
+        }
+    }
+}
+
+/// One component.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Component {
+    /// What the operator calls it.
+    pub name: Label,
+    /// Its serial number.
+    pub serial: Label,
+    /// What it is.
+    pub kind: Kind,
+    /// Which of its kind, from 1; 0 is all of them, or the only one.
+    pub number: u8,
+    /// How often the part in this place was replaced.
+    pub replaced: u16,
+    /// What it has run, less what the session counted: it came into the session, or changed, in the middle of it.
+    base: Figures,
+}
+
+const VERSION: u8 = 1;
+
+impl Component {
+    /// Length of the stored form: version, kind, number, replaced, name, serial, then powered, flight and motor time in
+    /// tenths of a second (u32), flights (u32) and cycles (f64).
+    pub const BYTES: usize = 1 + 1 + 1 + 2 + 2 * LABEL_BYTES + 4 * 4 + 8;
+
+    /// No component.
+    pub const NONE: Self = Self {
+        name: Label::EMPTY,
+        serial: Label::EMPTY,
+        kind: Kind::None,
+        number: 0,
+        replaced: 0,
+        base: Figures::ZERO,
+    };
+
+    /// What it has run over its life.
+    pub fn figures(&self, wear: &Wear<'_>) -> Figures {
+        self.base.zip(Figures::after(wear, self.kind, self.number), |base, ran| (base + ran).max(0.0))
+    }
+
+    /// The part of its life that is used, percent, by the limit that trips first; `None` where it has no limit.
+    pub fn used_percent(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Option<f32> {
+        let limits = PARAMS.get(place).filter(|_| self.kind != Kind::None)?;
+        let figures = self.figures(wear);
+        let hours = if self.kind.wears_while_powered() { figures.powered_s } else { figures.flight_s };
+        let used = [
+            (hours / 3_600.0, limits.hours),
+            (figures.flights, limits.flights),
+            (figures.cycles, limits.cycles),
+            (figures.motor_s / 3_600.0, limits.motor_hours),
+        ];
+        used.into_iter()
+            .map(|(used, limit)| (used, params.get(limit)))
+            .filter(|(_, limit)| *limit > 0.0)
+            .map(|(used, limit)| (used / f64::from(limit) * 100.0) as f32)
+            .reduce(f32::max)
+    }
+
+    /// Green, yellow or red.
+    pub fn status(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Status {
+        let used_percent = self.used_percent(place, wear, params).unwrap_or(0.0);
+        if used_percent >= params.get(Param::CompRed) {
+            Status::Red
+        } else if used_percent >= params.get(Param::CompYellow) {
+            Status::Yellow
+        } else {
+            Status::Green
+        }
+    }
+
+    /// Takes what its parameters say it is; `true` where that is something else than before. What it ran as the other
+    /// stays.
+    pub(crate) fn describe(&mut self, place: usize, wear: &Wear<'_>, params: &Params) -> bool {
+        let Some(described) = PARAMS.get(place) else { return false };
+        let kind = Kind::from_number(params.get(described.kind) as u8);
+        let number = (params.get(described.number) as u8).min(MOTORS_MAX as u8);
+        if (kind, number) == (self.kind, self.number) {
+            return false;
+        }
+        let ran = if self.kind == Kind::None { self.base } else { self.figures(wear) };
+        self.base = ran.zip(Figures::after(wear, kind, number), |ran, counted| ran - counted);
+        (self.kind, self.number) = (kind, number);
+        true
+    }
+
+    /// Another part is in its place: it has run nothing. Gives the old one.
+    pub(crate) fn replace(&mut self, serial: Label, wear: &Wear<'_>) -> Self {
+        let old = Self { base: self.figures(wear), ..*self };
+        self.serial = serial;
+        self.replaced = self.replaced.saturating_add(1);
+        self.base =
+            Figures::ZERO.zip(Figures::after(wear, self.kind, self.number), |ran, counted| ran - counted);
+        old
+    }
+
+    /// What it had run, of one that [`crate::Monitor`] gives away: no session adds to it.
+    pub const fn ran(&self) -> Figures {
+        self.base
+    }
+
+    /// Writes the stored form.
+    pub fn encode(&self, wear: &Wear<'_>, out: &mut [u8; Self::BYTES]) {
+        let figures = self.figures(wear);
+        let mut put = Put::new(out);
+        put.u8(VERSION).u8(self.kind as u8).u8(self.number).u16(self.replaced);
+        put.bytes(&self.name.0).bytes(&self.serial.0);
+        put.u32(tenths(figures.powered_s)).u32(tenths(figures.flight_s)).u32(tenths(figures.motor_s));
+        put.u32(figures.flights as u32).f64(figures.cycles);
+    }
+
+    /// Reads the stored form, of this version or a later one, at the start of a session.
+    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
+        let mut take = Take::new(stored);
+        if take.u8()? < VERSION {
+            return Err(Unreadable);
+        }
+        Ok(Self {
+            kind: Kind::from_number(take.u8()?),
+            number: take.u8()?,
+            replaced: take.u16()?,
+            name: Label::of(take.array::<LABEL_BYTES>()?.into_iter()),
+            serial: Label::of(take.array::<LABEL_BYTES>()?.into_iter()),
+            base: Figures {
+                powered_s: f64::from(take.u32()?) / 10.0,
+                flight_s: f64::from(take.u32()?) / 10.0,
+                motor_s: f64::from(take.u32()?) / 10.0,
+                flights: f64::from(take.u32()?),
+                cycles: amount(take.f64()?),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn params(set: &[(&str, f32)]) -> Params {
+        let mut params = Params::defaults();
+        for (name, value) in set {
+            params.set(name, *value).expect(name);
+        }
+        params
+    }
+
+    fn flown(hours: f64, flights: f64) -> Totals {
+        let mut totals = Totals::nothing();
+        totals.add(UsageCounter::Flight, hours * 3_600.0);
+        totals.add(UsageCounter::Flights, flights);
+        totals.motors[1].seconds = hours * 3_600.0;
+        totals
+    }
+
+    #[test]
+    fn the_limit_that_trips_first_decides() {
+        let params = params(&[("CMP2_KIND", 1.0), ("CMP2_HOURS", 100.0), ("CMP2_FLIGHTS", 10.0)]);
+        let mut component = Component::NONE;
+        for (hours, flights, status) in [
+            (89.0, 1.0, Status::Green),
+            (91.0, 1.0, Status::Yellow),
+            (2.0, 9.0, Status::Yellow),
+            (2.0, 10.0, Status::Red),
+        ] {
+            let totals = flown(hours, flights);
+            let wear = Wear { totals: &totals, battery_cycles: &[] };
+            component.kind = Kind::Airframe;
+            assert_eq!(component.status(1, &wear, &params), status, "{hours} h, {flights} flights");
+        }
+        let totals = flown(1e6, 1e6);
+        let wear = Wear { totals: &totals, battery_cycles: &[] };
+        assert_eq!(component.used_percent(0, &wear, &params), None, "without a limit");
+    }
+
+    #[test]
+    fn a_replaced_part_has_run_nothing_and_the_old_ones_figures_are_told() {
+        let params = params(&[("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 50.0)]);
+        let mut component = Component::NONE;
+        let totals = Totals::nothing();
+        assert!(component.describe(0, &Wear { totals: &totals, battery_cycles: &[] }, &params));
+        let totals = flown(60.0, 5.0);
+        let wear = Wear { totals: &totals, battery_cycles: &[] };
+        assert_eq!(component.status(0, &wear, &params), Status::Red);
+        let old = component.replace(Label::new("SN 2"), &wear);
+        assert_eq!((old.serial, old.ran().flights), (Label::EMPTY, 5.0));
+        assert_eq!((component.figures(&wear), component.serial.as_str()), (Figures::ZERO, "SN 2"));
+        assert_eq!(component.status(0, &wear, &params), Status::Green);
+    }
+
+    #[test]
+    fn a_component_reads_back_with_what_the_session_added() {
+        let params = params(&[("CMP1_KIND", 2.0), ("CMP1_NUMBER", 1.0)]);
+        let totals = flown(1.0, 2.0);
+        let wear = Wear { totals: &totals, battery_cycles: &[0.75] };
+        let none = Totals::nothing();
+        let mut component = Component { name: Label::new("pack A"), ..Component::NONE };
+        component.describe(0, &Wear { totals: &none, battery_cycles: &[] }, &params);
+        let mut stored = [0; Component::BYTES];
+        component.encode(&wear, &mut stored);
+        let read = Component::decode(&stored).expect("readable");
+        assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", Kind::Battery, 1));
+        assert_eq!(
+            read.ran(),
+            Figures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 }
+        );
+        for cut in 0..Component::BYTES {
+            assert_eq!(Component::decode(&stored[..cut]), Err(Unreadable));
+        }
+    }
+
+    #[test]
+    fn a_label_is_printable_and_ends() {
+        assert_eq!(Label::new("näme\n of sixteen and more").as_str(), "nme of sixteen a");
+        assert_eq!(Label::of([0xFF; LABEL_BYTES].into_iter()).as_str(), "");
+    }
+}

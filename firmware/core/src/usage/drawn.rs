@@ -1,0 +1,67 @@
+//! What the vehicle draws from its batteries, from the best source that is fresh.
+
+use crate::time::{Instant, Span};
+use crate::units::{Amperes, Volts};
+use crate::vehicle::Vehicle;
+
+/// What no vehicle here has: beyond it a value is garbage.
+const VOLTS_MAX: f32 = 1_000.0;
+const AMPERES_MAX: f32 = 10_000.0;
+/// A battery figure holds this long.
+const BATTERY_AGE: Span = Span::from_secs(5);
+/// A motor speed or current holds this long.
+pub(super) const MOTOR_AGE: Span = Span::from_secs(2);
+
+/// The first battery's voltage, or the autopilot's figure where none reports itself; the discharge current and the power
+/// of all batteries together, or of all ESCs where no battery knows its current (PX4 in simulation).
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Drawn {
+    pub(super) voltage_v: Option<f32>,
+    pub(super) current_a: Option<f32>,
+    pub(super) power_w: f32,
+}
+
+pub(super) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
+    let mut drawn = Drawn::default();
+    let batteries = vehicle.batteries.iter();
+    for battery in batteries.clone().filter_map(|slot| slot.within(now, BATTERY_AGE)) {
+        drawn.add(battery.voltage, battery.current);
+    }
+    let none_reported = batteries.clone().all(|slot| slot.get().is_none());
+    if let Some(system) = vehicle.system.within(now, BATTERY_AGE).filter(|_| none_reported) {
+        drawn.add(system.voltage, system.current);
+    }
+    if drawn.current_a.is_none() {
+        let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
+        for motor in vehicle.motors.iter().filter(|motor| fresh(motor.moved_at)) {
+            drawn.add(motor.esc.voltage, motor.esc.current);
+        }
+    }
+    drawn
+}
+
+/// The discharge current of one battery that reports itself, or of the only one by the autopilot's figure.
+pub(super) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f64 {
+    let Some(slot) = vehicle.batteries.get(battery) else { return 0.0 };
+    let mut drawn = Drawn::default();
+    if let Some(reported) = slot.within(now, BATTERY_AGE) {
+        drawn.add(reported.voltage, reported.current);
+    } else if battery == 0 && vehicle.batteries.iter().all(|slot| slot.get().is_none()) {
+        drawn = self::drawn(now, vehicle);
+    }
+    f64::from(drawn.current_a.unwrap_or(0.0))
+}
+
+impl Drawn {
+    /// Garbage is left out: it must not get into sums that are kept for good.
+    fn add(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
+        let voltage_v = voltage.map(|voltage| voltage.0).filter(|volts| (0.0..=VOLTS_MAX).contains(volts));
+        let current_a = current.map(|current| current.0).filter(|amperes| amperes.abs() <= AMPERES_MAX);
+        self.voltage_v = self.voltage_v.or(voltage_v);
+        if let Some(current_a) = current_a {
+            let discharge_a = current_a.max(0.0);
+            self.current_a = Some(self.current_a.unwrap_or(0.0) + discharge_a);
+            self.power_w += voltage_v.unwrap_or(0.0) * discharge_a;
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! Usage: what a mechanic acts on. Counters since power-on, each a number that is stored, with a name that carries its
+//! unit.
+
+mod counters;
+mod drawn;
+mod totals;
+
+pub use counters::{
+    BASELINE_FIRST, CounterName, EXPOSURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST,
+    UsageCounter, baseline_number, counter_name, exposure_number,
+};
+pub use totals::{MotorTotals, Totals};
+
+use crate::component::Wear;
+use crate::derived::Derived;
+use crate::flight::{Flight, FlightEvent, Phase, climb_mps, ground_speed_mps};
+use crate::observation::Observation;
+use crate::params::{Param, Params};
+use crate::rainflow::Rainflow;
+use crate::time::{Instant, Span};
+use crate::vehicle::{BATTERIES_MAX, Vehicle};
+use drawn::{Drawn, MOTOR_AGE, discharge_a, drawn};
+
+/// Integration steps longer than this are gaps: nothing is known of what happened in them.
+const STEP_MAX: Span = Span::from_secs(2);
+/// What no vehicle here has: beyond it a value is garbage.
+const RPM_MAX: f32 = 1e6;
+const HEIGHT_MAX_M: f32 = 100_000.0;
+const ACCELERATION_MAX: f32 = 10_000.0;
+/// The counters of the load factor's cycles, by bin.
+const LOAD_CYCLES: [UsageCounter; 7] = [
+    UsageCounter::LoadCycles0,
+    UsageCounter::LoadCycles1,
+    UsageCounter::LoadCycles2,
+    UsageCounter::LoadCycles3,
+    UsageCounter::LoadCycles4,
+    UsageCounter::LoadCycles5,
+    UsageCounter::LoadCycles6,
+];
+
+/// Usage since power-on.
+#[derive(Clone, Copy, Debug)]
+pub struct Usage {
+    last: Option<Instant>,
+    /// The discharge current now.
+    current_a: Option<f32>,
+    /// All but what is worked out when it is asked for: the cycles of the load factor.
+    totals: Totals,
+    /// The fastest descent near the ground of this second and of the three before.
+    sinks_mps: [f32; 4],
+    sinks_second: u64,
+    capacity_ah: f32,
+    /// Full discharges of each battery, where the capacity is known: each has an equal share of it.
+    battery_cycles: [f64; BATTERIES_MAX],
+    load_cycles: Rainflow<7>,
+}
+
+/// Lowest ranges of the load factor's cycles, g.
+const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// A load factor that turns back by less has not turned: that much is vibration and noise.
+const LOAD_TURN_G: f32 = 0.1;
+/// An autopilot that was not heard for so long is not known to be powered.
+const HEARD: Span = Span::from_secs(5);
+
+impl Default for Usage {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Usage {
+    /// All zero.
+    pub const fn new() -> Self {
+        Self {
+            last: None,
+            current_a: None,
+            totals: Totals::nothing(),
+            sinks_mps: [0.0; 4],
+            sinks_second: 0,
+            capacity_ah: 0.0,
+            battery_cycles: [0.0; BATTERIES_MAX],
+            load_cycles: Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
+        }
+    }
+
+    /// Takes an observation's extremes, which a step could miss.
+    pub fn observe(
+        &mut self,
+        at: Instant,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        derived: &Derived,
+        observation: &Observation,
+    ) {
+        match observation {
+            Observation::Vibration(vibration) if vehicle.armed() => {
+                let highest = vibration.levels.into_iter().flatten().fold(0.0, f32::max);
+                self.extend(UsageCounter::VibrationMax, highest, ACCELERATION_MAX);
+            }
+            Observation::Imu(_) | Observation::ImuAndAir(..) if flight.airborne() => {
+                let load_factor_g = derived.load_factor_g().unwrap_or(0.0);
+                self.extend(UsageCounter::LoadFactorMax, load_factor_g, ACCELERATION_MAX);
+                if load_factor_g <= ACCELERATION_MAX {
+                    self.load_cycles.take(load_factor_g);
+                }
+            }
+            Observation::GlobalPosition(global) if flight.airborne() => {
+                self.extend(UsageCounter::HeightMax, global.relative_altitude.0, HEIGHT_MAX_M);
+            }
+            Observation::Battery(_) | Observation::SystemStatus(_) if vehicle.armed() => {
+                self.take_battery(at, vehicle);
+            }
+            _ => {}
+        }
+    }
+
+    fn take_battery(&mut self, at: Instant, vehicle: &Vehicle) {
+        let Drawn { voltage_v, current_a, .. } = drawn(at, vehicle);
+        if let Some(voltage_v) = voltage_v.filter(|voltage_v| *voltage_v > 0.0) {
+            self.totals.extend(UsageCounter::VoltageMin, f64::from(voltage_v));
+        }
+        self.totals.extend(UsageCounter::CurrentMax, f64::from(current_a.unwrap_or(0.0)));
+    }
+
+    /// What is no number, or beyond what there can be, is left out.
+    fn extend(&mut self, counter: UsageCounter, value: f32, limit: f32) {
+        if value <= limit {
+            self.totals.extend(counter, f64::from(value));
+        }
+    }
+
+    /// One step, at least every 50 ms, after the flight's own.
+    pub fn step(
+        &mut self,
+        now: Instant,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        event: Option<FlightEvent>,
+        params: &Params,
+    ) {
+        match event {
+            Some(FlightEvent::TakeOff) => {
+                self.totals.add(UsageCounter::Flights, 1.0);
+                // It was seen a moment after it happened.
+                let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
+                self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
+            }
+            Some(FlightEvent::Landing) => self.land(params),
+            None => {}
+        }
+        self.totals.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
+        self.capacity_ah = params.get(Param::BatCapacity);
+        self.note_sink(now, vehicle, flight);
+        let step = self.last.map_or(Span::ZERO, |last| now.since(last));
+        self.last = Some(now);
+        self.totals.set(UsageCounter::Powered, now.as_secs_f64());
+        if step > STEP_MAX {
+            return;
+        }
+        let step_s = f64::from(step.as_secs_f32());
+        if vehicle.armed() {
+            self.totals.add(UsageCounter::Armed, step_s);
+        }
+        if vehicle.heartbeat.within(now, HEARD).is_some() {
+            self.totals.add(regime(flight.phase(now, vehicle)), step_s);
+        }
+        if flight.airborne() {
+            self.totals.add(UsageCounter::Flight, step_s);
+            if let Some(speed_mps) = ground_speed_mps(now, vehicle) {
+                self.totals.add(UsageCounter::Distance, f64::from(speed_mps) * step_s);
+                self.totals.extend(UsageCounter::SpeedMax, f64::from(speed_mps));
+            }
+        }
+        self.step_battery(now, vehicle, step_s);
+        self.step_motors(now, vehicle, step_s);
+    }
+
+    fn step_battery(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
+        let drawn = drawn(now, vehicle);
+        self.current_a = drawn.current_a;
+        let charge_ah = f64::from(drawn.current_a.unwrap_or(0.0)) * step_s / 3_600.0;
+        self.totals.add(UsageCounter::Charge, charge_ah);
+        self.totals.add(UsageCounter::Energy, f64::from(drawn.power_w) * step_s / 3_600.0);
+        if self.capacity_ah > 0.0 {
+            self.totals.add(UsageCounter::BatteryCycles, charge_ah / f64::from(self.capacity_ah));
+            let batteries = vehicle.batteries.iter().filter(|slot| slot.get().is_some()).count().max(1);
+            let capacity_ah = f64::from(self.capacity_ah) / batteries as f64;
+            for (battery, cycles) in self.battery_cycles.iter_mut().enumerate() {
+                *cycles += discharge_a(now, vehicle, battery) * step_s / 3_600.0 / capacity_ah;
+            }
+        }
+    }
+
+    /// The autopilot says that it has landed a second or two after it touched down.
+    fn land(&mut self, params: &Params) {
+        self.totals.add(UsageCounter::Landings, 1.0);
+        let touchdown_mps = self.sinks_mps.into_iter().fold(0.0, f32::max);
+        self.totals.extend(UsageCounter::TouchdownMax, f64::from(touchdown_mps));
+        if touchdown_mps >= params.get(Param::HardLanding) {
+            self.totals.add(UsageCounter::HardLandings, 1.0);
+        }
+    }
+
+    fn note_sink(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
+        let second = now.as_millis() / 1_000;
+        if second != self.sinks_second {
+            self.sinks_second = second;
+            self.sinks_mps = [0.0, self.sinks_mps[0], self.sinks_mps[1], self.sinks_mps[2]];
+        }
+        if flight.phase(now, vehicle) == Phase::Landing {
+            let sink_mps = -climb_mps(now, vehicle).unwrap_or(0.0);
+            self.sinks_mps[0] = self.sinks_mps[0].max(sink_mps);
+        }
+    }
+
+    fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
+        for (number, usage) in self.totals.motors.iter_mut().enumerate() {
+            let motor = &vehicle.motors[number];
+            let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= MOTOR_AGE);
+            if fresh && Derived::turns(vehicle, number) {
+                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(RPM_MAX));
+                usage.seconds += step_s;
+                usage.revolutions += f64::from(rpm) * step_s / 60.0;
+            }
+        }
+    }
+
+    /// Every counter that has something to say: its stored number and its value.
+    pub fn for_each(&self, each: impl FnMut(u8, f64)) {
+        self.totals().for_each(each);
+    }
+
+    /// Every counter as it stands now.
+    pub fn totals(&self) -> Totals {
+        let mut totals = self.totals;
+        for (bin, counter) in LOAD_CYCLES.into_iter().enumerate() {
+            totals.set(counter, self.load_cycles.cycles(bin));
+        }
+        totals
+    }
+
+    /// A counter's value; `None` for a minimum that was never measured, and for cycles of a battery whose capacity
+    /// nobody told.
+    pub fn value(&self, counter: UsageCounter) -> Option<f64> {
+        match LOAD_CYCLES.into_iter().position(|cycles| cycles == counter) {
+            Some(bin) => Some(self.load_cycles.cycles(bin)),
+            None => self.totals.value(counter),
+        }
+    }
+
+    /// The time of the last step.
+    pub(crate) fn until(&self) -> Instant {
+        self.last.unwrap_or_default()
+    }
+
+    /// The discharge current of all batteries together, as of the last step.
+    pub(crate) const fn current_a(&self) -> Option<f32> {
+        self.current_a
+    }
+
+    /// What components wear by.
+    pub const fn wear(&self) -> Wear<'_> {
+        Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
+    }
+}
+
+/// The counter of the time spent in a phase of flight.
+const fn regime(phase: Phase) -> UsageCounter {
+    match phase {
+        Phase::Ground => UsageCounter::Ground,
+        Phase::TakeOff => UsageCounter::TakeOff,
+        Phase::Hover => UsageCounter::Hover,
+        Phase::Climb => UsageCounter::Climb,
+        Phase::Cruise => UsageCounter::Cruise,
+        Phase::Descent => UsageCounter::Descent,
+        Phase::Landing => UsageCounter::Landing,
+    }
+}

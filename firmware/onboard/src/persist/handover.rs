@@ -1,0 +1,129 @@
+//! The monitor task's side: what is to be saved, and what is to be told about it.
+
+use core::sync::atomic::Ordering;
+
+use hums_core::Monitor;
+use hums_core::lifetime::ITEM_BYTES_MAX;
+use hums_core::params::Params;
+use hums_core::time::{Instant, Span};
+use hums_store::{Key, param_value};
+
+use super::mailbox::MailboxIn;
+use super::status::{StoreReading, StoreState, StoreStatus};
+
+/// No frame for this long, and disarmed: nothing will be missed while the processor stands still for an erase.
+pub const QUIET: Span = Span::from_secs(5);
+
+/// The monitor task's side: what is to be saved, and what is to be told about it.
+pub struct Handover<'a> {
+    items: MailboxIn<'a>,
+    status: &'a StoreStatus,
+    /// Parameters as they are stored, or as they are by default.
+    stored: Params,
+    told: StoreReading,
+    frames: u32,
+    frames_at: Instant,
+}
+
+/// Something about the store that is to be recorded and told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct News {
+    /// `MAV_SEVERITY`.
+    pub severity: u8,
+    /// At most 50 characters.
+    pub text: &'static str,
+}
+
+impl<'a> Handover<'a> {
+    /// After [`Keeper::load`], with the parameters as they are then.
+    pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, params: &Params) -> Self {
+        let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };
+        Self { items, status, stored: *params, told, frames: 0, frames_at: Instant::ZERO }
+    }
+
+    /// At every tick: hands over what is due. `frames` is what reception has counted.
+    pub fn step(&mut self, now: Instant, monitor: &mut Monitor, frames: u32) {
+        if self.frames != frames {
+            (self.frames, self.frames_at) = (frames, now);
+        }
+        let disarmed = monitor.vehicle().heartbeat.get().is_some_and(|heartbeat| !heartbeat.armed);
+        let quiet = disarmed && now.since(self.frames_at) >= QUIET;
+        self.status.quiet.store(quiet, Ordering::Relaxed);
+        self.put_params(monitor.params());
+        self.put_items(now, monitor);
+    }
+
+    /// At the end of a session: hands over everything that changed; `false` when it is to be called again after the
+    /// keeper took something.
+    pub fn finish(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
+        monitor.save_all();
+        self.put_params(monitor.params()) && self.put_items(now, monitor)
+    }
+
+    /// What is new about the store, one thing at a time.
+    pub fn news(&mut self) -> Option<News> {
+        let now = self.status.read();
+        let Self { told, .. } = self;
+        let news = |severity, text| Some(News { severity, text });
+        if told.state != now.state {
+            told.state = now.state;
+            return match now.state {
+                StoreState::Kept => None,
+                StoreState::Absent => news(5, "HUMS: no store, counters end with the power"),
+                StoreState::New => news(6, "HUMS: the store is new, all counters begin"),
+                StoreState::Remade => news(3, "HUMS: store unreadable, counters begin anew"),
+                StoreState::Failed => news(3, "HUMS: the store does not work"),
+            };
+        }
+        if newer(&mut told.unreadable, now.unreadable) {
+            return news(4, "HUMS: a stored item was unreadable");
+        }
+        if newer(&mut told.remade, now.remade) {
+            // All that is set goes there again; the items follow when they change.
+            self.stored = Params::defaults();
+            return news(3, "HUMS: store unreadable, made anew");
+        }
+        if newer(&mut told.refused, now.refused) {
+            return news(5, "HUMS: store full, saving waits for the ground");
+        }
+        if newer(&mut told.failed, now.failed) {
+            return news(4, "HUMS: an item could not be saved");
+        }
+        None
+    }
+
+    /// Each parameter that is not as it is stored; `false` when one found no room.
+    fn put_params(&mut self, params: &Params) -> bool {
+        let Self { items, stored, .. } = self;
+        let before = *stored;
+        for ((spec, value), (_, stored_value)) in params.iter().zip(before.iter()) {
+            if value.to_bits() == stored_value.to_bits() {
+                continue;
+            }
+            let Some((bytes, length)) = param_value(spec.name, value) else { continue };
+            if !items.put(Key::param(spec.name), bytes.get(..length).unwrap_or_default()) {
+                return false;
+            }
+            // Cannot be refused: it comes out of the same table.
+            let _ = stored.set(spec.name, value);
+        }
+        true
+    }
+
+    /// Each item that is due; `false` when one found no room.
+    fn put_items(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
+        while let Some(key) = monitor.save_due(now) {
+            let mut bytes = [0; ITEM_BYTES_MAX];
+            let length = monitor.encode_item(key, &mut bytes);
+            if !self.items.put(Key::item(key.number()), bytes.get(..length).unwrap_or_default()) {
+                return false;
+            }
+            monitor.saved(key);
+        }
+        true
+    }
+}
+
+fn newer(told: &mut u32, now: u32) -> bool {
+    core::mem::replace(told, now) != now
+}

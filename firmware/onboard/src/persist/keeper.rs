@@ -1,0 +1,119 @@
+//! The storage task's side: the store and what goes into it.
+
+use embedded_storage::nor_flash::NorFlash;
+use hums_core::Monitor;
+use hums_core::lifetime::ItemKey;
+use hums_core::params::ParamError;
+use hums_store::{Error, Found, Key, Saved, Store, param};
+
+use super::mailbox::MailboxOut;
+use super::status::{StoreState, StoreStatus, count};
+
+/// What one call of [`Keeper::service`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kept {
+    /// An item was taken: there may be another.
+    Took,
+    /// There is nothing to do.
+    Idle,
+    /// The oldest item waits until an erase is allowed.
+    Waits,
+}
+
+/// The storage task's side: the store and what goes into it.
+pub struct Keeper<'a, F: NorFlash> {
+    store: Option<Store<F>>,
+    items: MailboxOut<'a>,
+    pub(crate) status: &'a StoreStatus,
+    /// The oldest item has been counted as waiting.
+    waits: bool,
+}
+
+impl<'a, F: NorFlash> Keeper<'a, F> {
+    /// With the store in `flash`, if there is one. Ends what power cut short, which may take an erase: before reception
+    /// begins.
+    pub fn mount(flash: Option<F>, items: MailboxOut<'a>, status: &'a StoreStatus) -> Self {
+        let store = flash.and_then(|flash| {
+            let Ok((store, found)) = Store::mount(flash) else {
+                status.set_state(StoreState::Failed);
+                return None;
+            };
+            status.set_state(match found {
+                Found::Kept => StoreState::Kept,
+                Found::Blank => StoreState::New,
+                Found::Unreadable => StoreState::Remade,
+            });
+            Some(store)
+        });
+        Self { store, items, status, waits: false }
+    }
+
+    /// Makes half a sector free where less is. Takes an erase: not after a reset that may have come in flight.
+    pub fn turn_ahead(&mut self) {
+        if let Some(store) = &mut self.store
+            && store.turn_ahead(F::ERASE_SIZE / 2).is_err()
+        {
+            count(&self.status.failed);
+        }
+    }
+
+    /// Gives the monitor everything that is stored. An item that cannot be read is counted, and is as if there were none.
+    pub fn load(&mut self, monitor: &mut Monitor) {
+        let Self { store: Some(store), status, .. } = self else { return };
+        let outcome = store.for_each(|key, value| {
+            if !restore(monitor, key, value) {
+                count(&status.unreadable);
+            }
+        });
+        if outcome.is_err() {
+            count(&status.unreadable);
+        }
+    }
+
+    /// Saves one item. An erase is allowed while nothing can be missed, or if `may_erase` says so.
+    pub fn service(&mut self, may_erase: bool) -> Kept {
+        let Self { store, items, status, waits } = self;
+        let Some(store) = store else {
+            return items.oldest(|_, _| (Kept::Took, true)).unwrap_or(Kept::Idle);
+        };
+        if *waits && !may_erase && !status.is_quiet() {
+            return Kept::Waits;
+        }
+        store.allow_erase(may_erase || status.is_quiet());
+        let kept = items.oldest(|key, value| match store.save(key, value) {
+            Ok(saved) => {
+                count(&status.saved);
+                if saved == Saved::Remade {
+                    count(&status.remade);
+                }
+                (Kept::Took, true)
+            }
+            Err(Error::NotNow) => (Kept::Waits, false),
+            // To try again would not help; its owner saves it again when it has changed.
+            Err(_) => {
+                count(&status.failed);
+                (Kept::Took, true)
+            }
+        });
+        store.allow_erase(false);
+        let waited = core::mem::replace(waits, kept == Some(Kept::Waits));
+        if *waits && !waited {
+            count(&status.refused);
+        }
+        kept.unwrap_or(Kept::Idle)
+    }
+}
+
+/// `false` where the item cannot be read. One that this version does not know is left alone.
+fn restore(monitor: &mut Monitor, key: Key, value: &[u8]) -> bool {
+    if key.is_param() {
+        return match param(value).map(|(name, value)| monitor.params_mut().set(name, value)) {
+            Some(Ok(()) | Err(ParamError::UnknownName)) => true,
+            Some(Err(ParamError::OutOfRange { .. })) | None => false,
+        };
+    }
+    match key.number().and_then(ItemKey::from_number) {
+        Some(item) => monitor.restore(item, value).is_ok(),
+        None => true,
+    }
+}

@@ -1,0 +1,96 @@
+//! What the two sides tell each other: atomics, so that neither waits.
+
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+
+/// What the store is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum StoreState {
+    /// There is none: what is saved is gone with the power.
+    #[default]
+    Absent = 0,
+    /// What was stored has been read.
+    Kept = 1,
+    /// It was new.
+    New = 2,
+    /// What was stored could not be read, and it begins anew.
+    Remade = 3,
+    /// The flash does not work.
+    Failed = 4,
+}
+
+/// What the keeper tells the monitor, and what it is told: atomics, so that neither waits.
+#[derive(Debug, Default)]
+pub struct StoreStatus {
+    state: AtomicU8,
+    pub(crate) unreadable: AtomicU32,
+    pub(crate) saved: AtomicU32,
+    pub(crate) refused: AtomicU32,
+    pub(crate) failed: AtomicU32,
+    pub(crate) remade: AtomicU32,
+    pub(crate) quiet: AtomicBool,
+}
+
+/// A reading of [`StoreStatus`]; counters since power-on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StoreReading {
+    /// How it began.
+    pub state: StoreState,
+    /// Items that could not be read at the start.
+    pub unreadable: u32,
+    /// Items saved.
+    pub saved: u32,
+    /// Items that had to wait because an erase was not allowed.
+    pub refused: u32,
+    /// Items that could not be saved.
+    pub failed: u32,
+    /// Times that it was found unreadable later, and made anew.
+    pub remade: u32,
+}
+
+impl StoreStatus {
+    /// Nothing done.
+    pub const fn new() -> Self {
+        Self {
+            state: AtomicU8::new(StoreState::Absent as u8),
+            unreadable: AtomicU32::new(0),
+            saved: AtomicU32::new(0),
+            refused: AtomicU32::new(0),
+            failed: AtomicU32::new(0),
+            remade: AtomicU32::new(0),
+            quiet: AtomicBool::new(false),
+        }
+    }
+
+    /// All of it; each is right by itself.
+    pub fn read(&self) -> StoreReading {
+        StoreReading {
+            state: match self.state.load(Ordering::Relaxed) {
+                1 => StoreState::Kept,
+                2 => StoreState::New,
+                3 => StoreState::Remade,
+                4 => StoreState::Failed,
+                _ => StoreState::Absent,
+            },
+            unreadable: self.unreadable.load(Ordering::Relaxed),
+            saved: self.saved.load(Ordering::Relaxed),
+            refused: self.refused.load(Ordering::Relaxed),
+            failed: self.failed.load(Ordering::Relaxed),
+            remade: self.remade.load(Ordering::Relaxed),
+        }
+    }
+
+    /// Whether an erase would make nobody miss anything, as the monitor sees it.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn set_state(&self, state: StoreState) {
+        self.state.store(state as u8, Ordering::Relaxed);
+    }
+}
+
+/// One more.
+pub(crate) fn count(counter: &AtomicU32) {
+    counter.fetch_add(1, Ordering::Relaxed);
+}

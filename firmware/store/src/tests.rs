@@ -1,0 +1,209 @@
+//! What the store promises while power stays.
+
+use embedded_storage::nor_flash::{NorFlash as _, NorFlashErrorKind};
+
+use crate::sim::SimFlash;
+use crate::{Error, Found, Key, Saved, Store, VALUE_BYTES_MAX, param, param_value};
+
+type Flash = SimFlash<16384>;
+
+fn mounted(flash: &mut Flash) -> (Store<&mut Flash>, Found) {
+    Store::mount(flash).expect("this flash works")
+}
+
+fn value<'b>(store: &mut Store<&mut Flash>, key: Key, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+    let length = store.get(key, buffer).expect("readable")?;
+    Some(&buffer[..length])
+}
+
+#[test]
+fn what_is_saved_is_there_at_the_next_start_and_starts_are_counted() {
+    let mut flash = Flash::blank();
+    let mut buffer = [0; VALUE_BYTES_MAX];
+    {
+        let (mut store, found) = mounted(&mut flash);
+        assert_eq!((found, store.mounts()), (Found::Blank, Ok(1)));
+        assert_eq!(value(&mut store, Key::item(1), &mut buffer), None);
+        assert_eq!(store.save(Key::item(1), &[1, 2, 3]), Ok(Saved::Written));
+        assert_eq!(store.save(Key::item(1), &[1, 2]), Ok(Saved::Written));
+        assert_eq!(store.save(Key::item(2), &[0xFF; VALUE_BYTES_MAX]), Ok(Saved::Written));
+        assert_eq!(store.save(Key::item(2), &[0; VALUE_BYTES_MAX + 1]), Err(Error::TooLong));
+    }
+    let (mut store, found) = mounted(&mut flash);
+    assert_eq!((found, store.mounts()), (Found::Kept, Ok(2)));
+    assert_eq!(value(&mut store, Key::item(1), &mut buffer), Some(&[1, 2][..]));
+    assert_eq!(value(&mut store, Key::item(2), &mut buffer), Some(&[0xFF; VALUE_BYTES_MAX][..]));
+    assert_eq!(value(&mut store, Key::item(2), &mut [0; 9]), None, "no room for it");
+}
+
+#[test]
+fn a_value_that_is_there_already_costs_nothing() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    store.save(Key::item(1), b"same").expect("room");
+    let room = store.room();
+    assert_eq!(store.save(Key::item(1), b"same"), Ok(Saved::Unchanged));
+    assert_eq!(store.room(), room);
+    assert_eq!(store.save(Key::item(1), b"other"), Ok(Saved::Written));
+    assert_eq!(store.room(), room.map(|room| room - 20), "13 and 5 bytes are five words");
+}
+
+#[test]
+fn parameters_are_found_by_name() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    for (name, number) in [("ONE", 1.0), ("TWO", 2.0), ("ONE", 1.5)] {
+        let (bytes, length) = param_value(name, number).expect("short");
+        store.save(Key::param(name), &bytes[..length]).expect("room");
+    }
+    store.save(Key::item(9), b"no parameter").expect("room");
+    let mut seen = Vec::new();
+    let see = |key: Key, value: &[u8]| {
+        if key.is_param() {
+            seen.extend(param(value).map(|(name, value)| (name.to_owned(), value)));
+        }
+    };
+    store.for_each(see).expect("readable");
+    assert_eq!(seen, [("ONE".into(), 1.0), ("TWO".into(), 2.0), ("ONE".into(), 1.5)], "the last one counts");
+}
+
+#[test]
+fn a_save_that_needs_an_erase_waits_until_it_is_allowed_and_changes_nothing() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    let mut number: u16 = 0;
+    let refused = loop {
+        match store.save(Key::item(1), &[number.to_le_bytes(); 100].concat()) {
+            Ok(_) => number += 1,
+            Err(error) => break error,
+        }
+    };
+    assert_eq!(refused, Error::NotNow);
+    assert_eq!(number, 75, "items of 216 bytes in 16 KiB, beside what the store keeps for itself");
+    let mut buffer = [0; VALUE_BYTES_MAX];
+    let last = [(number - 1).to_le_bytes(); 100].concat();
+    assert_eq!(value(&mut store, Key::item(1), &mut buffer), Some(&last[..]));
+    assert_eq!(store.save(Key::item(2), b"still fits"), Ok(Saved::Written));
+    store.allow_erase(true);
+    assert_eq!(store.save(Key::item(1), b"new"), Ok(Saved::Written));
+    assert_eq!(store.save(Key::item(1), &[number as u8; 200]), Ok(Saved::Written));
+    assert!(store.room().is_ok_and(|room| room > 15_000));
+    // Two when the store was made, one for the way into the other sector.
+    assert_eq!(flash.erases(), 3);
+}
+
+#[test]
+fn the_other_sector_is_begun_ahead_when_little_is_free() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    assert_eq!(store.turn_ahead(8_192), Ok(false), "it has just been made");
+    for number in 0..30_u8 {
+        store.save(Key::item(number % 4), &[number; 300]).expect("room");
+    }
+    let room = store.room().expect("readable");
+    assert!(room < 8_192, "{room}");
+    assert_eq!(store.turn_ahead(room), Ok(false));
+    assert_eq!(store.turn_ahead(8_192), Ok(true));
+    let room = store.room().expect("readable");
+    assert!(room > 16_384 - 128 - 4 * 320 - 100, "four items went along, and nothing big beside: {room}");
+    let mut buffer = [0; VALUE_BYTES_MAX];
+    for number in 26..30_u8 {
+        assert_eq!(value(&mut store, Key::item(number % 4), &mut buffer), Some(&[number; 300][..]));
+    }
+    // Nor does it leave erases allowed.
+    let mut saves = (0..100).map(|number| store.save(Key::item(9), &[number; 500]));
+    assert_eq!(saves.find(Result::is_err), Some(Err(Error::NotNow)));
+}
+
+#[test]
+fn it_turns_at_any_fill() {
+    let mut flash = Flash::blank();
+    for fill in 0..700_usize {
+        let (mut store, found) = mounted(&mut flash);
+        assert_ne!(found, Found::Unreadable);
+        store.save(Key::item(1), &[fill as u8; 77]).expect("room");
+        store.save(Key::item(2), &vec![fill as u8; fill % 400]).expect("room");
+        store.turn_ahead(16_000 - 2 * fill).expect("it turns");
+        let mut buffer = [0; VALUE_BYTES_MAX];
+        assert_eq!(value(&mut store, Key::item(1), &mut buffer), Some(&[fill as u8; 77][..]), "{fill}");
+    }
+}
+
+#[test]
+fn more_than_fits_is_refused_and_what_is_there_stays() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    store.allow_erase(true);
+    let mut number = 0;
+    let refused = loop {
+        match store.save(Key::item(number), &[number; 512]) {
+            Ok(Saved::Written) => number += 1,
+            outcome => break outcome,
+        }
+    };
+    assert_eq!((refused, number), (Err(Error::Full), 30));
+    let mut buffer = [0; VALUE_BYTES_MAX];
+    for number in 0..30 {
+        assert_eq!(value(&mut store, Key::item(number), &mut buffer), Some(&[number; 512][..]), "{number}");
+    }
+    let (mut store, found) = mounted(&mut flash);
+    assert_eq!(found, Found::Kept);
+    assert_eq!(value(&mut store, Key::item(29), &mut buffer), Some(&[29; 512][..]));
+}
+
+#[test]
+fn whatever_is_in_the_flash_it_is_told_made_anew_and_works() {
+    let mut word: u32 = 1;
+    let mut noise = |bytes: &mut [u8]| {
+        for byte in bytes {
+            word = word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *byte = (word >> 24) as u8;
+        }
+    };
+    for run in 0..400 {
+        let mut bytes = vec![0; 2 * 16_384];
+        match run {
+            0 => {}
+            1 => bytes.fill(0x5A),
+            _ => noise(&mut bytes),
+        }
+        if run % 4 == 3 {
+            // Ours by its marks, and yet noise.
+            bytes[..8].copy_from_slice(&[0x31, 0x54, 0x53, 0x48, 9, 0, 0xF6, 0xFF]);
+            bytes[8..128].fill(0xFF);
+            bytes[16_384..16_392].copy_from_slice(&[0x31, 0x54, 0x53, 0x48, 3, 0, 0xFC, 0xFF]);
+            bytes[16_392..16_512].fill(0xFF);
+        }
+        let mut flash = Flash::with(&bytes);
+        let (mut store, found) = mounted(&mut flash);
+        if run % 4 != 3 {
+            assert_eq!(found, Found::Unreadable, "{run}");
+        }
+        store.for_each(|key, value| panic!("{run}: {key:?} {value:?} out of noise")).expect("readable");
+        store.allow_erase(true);
+        store.save(Key::item(1), b"works").expect("room");
+        let (mut store, found) = mounted(&mut flash);
+        assert_eq!((found, store.mounts()), (Found::Kept, Ok(2)), "{run}");
+        assert_eq!(value(&mut store, Key::item(1), &mut [0; 5]), Some(&b"works"[..]), "{run}");
+    }
+}
+
+#[test]
+fn one_sector_that_is_overwritten_is_told() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    store.save(Key::item(1), b"gone").expect("room");
+    let mut bytes = flash.bytes().to_vec();
+    bytes[..16_384].fill(0x12);
+    let mut flash = Flash::with(&bytes);
+    assert_eq!(mounted(&mut flash).1, Found::Unreadable);
+    assert_eq!(mounted(&mut flash).1, Found::Kept);
+}
+
+#[test]
+fn flash_that_does_not_work_is_told() {
+    let mut flash = Flash::blank();
+    flash.cut_after(1, 1);
+    assert_eq!(flash.erase(0, 16_384), Err(NorFlashErrorKind::Other));
+    assert_eq!(Store::mount(&mut flash).map(|_| ()), Err(Error::Flash(NorFlashErrorKind::Other)));
+}

@@ -1,0 +1,79 @@
+//! Campaigns: what the record promises, tried until chance has had its say.
+//!
+//! Each campaign runs in this process, on the same bodies of tasks as `hums sim`, because ten thousand runs of a program
+//! would take a day. What it finds is compared with the recording itself, the card with `fsck.vfat`. A campaign is one
+//! file here and one line in [`CAMPAIGNS`]; `cargo xtask prove` runs them and writes `docs/proof.md`.
+
+mod card;
+mod damage;
+mod endurance;
+mod noise;
+mod power_cuts;
+mod record;
+mod report;
+mod stalls;
+mod stream;
+
+use anyhow::Result;
+
+pub use report::{Figures, Provenance, write as write_report};
+
+/// How much is tried.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// The short form, for every change; otherwise the long one.
+    pub short: bool,
+    /// Makes chance repeatable.
+    pub seed: u64,
+    /// How many cases instead of the campaign's own number.
+    pub runs: Option<u64>,
+}
+
+impl Options {
+    /// The number of cases: as asked, or one of these.
+    fn runs(&self, long: u64, short: u64) -> u64 {
+        self.runs.unwrap_or(if self.short { short } else { long })
+    }
+}
+
+/// One campaign.
+#[derive(Debug)]
+pub struct Campaign {
+    /// What it is called on the command line.
+    pub name: &'static str,
+    /// What it tries, as a sentence.
+    pub about: &'static str,
+    /// Runs it; an error is a promise that was not kept.
+    pub run: fn(&Options) -> Result<Figures>,
+}
+
+/// All campaigns.
+pub const CAMPAIGNS: &[Campaign] = &[
+    Campaign {
+        name: "power-cuts",
+        about: "power goes at any block write, half of them torn: the card stays in order, earlier logs stay as they \
+                are, and the log gives the flight up to 200 ms before",
+        run: power_cuts::run,
+    },
+    Campaign {
+        name: "damage",
+        about: "bits flip anywhere in a log: each error is noticed, no wrong frame comes out, and at most one group is \
+                lost",
+        run: damage::run,
+    },
+    Campaign {
+        name: "stalls",
+        about: "the card answers nothing for 2.5 s at 921,600 baud: no frame is lost",
+        run: stalls::run,
+    },
+    Campaign {
+        name: "endurance",
+        about: "24 hours at 20 kB/s on a card of 64 MiB: the newest data is always there, and memory stays as it is",
+        run: endurance::run,
+    },
+    Campaign {
+        name: "noise",
+        about: "bytes on the line are damaged: each frame that is not itself damaged is recorded",
+        run: noise::run,
+    },
+];

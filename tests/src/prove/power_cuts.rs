@@ -1,0 +1,382 @@
+//! Power goes at any block write.
+//!
+//! A session is recorded once, at full rate, with every block write kept. Then its beginning is played back onto the
+//! card as it was before, up to a write chosen by chance, that one whole or in half, and the card is looked at: as many
+//! cuts as are wanted from one recording, each exactly what the card would hold.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Context as _, Result, ensure};
+use hums::card::Faults;
+use hums::card::faults::CardOut;
+use hums::card::sim::Written;
+use hums::logs::fat::CardFile;
+use hums::logs::{Log, on_card};
+use hums::run::sim::power_on;
+use hums_blackbox::Cause;
+use hums_core::params::Params;
+use rayon::prelude::*;
+
+use super::card::{BLOCK, Card};
+use super::record::Record;
+use super::stream::{FULL_RATE, Stream};
+use super::{Figures, Options};
+use crate::damage::Random;
+use crate::flights::own;
+
+/// What a cut may cost at most.
+const LOSS_MAX_US: u64 = 200_000;
+
+/// A card that is back is found within a second, and has what waited for it within half of one.
+const CATCH_UP_US: u64 = 1_500_000;
+
+/// What is recorded before and when power goes.
+struct Scenario {
+    name: &'static str,
+    flight: &'static str,
+    card_mib: u64,
+    /// Sessions that are on the card before.
+    earlier: u32,
+    seconds: f64,
+    /// Seconds before those in which the vehicle is not armed yet.
+    disarmed_s: f64,
+    /// When the card is out, in seconds.
+    out: Option<(f64, f64)>,
+    /// Parameters that are not at their defaults.
+    params: &'static [(&'static str, f32)],
+}
+
+const PX4: &str = "px4_hil_quad_low.tlog";
+const GUIDED: &str = "ap_quad_guided.tlog";
+const FAULTS: &str = "ap_quad_faults.tlog";
+const SIGNED: &str = "ap_quad_signed.raw";
+
+const NEW_CARD: Scenario = Scenario {
+    name: "the first session on a card",
+    flight: GUIDED,
+    card_mib: 64,
+    earlier: 0,
+    seconds: 20.0,
+    disarmed_s: 0.0,
+    out: None,
+    params: &[],
+};
+const LATER: Scenario = Scenario { name: "a session after others", earlier: 3, ..NEW_CARD };
+const FULL: Scenario = Scenario { name: "a session on a full card", card_mib: 34, earlier: 18, ..NEW_CARD };
+const SPLIT: Scenario =
+    Scenario { name: "a log that is split", card_mib: 34, earlier: 2, seconds: 110.0, ..NEW_CARD };
+const SPLIT_FULL: Scenario = Scenario { name: "a log that is split on a full card", earlier: 18, ..SPLIT };
+const RETURN: Scenario =
+    Scenario { name: "a card that was taken out and put back", out: Some((5.0, 6.5)), ..LATER };
+
+const BY_ARMING: Scenario = Scenario {
+    name: "a log by arming",
+    disarmed_s: 25.0,
+    params: &[("REC_MODE", 1.0), ("REC_BEFORE", 5.0), ("REC_AFTER", 0.0)],
+    ..LATER
+};
+
+const SCENARIOS: &[Scenario] = &[
+    NEW_CARD,
+    Scenario { flight: SIGNED, ..NEW_CARD },
+    LATER,
+    Scenario { flight: PX4, ..LATER },
+    Scenario { flight: FAULTS, ..LATER },
+    FULL,
+    Scenario { flight: PX4, ..FULL },
+    Scenario { flight: SIGNED, ..FULL },
+    Scenario { flight: PX4, ..SPLIT },
+    Scenario { flight: SIGNED, ..SPLIT },
+    Scenario { flight: PX4, ..SPLIT_FULL },
+    Scenario { flight: SIGNED, ..SPLIT_FULL },
+    RETURN,
+    Scenario { flight: PX4, ..RETURN },
+    Scenario { flight: FAULTS, ..RETURN },
+    BY_ARMING,
+    Scenario { flight: SIGNED, ..BY_ARMING },
+    Scenario { flight: FAULTS, seconds: 60.0, ..BY_ARMING },
+    Scenario { name: "a log by arming on a full card", card_mib: 34, earlier: 18, ..BY_ARMING },
+];
+
+pub(super) fn run(options: &Options) -> Result<Figures> {
+    let runs = options.runs(10_000, 240);
+    let share = runs.div_ceil(SCENARIOS.len() as u64);
+    // The split of a log takes minutes of recording: left to the long form.
+    let chosen: Vec<_> =
+        (0..).zip(SCENARIOS).filter(|(_, one)| !options.short || one.seconds < 60.0).collect();
+    let outcomes = chosen.into_par_iter().with_max_len(1).map(|(index, scenario)| {
+        let seed = options.seed.wrapping_add(index);
+        let what = || format!("{} ({}), seed {}", scenario.name, scenario.flight, options.seed);
+        Session::record(scenario).and_then(|session| session.cut_often(share, seed)).with_context(what)
+    });
+    let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
+    let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
+    let mut figures = Figures::default();
+    figures.fact("cuts", sum(|one| one.cuts));
+    figures.fact("of them torn", sum(|one| one.torn));
+    figures.fact("of them at the FAT or the directory", sum(|one| one.metadata));
+    figures.fact("files of earlier sessions compared", sum(|one| one.files));
+    figures.fact("frames decoded, all equal to those that went in", sum(|one| one.frames));
+    let worst = outcomes.iter().map(|one| one.loss_us_max).max().unwrap_or(0);
+    figures.fact("most that a cut cost, ms (200 allowed)", worst / 1000);
+    figures.head =
+        ["scenario", "flight", "block writes", "cuts", "torn", "worst ms"].map(str::to_owned).into();
+    for (one, scenario) in
+        outcomes.iter().zip(SCENARIOS.iter().filter(|one| !options.short || one.seconds < 60.0))
+    {
+        figures.row([
+            scenario.name.to_owned(),
+            scenario.flight.to_owned(),
+            one.writes.to_string(),
+            one.cuts.to_string(),
+            one.torn.to_string(),
+            (one.loss_us_max / 1000).to_string(),
+        ]);
+    }
+    Ok(figures)
+}
+
+#[derive(Default)]
+struct Outcome {
+    writes: u64,
+    cuts: u64,
+    torn: u64,
+    metadata: u64,
+    files: u64,
+    frames: u64,
+    loss_us_max: u64,
+}
+
+/// Which half of the block is new.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Tear {
+    Whole,
+    FirstHalf,
+    SecondHalf,
+}
+
+/// A session that was recorded, on the card as it was before it.
+struct Session {
+    card: Card,
+    before: Vec<u8>,
+    files: Vec<CardFile>,
+    /// Files of earlier sessions that made room for this one.
+    overwritten: BTreeSet<String>,
+    /// Which file of an earlier session a block belongs to.
+    owners: BTreeMap<u32, usize>,
+    trace: Vec<Written>,
+    /// The names of the session's own logs, and what its sectors name.
+    logs: BTreeSet<String>,
+    session: u32,
+    arrivals_us: Vec<u64>,
+    hashes: Vec<u64>,
+    data_start: u32,
+    /// From when until when the card was out and what waited for it was written, in microseconds.
+    out_us: Option<(u64, u64)>,
+}
+
+impl Session {
+    fn record(scenario: &Scenario) -> Result<Self> {
+        let card = Card::new(scenario.card_mib)?;
+        let earlier = Stream::of_flight(&own(GUIDED), FULL_RATE)?.for_seconds(0.3);
+        for boots in 1..=scenario.earlier {
+            card.record(&earlier, boots)?;
+        }
+        let (before, files) = (card.content()?, card.walk()?.files);
+        let logs_before: BTreeSet<_> = on_card(&card.path()).into_iter().map(|log| log.name).collect();
+        let stream = Stream::of_flight(&own(scenario.flight), FULL_RATE)?;
+        let stream = if scenario.disarmed_s > 0.0 {
+            stream.after_waiting(scenario.disarmed_s, scenario.seconds)?
+        } else {
+            stream.for_seconds(scenario.seconds)
+        };
+
+        let micros = |seconds: f64| (seconds * 1e6) as u64;
+        let out = scenario.out.map(|(from, to)| CardOut { from_us: micros(from), to_us: micros(to) });
+        let device = card.device(Faults { outs: out.into_iter().collect(), ..Faults::default() })?;
+        device.start_trace();
+        let mut params = Params::defaults();
+        for (name, value) in scenario.params {
+            params.set(name, *value).map_err(|error| anyhow::anyhow!("{name}: {error:?}"))?;
+        }
+        let boots = scenario.earlier + 1;
+        let done = power_on(&device, &params, boots, stream.chunks(), |_| Ok(()))?;
+        ensure!(done.stats.frames_lost == 0 && done.frames_left == 0, "frames were lost: {:?}", done.stats);
+        let drops = done.card.segments_released > 0;
+        ensure!(drops == (scenario.disarmed_s > 0.0), "{} segments dropped", done.card.segments_released);
+        let trace = device.take_trace();
+        ensure!(trace.len() > 200, "only {} block writes", trace.len());
+
+        let after: BTreeSet<_> = card.walk()?.files.into_iter().map(|file| file.path).collect();
+        let gone = files.iter().filter(|file| !after.contains(&file.path));
+        let overwritten = gone.map(|file| file.path.clone()).collect();
+        let logs: Vec<Log> =
+            on_card(&card.path()).into_iter().filter(|log| !logs_before.contains(&log.name)).collect();
+        let first = logs.first().context("the session left no log")?;
+        let session = Record::of(first)?.summary.session.context("the session's log is empty")?;
+        let mut owners = BTreeMap::new();
+        for (index, file) in files.iter().enumerate() {
+            for extent in &file.extents {
+                let first = (extent.start / BLOCK as u64) as u32;
+                let blocks = extent.length.div_ceil(BLOCK as u64) as u32;
+                owners.extend((first..first + blocks).map(|block| (block, index)));
+            }
+        }
+        let device = hums::card::ReadOnlyImage::new(std::fs::File::open(card.path())?)?;
+        let layout =
+            hums_recorder::layout::Layout::read(&device).map_err(|error| anyhow::anyhow!("{error}"))?;
+        let session = Self {
+            before,
+            files,
+            overwritten,
+            owners,
+            logs: logs.into_iter().map(|log| log.name).collect(),
+            session,
+            arrivals_us: stream.arrivals_us(),
+            hashes: stream.hashes(),
+            data_start: layout.data_start,
+            out_us: out.map(|out| (out.from_us, out.to_us + CATCH_UP_US)),
+            trace,
+            card,
+        };
+        session.rewind()?;
+        Ok(session)
+    }
+
+    /// The card as it was before the session.
+    fn rewind(&self) -> Result<()> {
+        self.trace
+            .iter()
+            .try_for_each(|write| self.card.write_block(write.block, &self.block_before(write.block)))
+    }
+
+    fn block_before(&self, block: u32) -> [u8; BLOCK] {
+        let at = block as usize * BLOCK;
+        self.before[at..at + BLOCK].try_into().expect("a whole block")
+    }
+
+    fn is_metadata(&self, write: &Written) -> bool {
+        // The root directory's first cluster; its further ones are few and written at the same moments.
+        write.block <= self.data_start
+    }
+
+    /// Chosen by chance: half of them torn, either way.
+    fn choose(&self, count: u64, seed: u64) -> Vec<(usize, Tear)> {
+        let mut random = Random::new(seed);
+        let mut cuts: Vec<_> = (0..count)
+            .map(|index| {
+                let write = random.below(self.trace.len() as u64) as usize;
+                let tear = match (index % 2, random.below(2)) {
+                    (0, _) => Tear::Whole,
+                    (_, 0) => Tear::FirstHalf,
+                    _ => Tear::SecondHalf,
+                };
+                (write, tear)
+            })
+            .collect();
+        // Few writes are about the file system: each of them counts, whole and torn.
+        let metadata = (0..self.trace.len()).filter(|index| self.is_metadata(&self.trace[*index]));
+        let sample: Vec<_> = metadata.step_by(1 + self.trace.len() / 2_000).collect();
+        for (index, write) in sample.into_iter().enumerate().take(count as usize / 4) {
+            cuts.push((write, if index % 2 == 0 { Tear::Whole } else { Tear::FirstHalf }));
+        }
+        cuts.sort_unstable();
+        cuts
+    }
+
+    fn cut_often(mut self, count: u64, seed: u64) -> Result<Outcome> {
+        let mut outcome = Outcome { writes: self.trace.len() as u64, ..Outcome::default() };
+        let mut done = 0;
+        for (index, tear) in self.choose(count, seed) {
+            for write in &self.trace[done..index] {
+                self.card.write_block(write.block, &write.bytes)?;
+            }
+            done = index;
+            let write = self.trace[index].clone();
+            let old = self.card.read_block(write.block)?;
+            let mut block = write.bytes;
+            match tear {
+                Tear::Whole => {}
+                Tear::FirstHalf => block[BLOCK / 2..].copy_from_slice(&old[BLOCK / 2..]),
+                Tear::SecondHalf => block[..BLOCK / 2].copy_from_slice(&old[..BLOCK / 2]),
+            }
+            self.card.write_block(write.block, &block)?;
+            let what = || format!("cut at write {index}, {tear:?}, block {}", write.block);
+            self.look(index, &mut outcome).with_context(what)?;
+            self.card.write_block(write.block, &old)?;
+            outcome.cuts += 1;
+            outcome.torn += u64::from(tear != Tear::Whole);
+            outcome.metadata += u64::from(self.is_metadata(&write));
+        }
+        Ok(outcome)
+    }
+
+    /// Everything that is promised of a card whose power went at this write.
+    fn look(&mut self, cut: usize, outcome: &mut Outcome) -> Result<()> {
+        self.card.check()?;
+        outcome.files += self.earlier_files(cut)?;
+        let (frames, known_us) = self.decode()?;
+        outcome.frames += frames;
+        let cut_us = self.trace[cut].at_us;
+        let given = self.arrivals_us.partition_point(|at| *at <= cut_us);
+        let given_us = given.checked_sub(1).map_or(0, |last| self.arrivals_us[last]);
+        // What waits for a card that is out is in memory only, and power takes it along.
+        let out = self.out_us.filter(|(from, to)| (*from..*to).contains(&cut_us));
+        let due_us = out.map_or(given_us, |(from, _)| given_us.min(from));
+        let loss_us = due_us.saturating_sub(known_us);
+        outcome.loss_us_max = outcome.loss_us_max.max(loss_us);
+        ensure!(
+            loss_us <= LOSS_MAX_US,
+            "at {cut_us} us, the last frame came at {given_us} and the last one in the log at {known_us}"
+        );
+        Ok(())
+    }
+
+    /// Each file of an earlier session is as it was, unless it made room. How many were compared.
+    fn earlier_files(&self, cut: usize) -> Result<u64> {
+        let walk = self.card.walk()?;
+        ensure!(walk.damage.is_empty(), "{:?}", walk.damage);
+        let now: BTreeMap<_, _> = walk.files.iter().map(|file| (file.path.as_str(), file)).collect();
+        let mut same = vec![false; self.files.len()];
+        for (index, file) in self.files.iter().enumerate() {
+            same[index] = now.get(file.path.as_str()) == Some(&file);
+            ensure!(same[index] || self.overwritten.contains(&file.path), "{} is gone or changed", file.path);
+        }
+        // Only blocks that were written can differ.
+        let written: BTreeSet<_> = self.trace[..=cut].iter().map(|write| write.block).collect();
+        for block in written {
+            if let Some(owner) = self.owners.get(&block).filter(|owner| same[**owner]) {
+                let path = &self.files[*owner].path;
+                ensure!(self.card.read_block(block)? == self.block_before(block), "{path} was written to");
+            }
+        }
+        Ok(same.iter().filter(|same| **same).count() as u64)
+    }
+
+    /// Decodes the session's log: how many frames, and when the last one came. Each is the one that went in.
+    fn decode(&self) -> Result<(u64, u64)> {
+        let (mut count, mut next, mut last_us) = (0, 0, 0);
+        for log in on_card(&self.card.path()).iter().filter(|log| self.logs.contains(&log.name)) {
+            let record = Record::of(log)?;
+            if record.summary.session != Some(self.session) {
+                // No sector of it was written yet: what is there is left over from the log that made room.
+                continue;
+            }
+            let mut gaps = record.gaps.iter().peekable();
+            for (index, frame) in record.frames.iter().enumerate() {
+                while let Some((_, gap)) = gaps.next_if(|(before, _)| *before == index) {
+                    let is_wanted = gap.from.is_none() && gap.cause == Cause::Disarmed;
+                    ensure!(is_wanted, "a gap before the cut: {gap:?}");
+                    next = gap.frames.context("a gap of unknown length")? as usize;
+                }
+                let arrival_us = *self.arrivals_us.get(next).context("more frames than went in")?;
+                ensure!(self.hashes[next] == frame.hash, "frame {next} is not the one that went in");
+                ensure!(frame.at_ms.abs_diff(arrival_us / 1000) <= 1, "frame {next} came at another time");
+                next += 1;
+                last_us = arrival_us;
+            }
+            count += record.frames.len() as u64;
+        }
+        Ok((count, last_us))
+    }
+}
