@@ -167,7 +167,7 @@ struct Session {
     trace: Vec<Written>,
     /// The names of the session's own logs, and what its sectors name.
     logs: BTreeSet<String>,
-    session: u32,
+    sealed_as: u32,
     arrivals_us: Vec<u64>,
     hashes: Vec<u64>,
     data_start: u32,
@@ -213,7 +213,7 @@ impl Session {
         let logs: Vec<Log> =
             on_card(&card.path()).into_iter().filter(|log| !logs_before.contains(&log.name)).collect();
         let first = logs.first().context("the session left no log")?;
-        let session = Record::of(first)?.summary.session.context("the session's log is empty")?;
+        let sealed_as = Record::of(first)?.summary.session.context("the session's log is empty")?;
         let mut owners = BTreeMap::new();
         for (index, file) in files.iter().enumerate() {
             for extent in &file.extents {
@@ -231,7 +231,7 @@ impl Session {
             overwritten,
             owners,
             logs: logs.into_iter().map(|log| log.name).collect(),
-            session,
+            sealed_as,
             arrivals_us: stream.arrivals_us(),
             hashes: stream.hashes(),
             data_start: layout.data_start,
@@ -358,7 +358,7 @@ impl Session {
         let (mut count, mut next, mut last_us) = (0, 0, 0);
         for log in on_card(&self.card.path()).iter().filter(|log| self.logs.contains(&log.name)) {
             let record = Record::of(log)?;
-            if record.summary.session != Some(self.session) {
+            if record.summary.session != Some(self.sealed_as) {
                 // No sector of it was written yet: what is there is left over from the log that made room.
                 continue;
             }
