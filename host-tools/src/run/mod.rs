@@ -5,9 +5,11 @@
 
 pub mod arrivals;
 pub mod emulate;
+mod params;
 pub mod qemu;
 pub mod report;
 pub mod sim;
+mod store;
 
 use std::fs::File;
 use std::io::Write;

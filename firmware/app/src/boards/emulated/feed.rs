@@ -1,10 +1,14 @@
 //! The feed: the arrival times of the input, read from a file or FIFO of the host.
 //!
 //! A record is 12 bytes, little endian: `u64` microseconds since power-on, `u32` count of bytes that arrive then.
-//! The bytes themselves come through USART1. A count of 0 only moves the clock. Times that go back count as now.
+//! The bytes themselves come through USART1. A count of 0 only moves the clock, and
+//! [`POWER_OFF`] is the end of the power. Times that go back count as now.
 
 use semihosting::fs::File;
 use semihosting::io::Read;
+
+/// A count that is none: power goes at this time.
+pub(crate) const POWER_OFF: u32 = u32::MAX;
 
 const RECORD_BYTES: usize = 12;
 /// Records read from the host at a time; a FIFO may give fewer.

@@ -29,6 +29,8 @@ const GS_BAUD: u64 = 57_600;
 const BITS_A_BYTE: u64 = 10;
 
 static RECEIVED: Mutex<RefCell<Vec<u8, PIECE_BYTES>>> = Mutex::new(RefCell::new(Vec::new()));
+/// Bytes that were taken out of the port since the start: what the host need not send again after a reset.
+static TAKEN: AtomicU32 = AtomicU32::new(0);
 /// Bytes still due of the current piece.
 static DUE: AtomicU32 = AtomicU32::new(0);
 static WAKER: AtomicWaker = AtomicWaker::new();
@@ -51,6 +53,11 @@ pub(super) fn init() -> (AutopilotRx, GsTx) {
     // SAFETY: the handler below shares nothing but what is made for it, and nobody relies on its being masked.
     unsafe { NVIC::unmask(interrupt::USART1) };
     (AutopilotRx(()), GsTx(()))
+}
+
+/// Bytes taken out of the port since the start.
+pub(super) fn taken() -> u32 {
+    TAKEN.load(Ordering::Relaxed)
 }
 
 /// Takes `count` bytes from the port, piece by piece, and lets reception have each piece. Returns when all are in; the
@@ -85,6 +92,7 @@ fn USART1() {
             // Never full: a piece is asked for when the one before is gone.
             let _ = received.push(usart.dr().read().dr() as u8);
             due -= 1;
+            TAKEN.fetch_add(1, Ordering::Relaxed);
         }
     });
     if due == 0 {
