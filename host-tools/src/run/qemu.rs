@@ -60,6 +60,9 @@ pub fn check() -> Result<()> {
     }
 }
 
+/// The bit of a count in the clock's pipe that says that the bytes are the ground station's.
+const FROM_GS: u32 = 1 << 31;
+
 /// A line of the firmware's.
 enum Line {
     Ready,
@@ -97,7 +100,7 @@ pub enum Ended {
     Again(Again),
 }
 
-/// Where the bytes for the ground station go; it outlives a start.
+/// Where the bytes of a port go; it outlives a start.
 pub type Ground = Arc<Mutex<Box<dyn Write + Send>>>;
 
 /// What a start of the firmware needs.
@@ -110,6 +113,8 @@ pub struct Start<'a> {
     pub store: &'a Path,
     /// Where the bytes for the ground station go.
     pub gs: Ground,
+    /// Where the bytes for the autopilot go.
+    pub autopilot: Ground,
     /// Further arguments, `key=value`.
     pub arguments: Vec<String>,
     /// It counts the instructions of each stage.
@@ -131,6 +136,8 @@ pub struct Qemu {
     feed: Option<File>,
     /// The autopilot UART.
     uart: Option<UnixStream>,
+    /// The ground station's.
+    ground: Option<UnixStream>,
     downlink: Option<JoinHandle<std::io::Result<u64>>>,
     complaints: JoinHandle<String>,
     dir: TempDir,
@@ -158,10 +165,16 @@ impl Qemu {
             .spawn()
             .with_context(|| format!("{PROGRAM} cannot be started"))?;
         let (lines, complaints) = listen(&mut child)?;
-        let mut qemu = Self { child, lines, feed: None, uart: None, downlink: None, complaints, dir };
+        let mut qemu =
+            Self { child, lines, feed: None, uart: None, ground: None, downlink: None, complaints, dir };
         // It waits for this one before it starts the firmware, so that not one byte is missed.
-        qemu.downlink = Some(forward(qemu.connect("gs")?, start.gs));
-        qemu.uart = Some(qemu.connect("ap")?);
+        let ground = qemu.connect("gs")?;
+        qemu.ground = Some(ground.try_clone().context("the ground station's port")?);
+        qemu.downlink = Some(forward(ground, start.gs));
+        let uart = qemu.connect("ap")?;
+        // What is sent to the autopilot must be read, or the emulator would wait for that.
+        let _ = forward(uart.try_clone().context("the autopilot's port")?, start.autopilot);
+        qemu.uart = Some(uart);
         match qemu.lines.recv_timeout(BOOT) {
             Ok(Line::Ready) => {}
             Ok(Line::Result(_) | Line::Again(_)) | Err(RecvTimeoutError::Disconnected) => {
@@ -196,7 +209,16 @@ impl Qemu {
 
     /// "At this time these bytes have arrived." `false`: it is being reset, and takes no more.
     pub fn arrive(&mut self, at_us: u64, bytes: &[u8]) -> Result<bool> {
-        match self.send(at_us, bytes.len() as u32, bytes) {
+        self.give(at_us, bytes, false)
+    }
+
+    /// The same for bytes of the ground station.
+    pub fn hear(&mut self, at_us: u64, bytes: &[u8]) -> Result<bool> {
+        self.give(at_us, bytes, true)
+    }
+
+    fn give(&mut self, at_us: u64, bytes: &[u8], from_gs: bool) -> Result<bool> {
+        match self.send(at_us, bytes, if from_gs { FROM_GS } else { 0 }) {
             Ok(()) => Ok(true),
             // It said so before it ended; its lines may still be on their way.
             Err(_) if self.child.wait()?.code() == Some(EXIT_AGAIN) => Ok(false),
@@ -210,15 +232,17 @@ impl Qemu {
     /// "At this time power goes."
     pub fn power_off(&mut self, at_us: u64) -> Result<()> {
         // Where it is reset before, that is how it ends.
-        let _ = self.send(at_us, POWER_OFF, &[]);
+        let _ = self.send(at_us, &[], POWER_OFF);
         Ok(())
     }
 
-    fn send(&mut self, at_us: u64, count: u32, bytes: &[u8]) -> std::io::Result<()> {
+    /// A record of the feed, its count with these bits, and the bytes at their port.
+    fn send(&mut self, at_us: u64, bytes: &[u8], bits: u32) -> std::io::Result<()> {
         let mut record = [0; 12];
         record[..8].copy_from_slice(&at_us.to_le_bytes());
-        record[8..].copy_from_slice(&count.to_le_bytes());
-        match (&mut self.feed, &mut self.uart) {
+        record[8..].copy_from_slice(&(bytes.len() as u32 | bits).to_le_bytes());
+        let port = if bits == FROM_GS { &mut self.ground } else { &mut self.uart };
+        match (&mut self.feed, port) {
             (Some(feed), Some(uart)) => feed.write_all(&record).and_then(|()| uart.write_all(bytes)),
             _ => Ok(()),
         }
@@ -237,7 +261,7 @@ impl Qemu {
             }
         };
         let status = self.child.wait().context("the emulator's end")?;
-        self.uart = None;
+        (self.uart, self.ground) = (None, None);
         if let Some(downlink) = self.downlink.take()
             && let Ok(result) = downlink.join()
         {
@@ -258,7 +282,7 @@ impl Qemu {
 
     /// How it ended, as the end of a sentence.
     fn end(&mut self) -> Result<String> {
-        (self.feed, self.uart) = (None, None);
+        (self.feed, self.uart, self.ground) = (None, None, None);
         let status = if let Some(status) = self.child.try_wait()? {
             status
         } else {

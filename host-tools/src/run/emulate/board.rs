@@ -20,6 +20,7 @@ pub(super) struct Fixed {
     pub(super) card: PathBuf,
     pub(super) store: PathBuf,
     pub(super) gs: Ground,
+    pub(super) autopilot: Ground,
     pub(super) costs: bool,
     /// What is to go wrong in the firmware itself.
     pub(super) provoke: Option<String>,
@@ -69,11 +70,12 @@ impl Board {
     }
 
     fn power_on(&mut self, survived: Option<Vec<u8>>) -> Result<()> {
-        let Fixed { firmware, card, store, gs, costs, provoke, .. } = &self.fixed;
+        let Fixed { firmware, card, store, gs, autopilot, costs, provoke, .. } = &self.fixed;
         let mut arguments = vec![format!("seed={}", self.earlier.starts)];
         // Once, also where power is lost in between.
         arguments.extend(provoke.iter().filter(|_| self.resets == 0).map(|what| format!("provoke={what}")));
-        let start = Start { firmware, card, store, gs: gs.clone(), arguments, costs: *costs, survived };
+        let (gs, autopilot, costs) = (gs.clone(), autopilot.clone(), *costs);
+        let start = Start { firmware, card, store, gs, autopilot, arguments, costs, survived };
         self.qemu = Some(Qemu::start(start)?);
         Ok(())
     }
@@ -169,6 +171,13 @@ impl Machine for Board {
             let Ended::Again(again) = qemu.finish()? else { bail!("the firmware ended before its input") };
             self.start_again(again)?;
         }
+        Ok(true)
+    }
+
+    fn hear(&mut self, chunk: &Chunk) -> Result<bool> {
+        let Some(qemu) = &mut self.qemu else { bail!("the firmware does not run") };
+        // Nobody hears it while the firmware is being reset, which the next arrival notices.
+        qemu.hear(chunk.at_us.saturating_sub(self.started_us), &chunk.bytes)?;
         Ok(true)
     }
 }

@@ -16,7 +16,7 @@ use serde::Deserialize;
 
 use super::qemu;
 use super::report::Report;
-use super::{arrivals::Arrivals, check_standard_output, drive, open_sink, pace, params, prepare_card, store};
+use super::{arrivals::Arrivals, check_standard_output, drive, ground, pace, params, prepare_card, store};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::logs;
@@ -48,16 +48,18 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let earlier = logs::on_card(&run.sd).len();
     let mut reboots = VecDeque::from(run.faults.reboot_at.clone());
     reboots.make_contiguous().sort_unstable();
+    let (mut ground, gs) = ground::open(run)?;
     let mut board = Board::start(Fixed {
         firmware,
         card: run.sd.clone(),
         store,
-        gs: Arc::new(Mutex::new(open_sink(run.gs.as_ref())?)),
+        gs: Arc::new(Mutex::new(gs)),
+        autopilot: Arc::new(Mutex::new(arrivals.take_autopilot())),
         costs: args.costs,
         provoke: args.provoke.clone(),
         reboots,
     })?;
-    drive(&mut arrivals, speed, live, Instant::now(), &mut board)?;
+    drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)?;
     let (json, before) = board.finish()?;
     if let Some(remark) = arrivals.remark() {
         eprintln!("hums: {remark}");

@@ -20,9 +20,10 @@ use hums_recorder::status::CardReading;
 use pipeline::{Memory, Outside, Pipeline};
 
 use super::arrivals::Arrivals;
+use super::ground::{self, Ground};
 use super::report::Report;
 use super::store::{self, FileFlash};
-use super::{check_standard_output, drive, open_sink, pace, params, prepare_card};
+use super::{check_standard_output, drive, pace, params, prepare_card};
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -46,10 +47,12 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     }
     let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
+    let (mut ground, gs) = ground::open(run)?;
     let mut world = World {
         card: &card,
         flash: &flash,
-        gs: open_sink(run.gs.as_ref())?,
+        gs,
+        autopilot: arrivals.take_autopilot(),
         report: Report::default(),
         reboots: run.faults.reboot_at.clone(),
         boots: 0,
@@ -60,7 +63,9 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     };
     world.reboots.sort_unstable();
     let start = WallClock::now();
-    while world.power_on(&mut arrivals, |arrivals, machine| drive(arrivals, speed, live, start, machine))? {}
+    while world.power_on(&mut arrivals, &mut ground, |arrivals, ground, machine| {
+        drive(arrivals, ground, speed, live, start, machine)
+    })? {}
     if let Some(error) = card.take_image_error() {
         bail!("{}: {error}", run.sd.display());
     }
@@ -99,9 +104,16 @@ pub fn power_on(
 ) -> Result<PowerOn> {
     let mut memory = Memory::new(params);
     let (mut findings, mut gs) = (Vec::new(), std::io::sink());
-    let flash = &store::open(None, &[])?;
-    let outside =
-        Outside { card, flash, gs: &mut gs, findings: &mut findings, power_on_us: 0, reboot_at_us: None };
+    let mut autopilot = std::io::sink();
+    let outside = Outside {
+        card,
+        flash: &store::open(None, &[])?,
+        gs: &mut gs,
+        autopilot: &mut autopilot,
+        findings: &mut findings,
+        power_on_us: 0,
+        reboot_at_us: None,
+    };
     let mut pipeline = Pipeline::new(outside, &mut memory, identity(boots), boots);
     pipeline.start()?;
     let mut ended = true;
@@ -144,6 +156,7 @@ struct World<'a> {
     card: &'a SimCard,
     flash: &'a FileFlash,
     gs: Box<dyn Write + Send>,
+    autopilot: Box<dyn Write + Send>,
     report: Report,
     /// When our own power goes for a moment, sorted.
     reboots: Vec<u64>,
@@ -161,7 +174,8 @@ impl World<'_> {
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
-        drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
+        ground: &mut Ground,
+        drive: impl FnOnce(&mut Arrivals, &mut Ground, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
         let mut memory = Memory::new(&Params::defaults());
@@ -169,6 +183,7 @@ impl World<'_> {
             card: self.card,
             flash: self.flash,
             gs: &mut *self.gs,
+            autopilot: &mut *self.autopilot,
             findings: &mut self.report.findings,
             power_on_us: self.power_on_us,
             reboot_at_us: self.reboots.first().copied(),
@@ -176,7 +191,7 @@ impl World<'_> {
         let mut pipeline =
             Pipeline::new(outside, &mut memory, identity(self.boots), self.entropy.wrapping_add(self.boots));
         pipeline.start()?;
-        let ended = drive(arrivals, &mut pipeline)?;
+        let ended = drive(arrivals, ground, &mut pipeline)?;
         let mut lost = 0;
         if ended {
             lost = pipeline.finish()?;
