@@ -67,6 +67,7 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --gs udpin:127.0.0.1:14551 --speed real
   hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
   hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
+  hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
 
 Raw bytes carry no times: they come as on a line at 115,200 baud. --sd is kept: a second run adds a session to it.";
 
@@ -85,7 +86,10 @@ pub struct Run {
     /// What the ground station sends, with the times that it has in this file
     #[arg(long, value_name = "SRC")]
     pub gs_input: Option<Endpoint>,
-    /// Parameters to start with: a file of `NAME VALUE` lines
+    /// The flash in which counters and parameters outlive power (32 KiB; made when missing); without it all begin anew
+    #[arg(long, value_name = "FILE")]
+    pub store: Option<PathBuf>,
+    /// Set these parameters before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
     /// As fast as possible on a virtual clock (repeatable), or in real time; live inputs are always real
@@ -115,6 +119,9 @@ pub struct FaultFlags {
     /// Power goes at the N-th 512-byte block write (torn: half of that block is old); the run ends there
     #[arg(long, value_name = "N[:torn]")]
     pub cut_after_writes: Vec<Cut>,
+    /// Power goes at the N-th word that is written to the store, or sector that is erased; the run ends there
+    #[arg(long, value_name = "N", overrides_with = "cut_store_after")]
+    pub cut_store_after: Option<u64>,
     /// The card answers nothing for MS milliseconds from T seconds on
     #[arg(long, value_name = "MS@T")]
     pub stall: Vec<Stall>,
@@ -173,6 +180,9 @@ pub struct Emulate {
     /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
     #[arg(long, value_name = "ELF")]
     pub firmware: Option<PathBuf>,
+    /// What is to go wrong in the firmware itself, when it first sends to the ground station
+    #[arg(long, value_name = "WHAT", value_parser = ["panic", "bus-fault", "silence"])]
+    pub provoke: Option<String>,
     /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
     #[arg(long)]
     pub costs: bool,
