@@ -21,7 +21,7 @@ struct Step {
 }
 
 /// In the order in which they fail soonest.
-const STEPS: [Step; 10] = [
+const STEPS: [Step; 12] = [
     Step { name: "fmt", about: "the formatting", needs: &[Need::Rustfmt], run: fmt },
     Step {
         name: "clippy",
@@ -53,6 +53,18 @@ const STEPS: [Step; 10] = [
         about: "end to end on this PC, against pymavlink",
         needs: &[Need::Mtools, Need::Dosfstools, Need::PythonVenv],
         run: sim,
+    },
+    Step {
+        name: "answer",
+        about: "every format against pymavlink, with pyarrow, DuckDB and InfluxDB as readers",
+        needs: &[Need::PythonVenv, Need::Influx],
+        run: answer,
+    },
+    Step {
+        name: "browser",
+        about: "the report in Chromium",
+        needs: &[Need::PythonVenv, Need::Chromium],
+        run: browser,
     },
     Step {
         name: "emulator",
@@ -148,7 +160,7 @@ fn fmt() -> Result<()> {
 fn clippy() -> Result<()> {
     Shell::cargo()
         .args(["clippy", "--workspace", "--exclude=hums-app", "--all-targets"])
-        .args(["--features=hums-tests/emulator", "--", "-D", "warnings"])
+        .args(["--features=hums-tests/emulator,hums-tests/browser", "--", "-D", "warnings"])
         .run()
 }
 
@@ -192,6 +204,14 @@ fn end_to_end(features: &str, target: &str) -> Result<()> {
 
 fn sim() -> Result<()> {
     end_to_end("oracle", "sim")
+}
+
+fn answer() -> Result<()> {
+    end_to_end("oracle", "answer")
+}
+
+fn browser() -> Result<()> {
+    end_to_end("browser", "browser")
 }
 
 fn emulator() -> Result<()> {
