@@ -64,6 +64,7 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --gs gs.bin
   hums sim --input flight.tlog --sd card.img --json --line-rate 921600
   hums sim --input udpin:0.0.0.0:14550 --sd card.img --gs udpout:127.0.0.1:14551
+  hums sim --input flight.tlog --sd card.img --gs udpin:127.0.0.1:14551 --speed real
   hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
   hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
 
@@ -78,9 +79,12 @@ pub struct Run {
     /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
     #[arg(long, value_name = "IMAGE")]
     pub sd: PathBuf,
-    /// Where the bytes for the ground station go
+    /// Where the bytes for the ground station go; where somebody is there (udp, tcp, serial), its own are heard too
     #[arg(long, value_name = "SINK")]
     pub gs: Option<Endpoint>,
+    /// What the ground station sends, with the times that it has in this file
+    #[arg(long, value_name = "SRC")]
+    pub gs_input: Option<Endpoint>,
     /// Parameters to start with: a file of `NAME VALUE` lines
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,

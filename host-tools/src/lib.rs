@@ -4,6 +4,7 @@ pub mod card;
 pub mod cli;
 pub mod decode;
 pub mod demo;
+pub mod duplex;
 pub mod endpoint;
 pub mod info;
 pub mod interrupt;

@@ -13,6 +13,10 @@ pub(crate) static FRAMES: Link = Signal::new();
 pub(crate) static SECTORS: Link = Signal::new();
 /// Monitor to downlink: there may be frames for the ground station.
 pub(crate) static GS: Link = Signal::new();
+/// Uplink to monitor: there may be frames from the ground station.
+pub(crate) static UPLINK: Link = Signal::new();
+/// Monitor to requests: there may be frames for the autopilot.
+pub(crate) static AUTOPILOT: Link = Signal::new();
 /// Reception to monitor: the input has ended, its last frame is queued.
 pub(crate) static INPUT_ENDED: Link = Signal::new();
 /// Monitor to storage: the last sector is queued. Looked at, not waited for: `SECTORS` wakes.

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! AutopilotRx -> reception -> monitor -> storage -> card
-//!                                    \-> downlink -> GsTx
+//!        GsRx -> uplink    -/       \\-> downlink -> GsTx
+//!                                     \-> requests -> AutopilotTx
 //! ```
 //! Everything is allocated here and once: queues, the codec, the tasks. What the tasks do is in `hums_onboard`, where
 //! it is tested on a PC; what the machine does is in `boards`.
@@ -53,7 +54,8 @@ fn main() -> ! {
         defmt::error!("before this start: {}", defmt::Display2Format(fault));
     }
 
-    let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out } = QUEUES.take().split();
+    let queues = QUEUES.take().split();
+    let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;
     let identity = Boot {
         version: env!("CARGO_PKG_VERSION"),
         git: env!("HUMS_GIT"),
@@ -76,10 +78,15 @@ fn main() -> ! {
     });
 
     let on = executors::start();
-    on.reception.spawn(tasks::reception::run(parts.autopilot, frames_in).expect(ONCE));
-    let ends = monitor::Ends { frames: frames_out, sectors: sectors_in, gs: gs_in };
+    let (autopilot_rx, autopilot_tx) = parts.autopilot;
+    let (gs_rx, gs_tx) = parts.gs;
+    on.reception.spawn(tasks::reception::run(autopilot_rx, frames_in).expect(ONCE));
+    let ends =
+        monitor::Ends { frames: frames_out, uplink: queues.uplink_out, sectors: sectors_in, gs: gs_in };
     on.monitor.spawn(monitor::run(monitoring, ends, handover, fault, parts.watchdog, parts.led).expect(ONCE));
-    on.downlink.spawn(tasks::downlink::run(parts.gs, gs_out).expect(ONCE));
+    on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
+    on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
+    on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
     on.storage.spawn(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out, keeper).expect(ONCE));
     let mut idle = parts.idle;
     idle.run()

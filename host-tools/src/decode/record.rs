@@ -196,6 +196,14 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Lifetime(life) => super::wear::lifetime(life),
         Record::Exceedance(exceedance) => super::wear::exceedance(exceedance),
         Record::Component(component) => vec![super::wear::component(component)],
+        Record::Keep(keep) => one(
+            "HUMS_KEEP",
+            vec![
+                ("all", count(u8::from(keep.all))),
+                ("from_sector", count(keep.from)),
+                ("seconds", count(keep.seconds)),
+            ],
+        ),
         Record::Unknown { kind, version, bytes } => one(
             "HUMS_UNKNOWN",
             vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],

@@ -39,7 +39,7 @@ use semihosting::{println, process};
 pub(crate) use card::ImageCard as Card;
 use feed::Feed;
 pub(crate) use store::StoreFlash;
-pub(crate) use uart::{AutopilotRx, GsTx};
+pub(crate) use uart::{AutopilotRx, AutopilotTx, GsRx, GsTx};
 
 use super::{Boot, ResetCause};
 use crate::costs::Stage;
@@ -74,8 +74,8 @@ static BITES_AT_MS: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// What the app gets.
 pub(crate) struct Parts {
-    pub(crate) autopilot: AutopilotRx,
-    pub(crate) gs: GsTx,
+    pub(crate) autopilot: (AutopilotRx, AutopilotTx),
+    pub(crate) gs: (GsRx, GsTx),
     pub(crate) card: Card,
     pub(crate) store: Option<StoreFlash>,
     pub(crate) led: Led,
@@ -203,7 +203,7 @@ impl Idle {
             match self.feed.peek() {
                 Some(arrival) if arrival.time_us.max(clock::now_us()) < alarm_us => {
                     clock::advance(arrival.time_us);
-                    uart::receive(arrival.bytes);
+                    uart::receive(arrival.from_gs, arrival.bytes);
                     self.feed.take();
                 }
                 None if !ended => {

@@ -4,6 +4,7 @@ pub(crate) mod downlink;
 pub(crate) mod monitor;
 pub(crate) mod reception;
 pub(crate) mod storage;
+pub(crate) mod uplink;
 
 use hums_onboard::{Mailbox, PortStatus, StoreStatus, Supervisor};
 use hums_recorder::CardStatus;

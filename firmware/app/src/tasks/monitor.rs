@@ -1,13 +1,17 @@
 //! Monitor: frames to records, findings and the summary. Also the one that feeds the watchdog, because it goes round
 //! every 50 ms whatever happens, and the one that works the LED.
 
-use embassy_futures::select::{Either3, select3};
+use core::sync::atomic::Ordering;
+
+use embassy_futures::select::{Either4, select4};
 use embassy_time::Ticker;
+use hums_core::params::Param;
 use hums_onboard::monitoring::{Monitoring, Step, TICK};
-use hums_onboard::queues::{FramesOut, GsIn, SectorsIn};
+use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
 use hums_onboard::{Handover, Task};
 use hums_recorder::CardState;
 
+use super::downlink::{BAUD_AUTOPILOT, BAUD_GS};
 use super::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
 use crate::boards::board;
 use crate::costs::{self, Stage, measure};
@@ -24,6 +28,7 @@ const BLINK_TROUBLE: u32 = 2;
 /// The monitor's ends of the queues.
 pub(crate) struct Ends {
     pub(crate) frames: FramesOut<'static>,
+    pub(crate) uplink: UplinkOut<'static>,
     pub(crate) sectors: SectorsIn<'static>,
     pub(crate) gs: GsIn<'static>,
 }
@@ -47,9 +52,11 @@ pub(crate) async fn run(
     loop {
         SUPERVISOR.report(Task::Monitor, now());
         // Frames first where both are due: they came before this tick.
-        match select3(links::FRAMES.wait(), ticker.next(), links::INPUT_ENDED.wait()).await {
-            Either3::First(()) => drain(body, &mut ends),
-            Either3::Second(()) => {
+        let work = (links::FRAMES.wait(), ticker.next(), links::UPLINK.wait(), links::INPUT_ENDED.wait());
+        match select4(work.0, work.1, work.2, work.3).await {
+            Either4::First(()) => drain(body, &mut ends),
+            Either4::Third(()) => uplink(body, &mut ends),
+            Either4::Second(()) => {
                 tick(body, &mut ends, handover);
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
@@ -59,7 +66,7 @@ pub(crate) async fn run(
                     Some(task) => fault::silent(task),
                 }
             }
-            Either3::Third(()) => break,
+            Either4::Fourth(()) => break,
         }
         wake_others();
     }
@@ -79,7 +86,7 @@ pub(crate) async fn run(
 }
 
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
-    let Ends { frames, sectors, gs } = ends;
+    let Ends { frames, sectors, gs, .. } = ends;
     let mut begin = |step| {
         costs::enter(match step {
             Step::Encode => Stage::Encode,
@@ -88,6 +95,11 @@ fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
         });
     };
     while measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin)) {}
+}
+
+fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
+    let Ends { uplink, sectors, gs, .. } = ends;
+    while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
 }
 
 /// Hands over everything that is to outlive power, as fast as the store takes it.
@@ -109,6 +121,9 @@ fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
 }
 
 fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+    let params = body.monitor().params();
+    BAUD_GS.store(params.get(Param::GsBaud) as u32, Ordering::Relaxed);
+    BAUD_AUTOPILOT.store(params.get(Param::ApBaud) as u32, Ordering::Relaxed);
     let Ends { sectors, gs, .. } = ends;
     measure(Stage::Tick, || {
         body.tick(now(), sectors, gs, &mut |finding| {
@@ -128,6 +143,7 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
 
 fn wake_others() {
     links::GS.signal(());
+    links::AUTOPILOT.signal(());
     links::SECTORS.signal(());
 }
 

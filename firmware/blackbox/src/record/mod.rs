@@ -6,6 +6,7 @@
 
 mod boot;
 mod finding;
+mod keep;
 mod loss;
 mod usage;
 mod vehicle;
@@ -15,6 +16,7 @@ use core::fmt;
 
 pub use boot::{Boot, Fault};
 pub use finding::{Event, FindingRecord, Note};
+pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
 pub use vehicle::{Clock, Parameter, Vehicle};
@@ -67,6 +69,8 @@ pub enum Record<'a> {
     Exceedance(Exceedance<'a>),
     /// Kind 14: a part that wears.
     Component(Component<'a>),
+    /// Kind 15: what of the session is kept, where not all of it is.
+    Keep(Keep),
     /// A kind that this reader does not know.
     Unknown {
         /// The stored kind.
@@ -109,6 +113,7 @@ impl<'a> Record<'a> {
             Self::Lifetime(lifetime) => lifetime.store(&mut sink),
             Self::Exceedance(exceedance) => exceedance.store(&mut sink),
             Self::Component(component) => component.store(&mut sink),
+            Self::Keep(keep) => keep.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
                 sink.u8(*kind).u8(*version).bytes(bytes);
             }
@@ -137,6 +142,7 @@ impl<'a> Record<'a> {
             12 => Self::Lifetime(Lifetime::read(fields)),
             13 => Self::Exceedance(Exceedance::read(fields)),
             14 => Self::Component(Component::read(fields)),
+            15 => Self::Keep(Keep::read(fields)),
             _ => unknown,
         }
     }
@@ -238,6 +244,7 @@ mod tests {
             by: (255, 190),
             new_serial: "SN 2",
         }));
+        reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }));
         reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });
     }
 
