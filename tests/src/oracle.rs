@@ -19,12 +19,43 @@ fn from_environment(name: &str, otherwise: &str) -> PathBuf {
 }
 
 fn ask(script: &str, files: &[PathBuf]) -> String {
+    let dialect = from_environment("HUMS_DIALECT", "target/oracle/hums_dialect.py");
+    run(script, &[&[dialect], files].concat())
+}
+
+fn run(script: &str, arguments: &[PathBuf]) -> String {
     let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
-    command.arg(root().join("tests/oracle").join(script));
-    command.arg(from_environment("HUMS_DIALECT", "target/oracle/hums_dialect.py")).args(files);
+    command.arg(root().join("tests/oracle").join(script)).args(arguments);
     // The repository stays as it is: no compiled scripts in it.
     command.env("PYTHONDONTWRITEBYTECODE", "1");
     child::run(&mut command, LIMIT).expect_code(&[0]).text()
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect("the script prints JSON")
+}
+
+/// Where the system's packages put a program, unless the environment says otherwise.
+fn program(variable: &str, path: &str) -> PathBuf {
+    std::env::var_os(variable).map_or_else(|| PathBuf::from(path), PathBuf::from)
+}
+
+/// Compares what a log was decoded to with its recording, field by field: see `tests/oracle/readback.py`.
+pub fn readback(recording: &Path, out: &Path) -> Value {
+    let influxd = program("HUMS_INFLUXD", "/usr/bin/influxd");
+    json(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
+}
+
+/// Runs a document's queries in a folder: see `tests/oracle/fleet.py`.
+pub fn fleet(document: &Path, folder: &Path) -> Value {
+    json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
+}
+
+/// Looks at a page in a browser: see `tests/oracle/browser.py`.
+pub fn browser(page: &Path) -> Value {
+    let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
+    let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
+    json(&run("browser.py", &[chromium, driver, page.to_owned()]))
 }
 
 /// What pymavlink finds in these recordings.

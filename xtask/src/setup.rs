@@ -30,10 +30,12 @@ pub(crate) enum Need {
     Mtools,
     Dosfstools,
     PythonVenv,
+    Influx,
+    Chromium,
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 10] = [
         Self::Linker,
         Self::FirmwareTarget,
         Self::Rustfmt,
@@ -42,6 +44,8 @@ impl Need {
         Self::Mtools,
         Self::Dosfstools,
         Self::PythonVenv,
+        Self::Influx,
+        Self::Chromium,
     ];
 
     /// What it is and what it is for.
@@ -55,6 +59,8 @@ impl Need {
             Self::Mtools => "mtools, which reads the card's image independently of our own reader",
             Self::Dosfstools => "dosfstools (fsck.vfat), which checks the card's file system",
             Self::PythonVenv => "python3 with venv, for pymavlink, the independent reader of MAVLink",
+            Self::Influx => "influxdb, which takes the line protocol",
+            Self::Chromium => "chromium and its driver, which look at the report",
         }
     }
 
@@ -69,6 +75,8 @@ impl Need {
             Self::Mtools => find_program("mcopy").is_some(),
             Self::Dosfstools => find_program("fsck.vfat").is_some(),
             Self::PythonVenv => Shell::new("python3").args(["-c", "import venv, ensurepip"]).ask().is_some(),
+            Self::Influx => find_program("influxd").is_some(),
+            Self::Chromium => find_program("chromium").is_some() && find_program("chromedriver").is_some(),
         }
     }
 
@@ -90,6 +98,8 @@ impl Need {
             Self::Mtools => &["mtools"],
             Self::Dosfstools => &["dosfstools"],
             Self::PythonVenv => &["python3-venv"],
+            Self::Influx => &["influxdb"],
+            Self::Chromium => &["chromium", "chromium-driver", "fonts-dejavu-core"],
             Self::FirmwareTarget | Self::Rustfmt | Self::Clippy => &[],
         }
     }

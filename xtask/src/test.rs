@@ -22,7 +22,7 @@ struct Step {
 }
 
 /// In the order in which they fail soonest.
-const STEPS: [Step; 11] = [
+const STEPS: [Step; 13] = [
     Step { name: "fmt", about: "the formatting", needs: &[Need::Rustfmt], run: fmt },
     Step {
         name: "clippy",
@@ -60,6 +60,18 @@ const STEPS: [Step; 11] = [
         about: "the campaigns in their short form",
         needs: prove::NEEDS,
         run: prove::short,
+    },
+    Step {
+        name: "answer",
+        about: "every format against pymavlink, with pyarrow, DuckDB and InfluxDB as readers",
+        needs: &[Need::PythonVenv, Need::Influx],
+        run: answer,
+    },
+    Step {
+        name: "browser",
+        about: "the report in Chromium",
+        needs: &[Need::PythonVenv, Need::Chromium],
+        run: browser,
     },
     Step {
         name: "emulator",
@@ -155,7 +167,7 @@ fn fmt() -> Result<()> {
 fn clippy() -> Result<()> {
     Shell::cargo()
         .args(["clippy", "--workspace", "--exclude=hums-app", "--all-targets"])
-        .args(["--features=hums-tests/emulator", "--", "-D", "warnings"])
+        .args(["--features=hums-tests/emulator,hums-tests/browser", "--", "-D", "warnings"])
         .run()
 }
 
@@ -199,6 +211,14 @@ fn end_to_end(features: &str, target: &str) -> Result<()> {
 
 fn sim() -> Result<()> {
     end_to_end("oracle", "sim")
+}
+
+fn answer() -> Result<()> {
+    end_to_end("oracle", "answer")
+}
+
+fn browser() -> Result<()> {
+    end_to_end("browser", "browser")
 }
 
 fn emulator() -> Result<()> {

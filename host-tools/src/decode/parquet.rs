@@ -204,6 +204,7 @@ impl RowColumns {
             let (plain, units) =
                 name.strip_suffix(']').and_then(|name| name.split_once('[')).unwrap_or((name, ""));
             let plain = if units.is_empty() { plain.to_owned() } else { format!("{plain}_{units}") };
+            let plain = plain.replace('%', "percent");
             let cells = self.rows.iter().map(|row| row.cells.get(place).map(|(_, cell)| cell));
             arrays.push(cell_array(&data_type, cells));
             fields.push(with_units(Field::new(column_name(&plain, &[]), data_type, true), units, ""));

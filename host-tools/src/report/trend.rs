@@ -48,10 +48,12 @@ struct RowJson {
 
 /// Compares a session with those before it of the same vehicle, as far as the vehicle is known.
 pub fn of(this: &Overview, earlier: &[Overview]) -> Trend {
-    let of_vehicle = |other: &&Overview| match (this.contents.vehicle, other.contents.vehicle) {
-        (Some(this), Some(other)) => (this.system, this.uid) == (other.system, other.uid),
-        _ => true,
+    let who = |log: &Overview| {
+        let vehicle = log.contents.vehicle?;
+        Some((vehicle.system, vehicle.uid, vehicle.autopilot, vehicle.vehicle_type))
     };
+    let of_vehicle =
+        |other: &&Overview| who(this).is_none() || who(other).is_none() || who(this) == who(other);
     let mut sessions: Vec<&Overview> = earlier.iter().filter(of_vehicle).collect();
     sessions.drain(..sessions.len().saturating_sub(EARLIER_MAX));
     sessions.push(this);

@@ -1,0 +1,53 @@
+//! Damaged, cut and foreign files: exit code 3 or 1, and what could be saved is in every format.
+
+use std::fs;
+
+use hums_tests::child;
+use hums_tests::flights::own;
+use hums_tests::program::{LIMIT, command, hums};
+
+const FORMATS: &str = "tlog,csv,jsonl,influx,parquet,thesis";
+
+#[test]
+fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = dir.path().join("log.hum");
+    hums(["pack".as_ref(), own("px4_hil_quad_low.tlog").as_os_str(), "-o".as_ref(), log.as_os_str()])
+        .expect_code(&[0]);
+    let whole = fs::read(&log).unwrap();
+    let middle = whole.len() / 1024 * 512;
+    let mut zeroed = whole.clone();
+    zeroed[middle..middle + 20 * 512].fill(0);
+    let mut noisy = whole.clone();
+    noisy[middle..middle + 700].iter_mut().for_each(|byte| *byte ^= 0x5a);
+    let cases = [
+        ("zeroed", zeroed, 3),
+        ("noisy", noisy, 3),
+        ("cut", whole[..middle + 100].to_vec(), 3),
+        ("headless", whole[40 * 512..].to_vec(), 3),
+        ("foreign", b"GIF89a".repeat(2000), 1),
+    ];
+    for (name, bytes, code) in cases {
+        let (damaged, out) = (dir.path().join(format!("{name}.hum")), dir.path().join(name));
+        fs::write(&damaged, bytes).unwrap();
+        let page = dir.path().join(format!("{name}.html"));
+        let mut decode = command(["decode".as_ref(), damaged.as_os_str(), "-o".as_ref(), out.as_os_str()]);
+        child::run(decode.args(["--format", FORMATS]), LIMIT).expect_code(&[code]);
+        hums(["report".as_ref(), damaged.as_os_str(), "-o".as_ref(), page.as_os_str()]).expect_code(&[code]);
+        if code == 1 {
+            assert!(!page.exists() && !out.exists(), "{name}: nothing is made of nothing");
+            continue;
+        }
+        let read =
+            |file: String| fs::read_to_string(out.join(&file)).unwrap_or_else(|_| panic!("{name}: {file}"));
+        let jsonl = read(format!("{name}.jsonl"));
+        assert!(jsonl.lines().filter(|line| line.contains("\"message\"")).count() > 5_000, "{name}");
+        assert!(jsonl.contains("\"HUMS_GAP\""), "{name}");
+        assert!(read(format!("{name}.lp")).lines().any(|line| line.starts_with("HUMS_GAP,")), "{name}");
+        assert_eq!(read(format!("{name}/HUMS_GAP.csv")).lines().count(), 2, "{name}");
+        assert_eq!(read(format!("{name}/thesis/gaps.csv")).lines().count(), 2, "{name}");
+        assert_eq!(read(format!("{name}.tlog.gaps.csv")).lines().count(), 2, "{name}");
+        let html = fs::read_to_string(page).unwrap();
+        assert!(html.contains("\"gaps_count\":1"), "{name}");
+    }
+}

@@ -1,0 +1,86 @@
+//! A folder of cards as one table: the queries of `docs/fleet.md` answer what the cards say.
+
+use std::fs;
+use std::path::Path;
+
+use hums_tests::child;
+use hums_tests::flights::{own, root};
+use hums_tests::oracle;
+use hums_tests::program::{LIMIT, command, hums};
+use serde_json::Value;
+
+/// Two cards, one with two flights.
+fn cards(dir: &Path) {
+    fs::create_dir(dir.join("cards")).unwrap();
+    for (card, flight) in [
+        ("first", "px4_hil_quad_low.tlog"),
+        ("second", "ap_quad_guided.tlog"),
+        ("second", "ap_quad_faults.tlog"),
+    ] {
+        let mut sim = command(["sim", "--speed", "max", "--input"]);
+        let image = dir.join("cards").join(format!("{card}.img"));
+        child::run(sim.arg(own(flight)).arg("--sd").arg(image), LIMIT).expect_code(&[0]);
+    }
+}
+
+/// The rows of the query under a heading, as objects.
+fn rows(results: &Value, heading: &str) -> Vec<Value> {
+    let result =
+        results.as_array().unwrap().iter().find(|result| result["heading"] == heading).expect(heading);
+    let columns: Vec<&str> = result["columns"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    let object = |row: &Value| -> Value {
+        columns
+            .iter()
+            .zip(row.as_array().unwrap())
+            .map(|(name, value)| ((*name).to_owned(), value.clone()))
+            .collect()
+    };
+    result["rows"].as_array().unwrap().iter().map(object).collect()
+}
+
+#[test]
+fn the_documents_queries_answer_what_the_cards_say() {
+    let dir = tempfile::tempdir().unwrap();
+    cards(dir.path());
+    let (cards, fleet) = (dir.path().join("cards"), dir.path().join("fleet"));
+    let decode = |format: &str, out: &Path| {
+        let mut decode = command(["decode".as_ref(), cards.as_os_str(), "-o".as_ref(), out.as_os_str()]);
+        child::run(decode.args(["--format", format]), LIMIT).expect_code(&[0]);
+    };
+    decode("parquet", &fleet);
+    // Again, over it: nothing is there twice.
+    decode("parquet", &fleet);
+    let info = hums(["info".as_ref(), "--json".as_ref(), cards.as_os_str()]).expect_code(&[0]).text();
+    let info: Value = serde_json::from_str(&info).unwrap();
+    let logs = info["logs"].as_array().unwrap();
+    assert_eq!(logs.len(), 3, "three sessions on two cards");
+
+    let results = oracle::fleet(&root().join("docs/fleet.md"), dir.path());
+    let hours = rows(&results, "Hours per motor");
+    let sum: f64 =
+        hours.iter().filter(|row| row["motor"] == 1).map(|row| row["hours"].as_f64().unwrap()).sum();
+    let expected: f64 = logs.iter().map(|log| log["usage"]["motor0_run_time_s"].as_f64().unwrap()).sum();
+    assert!((sum * 3600.0 - expected).abs() < 1.0, "motor 1 ran {sum} h, by info {expected} s");
+    assert!(expected > 600.0, "{expected} s");
+
+    let vibration = rows(&results, "Worst vibration by airframe");
+    let worst = vibration.iter().map(|row| row["worst"].as_f64().unwrap()).fold(0.0, f64::max);
+    assert!(worst > 14.0, "the fault flight shakes: {vibration:?}");
+
+    let ageing = rows(&results, "Battery ageing");
+    // The PX4 flight's battery does not measure its current.
+    assert_eq!(ageing.len(), 2, "a row for each session whose battery measures its current: {ageing:?}");
+
+    let attention = rows(&results, "What needs attention");
+    let worrying = |log: &&Value| {
+        let findings = log["findings"].as_array().unwrap().iter();
+        findings.filter(|finding| finding["level"] == "warning" || finding["level"] == "critical").count()
+    };
+    let expected: usize = logs.iter().map(|log| worrying(&log)).sum();
+    assert!(expected > 0 && attention.len() == expected, "{expected}: {attention:?}");
+
+    let recorders = rows(&results, "How the recorders did");
+    let frames: u64 = recorders.iter().map(|row| row["frames_in"].as_u64().unwrap()).sum();
+    let expected: u64 = logs.iter().map(|log| log["frames"].as_u64().unwrap()).sum();
+    assert_eq!(frames, expected);
+}

@@ -1,0 +1,9 @@
+//! From card to answer, checked by readers that are not ours.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+#[cfg(feature = "oracle")]
+mod damaged;
+#[cfg(feature = "oracle")]
+mod fleet;
+#[cfg(feature = "oracle")]
+mod readback;

@@ -1,0 +1,40 @@
+//! Every field of every message in every format, as pymavlink reads it from the recording.
+
+use std::path::Path;
+
+use hums_tests::flights::{OWN, more, own};
+use hums_tests::program::hums;
+use hums_tests::{child, oracle};
+
+/// Packs a recording, decodes it to every format, and lets the oracle compare.
+#[track_caller]
+fn compare(recording: &Path) {
+    let dir = tempfile::tempdir().unwrap();
+    let (log, out) = (dir.path().join("log.hum"), dir.path().join("out"));
+    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0, 3]);
+    let mut command =
+        hums_tests::program::command(["decode".as_ref(), log.as_os_str(), "-o".as_ref(), out.as_os_str()]);
+    child::run(command.args(["--format", "csv,jsonl,influx,parquet"]), hums_tests::program::LIMIT)
+        .expect_code(&[0]);
+    let found = oracle::readback(recording, &out);
+    let name = recording.file_name().unwrap_or_default().display();
+    eprintln!("{name}: {found}");
+    assert_eq!(found["differences"], serde_json::json!([]), "{name}");
+    let values = &found["values"];
+    assert!(values["csv"].as_u64().unwrap() > 10 * found["messages"].as_u64().unwrap(), "{name}: {found}");
+    for format in ["jsonl", "parquet", "influx"] {
+        assert_eq!(values[format], values["csv"], "{name}: {format} has other values than csv");
+    }
+    // Besides its frames, the line protocol has the reference system's quantities.
+    assert!(found["points"].as_u64() > found["messages"].as_u64(), "{name}: {found}");
+}
+
+#[test]
+fn every_field_of_every_message_of_our_recordings_reads_back_the_same() {
+    OWN.iter().for_each(|name| compare(&own(name)));
+}
+
+#[test]
+fn every_field_of_every_message_of_further_recordings_reads_back_the_same() {
+    more().iter().for_each(|path| compare(path));
+}

@@ -1,0 +1,138 @@
+"""Looks at a report in Chromium, as a person would, and tells what it shows.
+
+usage: browser.py CHROMIUM CHROMEDRIVER PAGE [SCREENSHOT]        prints JSON
+
+  console       what the browser complained about
+  requests      addresses that the page asked for, but for itself
+  title, text   what stands there
+  findings      level and check of each row of the table
+  tiles         label and value
+  plots         for each plot: id, lines, the pixels of each line's colour, and what its lines say where the mouse points
+                at 30, 50 and 70 % of it, with the time there
+  map           the part of the map's pixels that is drawn on
+  width         of the page and of the window, at the width of a phone
+"""
+
+import json
+import sys
+import tempfile
+
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.support.ui import WebDriverWait
+
+FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
+         "--disable-component-update", "--disable-sync", "--no-first-run", "--disable-default-apps",
+         "--force-device-scale-factor=1", "--window-size=1280,1000"]
+
+# The part of a canvas whose pixels differ from the commonest one.
+DRAWN = """
+const canvas = arguments[0];
+const pixels = new Uint32Array(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.buffer);
+const counts = new Map();
+for (const pixel of pixels) counts.set(pixel, (counts.get(pixel) ?? 0) + 1);
+return 1 - Math.max(...counts.values()) / pixels.length;
+"""
+
+# How many pixels of a plot have the colour of each of its lines, but for the smoothing of edges.
+LINE_PIXELS = """
+const [canvas, keys] = arguments;
+const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+return keys.map((key) => {
+  const [r, g, b] = getComputedStyle(key).borderTopColor.match(/[0-9]+/g).map(Number);
+  let count = 0;
+  for (let i = 0; i < pixels.length; i += 4) {
+    if (Math.abs(pixels[i] - r) + Math.abs(pixels[i + 1] - g) + Math.abs(pixels[i + 2] - b) < 30) count++;
+  }
+  return count;
+});
+"""
+
+RANGE = """
+const log = JSON.parse(document.getElementById("data").textContent).log;
+return [log.start_s, log.end_s];
+"""
+
+
+def point(driver, plot, part, time_range):
+    """Moves the mouse over a plot and reads its lines' values."""
+    over = plot.find_element("css selector", ".u-over")
+    width = over.rect["width"]
+    offset = round(width * (part - 0.5))
+    ActionChains(driver).move_to_element_with_offset(over, offset, 10).perform()
+    values = {}
+    for key in plot.find_elements("css selector", ".keys button"):
+        value = key.find_element("tag name", "b").text
+        values[key.text.removesuffix(value).strip()] = value.replace("\u202f", "")
+    at = time_range[0] + (round(width / 2) + offset) / width * (time_range[1] - time_range[0])
+    return {"time_s": at, "values": values}
+
+
+def main():
+    if len(sys.argv) not in (4, 5):
+        sys.exit(__doc__)
+    options = webdriver.ChromeOptions()
+    options.binary_location = sys.argv[1]
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    with tempfile.TemporaryDirectory() as profile:
+        for flag in [*FLAGS, f"--user-data-dir={profile}"]:
+            options.add_argument(flag)
+        driver = webdriver.Chrome(options=options, service=Service(sys.argv[2]))
+        try:
+            print(json.dumps(look(driver, sys.argv[3], sys.argv[4] if len(sys.argv) == 5 else None)))
+        finally:
+            driver.quit()
+
+
+def look(driver, page, screenshot):
+    address = f"file://{page}"
+    driver.get(address)
+    WebDriverWait(driver, 60).until(
+        lambda driver: driver.execute_script("return document.documentElement.dataset.ready") == "true")
+    time_range = driver.execute_script(RANGE)
+    all_of = lambda selector: driver.find_elements("css selector", selector)
+    shown = {"title": driver.title, "text": driver.find_element("tag name", "body").text}
+    shown["findings"] = [[cell.text for cell in row.find_elements("tag name", "td")] for row in all_of("tr.finding")]
+    shown["gaps"] = [row.text for row in all_of("tr.gap")]
+    shown["texts"] = [row.find_elements("tag name", "td")[2].text for row in all_of("tr.text")]
+    shown["tiles"] = {tile.find_element("tag name", "small").text: tile.find_element("tag name", "b").text
+                      for tile in all_of(".tile")}
+    shown["plots"] = {}
+    for plot in all_of(".plot"):
+        driver.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", plot)
+        canvas = plot.find_element("tag name", "canvas")
+        shown["plots"][plot.get_attribute("id").removeprefix("plot-")] = {
+            "lines": len(plot.find_elements("css selector", ".keys button")),
+            "pixels": driver.execute_script(
+                LINE_PIXELS, canvas, plot.find_elements("css selector", ".keys i")),
+            "points": [point(driver, plot, part, time_range) for part in (0.3, 0.5, 0.7)],
+        }
+    shown["map"] = [driver.execute_script(DRAWN, canvas) for canvas in all_of("#map")]
+    shown["timeline"] = driver.execute_script(DRAWN, driver.find_element("id", "timeline"))
+    if all_of("tr.finding"):
+        # A click on a finding looks closer; the button goes back.
+        driver.execute_script("arguments[0].click()", all_of("tr.finding")[0])
+        back = driver.find_element("css selector", "nav button")
+        WebDriverWait(driver, 10).until(lambda _: back.is_displayed())
+        driver.execute_script("arguments[0].click()", back)
+        WebDriverWait(driver, 10).until(lambda _: not back.is_displayed())
+    if screenshot:
+        driver.set_window_size(1280, min(driver.execute_script("return document.body.scrollHeight") + 200, 12000))
+        driver.save_screenshot(screenshot)
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                           {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True})
+    WebDriverWait(driver, 10).until(
+        lambda driver: driver.execute_script("return document.querySelector('.plot .uplot')?.clientWidth ?? 0") < 390)
+    shown["width"] = driver.execute_script("return [document.documentElement.scrollWidth, innerWidth]")
+    shown["console"] = [entry["message"] for entry in driver.get_log("browser")]
+    events = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
+    # The browser's own first tab asks for things too.
+    asked = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+    urls = {request["request"]["url"] for request in asked if request["documentURL"] == address}
+    shown["requests"] = sorted(url for url in urls if url != address and not url.startswith("data:"))
+    return shown
+
+
+if __name__ == "__main__":
+    main()
