@@ -7,6 +7,7 @@
 mod boot;
 mod finding;
 mod loss;
+mod snapshot;
 mod usage;
 mod vehicle;
 mod wear;
@@ -16,6 +17,7 @@ use core::fmt;
 pub use boot::{Boot, Fault};
 pub use finding::{Event, FindingRecord, Note};
 pub use loss::{Loss, Lost, Stats};
+pub use snapshot::{Protection, Snapshot, SnapshotValues};
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
 pub use vehicle::{Clock, Parameter, Vehicle};
 pub use wear::{Component, Exceedance, Why};
@@ -67,6 +69,10 @@ pub enum Record<'a> {
     Exceedance(Exceedance<'a>),
     /// Kind 14: a part that wears.
     Component(Component<'a>),
+    /// Kind 15: half of a snapshot around a critical finding.
+    Snapshot(Snapshot<'a>),
+    /// Kind 16: a step of the protective action.
+    Protection(Protection),
     /// A kind that this reader does not know.
     Unknown {
         /// The stored kind.
@@ -109,6 +115,8 @@ impl<'a> Record<'a> {
             Self::Lifetime(lifetime) => lifetime.store(&mut sink),
             Self::Exceedance(exceedance) => exceedance.store(&mut sink),
             Self::Component(component) => component.store(&mut sink),
+            Self::Snapshot(snapshot) => snapshot.store(&mut sink),
+            Self::Protection(protection) => protection.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
                 sink.u8(*kind).u8(*version).bytes(bytes);
             }
@@ -137,6 +145,8 @@ impl<'a> Record<'a> {
             12 => Self::Lifetime(Lifetime::read(fields)),
             13 => Self::Exceedance(Exceedance::read(fields)),
             14 => Self::Component(Component::read(fields)),
+            15 => Snapshot::read(fields).map_or(unknown, Self::Snapshot),
+            16 => Protection::read(fields).map_or(unknown, Self::Protection),
             _ => unknown,
         }
     }
@@ -147,6 +157,7 @@ mod tests {
     use hums_core::component::{Figures, Kind, Status};
     use hums_core::exceedance::Crossings;
     use hums_core::health::{Level, Subsystem};
+    use hums_core::protect::{Action, Stage};
     use hums_core::time::Instant;
 
     use super::*;
@@ -238,6 +249,8 @@ mod tests {
             by: (255, 190),
             new_serial: "SN 2",
         }));
+        let (action, stage) = (Action::Land, Stage::Answered);
+        reads_back(Record::Protection(Protection { action, stage, detail: 4, command: 21 }));
         reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });
     }
 
