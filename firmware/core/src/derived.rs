@@ -1,11 +1,12 @@
 //! What the raw messages do not say by themselves: cell count and cell voltage, silence of an ESC against its own rhythm,
 //! imbalance of motors in steady flight, clips since take-off, load factor.
 
-use crate::flight::FlightEvent;
+use crate::flight::{Flight, FlightEvent};
 use crate::health::{Inputs, Reading};
 use crate::latest::Latest;
 use crate::observation::{Battery, CELLS_MAX, EscGroup, MOTORS_MAX, Observation};
 use crate::params::{Param, Params};
+use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
 use crate::trend::{Rate, Resistance};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
@@ -46,9 +47,34 @@ pub struct Derived {
     load_factor: Latest<f32>,
     had_fix: [bool; RECEIVERS_MAX],
     clips_at_takeoff: Option<u32>,
-    frames_lost: u64,
-    frames_lost_at: Option<Instant>,
-    frames_lost_before: u64,
+    frames_lost: Lately,
+    write_errors: Lately,
+}
+
+/// A count of the last ten seconds, of one that only rises.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lately {
+    count: u64,
+    rose_at: Option<Instant>,
+    before: u64,
+}
+
+impl Lately {
+    const NONE: Self = Self { count: 0, rose_at: None, before: 0 };
+
+    fn take(&mut self, now: Instant, count: u64) {
+        if count > self.count {
+            self.count = count;
+            self.rose_at = Some(now);
+        } else if self.rose_at.is_some_and(|at| now.since(at) > LOSS_MEMORY) {
+            self.before = self.count;
+            self.rose_at = None;
+        }
+    }
+
+    const fn lately(&self) -> f32 {
+        self.count.saturating_sub(self.before) as f32
+    }
 }
 
 impl Default for Derived {
@@ -69,9 +95,8 @@ impl Derived {
             load_factor: Latest::nothing(),
             had_fix: [false; RECEIVERS_MAX],
             clips_at_takeoff: None,
-            frames_lost: 0,
-            frames_lost_at: None,
-            frames_lost_before: 0,
+            frames_lost: Lately::NONE,
+            write_errors: Lately::NONE,
         }
     }
 
@@ -148,18 +173,33 @@ impl Derived {
     }
 
     /// One step, at least every 50 ms, after the flight's own.
-    pub fn step(&mut self, now: Instant, vehicle: &Vehicle, event: Option<FlightEvent>, frames_lost: u64) {
+    pub fn step(
+        &mut self,
+        now: Instant,
+        vehicle: &Vehicle,
+        event: Option<FlightEvent>,
+        recorder: &RecorderStatus,
+    ) {
         match event {
             Some(FlightEvent::TakeOff) => self.clips_at_takeoff = clips(vehicle),
             Some(FlightEvent::Landing) => self.clips_at_takeoff = None,
             None => {}
         }
-        if frames_lost > self.frames_lost {
-            self.frames_lost = frames_lost;
-            self.frames_lost_at = Some(now);
-        } else if self.frames_lost_at.is_some_and(|at| now.since(at) > LOSS_MEMORY) {
-            self.frames_lost_before = self.frames_lost;
-            self.frames_lost_at = None;
+        self.frames_lost.take(now, recorder.frames_lost);
+        self.write_errors.take(now, recorder.write_errors);
+    }
+
+    /// What earlier flights found of a battery's internal resistance.
+    pub(crate) fn set_resistance_baseline(&mut self, battery: usize, ohm: f32) {
+        if let Some(resistance) = self.resistance.get_mut(battery) {
+            resistance.set_baseline(ohm);
+        }
+    }
+
+    /// The battery is another one.
+    pub(crate) fn forget_resistance(&mut self, battery: usize) {
+        if let Some(resistance) = self.resistance.get_mut(battery) {
+            *resistance = Resistance::new();
         }
     }
 
@@ -219,21 +259,37 @@ impl Derived {
     /// How far a motor's speed is from the mean of the others, in percent of it, in steady flight.
     pub(crate) fn motor_imbalance(&self, inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
-        let steady =
-            inputs.flight.airborne_since().is_some_and(|since| inputs.now.since(since) > STEADY_AFTER)
-                && inputs.vehicle.attitude.get().is_none_or(|attitude| {
-                    attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
-                });
+        let mean = self.mean_of_others(motor)?;
+        if !Self::is_steady(inputs.now, inputs.vehicle, inputs.flight) {
+            return None;
+        }
+        Reading::new(track.last, Some((track.smooth_rpm - mean).abs() / mean * 100.0))
+    }
+
+    /// The same with its sign, wherever it flies; `None` for a motor that is not fitted.
+    pub(crate) fn motor_departure(&self, motor: u8) -> Option<f32> {
+        let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
+        let mean = self.mean_of_others(motor)?;
+        Some((track.smooth_rpm - mean) / mean * 100.0)
+    }
+
+    /// In the air for a moment, and not tilted far.
+    pub(crate) fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+        flight.airborne_since().is_some_and(|since| now.since(since) > STEADY_AFTER)
+            && vehicle.attitude.get().is_none_or(|attitude| {
+                attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
+            })
+    }
+
+    /// The mean speed of the motors that are fitted, but for one; `None` while they do not turn.
+    fn mean_of_others(&self, motor: u8) -> Option<f32> {
         let others = self.motors.iter().enumerate();
         let others =
             others.filter(|(other, track)| *other != usize::from(motor) && track.highest_rpm > TURNING_RPM);
         let (sum, count) =
             others.fold((0.0, 0_u8), |(sum, count), (_, other)| (sum + other.smooth_rpm, count + 1));
         let mean = sum / f32::from(count);
-        if !steady || count == 0 || mean < TURNING_RPM {
-            return None;
-        }
-        Reading::new(track.last, Some((track.smooth_rpm - mean).abs() / mean * 100.0))
+        (count > 0 && mean >= TURNING_RPM).then_some(mean)
     }
 
     /// Clipped samples since take-off, the worst accelerometer.
@@ -259,7 +315,12 @@ impl Derived {
 
     /// Frames that our own recording lost in the last ten seconds.
     pub(crate) fn frames_lost_lately(&self, _: &Inputs<'_>) -> f32 {
-        self.frames_lost.saturating_sub(self.frames_lost_before) as f32
+        self.frames_lost.lately()
+    }
+
+    /// Block writes that the card refused in the last ten seconds.
+    pub(crate) const fn write_errors_lately(&self) -> f32 {
+        self.write_errors.lately()
     }
 
     /// Whether a motor turns now.

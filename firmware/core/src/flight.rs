@@ -40,6 +40,21 @@ pub enum Phase {
     Landing,
 }
 
+impl Phase {
+    /// The name that records and reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ground => "ground",
+            Self::TakeOff => "take_off",
+            Self::Hover => "hover",
+            Self::Climb => "climb",
+            Self::Cruise => "cruise",
+            Self::Descent => "descent",
+            Self::Landing => "landing",
+        }
+    }
+}
+
 /// Vertical speed from which it is a climb or a descent; half of it near the ground.
 const VERTICAL_MPS: f32 = 0.7;
 /// Speed over ground from which it is a cruise.

@@ -5,13 +5,17 @@ use crate::component::{COMPONENTS_MAX, Component, Figures, Kind, Label, Status};
 use crate::derived::Derived;
 use crate::exceedance::Exceedances;
 use crate::exposure::Exposure;
-use crate::flight::{Flight, FlightEvent};
-use crate::health::{Finding, Health, Inputs};
+use crate::flight::{Flight, FlightEvent, Phase};
+use crate::happening::{Happening, Happenings};
+use crate::health::{Finding, Health, Inputs, Subsystem};
 use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Saving, Unreadable};
 use crate::observation::{MOTORS_MAX, Observation, Source};
 use crate::params::Params;
+use crate::protect::{Protect, Request};
+use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{Instant, Span};
+use crate::trends::Trends;
 use crate::usage::{Usage, baseline_number, exposure_number};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
@@ -33,9 +37,30 @@ pub struct Monitor {
     exceedances: Exceedances,
     exposure: Exposure,
     components: [Component; COMPONENTS_MAX],
+    /// Of each component, whose health it is and what is used of its life, percent; one a tick is worked out anew.
+    wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX],
+    wear_next: u8,
+    trends: Trends,
+    snapshots: Snapshots,
+    protect: Protect,
     saving: Saving,
-    was_armed: bool,
+    happenings: Happenings,
+    before_tick: Before,
 }
+
+/// What was so at the last tick.
+#[derive(Clone, Copy, Debug)]
+struct Before {
+    armed: bool,
+    reboots: u32,
+    /// The phase that was told last, and the one that would be next, since when.
+    phase: Phase,
+    next_phase: Phase,
+    next_since: Instant,
+}
+
+/// A phase that does not last this long is not told: speeds cross their limits back and forth.
+const PHASE_LASTS: Span = Span::from_secs(1);
 
 const _: () = assert!(size_of::<Monitor>() <= 12 * 1024);
 
@@ -54,8 +79,20 @@ impl Monitor {
             exceedances: Exceedances::new(),
             exposure: Exposure::new(),
             components: [Component::NONE; COMPONENTS_MAX],
+            wear: [None; COMPONENTS_MAX],
+            wear_next: 0,
+            trends: Trends::new(),
+            snapshots: Snapshots::new(),
+            protect: Protect::new(),
             saving: Saving::new(),
-            was_armed: false,
+            happenings: Happenings::new(),
+            before_tick: Before {
+                armed: false,
+                reboots: 0,
+                phase: Phase::Ground,
+                next_phase: Phase::Ground,
+                next_since: Instant::ZERO,
+            },
         }
     }
 
@@ -78,8 +115,10 @@ impl Monitor {
         findings: &mut impl FnMut(&Finding),
     ) {
         let event = self.flight.step(now, &self.vehicle);
-        self.derived.step(now, &self.vehicle, event, recorder.frames_lost);
+        self.derived.step(now, &self.vehicle, event, recorder);
+        self.step_trends(now, event);
         self.usage.step(now, &self.vehicle, &self.flight, event, &self.params);
+        self.step_wear();
         let inputs = Inputs {
             now,
             vehicle: &self.vehicle,
@@ -87,11 +126,16 @@ impl Monitor {
             derived: &self.derived,
             link,
             recorder,
+            trends: &self.trends,
+            baselines: &self.baselines,
+            wear: &self.wear,
             params: &self.params,
         };
+        self.snapshots.step(&inputs);
         let mut crossed = false;
         self.health.step(&inputs, &mut self.exceedances, &mut |finding| {
             crossed = true;
+            self.snapshots.trigger(finding);
             findings(finding);
         });
         if crossed || self.exceedances.lasting() {
@@ -100,7 +144,72 @@ impl Monitor {
         if self.exposure.step(now, &self.vehicle, &self.usage) {
             self.saving.change(ItemKey::Exposure);
         }
+        self.step_protect(now, event);
         self.step_life(event);
+        self.step_happenings(now, event);
+    }
+
+    fn step_trends(&mut self, now: Instant, event: Option<FlightEvent>) {
+        let Self { vehicle, flight, derived, params, baselines, trends, saving, .. } = self;
+        if event == Some(FlightEvent::TakeOff) {
+            for battery in 0..BATTERIES_MAX {
+                if let Some(ohm) = baselines.get(Quantity::Resistance(battery as u8)).known() {
+                    derived.set_resistance_baseline(battery, ohm);
+                }
+            }
+        }
+        if event.is_some_and(|event| trends.event(event, params, baselines)) {
+            saving.change(ItemKey::Baselines);
+        }
+        trends.step(now, vehicle, flight, derived);
+    }
+
+    /// One component a tick: there is time, and divisions cost.
+    fn step_wear(&mut self) {
+        let place = usize::from(self.wear_next);
+        self.describe_component(place);
+        let subsystem = self.components.get(place).and_then(|component| component.kind.subsystem());
+        let used_percent = self.component_used_percent(place);
+        if let Some(wear) = self.wear.get_mut(place) {
+            *wear = subsystem.zip(used_percent);
+        }
+        self.wear_next = (self.wear_next + 1) % COMPONENTS_MAX as u8;
+    }
+
+    fn step_protect(&mut self, now: Instant, event: Option<FlightEvent>) {
+        let Self { vehicle, flight, health, params, protect, happenings, .. } = self;
+        if let Some(step) = protect.step(now, vehicle, flight.airborne(), event, health, params) {
+            happenings.push(Happening::Protect(step));
+        }
+    }
+
+    fn step_happenings(&mut self, now: Instant, event: Option<FlightEvent>) {
+        let Self { vehicle, flight, happenings, before_tick: before, .. } = self;
+        let armed = vehicle.armed();
+        if armed && !before.armed {
+            happenings.push(Happening::Armed);
+        }
+        match event {
+            Some(FlightEvent::TakeOff) => happenings.push(Happening::TakeOff),
+            Some(FlightEvent::Landing) => happenings.push(Happening::Landing),
+            None => {}
+        }
+        if before.armed && !armed {
+            happenings.push(Happening::Disarmed);
+        }
+        before.armed = armed;
+        if vehicle.reboots != before.reboots {
+            before.reboots = vehicle.reboots;
+            happenings.push(Happening::AutopilotReboot);
+        }
+        let phase = flight.phase(now, vehicle);
+        if phase != before.next_phase {
+            (before.next_phase, before.next_since) = (phase, now);
+        }
+        if phase != before.phase && now.since(before.next_since) >= PHASE_LASTS {
+            before.phase = phase;
+            happenings.push(Happening::Phase(phase));
+        }
     }
 
     /// Whose life it is, and what of it is to be saved.
@@ -109,6 +218,7 @@ impl Monitor {
         let seen = Airframe { system: self.vehicle.source.map_or(0, |source| source.system), uid };
         if self.before.airframe.differs(seen) {
             // A lifetime belongs to an airframe: this one's begins with this session.
+            self.happenings.push(Happening::OtherAirframe);
             self.before = Lifetime { boots: self.before.boots, ..Lifetime::new() };
             self.baselines = Baselines::new();
             self.exceedances.forget_life();
@@ -119,14 +229,9 @@ impl Monitor {
         }
         self.before.airframe = self.before.airframe.learn(seen);
         self.saving.change(ItemKey::Lifetime);
-        for place in 0..COMPONENTS_MAX {
-            self.describe_component(place);
-        }
-        let armed = self.vehicle.armed();
-        if event == Some(FlightEvent::Landing) || (self.was_armed && !armed) {
+        if event == Some(FlightEvent::Landing) || (self.before_tick.armed && !self.vehicle.armed()) {
             self.saving.hurry_all();
         }
-        self.was_armed = armed;
     }
 
     fn describe_component(&mut self, place: usize) {
@@ -291,6 +396,36 @@ impl Monitor {
         Some(old)
     }
 
+    /// What happened, in order, each once.
+    pub fn take_happening(&mut self) -> Option<Happening> {
+        self.happenings.take()
+    }
+
+    /// Happenings that nobody took in time.
+    pub const fn happenings_lost(&self) -> u16 {
+        self.happenings.lost()
+    }
+
+    /// Half of a snapshot of what went on around a critical finding, each once.
+    pub fn take_snapshot(&mut self, now: Instant) -> Option<Snapshot<'_>> {
+        self.snapshots.take(now)
+    }
+
+    /// What is to be asked of the autopilot now, once: the protective action.
+    pub const fn take_request(&mut self) -> Option<Request> {
+        self.protect.take_request()
+    }
+
+    /// Somebody does not want the protective action; `true` where one is on its way.
+    pub const fn cancel_protection(&mut self) -> bool {
+        self.protect.cancel()
+    }
+
+    /// Quantities of steady flight.
+    pub const fn trends(&self) -> &Trends {
+        &self.trends
+    }
+
     /// What the operator calls a component, and its serial number, without replacing it.
     pub fn name_component(&mut self, place: usize, name: Label, serial: Label) -> bool {
         let Some(component) = self.components.get_mut(place) else { return false };
@@ -307,6 +442,7 @@ impl Monitor {
             Kind::Battery => {
                 for battery in (0..BATTERIES_MAX).filter(|battery| concerned(*battery)) {
                     self.baselines.forget(Quantity::Resistance(battery as u8));
+                    self.derived.forget_resistance(battery);
                 }
             }
             Kind::Motor | Kind::Propeller | Kind::Esc => {

@@ -1,7 +1,7 @@
 //! Slow figures: a battery's internal resistance against its own past, and rates of counters that wrap.
 
 use crate::observation::Battery;
-use crate::time::{Instant, Span};
+use crate::time::Instant;
 
 /// A battery's internal resistance: the slope of its voltage over its current, from means that forget slowly.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,26 +102,28 @@ pub struct Rate {
     count: u32,
     /// Of this half minute and of the one before.
     events: [u32; 2],
-    half_began: Instant,
+    /// Milliseconds since power-on, modulo 2^32.
+    half_began_ms: u32,
 }
 
 impl Rate {
-    const HALF: Span = Span::from_secs(30);
+    const HALF_MS: u32 = 30_000;
     /// A larger step is a counter that started again.
     const STEP_MAX: u32 = 10_000;
 
     /// From the first value of the counter.
     pub const fn new(at: Instant, count: u32) -> Self {
-        Self { count, events: [0; 2], half_began: at }
+        Self { count, events: [0; 2], half_began_ms: at.as_millis() as u32 }
     }
 
     /// Takes the counter's value.
     pub fn take(&mut self, at: Instant, count: u32) {
-        let age = at.since(self.half_began);
-        if age >= Self::HALF {
-            let recent = age < Self::HALF + Self::HALF;
+        let now_ms = at.as_millis() as u32;
+        let age_ms = now_ms.wrapping_sub(self.half_began_ms);
+        if age_ms >= Self::HALF_MS {
+            let recent = age_ms < 2 * Self::HALF_MS;
             self.events = [0, if recent { self.events[0] } else { 0 }];
-            self.half_began = at;
+            self.half_began_ms = now_ms;
         }
         let step = count.wrapping_sub(self.count);
         self.count = count;

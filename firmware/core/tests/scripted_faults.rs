@@ -1,131 +1,16 @@
 //! Scripted faults in a simulated flight: each is found within its debounce plus 100 ms, and its end is seen.
 #![allow(clippy::panic, clippy::unwrap_used)]
 
+mod common;
+
+use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level};
-use hums_core::observation::{
-    Attitude, Autopilot, Battery, Esc, EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss,
-    GnssIntegrity, Heartbeat, Hud, Imu, Observation, Source, SystemStatus, SystemTime, VehicleKind,
-    Vibration,
-};
+use hums_core::observation::{Observation, SystemTime};
 use hums_core::params::Params;
-use hums_core::status::{LinkReading, RecorderStatus, Recording};
-use hums_core::time::Instant;
-use hums_core::units::{
-    Amperes, Celsius, Fraction, Metres, MetresPerSecond, MetresPerSecond2, Radians, Rpm, Volts,
-};
-
-const AUTOPILOT: Source = Source { system: 1, component: 1 };
-
-/// A healthy quad in hover; a script changes what it says.
-#[derive(Clone)]
-struct Quad {
-    silent: bool,
-    armed: bool,
-    boot_offset_ms: i64,
-    battery: Battery,
-    escs: [Option<Esc>; 4],
-    estimator: Estimator,
-    gnss: Gnss,
-    integrity: GnssIntegrity,
-    vibration: Vibration,
-    acceleration_down: f32,
-    roll: f32,
-    system: SystemStatus,
-    recorder: RecorderStatus,
-    lost: f32,
-}
-
-impl Quad {
-    fn healthy() -> Self {
-        let esc = Esc {
-            rpm: Some(Rpm(5_000.0)),
-            voltage: Some(Volts(15.5)),
-            current: Some(Amperes(5.0)),
-            temperature: Some(Celsius(45.0)),
-            failures: Some(0),
-            errors: Some(u32::MAX - 3),
-        };
-        Self {
-            silent: false,
-            armed: true,
-            boot_offset_ms: 100_000,
-            battery: Battery {
-                voltage: Some(Volts(15.5)),
-                current: Some(Amperes(20.0)),
-                remaining: Some(Fraction(0.8)),
-                temperature: Some(Celsius(35.0)),
-                ..Battery::default()
-            },
-            escs: [Some(esc); 4],
-            estimator: Estimator {
-                scale: EstimatorScale::Variance,
-                velocity: Some(0.05),
-                position_horizontal: Some(0.04),
-                position_vertical: Some(0.03),
-                compass: Some(0.06),
-                ..Estimator::default()
-            },
-            gnss: Gnss {
-                fix: 3,
-                satellites: Some(16),
-                hdop: Some(0.8),
-                accuracy: Some(Metres(0.5)),
-                ..Gnss::default()
-            },
-            integrity: GnssIntegrity { jamming: 1, spoofing: 1, ..GnssIntegrity::default() },
-            vibration: Vibration { levels: [Some(5.0); 3], clips: [7; 3], ..Vibration::default() },
-            acceleration_down: -9.8,
-            roll: 0.02,
-            system: SystemStatus { load: Some(Fraction(0.3)), ..SystemStatus::default() },
-            recorder: RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() },
-            lost: 0.0,
-        }
-    }
-
-    /// What it says every 100 ms.
-    fn says(&self, now_ms: u64) -> Vec<Observation> {
-        if self.silent {
-            return Vec::new();
-        }
-        let boot_ms = (now_ms as i64 + self.boot_offset_ms).max(0) as u32;
-        let height = if now_ms < 2_000 { 0.0 } else { 20.0 };
-        let heartbeat = Heartbeat {
-            autopilot: Autopilot::ArduPilot,
-            kind: VehicleKind::Rotorcraft,
-            armed: self.armed,
-            state: 4,
-            ..Heartbeat::default()
-        };
-        let acceleration = [0.0, 0.0, self.acceleration_down].map(MetresPerSecond2);
-        let mut said = vec![
-            Observation::Attitude(Attitude {
-                roll: Radians(self.roll),
-                boot_ms: Some(boot_ms),
-                ..Attitude::default()
-            }),
-            Observation::GlobalPosition(GlobalPosition {
-                relative_altitude: Metres(height),
-                velocity: [MetresPerSecond(0.1); 3],
-                ..GlobalPosition::default()
-            }),
-            Observation::Hud(Hud { throttle: Some(Fraction(0.5)), ..Hud::default() }),
-            Observation::Imu(Imu { acceleration: Some(acceleration), ..Imu::default() }),
-            Observation::Escs(EscGroup { first: 0, escs: self.escs }),
-            Observation::Estimator(self.estimator),
-            Observation::Gnss(self.gnss),
-            Observation::GnssIntegrity(self.integrity),
-            Observation::Vibration(self.vibration),
-            Observation::SystemStatus(self.system),
-            Observation::Battery(self.battery),
-        ];
-        if now_ms.is_multiple_of(500) {
-            said.push(Observation::Heartbeat(heartbeat));
-            said.push(Observation::SystemTime(SystemTime { boot_ms, utc_micros: None }));
-        }
-        said
-    }
-}
+use hums_core::status::{LinkReading, Recording};
+use hums_core::time::{Instant, Span};
+use hums_core::units::{Amperes, Celsius, Fraction, Volts};
 
 /// When the fault begins and ends in each script.
 const FAULT_MS: u64 = 20_000;
@@ -293,6 +178,27 @@ fn frames_that_are_lost() {
 fn a_recorder_that_stops_while_armed() {
     let findings = fly(|_, quad| quad.recorder.recording = Recording::Stopped);
     found(&findings, "recording", 0, Level::Critical, 1_000, &[]);
+}
+
+#[test]
+fn a_card_that_keeps_the_recorder_waiting() {
+    let findings = fly(|_, quad| quad.recorder.stall = Span::from_millis(800));
+    found(&findings, "card_stall", 0, Level::Warning, 0, &[]);
+}
+
+#[test]
+fn a_card_that_refuses_writes() {
+    let findings = fly(|_, quad| quad.recorder.write_errors = 3);
+    let errors = findings.iter().find(|finding| finding.check == "card_errors").expect("found");
+    assert_eq!((errors.level, errors.at.as_millis()), (Level::Warning, FAULT_MS));
+    let cleared = findings.iter().rfind(|finding| finding.check == "card_errors").expect("there");
+    assert_eq!(cleared.level, Level::Ok, "ten seconds without one");
+}
+
+#[test]
+fn a_card_that_is_full_of_other_files() {
+    let findings = fly(|_, quad| quad.recorder.room = Some(0.005));
+    found(&findings, "card_room", 0, Level::Critical, 1_000, &[]);
 }
 
 #[test]

@@ -204,6 +204,16 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("seconds", count(keep.seconds)),
             ],
         ),
+        Record::Snapshot(snapshot) => super::wear::snapshot(snapshot),
+        Record::Protection(protection) => one(
+            "HUMS_PROTECTION",
+            vec![
+                ("action", text(protection.action.name())),
+                ("stage", text(protection.stage.name())),
+                ("detail", count(protection.detail)),
+                ("command", count(protection.command)),
+            ],
+        ),
         Record::Unknown { kind, version, bytes } => one(
             "HUMS_UNKNOWN",
             vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],
@@ -241,6 +251,10 @@ pub fn event_name(number: u8) -> &'static str {
         5 => "snapshot",
         6 => "card_in",
         7 => "card_out",
+        8 => "critical",
+        9 => "phase",
+        10 => "autopilot_reboot",
+        11 => "other_airframe",
         _ => "other",
     }
 }

@@ -1,6 +1,6 @@
-//! The records of what wears, as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`.
+//! The records of what wears, as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`; and `HUMS_SNAPSHOT`.
 
-use hums_blackbox::record::{Component, Exceedance, Lifetime, UsageValue};
+use hums_blackbox::record::{Component, Exceedance, Lifetime, Snapshot, UsageValue};
 
 use super::record::{Cell, Row};
 
@@ -68,4 +68,21 @@ pub(super) fn component(component: &Component<'_>) -> Row {
         ("by", Cell::Text(by)),
     ];
     Row::new("HUMS_COMPONENT", cells)
+}
+
+/// One row a value.
+pub(super) fn snapshot(snapshot: &Snapshot<'_>) -> Vec<Row> {
+    let row = |(at, quantity, value): (_, Option<&str>, _)| {
+        let cells = vec![
+            ("finding_at[s]", Cell::Time(snapshot.at)),
+            ("check", Cell::Text(snapshot.check.to_owned())),
+            ("instance", Cell::Count(u64::from(snapshot.instance))),
+            ("half", Cell::Text(if snapshot.after { "after" } else { "before" }.to_owned())),
+            ("at[s]", Cell::Time(at)),
+            ("quantity", Cell::Text(quantity.unwrap_or("unknown").to_owned())),
+            ("value", Cell::Single(value)),
+        ];
+        Row::new("HUMS_SNAPSHOT", cells)
+    };
+    snapshot.iter().map(row).collect()
 }

@@ -8,6 +8,7 @@ mod boot;
 mod finding;
 mod keep;
 mod loss;
+mod snapshot;
 mod usage;
 mod vehicle;
 mod wear;
@@ -18,6 +19,7 @@ pub use boot::{Boot, Fault};
 pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
+pub use snapshot::{Protection, Snapshot, SnapshotValues};
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
 pub use vehicle::{Clock, Parameter, Vehicle};
 pub use wear::{Component, Exceedance, Why};
@@ -71,6 +73,10 @@ pub enum Record<'a> {
     Component(Component<'a>),
     /// Kind 15: what of the session is kept, where not all of it is.
     Keep(Keep),
+    /// Kind 16: half of a snapshot around a critical finding.
+    Snapshot(Snapshot<'a>),
+    /// Kind 17: a step of the protective action.
+    Protection(Protection),
     /// A kind that this reader does not know.
     Unknown {
         /// The stored kind.
@@ -114,6 +120,8 @@ impl<'a> Record<'a> {
             Self::Exceedance(exceedance) => exceedance.store(&mut sink),
             Self::Component(component) => component.store(&mut sink),
             Self::Keep(keep) => keep.store(&mut sink),
+            Self::Snapshot(snapshot) => snapshot.store(&mut sink),
+            Self::Protection(protection) => protection.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
                 sink.u8(*kind).u8(*version).bytes(bytes);
             }
@@ -143,6 +151,8 @@ impl<'a> Record<'a> {
             13 => Self::Exceedance(Exceedance::read(fields)),
             14 => Self::Component(Component::read(fields)),
             15 => Self::Keep(Keep::read(fields)),
+            16 => Snapshot::read(fields).map_or(unknown, Self::Snapshot),
+            17 => Protection::read(fields).map_or(unknown, Self::Protection),
             _ => unknown,
         }
     }
@@ -153,6 +163,7 @@ mod tests {
     use hums_core::component::{Figures, Kind, Status};
     use hums_core::exceedance::Crossings;
     use hums_core::health::{Level, Subsystem};
+    use hums_core::protect::{Action, Stage};
     use hums_core::time::Instant;
 
     use super::*;
@@ -245,6 +256,8 @@ mod tests {
             new_serial: "SN 2",
         }));
         reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }));
+        let (action, stage) = (Action::Land, Stage::Answered);
+        reads_back(Record::Protection(Protection { action, stage, detail: 4, command: 21 }));
         reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });
     }
 

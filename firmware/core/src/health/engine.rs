@@ -46,6 +46,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| read(inputs, |engine| engine.fuel_pressure.map(|pressure| pressure.0)),
         ..ENGINE
     },
+    Check { name: "engine_due", words: "engine due", ..super::due(Subsystem::Engine) },
 ];
 
 fn read(inputs: &Inputs<'_>, value: impl FnOnce(&Engine) -> Option<f32>) -> Option<Reading> {

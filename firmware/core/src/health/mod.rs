@@ -18,11 +18,14 @@ mod structure;
 pub use check::{Check, Reading, Side, State, When};
 pub use finding::{Finding, Level, Subsystem};
 
+use crate::baseline::{Baselines, Quantity};
+use crate::component::COMPONENTS_MAX;
 use crate::exceedance::Exceedances;
 use crate::flight::Flight;
 use crate::params::{Param, Params};
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{Instant, Span};
+use crate::trends::Trends;
 use crate::vehicle::Vehicle;
 
 /// What checks read. Nothing here changes while they do.
@@ -40,6 +43,12 @@ pub struct Inputs<'a> {
     pub link: &'a LinkReading,
     /// Our own recording.
     pub recorder: &'a RecorderStatus,
+    /// Quantities of steady flight.
+    pub trends: &'a Trends,
+    /// What is normal for this airframe.
+    pub baselines: &'a Baselines,
+    /// Of each component, whose health it is and the part of its life that is used, percent.
+    pub wear: &'a [Option<(Subsystem, f32)>; COMPONENTS_MAX],
     /// Limits and settings.
     pub params: &'a Params,
 }
@@ -48,6 +57,45 @@ pub struct Inputs<'a> {
 pub(crate) const STALE: Option<Span> = Some(Span::from_secs(5));
 /// For streams that come at 0.5 Hz.
 pub(crate) const STALE_SLOW: Option<Span> = Some(Span::from_secs(12));
+
+/// Of a subsystem's components, the one that is nearest to its limit.
+const fn due(subsystem: Subsystem) -> Check {
+    Check {
+        name: "",
+        words: "",
+        subsystem,
+        unit: "%",
+        side: Side::Above,
+        warn: Some(Param::CompYellow),
+        critical: Some(Param::CompRed),
+        hysteresis: 0.0,
+        debounce_warn: Span::from_secs(1),
+        debounce_critical: Span::from_secs(1),
+        when: When::Always,
+        stale_after: None,
+        instances: 1,
+        // That a part is not due does not make its subsystem healthy.
+        alarm_only: true,
+        read: match subsystem {
+            Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
+            Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),
+            Subsystem::Engine => |inputs, _| used(inputs, Subsystem::Engine),
+            Subsystem::Structure => |inputs, _| used(inputs, Subsystem::Structure),
+            Subsystem::Recorder => |inputs, _| used(inputs, Subsystem::Recorder),
+            _ => |_, _| None,
+        },
+    }
+}
+
+fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
+    let mine = inputs.wear.iter().flatten().filter(|(of, _)| *of == subsystem);
+    Reading::new(Some(inputs.now), mine.map(|(_, percent)| *percent).reduce(f32::max))
+}
+
+/// How far a quantity is from what is normal for this airframe.
+fn departure(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
+    Reading::new(Some(inputs.now), inputs.trends.departure(quantity, inputs.baselines))
+}
 
 const TABLES: [&[Check]; 9] = [
     power::CHECKS,

@@ -139,6 +139,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: rail_v,
         ..BATTERY
     },
+    Check { name: "battery_due", words: "battery due", ..super::due(Subsystem::Power) },
 ];
 
 /// A battery's own figure; the autopilot's only where no battery reports itself (it is ambiguous with several).

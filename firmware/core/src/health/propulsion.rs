@@ -2,6 +2,7 @@
 
 use super::check::{Check, Reading, Side, When};
 use super::{Inputs, STALE_SLOW, Subsystem};
+use crate::baseline::Quantity;
 use crate::observation::MOTORS_MAX;
 use crate::params::Param;
 use crate::time::Span;
@@ -94,6 +95,34 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, motor| inputs.derived.motor_imbalance(inputs, motor),
         ..ESC
     },
+    Check {
+        name: "motor_trend",
+        words: "motor changed",
+        unit: "%",
+        warn: Some(Param::TrdEscWarn),
+        critical: Some(Param::TrdEscCrit),
+        hysteresis: 1.0,
+        debounce_warn: Span::from_secs(10),
+        debounce_critical: Span::from_secs(10),
+        when: When::InFlight,
+        read: |inputs, motor| super::departure(inputs, Quantity::MotorSpeed(motor)),
+        ..ESC
+    },
+    Check {
+        name: "throttle_trend",
+        words: "hover throttle up",
+        unit: "%",
+        warn: Some(Param::TrdThrWarn),
+        critical: Some(Param::TrdThrCrit),
+        hysteresis: 2.0,
+        debounce_warn: Span::from_secs(10),
+        debounce_critical: Span::from_secs(10),
+        when: When::InFlight,
+        instances: 1,
+        read: |inputs, _| super::departure(inputs, Quantity::HoverThrottle),
+        ..ESC
+    },
+    Check { name: "drive_due", words: "motor, prop or ESC due", ..super::due(Subsystem::Propulsion) },
 ];
 
 fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {

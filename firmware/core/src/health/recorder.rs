@@ -48,6 +48,38 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.frames_lost_lately(inputs) }),
         ..STATE
     },
+    Check {
+        name: "card_stall",
+        words: "card waits",
+        unit: "ms",
+        warn: Some(Param::RecStallWarn),
+        critical: Some(Param::RecStallCrit),
+        debounce_warn: Span::ZERO,
+        debounce_critical: Span::ZERO,
+        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.stall.as_millis() as f32 }),
+        ..STATE
+    },
+    Check {
+        name: "card_errors",
+        words: "card refuses writes",
+        warn: Some(Param::RecErrWarn),
+        critical: None,
+        debounce_warn: Span::ZERO,
+        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.write_errors_lately() }),
+        ..STATE
+    },
+    Check {
+        name: "card_room",
+        words: "card full of other files",
+        unit: "%",
+        side: Side::Below,
+        warn: Some(Param::RecRoomWarn),
+        critical: Some(Param::RecRoomCrit),
+        hysteresis: 1.0,
+        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.room? * 100.0 }),
+        ..STATE
+    },
+    Check { name: "card_due", words: "card due", ..super::due(Subsystem::Recorder) },
 ];
 
 /// 0 recording, 1 not recording, 2 not recording while armed.

@@ -2,6 +2,7 @@
 
 use super::check::{Check, Reading, Side, When};
 use super::{Inputs, STALE, Subsystem};
+use crate::baseline::Quantity;
 use crate::observation::VibrationScale;
 use crate::params::Param;
 use crate::time::Span;
@@ -61,6 +62,22 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.derived.load_factor(inputs),
         ..VIBRATION
     },
+    Check {
+        name: "vibration_trend",
+        words: "vibration up",
+        unit: "%",
+        warn: Some(Param::TrdVibeWarn),
+        critical: Some(Param::TrdVibeCrit),
+        hysteresis: 5.0,
+        debounce_warn: Span::from_secs(10),
+        debounce_critical: Span::from_secs(10),
+        when: When::InFlight,
+        // A trend holds until the next figure.
+        stale_after: None,
+        read: |inputs, _| super::departure(inputs, Quantity::Vibration),
+        ..VIBRATION
+    },
+    Check { name: "airframe_due", words: "airframe due", ..super::due(Subsystem::Structure) },
 ];
 
 fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -5,6 +5,7 @@
 //! what time alone asks for.
 
 mod figures;
+mod happenings;
 mod records;
 
 use hums_blackbox::record::{
@@ -24,7 +25,10 @@ use crate::keeping::Keeping;
 use crate::loss::Losses;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::{FramesOut, GsIn, SectorsIn};
+pub use happenings::By;
+
 use figures::Sums;
+use happenings::CRITICAL;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = monitor::TICK;
@@ -209,6 +213,7 @@ impl<'a> Monitoring<'a> {
         self.keep(now, sectors);
         self.count_losses(now, sectors);
         self.check(now, sectors, gs, findings);
+        self.record_happenings(now, sectors);
         self.record_vehicle(now, sectors);
         self.record_clock(now, sectors);
         self.losses_to_record(now, false, sectors);
@@ -265,8 +270,8 @@ impl<'a> Monitoring<'a> {
             write(now, &Record::Finding(FindingRecord::from(finding)), writer, losses, sectors);
             if finding.level == Level::Critical {
                 // Marks the place for whoever looks through the record.
-                let event = Record::Event(Event { number: 1, text: finding.check });
-                let _ = sectors.with_reserve(|sink| writer.record(now, &event, sink));
+                let event = Record::Event(Event { number: CRITICAL, text: finding.check });
+                write(now, &event, writer, losses, sectors);
             }
             summary.finding(now, finding, &mut |bytes| gs.tell(bytes));
             findings(finding);

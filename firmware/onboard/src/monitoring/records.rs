@@ -4,7 +4,7 @@ use hums_blackbox::record::{
     Clock, Component as ComponentRecord, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime, Moment, Record,
     USAGE_ENTRIES_MAX, Usage, UsageValue, Vehicle as VehicleRecord, Why,
 };
-use hums_core::component::{COMPONENTS_MAX, Component};
+use hums_core::component::{COMPONENTS_MAX, Component, Figures, Status};
 use hums_core::time::Instant;
 
 use super::Monitoring;
@@ -119,23 +119,36 @@ impl Monitoring<'_> {
         }
     }
 
-    fn record_component(&mut self, now: Instant, place: usize, why: Why, sectors: &mut SectorsIn) {
+    pub(super) fn record_component(&mut self, now: Instant, place: usize, why: Why, sectors: &mut SectorsIn) {
         let Some((figures, status)) = self.monitor.component_figures(place) else { return };
-        let Component { name, serial, kind, number, replaced, .. } = self.monitor.components()[place];
-        let record = ComponentRecord {
-            why,
-            place: place as u8,
-            kind,
-            number,
-            status,
-            replaced: u32::from(replaced),
-            name: name.as_str(),
-            serial: serial.as_str(),
-            figures,
-            used_percent: self.monitor.component_used_percent(place).unwrap_or(f32::NAN),
-            by: (0, 0),
-            new_serial: "",
-        };
+        let used_percent = self.monitor.component_used_percent(place);
+        let known = self.monitor.components()[place];
+        let record = component(&known, place, figures, status, used_percent, why);
         self.record(now, &Record::Component(record), sectors);
+    }
+}
+
+/// A component's record.
+pub(super) fn component(
+    of: &Component,
+    place: usize,
+    figures: Figures,
+    status: Status,
+    used_percent: Option<f32>,
+    why: Why,
+) -> ComponentRecord<'_> {
+    ComponentRecord {
+        why,
+        place: place as u8,
+        kind: of.kind,
+        number: of.number,
+        status,
+        replaced: u32::from(of.replaced),
+        name: of.name.as_str(),
+        serial: of.serial.as_str(),
+        figures,
+        used_percent: used_percent.unwrap_or(f32::NAN),
+        by: (0, 0),
+        new_serial: "",
     }
 }

@@ -1,0 +1,155 @@
+//! What went on around a critical finding, and what was asked of the autopilot because of one.
+
+use hums_core::half;
+use hums_core::health::Subsystem;
+use hums_core::protect::{Action, Stage};
+use hums_core::snapshot::{COLUMNS_MAX, INTERVAL, SAMPLES, columns};
+use hums_core::time::{Instant, Span};
+
+use super::RECORD_BYTES_MAX;
+use crate::bytes::{Fields, Sink};
+
+/// Bytes of the values of a snapshot at most.
+const VALUES_MAX: usize = 2 * COLUMNS_MAX * SAMPLES;
+// A check's name has 16 characters at most.
+const _: () = assert!(2 + 8 + 1 + 16 + 3 + 8 + 2 + 1 + VALUES_MAX <= RECORD_BYTES_MAX);
+
+/// Half of a snapshot: the seconds before a critical finding, or those after it.
+#[derive(Clone, Copy, Debug)]
+pub struct Snapshot<'a> {
+    /// When the finding was made.
+    pub at: Instant,
+    /// The finding's check.
+    pub check: &'a str,
+    /// The finding's instance.
+    pub instance: u8,
+    /// The part of the vehicle, which says what the columns are.
+    pub subsystem: Subsystem,
+    /// `false`: before the finding; `true`: after it.
+    pub after: bool,
+    /// The time of the first sample.
+    pub first: Instant,
+    /// Between two samples.
+    pub interval: Span,
+    /// Columns of a sample.
+    pub width: u8,
+    /// Sample by sample, column by column: half-precision numbers, little endian.
+    values: &'a [u8],
+}
+
+impl<'a> Snapshot<'a> {
+    /// To be written; `values` is room for its values.
+    pub fn new(of: &hums_core::snapshot::Snapshot<'_>, values: &'a mut SnapshotValues) -> Self {
+        let SnapshotValues { bytes, .. } = values;
+        let mut length = 0;
+        for (place, half) in bytes.chunks_exact_mut(2).zip(of.values()) {
+            place.copy_from_slice(&half.to_le_bytes());
+            length += 2;
+        }
+        Self {
+            at: of.at,
+            check: of.check,
+            instance: of.instance,
+            subsystem: of.subsystem,
+            after: of.after,
+            first: of.first,
+            interval: INTERVAL,
+            width: of.width() as u8,
+            values: bytes.get(..length).unwrap_or_default(),
+        }
+    }
+
+    /// Each value with its time and its column's name; `None` for a column that this reader does not know.
+    pub fn iter(&self) -> impl Iterator<Item = (Instant, Option<&'static str>, f32)> + 'a {
+        let Self { first, interval, width, subsystem, values, .. } = *self;
+        let width = usize::from(width).max(1);
+        (0_u64..).zip(values.chunks_exact(2 * width)).flat_map(move |(sample, values)| {
+            let at = first + Span::from_micros(interval.as_micros().saturating_mul(sample));
+            let names = columns(subsystem).map(Some).chain(core::iter::repeat(None));
+            names.zip(values.chunks_exact(2)).map(move |(name, value)| {
+                let half = value.first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes));
+                (at, name, half::from_bits(half))
+            })
+        })
+    }
+
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(16).u64(self.at.as_micros()).name(self.check).u8(self.instance);
+        sink.u8(self.subsystem as u8).u8(u8::from(self.after)).u64(self.first.as_micros());
+        sink.bytes(&(self.interval.as_millis() as u16).to_le_bytes()).u8(self.width);
+        sink.bytes(self.values);
+    }
+
+    /// `None` where its subsystem is one that this reader does not know.
+    pub(super) fn read(fields: &mut Fields<'a>) -> Option<Self> {
+        Some(Self {
+            at: fields.instant(),
+            check: fields.text(),
+            instance: fields.u8(),
+            subsystem: Subsystem::from_number(fields.u8())?,
+            after: fields.u8() != 0,
+            first: fields.instant(),
+            interval: Span::from_millis(u64::from(u16::from_le_bytes(fields.array()))),
+            width: fields.u8(),
+            values: fields.bytes(VALUES_MAX),
+        })
+    }
+}
+
+impl PartialEq for Snapshot<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        let head = |snapshot: &Self| {
+            let Self { at, instance, subsystem, after, first, interval, width, .. } = *snapshot;
+            (at, instance, subsystem, after, first, interval, width)
+        };
+        // By bits: a value that was not known is no number.
+        head(self) == head(other) && self.check == other.check && self.values == other.values
+    }
+}
+
+/// Room for the values of a snapshot.
+#[derive(Clone, Copy, Debug)]
+pub struct SnapshotValues {
+    bytes: [u8; VALUES_MAX],
+}
+
+impl Default for SnapshotValues {
+    fn default() -> Self {
+        Self { bytes: [0; VALUES_MAX] }
+    }
+}
+
+/// A step of the protective action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Protection {
+    /// What is asked of the autopilot.
+    pub action: Action,
+    /// What happened.
+    pub stage: Stage,
+    /// Seconds, attempt or `MAV_RESULT`, as the stage says.
+    pub detail: u8,
+    /// `MAV_CMD`
+    pub command: u16,
+}
+
+impl Protection {
+    /// To be written.
+    pub const fn new(step: &hums_core::protect::Step) -> Self {
+        Self { action: step.action, stage: step.stage, detail: step.detail, command: step.action.command() }
+    }
+
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(17).u8(self.action as u8).u8(self.stage as u8).u8(self.detail);
+        sink.bytes(&self.command.to_le_bytes());
+    }
+
+    /// `None` where its action or stage is one that this reader does not know.
+    pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
+        Some(Self {
+            action: Action::from_number(fields.u8())?,
+            stage: Stage::from_number(fields.u8())?,
+            detail: fields.u8(),
+            command: u16::from_le_bytes(fields.array()),
+        })
+    }
+}

@@ -1,0 +1,58 @@
+//! What happened besides findings: to be recorded, and told where a pilot should hear of it.
+
+use crate::flight::Phase;
+use crate::protect;
+
+/// Something that happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Happening {
+    /// The motors may turn.
+    Armed,
+    /// The motors may not turn any more.
+    Disarmed,
+    /// It left the ground.
+    TakeOff,
+    /// It is back on the ground.
+    Landing,
+    /// It does something else now, for a second at least.
+    Phase(Phase),
+    /// The autopilot restarted.
+    AutopilotReboot,
+    /// The lifetime that was stored is that of another airframe; a new one begins.
+    OtherAirframe,
+    /// A step of the protective action.
+    Protect(protect::Step),
+}
+
+/// Happenings that wait to be taken: the steps of one tick are far fewer.
+const WAITING_MAX: usize = 8;
+
+/// Happenings in order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Happenings {
+    waiting: [Option<Happening>; WAITING_MAX],
+    lost: u16,
+}
+
+impl Happenings {
+    pub(crate) const fn new() -> Self {
+        Self { waiting: [None; WAITING_MAX], lost: 0 }
+    }
+
+    pub(crate) fn push(&mut self, happening: Happening) {
+        match self.waiting.iter_mut().find(|place| place.is_none()) {
+            Some(place) => *place = Some(happening),
+            None => self.lost = self.lost.saturating_add(1),
+        }
+    }
+
+    pub(crate) fn take(&mut self) -> Option<Happening> {
+        self.waiting.rotate_left(1);
+        self.waiting[WAITING_MAX - 1].take()
+    }
+
+    /// Happenings that nobody took in time.
+    pub(crate) const fn lost(&self) -> u16 {
+        self.lost
+    }
+}

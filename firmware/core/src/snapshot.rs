@@ -1,0 +1,266 @@
+//! Snapshots: what went on around a critical finding. The key values of the vehicle are kept five times a second for five
+//! seconds; a critical finding takes those of its subsystem, and attitude and climb with them, as they were before, and
+//! five seconds later as they went on.
+
+use crate::half;
+use crate::health::{Finding, Inputs, Level, Subsystem};
+use crate::time::{Instant, Span};
+
+/// Between two samples.
+pub const INTERVAL: Span = Span::from_millis(200);
+/// Samples before a finding, and after it.
+pub const SAMPLES: usize = 25;
+/// Columns of one snapshot at most.
+pub const COLUMNS_MAX: usize = 8;
+/// Snapshots that are being taken at the same time.
+const PENDING_MAX: usize = 4;
+
+const AFTER: Span = Span::from_millis(INTERVAL.as_millis() * SAMPLES as u64);
+/// A value that is older than this is not known any more.
+const FRESH: Span = Span::from_secs(3);
+
+type Read = fn(&Inputs<'_>) -> Option<f32>;
+
+/// A quantity that is kept: its name, which ends in its unit, and how it is read.
+struct Quantity(&'static str, Read);
+
+/// Columns of each subsystem, in the order of [`KEPT`]. A later version may only append to a subsystem's.
+const COLUMNS: [&[usize]; Subsystem::ALL.len()] = [
+    &[0, 1, 2, 3, 20, 21, 22, 23],
+    &[4, 5, 6, 7, 20, 21, 22, 23],
+    &[8, 9, 20, 21, 22, 23],
+    &[10, 11, 20, 21, 22, 23],
+    &[12, 13, 14, 15, 20, 21, 22, 23],
+    &[16, 17, 20, 21, 22, 23],
+    &[18, 20, 21, 22, 23],
+    &[20, 21, 22, 23, 4, 11],
+    &[19, 20, 21, 22, 23],
+];
+
+const KEPT: [Quantity; 24] = [
+    Quantity("voltage_v", voltage_v),
+    Quantity("current_a", current_a),
+    Quantity("cell_lowest_v", |inputs| inputs.derived.cell_voltage(inputs, 0).map(|reading| reading.value)),
+    Quantity("remaining_percent", remaining_percent),
+    Quantity("throttle_percent", |inputs| {
+        Some(inputs.vehicle.hud.within(inputs.now, FRESH)?.throttle?.0 * 100.0)
+    }),
+    Quantity("rpm_lowest", |inputs| speeds(inputs).reduce(f32::min)),
+    Quantity("rpm_highest", |inputs| speeds(inputs).reduce(f32::max)),
+    Quantity("esc_hottest_degc", |inputs| {
+        let motors = inputs.vehicle.motors.iter();
+        motors.filter_map(|motor| Some(motor.esc.temperature?.0)).reduce(f32::max)
+    }),
+    Quantity("engine_rpm", |inputs| Some(inputs.vehicle.engine.within(inputs.now, FRESH)?.rpm?.0)),
+    Quantity("cylinder_degc", |inputs| {
+        Some(inputs.vehicle.engine.within(inputs.now, FRESH)?.cylinder_head?.0)
+    }),
+    Quantity("vibration_m_s2", |inputs| {
+        let vibration = inputs.vehicle.vibration.within(inputs.now, FRESH)?;
+        vibration.levels.into_iter().flatten().reduce(f32::max)
+    }),
+    Quantity("load_factor_g", |inputs| inputs.derived.load_factor_g()),
+    Quantity("estimator_worst", |inputs| {
+        let estimator = inputs.vehicle.estimator.within(inputs.now, FRESH)?;
+        let figures = [
+            estimator.velocity,
+            estimator.position_horizontal,
+            estimator.position_vertical,
+            estimator.compass,
+        ];
+        figures.into_iter().flatten().reduce(f32::max)
+    }),
+    Quantity("satellites", |inputs| {
+        Some(f32::from(inputs.vehicle.gnss[0].within(inputs.now, FRESH)?.satellites?))
+    }),
+    Quantity("fix", |inputs| Some(f32::from(inputs.vehicle.gnss[0].within(inputs.now, FRESH)?.fix))),
+    Quantity("hdop", |inputs| inputs.vehicle.gnss[0].within(inputs.now, FRESH)?.hdop),
+    Quantity("heartbeat_age_s", |inputs| {
+        Some(inputs.now.since(inputs.vehicle.heartbeat.at()?).as_secs_f32())
+    }),
+    Quantity("frames_lost_percent", |inputs| Some(inputs.link.frames_lost? * 100.0)),
+    Quantity("load_percent", |inputs| Some(inputs.vehicle.system.within(inputs.now, FRESH)?.load?.0 * 100.0)),
+    Quantity("queue_percent", |inputs| Some(inputs.recorder.queue * 100.0)),
+    Quantity("roll_deg", |inputs| {
+        Some(inputs.vehicle.attitude.within(inputs.now, FRESH)?.roll.0.to_degrees())
+    }),
+    Quantity("pitch_deg", |inputs| {
+        Some(inputs.vehicle.attitude.within(inputs.now, FRESH)?.pitch.0.to_degrees())
+    }),
+    Quantity("climb_m_s", |inputs| crate::flight::climb_mps(inputs.now, inputs.vehicle)),
+    Quantity("height_m", |inputs| Some(inputs.vehicle.global.within(inputs.now, FRESH)?.relative_altitude.0)),
+];
+
+fn voltage_v(inputs: &Inputs<'_>) -> Option<f32> {
+    let battery = inputs.vehicle.batteries[0].get();
+    let system = || inputs.vehicle.system.get().and_then(|system| system.voltage);
+    battery.map_or_else(system, |battery| battery.voltage).map(|voltage| voltage.0)
+}
+
+fn current_a(inputs: &Inputs<'_>) -> Option<f32> {
+    let battery = inputs.vehicle.batteries[0].get();
+    let system = || inputs.vehicle.system.get().and_then(|system| system.current);
+    battery.map_or_else(system, |battery| battery.current).map(|current| current.0)
+}
+
+fn remaining_percent(inputs: &Inputs<'_>) -> Option<f32> {
+    let battery = inputs.vehicle.batteries[0].get();
+    let system = || inputs.vehicle.system.get().and_then(|system| system.remaining);
+    battery.map_or_else(system, |battery| battery.remaining).map(|remaining| remaining.0 * 100.0)
+}
+
+fn speeds(inputs: &Inputs<'_>) -> impl Iterator<Item = f32> {
+    let (now, motors) = (inputs.now, inputs.vehicle.motors.iter());
+    let fresh = motors.filter(move |motor| motor.moved_at.is_some_and(|at| now.since(at) <= FRESH));
+    fresh.filter_map(|motor| Some(motor.esc.rpm?.0.abs()))
+}
+
+/// The names of a subsystem's columns; each ends in its unit.
+pub fn columns(subsystem: Subsystem) -> impl Iterator<Item = &'static str> {
+    COLUMNS[subsystem as usize].iter().map(|column| KEPT[*column].0)
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    at: Instant,
+    check: &'static str,
+    instance: u8,
+    subsystem: Subsystem,
+    before_told: bool,
+}
+
+/// The last seconds, and the snapshots that are being taken.
+#[derive(Clone, Copy, Debug)]
+pub struct Snapshots {
+    /// The newest is before `next`.
+    ring: [[u16; KEPT.len()]; SAMPLES],
+    next: u8,
+    filled: u8,
+    newest: Instant,
+    pending: [Option<Pending>; PENDING_MAX],
+    left_out: u16,
+}
+
+/// One half of a snapshot.
+#[derive(Clone, Copy, Debug)]
+pub struct Snapshot<'a> {
+    /// When the finding was made.
+    pub at: Instant,
+    /// The finding's check.
+    pub check: &'static str,
+    /// The finding's instance.
+    pub instance: u8,
+    /// Its subsystem, which says what the columns are.
+    pub subsystem: Subsystem,
+    /// `false`: before the finding; `true`: after it.
+    pub after: bool,
+    /// The time of the first sample; the others follow every [`INTERVAL`].
+    pub first: Instant,
+    snapshots: &'a Snapshots,
+}
+
+impl Snapshot<'_> {
+    /// Sample by sample, column by column, as half-precision numbers; NaN where a value was not known.
+    pub fn values(&self) -> impl Iterator<Item = u16> {
+        let columns = COLUMNS[self.subsystem as usize];
+        self.snapshots.samples().flat_map(move |sample| columns.iter().map(move |column| sample[*column]))
+    }
+
+    /// How many columns a sample has.
+    pub const fn width(&self) -> usize {
+        COLUMNS[self.subsystem as usize].len()
+    }
+}
+
+impl Default for Snapshots {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Snapshots {
+    /// Nothing kept yet.
+    pub const fn new() -> Self {
+        Self {
+            ring: [[0; KEPT.len()]; SAMPLES],
+            next: 0,
+            filled: 0,
+            newest: Instant::ZERO,
+            pending: [None; PENDING_MAX],
+            left_out: 0,
+        }
+    }
+
+    /// Keeps a sample where one is due.
+    pub(crate) fn step(&mut self, inputs: &Inputs<'_>) {
+        if self.filled > 0 && inputs.now.since(self.newest) < INTERVAL {
+            return;
+        }
+        if inputs.now.since(self.newest) > INTERVAL + INTERVAL {
+            // A gap: what was before it is not what was just before.
+            self.filled = 0;
+        }
+        self.newest = inputs.now;
+        for (place, Quantity(_, read)) in self.ring[usize::from(self.next)].iter_mut().zip(&KEPT) {
+            *place = half::to_bits(read(inputs).unwrap_or(f32::NAN));
+        }
+        self.next = (self.next + 1) % SAMPLES as u8;
+        self.filled = (self.filled + 1).min(SAMPLES as u8);
+    }
+
+    fn samples(&self) -> impl Iterator<Item = &[u16; KEPT.len()]> {
+        let first = usize::from(self.next) + SAMPLES - usize::from(self.filled);
+        (0..usize::from(self.filled)).map(move |sample| &self.ring[(first + sample) % SAMPLES])
+    }
+
+    /// Takes a critical finding. One of a subsystem of which a snapshot is being taken is in that.
+    pub(crate) fn trigger(&mut self, finding: &Finding) {
+        let same = |pending: &Pending| pending.subsystem == finding.subsystem;
+        if finding.level != Level::Critical || self.pending.iter().flatten().any(same) {
+            return;
+        }
+        let Some(place) = self.pending.iter_mut().find(|place| place.is_none()) else {
+            self.left_out = self.left_out.saturating_add(1);
+            return;
+        };
+        *place = Some(Pending {
+            at: finding.at,
+            check: finding.check,
+            instance: finding.instance,
+            subsystem: finding.subsystem,
+            before_told: false,
+        });
+    }
+
+    /// The next half of a snapshot that is ready, once.
+    pub(crate) fn take(&mut self, now: Instant) -> Option<Snapshot<'_>> {
+        let ready = |pending: &Pending| !pending.before_told || now.since(pending.at) >= AFTER;
+        let place = self.pending.iter_mut().find(|place| place.as_ref().is_some_and(ready))?;
+        let Pending { at, check, instance, subsystem, before_told } = (*place)?;
+        match place {
+            Some(pending) if !before_told => pending.before_told = true,
+            _ => *place = None,
+        }
+        let length = INTERVAL.as_micros() * u64::from(self.filled.saturating_sub(1));
+        let first = Instant::from_micros(self.newest.as_micros().saturating_sub(length));
+        Some(Snapshot { at, check, instance, subsystem, after: before_told, first, snapshots: self })
+    }
+
+    /// Findings of which no snapshot was taken because too many were being taken.
+    pub const fn left_out(&self) -> u16 {
+        self.left_out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_subsystem_has_columns_that_there_are() {
+        for subsystem in Subsystem::ALL {
+            let names: Vec<_> = columns(subsystem).collect();
+            assert!((4..=COLUMNS_MAX).contains(&names.len()), "{subsystem:?}: {names:?}");
+        }
+    }
+}

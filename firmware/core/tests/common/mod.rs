@@ -1,0 +1,137 @@
+//! A simulated quad, which scripts make say what they want.
+#![allow(dead_code, missing_docs, unreachable_pub)]
+
+use hums_core::observation::{
+    Attitude, Autopilot, Battery, Esc, EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss,
+    GnssIntegrity, Heartbeat, Hud, Imu, Observation, Source, SystemStatus, SystemTime, VehicleKind,
+    Vibration,
+};
+use hums_core::status::{RecorderStatus, Recording};
+use hums_core::units::{
+    Amperes, Celsius, Fraction, Metres, MetresPerSecond, MetresPerSecond2, Radians, Rpm, Volts,
+};
+
+pub const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+/// A healthy quad in hover; a script changes what it says.
+#[derive(Clone)]
+pub struct Quad {
+    pub silent: bool,
+    pub armed: bool,
+    pub boot_offset_ms: i64,
+    pub battery: Battery,
+    pub escs: [Option<Esc>; 4],
+    pub estimator: Estimator,
+    pub gnss: Gnss,
+    pub integrity: GnssIntegrity,
+    pub vibration: Vibration,
+    pub acceleration_down: f32,
+    pub roll: f32,
+    pub system: SystemStatus,
+    pub recorder: RecorderStatus,
+    pub lost: f32,
+    /// Metres above home.
+    pub height: f32,
+    pub throttle: f32,
+    /// The autopilot's own mode number.
+    pub mode: u32,
+}
+
+impl Quad {
+    pub fn healthy() -> Self {
+        let esc = Esc {
+            rpm: Some(Rpm(5_000.0)),
+            voltage: Some(Volts(15.5)),
+            current: Some(Amperes(5.0)),
+            temperature: Some(Celsius(45.0)),
+            failures: Some(0),
+            errors: Some(u32::MAX - 3),
+        };
+        Self {
+            silent: false,
+            armed: true,
+            boot_offset_ms: 100_000,
+            battery: Battery {
+                voltage: Some(Volts(15.5)),
+                current: Some(Amperes(20.0)),
+                remaining: Some(Fraction(0.8)),
+                temperature: Some(Celsius(35.0)),
+                ..Battery::default()
+            },
+            escs: [Some(esc); 4],
+            estimator: Estimator {
+                scale: EstimatorScale::Variance,
+                velocity: Some(0.05),
+                position_horizontal: Some(0.04),
+                position_vertical: Some(0.03),
+                compass: Some(0.06),
+                ..Estimator::default()
+            },
+            gnss: Gnss {
+                fix: 3,
+                satellites: Some(16),
+                hdop: Some(0.8),
+                accuracy: Some(Metres(0.5)),
+                ..Gnss::default()
+            },
+            integrity: GnssIntegrity { jamming: 1, spoofing: 1, ..GnssIntegrity::default() },
+            vibration: Vibration { levels: [Some(5.0); 3], clips: [7; 3], ..Vibration::default() },
+            acceleration_down: -9.8,
+            roll: 0.02,
+            system: SystemStatus { load: Some(Fraction(0.3)), ..SystemStatus::default() },
+            recorder: RecorderStatus {
+                recording: Recording::Running,
+                room: Some(0.9),
+                ..RecorderStatus::default()
+            },
+            lost: 0.0,
+            height: 20.0,
+            throttle: 0.5,
+            mode: 4,
+        }
+    }
+
+    /// What it says every 100 ms.
+    pub fn says(&self, now_ms: u64) -> Vec<Observation> {
+        if self.silent {
+            return Vec::new();
+        }
+        let boot_ms = (now_ms as i64 + self.boot_offset_ms).max(0) as u32;
+        let height = if now_ms < 2_000 { 0.0 } else { self.height };
+        let heartbeat = Heartbeat {
+            autopilot: Autopilot::ArduPilot,
+            kind: VehicleKind::Rotorcraft,
+            armed: self.armed,
+            state: 4,
+            mode: self.mode,
+            ..Heartbeat::default()
+        };
+        let acceleration = [0.0, 0.0, self.acceleration_down].map(MetresPerSecond2);
+        let mut said = vec![
+            Observation::Attitude(Attitude {
+                roll: Radians(self.roll),
+                boot_ms: Some(boot_ms),
+                ..Attitude::default()
+            }),
+            Observation::GlobalPosition(GlobalPosition {
+                relative_altitude: Metres(height),
+                velocity: [MetresPerSecond(0.1); 3],
+                ..GlobalPosition::default()
+            }),
+            Observation::Hud(Hud { throttle: Some(Fraction(self.throttle)), ..Hud::default() }),
+            Observation::Imu(Imu { acceleration: Some(acceleration), ..Imu::default() }),
+            Observation::Escs(EscGroup { first: 0, escs: self.escs }),
+            Observation::Estimator(self.estimator),
+            Observation::Gnss(self.gnss),
+            Observation::GnssIntegrity(self.integrity),
+            Observation::Vibration(self.vibration),
+            Observation::SystemStatus(self.system),
+            Observation::Battery(self.battery),
+        ];
+        if now_ms.is_multiple_of(500) {
+            said.push(Observation::Heartbeat(heartbeat));
+            said.push(Observation::SystemTime(SystemTime { boot_ms, utc_micros: None }));
+        }
+        said
+    }
+}
