@@ -11,12 +11,14 @@
 #![cfg_attr(not(test), no_std)]
 
 mod companion;
+mod library;
 mod loss;
 pub mod monitoring;
 pub mod persist;
 pub mod port;
 pub mod queues;
 pub mod reception;
+pub mod shelf;
 pub mod storage;
 pub mod supervisor;
 pub mod uplink;
