@@ -324,6 +324,13 @@ impl Monitoring<'_> {
         self.lend(now, gs);
     }
 
+    pub(crate) fn bulk_frame_max(&self, port: Port) -> usize {
+        match port {
+            Port::Gs => self.summary.outlet.bulk_frame_max(),
+            Port::Autopilot => self.companion.outlet.bulk_frame_max(),
+        }
+    }
+
     pub(crate) fn send(
         &mut self,
         now: Instant,

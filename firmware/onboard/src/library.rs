@@ -22,6 +22,9 @@ use crate::shelf::{Answer, Want, What, Which};
 
 /// Bytes in one `LOG_DATA`.
 const LOG_DATA_BYTES: usize = 90;
+/// What an FTP message adds to its data, and the least data that is worth it.
+const FTP_FRAME: usize = 12 + 3 + ftp::HEAD + 13;
+const FTP_DATA_MIN: usize = 20;
 /// Messages of one burst; the client then asks on, and so a client that has gone is not sent a whole log.
 const BURST: u16 = 64;
 
@@ -217,6 +220,7 @@ impl Monitoring<'_> {
         let mut say = |this: &mut Self, packet: &Packet, then: Step| {
             if this.send(now, port, Class::Bulk, packet, gs) { then } else { Step::Wait }
         };
+        let size_max = self.bulk_frame_max(port).saturating_sub(FTP_FRAME).max(FTP_DATA_MIN);
         let files = |payload: &[u8]| messages::file_transfer(by.0, by.1, payload);
         match (&mut job.kind, answer) {
             (Kind::FtpSay { reply, error }, _) => {
@@ -278,14 +282,15 @@ impl Monitoring<'_> {
                 say(self, &files(payload), Step::Done)
             }
             (Kind::FtpRead { reply, size, left, .. }, Some((answer, data))) => {
+                let size = usize::from(*size).min(size_max);
                 let mut rest = data;
                 loop {
-                    let piece = rest.get(..usize::from(*size)).unwrap_or(rest);
+                    let piece = rest.get(..size).unwrap_or(rest);
                     let end = reply.offset.saturating_add(piece.len() as u32);
                     if reply.offset >= answer.bytes {
                         return say(self, &files(reply.nak(Error::EndOfFile, &mut buffer)), Step::Done);
                     }
-                    if piece.len() < usize::from(*size) && end < answer.bytes {
+                    if piece.len() < size && end < answer.bytes {
                         return if piece.is_empty() && data.is_empty() { Step::Done } else { Step::Next };
                     }
                     reply.complete = *left <= 1 && reply.opcode == 15;

@@ -18,11 +18,11 @@ use hums_recorder::card::Segment;
 use hums_recorder::{Card, CardDevice, LogName, Recorder};
 
 /// Bytes of a log in one answer.
-pub const DATA_MAX: usize = 480;
+pub const DATA_MAX: usize = 240;
 /// What an answer's head takes.
 const HEAD: usize = 20;
-/// One answer, with the queue's own bytes, and room so that it fits wherever the last one ended.
-pub const ANSWER_BYTES: usize = 2 * (HEAD + 4) + DATA_MAX + 40;
+/// The longest answer in one piece, with the queue's own two bytes, wherever the last one ended: twice its length.
+pub const ANSWER_BYTES: usize = 2 * (HEAD + DATA_MAX + 2) + 8;
 
 /// What is wanted of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
