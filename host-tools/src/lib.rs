@@ -19,6 +19,7 @@ pub mod run;
 pub mod sink;
 pub mod source;
 pub mod summary;
+pub mod talk;
 pub mod utc;
 pub mod verify;
 
@@ -52,5 +53,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Report(args) => report::run(args),
         Command::Pack(args) => pack::run(args),
         Command::Demo(args) => demo::run(args),
+        Command::Params(args) => talk::params::run(args),
+        Command::Pull(args) => talk::pull::run(args),
     }
 }

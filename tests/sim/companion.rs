@@ -1,8 +1,13 @@
 //! The box as a companion, against a ground station of pymavlink's.
 #![cfg(feature = "oracle")]
 
+use std::fs;
+use std::io::ErrorKind;
 use std::net::UdpSocket;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use hums_tests::flights::own;
@@ -20,7 +25,11 @@ struct Board {
 
 impl Board {
     fn start(flags: &[&str]) -> Self {
-        let dir = tempfile::tempdir().unwrap();
+        Self::start_in(tempfile::tempdir().unwrap(), flags)
+    }
+
+    /// On the card that lies in `dir`, if one does.
+    fn start_in(dir: TempDir, flags: &[&str]) -> Self {
         // Free a moment ago: the next one to ask gets another.
         let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let mut command: Command = program::command(["sim", "--json", "--speed", "real", "--input"]);
@@ -92,4 +101,120 @@ fn a_ground_station_lists_reads_sets_and_commands() {
     for recorded in ["BAT_REM_WARN", "recording stopped by 255/190", "recording started by 255/190"] {
         assert!(log.contains(recorded), "the record does not tell: {recorded}");
     }
+}
+
+/// A UDP link that loses every tenth datagram, each way.
+struct Lossy {
+    port: u16,
+    lost: Arc<AtomicU32>,
+    over: Arc<AtomicBool>,
+}
+
+impl Lossy {
+    fn to(board: u16) -> Self {
+        let (lost, over) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicBool::new(false)));
+        let client = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let port = client.local_addr().unwrap().port();
+        let server = UdpSocket::bind("127.0.0.1:0").unwrap();
+        server.connect(("127.0.0.1", board)).unwrap();
+        let (counted, ended) = (Arc::clone(&lost), Arc::clone(&over));
+        std::thread::spawn(move || {
+            for socket in [&client, &server] {
+                socket.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+            }
+            let (mut peer, mut random, mut buffer) = (None, 7_u32, [0; 2048]);
+            let mut loses = || {
+                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let loses = random >> 16 & 0xff < 26;
+                counted.fetch_add(u32::from(loses), Ordering::Relaxed);
+                loses
+            };
+            while !ended.load(Ordering::Relaxed) {
+                match client.recv_from(&mut buffer) {
+                    Ok((count, from)) => {
+                        peer = Some(from);
+                        if !loses() {
+                            let _ = server.send(&buffer[..count]);
+                        }
+                    }
+                    Err(error) => {
+                        assert!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+                    }
+                }
+                if let (Ok(count), Some(peer)) = (server.recv(&mut buffer), peer)
+                    && !loses()
+                {
+                    let _ = client.send_to(&buffer[..count], peer);
+                }
+            }
+        });
+        Self { port, lost, over }
+    }
+}
+
+impl Drop for Lossy {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A card with one finished session on it, of some seconds.
+fn card_with_a_log() -> (TempDir, Vec<u8>) {
+    let dir = tempfile::tempdir().unwrap();
+    let recording = fs::read(own("ap_quad_signed.raw")).unwrap();
+    fs::write(dir.path().join("short.raw"), &recording[..80_000]).unwrap();
+    fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
+    let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
+    hums(["sim".as_ref(), "--input".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()])
+        .expect_code(&[0]);
+    // What is downloaded is the part of the file that was recorded.
+    let card = fs::read(&image).unwrap();
+    (dir, card)
+}
+
+/// The log is on the card as it was downloaded, whole and in one row.
+#[track_caller]
+fn assert_on_card(log: &Path, card: &[u8]) {
+    let log = fs::read(log).unwrap();
+    assert!(log.len() > 8_000 && log.len().is_multiple_of(512), "{} bytes", log.len());
+    let first = card.chunks_exact(512).position(|block| block == &log[..512]).expect("its first sector");
+    assert!(card[first * 512..].starts_with(&log), "the download differs from the card");
+}
+
+#[test]
+fn a_log_pulled_over_a_link_that_loses_a_tenth_is_the_one_on_the_card() {
+    let (dir, card) = card_with_a_log();
+    let params = dir.path().join("params.txt").display().to_string();
+    let (pulled, downloaded) = (dir.path().join("pulled"), dir.path().join("downloaded"));
+    let board = Board::start_in(dir, &["--params", &params]);
+    let link = Lossy::to(board.port);
+    let address = format!("udpout:127.0.0.1:{}", link.port);
+    let output = pulled.to_str().unwrap();
+    let log = "00001_00.HUM";
+    hums(["pull", "--link", &address, "-o", output, log]).expect_code(&[0]);
+    assert!(link.lost.load(Ordering::Relaxed) > 5, "nothing was lost: {:?}", link.lost);
+    assert_on_card(&pulled.join(log), &card);
+    // Again: what is there is left.
+    let again = hums(["pull", "--link", &address, "-o", output, log]).expect_code(&[0]);
+    assert!(again.stderr.contains("00001_00.HUM: is there already"), "{}", again.stderr);
+
+    let said = oracle::log_download(board.port, &downloaded, 0.1);
+    assert_eq!(said["missing"], 0, "{said}");
+    assert!(said["requests"].as_u64() > Some(1), "nothing was lost: {said}");
+    assert_on_card(&downloaded, &card);
+}
+
+#[test]
+fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
+    let board = Board::start(&[]);
+    let link = Lossy::to(board.port);
+    let address = format!("udpout:127.0.0.1:{}", link.port);
+    let list = hums(["params", "list", "--link", &address]).expect_code(&[0]).text();
+    assert!(list.contains("GS_BUDGET 2000\n") && list.contains("BAT_REM_WARN 15\n"), "{list}");
+    let set = hums(["params", "set", "BAT_REM_WARN", "21.5", "--link", &address]).expect_code(&[0]).text();
+    assert_eq!(set, "BAT_REM_WARN 21.5\n");
+    let got = hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[0]).text();
+    assert_eq!(got, "BAT_REM_WARN 21.5\n");
+    let refused = hums(["params", "set", "BAT_REM_WARN", "1000", "--link", &address]).expect_code(&[1]);
+    assert!(refused.stderr.contains("keeps 21.5"), "{}", refused.stderr);
 }

@@ -76,3 +76,10 @@ pub fn companion(port: u16) -> Value {
     let said = ask("companion.py", &[PathBuf::from(port.to_string())]);
     serde_json::from_str(&said).expect("companion.py prints JSON")
 }
+
+/// Downloads the oldest log to `out` as a ground station does, `loss` of all frames lost: see
+/// `tests/oracle/log_download.py`.
+pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {
+    let arguments = [PathBuf::from(port.to_string()), out.to_owned(), PathBuf::from(loss.to_string())];
+    serde_json::from_str(&ask("log_download.py", &arguments)).expect("log_download.py prints JSON")
+}

@@ -88,7 +88,9 @@ fn main() -> ! {
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
     on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
-    on.storage.spawn(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out, keeper).expect(ONCE));
+    on.storage.spawn(
+        tasks::storage::run(parts.card, parts.boot.entropy, sectors_out, queues.shelf, keeper).expect(ONCE),
+    );
     let mut idle = parts.idle;
     idle.run()
 }

@@ -19,6 +19,7 @@ pub const TEXT_BYTES_MAX: usize = 50;
 #[derive(Clone, Copy, Debug)]
 pub struct Encoder {
     system: u8,
+    component: u8,
     sequence: u8,
 }
 
@@ -31,7 +32,12 @@ impl Default for Encoder {
 impl Encoder {
     /// Before the vehicle's system id is known.
     pub const fn new() -> Self {
-        Self { system: SYSTEM_DEFAULT, sequence: 0 }
+        Self::of(SYSTEM_DEFAULT, COMPONENT)
+    }
+
+    /// For frames of another component: a ground station's, in tools and tests.
+    pub const fn of(system: u8, component: u8) -> Self {
+        Self { system, component, sequence: 0 }
     }
 
     /// Takes on the vehicle's system id.
@@ -60,7 +66,7 @@ impl Encoder {
         let payload = packet.payload();
         let [id0, id1, id2, _] = packet.id().to_le_bytes();
         let len = payload.len() as u8;
-        let header = [START_V2, len, 0, 0, self.sequence, self.system, COMPONENT, id0, id1, id2];
+        let header = [START_V2, len, 0, 0, self.sequence, self.system, self.component, id0, id1, id2];
         self.sequence = self.sequence.wrapping_add(1);
         let end = HEADER_V2 + payload.len();
         out[..HEADER_V2].copy_from_slice(&header);

@@ -6,6 +6,7 @@ mod crc;
 pub mod encode;
 pub mod frame;
 pub mod framer;
+pub mod ftp;
 pub mod messages;
 mod observe;
 pub mod outlet;

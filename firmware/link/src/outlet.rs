@@ -12,7 +12,8 @@
 //! Each [`Class`] may fill the budget up to a mark of its own, so that the more urgent one always finds room above it;
 //! and only findings may wait behind more than [`BACKLOG`] of the line, so that a finding never waits longer than that.
 //! Events (the vehicle's texts and answers) and bulk (lists, logs) have half and three fifths of the budget at most, so
-//! that neither starves what is forwarded.
+//! that neither starves what is forwarded; and what is forwarded leaves three fifths, and half of the line's backlog,
+//! to bulk that waits.
 
 use hums_core::time::{Instant, Span};
 
@@ -23,6 +24,8 @@ use crate::packet::Packet;
 pub const BACKLOG: Span = Span::from_millis(50);
 /// The same for findings, which come in bursts: no queue needs to hold more.
 const BACKLOG_FINDINGS: Span = Span::from_millis(300);
+/// The same for what is forwarded, so that longer frames find the line free enough.
+const BACKLOG_FORWARD: Span = Span::from_millis(25);
 /// A finding's text with its header, and a signature: what stays free for a critical one.
 const RESERVE: u32 = 80;
 /// The least budget that has such a reserve: below, it would leave nothing for anything else.
@@ -122,11 +125,18 @@ pub struct Outlet {
     window: Window,
     events: Bucket,
     bulk: Bucket,
+    /// What is forwarded while bulk waits.
+    forward: Bucket,
     budget: u32,
     baud: u32,
     /// When the line has sent everything.
     free_at: Instant,
+    /// When bulk had something to send last.
+    bulk_at: Option<Instant>,
 }
+
+/// How long bulk counts as waiting after it asked.
+const BULK_WAITS: Span = Span::from_secs(1);
 
 impl Outlet {
     /// A port that may send `budget` bytes a second on a line of `baud`.
@@ -136,9 +146,11 @@ impl Outlet {
             window: Window { slots: [0; Window::SLOTS], newest: 0 },
             events: Bucket::FULL,
             bulk: Bucket::FULL,
+            forward: Bucket::FULL,
             budget,
             baud,
             free_at: Instant::ZERO,
+            bulk_at: None,
         }
     }
 
@@ -176,14 +188,22 @@ impl Outlet {
         let busy = start.since(now);
         let waits = match class {
             Class::Critical | Class::Finding => busy <= BACKLOG_FINDINGS,
+            Class::Forward => busy == Span::ZERO || busy + self.duration(bytes) <= BACKLOG_FORWARD,
             _ => busy == Span::ZERO || busy + self.duration(bytes) <= BACKLOG,
         };
+        if class == Class::Bulk {
+            self.bulk_at = Some(now);
+        }
         if !waits || bytes > GS_FRAME_BYTES_MAX {
             return false;
         }
         let share = match class {
             Class::Event => self.events.refresh(now, (self.budget / 2).max(RESERVE.min(self.budget))),
-            Class::Bulk => self.bulk.refresh(now, self.budget / 5 * 3),
+            Class::Bulk => self.bulk.refresh(now, self.mark(class) / 5 * 3),
+            Class::Forward => {
+                let share = self.forward.refresh(now, self.mark(class) / 5 * 2);
+                if self.bulk_at.is_some_and(|at| now.since(at) < BULK_WAITS) { share } else { u32::MAX }
+            }
             _ => u32::MAX,
         };
         // Old slots are cleared before they are counted.
@@ -196,6 +216,12 @@ impl Outlet {
         Span::from_micros(bytes as u64 * 10_000_000 / u64::from(self.baud.max(1)))
     }
 
+    /// The longest frame of bulk that finds its way in time: half of the line's backlog, and of a second's share.
+    pub fn bulk_frame_max(&self) -> usize {
+        let line = self.baud / 10 * BACKLOG_FORWARD.as_millis() as u32 / 1_000;
+        line.min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize
+    }
+
     /// Sends a frame as it is, if it may go now.
     pub fn pass(&mut self, now: Instant, class: Class, frame: &[u8], out: &mut impl FnMut(&[u8])) -> bool {
         if !self.fits(now, class, frame.len()) {
@@ -206,6 +232,7 @@ impl Outlet {
         match class {
             Class::Event => self.events.take(frame.len()),
             Class::Bulk => self.bulk.take(frame.len()),
+            Class::Forward => self.forward.take(frame.len()),
             _ => {}
         }
         out(frame);
@@ -282,6 +309,27 @@ mod tests {
         }
         let mark = outlet.mark(Class::Forward) as usize;
         assert!(bytes >= 60 * mark * 95 / 100 && bytes <= 61 * mark, "{bytes} of {} bytes", 60 * mark);
+    }
+
+    #[test]
+    fn what_is_forwarded_leaves_room_for_bulk_and_bulk_for_it() {
+        for budget in [500, 2_000, 5_000] {
+            let mut outlet = Outlet::new(budget, 57_600);
+            let (mut forwarded, mut bulk) = (0, 0);
+            let piece = vec![0; outlet.bulk_frame_max()];
+            for now_ms in 0..20_000 {
+                let now = Instant::from_millis(now_ms);
+                outlet.pass(now, Class::Forward, &[0; 40], &mut |frame| forwarded += frame.len());
+                if now_ms % 50 == 0 {
+                    outlet.pass(now, Class::Bulk, &piece, &mut |frame| bulk += frame.len());
+                }
+            }
+            let share = 20 * outlet.mark(Class::Bulk) as usize / 10;
+            assert!(
+                bulk > 4 * share && forwarded > 3 * share,
+                "{bulk} and {forwarded} bytes at {budget} B/s"
+            );
+        }
     }
 
     #[test]

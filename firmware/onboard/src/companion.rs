@@ -20,7 +20,9 @@ use hums_link::outlet::{Class, Outlet};
 use hums_link::packet::{Fields, Packet};
 use hums_link::request::{self, Port, Replies, Reply, Request};
 use hums_link::summary;
+use hums_recorder::LogName;
 
+use crate::library::Library;
 use crate::monitoring::{Identity, Monitoring};
 use crate::queues::{GsIn, Path, SectorsIn, UplinkOut};
 
@@ -83,6 +85,9 @@ pub(crate) struct Companion {
     replies: Replies,
     limits: [Limiter; 2],
     heartbeat_at: Option<Instant>,
+    pub(crate) library: Library,
+    /// The log that is open over FTP.
+    file: Option<LogName>,
     /// Somebody stopped the record.
     pub(crate) stopped: bool,
 }
@@ -95,6 +100,8 @@ impl Companion {
             replies: Replies::new(),
             limits: [Limiter::new(); 2],
             heartbeat_at: None,
+            library: Library::new(),
+            file: None,
             stopped: false,
         }
     }
@@ -173,6 +180,11 @@ impl Monitoring<'_> {
                 if !broadcast || result == ACCEPTED {
                     self.companion.replies.push(port, Reply::Ack(command, result, by));
                 }
+            }
+            // Of the broadcasts of a vehicle only those that name us: the autopilot has logs and files of its own.
+            ref about_logs if asked.target.1 != 0 => {
+                let Companion { library, file, .. } = &mut self.companion;
+                library.asked(port, by, about_logs, file);
             }
             _ => {}
         }
@@ -309,9 +321,24 @@ impl Monitoring<'_> {
                 self.companion.replies.listed_done(port, count);
             }
         }
+        self.lend(now, gs);
     }
 
-    fn send(&mut self, now: Instant, port: Port, class: Class, packet: &Packet, gs: &mut GsIn) -> bool {
+    pub(crate) fn bulk_frame_max(&self, port: Port) -> usize {
+        match port {
+            Port::Gs => self.summary.outlet.bulk_frame_max(),
+            Port::Autopilot => self.companion.outlet.bulk_frame_max(),
+        }
+    }
+
+    pub(crate) fn send(
+        &mut self,
+        now: Instant,
+        port: Port,
+        class: Class,
+        packet: &Packet,
+        gs: &mut GsIn,
+    ) -> bool {
         match port {
             Port::Gs => self.summary.outlet.send(now, class, packet, &mut |bytes| gs.put(bytes)),
             Port::Autopilot => {

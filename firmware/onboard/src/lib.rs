@@ -12,12 +12,14 @@
 
 mod companion;
 mod keeping;
+mod library;
 mod loss;
 pub mod monitoring;
 pub mod persist;
 pub mod port;
 pub mod queues;
 pub mod reception;
+pub mod shelf;
 pub mod storage;
 pub mod supervisor;
 pub mod uplink;

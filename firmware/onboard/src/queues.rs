@@ -13,6 +13,8 @@ use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use heapless::spsc;
 use hums_blackbox::{ENTRY_SECTORS_MAX, Header, SECTOR_BYTES, Sector, SectorSink};
 
+use crate::shelf::{Reader, Server, Shelf};
+
 /// 80 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes a fraction.
 pub const FRAME_QUEUE_BYTES: usize = 8 * 1024;
 
@@ -52,6 +54,7 @@ pub struct Queues {
     uplink: UplinkQueue,
     autopilot: AutopilotQueue,
     sectors: SectorQueue,
+    shelf: Shelf,
 }
 
 /// The ends of all queues, each for one task.
@@ -72,6 +75,8 @@ pub struct Ends<'a> {
     pub uplink_in: UplinkIn<'a>,
     /// For the monitor.
     pub uplink_out: UplinkOut<'a>,
+    /// For storage.
+    pub shelf: Server<'a>,
     /// For the task that sends to the autopilot.
     pub autopilot_out: AutopilotOut<'a>,
 }
@@ -91,12 +96,14 @@ impl Queues {
             uplink: Churrasco::new(),
             autopilot: Churrasco::new(),
             sectors: spsc::Queue::new(),
+            shelf: Shelf::new(),
         }
     }
 
     /// Hands out the ends, once.
     pub fn split(&mut self) -> Ends<'_> {
         let (sectors_in, sectors_out) = self.sectors.split();
+        let (reader, shelf) = self.shelf.split();
         Ends {
             frames_in: FramesIn(self.frames.framed_producer()),
             frames_out: FramesOut(self.frames.framed_consumer()),
@@ -105,8 +112,10 @@ impl Queues {
             gs_in: GsIn {
                 gs: PortIn::new(self.gs.framed_producer()),
                 autopilot: PortIn::new(self.autopilot.framed_producer()),
+                shelf: reader,
                 path: Path::Port,
             },
+            shelf,
             gs_out: PortOut(self.gs.framed_consumer()),
             uplink_in: FramesIn(self.uplink.framed_producer()),
             uplink_out: FramesOut(self.uplink.framed_consumer()),
@@ -238,11 +247,13 @@ impl SectorsOut<'_> {
     }
 }
 
-/// The writing ends of both ports' queues: to the ground station, and to the autopilot.
+/// The monitor's ends of what is around it: both ports, and the logs on the card.
 pub struct GsIn<'a> {
     gs: PortIn<'a, GS_QUEUE_BYTES>,
     /// To the autopilot.
     pub autopilot: PortIn<'a, AUTOPILOT_QUEUE_BYTES>,
+    /// To storage and back: the logs on the card.
+    pub shelf: Reader<'a>,
     path: Path,
 }
 

@@ -8,6 +8,7 @@ use hums_recorder::recorder::Written;
 use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Recorder};
 
 use crate::queues::SectorsOut;
+use crate::shelf::Server;
 
 /// How soon to call again after [`Service::NoCard`].
 pub const NO_CARD_RETRY: Span = Span::from_millis(100);
@@ -54,6 +55,12 @@ impl<'a, D: CardDevice> Storage<'a, D> {
             Written::Done => Service::Wrote,
             Written::Later => Service::NoCard,
         }
+    }
+
+    /// Answers one question about the logs on the card, if there is one; whether there was. To be called only when
+    /// [`Self::service`] found nothing to write.
+    pub fn serve(&mut self, shelf: &mut Server<'_>) -> bool {
+        shelf.serve(&mut self.recorder)
     }
 
     /// Whether everything that was given to it is on the card.

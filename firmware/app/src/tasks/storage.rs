@@ -5,6 +5,7 @@ use embassy_time::{Duration, Timer, with_timeout};
 use hums_core::time::Span;
 use hums_onboard::persist::Kept;
 use hums_onboard::queues::SectorsOut;
+use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Keeper, Service, Storage, Task};
 use hums_recorder::HeldBlocks;
@@ -25,6 +26,7 @@ pub(crate) async fn run(
     card: board::Card,
     entropy: u32,
     mut sectors: SectorsOut<'static>,
+    mut shelf: Server<'static>,
     keeper: &'static mut Keeper<'static, board::StoreFlash>,
 ) -> ! {
     let held = HeldBlocks::new();
@@ -43,7 +45,8 @@ pub(crate) async fn run(
             Service::Wrote => {}
             Service::Idle if !sectors.is_empty() => {}
             Service::Idle if ended_at.is_some() => break,
-            Service::Idle => wait_for_work(&sectors, keeper).await,
+            Service::Idle if measure(Stage::Storage, || body.serve(&mut shelf)) => {}
+            Service::Idle => wait_for_work(&sectors, &shelf, keeper).await,
             Service::NoCard if ended_at.is_some_and(|at| now().since(at) > CARD_PATIENCE) => break,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
@@ -57,12 +60,18 @@ pub(crate) async fn run(
 }
 
 /// Returns when there is a sector, or no more to come.
-async fn wait_for_work(sectors: &SectorsOut<'_>, keeper: &mut Keeper<'static, board::StoreFlash>) {
-    while sectors.is_empty() && !links::RECORD_ENDED.signaled() {
+async fn wait_for_work(
+    sectors: &SectorsOut<'_>,
+    shelf: &Server<'_>,
+    keeper: &mut Keeper<'static, board::StoreFlash>,
+) {
+    let mut asked = shelf.is_wanted();
+    while sectors.is_empty() && !asked && !links::RECORD_ENDED.signaled() {
         SUPERVISOR.report(Task::Storage, now());
         keep(keeper);
         // Either way it looks again.
         let _ = with_timeout(REPORT, links::SECTORS.wait()).await;
+        asked = shelf.is_wanted();
     }
 }
 

@@ -294,7 +294,8 @@ impl<'a, 'w> Pipeline<'a, 'w> {
 
     /// The monitor may have left work for the others.
     fn after_monitor(&mut self) -> Result<()> {
-        if self.storage_at.is_none() && !self.ends.sectors_out.is_empty() {
+        let work = !self.ends.sectors_out.is_empty() || self.ends.shelf.is_wanted();
+        if self.storage_at.is_none() && work {
             self.storage_at = Some(self.now);
         }
         self.send_gs()
@@ -330,10 +331,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.end_service();
         self.outside.card.set_clock(begin_us);
         let service = self.storage.service(self.now, &mut self.ends.sectors_out);
+        let served = service == Service::Idle && self.storage.serve(&mut self.ends.shelf);
         let took = Span::from_micros(self.outside.card.clock().saturating_sub(begin_us));
         self.busy = Some((self.now + took, took));
         self.storage_at = match service {
-            Service::Idle if self.ends.sectors_out.is_empty() => None,
+            Service::Idle if self.ends.sectors_out.is_empty() && !served => None,
             Service::Wrote | Service::Idle => Some(self.now + took),
             Service::NoCard => Some(self.now + took + NO_CARD_RETRY),
         };

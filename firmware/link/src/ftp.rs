@@ -1,0 +1,152 @@
+//! MAVLink FTP: what a client asks, and the answers, byte for byte as they lie in `FILE_TRANSFER_PROTOCOL`
+//! (<https://mavlink.io/en/services/ftp.html>). Reading only.
+
+use crate::packet::Fields;
+
+/// Bytes before the data.
+pub const HEAD: usize = 12;
+/// Bytes of data in one message.
+pub const DATA_MAX: usize = 239;
+
+/// What went wrong (`MAV_FTP_ERR`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Error {
+    /// For reasons that nobody knows.
+    Fail = 1,
+    /// No such session.
+    InvalidSession = 4,
+    /// Nothing lies there: after the last byte, after the last entry.
+    EndOfFile = 6,
+    /// Not something that we do.
+    UnknownCommand = 7,
+    /// Logs are not written from outside.
+    FileProtected = 9,
+    /// No such file.
+    FileNotFound = 10,
+}
+
+/// What a client asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operation<'a> {
+    /// Nothing: an answer is all.
+    None,
+    /// Close the file.
+    End,
+    /// Entries of a directory, from this one on.
+    List(&'a str, u32),
+    /// Open a file.
+    Open(&'a str),
+    /// Bytes from an offset, so many.
+    Read(u32, u8),
+    /// Bytes from an offset to the end, so many a message.
+    Burst(u32, u8),
+    /// Writing of any kind.
+    Write,
+    /// Anything else.
+    Unknown,
+}
+
+/// A client's message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked<'a> {
+    /// Counts up with each message, the answer's included.
+    pub sequence: u16,
+    /// The session that it is about.
+    pub session: u8,
+    /// The number of the operation, for the answer.
+    pub opcode: u8,
+    /// What is asked.
+    pub operation: Operation<'a>,
+}
+
+/// Reads a client's message.
+pub fn read(payload: &[u8]) -> Asked<'_> {
+    let fields = Fields(payload);
+    let (size, offset) = (fields.u8(4), fields.u32(8));
+    let text = || fields.text(HEAD, usize::from(size)).unwrap_or_default();
+    let bytes = size.min(DATA_MAX as u8);
+    let operation = match fields.u8(3) {
+        0 => Operation::None,
+        1 | 2 => Operation::End,
+        3 => Operation::List(text(), offset),
+        4 => Operation::Open(text()),
+        5 => Operation::Read(offset, bytes),
+        15 => Operation::Burst(offset, bytes),
+        6..=13 => Operation::Write,
+        _ => Operation::Unknown,
+    };
+    Asked { sequence: fields.u16(0), session: fields.u8(2), opcode: fields.u8(3), operation }
+}
+
+/// An answer; its data is added by the caller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// One more than the message's that it answers, or than the answer's before it in a burst.
+    pub sequence: u16,
+    /// The session.
+    pub session: u8,
+    /// The operation that is answered.
+    pub opcode: u8,
+    /// Where the data lies.
+    pub offset: u32,
+    /// The last one of a burst.
+    pub complete: bool,
+}
+
+impl Reply {
+    /// To `asked`.
+    pub const fn to(asked: &Asked<'_>) -> Self {
+        Self {
+            sequence: asked.sequence.wrapping_add(1),
+            session: asked.session,
+            opcode: asked.opcode,
+            offset: 0,
+            complete: false,
+        }
+    }
+
+    /// "Done", with data.
+    pub fn ack<'a>(&self, data: &[u8], buffer: &'a mut [u8; HEAD + DATA_MAX]) -> &'a [u8] {
+        self.put(128, data, buffer)
+    }
+
+    /// "Not done".
+    pub fn nak<'a>(&self, error: Error, buffer: &'a mut [u8; HEAD + DATA_MAX]) -> &'a [u8] {
+        self.put(129, &[error as u8], buffer)
+    }
+
+    fn put<'a>(&self, opcode: u8, data: &[u8], buffer: &'a mut [u8; HEAD + DATA_MAX]) -> &'a [u8] {
+        let size = data.len().min(DATA_MAX);
+        let [s0, s1] = self.sequence.to_le_bytes();
+        let head = [s0, s1, self.session, opcode, size as u8, self.opcode, u8::from(self.complete), 0];
+        buffer[..8].copy_from_slice(&head);
+        buffer[8..HEAD].copy_from_slice(&self.offset.to_le_bytes());
+        buffer[HEAD..HEAD + size].copy_from_slice(&data[..size]);
+        &buffer[..HEAD + size]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_reads_as_the_protocol_says() {
+        let asked = [7, 0, 0, 5, 100, 0, 0, 0, 0x10, 0x20, 0, 0];
+        let asked = read(&asked);
+        assert_eq!((asked.sequence, asked.operation), (7, Operation::Read(0x2010, 100)));
+        let mut buffer = [0; HEAD + DATA_MAX];
+        let reply = Reply { offset: 0x2010, ..Reply::to(&asked) };
+        assert_eq!(reply.ack(&[1, 2], &mut buffer), [8, 0, 0, 128, 2, 5, 0, 0, 0x10, 0x20, 0, 0, 1, 2]);
+        assert_eq!(reply.nak(Error::EndOfFile, &mut buffer)[3..5], [129, 1]);
+    }
+
+    #[test]
+    fn whatever_comes_is_read() {
+        assert_eq!(read(&[]).operation, Operation::None);
+        assert_eq!(read(&[0, 0, 0, 4, 255]).operation, Operation::Open(""));
+        assert_eq!(read(&[0, 0, 0, 9]).operation, Operation::Write);
+        assert_eq!(read(&[0, 0, 0, 200]).operation, Operation::Unknown);
+    }
+}

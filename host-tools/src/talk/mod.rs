@@ -1,0 +1,146 @@
+//! Talking with a board as a ground station does: `hums params` and `hums pull`.
+
+pub mod params;
+pub mod pull;
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use hums_link::encode::{COMPONENT, Encoder, GS_FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+use hums_link::{Check, Frame, Framer};
+
+use crate::duplex::{self, Duplex};
+use crate::endpoint::Endpoint;
+use crate::interrupt;
+use crate::outcome::usage;
+
+/// A ground station's usual identity.
+const SYSTEM: u8 = 255;
+/// `MAV_COMP_ID_MISSIONPLANNER`
+const OUR_COMPONENT: u8 = 190;
+/// How long the board may keep silent at first.
+const CONNECT: Duration = Duration::from_secs(15);
+/// How often we say that we are there: radios and UDP peers learn from it where to answer.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+const READ: Duration = Duration::from_millis(20);
+
+/// A conversation with one board.
+pub struct Client {
+    duplex: Duplex,
+    framer: Framer,
+    encoder: Encoder,
+    /// The system that the board is part of.
+    system: u8,
+    frames: VecDeque<Vec<u8>>,
+    heartbeat_at: Option<Instant>,
+}
+
+impl Client {
+    /// Opens the link and waits for the board's heartbeat.
+    pub fn connect(endpoint: &Endpoint) -> Result<Self> {
+        if !endpoint.is_live() {
+            return Err(usage(format!("--link {endpoint}: a file does not answer; give udp, tcp or serial")));
+        }
+        let duplex = duplex::open(endpoint, READ)?;
+        interrupt::watch();
+        let mut client = Self {
+            duplex,
+            framer: Framer::new(),
+            encoder: Encoder::of(SYSTEM, OUR_COMPONENT),
+            system: 0,
+            frames: VecDeque::new(),
+            heartbeat_at: None,
+        };
+        let end = Instant::now() + CONNECT;
+        let board = client.until(end, |frame| (frame.id() == 0).then(|| frame.system()))?;
+        client.system = board.with_context(|| {
+            format!(
+                "{endpoint}: no board of ours is heard (component {COMPONENT}); is GS_PATH as it should be?"
+            )
+        })?;
+        Ok(client)
+    }
+
+    /// System and component of the board.
+    pub const fn target(&self) -> (u8, u8) {
+        (self.system, COMPONENT)
+    }
+
+    /// Sends a message.
+    pub fn send(&mut self, packet: &Packet) -> Result<()> {
+        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let frame = self.encoder.frame(&mut buffer, packet);
+        self.duplex.writer.write_all(frame).and_then(|()| self.duplex.writer.flush()).context("--link")
+    }
+
+    /// Looks at the board's frames until `look` makes something of one, or time is up.
+    pub fn until<T>(
+        &mut self,
+        end: Instant,
+        mut look: impl FnMut(&Frame<'_>) -> Option<T>,
+    ) -> Result<Option<T>> {
+        loop {
+            while let Some(bytes) = self.frames.pop_front() {
+                let frame =
+                    Frame::again(&bytes, Check::Verified).filter(|frame| frame.component() == COMPONENT);
+                if let Some(found) = frame.and_then(|frame| look(&frame)) {
+                    return Ok(Some(found));
+                }
+            }
+            if interrupt::requested() {
+                bail!("interrupted");
+            }
+            if Instant::now() >= end {
+                return Ok(None);
+            }
+            self.receive()?;
+        }
+    }
+
+    /// Asks, and asks again, until `look` makes something of an answer; `None` after the last try.
+    pub fn ask<T>(
+        &mut self,
+        packet: &Packet,
+        patience: Duration,
+        tries: usize,
+        mut look: impl FnMut(&Frame<'_>) -> Option<T>,
+    ) -> Result<Option<T>> {
+        for _ in 0..tries {
+            self.send(packet)?;
+            if let Some(found) = self.until(Instant::now() + patience, &mut look)? {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
+    fn receive(&mut self) -> Result<()> {
+        if self.heartbeat_at.is_none_or(|at| at.elapsed() >= HEARTBEAT) {
+            self.heartbeat_at = Some(Instant::now());
+            // MAV_TYPE_GCS, MAV_AUTOPILOT_INVALID, MAV_STATE_ACTIVE.
+            self.send(&Packet::new(0).u8(4, 6).u8(5, 8).u8(7, 4).u8(8, 3))?;
+        }
+        // The largest UDP datagram.
+        let mut buffer = vec![0; 65_536];
+        let Self { duplex, framer, frames, .. } = self;
+        let count = match duplex.reader.read(&mut buffer) {
+            Ok(0) => bail!("--link: the other side has closed the connection"),
+            Ok(count) => count,
+            Err(error) if duplex::is_silence(&error) => {
+                framer.idle(&mut |frame| keep(frames, &frame));
+                return Ok(());
+            }
+            Err(error) => return Err(error).context("--link"),
+        };
+        framer.push(buffer.get(..count).unwrap_or_default(), &mut |frame| keep(frames, &frame));
+        Ok(())
+    }
+}
+
+fn keep(frames: &mut VecDeque<Vec<u8>>, frame: &Frame<'_>) {
+    if frame.check() == Check::Verified {
+        frames.push_back(frame.bytes().to_vec());
+    }
+}

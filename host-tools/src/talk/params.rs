@@ -1,0 +1,116 @@
+//! `hums params`: the board's parameters, as ground stations ask for them.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use hums_link::Frame;
+use hums_link::packet::{Fields, Packet};
+
+use super::Client;
+use crate::cli::{self, ParamsAction};
+use crate::outcome::Outcome;
+use crate::output::Stdout;
+
+/// A silence of this long in a list means that what is missing was lost.
+const GAP: Duration = Duration::from_millis(1_500);
+const ANSWER: Duration = Duration::from_millis(700);
+const TRIES: usize = 8;
+/// More parameters than a board has.
+const COUNT_MAX: u16 = 4_096;
+
+/// `PARAM_VALUE`
+struct Param {
+    name: String,
+    value: f32,
+    index: u16,
+    count: u16,
+}
+
+/// Runs `hums params`.
+pub fn run(args: &cli::Params) -> Result<Outcome> {
+    let mut out = Stdout::new();
+    match &args.action {
+        ParamsAction::List { at, json } => {
+            let values = list(&mut Client::connect(&at.link)?)?;
+            if *json {
+                let object: serde_json::Map<_, _> =
+                    values.iter().map(|value| (value.name.clone(), f64::from(value.value).into())).collect();
+                writeln!(out, "{}", serde_json::Value::Object(object))?;
+            } else {
+                for value in values {
+                    writeln!(out, "{} {}", value.name, value.value)?;
+                }
+            }
+        }
+        ParamsAction::Get { names, at } => {
+            let mut client = Client::connect(&at.link)?;
+            for name in names {
+                let value = read(&mut client, name)?;
+                writeln!(out, "{name} {}", value.value)?;
+            }
+        }
+        ParamsAction::Set { name, value, at } => {
+            let mut client = Client::connect(&at.link)?;
+            let (system, component) = client.target();
+            let packet =
+                Packet::new(23).f32(0, *value).u8(4, system).u8(5, component).text(6, 16, name).u8(22, 9);
+            let kept = client
+                .ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == *name))?
+                .with_context(|| format!("{name}: no answer; is there such a parameter?"))?;
+            if kept.value.to_bits() != value.to_bits() {
+                bail!("{name}: the board refused {value} and keeps {}", kept.value);
+            }
+            writeln!(out, "{name} {value}")?;
+        }
+    }
+    out.flush()?;
+    Ok(Outcome::Done)
+}
+
+fn value_of(frame: &Frame<'_>) -> Option<Param> {
+    let fields = Fields(frame.payload());
+    (frame.id() == 22).then(|| Param {
+        name: fields.text(8, 16).unwrap_or_default().to_owned(),
+        value: fields.f32(0),
+        index: fields.u16(6),
+        count: fields.u16(4),
+    })
+}
+
+fn read(client: &mut Client, name: &str) -> Result<Param> {
+    let (system, component) = client.target();
+    let packet = Packet::new(20).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name);
+    let answer =
+        client.ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == name))?;
+    answer.with_context(|| format!("{name}: no answer; is there such a parameter?"))
+}
+
+/// The whole list; what was lost on the way is asked for one by one.
+fn list(client: &mut Client) -> Result<Vec<Param>> {
+    let (system, component) = client.target();
+    let request = Packet::new(21).u8(0, system).u8(1, component);
+    let mut values: BTreeMap<u16, Param> = BTreeMap::new();
+    let first = client.ask(&request, GAP, TRIES, value_of)?.context("no list of parameters comes")?;
+    let count = first.count.min(COUNT_MAX);
+    values.insert(first.index, first);
+    while values.len() < usize::from(count) {
+        match client.until(Instant::now() + GAP, value_of)? {
+            Some(value) => {
+                values.insert(value.index, value);
+            }
+            None => break,
+        }
+    }
+    for index in 0..count {
+        if values.contains_key(&index) {
+            continue;
+        }
+        let packet = Packet::new(20).u16(0, index).u8(2, system).u8(3, component);
+        let wanted = |frame: &Frame<'_>| value_of(frame).filter(|value| value.index == index);
+        let value = client.ask(&packet, ANSWER, TRIES, wanted)?;
+        values.insert(index, value.with_context(|| format!("parameter {index} of {count}: no answer"))?);
+    }
+    Ok(values.into_values().collect())
+}
