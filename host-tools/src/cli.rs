@@ -46,12 +46,14 @@ pub enum Command {
     Sim(Sim),
     /// The same with the real Cortex-M4 firmware image, in QEMU
     Emulate(Emulate),
-    /// Turn logs into files for other tools: tlog, CSV, JSON lines
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines, line protocol, Parquet, the thesis's tables
     Decode(Decode),
     /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
     /// Check everything that can be checked about a log or a card
     Verify(Verify),
+    /// Write a page about a flight: plots, map, findings, usage, trend; one HTML file, no network
+    Report(Report),
     /// Write one log file from a recording, without a card's file system
     Pack(Pack),
     /// Show it: a recorded flight is recorded, decoded and summed up
@@ -62,6 +64,7 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --gs gs.bin
   hums sim --input flight.tlog --sd card.img --json --line-rate 921600
   hums sim --input udpin:0.0.0.0:14550 --sd card.img --gs udpout:127.0.0.1:14551
+  hums sim --input flight.tlog --sd card.img --gs udpin:127.0.0.1:14551 --speed real
   hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
   hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
 
@@ -76,9 +79,12 @@ pub struct Run {
     /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
     #[arg(long, value_name = "IMAGE")]
     pub sd: PathBuf,
-    /// Where the bytes for the ground station go
+    /// Where the bytes for the ground station go; where somebody is there (udp, tcp, serial), its own are heard too
     #[arg(long, value_name = "SINK")]
     pub gs: Option<Endpoint>,
+    /// What the ground station sends, with the times that it has in this file
+    #[arg(long, value_name = "SRC")]
+    pub gs_input: Option<Endpoint>,
     /// Parameters to start with: a file of `NAME VALUE` lines
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
@@ -177,9 +183,12 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode card.img -o out --format tlog,csv,jsonl
   hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
   hums decode 00042.hum -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
+  hums decode cards/ -o fleet --format parquet
+  hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8086/write?db=hums
 
-Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl), unless it is a
-directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl and, for tables, OUT/LOG/ATTITUDE.csv and so on.
+Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
+it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
+OUT/LOG/ATTITUDE.csv, OUT/LOG/thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
 `-o -` is standard output.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
@@ -216,6 +225,12 @@ pub enum Format {
     Csv,
     /// An object a line, in order of time
     Jsonl,
+    /// Line protocol, with the reference system's measurement HUMS
+    Influx,
+    /// Typed columns by vehicle, date and session, for `DuckDB`, Spark, pandas
+    Parquet,
+    /// The reference system's four tables, a row a second
+    Thesis,
 }
 
 const INFO_EXAMPLES: &str = "Examples:
@@ -251,6 +266,29 @@ pub struct Verify {
     /// Print the result as one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+const REPORT_EXAMPLES: &str = "Examples:
+  hums report card.img -o report.html
+  hums report card.img -o pages/
+  hums report card.img --session 00042 -o report.html
+
+With a directory for -o each session gets a page, named after it; otherwise the newest gets one. The page compares with
+the sessions before on the same card.";
+
+/// `hums report`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = REPORT_EXAMPLES)]
+pub struct Report {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// The page to write, or a directory for a page a session
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// Only this session, by the name that `hums info` gives
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
 }
 
 const PACK_EXAMPLES: &str = "Examples:

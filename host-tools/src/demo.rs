@@ -83,6 +83,7 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
     let run = cli::Run {
         input: flight.clone(),
         sd: card.to_owned(),
+        gs_input: None,
         gs: Some(Endpoint::File(gs.to_owned())),
         params: None,
         speed: None,

@@ -4,6 +4,7 @@ pub mod card;
 pub mod cli;
 pub mod decode;
 pub mod demo;
+pub mod duplex;
 pub mod endpoint;
 pub mod info;
 pub mod interrupt;
@@ -12,6 +13,7 @@ pub mod mavlink;
 pub mod outcome;
 pub mod output;
 pub mod pack;
+pub mod report;
 pub mod rng;
 pub mod run;
 pub mod sink;
@@ -47,6 +49,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Emulate(args) => run::emulate::run(args),
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
+        Command::Report(args) => report::run(args),
         Command::Pack(args) => pack::run(args),
         Command::Demo(args) => demo::run(args),
     }

@@ -1,85 +1,89 @@
-//! Where the bytes of the ground-station UART go.
+//! Where the bytes of the ground-station UART go, and, where somebody is there to answer, where its own come from.
 
 use std::fs::File;
-use std::io::{self, BufWriter, ErrorKind, Write};
-use std::net::{SocketAddr, TcpStream, UdpSocket};
+use std::io::{self, BufWriter, Write};
+use std::sync::mpsc::{Receiver, TryRecvError, TrySendError, sync_channel};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
 
+use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::output::Stdout;
 
-const CONNECT: Duration = Duration::from_secs(10);
-const WRITE: Duration = Duration::from_secs(5);
-/// A datagram that fits the smallest path without being cut up.
-const DATAGRAM_BYTES_MAX: usize = 1200;
+/// How long the reader waits before it looks whether anybody still listens.
+const SILENCE: Duration = Duration::from_millis(50);
+/// Pieces that may wait for the pipeline; more are lost, as at a UART.
+const PIECES: usize = 64;
+/// The largest UDP datagram.
+const BUFFER_BYTES: usize = 65_536;
+
+/// The other side of the ground station's port.
+pub struct Ground {
+    /// What goes to it.
+    pub writer: Box<dyn Write + Send>,
+    /// What comes from it.
+    pub heard: Heard,
+}
+
+/// What the ground station sends.
+pub struct Heard(Option<Receiver<Vec<u8>>>);
+
+impl Heard {
+    /// Nobody is there.
+    pub const fn nobody() -> Self {
+        Self(None)
+    }
+
+    /// The bytes that came since the last call, or none.
+    pub fn take(&mut self) -> Option<Vec<u8>> {
+        match self.0.as_ref()?.try_recv() {
+            Ok(bytes) => Some(bytes),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => {
+                self.0 = None;
+                None
+            }
+        }
+    }
+}
 
 /// Opens SINK.
-pub fn open(endpoint: &Endpoint) -> Result<Box<dyn Write + Send>> {
+pub fn open(endpoint: &Endpoint) -> Result<Ground> {
     let context = || format!("{endpoint}: cannot be opened for writing");
-    Ok(match endpoint {
+    let writer: Box<dyn Write + Send> = match endpoint {
         Endpoint::File(path) => Box::new(BufWriter::new(File::create(path).with_context(context)?)),
         Endpoint::Standard => Box::new(BufWriter::new(Stdout::new())),
-        Endpoint::UdpOut(address) => {
-            let to = address.resolve()?;
-            let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
-            Box::new(Datagrams {
-                socket: UdpSocket::bind(any).with_context(context)?,
-                peer: Some(to),
-                answers: false,
-            })
+        _ => {
+            let duplex = duplex::open(endpoint, SILENCE)?;
+            return Ok(Ground { writer: duplex.writer, heard: listen(duplex.reader) });
         }
-        Endpoint::UdpIn(address) => {
-            let socket = UdpSocket::bind(address.resolve()?).with_context(context)?;
-            socket.set_nonblocking(true).with_context(context)?;
-            Box::new(Datagrams { socket, peer: None, answers: true })
-        }
-        Endpoint::Tcp(address) => {
-            let stream = TcpStream::connect_timeout(&address.resolve()?, CONNECT).with_context(context)?;
-            stream.set_write_timeout(Some(WRITE)).with_context(context)?;
-            stream.set_nodelay(true).with_context(context)?;
-            Box::new(stream)
-        }
-        Endpoint::Serial { device, baud } => {
-            Box::new(serialport::new(device, *baud).timeout(WRITE).open().with_context(context)?)
-        }
-    })
+    };
+    Ok(Ground { writer, heard: Heard::nobody() })
 }
 
-/// UDP: to a fixed peer, or (`udpin`) to whoever spoke last; before anyone did, bytes go nowhere, as on a UART that
-/// nothing is plugged into.
-struct Datagrams {
-    socket: UdpSocket,
-    peer: Option<SocketAddr>,
-    answers: bool,
+/// A thread reads, so that the pipeline never waits for a ground station.
+fn listen(mut port: Box<dyn Port>) -> Heard {
+    let (sender, receiver) = sync_channel(PIECES);
+    std::thread::spawn(move || {
+        let mut buffer = vec![0; BUFFER_BYTES];
+        loop {
+            let piece = match port.read(&mut buffer) {
+                Ok(0) => break,
+                Ok(count) => buffer.get(..count).unwrap_or_default().to_vec(),
+                Err(error) if duplex::is_silence(&error) => continue,
+                Err(_) => break,
+            };
+            // A piece that finds no room is lost.
+            if let Err(TrySendError::Disconnected(_)) = sender.try_send(piece) {
+                break;
+            }
+        }
+    });
+    Heard(Some(receiver))
 }
 
-impl Write for Datagrams {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.answers {
-            let mut scrap = [0; 16];
-            while let Ok((_, from)) = self.socket.recv_from(&mut scrap) {
-                self.peer = Some(from);
-            }
-        }
-        if let Some(peer) = self.peer {
-            for datagram in bytes.chunks(DATAGRAM_BYTES_MAX) {
-                match self.socket.send_to(datagram, peer) {
-                    // Nobody listens (yet), or the line is full: UDP loses, that is its nature.
-                    Err(error)
-                        if !matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::WouldBlock) =>
-                    {
-                        return Err(error);
-                    }
-                    _ => {}
-                }
-            }
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
+/// A writer that nobody reads.
+pub fn nowhere() -> Box<dyn Write + Send> {
+    Box::new(io::sink())
 }

@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod card_trouble;
+mod companion;
 mod downlink;
 mod hostile_input;
 mod noise;

@@ -39,3 +39,9 @@ pub fn manifest(files: &[PathBuf]) -> Manifest {
 pub fn ground_station(stream: &Path) -> Value {
     serde_json::from_str(&ask("gs_stream.py", &[stream.to_owned()])).expect("gs_stream.py prints JSON")
 }
+
+/// Talks to the box at this UDP port as a ground station does: see `tests/oracle/companion.py`.
+pub fn companion(port: u16) -> Value {
+    let said = ask("companion.py", &[PathBuf::from(port.to_string())]);
+    serde_json::from_str(&said).expect("companion.py prints JSON")
+}

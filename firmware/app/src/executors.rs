@@ -7,7 +7,7 @@
 //! | 2 | the clock's interrupt | wakes tasks |
 //! | 3 | reception | the ring holds 44 ms |
 //! | 5 | monitor | the frame queue holds 80 ms |
-//! | 7 | downlink | an alert has 50 ms |
+//! | 7 | downlink | an alert has 50 ms; with it requests and uplink, which only move bytes between ports and queues |
 //! | 9 | storage | the sector queue holds 2.5 s; its library waits for the card with the processor |
 
 use cortex_m::peripheral::SCB;
@@ -34,6 +34,8 @@ pub(crate) struct Spawners {
 pub(crate) fn start() -> Spawners {
     interrupt::USART1.set_priority(Priority::P1);
     interrupt::DMA2_STREAM2.set_priority(Priority::P1);
+    interrupt::DMA2_STREAM7.set_priority(Priority::P1);
+    interrupt::DMA1_STREAM5.set_priority(Priority::P1);
     interrupt::DMA1_STREAM6.set_priority(Priority::P1);
     interrupt::TIM2.set_priority(Priority::P2);
     interrupt::CAN1_TX.set_priority(Priority::P3);

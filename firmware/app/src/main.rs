@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! AutopilotRx -> reception -> monitor -> storage -> card
-//!                                    \-> downlink -> GsTx
+//!        GsRx -> uplink    -/       \\-> downlink -> GsTx
+//!                                     \-> requests -> AutopilotTx
 //! ```
 //! Everything is allocated here and once: queues, the codec, the tasks. What the tasks do is in `hums_onboard`, where
 //! it is tested on a PC; what the machine does is in `boards`.
@@ -22,8 +23,8 @@ use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::params::Params;
-use hums_onboard::Monitoring;
 use hums_onboard::queues::{Ends, Queues};
+use hums_onboard::{Handover, Keeper, Monitoring};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use boards::board;
@@ -35,6 +36,8 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
+static KEEPER: StaticCell<Keeper<'static, board::StoreFlash>> = StaticCell::new();
+static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
 /// What a second spawning of a task would be told.
 const ONCE: &str = "each task is spawned once";
@@ -51,7 +54,8 @@ fn main() -> ! {
         defmt::error!("before this start: {}", defmt::Display2Format(fault));
     }
 
-    let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out } = QUEUES.take().split();
+    let queues = QUEUES.take().split();
+    let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;
     let identity = Boot {
         version: env!("CARGO_PKG_VERSION"),
         git: env!("HUMS_GIT"),
@@ -61,16 +65,29 @@ fn main() -> ! {
         uid: parts.boot.id,
         boots,
     };
+    let monitor = MONITOR.take();
+    let (items_in, items_out) = tasks::MAILBOX.split();
+    let keeper = KEEPER.init_with(|| Keeper::mount(parts.store, items_out, &tasks::STORE_STATUS));
+    if !parts.boot.cause.may_be_in_flight() {
+        keeper.turn_ahead();
+    }
+    keeper.load(monitor);
+    let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor.params()));
     let monitoring = MONITORING.init_with(|| {
-        Monitoring::new(MONITOR.take(), WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+        Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
     });
 
     let on = executors::start();
-    on.reception.spawn(tasks::reception::run(parts.autopilot, frames_in).expect(ONCE));
-    let ends = monitor::Ends { frames: frames_out, sectors: sectors_in, gs: gs_in };
-    on.monitor.spawn(monitor::run(monitoring, ends, fault, parts.watchdog, parts.led).expect(ONCE));
-    on.downlink.spawn(tasks::downlink::run(parts.gs, gs_out).expect(ONCE));
-    on.storage.spawn(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out).expect(ONCE));
+    let (autopilot_rx, autopilot_tx) = parts.autopilot;
+    let (gs_rx, gs_tx) = parts.gs;
+    on.reception.spawn(tasks::reception::run(autopilot_rx, frames_in).expect(ONCE));
+    let ends =
+        monitor::Ends { frames: frames_out, uplink: queues.uplink_out, sectors: sectors_in, gs: gs_in };
+    on.monitor.spawn(monitor::run(monitoring, ends, handover, fault, parts.watchdog, parts.led).expect(ONCE));
+    on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
+    on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
+    on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
+    on.storage.spawn(tasks::storage::run(parts.card, parts.boot.entropy, sectors_out, keeper).expect(ONCE));
     let mut idle = parts.idle;
     idle.run()
 }

@@ -19,6 +19,19 @@ pub(crate) const LOOKAHEAD: usize = 4;
 /// Bytes that end a stream at most: enough to name one number within the interval, as `range >= 2^16`.
 pub(crate) const FLUSH_MAX: usize = 2;
 
+/// The range with which the interval's top byte is settled, if it is: cut where the interval got too small without
+/// that.
+#[inline]
+const fn cut(low: u32, range: u32) -> Option<u32> {
+    if (low ^ low.wrapping_add(range)) < TOP {
+        Some(range)
+    } else if range < BOTTOM {
+        Some(low.wrapping_neg() & (BOTTOM - 1))
+    } else {
+        None
+    }
+}
+
 /// Where the encoder's bytes go for one entry.
 pub(crate) struct Scratch<const N: usize> {
     bytes: [u8; N],
@@ -68,13 +81,10 @@ impl Encoder {
         let part = self.range >> bits;
         self.low = self.low.wrapping_add(part.wrapping_mul(start));
         self.range = part.wrapping_mul(size);
-        while (self.low ^ self.low.wrapping_add(self.range)) < TOP || self.range < BOTTOM {
-            if (self.low ^ self.low.wrapping_add(self.range)) >= TOP {
-                self.range = self.low.wrapping_neg() & (BOTTOM - 1);
-            }
+        while let Some(range) = cut(self.low, self.range) {
             out.push((self.low >> 24) as u8);
             self.low <<= 8;
-            self.range <<= 8;
+            self.range = range << 8;
         }
     }
 
@@ -129,7 +139,7 @@ pub(crate) struct Writing<'a, const N: usize> {
 impl<const N: usize> Coder for Writing<'_, N> {
     const WRITES: bool = true;
 
-    #[inline]
+    #[inline(never)]
     fn symbol(&mut self, cdf: &mut Cdf, symbol: usize) -> usize {
         let (start, size) = cdf.part_of(symbol);
         self.encoder.put(start, size, PROBABILITY_BITS, self.out);
@@ -227,13 +237,10 @@ impl Decoder {
     pub(crate) fn take(&mut self, start: u32, size: u32, input: &[u8]) {
         self.low = self.low.wrapping_add(self.range.wrapping_mul(start));
         self.range = self.range.wrapping_mul(size);
-        while (self.low ^ self.low.wrapping_add(self.range)) < TOP || self.range < BOTTOM {
-            if (self.low ^ self.low.wrapping_add(self.range)) >= TOP {
-                self.range = self.low.wrapping_neg() & (BOTTOM - 1);
-            }
+        while let Some(range) = cut(self.low, self.range) {
             self.code = self.code << 8 | self.byte(input);
             self.low <<= 8;
-            self.range <<= 8;
+            self.range = range << 8;
         }
     }
 

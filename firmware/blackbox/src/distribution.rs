@@ -111,7 +111,7 @@ impl Cdf {
     }
 
     /// Moves towards a symbol (modulo 16).
-    #[inline]
+    #[inline(always)]
     pub(crate) fn adapt(&mut self, symbol: usize) {
         if self.0[USES] < USES_MAX {
             self.adapt_young(symbol);
@@ -120,7 +120,7 @@ impl Cdf {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn step(&mut self, gains: &[u32; SYMBOLS / 2], speed: u32) {
         let mask = u32::from(u16::MAX >> speed) * 0x0001_0001;
         for (pair, gain) in self.0.as_chunks_mut::<2>().0.iter_mut().zip(gains) {
@@ -172,7 +172,7 @@ impl Cell {
         self.0 as u32 >> 4
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn adapt(&mut self, bit: bool) {
         let uses = self.uses();
         let rate = i32::from(RATES[uses as usize]);

@@ -187,6 +187,17 @@ params! {
     Cmp8Flights "CMP8_FLIGHTS" "" 0.0 0.0 1_000_000.0 "limit of flights; 0: none";
     Cmp8Cycles "CMP8_CYCLES" "" 0.0 0.0 100_000.0 "limit of full battery discharges; 0: none";
     Cmp8MotorHours "CMP8_MOT_HOURS" "h" 0.0 0.0 100_000.0 "limit of hours that the motor turned; 0: none";
+    GsPath "GS_PATH" "" 1.0 0.0 2.0 "0: no summary, 1: a radio at the GS port, 2: through the autopilot";
+    GsBaud "GS_BAUD" "baud" 57_600.0 9_600.0 921_600.0 "what SiK radios come with";
+    GsPass "GS_PASS" "" 0.0 0.0 1.0 "1: what is not for us passes between ground station and autopilot";
+    GsSign "GS_SIGN" "" 0.0 0.0 2.0 "1: our frames are signed, 2: and unsigned settings and commands refused";
+    ApBaud "AP_BAUD" "baud" 921_600.0 9_600.0 921_600.0 "PX4 TELEM2, ArduPilot SERIAL2 for companions";
+    ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "what we send to the autopilot, answers it carries on included";
+    ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "1: ask the autopilot for the messages that the checks need";
+    ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot";
+    RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED: 0 from power-on, 1 by arming";
+    RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before";
+    RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)";
 }
 
 impl Default for Params {

@@ -2,12 +2,9 @@
 
 use core::fmt::{self, Write as _};
 
-use hums_core::time::Instant;
-use mavlink::dialects::ardupilotmega::{
-    HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavSeverity, MavState, MavType, NAMED_VALUE_FLOAT_DATA,
-    STATUSTEXT_DATA,
-};
-use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData};
+use crate::crc;
+use crate::frame::{CHECKSUM, HEADER_V2, START_V2};
+use crate::packet::Packet;
 
 /// `MAV_COMP_ID_ONBOARD_COMPUTER`
 pub const COMPONENT: u8 = 191;
@@ -17,8 +14,6 @@ pub const GS_FRAME_BYTES_MAX: usize = 280;
 const SYSTEM_DEFAULT: u8 = 1;
 /// Bytes of text in one STATUSTEXT.
 pub const TEXT_BYTES_MAX: usize = 50;
-/// Bytes of the name in a `NAMED_VALUE_FLOAT`.
-const NAME_BYTES: usize = 10;
 
 /// Makes our frames and counts them.
 #[derive(Clone, Copy, Debug)]
@@ -44,95 +39,50 @@ impl Encoder {
         self.system = system;
     }
 
+    /// The system id that our frames carry.
+    pub const fn system(&self) -> u8 {
+        self.system
+    }
+
     /// The sequence number of the next frame.
     pub const fn set_sequence(&mut self, sequence: u8) {
         self.sequence = sequence;
     }
 
-    /// Our heartbeat; `state` is a `MAV_STATE`: 3 standby, 4 active, 5 critical, 6 emergency.
-    pub fn heartbeat<'a>(&mut self, out: &'a mut [u8; GS_FRAME_BYTES_MAX], state: u8) -> &'a [u8] {
-        let system_status = match state {
-            3 => MavState::MAV_STATE_STANDBY,
-            5 => MavState::MAV_STATE_CRITICAL,
-            6 => MavState::MAV_STATE_EMERGENCY,
-            _ => MavState::MAV_STATE_ACTIVE,
-        };
-        let data = HEARTBEAT_DATA {
-            custom_mode: 0,
-            mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
-            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
-            base_mode: MavModeFlag::empty(),
-            system_status,
-            mavlink_version: 3,
-        };
-        self.encode(out, &data)
+    /// The bytes of the frame that carries `packet`.
+    pub fn frame_len(&self, packet: &Packet) -> usize {
+        HEADER_V2 + packet.payload().len() + CHECKSUM
     }
 
-    /// A text for the pilot; longer than [`TEXT_BYTES_MAX`] bytes is cut.
-    pub fn status_text<'a>(
-        &mut self,
-        out: &'a mut [u8; GS_FRAME_BYTES_MAX],
-        severity: Severity,
-        text: &str,
-    ) -> &'a [u8] {
-        let mut data = STATUSTEXT_DATA { severity: severity.into(), ..STATUSTEXT_DATA::DEFAULT };
-        let len = text.len().min(TEXT_BYTES_MAX);
-        let mut bytes = [0; TEXT_BYTES_MAX];
-        bytes[..len].copy_from_slice(&text.as_bytes()[..len]);
-        data.text = bytes.into();
-        self.encode(out, &data)
-    }
-
-    /// A value that ground stations plot by its name (at most 10 bytes).
-    pub fn named_value<'a>(
-        &mut self,
-        out: &'a mut [u8; GS_FRAME_BYTES_MAX],
-        now: Instant,
-        name: &str,
-        value: f32,
-    ) -> &'a [u8] {
-        let len = name.len().min(NAME_BYTES);
-        let mut bytes = [0; NAME_BYTES];
-        bytes[..len].copy_from_slice(&name.as_bytes()[..len]);
-        let data = NAMED_VALUE_FLOAT_DATA { time_boot_ms: now.as_millis() as u32, value, name: bytes.into() };
-        self.encode(out, &data)
-    }
-
-    fn encode<'a>(&mut self, out: &'a mut [u8; GS_FRAME_BYTES_MAX], data: &impl MessageData) -> &'a [u8] {
-        let header =
-            MavHeader { system_id: u32::from(self.system), component_id: COMPONENT, sequence: self.sequence };
+    /// The frame that carries `packet`; empty for a message that no definition of ours knows.
+    pub fn frame<'a>(&mut self, out: &'a mut [u8; GS_FRAME_BYTES_MAX], packet: &Packet) -> &'a [u8] {
+        let Some(message) = hums_dialect::message(packet.id()) else { return &[] };
+        let payload = packet.payload();
+        let [id0, id1, id2, _] = packet.id().to_le_bytes();
+        let len = payload.len() as u8;
+        let header = [START_V2, len, 0, 0, self.sequence, self.system, COMPONENT, id0, id1, id2];
         self.sequence = self.sequence.wrapping_add(1);
-        let mut raw = MAVLinkV2MessageRaw::new();
-        raw.serialize_message_data(header, data);
-        let bytes = raw.raw_bytes();
-        let len = bytes.len().min(out.len());
-        out[..len].copy_from_slice(&bytes[..len]);
-        &out[..len]
+        let end = HEADER_V2 + payload.len();
+        out[..HEADER_V2].copy_from_slice(&header);
+        out[HEADER_V2..end].copy_from_slice(payload);
+        let sum = crc::step(crc::update(crc::START, &out[1..end]), message.crc_extra);
+        out[end..end + CHECKSUM].copy_from_slice(&sum.to_le_bytes());
+        &out[..end + CHECKSUM]
     }
 }
 
 /// How urgent a text is (`MAV_SEVERITY`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Severity {
     /// Act now.
-    Critical,
+    Critical = 2,
     /// Act soon.
-    Warning,
+    Warning = 4,
     /// Worth knowing.
-    Notice,
+    Notice = 5,
     /// All is well again.
-    Info,
-}
-
-impl From<Severity> for MavSeverity {
-    fn from(severity: Severity) -> Self {
-        match severity {
-            Severity::Critical => Self::MAV_SEVERITY_CRITICAL,
-            Severity::Warning => Self::MAV_SEVERITY_WARNING,
-            Severity::Notice => Self::MAV_SEVERITY_NOTICE,
-            Severity::Info => Self::MAV_SEVERITY_INFO,
-        }
-    }
+    Info = 6,
 }
 
 /// A text that is put together; what does not fit is cut.
@@ -167,6 +117,7 @@ impl fmt::Write for Text {
 mod tests {
     use super::*;
     use crate::frame::{Check, Frame};
+    use crate::messages;
 
     #[test]
     fn our_frames_check_and_count() {
@@ -174,19 +125,14 @@ mod tests {
         encoder.set_system(7);
         let mut buffer = [0; GS_FRAME_BYTES_MAX];
         for sequence in 0..3 {
-            let frame = Frame::parse(encoder.heartbeat(&mut buffer, 4)).expect("a frame");
+            let packet = messages::heartbeat(4);
+            let frame = Frame::parse(encoder.frame(&mut buffer, &packet)).expect("a frame");
+            assert_eq!(frame.bytes().len(), encoder.frame_len(&packet));
             assert_eq!(frame.check(), Check::Verified);
             assert_eq!((frame.id(), frame.system(), frame.component()), (0, 7, COMPONENT));
             assert_eq!(frame.sequence(), sequence);
         }
-        let long = "x".repeat(80);
-        let frame =
-            Frame::parse(encoder.status_text(&mut buffer, Severity::Warning, &long)).expect("a frame");
-        assert_eq!((frame.check(), frame.id()), (Check::Verified, 253));
-        assert_eq!(frame.payload(), [&[4][..], &[b'x'; TEXT_BYTES_MAX]].concat());
-        let frame =
-            Frame::parse(encoder.named_value(&mut buffer, Instant::ZERO, "HUMS", 1.0)).expect("a frame");
-        assert_eq!((frame.check(), frame.id()), (Check::Verified, 251));
+        assert_eq!(encoder.frame(&mut buffer, &Packet::new(0xff_fffe)), [0; 0], "no such message");
     }
 
     #[test]

@@ -1,11 +1,16 @@
 //! The MAVLink edge: framer, decoding to observations, encoding of what we send.
 #![cfg_attr(not(test), no_std)]
 
+pub mod asking;
 mod crc;
 pub mod encode;
 pub mod frame;
 pub mod framer;
+pub mod messages;
 mod observe;
+pub mod outlet;
+pub mod packet;
+pub mod request;
 mod seen;
 pub mod sequence;
 pub mod summary;

@@ -103,7 +103,7 @@ mod tests {
             encoder.set_system(1);
             encoder.set_sequence(number);
             let mut buffer = [0; GS_FRAME_BYTES_MAX];
-            let bytes = encoder.heartbeat(&mut buffer, 4);
+            let bytes = encoder.frame(&mut buffer, &crate::messages::heartbeat(4));
             let frame = Frame::parse(bytes).expect("a frame of ours");
             lost += u32::from(sequences.frame(Instant::from_millis(from_ms + index * 10), &frame));
         }

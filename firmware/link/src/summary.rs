@@ -1,23 +1,29 @@
 //! The summary stream to the ground station: the vehicle's own frames that matter to a pilot, unaltered and less often,
-//! and what the monitor has to say: heartbeat, findings as `STATUSTEXT`, levels and flight time as `NAMED_VALUE_FLOAT`.
+//! and what the monitor has to say: heartbeat, findings as `STATUSTEXT`, levels and usage as `NAMED_VALUE_FLOAT`, and
+//! all levels together in one `NAMED_VALUE_INT` ([`state`]).
 //!
-//! A byte budget holds in every window of one second, whatever comes in: [`Budget`] remembers what was sent lately and
-//! lets nothing pass that would exceed it. Forwarded frames may use four fifths of it, so that a finding never finds the
-//! link full; findings that must wait do so in order, the most urgent first.
+//! All of it goes through an [`Outlet`], which keeps the byte budget and lets findings overtake. What repeats takes
+//! turns: a message may go when its interval is nearly over, and how long it has waited, in intervals, is its score.
+//! Where the budget does not carry them all, a frame goes only if the one with the highest score would still find room
+//! after it; so each becomes the highest in time, and nothing starves. One that has waited [`STARVED`] times its interval
+//! goes like a heartbeat.
 
 use hums_core::Monitor;
+use hums_core::health::Subsystem;
 use hums_core::health::{self, Finding, Level};
 use hums_core::observation::Source;
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 
-use crate::encode::{Encoder, GS_FRAME_BYTES_MAX, Severity, Text};
+use crate::encode::{Severity, Text};
 use crate::frame::Frame;
+use crate::messages;
+use crate::outlet::{Class, Outlet};
 
-/// Forwarded messages: id and the least time between two, in milliseconds (0: every one).
+/// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
-    (0, 500),        // HEARTBEAT: each of a sender's one a second, early ones too
+    (0, 1_000),      // HEARTBEAT
     (1, 2_000),      // SYS_STATUS
     (2, 5_000),      // SYSTEM_TIME
     (24, 1_000),     // GPS_RAW_INT
@@ -46,78 +52,93 @@ const FORWARDED: &[(u32, u16)] = &[
     (11_031, 1_000), // ESC_TELEMETRY_5_TO_8
     (11_032, 1_000), // ESC_TELEMETRY_9_TO_12
 ];
+/// Our values, which take turns with what is forwarded.
+const VALUES: usize = FORWARDED.len();
+/// All levels together.
+const STATE: usize = VALUES + 1;
+const TURNS: usize = STATE + 1;
+const VALUES_MS: u16 = 700;
+const STATE_MS: u16 = 2_000;
+/// `NAMED_VALUE_FLOAT` and `_INT` with their header.
+const VALUE_BYTES: usize = 30;
 
 /// Findings that wait for their turn.
 const WAITING_MAX: usize = 16;
 const HEARTBEAT: Span = Span::from_secs(1);
-const VALUES: Span = Span::from_secs(2);
-/// Of the budget, what forwarded frames may use, in fifths.
-const FORWARDED_FIFTHS: u32 = 4;
+/// Intervals after which a message goes like a heartbeat.
+const STARVED: u32 = 4;
+/// A message that did not come for so many intervals, and [`GONE_MS`], is not waited for.
+const GONE: u32 = 3;
+const GONE_MS: u32 = 3_000;
 
-/// What was sent in the last second, in slots.
+/// When a message has its turn.
 #[derive(Clone, Copy, Debug)]
-struct Budget {
-    bytes_per_s: u32,
-    slots: [u16; Self::SLOTS],
-    newest: u64,
+struct Turn {
+    /// Milliseconds since power-on, modulo 2^32, as `seen_ms`.
+    due_ms: u32,
+    seen_ms: u32,
+    bytes: u16,
+    known: bool,
 }
 
-impl Budget {
-    /// One more than a second has, so that the oldest slot, of which a part is still within the second, counts whole.
-    const SLOTS: usize = 21;
-    const SLOT_MICROS: u64 = 50_000;
-
-    const fn new(bytes_per_s: u32) -> Self {
-        Self { bytes_per_s, slots: [0; Self::SLOTS], newest: 0 }
+impl Turn {
+    /// How long it has waited, in 16ths of its interval; at least 1. `None` before its turn.
+    fn score(&self, now_ms: u32, interval_ms: u32) -> Option<u32> {
+        // Streams jitter: what comes a quarter early is not told to come again.
+        let early = interval_ms / 4;
+        let waited = now_ms.wrapping_add(early).wrapping_sub(self.due_ms);
+        // The other half of the numbers is the future.
+        (waited < u32::MAX / 2).then(|| waited.saturating_mul(16) / interval_ms.max(1) + 1)
     }
 
-    fn advance(&mut self, now: Instant) {
-        let slot = now.as_micros() / Self::SLOT_MICROS;
-        for passed in 0..slot.saturating_sub(self.newest).min(Self::SLOTS as u64) {
-            self.slots[((slot - passed) % Self::SLOTS as u64) as usize] = 0;
-        }
-        self.newest = self.newest.max(slot);
+    fn is_coming(&self, now_ms: u32, interval_ms: u32) -> bool {
+        self.known && now_ms.wrapping_sub(self.seen_ms) <= (interval_ms * GONE).max(GONE_MS)
     }
 
-    /// Takes `bytes` from `share` fifths of the budget; `false` where they would exceed it.
-    fn take(&mut self, now: Instant, bytes: usize, share: u32) -> bool {
-        self.advance(now);
-        let sent: u32 = self.slots.iter().map(|bytes| u32::from(*bytes)).sum();
-        let fits = sent + bytes as u32 <= self.bytes_per_s * share / 5;
-        if fits {
-            let slot = &mut self.slots[(self.newest % Self::SLOTS as u64) as usize];
-            *slot = slot.saturating_add(bytes as u16);
-        }
-        fits
+    /// Its turn was taken: the next one is an interval later, in step with the ones before where that is possible.
+    fn took(&mut self, now_ms: u32, interval_ms: u32) {
+        let late = now_ms.wrapping_sub(self.due_ms);
+        let in_step = late < interval_ms / 2 || late > u32::MAX - interval_ms / 2;
+        self.due_ms = if in_step { self.due_ms } else { now_ms }.wrapping_add(interval_ms);
     }
+}
+
+const fn interval_ms(index: usize) -> u32 {
+    (match index {
+        VALUES => VALUES_MS,
+        STATE => STATE_MS,
+        _ => FORWARDED[index].1,
+    }) as u32
 }
 
 /// The summary stream.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    encoder: Encoder,
-    budget: Budget,
+    /// The port's way out, which answers share with the stream.
+    pub outlet: Outlet,
+    /// Whether the vehicle's frames are forwarded: not where the autopilot itself carries the stream.
+    pub forwards: bool,
     vehicle: Option<Source>,
-    sent_at: [Option<Instant>; FORWARDED.len()],
+    turns: [Turn; TURNS],
+    next_value: usize,
     /// The most urgent first, then in order.
     waiting: heapless::Vec<Finding, WAITING_MAX>,
     dropped: u32,
     heartbeat_at: Option<Instant>,
-    values_at: Option<Instant>,
 }
 
 impl Summary {
     /// Before the first frame.
     pub fn new(params: &Params) -> Self {
         Self {
-            encoder: Encoder::new(),
-            budget: Budget::new(params.get(Param::GsBudget) as u32),
+            outlet: Outlet::new(params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32),
+            forwards: true,
             vehicle: None,
-            sent_at: [None; FORWARDED.len()],
+            turns: [Turn { due_ms: 0, seen_ms: 0, bytes: 0, known: false }; TURNS],
+            next_value: 0,
             waiting: heapless::Vec::new(),
             dropped: 0,
             heartbeat_at: None,
-            values_at: None,
         }
     }
 
@@ -127,16 +148,60 @@ impl Summary {
         let ours = |vehicle: Source| {
             vehicle.system == frame.system() && (frame.id() != 0 || vehicle.component == frame.component())
         };
-        if !self.vehicle.is_some_and(ours) {
+        if !self.forwards || !self.vehicle.is_some_and(ours) {
             return;
         }
         let Ok(index) = FORWARDED.binary_search_by_key(&frame.id(), |(id, _)| *id) else { return };
-        let interval = Span::from_millis(u64::from(FORWARDED[index].1));
-        let turn = self.sent_at[index].is_none_or(|sent_at| at.since(sent_at) >= interval);
-        if turn && self.budget.take(at, frame.bytes().len(), FORWARDED_FIFTHS) {
-            self.sent_at[index] = Some(at);
-            out(frame.bytes());
+        let bytes = frame.bytes();
+        if interval_ms(index) == 0 {
+            self.outlet.pass(at, Class::Event, bytes, out);
+            return;
         }
+        let now_ms = at.as_millis() as u32;
+        self.announce(index, now_ms, bytes.len());
+        if self.has_turn(index, at, bytes.len()) {
+            let class = if self.is_urgent(index, now_ms) { Class::Own } else { Class::Forward };
+            if self.outlet.pass(at, class, bytes, out) {
+                self.turns[index].took(now_ms, interval_ms(index));
+            }
+        }
+    }
+
+    /// It is there, or would be.
+    fn announce(&mut self, index: usize, now_ms: u32, bytes: usize) {
+        let turn = &mut self.turns[index];
+        if !turn.known {
+            // Its first turn is now.
+            turn.due_ms = now_ms;
+        }
+        *turn = Turn { seen_ms: now_ms, bytes: bytes as u16, known: true, ..*turn };
+    }
+
+    /// The vehicle's heartbeat is what makes it a vehicle on the ground station's map.
+    fn is_urgent(&self, index: usize, now_ms: u32) -> bool {
+        let score = self.turns[index].score(now_ms, interval_ms(index));
+        index == 0 || score.is_some_and(|score| score > 16 * STARVED)
+    }
+
+    /// Whether it is its turn, and the one that has waited longest would still find room after it.
+    fn has_turn(&mut self, index: usize, now: Instant, bytes: usize) -> bool {
+        let now_ms = now.as_millis() as u32;
+        let Some(score) = self.turns[index].score(now_ms, interval_ms(index)) else { return false };
+        if index == 0 {
+            return true;
+        }
+        let mut first = (score, 0);
+        for (other, turn) in self.turns.iter().enumerate().filter(|(other, _)| *other != index) {
+            let interval = interval_ms(other);
+            if let Some(other_score) = turn.score(now_ms, interval)
+                && other_score > first.0
+                && turn.is_coming(now_ms, interval)
+            {
+                first = (other_score, usize::from(turn.bytes));
+            }
+        }
+        let class = if self.is_urgent(index, now_ms) { Class::Own } else { Class::Forward };
+        self.outlet.fits_besides(now, class, bytes, first.1)
     }
 
     /// Tells a finding that a pilot should hear of, now or as soon as the budget allows.
@@ -156,17 +221,13 @@ impl Summary {
     }
 
     fn tell(&mut self, now: Instant, out: &mut impl FnMut(&[u8])) {
-        while let Some(finding) = self.waiting.first().copied() {
-            let mut buffer = [0; GS_FRAME_BYTES_MAX];
-            let severity = severity(&finding).unwrap_or(Severity::Notice);
-            let before = self.encoder;
-            let bytes = self.encoder.status_text(&mut buffer, severity, text(&finding).as_str());
-            if !self.budget.take(now, bytes.len(), 5) {
-                // Not sent: its sequence number is not used either.
-                self.encoder = before;
+        while let Some(finding) = self.waiting.first() {
+            let class = if finding.level == Level::Critical { Class::Critical } else { Class::Finding };
+            let severity = severity(finding).unwrap_or(Severity::Notice);
+            let packet = messages::status_text(severity, text(finding).as_str());
+            if !self.outlet.send(now, class, &packet, out) {
                 return;
             }
-            out(bytes);
             self.waiting.remove(0);
         }
     }
@@ -175,44 +236,33 @@ impl Summary {
     pub fn tick(&mut self, now: Instant, monitor: &Monitor, out: &mut impl FnMut(&[u8])) {
         if let Some(source) = monitor.vehicle().source {
             self.vehicle = Some(source);
-            self.encoder.set_system(source.system);
+            self.outlet.encoder.set_system(source.system);
         }
-        self.budget.bytes_per_s = monitor.params().get(Param::GsBudget) as u32;
+        let params = monitor.params();
+        self.outlet.set(params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32);
         self.tell(now, out);
-        let due = |at: Option<Instant>, every: Span| at.is_none_or(|at| now.since(at) >= every);
-        if due(self.heartbeat_at, HEARTBEAT) {
+        if self.heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
+            && self.outlet.send(now, Class::Own, &heartbeat(monitor), out)
+        {
             self.heartbeat_at = Some(now);
-            let state = match monitor.health().overall() {
-                Level::Critical => 5,
-                _ if monitor.vehicle().armed() => 4,
-                _ => 3,
+        }
+        let now_ms = now.as_millis() as u32;
+        for index in [STATE, VALUES] {
+            self.announce(index, now_ms, VALUE_BYTES);
+            if !self.has_turn(index, now, VALUE_BYTES) {
+                continue;
+            }
+            let packet = if index == STATE {
+                messages::named_int(now, "HUMS_STATE", state(monitor))
+            } else {
+                value(now, monitor, self.next_value)
             };
-            self.own(now, out, |encoder, buffer| encoder.heartbeat(buffer, state).len());
-        }
-        if due(self.values_at, VALUES) {
-            self.values_at = Some(now);
-            let level = f32::from(monitor.health().overall() as u8);
-            let flight_s = monitor.usage().value(UsageCounter::Flight).unwrap_or(0.0) as f32;
-            self.own(now, out, |encoder, buffer| encoder.named_value(buffer, now, "HUMS_LEVEL", level).len());
-            self.own(now, out, |encoder, buffer| {
-                encoder.named_value(buffer, now, "FLT_TIME_S", flight_s).len()
-            });
-        }
-    }
-
-    fn own(
-        &mut self,
-        now: Instant,
-        out: &mut impl FnMut(&[u8]),
-        make: impl FnOnce(&mut Encoder, &mut [u8; GS_FRAME_BYTES_MAX]) -> usize,
-    ) {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
-        let before = self.encoder;
-        let len = make(&mut self.encoder, &mut buffer);
-        if self.budget.take(now, len, 5) {
-            out(&buffer[..len]);
-        } else {
-            self.encoder = before;
+            if self.outlet.send(now, Class::Forward, &packet, out) {
+                self.turns[index].took(now_ms, interval_ms(index));
+                if index == VALUES {
+                    self.next_value = (self.next_value + 1) % VALUE_NAMES.len();
+                }
+            }
         }
     }
 
@@ -220,6 +270,66 @@ impl Summary {
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }
+}
+
+/// Our heartbeat as the vehicle is.
+pub fn heartbeat(monitor: &Monitor) -> crate::packet::Packet {
+    messages::heartbeat(match monitor.health().overall() {
+        Level::Critical => 5,
+        _ if monitor.vehicle().armed() => 4,
+        _ => 3,
+    })
+}
+
+/// The values that are told in turn: the level of all and of each subsystem (0 ok, 1 advisory, 2 warning, 3 critical,
+/// 4 stale), and what usage a pilot asks for. The overall level comes every other time.
+const VALUE_NAMES: [&str; 24] = [
+    "HUMS_LEVEL",
+    "L_POWER",
+    "HUMS_LEVEL",
+    "L_PROPULS",
+    "HUMS_LEVEL",
+    "L_ENGINE",
+    "HUMS_LEVEL",
+    "L_STRUCT",
+    "HUMS_LEVEL",
+    "L_NAVIG",
+    "HUMS_LEVEL",
+    "L_LINK",
+    "HUMS_LEVEL",
+    "L_COMPUT",
+    "HUMS_LEVEL",
+    "L_ATTITU",
+    "HUMS_LEVEL",
+    "L_RECORD",
+    "HUMS_LEVEL",
+    "FLT_TIME_S",
+    "HUMS_LEVEL",
+    "FLIGHTS",
+    "HUMS_LEVEL",
+    "DIST_M",
+];
+
+fn value(now: Instant, monitor: &Monitor, index: usize) -> crate::packet::Packet {
+    let usage = |counter| monitor.usage().value(counter).unwrap_or(0.0) as f32;
+    let value = match index {
+        19 => usage(UsageCounter::Flight),
+        21 => usage(UsageCounter::Flights),
+        23 => usage(UsageCounter::Distance),
+        _ if index % 2 == 1 => match Subsystem::ALL.get(index / 2) {
+            Some(subsystem) => f32::from(monitor.health().subsystem(*subsystem) as u8),
+            None => 0.0,
+        },
+        _ => f32::from(monitor.health().overall() as u8),
+    };
+    messages::named_float(now, VALUE_NAMES.get(index).copied().unwrap_or_default(), value)
+}
+
+/// `HUMS_STATE`: the levels of all subsystems in one number, three bits each, in the order of [`Subsystem::ALL`] from
+/// the lowest bits up.
+pub fn state(monitor: &Monitor) -> i32 {
+    let levels = Subsystem::ALL.into_iter().map(|subsystem| monitor.health().subsystem(subsystem) as i32);
+    levels.enumerate().fold(0, |sum, (index, level)| sum | level << (3 * index))
 }
 
 /// How a finding is told, or `None` where a pilot need not hear of it.
@@ -261,7 +371,10 @@ pub fn text(finding: &Finding) -> Text {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hums_core::health::Subsystem;
+    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::packet::Packet;
+
+    const VEHICLE: Source = Source { system: 1, component: 1 };
 
     fn finding(level: Level) -> Finding {
         Finding {
@@ -276,6 +389,72 @@ mod tests {
             unit: "%",
         }
     }
+
+    fn params(budget: f32) -> Params {
+        let mut params = Params::defaults();
+        params.set("GS_BUDGET", budget).expect("in range");
+        params
+    }
+
+    /// A frame of the vehicle, `bytes` long.
+    fn frame(id: u32, bytes: usize) -> Vec<u8> {
+        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let packet = Packet::new(id).bytes(0, &vec![1; bytes - 12]);
+        let mut frame = Encoder::new().frame(&mut buffer, &packet).to_vec();
+        frame[6] = 1;
+        frame
+    }
+
+    /// What a summary sends when each of `streams` (id, bytes, every so many ms) comes with jitter.
+    fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u32, usize)> {
+        let params = params(budget);
+        let mut summary = Summary::new(&params);
+        let monitor = Monitor::new(params);
+        summary.vehicle = Some(VEHICLE);
+        let frames: Vec<Vec<u8>> = streams.iter().map(|(id, bytes, _)| frame(*id, *bytes)).collect();
+        let mut sent = Vec::new();
+        let mut random = 12_345_u64;
+        let mut next: Vec<u64> = streams.iter().map(|(_, _, every)| every / 2).collect();
+        for now_ms in 0..seconds * 1_000 {
+            let now = Instant::from_millis(now_ms);
+            let mut out = |bytes: &[u8]| {
+                let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
+                sent.push((now_ms, id, bytes.len()));
+            };
+            for (index, (_, _, every)) in streams.iter().enumerate() {
+                if now_ms == next[index] {
+                    random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    // Each comes up to a tenth of its interval early or late.
+                    let jitter = (random >> 33) % (every / 5 + 1);
+                    next[index] = (now_ms / every + 1) * every + every / 2 + jitter - every / 10;
+                    next[index] = next[index].max(now_ms + 1);
+                    let bytes = &frames[index];
+                    let frame = Frame::again(bytes, crate::Check::Verified).expect("a frame");
+                    summary.frame(now, &frame, &mut out);
+                }
+            }
+            if now_ms % 50 == 0 {
+                summary.tick(now, &monitor, &mut out);
+            }
+        }
+        sent
+    }
+
+    const ALL: &[(u32, usize, u64)] = &[
+        (0, 21, 1_000),
+        (1, 43, 500),
+        (2, 24, 1_000),
+        (24, 64, 200),
+        (30, 40, 20),
+        (33, 40, 100),
+        (65, 54, 200),
+        (74, 32, 50),
+        (147, 66, 1_000),
+        (193, 34, 200),
+        (241, 44, 200),
+        (245, 14, 500),
+        (291, 69, 100),
+    ];
 
     #[test]
     fn a_finding_reads_as_a_sentence_and_fits() {
@@ -295,41 +474,62 @@ mod tests {
     }
 
     #[test]
-    fn the_budget_holds_in_every_window_of_a_second() {
-        let params = Params::defaults();
-        let mut summary = Summary::new(&params);
-        let monitor = Monitor::new(params);
-        let mut sent: Vec<(u64, usize)> = Vec::new();
-        let mut encoder = Encoder::new();
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
-        summary.vehicle = Some(Source { system: 1, component: 1 });
-        for now_ms in 0..10_000 {
-            let now = Instant::from_millis(now_ms);
-            let mut out = |bytes: &[u8]| sent.push((now_ms, bytes.len()));
-            let text =
-                encoder.status_text(&mut buffer, Severity::Info, "a text of the vehicle, as long as it gets");
-            summary.frame(now, &Frame::parse(text).expect("a frame"), &mut out);
-            summary.finding(now, &finding(Level::Warning), &mut out);
-            summary.tick(now, &monitor, &mut out);
+    fn the_budget_holds_in_every_window_of_a_second_and_is_used() {
+        for budget in [100, 250, 400, 2_000, 5_000_u32] {
+            let sent = run(budget as f32, 60, ALL);
+            for (index, (start, ..)) in sent.iter().enumerate() {
+                let window = sent[index..].iter().take_while(|(at, ..)| *at < start + 1_000);
+                let bytes: usize = window.map(|(.., bytes)| bytes).sum();
+                assert!(bytes <= budget as usize, "{bytes} of {budget} bytes in the second from {start} ms");
+            }
+            let total: usize = sent.iter().map(|(.., bytes)| bytes).sum();
+            assert!(budget > 1_000 || total as u32 > budget * 60 / 2, "{total} bytes at {budget} B/s");
         }
-        let budget = params.get(Param::GsBudget) as usize;
-        for (start, _) in &sent {
-            let window = sent.iter().filter(|(at, _)| at >= start && *at < start + 1_000);
-            let bytes: usize = window.map(|(_, bytes)| bytes).sum();
-            assert!(bytes <= budget, "{bytes} bytes in the second from {start} ms");
+    }
+
+    #[test]
+    fn nothing_starves_from_the_smallest_budget_up() {
+        for budget in [100.0, 150.0, 300.0, 1_000.0] {
+            let sent = run(budget, 240, ALL);
+            for (id, ..) in ALL.iter().chain(&[(251, 30, 0), (252, 30, 0)]) {
+                let times: Vec<u64> =
+                    sent.iter().filter(|(_, sent, _)| sent == id).map(|(at, ..)| *at).collect();
+                let longest = times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(u64::MAX);
+                // At 100 B/s all intervals are about twelve times as long.
+                assert!(longest < 90_000, "{id} at {budget} B/s: {longest} ms without one");
+            }
+            // The vehicle's heartbeats and ours, of 240 each: link loss is four in a row.
+            let beats: Vec<u64> = sent.iter().filter(|(_, id, _)| *id == 0).map(|(at, ..)| *at).collect();
+            assert!(beats.len() > 300, "{} heartbeats at {budget} B/s", beats.len());
         }
-        let total: usize = sent.iter().map(|(_, bytes)| bytes).sum();
-        assert!(total > budget * 9, "the budget is used: {total} bytes");
+    }
+
+    #[test]
+    fn a_stream_of_one_a_second_is_not_halved_by_its_jitter() {
+        let sent = run(2_000.0, 100, &[(0, 21, 1_000), (24, 64, 1_000), (245, 14, 250)]);
+        let count = |id| sent.iter().filter(|(_, sent, _)| *sent == id).count();
+        assert!(count(24) >= 97, "{} of 100 positions", count(24));
+        assert!((97..=103).contains(&count(245)), "{} where one a second was wanted", count(245));
     }
 
     #[test]
     fn a_critical_finding_overtakes_those_that_wait() {
         let mut summary = Summary::new(&Params::defaults());
-        summary.budget.bytes_per_s = 0;
+        summary.outlet.set(0, 57_600);
         for level in [Level::Warning, Level::Stale, Level::Critical, Level::Warning] {
             summary.finding(Instant::ZERO, &finding(level), &mut |_| panic!("there is no budget"));
         }
         let order: Vec<_> = summary.waiting.iter().map(|finding| finding.level).collect();
         assert_eq!(order, [Level::Critical, Level::Warning, Level::Warning, Level::Stale]);
+    }
+
+    #[test]
+    fn the_state_holds_every_subsystem() {
+        let monitor = Monitor::new(Params::defaults());
+        for (index, subsystem) in Subsystem::ALL.into_iter().enumerate() {
+            assert_eq!(state(&monitor) >> (3 * index) & 7, monitor.health().subsystem(subsystem) as i32);
+        }
+        assert_eq!(VALUE_NAMES.iter().filter(|name| name.starts_with("L_")).count(), Subsystem::ALL.len());
+        assert!(VALUE_NAMES.iter().all(|name| name.len() <= 10));
     }
 }

@@ -10,6 +10,8 @@
 //! [`queues`] is the home of all queues, with their capacities and what happens when each is full.
 #![cfg_attr(not(test), no_std)]
 
+mod companion;
+mod keeping;
 mod loss;
 pub mod monitoring;
 pub mod persist;
@@ -18,6 +20,7 @@ pub mod queues;
 pub mod reception;
 pub mod storage;
 pub mod supervisor;
+pub mod uplink;
 
 pub use monitoring::{Identity, Monitoring};
 pub use persist::{Handover, Keeper, Mailbox, StoreStatus};

@@ -5,6 +5,8 @@
 //! | frames | reception | monitor | [`FRAME_QUEUE_BYTES`] | the frame is lost, counted in [`crate::PortStatus`] |
 //! | sectors | monitor | storage | [`SECTOR_QUEUE_SECTORS`] | frames are refused before they are encoded, and counted; [`SECTOR_RESERVE`] stays for records |
 //! | GS | monitor | downlink | [`GS_QUEUE_BYTES`] | the frame is lost, counted; the summary stream repeats what matters |
+//! | uplink | uplink | monitor | [`UPLINK_QUEUE_BYTES`] | the frame is lost, counted; whoever asks the ground station's port must ask again |
+//! | autopilot | monitor | requests | [`AUTOPILOT_QUEUE_BYTES`] | the frame is lost, counted; requests are repeated |
 
 use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
@@ -14,11 +16,18 @@ use hums_blackbox::{ENTRY_SECTORS_MAX, Header, SECTOR_BYTES, Sector, SectorSink}
 /// 80 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes a fraction.
 pub const FRAME_QUEUE_BYTES: usize = 8 * 1024;
 
-/// 0.4 s of a radio at 57,600 baud: an alert must not queue behind more than it can overtake in time.
-pub const GS_QUEUE_BYTES: usize = 2 * 1024;
+/// The outlet lets 50 ms of the port wait (288 bytes at 57,600 baud), and behind them every finding that it holds back
+/// at once: 16 texts of 79 bytes, signed and with the queue's two bytes each.
+pub const GS_QUEUE_BYTES: usize = 288 + 16 * 81;
 
-/// 2.5 s of a standing card at 921,600 baud: 92 kB/s at 3.5 times smaller is 66 KB.
-pub const SECTOR_QUEUE_SECTORS: usize = 142;
+/// 0.17 s of a radio at 57,600 baud: the monitor looks at least every 50 ms. Three of the longest frames.
+pub const UPLINK_QUEUE_BYTES: usize = 1024;
+
+/// A round of requests to the autopilot (9 commands of 45 bytes, signed 58) and two frames that pass through.
+pub const AUTOPILOT_QUEUE_BYTES: usize = 1100;
+
+/// 2.5 s of a standing card at 921,600 baud: 92 kB/s at 3.5 times smaller is 66 KB; storage holds eight sectors more.
+pub const SECTOR_QUEUE_SECTORS: usize = 134;
 
 /// Sectors kept free for findings and losses when frames are refused already.
 pub const SECTOR_RESERVE: usize = 2 * ENTRY_SECTORS_MAX;
@@ -33,11 +42,15 @@ const _: () = assert!(SECTOR_QUEUE_BYTES >= 66 * 1024);
 
 type FrameQueue = Churrasco<FRAME_QUEUE_BYTES>;
 type GsQueue = Churrasco<GS_QUEUE_BYTES>;
+type UplinkQueue = Churrasco<UPLINK_QUEUE_BYTES>;
+type AutopilotQueue = Churrasco<AUTOPILOT_QUEUE_BYTES>;
 
 /// All queues of the firmware; one static.
 pub struct Queues {
     frames: FrameQueue,
     gs: GsQueue,
+    uplink: UplinkQueue,
+    autopilot: AutopilotQueue,
     sectors: SectorQueue,
 }
 
@@ -55,6 +68,12 @@ pub struct Ends<'a> {
     pub gs_in: GsIn<'a>,
     /// For the downlink.
     pub gs_out: GsOut<'a>,
+    /// For the uplink.
+    pub uplink_in: UplinkIn<'a>,
+    /// For the monitor.
+    pub uplink_out: UplinkOut<'a>,
+    /// For the task that sends to the autopilot.
+    pub autopilot_out: AutopilotOut<'a>,
 }
 
 impl Default for Queues {
@@ -66,7 +85,13 @@ impl Default for Queues {
 impl Queues {
     /// Empty queues.
     pub const fn new() -> Self {
-        Self { frames: Churrasco::new(), gs: Churrasco::new(), sectors: spsc::Queue::new() }
+        Self {
+            frames: Churrasco::new(),
+            gs: Churrasco::new(),
+            uplink: Churrasco::new(),
+            autopilot: Churrasco::new(),
+            sectors: spsc::Queue::new(),
+        }
     }
 
     /// Hands out the ends, once.
@@ -77,8 +102,15 @@ impl Queues {
             frames_out: FramesOut(self.frames.framed_consumer()),
             sectors_in: SectorsIn { queue: sectors_in, reserve: SECTOR_RESERVE, deepest: 0 },
             sectors_out: SectorsOut(sectors_out),
-            gs_in: GsIn { queue: self.gs.framed_producer(), frames: 0, bytes: 0, lost: 0 },
-            gs_out: GsOut(self.gs.framed_consumer()),
+            gs_in: GsIn {
+                gs: PortIn::new(self.gs.framed_producer()),
+                autopilot: PortIn::new(self.autopilot.framed_producer()),
+                path: Path::Port,
+            },
+            gs_out: PortOut(self.gs.framed_consumer()),
+            uplink_in: FramesIn(self.uplink.framed_producer()),
+            uplink_out: FramesOut(self.uplink.framed_consumer()),
+            autopilot_out: PortOut(self.autopilot.framed_consumer()),
         }
     }
 }
@@ -87,9 +119,11 @@ impl Queues {
 const STAMP_BYTES: usize = 9;
 
 /// The frame queue's writing end.
-pub struct FramesIn<'a>(FramedProducer<&'a FrameQueue>);
+pub struct FramesIn<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(FramedProducer<&'a Churrasco<BYTES>>);
+/// The uplink queue's writing end.
+pub type UplinkIn<'a> = FramesIn<'a, UPLINK_QUEUE_BYTES>;
 
-impl FramesIn<'_> {
+impl<const BYTES: usize> FramesIn<'_, BYTES> {
     /// Queues a frame; `false` when there is no room for it.
     pub fn put(&mut self, at_micros: u64, verified: bool, frame: &[u8]) -> bool {
         let len = STAMP_BYTES + frame.len();
@@ -103,9 +137,11 @@ impl FramesIn<'_> {
 }
 
 /// The frame queue's reading end.
-pub struct FramesOut<'a>(FramedConsumer<&'a FrameQueue>);
+pub struct FramesOut<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(FramedConsumer<&'a Churrasco<BYTES>>);
+/// The uplink queue's reading end.
+pub type UplinkOut<'a> = FramesOut<'a, UPLINK_QUEUE_BYTES>;
 
-impl FramesOut<'_> {
+impl<const BYTES: usize> FramesOut<'_, BYTES> {
     /// Hands the oldest frame to `take` (time in microseconds, verified, bytes); `false` when there is none.
     pub fn take(&mut self, take: impl FnOnce(u64, bool, &[u8])) -> bool {
         let Ok(grant) = self.0.read() else { return false };
@@ -202,16 +238,80 @@ impl SectorsOut<'_> {
     }
 }
 
-/// The GS queue's writing end, with what went in.
+/// The writing ends of both ports' queues: to the ground station, and to the autopilot.
 pub struct GsIn<'a> {
-    queue: FramedProducer<&'a GsQueue>,
+    gs: PortIn<'a, GS_QUEUE_BYTES>,
+    /// To the autopilot.
+    pub autopilot: PortIn<'a, AUTOPILOT_QUEUE_BYTES>,
+    path: Path,
+}
+
+/// The way of the summary stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// There is none.
+    Nobody,
+    /// A radio at the ground station's port.
+    Port,
+    /// The autopilot carries it.
+    Autopilot,
+}
+
+impl GsIn<'_> {
+    /// Queues a frame for the GS, or counts it lost.
+    pub fn put(&mut self, frame: &[u8]) {
+        self.gs.put(frame);
+    }
+
+    /// Queues a frame of the summary stream, on its way.
+    pub fn tell(&mut self, frame: &[u8]) {
+        match self.path {
+            Path::Nobody => {}
+            Path::Port => self.gs.put(frame),
+            Path::Autopilot => self.autopilot.put(frame),
+        }
+    }
+
+    /// The way of the summary stream.
+    pub const fn path(&self) -> Path {
+        self.path
+    }
+
+    /// Another way for the summary stream.
+    pub const fn set_path(&mut self, path: Path) {
+        self.path = path;
+    }
+
+    /// Frames queued since power-on.
+    pub const fn frames(&self) -> u64 {
+        self.gs.frames
+    }
+
+    /// Bytes queued since power-on.
+    pub const fn bytes(&self) -> u64 {
+        self.gs.bytes
+    }
+
+    /// Frames that found the queue full.
+    pub const fn lost(&self) -> u64 {
+        self.gs.lost
+    }
+}
+
+/// The writing end of a port's queue, with what went in.
+pub struct PortIn<'a, const BYTES: usize> {
+    queue: FramedProducer<&'a Churrasco<BYTES>>,
     frames: u64,
     bytes: u64,
     lost: u64,
 }
 
-impl GsIn<'_> {
-    /// Queues a frame for the GS, or counts it lost.
+impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
+    const fn new(queue: FramedProducer<&'a Churrasco<BYTES>>) -> Self {
+        Self { queue, frames: 0, bytes: 0, lost: 0 }
+    }
+
+    /// Queues a frame, or counts it lost.
     pub fn put(&mut self, frame: &[u8]) {
         let len = frame.len() as u16;
         let Ok(mut grant) = self.queue.grant(len) else {
@@ -229,21 +329,20 @@ impl GsIn<'_> {
         self.frames
     }
 
-    /// Bytes queued since power-on.
-    pub const fn bytes(&self) -> u64 {
-        self.bytes
-    }
-
     /// Frames that found the queue full.
     pub const fn lost(&self) -> u64 {
         self.lost
     }
 }
 
+/// The reading end of a port's queue.
+pub struct PortOut<'a, const BYTES: usize>(FramedConsumer<&'a Churrasco<BYTES>>);
 /// The GS queue's reading end.
-pub struct GsOut<'a>(FramedConsumer<&'a GsQueue>);
+pub type GsOut<'a> = PortOut<'a, GS_QUEUE_BYTES>;
+/// The autopilot queue's reading end.
+pub type AutopilotOut<'a> = PortOut<'a, AUTOPILOT_QUEUE_BYTES>;
 
-impl GsOut<'_> {
+impl<const BYTES: usize> PortOut<'_, BYTES> {
     /// Copies the oldest frame into `out` and takes it out of the queue; its length, or `None` when there is none.
     pub fn take(&mut self, out: &mut [u8; GS_FRAME_BYTES_MAX]) -> Option<usize> {
         let grant = self.0.read().ok()?;

@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use hums_blackbox::Cause;
 use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
@@ -140,7 +141,12 @@ fn gaps_text(text: &mut String, log: &Overview) {
             summary.gaps
         );
     }
-    for gap in contents.gaps.iter().take(SHOWN_MAX) {
+    for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
+        let time = |at: Option<Instant>| at.map_or(0.0, Instant::as_secs_f64);
+        let (from, to) = (time(gap.from), time(gap.to));
+        let _ = writeln!(text, "    from {from:.3} to {to:.3} s: not recorded: disarmed");
+    }
+    for gap in contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed).take(SHOWN_MAX) {
         let time = |at: Option<Instant>, none: &str| {
             at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
         };
@@ -151,7 +157,7 @@ fn gaps_text(text: &mut String, log: &Overview) {
             "    from {} to {}: {}, {} sectors lost, {} more of no use, {frames} frames missing",
             time(gap.from, "the beginning"),
             time(gap.to, "the end"),
-            gap.cause.name(),
+            words(gap.cause),
             gap.sectors_lost,
             gap.sectors_skipped
         );
@@ -163,6 +169,19 @@ fn gaps_text(text: &mut String, log: &Overview) {
             "  lost     {} {} between {:.3} and {:.3} s",
             loss.count, loss.what, loss.from_s, loss.to_s
         );
+    }
+}
+
+/// Why something is missing.
+fn words(cause: Cause) -> &'static str {
+    match cause {
+        Cause::Missing => "sectors are not there (never written, overwritten or lost)",
+        Cause::Damaged => "sectors are damaged",
+        Cause::UnknownLayouts(_) => {
+            "written with message layouts that this program does not know; take a newer hums"
+        }
+        Cause::Corrupt => "sectors hold what no recorder writes",
+        Cause::Disarmed => "not recorded: disarmed",
     }
 }
 

@@ -22,6 +22,8 @@ pub struct Arrivals {
     waiting: VecDeque<Chunk>,
     tap: Option<BufWriter<File>>,
     bytes: u64,
+    /// To the autopilot, where there is a live one.
+    autopilot: Option<Box<dyn Write + Send>>,
 }
 
 impl Arrivals {
@@ -37,7 +39,7 @@ impl Arrivals {
     }
 
     fn new(run: &Run, tap: Option<&Path>) -> Result<Self> {
-        let source = source::open(&run.input, Timing { line_rate: run.faults.line_rate })?;
+        let (source, autopilot) = source::open_both(&run.input, Timing { line_rate: run.faults.line_rate })?;
         let create = |path: &Path| {
             File::create(path)
                 .map(BufWriter::new)
@@ -49,6 +51,7 @@ impl Arrivals {
             waiting: VecDeque::new(),
             tap: tap.map(create).transpose()?,
             bytes: 0,
+            autopilot,
         })
     }
 
@@ -79,6 +82,11 @@ impl Arrivals {
     /// The machine did not take this one: its power went before.
     pub fn put_back(&mut self, chunk: Chunk) {
         self.waiting.push_front(chunk);
+    }
+
+    /// The way to the autopilot, once; nobody hears what is sent to a recording.
+    pub fn take_autopilot(&mut self) -> Box<dyn Write + Send> {
+        self.autopilot.take().unwrap_or_else(crate::sink::nowhere)
     }
 
     /// Bytes that have arrived.

@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::qemu::{self, Qemu};
 use super::report::Report;
-use super::{Machine, arrivals::Arrivals, check_standard_output, drive, open_sink, pace, prepare_card};
+use super::{Machine, arrivals::Arrivals, check_standard_output, drive, ground, pace, prepare_card};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::logs;
@@ -35,8 +35,9 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let mut arrivals =
         Arrivals::open(run, None, || prepare_card(&run.sd, run.faults.card_size, run.faults.seed))?.0;
     let earlier = logs::on_card(&run.sd).len();
-    let mut qemu = Qemu::start(&firmware, &run.sd, open_sink(run.gs.as_ref())?, args.costs)?;
-    drive(&mut arrivals, speed, live, Instant::now(), &mut qemu)?;
+    let (mut ground, gs) = ground::open(run)?;
+    let mut qemu = Qemu::start(&firmware, &run.sd, gs, arrivals.take_autopilot(), args.costs)?;
+    drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut qemu)?;
     let json = qemu.finish()?;
     if let Some(remark) = arrivals.remark() {
         eprintln!("hums: {remark}");
@@ -51,6 +52,11 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
 impl Machine for Qemu {
     fn arrive(&mut self, chunk: &Chunk) -> Result<bool> {
         Qemu::arrive(self, chunk.at_us, &chunk.bytes)?;
+        Ok(true)
+    }
+
+    fn hear(&mut self, chunk: &Chunk) -> Result<bool> {
+        Qemu::hear(self, chunk.at_us, &chunk.bytes)?;
         Ok(true)
     }
 }

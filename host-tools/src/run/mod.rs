@@ -5,12 +5,12 @@
 
 pub mod arrivals;
 pub mod emulate;
+pub mod ground;
 pub mod qemu;
 pub mod report;
 pub mod sim;
 
 use std::fs::File;
-use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -24,6 +24,7 @@ use crate::interrupt;
 use crate::outcome::usage;
 use crate::source::Chunk;
 use arrivals::Arrivals;
+use ground::Ground;
 
 /// In real time the machine's clock goes on at least this often, also while nothing arrives.
 const STEP: Duration = Duration::from_millis(20);
@@ -32,11 +33,15 @@ const STEP: Duration = Duration::from_millis(20);
 pub trait Machine {
     /// Time goes on to the chunk's, then its bytes are there. `false`: the run is over (power went).
     fn arrive(&mut self, chunk: &Chunk) -> Result<bool>;
+
+    /// The same for bytes of the ground station.
+    fn hear(&mut self, chunk: &Chunk) -> Result<bool>;
 }
 
 /// Gives everything that arrives to the machine, in the time that was asked for. `false`: power went.
 fn drive(
     arrivals: &mut Arrivals,
+    ground: &mut Ground,
     speed: Speed,
     live: bool,
     start: Instant,
@@ -57,6 +62,10 @@ fn drive(
             std::thread::sleep(STEP.min(due.saturating_sub(elapsed)));
             now_us =
                 chunk.at_us.min(u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX)).max(now_us);
+            if !hear(ground, now_us, machine)? {
+                arrivals.put_back(chunk);
+                return Ok(false);
+            }
             if !machine.arrive(&Chunk { at_us: now_us, bytes: Vec::new() })? {
                 arrivals.put_back(chunk);
                 return Ok(false);
@@ -66,8 +75,18 @@ fn drive(
             return Ok(true);
         }
         now_us = chunk.at_us;
-        if !machine.arrive(&chunk)? {
+        if !hear(ground, now_us, machine)? || !machine.arrive(&chunk)? {
             arrivals.put_back(chunk);
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Gives the machine what the ground station sent by now.
+fn hear(ground: &mut Ground, now_us: u64, machine: &mut impl Machine) -> Result<bool> {
+    while let Some(chunk) = ground.until(now_us)? {
+        if !machine.hear(&chunk)? {
             return Ok(false);
         }
     }
@@ -99,14 +118,6 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
         }
     }
     Ok(file)
-}
-
-/// A place for bytes that nobody asked for.
-fn open_sink(gs: Option<&Endpoint>) -> Result<Box<dyn Write + Send>> {
-    match gs {
-        Some(endpoint) => crate::sink::open(endpoint),
-        None => Ok(Box::new(std::io::sink())),
-    }
 }
 
 /// Two kinds of output cannot share standard output.

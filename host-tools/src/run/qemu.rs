@@ -56,6 +56,9 @@ pub fn check() -> Result<()> {
     }
 }
 
+/// The bit of a count in the clock's pipe that says that the bytes are the ground station's.
+const FROM_GS: u32 = 1 << 31;
+
 /// A line of the firmware's.
 enum Line {
     Ready,
@@ -70,6 +73,8 @@ pub struct Qemu {
     feed: Option<File>,
     /// The autopilot UART.
     uart: Option<UnixStream>,
+    /// The ground station's.
+    ground: Option<UnixStream>,
     downlink: Option<JoinHandle<std::io::Result<u64>>>,
     complaints: JoinHandle<String>,
     dir: TempDir,
@@ -77,7 +82,13 @@ pub struct Qemu {
 
 impl Qemu {
     /// Starts the firmware and waits until it listens. `costs`: it counts the instructions of each stage.
-    pub fn start(firmware: &Path, card: &Path, gs: Box<dyn Write + Send>, costs: bool) -> Result<Self> {
+    pub fn start(
+        firmware: &Path,
+        card: &Path,
+        gs: Box<dyn Write + Send>,
+        autopilot: Box<dyn Write + Send>,
+        costs: bool,
+    ) -> Result<Self> {
         let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
         let at = |name: &str| dir.path().join(name);
         // Links keep the paths in QEMU's argument short and free of characters that it would read.
@@ -91,10 +102,16 @@ impl Qemu {
             .spawn()
             .with_context(|| format!("{PROGRAM} cannot be started"))?;
         let (lines, complaints) = listen(&mut child)?;
-        let mut qemu = Self { child, lines, feed: None, uart: None, downlink: None, complaints, dir };
+        let mut qemu =
+            Self { child, lines, feed: None, uart: None, ground: None, downlink: None, complaints, dir };
         // It waits for this one before it starts the firmware, so that not one byte is missed.
-        qemu.downlink = Some(forward(qemu.connect("gs")?, gs));
-        qemu.uart = Some(qemu.connect("ap")?);
+        let ground = qemu.connect("gs")?;
+        qemu.ground = Some(ground.try_clone().context("the ground station's port")?);
+        qemu.downlink = Some(forward(ground, gs));
+        let uart = qemu.connect("ap")?;
+        // What is sent to the autopilot must be read, or the emulator would wait for that.
+        let _ = forward(uart.try_clone().context("the autopilot's port")?, autopilot);
+        qemu.uart = Some(uart);
         match qemu.lines.recv_timeout(BOOT) {
             Ok(Line::Ready) => {}
             Ok(Line::Result(_)) | Err(RecvTimeoutError::Disconnected) => {
@@ -129,10 +146,21 @@ impl Qemu {
 
     /// "At this time these bytes have arrived."
     pub fn arrive(&mut self, at_us: u64, bytes: &[u8]) -> Result<()> {
+        self.give(at_us, bytes, false)
+    }
+
+    /// The same for bytes of the ground station.
+    pub fn hear(&mut self, at_us: u64, bytes: &[u8]) -> Result<()> {
+        self.give(at_us, bytes, true)
+    }
+
+    fn give(&mut self, at_us: u64, bytes: &[u8], from_gs: bool) -> Result<()> {
         let mut record = [0; 12];
         record[..8].copy_from_slice(&at_us.to_le_bytes());
-        record[8..].copy_from_slice(&(bytes.len() as u32).to_le_bytes());
-        let sent = match (&mut self.feed, &mut self.uart) {
+        let count = bytes.len() as u32 | if from_gs { FROM_GS } else { 0 };
+        record[8..].copy_from_slice(&count.to_le_bytes());
+        let port = if from_gs { &mut self.ground } else { &mut self.uart };
+        let sent = match (&mut self.feed, port) {
             (Some(feed), Some(uart)) => feed.write_all(&record).and_then(|()| uart.write_all(bytes)),
             _ => Ok(()),
         };
@@ -154,7 +182,7 @@ impl Qemu {
             }
         };
         let status = self.child.wait().context("the emulator's end")?;
-        self.uart = None;
+        (self.uart, self.ground) = (None, None);
         if let Some(downlink) = self.downlink.take()
             && let Ok(result) = downlink.join()
         {
@@ -170,7 +198,7 @@ impl Qemu {
 
     /// How it ended, as the end of a sentence.
     fn end(&mut self) -> Result<String> {
-        (self.feed, self.uart) = (None, None);
+        (self.feed, self.uart, self.ground) = (None, None, None);
         let status = if let Some(status) = self.child.try_wait()? {
             status
         } else {

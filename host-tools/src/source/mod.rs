@@ -17,7 +17,7 @@ pub mod sniff;
 pub mod tlog;
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 
 use anyhow::{Context, Result, bail};
 
@@ -57,11 +57,23 @@ pub trait Source {
     }
 }
 
+/// The way back to a source that hears.
+pub type Way = Box<dyn Write + Send>;
+
 /// Which times count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     /// Ignore recorded times: feed back to back at this rate, in baud.
     pub line_rate: Option<u32>,
+}
+
+/// Opens SRC, and where it can answer, the way to it.
+pub fn open_both(endpoint: &Endpoint, timing: Timing) -> Result<(Box<dyn Source>, Option<Way>)> {
+    if endpoint.is_live() && timing.line_rate.is_none() {
+        let (source, writer) = live::open(endpoint)?;
+        return Ok((source, Some(writer)));
+    }
+    Ok((open(endpoint, timing)?, None))
 }
 
 /// Opens SRC.
@@ -70,7 +82,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
         if timing.line_rate.is_some() {
             return Err(usage(format!("--line-rate: {endpoint} comes at its own rate; give a file or `-`")));
         }
-        return live::open(endpoint);
+        return Ok(live::open(endpoint)?.0);
     }
     let input: Box<dyn Read + Send> = match endpoint {
         Endpoint::File(path) => {

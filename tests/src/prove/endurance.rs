@@ -1,5 +1,160 @@
+//! A day on a small card.
+
+use std::cell::Cell;
+use std::path::Path;
+
+use anyhow::{Context as _, Result, ensure};
+use hums::card::Faults;
+use hums::logs::on_card;
+use hums::run::sim::power_on;
+use hums::source::Chunk;
+use hums_core::params::Params;
+
+use super::card::Card;
+use super::record::Record;
+use super::stream::Stream;
 use super::{Figures, Options};
-use anyhow::Result;
-pub(super) fn run(_: &Options) -> Result<Figures> {
-    Ok(Figures::default())
+use crate::flights::{OWN, own};
+
+/// 20 kB/s.
+const BAUD: u64 = 200_000;
+
+struct Form {
+    card_mib: u64,
+    seconds: u64,
+    /// How often the card is looked at.
+    looks: u64,
+    flights: &'static [&'static str],
+}
+
+const LONG: Form = Form { card_mib: 64, seconds: 24 * 3600, looks: 24, flights: &OWN };
+/// The smallest card and the flight that compresses least, so that the card is full after an hour and a half.
+const SHORT: Form = Form { card_mib: 34, seconds: 6_500, looks: 4, flights: &["px4_hil_quad_low.tlog"] };
+/// How far the log may be behind at any moment, in milliseconds.
+const BEHIND_MS_MAX: u64 = 200;
+/// Of the card's space, what the newest data has at least: one segment of sixteen is being overwritten, and the file
+/// system takes some.
+const KEPT_MIN: f64 = 0.8;
+/// What the process may have grown by, in KiB, between looks at the card.
+const GROWTH_KIB_MAX: u64 = 8 << 10;
+
+pub(super) fn run(options: &Options) -> Result<Figures> {
+    let form = if options.short { &SHORT } else { &LONG };
+    let (seconds, looks) = (options.runs(form.seconds, form.seconds), form.looks);
+    let open = |flight: &&str| Stream::of_flight(&own(flight), BAUD);
+    let streams = form.flights.iter().map(open).collect::<Result<Vec<_>>>()?;
+    let mut card = Card::new(form.card_mib)?;
+    let device = card.device(Faults::default())?;
+    let (look_at, looked) = (Cell::new(seconds * 1_000_000 / looks), Cell::new(0_u64));
+    let mut seen = Vec::new();
+    let path = card.path();
+    let done = power_on(&device, &Params::defaults(), 1, Day::new(&streams, seconds), |chunk| {
+        if chunk.at_us < look_at.get() {
+            return Ok(());
+        }
+        looked.set(looked.get() + 1);
+        look_at.set((looked.get() + 1) * seconds * 1_000_000 / looks);
+        let about =
+            look(&path, form, chunk.at_us).with_context(|| format!("after {} s", chunk.at_us / 1_000_000))?;
+        seen.push(about);
+        Ok(())
+    })?;
+    card.check()?;
+    let last = look(&path, form, seconds * 1_000_000).context("at the end")?;
+    ensure!(done.stats.frames_lost == 0, "{} frames lost", done.stats.frames_lost);
+    ensure!(done.card.segments_overwritten > 0, "the card never became full");
+    // Before the second look what reading the card keeps for the next time is there already.
+    let early = seen.get(1).context("looked too rarely")?.memory_kib;
+    let late = seen.iter().skip(2).map(|about| about.memory_kib).max().unwrap_or(early);
+    ensure!(late <= early + GROWTH_KIB_MAX, "memory grew from {early} to {late} KiB");
+
+    let mut figures = Figures::default();
+    figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
+    figures.fact("frames", done.stats.frames_in);
+    figures.fact("frames lost", done.stats.frames_lost);
+    figures.fact("MAVLink, MB", done.stats.bytes_in / 1_000_000);
+    figures.fact("log, MB", done.stats.bytes_logged / 1_000_000);
+    figures.fact("segments", done.card.segments);
+    figures.fact("of them in the place of an older one", done.card.segments_overwritten);
+    figures.fact(
+        "block writes of the log, commands",
+        format!("{}, {}", done.card.blocks_written, done.card.writes),
+    );
+    figures.fact("the card was looked at", seen.len() + 1);
+    figures.fact("newest data on the card, whole, minutes at least", {
+        let kept = seen.iter().filter(|about| about.is_full).chain([&last]);
+        kept.map(|about| about.kept_ms / 60_000).min().unwrap_or(0)
+    });
+    figures
+        .fact("log behind the line at most, ms", seen.iter().map(|about| about.behind_ms).max().unwrap_or(0));
+    figures
+        .fact("memory at the first look and at most later, MiB", format!("{}, {}", early >> 10, late >> 10));
+    figures.fact("`fsck.vfat -n` at the end", "clean");
+    Ok(figures)
+}
+
+/// The recordings in turn, again and again, until the day is over.
+struct Day<'a> {
+    streams: &'a [Stream],
+    next: usize,
+    chunks: Box<dyn Iterator<Item = Chunk> + 'a>,
+    begin_us: u64,
+    last_us: u64,
+    end_us: u64,
+}
+
+impl<'a> Day<'a> {
+    fn new(streams: &'a [Stream], seconds: u64) -> Self {
+        let chunks = Box::new(std::iter::empty());
+        Self { streams, next: 0, chunks, begin_us: 0, last_us: 0, end_us: seconds * 1_000_000 }
+    }
+}
+
+impl Iterator for Day<'_> {
+    type Item = Chunk;
+
+    fn next(&mut self) -> Option<Chunk> {
+        let chunk = loop {
+            if let Some(chunk) = self.chunks.next() {
+                break chunk;
+            }
+            self.begin_us = self.last_us;
+            self.chunks = Box::new(self.streams.get(self.next % self.streams.len())?.chunks());
+            self.next += 1;
+        };
+        self.last_us = self.begin_us + chunk.at_us;
+        (self.last_us < self.end_us).then_some(Chunk { at_us: self.last_us, ..chunk })
+    }
+}
+
+struct About {
+    kept_ms: u64,
+    behind_ms: u64,
+    is_full: bool,
+    memory_kib: u64,
+}
+
+/// The newest data is on the card, without a hole, up to this moment.
+fn look(path: &Path, form: &Form, now_us: u64) -> Result<About> {
+    let memory_kib = memory_kib();
+    let logs = on_card(path);
+    let log = logs.last().context("no log")?;
+    let record = Record::of(log)?;
+    let holes: Vec<_> = record.gaps.iter().filter(|(_, gap)| gap.from.is_some()).collect();
+    ensure!(holes.is_empty(), "holes: {holes:?}");
+    let is_full = !record.gaps.is_empty();
+    let (first, last) =
+        (record.frames.first().context("no frames")?, record.frames.last().context("no frames")?);
+    let behind_ms = (now_us / 1000).saturating_sub(last.at_ms);
+    ensure!(behind_ms <= BEHIND_MS_MAX, "the log is {behind_ms} ms behind");
+    let kept = record.summary.blocks.sectors as f64 * 512.0 / (form.card_mib << 20) as f64;
+    ensure!(!is_full || kept >= KEPT_MIN, "only {kept:.2} of the card holds the newest data");
+    Ok(About { kept_ms: last.at_ms - first.at_ms, behind_ms, is_full, memory_kib })
+}
+
+/// What this process has resident now, in KiB.
+fn memory_kib() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap_or_default();
+    line.split_whitespace().nth(1).and_then(|number| number.parse().ok()).unwrap_or(0)
 }

@@ -1,5 +1,106 @@
+//! Bytes on the line are damaged.
+
+use anyhow::{Result, ensure};
+use hums::logs::on_card;
+use rayon::prelude::*;
+
+use super::card::Card;
+use super::record::Record;
+use super::stream::{Stream, hash};
 use super::{Figures, Options};
-use anyhow::Result;
-pub(super) fn run(_: &Options) -> Result<Figures> {
-    Ok(Figures::default())
+use crate::damage;
+use crate::flights::{OWN, own};
+
+/// The probability that a byte is damaged.
+const PROBABILITIES: [f64; 5] = [0.000_01, 0.000_1, 0.001, 0.003, 0.01];
+/// Far below what the recorder keeps up with: only the noise matters.
+const BAUD: u64 = 230_400;
+/// A damaged frame that fits its checksum by chance, of 65,536; and a damaged header that makes a candidate of bytes
+/// within a frame, each of which has that chance again.
+const INVENTED_MAX: f64 = 1.0 / 2_000.0;
+
+pub(super) fn run(options: &Options) -> Result<Figures> {
+    let rounds = options.runs(8, 1);
+    let seconds = if options.short { 10.0 } else { 60.0 };
+    let cases: Vec<_> = OWN
+        .into_iter()
+        .flat_map(|flight| PROBABILITIES.map(|probability| (flight, probability)))
+        .flat_map(|(flight, probability)| (0..rounds).map(move |round| (flight, probability, round)))
+        .collect();
+    let outcomes = cases.par_iter().with_max_len(1).map(|(flight, probability, round)| {
+        let stream = Stream::of_flight(&own(flight), BAUD)?.for_seconds(seconds);
+        let seed = options
+            .seed
+            .wrapping_add(*round)
+            .wrapping_mul(1_000_003)
+            .wrapping_add((probability * 1e6) as u64);
+        record(stream, *probability, seed).map(|outcome| (*probability, outcome))
+    });
+    let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
+    let mut figures = Figures::default();
+    figures.fact("runs", outcomes.len());
+    figures.fact("frames", outcomes.iter().map(|(_, one)| one.frames).sum::<u64>());
+    figures.fact("whole frames that were not recorded", 0);
+    figures.head = [
+        "a byte is damaged with",
+        "frames",
+        "damaged",
+        "whole and recorded",
+        "damaged, but fit their checksum by chance",
+    ]
+    .map(str::to_owned)
+    .into();
+    for probability in PROBABILITIES {
+        let of = |figure: fn(&Outcome) -> u64| {
+            let these = outcomes.iter().filter(|(this, _)| this.to_bits() == probability.to_bits());
+            these.map(|(_, one)| figure(one)).sum::<u64>().to_string()
+        };
+        figures.row([
+            probability.to_string(),
+            of(|one| one.frames),
+            of(|one| one.frames - one.whole),
+            of(|one| one.whole),
+            of(|one| one.invented),
+        ]);
+    }
+    Ok(figures)
+}
+
+struct Outcome {
+    frames: u64,
+    whole: u64,
+    invented: u64,
+}
+
+fn record(mut stream: Stream, probability: f64, seed: u64) -> Result<Outcome> {
+    let clean = stream.bytes.clone();
+    damage::noise(&mut stream.bytes, probability, seed);
+    let is_whole = |place: &&std::ops::Range<usize>| {
+        let covered = place.start..place.start + covered(&clean[(*place).clone()]);
+        stream.bytes[covered.clone()] == clean[covered]
+    };
+    let whole: Vec<u64> =
+        stream.frames.iter().filter(is_whole).map(|place| hash(&stream.bytes[place.clone()])).collect();
+    let card = Card::new(256)?;
+    let done = card.record(&stream, 1)?;
+    ensure!(done.stats.frames_lost == 0, "frames were lost: {:?}", done.stats);
+    let Some(log) = on_card(&card.path()).pop() else { anyhow::bail!("no log") };
+    let record = Record::of(&log)?;
+    ensure!(record.gaps.is_empty(), "gaps: {:?}", record.gaps);
+    // Both are in order: what is in the record and is no whole frame was made by the noise.
+    let mut expected = whole.iter().peekable();
+    let invented = record.frames.iter().filter(|frame| expected.next_if_eq(&&frame.hash).is_none()).count();
+    ensure!(expected.peek().is_none(), "{} whole frames are missing, seed {seed}", expected.count());
+    ensure!(
+        invented as f64 <= 3.0 + stream.frames.len() as f64 * INVENTED_MAX,
+        "{invented} frames that never went in, seed {seed}"
+    );
+    Ok(Outcome { frames: stream.frames.len() as u64, whole: whole.len() as u64, invented: invented as u64 })
+}
+
+/// How many bytes of a frame its checksum covers, itself included: whether the signature after it is right can be told
+/// only by who has the key.
+fn covered(frame: &[u8]) -> usize {
+    let is_signed = frame[0] == 0xFD && frame[2] & 1 == 1;
+    if is_signed { frame.len() - 13 } else { frame.len() }
 }

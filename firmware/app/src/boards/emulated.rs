@@ -10,6 +10,7 @@
 //! |---|---|
 //! | `feed` | when the input's bytes arrive; a file or a FIFO (see [`feed`]). Its end ends the run |
 //! | `sd` | the card's image, opened for writing in place; without it the slot is empty |
+//! | `store` | the store's flash, two sectors of 16 KiB; without it there is no store (see [`store`]) |
 //! | `log` | where defmt's messages go |
 //! | `seed` | a number that stands for the true random number of a real board |
 //! | `provoke` | `panic`, `bus-fault` or `silence`: that fault, when the downlink sends first (see [`provoke`]) |
@@ -22,6 +23,7 @@ mod clock;
 mod feed;
 mod log;
 mod provoke;
+mod store;
 mod uart;
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -36,7 +38,8 @@ use semihosting::{println, process};
 
 pub(crate) use card::ImageCard as Card;
 use feed::Feed;
-pub(crate) use uart::{AutopilotRx, GsTx};
+pub(crate) use store::StoreFlash;
+pub(crate) use uart::{AutopilotRx, AutopilotTx, GsRx, GsTx};
 
 use super::{Boot, ResetCause};
 use crate::costs::Stage;
@@ -71,9 +74,10 @@ static BITES_AT_MS: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// What the app gets.
 pub(crate) struct Parts {
-    pub(crate) autopilot: AutopilotRx,
-    pub(crate) gs: GsTx,
+    pub(crate) autopilot: (AutopilotRx, AutopilotTx),
+    pub(crate) gs: (GsRx, GsTx),
     pub(crate) card: Card,
+    pub(crate) store: Option<StoreFlash>,
     pub(crate) led: Led,
     pub(crate) watchdog: Watchdog,
     pub(crate) idle: Idle,
@@ -85,6 +89,7 @@ pub(crate) struct Parts {
 struct Arguments {
     feed: CString<PATH_BYTES>,
     card: CString<PATH_BYTES>,
+    store: CString<PATH_BYTES>,
     log: CString<PATH_BYTES>,
     seed: u32,
     tell_costs: bool,
@@ -99,6 +104,7 @@ pub(crate) fn take() -> Parts {
     provoke::arm(arguments.provoked);
     log::open(File::create(arguments.log.as_c_str()).ok());
     let image = File::options().read(true).write(true).open(arguments.card.as_c_str());
+    let store = File::options().read(true).write(true).open(arguments.store.as_c_str());
     let (autopilot, gs) = uart::init();
     // From here on no byte is lost. Whoever feeds us waits for this line.
     println!("ready");
@@ -110,6 +116,7 @@ pub(crate) fn take() -> Parts {
         autopilot,
         gs,
         card: Card::new(image.ok()),
+        store: store.ok().map(StoreFlash::new),
         led: Led(()),
         watchdog: Watchdog(()),
         idle: Idle { feed: Feed::new(feed) },
@@ -130,6 +137,7 @@ impl Arguments {
             match key {
                 "feed" => set_path(&mut arguments.feed, value),
                 "sd" => set_path(&mut arguments.card, value),
+                "store" => set_path(&mut arguments.store, value),
                 "log" => set_path(&mut arguments.log, value),
                 "seed" => arguments.seed = value.parse().unwrap_or_default(),
                 "cost" => arguments.tell_costs = value == "1",
@@ -195,7 +203,7 @@ impl Idle {
             match self.feed.peek() {
                 Some(arrival) if arrival.time_us.max(clock::now_us()) < alarm_us => {
                     clock::advance(arrival.time_us);
-                    uart::receive(arrival.bytes);
+                    uart::receive(arrival.from_gs, arrival.bytes);
                     self.feed.take();
                 }
                 None if !ended => {

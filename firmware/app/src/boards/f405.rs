@@ -3,26 +3,29 @@
 //! | pin | what | remark |
 //! |---|---|---|
 //! | PA10 | USART1 RX, from the autopilot's TELEM TX | DMA2 stream 2, ring of [`RING_BYTES`] |
-//! | PA9 | USART1 TX, to the autopilot's TELEM RX | kept for it, not driven yet |
+//! | PA9 | USART1 TX, to the autopilot's TELEM RX | DMA2 stream 7 |
 //! | PA2 | USART2 TX, to the ground station's radio | DMA1 stream 6 |
-//! | PA3 | USART2 RX, from the radio | kept for it, not read yet |
+//! | PA3 | USART2 RX, from the radio | DMA1 stream 5, ring of [`GS_RING_BYTES`] |
 //! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz; MISO pulled up |
 //! | PC12 | LED, lit when low | |
 //!
 //! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
 //! is for the checksum to find), so that not one good byte is thrown away with a bad one.
 
+mod flash;
+
 use core::cell::Cell;
 
 use cortex_m::peripheral::DWT;
-use embassy_stm32::dma::{self, ReadableRingBuffer, TransferOptions};
+use embassy_stm32::dma::{self, ReadableRingBuffer, Request, TransferOptions};
+use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
-use embassy_stm32::mode::{Async, Blocking};
-use embassy_stm32::peripherals::{DMA1_CH6, DMA2_CH2, IWDG, RNG};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH2, DMA2_CH7, IWDG, RNG};
 use embassy_stm32::rng::{self, Rng};
 use embassy_stm32::spi::{self, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::usart::{self, UartRx, UartTx};
+use embassy_stm32::usart::{self, Uart, UartRx, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, pac, rcc};
 use embassy_time::{Delay, Duration, Timer};
@@ -35,6 +38,8 @@ use super::{Boot, Overrun, Receive, ResetCause, Transmit};
 use crate::costs::Stage;
 use crate::report::Report;
 
+pub(crate) use flash::StoreFlash;
+
 use defmt_rtt as _;
 
 /// The board's name.
@@ -42,7 +47,7 @@ pub(crate) const NAME: &str = "f405";
 
 /// The crystal.
 const HSE: Hertz = Hertz(8_000_000);
-/// Baud rate of the autopilot's port; a parameter will set it.
+/// Baud rate of the autopilot's port until a parameter sets it.
 const AUTOPILOT_BAUD: u32 = 921_600;
 /// Baud rate of the ground station's port: the radios' usual one.
 const GS_BAUD: u32 = 57_600;
@@ -50,6 +55,10 @@ const GS_BAUD: u32 = 57_600;
 const RING_BYTES: usize = 4_096;
 /// How often reception looks into the ring: the resolution of arrival times in the log.
 const FETCH_EVERY: Duration = Duration::from_millis(1);
+/// 88 ms at 57,600 baud.
+const GS_RING_BYTES: usize = 512;
+/// How often the uplink looks into its ring: nobody there is in a hurry.
+const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
 /// What a card must be able to take before it is identified (SD specification, 4.2.1).
 const CARD_IDENTIFICATION: Hertz = Hertz(400_000);
 /// What every card takes afterwards: default speed is 25 MHz at most, the next slower clock of this chip is 21.
@@ -59,17 +68,33 @@ const WATCHDOG_US: u32 = 1_000_000;
 
 bind_interrupts!(struct Irqs {
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
+    DMA2_STREAM7 => dma::InterruptHandler<DMA2_CH7>;
+    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
     RNG => rng::InterruptHandler<RNG>;
 });
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
+static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
+
+/// What both ports' channels are called on all four streams (RM0090, tables 42 and 43).
+const USART_REQUEST: Request = 4;
+
+/// Reception from the autopilot.
+pub(crate) type AutopilotRx = PortRx;
+/// Transmission to the autopilot.
+pub(crate) type AutopilotTx = PortTx;
+/// Reception from the ground station.
+pub(crate) type GsRx = PortRx;
+/// Transmission to the ground station.
+pub(crate) type GsTx = PortTx;
 
 /// What the app gets.
 pub(crate) struct Parts {
-    pub(crate) autopilot: AutopilotRx,
-    pub(crate) gs: GsTx,
+    pub(crate) autopilot: (AutopilotRx, AutopilotTx),
+    pub(crate) gs: (GsRx, GsTx),
     pub(crate) card: Card,
+    pub(crate) store: Option<StoreFlash>,
     pub(crate) led: Led,
     pub(crate) watchdog: Watchdog,
     pub(crate) idle: Idle,
@@ -87,11 +112,19 @@ pub(crate) fn take() -> Parts {
 
     let mut line = usart::Config::default();
     line.baudrate = AUTOPILOT_BAUD;
-    let port = UartRx::new_blocking(p.USART1, p.PA10, line).expect("the clocks allow this baud rate");
-    let autopilot = AutopilotRx::new(port, dma::Channel::new(p.DMA2_CH2, Irqs));
+    let port =
+        Uart::new_blocking(p.USART1, p.PA10, p.PA9, line).expect("the clocks allow this baud rate").split();
+    let autopilot = (
+        PortRx::new(port.1, pac::USART1, dma::Channel::new(p.DMA2_CH2, Irqs), RING.take(), FETCH_EVERY),
+        PortTx::new(port.0, pac::USART1, dma::Channel::new(p.DMA2_CH7, Irqs)),
+    );
     line.baudrate = GS_BAUD;
-    let port = UartTx::new(p.USART2, p.PA2, p.DMA1_CH6, Irqs, line).expect("the clocks allow this baud rate");
-    let gs = GsTx(port);
+    let port =
+        Uart::new_blocking(p.USART2, p.PA3, p.PA2, line).expect("the clocks allow this baud rate").split();
+    let gs = (
+        PortRx::new(port.1, pac::USART2, dma::Channel::new(p.DMA1_CH5, Irqs), GS_RING.take(), GS_FETCH_EVERY),
+        PortTx::new(port.0, pac::USART2, dma::Channel::new(p.DMA1_CH6, Irqs)),
+    );
 
     let mut bus = spi::Config::default();
     bus.frequency = CARD_IDENTIFICATION;
@@ -104,6 +137,7 @@ pub(crate) fn take() -> Parts {
         autopilot,
         gs,
         card: Card { driver: SdCard::new(spi, Delay), identified: Cell::new(false) },
+        store: Some(StoreFlash::new(Flash::new_blocking(p.FLASH))),
         led: Led(Output::new(p.PC12, Level::High, Speed::Low)),
         watchdog: Watchdog { timer: IndependentWatchdog::new(p.IWDG, WATCHDOG_US), running: false },
         idle: Idle(()),
@@ -154,34 +188,40 @@ fn reset_cause() -> (ResetCause, u32) {
     (cause, flags.0)
 }
 
-/// Reception of the autopilot's bytes: a DMA ring.
-pub(crate) struct AutopilotRx {
+/// A port's reception: a DMA ring.
+pub(crate) struct PortRx {
     /// Keeps the pin and the port's clock.
     _port: UartRx<'static, Blocking>,
     ring: ReadableRingBuffer<'static, u8>,
+    fetch_every: Duration,
 }
 
-impl AutopilotRx {
-    fn new(port: UartRx<'static, Blocking>, channel: dma::Channel<'static>) -> Self {
-        /// `USART1_RX` is channel 4 of DMA2's stream 2 (RM0090, table 43).
-        const USART1_RX: dma::Request = 4;
-        let from = pac::USART1.dr().as_ptr().cast::<u8>();
-        // SAFETY: `from` is the port's data register, `RING` is a static in RAM that DMA reaches and that nobody else
-        // has (it can be taken once), and the channel is owned by the ring from here on.
+impl PortRx {
+    /// `channel` must be the one that serves the reception of `registers`, which must be `port`'s own.
+    fn new(
+        port: UartRx<'static, Blocking>,
+        registers: pac::usart::Usart,
+        channel: dma::Channel<'static>,
+        buffer: &'static mut [u8],
+        fetch_every: Duration,
+    ) -> Self {
+        let from = registers.dr().as_ptr().cast::<u8>();
+        // SAFETY: `from` is the port's data register, `buffer` is a static in RAM that DMA reaches and that nobody else
+        // has, and the channel is owned by the ring from here on.
         let mut ring = unsafe {
-            ReadableRingBuffer::new(channel, USART1_RX, from, RING.take(), TransferOptions::default())
+            ReadableRingBuffer::new(channel, USART_REQUEST, from, buffer, TransferOptions::default())
         };
         ring.start();
-        pac::USART1.cr3().modify(|w| w.set_dmar(true));
-        Self { _port: port, ring }
+        registers.cr3().modify(|w| w.set_dmar(true));
+        Self { _port: port, ring, fetch_every }
     }
 }
 
-impl Receive for AutopilotRx {
+impl Receive for PortRx {
     async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
         loop {
             match self.ring.read(buffer) {
-                Ok((0, _)) => Timer::after(FETCH_EVERY).await,
+                Ok((0, _)) => Timer::after(self.fetch_every).await,
                 Ok((count, _)) => return Ok(count),
                 Err(_) => {
                     self.ring.clear();
@@ -192,14 +232,43 @@ impl Receive for AutopilotRx {
     }
 }
 
-/// Transmission to the ground station.
-pub(crate) struct GsTx(UartTx<'static, Async>);
+/// A port's transmission, by DMA.
+pub(crate) struct PortTx {
+    port: UartTx<'static, Blocking>,
+    registers: pac::usart::Usart,
+    channel: dma::Channel<'static>,
+    baud: u32,
+}
 
-impl Transmit for GsTx {
+impl PortTx {
+    /// `channel` must be the one that serves the transmission of `registers`, which must be `port`'s own.
+    fn new(
+        port: UartTx<'static, Blocking>,
+        registers: pac::usart::Usart,
+        channel: dma::Channel<'static>,
+    ) -> Self {
+        registers.cr3().modify(|w| w.set_dmat(true));
+        Self { port, registers, channel, baud: 0 }
+    }
+}
+
+impl Transmit for PortTx {
     async fn transmit(&mut self, bytes: &[u8]) {
-        if let Err(error) = self.0.write(bytes).await {
-            defmt::warn!("GS port: {}", defmt::Debug2Format(&error));
+        if bytes.is_empty() {
+            return;
         }
+        let to = self.registers.dr().as_ptr().cast::<u8>();
+        // SAFETY: `to` is the port's data register. The transfer borrows `bytes`, which lie in a task's memory, in RAM
+        // that DMA reaches, and stops when it is dropped.
+        unsafe { self.channel.write(USART_REQUEST, bytes, to, TransferOptions::default()) }.await;
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        // Both halves share the divider. A rate that the clock cannot give changes nothing.
+        if baud != self.baud && self.port.set_baudrate(baud).is_err() {
+            defmt::warn!("a port cannot run at {=u32} baud", baud);
+        }
+        self.baud = baud;
     }
 }
 

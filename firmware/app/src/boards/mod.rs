@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `NAME` | the board's name |
 //! | `take() -> Parts` | starts the machine; to be called once, first |
-//! | `Parts` | `autopilot` ([`Receive`]), `gs` ([`Transmit`]), `card` (`CardDevice`), `led`, `watchdog`, `idle`, `boot` ([`Boot`]) |
+//! | `Parts` | `autopilot` and `gs` (each [`Receive`] and [`Transmit`]), `card` (`CardDevice`), `store` (`NorFlash`, two sectors), `led`, `watchdog`, `idle`, `boot` ([`Boot`]) |
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |
 //! | `ended()` | waits for the end of the input; for ever on a board that flies |
 //! | `cycles()` | a free running counter of [`CYCLE_BITS`] bits, for measuring |
@@ -47,6 +47,9 @@ pub(crate) trait Receive {
 pub(crate) trait Transmit {
     /// Sends all of `bytes`; returns when the port has taken the last.
     async fn transmit(&mut self, bytes: &[u8]);
+
+    /// The port's baud rate, both ways, from the next frame on.
+    fn set_baud(&mut self, baud: u32);
 }
 
 /// Why the machine started.
@@ -69,6 +72,11 @@ pub(crate) enum ResetCause {
 }
 
 impl ResetCause {
+    /// Whether it may have come in flight. Power that comes on its own is a pilot's.
+    pub(crate) const fn may_be_in_flight(self) -> bool {
+        !matches!(self, Self::PowerOn | Self::Pin)
+    }
+
     /// As the log names it.
     pub(crate) const fn name(self) -> &'static str {
         match self {

@@ -4,8 +4,9 @@ pub(crate) mod downlink;
 pub(crate) mod monitor;
 pub(crate) mod reception;
 pub(crate) mod storage;
+pub(crate) mod uplink;
 
-use hums_onboard::{PortStatus, Supervisor};
+use hums_onboard::{Mailbox, PortStatus, StoreStatus, Supervisor};
 use hums_recorder::CardStatus;
 
 /// Who has reported in.
@@ -14,3 +15,7 @@ pub(crate) static SUPERVISOR: Supervisor = Supervisor::new();
 pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
 /// What storage counts.
 pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
+/// Monitor to storage: what is to outlive power.
+pub(crate) static MAILBOX: Mailbox = Mailbox::new();
+/// What became of it.
+pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();

@@ -1,14 +1,18 @@
 //! Monitor: frames to records, findings and the summary. Also the one that feeds the watchdog, because it goes round
 //! every 50 ms whatever happens, and the one that works the LED.
 
-use embassy_futures::select::{Either3, select3};
+use core::sync::atomic::Ordering;
+
+use embassy_futures::select::{Either4, select4};
 use embassy_time::Ticker;
-use hums_onboard::Task;
+use hums_core::params::Param;
 use hums_onboard::monitoring::{Monitoring, Step, TICK};
-use hums_onboard::queues::{FramesOut, GsIn, SectorsIn};
+use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
+use hums_onboard::{Handover, Task};
 use hums_recorder::CardState;
 
-use super::{CARD_STATUS, SUPERVISOR};
+use super::downlink::{BAUD_AUTOPILOT, BAUD_GS};
+use super::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
 use crate::boards::board;
 use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
@@ -24,6 +28,7 @@ const BLINK_TROUBLE: u32 = 2;
 /// The monitor's ends of the queues.
 pub(crate) struct Ends {
     pub(crate) frames: FramesOut<'static>,
+    pub(crate) uplink: UplinkOut<'static>,
     pub(crate) sectors: SectorsIn<'static>,
     pub(crate) gs: GsIn<'static>,
 }
@@ -32,6 +37,7 @@ pub(crate) struct Ends {
 pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
     mut ends: Ends,
+    handover: &'static mut Handover<'static>,
     fault: Option<Fault>,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
@@ -46,10 +52,12 @@ pub(crate) async fn run(
     loop {
         SUPERVISOR.report(Task::Monitor, now());
         // Frames first where both are due: they came before this tick.
-        match select3(links::FRAMES.wait(), ticker.next(), links::INPUT_ENDED.wait()).await {
-            Either3::First(()) => drain(body, &mut ends),
-            Either3::Second(()) => {
-                tick(body, &mut ends);
+        let work = (links::FRAMES.wait(), ticker.next(), links::UPLINK.wait(), links::INPUT_ENDED.wait());
+        match select4(work.0, work.1, work.2, work.3).await {
+            Either4::First(()) => drain(body, &mut ends),
+            Either4::Third(()) => uplink(body, &mut ends),
+            Either4::Second(()) => {
+                tick(body, &mut ends, handover);
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
                 match SUPERVISOR.silent(now()) {
@@ -58,11 +66,12 @@ pub(crate) async fn run(
                     Some(task) => fault::silent(task),
                 }
             }
-            Either3::Third(()) => break,
+            Either4::Fourth(()) => break,
         }
         wake_others();
     }
     drain(body, &mut ends);
+    save_all(body, &mut ends, handover).await;
     body.finish(now(), &mut ends.sectors, &ends.gs);
     links::RECORD_ENDED.signal(());
     links::GS_EMPTY.reset();
@@ -77,7 +86,7 @@ pub(crate) async fn run(
 }
 
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
-    let Ends { frames, sectors, gs } = ends;
+    let Ends { frames, sectors, gs, .. } = ends;
     let mut begin = |step| {
         costs::enter(match step {
             Step::Encode => Stage::Encode,
@@ -88,7 +97,33 @@ fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
     while measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin)) {}
 }
 
-fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {
+fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
+    let Ends { uplink, sectors, gs, .. } = ends;
+    while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
+}
+
+/// Hands over everything that is to outlive power, as fast as the store takes it.
+async fn save_all(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+    links::ENDING.signal(());
+    while !handover.finish(now(), body.monitor_mut()) {
+        wake_others();
+        links::STORED.wait().await;
+    }
+    note(body, ends, handover);
+}
+
+/// Records what is new about the store.
+fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+    while let Some(news) = handover.news() {
+        defmt::info!("{=str}", news.text);
+        body.note(now(), news.severity, news.text, &mut ends.sectors);
+    }
+}
+
+fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
+    let params = body.monitor().params();
+    BAUD_GS.store(params.get(Param::GsBaud) as u32, Ordering::Relaxed);
+    BAUD_AUTOPILOT.store(params.get(Param::ApBaud) as u32, Ordering::Relaxed);
     let Ends { sectors, gs, .. } = ends;
     measure(Stage::Tick, || {
         body.tick(now(), sectors, gs, &mut |finding| {
@@ -101,11 +136,14 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends) {
                 finding.unit
             );
         });
+        handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
     });
+    note(body, ends, handover);
 }
 
 fn wake_others() {
     links::GS.signal(());
+    links::AUTOPILOT.signal(());
     links::SECTORS.signal(());
 }
 

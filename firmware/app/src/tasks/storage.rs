@@ -1,14 +1,15 @@
-//! Storage: sectors onto the card. The least urgent task: the card's driver waits with the processor, and so may delay
+//! Storage: sectors onto the card, and between them what outlives power into the store. The least urgent task: the card's driver waits with the processor, and so may delay
 //! nobody but idle.
 
 use embassy_time::{Duration, Timer, with_timeout};
 use hums_core::time::Span;
+use hums_onboard::persist::Kept;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::storage::NO_CARD_RETRY;
-use hums_onboard::{Service, Storage, Task};
+use hums_onboard::{Keeper, Service, Storage, Task};
+use hums_recorder::HeldBlocks;
 
 use super::{CARD_STATUS, SUPERVISOR};
-use hums_recorder::HeldBlocks;
 
 use crate::boards::board;
 use crate::costs::{Stage, measure};
@@ -20,7 +21,12 @@ const REPORT: Duration = Duration::from_secs(1);
 const CARD_PATIENCE: Span = Span::from_secs(5);
 
 #[embassy_executor::task]
-pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut<'static>) -> ! {
+pub(crate) async fn run(
+    card: board::Card,
+    entropy: u32,
+    mut sectors: SectorsOut<'static>,
+    keeper: &'static mut Keeper<'static, board::StoreFlash>,
+) -> ! {
     let held = HeldBlocks::new();
     let mut body = Storage::new(card, &CARD_STATUS, &held, entropy);
     let mut ended_at = None;
@@ -29,6 +35,7 @@ pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut
         let begun = now();
         let service = measure(Stage::Storage, || body.service(begun, &mut sectors));
         CARD_STATUS.end_service(now().since(begun).as_millis() as u32);
+        keep(keeper);
         if ended_at.is_none() && links::RECORD_ENDED.signaled() {
             ended_at = Some(begun);
         }
@@ -36,11 +43,12 @@ pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut
             Service::Wrote => {}
             Service::Idle if !sectors.is_empty() => {}
             Service::Idle if ended_at.is_some() => break,
-            Service::Idle => wait_for_work(&sectors).await,
+            Service::Idle => wait_for_work(&sectors, keeper).await,
             Service::NoCard if ended_at.is_some_and(|at| now().since(at) > CARD_PATIENCE) => break,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
     }
+    while keep(keeper) == Kept::Took {}
     body.finish();
     links::LOG_CLOSED.signal(body.abandon(&mut sectors));
     loop {
@@ -49,10 +57,20 @@ pub(crate) async fn run(card: board::Card, entropy: u32, mut sectors: SectorsOut
 }
 
 /// Returns when there is a sector, or no more to come.
-async fn wait_for_work(sectors: &SectorsOut<'_>) {
+async fn wait_for_work(sectors: &SectorsOut<'_>, keeper: &mut Keeper<'static, board::StoreFlash>) {
     while sectors.is_empty() && !links::RECORD_ENDED.signaled() {
         SUPERVISOR.report(Task::Storage, now());
+        keep(keeper);
         // Either way it looks again.
         let _ = with_timeout(REPORT, links::SECTORS.wait()).await;
     }
+}
+
+/// Saves one item, if there is one.
+fn keep(keeper: &mut Keeper<'static, board::StoreFlash>) -> Kept {
+    let kept = measure(Stage::Storage, || keeper.service(links::ENDING.signaled()));
+    if kept == Kept::Took {
+        links::STORED.signal(());
+    }
+    kept
 }

@@ -66,6 +66,7 @@ impl Body {
     }
 
     /// The fields that the layout describes; gives where they end. `calm`: the quiet ones stay as they are.
+    #[inline(never)]
     fn fields<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -75,11 +76,16 @@ impl Body {
         calm: bool,
     ) -> Option<usize> {
         let limit = limit(slot);
-        let mut context =
-            Context { elapsed_ms, clock_us: self.clock_us, clock_ms: self.clock_ms, neighbour: None };
+        let mut context = Context {
+            elapsed_ms,
+            clock_us: self.clock_us,
+            clock_ms: self.clock_ms,
+            neighbour: None,
+            link: None,
+        };
         let mut offset = 0;
         let mut link = usize::from(slot.links);
-        let mut quiet = 0;
+        let mut quiet = false;
         let mut elements = self.elements.list.get_mut(elements_in(slot))?.iter_mut();
         while let Some(element) = elements.next() {
             let (what, size) = (element.what, usize::from(element.size));
@@ -88,21 +94,18 @@ impl Body {
             }
             let place = frame.place(offset);
             let last = element.last;
-            let skip = calm && element.is_quiet();
-            match what {
-                _ if skip && what != What::Text => {
-                    if what.is_wide() {
-                        let upper = elements.next()?;
-                        if !C::WRITES {
-                            *place = (u64::from(upper.last) << 32 | u64::from(last)).to_le_bytes();
-                        }
-                    } else if !C::WRITES {
-                        put(place, last, size);
-                    }
-                    if what == What::Float {
-                        context.neighbour = Some((f32::from_bits(last), f32::from_bits(last)));
-                    }
+            let stays = calm && element.is_quiet();
+            if stays && what != What::Text {
+                let upper = if what.is_wide() { elements.next()?.last } else { 0 };
+                if !C::WRITES {
+                    let value = u64::from(upper) << 32 | u64::from(last);
+                    place.get_mut(..size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
                 }
+                quiet = true;
+                offset += size;
+                continue;
+            }
+            match what {
                 What::Integer1 | What::Integer2 | What::Integer4 => {
                     let bits = word(place) & (u32::MAX >> (32 - 8 * size));
                     let value = self.distributions.integer(coder, element, bits);
@@ -132,10 +135,10 @@ impl Body {
                     if element.has_links() {
                         links = links_at(&mut link, slot.key.id, offset);
                     }
-                    let linked = links
+                    context.link = links
                         .0
                         .and_then(|link| Some(self.registers.get(usize::from(link.register))? * link.scale));
-                    let value = self.distributions.float(coder, element, word(place), &context, linked);
+                    let value = self.distributions.float(coder, element, word(place), &context);
                     context.neighbour = Some((f32::from_bits(value), f32::from_bits(last)));
                     publish(&mut self.registers, links.1, element);
                     if !C::WRITES {
@@ -156,7 +159,7 @@ impl Body {
                 }
                 What::Text => {
                     let text = frame.payload.get_mut(offset..offset + size)?;
-                    self.texts.code(coder, element, text, skip)?;
+                    self.texts.code(coder, element, text, stays)?;
                 }
                 What::Instance => {
                     let instance = slot.key.instance.get(..size)?;
@@ -164,14 +167,15 @@ impl Body {
                 }
                 What::Upper => {}
             }
-            quiet |= u8::from(element.is_quiet());
+            quiet |= element.is_quiet();
             offset += size;
         }
-        slot.quiet = quiet != 0;
+        slot.quiet = quiet;
         Some(offset)
     }
 
     /// Whether all quiet elements stay as they are: one bit for all of them.
+    #[inline(never)]
     fn calm<C: Coder>(&mut self, coder: &mut C, slot: &mut Slot, frame: &mut Frame) -> Option<bool> {
         let same = C::WRITES && self.stays(slot, frame)?;
         let same = coder.bit(slot.calm.one().clamp(16, 4_080), same);

@@ -13,11 +13,15 @@ pub(super) const REPEATED: usize = 1;
 const SEQUENCE_JUMPS: usize = 2;
 const SPELLED_OUT: usize = 3;
 
+const UNEXPECTED: Cdf = Cdf::from_sizes([4, 8, 80, 20, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
 const SYMBOL: Cdf = Cdf::from_sizes([80, 4, 8, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
 
 /// How headers were coded so far.
 pub(super) struct Headers {
     last: u8,
+    /// Of a slot's first frame.
+    first: Cdf,
+    /// Of frames that are not as expected, by how the slot's last one was coded, and the one before.
     symbols: [Cdf; 16],
     jumps: [Cdf; 2],
     signatures: Cdf,
@@ -32,14 +36,50 @@ pub(super) struct Plan {
 
 impl Headers {
     pub(super) const fn new() -> Self {
-        Self { last: 0, symbols: [SYMBOL; 16], jumps: [Cdf::FLAT; 2], signatures: Cdf::FLAT }
+        Self {
+            last: 0,
+            first: SYMBOL,
+            symbols: [UNEXPECTED; 16],
+            jumps: [Cdf::FLAT; 2],
+            signatures: Cdf::FLAT,
+        }
     }
 
     pub(super) fn reset(&mut self) {
         *self = Self::new();
     }
 
+    /// Whether the header of the last frame was not as expected.
+    #[inline]
+    pub(super) const fn is_rough(&self) -> bool {
+        self.last != AS_EXPECTED as u8
+    }
+
+    /// Of a frame to be written: whether its header, length and checksum are as expected.
+    #[inline]
+    pub(super) fn is_expected(slot: &Slot, sender: &Sender, frame: &Frame, verified: bool) -> bool {
+        frame.sequence == sender.sequence && is_usual(slot, frame, verified)
+    }
+
+    /// Header, flags, length and checksum as expected.
+    #[inline]
+    pub(super) fn expected<C: Coder>(
+        &mut self,
+        slot: &mut Slot,
+        sender: &mut Sender,
+        frame: &mut Frame,
+    ) -> Plan {
+        (slot.header, self.last) = (AS_EXPECTED as u8, AS_EXPECTED as u8);
+        frame.sequence = sender.sequence;
+        sender.sequence = frame.sequence.wrapping_add(1);
+        if !C::WRITES {
+            take_flags(slot, frame);
+        }
+        Plan { header: AS_EXPECTED, length: None, checksum: None }
+    }
+
     /// Header, flags, length and checksum, as far as they are not as expected.
+    #[inline(never)]
     pub(super) fn code<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -60,7 +100,8 @@ impl Headers {
             };
         }
         let context = usize::from(slot.header) * 4 + usize::from(self.last);
-        let symbol = coder.symbol(&mut self.symbols[context & 15], symbol).min(SPELLED_OUT);
+        let cdf = if slot.frames == 0 { &mut self.first } else { &mut self.symbols[context & 15] };
+        let symbol = coder.symbol(cdf, symbol).min(SPELLED_OUT);
         (slot.header, self.last) = (symbol as u8, symbol as u8);
         jump = match symbol {
             AS_EXPECTED => 0,
@@ -77,10 +118,7 @@ impl Headers {
             plan = spelled_out(coder, slot, frame, verified);
         }
         if !C::WRITES {
-            (frame.incompat, frame.compat) = (slot.incompat, slot.compat);
-            if let Length::Fixed(len) = slot.length {
-                frame.len = usize::from(len);
-            }
+            take_flags(slot, frame);
         }
         plan
     }
@@ -122,6 +160,14 @@ impl Headers {
             *byte = coder.bits16(u32::from(*byte), 8) as u8;
         }
         Some(())
+    }
+}
+
+/// Flags and length of a frame that is read.
+fn take_flags(slot: &Slot, frame: &mut Frame) {
+    (frame.incompat, frame.compat) = (slot.incompat, slot.compat);
+    if let Length::Fixed(len) = slot.length {
+        frame.len = usize::from(len);
     }
 }
 

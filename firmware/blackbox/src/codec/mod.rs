@@ -116,13 +116,14 @@ impl Model {
             && frame.parse(entry.bytes).is_some()
             && let Some((next, key)) = self.route(frame)
         {
-            if self.slots.next(coder, next).is_some() {
-                self.frame(coder, next, key, frame, verified, entry.at_ms);
+            let expected = self.is_expected(next, frame, verified);
+            if self.slots.next(coder, next, expected, self.headers.is_rough()).is_some() {
+                self.frame(coder, (next, expected), key, frame, verified, entry.at_ms);
             }
             return;
         }
         let next = if entry.kind == Kind::Record { Next::Record } else { Next::Plain };
-        self.slots.next(coder, next);
+        self.slots.next(coder, next, false, self.headers.is_rough());
         let mut buffer = [0; ENTRY_BYTES_MAX];
         let len = entry.bytes.len().min(ENTRY_BYTES_MAX);
         buffer[..len].copy_from_slice(&entry.bytes[..len]);
@@ -139,16 +140,27 @@ impl Model {
         buffer: &mut [u8; ENTRY_BYTES_MAX],
     ) -> Result<Decoded, Corrupt> {
         let coder = &mut Reading { decoder, input };
-        let next = self.slots.next(coder, Next::Plain).ok_or(Corrupt)?;
+        let rough = self.headers.is_rough();
+        let (next, expected) = self.slots.next(coder, Next::Plain, false, rough).ok_or(Corrupt)?;
         if next == Next::Plain || next == Next::Record {
             let verified = Kind::Frame { verified: false };
             let kind = if next == Next::Record { Kind::Record } else { verified };
             return self.plain(coder, Decoded { kind, at_ms: 0, len: 0 }, buffer, false).ok_or(Corrupt);
         }
         frame.clear();
-        let (verified, at_ms) = self.frame(coder, next, NO_KEY, frame, false, 0).ok_or(Corrupt)?;
+        let (verified, at_ms) =
+            self.frame(coder, (next, expected), NO_KEY, frame, false, 0).ok_or(Corrupt)?;
         let len = frame.assemble(buffer);
         Ok(Decoded { kind: Kind::Frame { verified }, at_ms, len })
+    }
+
+    /// Whether the header of a frame to be written is as its slot lets expect.
+    #[inline]
+    fn is_expected(&self, next: Next, frame: &Frame, verified: bool) -> bool {
+        let Next::Slot(slot) = next else { return false };
+        let Some(slot) = self.slots.list.get(usize::from(slot)) else { return false };
+        let Some(sender) = self.slots.senders.get(usize::from(slot.key.sender)) else { return false };
+        Headers::is_expected(slot, sender, frame, verified)
     }
 
     /// Which slot a frame belongs to; `None` where there is no room for it in the model.
@@ -234,7 +246,7 @@ impl Model {
     fn frame<C: Coder>(
         &mut self,
         coder: &mut C,
-        next: Next,
+        (next, expected): (Next, bool),
         key: Key,
         frame: &mut Frame,
         verified: bool,
@@ -250,7 +262,11 @@ impl Model {
         let sender = self.slots.senders.get_mut(usize::from(slot.key.sender))?;
         (frame.system, frame.component) = (sender.system, sender.component);
         (frame.id, frame.v2) = (slot.key.id, slot.key.v2);
-        let plan = self.headers.code(coder, slot, sender, frame, verified, &self.body);
+        let plan = if expected {
+            self.headers.expected::<C>(slot, sender, frame)
+        } else {
+            self.headers.code(coder, slot, sender, frame, verified, &self.body)
+        };
         let elapsed_ms = (at_ms as u32).wrapping_sub(slot.at_ms);
         slot.at_ms = at_ms as u32;
         slot.frames = slot.frames.saturating_add(1);

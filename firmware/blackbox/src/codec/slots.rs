@@ -154,6 +154,11 @@ const OTHER_SLOT: usize = 2;
 const NEW_SLOT: usize = 3;
 const PLAIN: usize = 4;
 const RECORD: usize = 5;
+/// Added for a slot's frame whose header is not as expected.
+const UNEXPECTED: usize = 6;
+
+/// Distributions of the above: by how sure the first guess is, and whether the last frame's header was as expected.
+const KINDS: usize = 32;
 
 /// Successions of three and of two slots, hashed.
 const ORDER_3: usize = 512;
@@ -182,7 +187,7 @@ pub(crate) struct Slots {
     places: (u16, u16),
     /// What they let expect: the two likeliest slots, and how sure the first one is.
     guesses: (u8, u8, u8),
-    kind: [Cdf; 16],
+    kind: [Cdf; KINDS],
     high: Cdf,
     low: [Cdf; SLOTS / 16],
 }
@@ -200,7 +205,7 @@ impl Slots {
             past: [NONE; 3],
             places: places([NONE; 3]),
             guesses: (NONE, NONE, 0),
-            kind: [KIND; 16],
+            kind: [KIND; KINDS],
             high: Cdf::FLAT,
             low: [Cdf::FLAT; SLOTS / 16],
         }
@@ -214,7 +219,7 @@ impl Slots {
         self.past = [NONE; 3];
         self.places = places(self.past);
         self.guesses = (NONE, NONE, 0);
-        self.kind = [KIND; 16];
+        self.kind = [KIND; KINDS];
         self.high = Cdf::FLAT;
         self.low = [Cdf::FLAT; SLOTS / 16];
     }
@@ -301,10 +306,17 @@ impl Slots {
         (first, second, if agree && sure >= 7 { 12 + (sure & 3) } else { sure })
     }
 
-    /// Codes what comes next.
-    pub(crate) fn next<C: Coder>(&mut self, coder: &mut C, next: Next) -> Option<Next> {
+    /// Codes what comes next, and of a slot's frame whether its header is as expected. `rough`: that of the last
+    /// frame was not.
+    pub(crate) fn next<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        next: Next,
+        expected: bool,
+        rough: bool,
+    ) -> Option<(Next, bool)> {
         let (first, second, context) = self.guesses;
-        let symbol = match next {
+        let mut symbol = match next {
             Next::Slot(slot) if slot == first => FIRST_GUESS,
             Next::Slot(slot) if slot == second => SECOND_GUESS,
             Next::Slot(_) => OTHER_SLOT,
@@ -312,8 +324,13 @@ impl Slots {
             Next::Plain => PLAIN,
             Next::Record => RECORD,
         };
-        let symbol = coder.symbol(&mut self.kind[usize::from(context & 15)], symbol);
-        let slot = match symbol {
+        if symbol <= OTHER_SLOT && !expected {
+            symbol += UNEXPECTED;
+        }
+        let context = usize::from(context & 15) + if rough { 16 } else { 0 };
+        symbol = coder.symbol(&mut self.kind[context % KINDS], symbol);
+        let expected = symbol < UNEXPECTED;
+        let slot = match if expected { symbol } else { symbol - UNEXPECTED } {
             FIRST_GUESS => first,
             SECOND_GUESS => second,
             OTHER_SLOT => {
@@ -322,12 +339,12 @@ impl Slots {
                 let low = coder.symbol(self.low.get_mut(high)?, slot & 15);
                 (high << 4 | low) as u8
             }
-            NEW_SLOT => return Some(Next::NewSlot),
-            PLAIN => return Some(Next::Plain),
-            RECORD => return Some(Next::Record),
+            NEW_SLOT if expected => return Some((Next::NewSlot, false)),
+            PLAIN if expected => return Some((Next::Plain, false)),
+            RECORD if expected => return Some((Next::Record, false)),
             _ => return None,
         };
-        (slot < self.used).then_some(Next::Slot(slot))
+        (slot < self.used).then_some((Next::Slot(slot), expected))
     }
 
     /// Remembers that this slot came.
@@ -361,4 +378,4 @@ const fn places([a, b, c]: [u8; 3]) -> (u16, u16) {
     (three as u16 % ORDER_3 as u16, two as u16 % ORDER_2 as u16)
 }
 
-const KIND: Cdf = Cdf::from_sizes([60, 12, 12, 8, 1, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]);
+const KIND: Cdf = Cdf::from_sizes([60, 12, 12, 8, 1, 2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1]);

@@ -4,20 +4,23 @@
 use crate::coder::Coder;
 use crate::distribution::Cell;
 
-/// Contexts, hashed without check.
-const CELLS: usize = 2_048;
+/// Cells of a context's row: for the ways in which four bits may begin (the first is not used).
+const ROW: usize = 16;
+
+/// Rows, hashed without check.
+const ROWS: usize = 128;
 
 pub(crate) struct TextModel {
-    cells: [Cell; CELLS],
+    rows: [[Cell; ROW]; ROWS],
 }
 
 impl TextModel {
     pub(crate) const fn new() -> Self {
-        Self { cells: [Cell::EVEN; CELLS] }
+        Self { rows: [[Cell::EVEN; ROW]; ROWS] }
     }
 
     pub(crate) fn reset(&mut self) {
-        self.cells.fill(Cell::EVEN);
+        self.rows = [[Cell::EVEN; ROW]; ROWS];
     }
 
     /// One byte after `before` (the last three, the latest lowest), where the text before had `above`, and `matched`
@@ -36,19 +39,27 @@ impl TextModel {
             hash(before & 0xff, 0x3000_0005),
             hash(u32::from(above) << 2 | matched.min(3), 0x4000_0007),
         ];
-        let mut node = 1_u32;
-        for _ in 0..8 {
-            let bit = byte >> 7 != 0;
-            let bit = if C::WRITES { (byte >> (7 - node.ilog2())) & 1 != 0 } else { bit };
-            let places = seeds.map(|seed| (hash(seed ^ node, 0x9e37_79b1) >> 20) as usize % CELLS);
-            let one = mix(places.map(|place| self.cells[place]));
-            let bit = coder.bit(one, bit);
-            for place in places {
-                self.cells[place].adapt(bit);
+        let mut value = u32::from(byte);
+        let upper = self.nibble(coder, seeds, value >> 4);
+        value = self.nibble(coder, seeds.map(|seed| seed ^ (16 + upper)), value & 15);
+        (upper << 4 | value) as u8
+    }
+
+    /// Four bits, the highest first. Each context has a row of cells for them, one for each way they may begin.
+    #[inline]
+    fn nibble<C: Coder>(&mut self, coder: &mut C, seeds: [u32; 4], value: u32) -> u32 {
+        let rows = seeds.map(|seed| (hash(seed, 0x9e37_79b1) >> 25) as usize % ROWS);
+        let mut node = 1_usize;
+        for shift in [3, 2, 1, 0] {
+            let cells = rows.map(|row| self.rows[row][node % ROW]);
+            let bit = coder.bit(mix(cells), value >> shift & 1 != 0);
+            for (row, mut cell) in rows.into_iter().zip(cells) {
+                cell.adapt(bit);
+                self.rows[row][node % ROW] = cell;
             }
-            node = node << 1 | u32::from(bit);
+            node = node << 1 | usize::from(bit);
         }
-        node as u8
+        node as u32 & 15
     }
 }
 

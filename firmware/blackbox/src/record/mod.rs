@@ -6,6 +6,7 @@
 
 mod boot;
 mod finding;
+mod keep;
 mod loss;
 mod snapshot;
 mod usage;
@@ -16,6 +17,7 @@ use core::fmt;
 
 pub use boot::{Boot, Fault};
 pub use finding::{Event, FindingRecord, Note};
+pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
 pub use snapshot::{Protection, Snapshot, SnapshotValues};
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
@@ -69,9 +71,11 @@ pub enum Record<'a> {
     Exceedance(Exceedance<'a>),
     /// Kind 14: a part that wears.
     Component(Component<'a>),
-    /// Kind 15: half of a snapshot around a critical finding.
+    /// Kind 15: what of the session is kept, where not all of it is.
+    Keep(Keep),
+    /// Kind 16: half of a snapshot around a critical finding.
     Snapshot(Snapshot<'a>),
-    /// Kind 16: a step of the protective action.
+    /// Kind 17: a step of the protective action.
     Protection(Protection),
     /// A kind that this reader does not know.
     Unknown {
@@ -115,6 +119,7 @@ impl<'a> Record<'a> {
             Self::Lifetime(lifetime) => lifetime.store(&mut sink),
             Self::Exceedance(exceedance) => exceedance.store(&mut sink),
             Self::Component(component) => component.store(&mut sink),
+            Self::Keep(keep) => keep.store(&mut sink),
             Self::Snapshot(snapshot) => snapshot.store(&mut sink),
             Self::Protection(protection) => protection.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
@@ -145,8 +150,9 @@ impl<'a> Record<'a> {
             12 => Self::Lifetime(Lifetime::read(fields)),
             13 => Self::Exceedance(Exceedance::read(fields)),
             14 => Self::Component(Component::read(fields)),
-            15 => Snapshot::read(fields).map_or(unknown, Self::Snapshot),
-            16 => Protection::read(fields).map_or(unknown, Self::Protection),
+            15 => Self::Keep(Keep::read(fields)),
+            16 => Snapshot::read(fields).map_or(unknown, Self::Snapshot),
+            17 => Protection::read(fields).map_or(unknown, Self::Protection),
             _ => unknown,
         }
     }
@@ -249,6 +255,7 @@ mod tests {
             by: (255, 190),
             new_serial: "SN 2",
         }));
+        reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }));
         let (action, stage) = (Action::Land, Stage::Answered);
         reads_back(Record::Protection(Protection { action, stage, detail: 4, command: 21 }));
         reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });

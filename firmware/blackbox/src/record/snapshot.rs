@@ -74,7 +74,7 @@ impl<'a> Snapshot<'a> {
     }
 
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(15).u64(self.at.as_micros()).name(self.check).u8(self.instance);
+        sink.head(16).u64(self.at.as_micros()).name(self.check).u8(self.instance);
         sink.u8(self.subsystem as u8).u8(u8::from(self.after)).u64(self.first.as_micros());
         sink.bytes(&(self.interval.as_millis() as u16).to_le_bytes()).u8(self.width);
         sink.bytes(self.values);
@@ -139,7 +139,7 @@ impl Protection {
     }
 
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(16).u8(self.action as u8).u8(self.stage as u8).u8(self.detail);
+        sink.head(17).u8(self.action as u8).u8(self.stage as u8).u8(self.detail);
         sink.bytes(&self.command.to_le_bytes());
     }
 

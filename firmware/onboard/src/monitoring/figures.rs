@@ -45,6 +45,7 @@ impl Monitoring<'_> {
     pub(super) fn recorder_status(&self, now: Instant, sectors: &SectorsIn) -> RecorderStatus {
         let card = self.card.read();
         let recording = match card.state {
+            _ if self.companion.stopped => Recording::Stopped,
             CardState::Recording => Recording::Running,
             CardState::Unknown if now.since(Instant::ZERO) < START => Recording::Starting,
             CardState::Finished => Recording::Starting,

@@ -9,7 +9,7 @@ mod happenings;
 mod records;
 
 use hums_blackbox::record::{
-    Boot, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Vehicle as VehicleRecord,
+    Boot, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
@@ -20,6 +20,8 @@ use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
 use hums_recorder::status::{CardReading, CardStatus};
 
+use crate::companion::Companion;
+use crate::keeping::Keeping;
 use crate::loss::Losses;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::{FramesOut, GsIn, SectorsIn};
@@ -54,18 +56,20 @@ pub enum Step {
 /// The pipeline between the frame queue and the queues of sectors and of GS frames.
 pub struct Monitoring<'a> {
     /// Lent, as the writer is: either is too large to be moved over the firmware's stack.
-    monitor: &'a mut Monitor,
+    pub(crate) monitor: &'a mut Monitor,
     writer: &'a mut Writer,
-    summary: Summary,
+    pub(crate) summary: Summary,
+    pub(crate) companion: Companion,
     sequences: Sequences,
     card: &'a CardStatus,
     port: &'a PortStatus,
-    identity: Identity<'a>,
+    pub(crate) identity: Identity<'a>,
     /// The vehicle as it was recorded last.
     vehicle: VehicleRecord,
     /// UTC of power-on as it was recorded last, microseconds since 1970.
     epoch_micros: Option<u64>,
     losses: Losses,
+    keeping: Keeping,
     port_before: PortReading,
     card_before: CardReading,
     sums: Sums,
@@ -88,6 +92,7 @@ impl<'a> Monitoring<'a> {
     ) -> Self {
         Self {
             summary: Summary::new(monitor.params()),
+            companion: Companion::new(monitor.params()),
             monitor,
             writer,
             sequences: Sequences::new(),
@@ -97,6 +102,7 @@ impl<'a> Monitoring<'a> {
             vehicle: VehicleRecord::default(),
             epoch_micros: None,
             losses: Losses::new(),
+            keeping: Keeping::new(),
             port_before: PortReading::default(),
             card_before: card.read(),
             sums: Sums::default(),
@@ -110,6 +116,14 @@ impl<'a> Monitoring<'a> {
 
     /// Writes what a log begins with: who records, and every parameter that is not at its default.
     pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        self.keep(now, sectors);
+        self.heading(now, sectors);
+        self.record_usage(now, Moment::Start, sectors);
+    }
+
+    /// What each file of a log says of itself: one that is read alone, because those before it made room, misses
+    /// nothing but their time.
+    fn heading(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let boot = Record::Boot(self.identity);
         self.record(now, &boot, sectors);
         let params = *self.monitor.params();
@@ -121,7 +135,18 @@ impl<'a> Monitoring<'a> {
                 self.record(now, &Record::Parameter(parameter), sectors);
             }
         }
-        self.record_usage(now, Moment::Start, sectors);
+        self.vehicle = VehicleRecord::default();
+    }
+
+    /// What of the record is to be kept, by whether the vehicle is armed.
+    fn keep(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        let Self { keeping, monitor, card, writer, .. } = self;
+        let armed = monitor.vehicle().armed();
+        keeping.tick(now, monitor.params(), armed, card, writer, sectors);
+        if self.keeping.takes_new_file(self.card) {
+            self.heading(now, sectors);
+            self.record_usage(now, Moment::Periodic, sectors);
+        }
     }
 
     /// Records how the boot before this one ended. To be called after [`Self::start`].
@@ -157,7 +182,7 @@ impl<'a> Monitoring<'a> {
         begin: &mut impl FnMut(Step),
     ) {
         begin(Step::Encode);
-        if self.writer.frame(at, bytes, verified, sectors).is_err() {
+        if !self.companion.stopped && self.writer.frame(at, bytes, verified, sectors).is_err() {
             self.refused += 1;
             self.losses.count(at, Lost::QueueFull, 1);
         }
@@ -169,8 +194,9 @@ impl<'a> Monitoring<'a> {
         if let Some((source, observation)) = hums_link::observe(&frame) {
             self.monitor.observe(at, source, &observation);
         }
+        self.heard(at, &frame, sectors);
         begin(Step::Summary);
-        self.summary.frame(at, &frame, &mut |bytes| gs.put(bytes));
+        self.summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
     }
 
     /// What time alone asks for, every [`TICK`]. Each finding is recorded, told to the GS, and given to `findings`.
@@ -184,6 +210,7 @@ impl<'a> Monitoring<'a> {
         if self.card.take_group_wanted() && !self.writer.restart(sectors) {
             self.card.want_group();
         }
+        self.keep(now, sectors);
         self.count_losses(now, sectors);
         self.check(now, sectors, gs, findings);
         self.record_happenings(now, sectors);
@@ -199,7 +226,8 @@ impl<'a> Monitoring<'a> {
             self.record_usage(now, Moment::Periodic, sectors);
         }
         self.partial(now, sectors);
-        self.summary.tick(now, self.monitor, &mut |bytes| gs.put(bytes));
+        self.summary.tick(now, self.monitor, &mut |bytes| gs.tell(bytes));
+        self.converse(now, sectors, gs);
     }
 
     /// Ends the record in order: everything that is still open is written. The queues then hold what storage has to
@@ -216,6 +244,16 @@ impl<'a> Monitoring<'a> {
     /// What the monitor knows.
     pub const fn monitor(&self) -> &Monitor {
         self.monitor
+    }
+
+    /// What the monitor knows, to be changed: what is restored, saved, set.
+    pub const fn monitor_mut(&mut self) -> &mut Monitor {
+        self.monitor
+    }
+
+    /// Records a text of our own; `severity` is a `MAV_SEVERITY`.
+    pub fn note(&mut self, now: Instant, severity: u8, text: &str, sectors: &mut SectorsIn) {
+        self.record(now, &Record::Note(Note { severity, text }), sectors);
     }
 
     fn check(
@@ -235,7 +273,7 @@ impl<'a> Monitoring<'a> {
                 let event = Record::Event(Event { number: CRITICAL, text: finding.check });
                 write(now, &event, writer, losses, sectors);
             }
-            summary.finding(now, finding, &mut |bytes| gs.put(bytes));
+            summary.finding(now, finding, &mut |bytes| gs.tell(bytes));
             findings(finding);
         });
     }
@@ -248,7 +286,7 @@ impl<'a> Monitoring<'a> {
     }
 
     /// Writes a record, from the reserve if need be; a record that still finds no room is a counted loss.
-    fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
+    pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
         write(now, record, self.writer, &mut self.losses, sectors)
     }
 

@@ -20,8 +20,9 @@ use hums_recorder::status::CardReading;
 use pipeline::{Memory, Outside, Pipeline};
 
 use super::arrivals::Arrivals;
+use super::ground::{self, Ground};
 use super::report::Report;
-use super::{check_standard_output, drive, open_sink, pace, prepare_card};
+use super::{check_standard_output, drive, pace, prepare_card};
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -41,9 +42,11 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     })?;
     let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
+    let (mut ground, gs) = ground::open(run)?;
     let mut world = World {
         card: &card,
-        gs: open_sink(run.gs.as_ref())?,
+        gs,
+        autopilot: arrivals.take_autopilot(),
         report: Report::default(),
         reboots: run.faults.reboot_at.clone(),
         boots: 0,
@@ -54,10 +57,9 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     };
     world.reboots.sort_unstable();
     let start = WallClock::now();
-    while world
-        .power_on(&mut arrivals, &params, |arrivals, machine| drive(arrivals, speed, live, start, machine))?
-    {
-    }
+    while world.power_on(&mut arrivals, &mut ground, &params, |arrivals, ground, machine| {
+        drive(arrivals, ground, speed, live, start, machine)
+    })? {}
     if let Some(error) = card.take_image_error() {
         bail!("{}: {error}", run.sd.display());
     }
@@ -121,7 +123,15 @@ pub fn power_on(
 ) -> Result<PowerOn> {
     let mut memory = Memory::new(params);
     let (mut findings, mut gs) = (Vec::new(), std::io::sink());
-    let outside = Outside { card, gs: &mut gs, findings: &mut findings, power_on_us: 0, reboot_at_us: None };
+    let mut autopilot = std::io::sink();
+    let outside = Outside {
+        card,
+        gs: &mut gs,
+        autopilot: &mut autopilot,
+        findings: &mut findings,
+        power_on_us: 0,
+        reboot_at_us: None,
+    };
     let mut pipeline = Pipeline::new(outside, &mut memory, identity(boots), boots);
     pipeline.start()?;
     let mut ended = true;
@@ -163,6 +173,7 @@ fn identity(boots: u32) -> Boot<'static> {
 struct World<'a> {
     card: &'a SimCard,
     gs: Box<dyn Write + Send>,
+    autopilot: Box<dyn Write + Send>,
     report: Report,
     /// When our own power goes for a moment, sorted.
     reboots: Vec<u64>,
@@ -180,14 +191,16 @@ impl World<'_> {
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
+        ground: &mut Ground,
         params: &Params,
-        drive: impl FnOnce(&mut Arrivals, &mut Pipeline<'_, '_>) -> Result<bool>,
+        drive: impl FnOnce(&mut Arrivals, &mut Ground, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
         let mut memory = Memory::new(params);
         let outside = Outside {
             card: self.card,
             gs: &mut *self.gs,
+            autopilot: &mut *self.autopilot,
             findings: &mut self.report.findings,
             power_on_us: self.power_on_us,
             reboot_at_us: self.reboots.first().copied(),
@@ -195,7 +208,7 @@ impl World<'_> {
         let mut pipeline =
             Pipeline::new(outside, &mut memory, identity(self.boots), self.entropy.wrapping_add(self.boots));
         pipeline.start()?;
-        let ended = drive(arrivals, &mut pipeline)?;
+        let ended = drive(arrivals, ground, &mut pipeline)?;
         let mut lost = 0;
         if ended {
             lost = pipeline.finish()?;

@@ -7,11 +7,12 @@ use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_blackbox::Writer;
 use hums_blackbox::record::{Boot, Stats};
 use hums_core::Monitor;
-use hums_core::params::Params;
+use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 use hums_onboard::port::PortReading;
 use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
+use hums_onboard::uplink::{self, Uplink};
 use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
 use hums_recorder::status::CardReading;
 use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
@@ -22,8 +23,6 @@ use crate::run::Machine;
 use crate::run::report::Finding;
 use crate::source::Chunk;
 
-/// The ground station's port, in baud: a telemetry radio.
-const GS_BAUD: u64 = 57_600;
 /// A line that is silent for this long will not finish the frame it began.
 const SILENCE: Span = Span::from_millis(20);
 /// How soon storage looks again after it found no card.
@@ -65,6 +64,7 @@ impl Memory {
 pub(super) struct Outside<'a, 'w> {
     pub(super) card: &'a SimCard,
     pub(super) gs: &'w mut (dyn Write + Send),
+    pub(super) autopilot: &'w mut (dyn Write + Send),
     pub(super) findings: &'w mut Vec<Finding>,
     /// When this power-on is, in microseconds since the first input byte.
     pub(super) power_on_us: u64,
@@ -100,6 +100,7 @@ pub(super) struct Pipeline<'a, 'w> {
     port_status: &'a PortStatus,
     ends: Ends<'a>,
     reception: Reception<'a>,
+    uplink: Uplink,
     monitoring: Monitoring<'a>,
     storage: Storage<'a, Slot<'a>>,
     /// Since this power-on, as all that follow.
@@ -113,12 +114,15 @@ pub(super) struct Pipeline<'a, 'w> {
     gs_at: Instant,
     /// When the line counts as silent.
     silent_at: Option<Instant>,
+    /// When the ground station's line does.
+    uplink_silent_at: Option<Instant>,
 }
 
 /// What happens next.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Event {
     Silence,
+    UplinkSilence,
     Tick,
     Storage,
 }
@@ -139,6 +143,21 @@ impl Machine for Pipeline<'_, '_> {
         }
         Ok(!self.outside.card.is_dead())
     }
+
+    fn hear(&mut self, chunk: &Chunk) -> Result<bool> {
+        if self.outside.reboot_at_us.is_some_and(|at| chunk.at_us >= at) {
+            // Nobody listens while the power is off.
+            return Ok(true);
+        }
+        let at = Instant::from_micros(chunk.at_us.saturating_sub(self.outside.power_on_us));
+        if !self.advance(at)? {
+            return Ok(false);
+        }
+        self.uplink.bytes(self.now, &chunk.bytes, &mut self.ends.uplink_in);
+        self.uplink_silent_at = Some(self.now + uplink::SILENCE);
+        self.listen()?;
+        Ok(!self.outside.card.is_dead())
+    }
 }
 
 impl<'a, 'w> Pipeline<'a, 'w> {
@@ -154,6 +173,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             port_status,
             ends: queues.split(),
             reception: Reception::new(port_status),
+            uplink: Uplink::new(),
             monitoring: Monitoring::new(monitor, writer, identity, card_status, port_status),
             storage: Storage::new(Slot(outside.card), card_status, held, entropy),
             outside,
@@ -163,6 +183,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             busy: None,
             gs_at: Instant::ZERO,
             silent_at: None,
+            uplink_silent_at: None,
         }
     }
 
@@ -180,6 +201,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
                     self.silent_at = None;
                     self.reception.idle(self.now, &mut self.ends.frames_in);
                     self.drain()?;
+                }
+                Event::UplinkSilence => {
+                    self.uplink_silent_at = None;
+                    self.uplink.idle(self.now, &mut self.ends.uplink_in);
+                    self.listen()?;
                 }
                 Event::Tick => {
                     self.tick_at = self.tick_at + TICK;
@@ -200,7 +226,8 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     fn next_event(&self) -> Option<(Instant, Event)> {
         let silence = self.silent_at.map(|at| (at, Event::Silence));
         let storage = self.storage_at.map(|at| (at, Event::Storage));
-        let events = [silence, Some((self.tick_at, Event::Tick)), storage];
+        let uplink = self.uplink_silent_at.map(|at| (at, Event::UplinkSilence));
+        let events = [silence, Some((self.tick_at, Event::Tick)), uplink, storage];
         // `min_by_key` keeps the first of equals.
         events.into_iter().flatten().min_by_key(|(at, _)| *at)
     }
@@ -208,6 +235,12 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     fn drain(&mut self) -> Result<()> {
         let Ends { frames_out, sectors_in, gs_in, .. } = &mut self.ends;
         while self.monitoring.drain(frames_out, sectors_in, gs_in) {}
+        self.after_monitor()
+    }
+
+    fn listen(&mut self) -> Result<()> {
+        let Ends { uplink_out, sectors_in, gs_in, .. } = &mut self.ends;
+        while self.monitoring.uplink(self.now, uplink_out, sectors_in, gs_in) {}
         self.after_monitor()
     }
 
@@ -248,10 +281,16 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     /// What the GS port can have sent by now.
     fn send_gs(&mut self) -> Result<()> {
         let mut frame = [0; GS_FRAME_BYTES_MAX];
+        while let Some(length) = self.ends.autopilot_out.take(&mut frame) {
+            // An autopilot that has gone does not hear: its end shows in its own bytes.
+            let _ = self.outside.autopilot.write_all(frame.get(..length).unwrap_or_default());
+            let _ = self.outside.autopilot.flush();
+        }
+        let baud = (self.monitoring.monitor().params().get(Param::GsBaud) as u64).max(1);
         while self.gs_at <= self.now {
             let Some(length) = self.ends.gs_out.take(&mut frame) else { break };
             let bits = length as u64 * 10;
-            self.gs_at = self.now.max(self.gs_at) + Span::from_micros(bits * 1_000_000 / GS_BAUD);
+            self.gs_at = self.now.max(self.gs_at) + Span::from_micros(bits * 1_000_000 / baud);
             let bytes = frame.get(..length).unwrap_or_default();
             if let Err(error) = self.outside.gs.write_all(bytes).and_then(|()| self.outside.gs.flush()) {
                 if crate::output::is_reader_gone(&error) {
@@ -318,9 +357,10 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         stats
     }
 
-    /// Whether old segments were overwritten.
+    /// Whether the card no longer holds all that was logged: old segments were overwritten.
     pub(super) fn has_overwritten(&self) -> bool {
-        self.slot_status.read().segments_overwritten > 0
+        let card = self.slot_status.read();
+        card.segments_overwritten + card.segments_released > 0
     }
 }
 

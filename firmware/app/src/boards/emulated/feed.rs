@@ -1,7 +1,8 @@
 //! The feed: the arrival times of the input, read from a file or FIFO of the host.
 //!
 //! A record is 12 bytes, little endian: `u64` microseconds since power-on, `u32` count of bytes that arrive then.
-//! The bytes themselves come through USART1. A count of 0 only moves the clock. Times that go back count as now.
+//! The bytes themselves come through USART1, or through USART2 where the count's highest bit is set: then they are the
+//! ground station's. A count of 0 only moves the clock. Times that go back count as now.
 
 use semihosting::fs::File;
 use semihosting::io::Read;
@@ -10,6 +11,9 @@ const RECORD_BYTES: usize = 12;
 /// Records read from the host at a time; a FIFO may give fewer.
 const RECORDS_AT_A_TIME: usize = 64;
 
+/// The bit of a count that says whose bytes they are.
+const FROM_GS: u32 = 1 << 31;
+
 /// One record of the feed.
 #[derive(Clone, Copy)]
 pub(crate) struct Arrival {
@@ -17,6 +21,8 @@ pub(crate) struct Arrival {
     pub(crate) time_us: u64,
     /// How many bytes.
     pub(crate) bytes: u32,
+    /// They come from the ground station, not from the autopilot.
+    pub(crate) from_gs: bool,
 }
 
 /// Reads the feed record by record.
@@ -47,9 +53,11 @@ impl Feed {
         }
         let record = self.buffer.get(self.start..self.end)?.first_chunk::<RECORD_BYTES>()?;
         let [t0, t1, t2, t3, t4, t5, t6, t7, n0, n1, n2, n3] = *record;
+        let count = u32::from_le_bytes([n0, n1, n2, n3]);
         Some(Arrival {
             time_us: u64::from_le_bytes([t0, t1, t2, t3, t4, t5, t6, t7]),
-            bytes: u32::from_le_bytes([n0, n1, n2, n3]),
+            bytes: count & !FROM_GS,
+            from_gs: count & FROM_GS != 0,
         })
     }
 

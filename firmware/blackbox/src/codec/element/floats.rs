@@ -20,16 +20,16 @@ const LINKED: usize = 5;
 const RANDOM: u32 = 192;
 
 impl Distributions {
-    /// A float. `link`: what the linked register predicts.
+    /// A float.
+    #[inline(never)]
     pub(crate) fn float<C: Coder>(
         &mut self,
         coder: &mut C,
         element: &mut Element,
         value: u32,
         context: &Context,
-        link: Option<f32>,
     ) -> u32 {
-        let last = element.last;
+        let (last, link) = (element.last, context.link);
         let mut coded = (None, None);
         if element.decimals() >= 3
             && let Some(hundredths) = hundredths(last)

@@ -12,7 +12,7 @@ const HALF: usize = 2;
 
 impl Distributions {
     /// Codes the value's bits.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn integer<C: Coder>(&mut self, coder: &mut C, element: &mut Element, value: u32) -> u32 {
         // Bits that the value does not have.
         let (spare, kind) = match element.what {

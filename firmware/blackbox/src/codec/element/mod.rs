@@ -17,8 +17,8 @@ use costs::Costs;
 /// Elements at most: a copter with all streams has 430, a PX4 510.
 pub(crate) const ELEMENTS: usize = 544;
 
-/// An element that has not changed for so many frames is quiet.
-pub(crate) const QUIET: u8 = 6;
+/// An element that has not changed for 8 frames is quiet: one of these bits of the count is set.
+const QUIET: u8 = 0x38;
 
 /// How an element is coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +107,7 @@ impl Element {
     /// Whether it has not changed for long.
     #[inline]
     pub(crate) const fn is_quiet(&self) -> bool {
-        self.quiet & QUIET_MAX >= QUIET
+        self.quiet & QUIET != 0
     }
 
     /// Whether the table of links names it.
@@ -156,6 +156,8 @@ pub(crate) struct Context {
     pub(crate) clock_ms: u32,
     /// The float before in this frame: now and before.
     pub(crate) neighbour: Option<(f32, f32)>,
+    /// What the linked register predicts for the float that comes now.
+    pub(crate) link: Option<f32>,
 }
 
 /// The elements of a group, in the order in which slots claimed them.

@@ -15,6 +15,7 @@ const SAME_CLOCK: usize = 4;
 
 impl Distributions {
     /// A time of 4 bytes.
+    #[inline(never)]
     pub(crate) fn time<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -51,6 +52,7 @@ impl Distributions {
 
     /// An integer of 8 bytes (a double is coded by its bits): the element holds the lower half, the next one the
     /// upper.
+    #[inline(never)]
     pub(crate) fn wide<C: Coder>(
         &mut self,
         coder: &mut C,

@@ -1,0 +1,33 @@
+//! Uplink: the ground station's bytes to frames. What comes here is nobody's word: the monitor judges it.
+
+use embassy_time::with_timeout;
+use hums_onboard::queues::UplinkIn;
+use hums_onboard::uplink::{SILENCE, Uplink};
+
+use crate::boards::{Receive, board};
+use crate::links::{self, now};
+
+/// Bytes fetched at a time: 22 ms at 57,600 baud.
+const FETCH_BYTES: usize = 128;
+
+#[embassy_executor::task]
+pub(crate) async fn run(mut port: board::GsRx, mut frames: UplinkIn<'static>) -> ! {
+    let mut body = Uplink::new();
+    let mut bytes = [0; FETCH_BYTES];
+    let mut begun = false;
+    loop {
+        let received = if begun {
+            with_timeout(links::wait(SILENCE), port.receive(&mut bytes)).await
+        } else {
+            Ok(port.receive(&mut bytes).await)
+        };
+        begun = received.is_ok();
+        match received {
+            Ok(Ok(count)) => body.bytes(now(), bytes.get(..count).unwrap_or_default(), &mut frames),
+            // What is missing is missed by a checksum, and asked for again.
+            Ok(Err(_overrun)) => {}
+            Err(_silence) => body.idle(now(), &mut frames),
+        }
+        links::UPLINK.signal(());
+    }
+}

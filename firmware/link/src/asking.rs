@@ -1,0 +1,505 @@
+//! Asking the autopilot for the messages that the checks need, and for who it is.
+//!
+//! # How
+//! First we listen for [`LISTEN`]: what already comes often enough is not asked for, so that nothing is ever made
+//! slower. Then one message after the other is asked for with `SET_MESSAGE_INTERVAL`, each answered before the next.
+//! Every [`ROUND`] the rates are looked at anew: what has stopped (a reboot that we did not see, a stream that somebody
+//! else changed) is asked for again, each time twice as patiently, because an autopilot may well promise a message that
+//! it never has. A message that is refused is not asked for again until the autopilot reboots. An ArduPilot that never
+//! answers such commands, or knows none, is asked for whole groups with `REQUEST_DATA_STREAM`.
+//!
+//! # How much
+//! What is asked for takes at most [`SHARE`] percent of the port's line, and all intervals are stretched until it does.
+
+use hums_core::observation::{Autopilot, Source};
+use hums_core::time::{Instant, Span};
+
+use crate::messages;
+use crate::packet::Packet;
+
+/// How long we listen after the vehicle is heard first, or has rebooted.
+pub const LISTEN: Span = Span::from_secs(5);
+/// How often the rates are looked at.
+pub const ROUND: Span = Span::from_secs(10);
+/// Of the line, in percent, what all messages asked for may take together.
+pub const SHARE: u32 = 50;
+/// How long an answer may take.
+const ANSWER: Span = Span::from_secs(1);
+/// How often a command is repeated when there is no answer.
+const TRIES: u8 = 3;
+/// Commands without any answer, one after the other, that make an autopilot one that does not answer.
+const DEAF: u8 = 6;
+/// Rounds doubled at most: 10 s, 20 s ... 10 minutes and a half.
+const PATIENCE_MAX: u8 = 6;
+
+/// `MAV_CMD_SET_MESSAGE_INTERVAL`
+pub const SET_MESSAGE_INTERVAL: u16 = 511;
+/// `MAV_CMD_REQUEST_MESSAGE`
+pub const REQUEST_MESSAGE: u16 = 512;
+const AUTOPILOT_VERSION: u32 = 148;
+/// Of `MAV_RESULT`.
+const ACCEPTED: u8 = 0;
+/// As above.
+const TEMPORARILY: u8 = 1;
+/// As above.
+const IN_PROGRESS: u8 = 5;
+
+/// Who sends a message.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum By {
+    Both,
+    Px4,
+    ArduPilot,
+}
+
+/// id, who sends it, how many a second, bytes of a frame.
+type Wanted = (u32, By, u8, u8);
+
+/// What the checks need, the most needed first.
+const WANTED: [Wanted; 24] = [
+    (1, By::Both, 2, 43),           // SYS_STATUS
+    (30, By::Both, 10, 40),         // ATTITUDE
+    (33, By::Both, 5, 40),          // GLOBAL_POSITION_INT
+    (24, By::Both, 2, 64),          // GPS_RAW_INT
+    (147, By::Both, 1, 66),         // BATTERY_STATUS
+    (74, By::Both, 4, 32),          // VFR_HUD
+    (241, By::Both, 2, 44),         // VIBRATION
+    (2, By::Both, 1, 24),           // SYSTEM_TIME
+    (65, By::Both, 2, 54),          // RC_CHANNELS
+    (245, By::Px4, 2, 14),          // EXTENDED_SYS_STATE
+    (230, By::Px4, 2, 54),          // ESTIMATOR_STATUS
+    (291, By::Px4, 5, 69),          // ESC_STATUS
+    (290, By::Px4, 1, 58),          // ESC_INFO
+    (105, By::Px4, 20, 75),         // HIGHRES_IMU
+    (32, By::Px4, 5, 40),           // LOCAL_POSITION_NED
+    (193, By::ArduPilot, 2, 34),    // EKF_STATUS_REPORT
+    (125, By::ArduPilot, 1, 18),    // POWER_STATUS
+    (11_030, By::ArduPilot, 5, 56), // ESC_TELEMETRY_1_TO_4
+    (11_031, By::ArduPilot, 5, 56), // ESC_TELEMETRY_5_TO_8
+    (27, By::ArduPilot, 10, 41),    // RAW_IMU
+    (226, By::ArduPilot, 2, 20),    // RPM
+    (225, By::ArduPilot, 2, 82),    // EFI_STATUS
+    (11_039, By::ArduPilot, 1, 22), // MCU_STATUS
+    (29, By::ArduPilot, 1, 28),     // SCALED_PRESSURE
+];
+
+/// Groups of `REQUEST_DATA_STREAM` and their rates: raw sensors, extended status, RC, position, extra 1 to 3.
+const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Message {
+    /// Frames since the last look.
+    seen: u8,
+    refused: bool,
+    /// How often it was promised and did not come.
+    patience: u8,
+    /// Rounds to wait before it is asked for again.
+    wait: u8,
+    /// To be asked for in this round.
+    due: bool,
+}
+
+/// What is asked for and not answered yet.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    what: What,
+    at: Instant,
+    tries: u8,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum What {
+    Interval(usize),
+    Identity,
+}
+
+/// What we ask of the autopilot.
+#[derive(Clone, Debug)]
+pub struct Asking {
+    vehicle: Option<(Source, Autopilot)>,
+    reboots: u32,
+    messages: [Message; WANTED.len()],
+    asked: Option<Asked>,
+    /// When rates are looked at next.
+    look_at: Instant,
+    window: Span,
+    /// Commands without an answer, one after the other.
+    deaf: u8,
+    /// It knows no intervals: the next group to ask for, or how many there are when all are.
+    groups: Option<usize>,
+    identity: Message,
+}
+
+impl Default for Asking {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What the vehicle is, at this moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    /// The autopilot.
+    pub source: Source,
+    /// Whose it is.
+    pub autopilot: Autopilot,
+    /// How often it has rebooted.
+    pub reboots: u32,
+    /// Whether its `AUTOPILOT_VERSION` came.
+    pub identified: bool,
+    /// The port's line rate.
+    pub baud: u32,
+}
+
+impl Asking {
+    /// Nobody heard yet.
+    pub const fn new() -> Self {
+        const NONE: Message = Message { seen: 0, refused: false, patience: 0, wait: 0, due: false };
+        Self {
+            vehicle: None,
+            reboots: 0,
+            messages: [NONE; WANTED.len()],
+            asked: None,
+            look_at: Instant::ZERO,
+            window: LISTEN,
+            deaf: 0,
+            groups: None,
+            identity: NONE,
+        }
+    }
+
+    /// A frame of the vehicle came.
+    pub fn seen(&mut self, id: u32) {
+        if let Some(index) = WANTED.iter().position(|wanted| wanted.0 == id) {
+            let seen = &mut self.messages[index].seen;
+            *seen = seen.saturating_add(1);
+        }
+    }
+
+    /// The autopilot answered a command.
+    pub fn answered(&mut self, command: u16, result: u8) {
+        let Some(asked) = self.asked else { return };
+        let (expected, message) = match asked.what {
+            What::Interval(index) => (SET_MESSAGE_INTERVAL, &mut self.messages[index]),
+            What::Identity => (REQUEST_MESSAGE, &mut self.identity),
+        };
+        if command != expected || result == IN_PROGRESS {
+            return;
+        }
+        message.refused = !matches!(result, ACCEPTED | TEMPORARILY);
+        self.asked = None;
+        self.deaf = 0;
+    }
+
+    /// To be called at every tick; at most one message is given to `send`, which says whether it could be sent.
+    pub fn tick(&mut self, now: Instant, known: Option<&Known>, send: &mut impl FnMut(&Packet) -> bool) {
+        let Some(known) = known else { return };
+        if self.vehicle != Some((known.source, known.autopilot)) || self.reboots != known.reboots {
+            // It knows nothing of what we asked before.
+            *self = Self::new();
+            self.vehicle = Some((known.source, known.autopilot));
+            self.reboots = known.reboots;
+            self.look_at = now + LISTEN;
+        }
+        if now >= self.look_at {
+            self.look(known);
+            self.look_at = now + ROUND;
+            self.window = ROUND;
+        }
+        self.ask(now, known, send);
+    }
+
+    fn look(&mut self, known: &Known) {
+        let stretch = stretch(known);
+        let window_ms = self.window.as_millis() as u32;
+        let mut missing = false;
+        for (message, wanted) in self.messages.iter_mut().zip(&WANTED) {
+            // Less than two thirds of what is wanted.
+            let expected = u32::from(wanted.2) * window_ms / 1_000 * 2 / 3;
+            let is_enough = u32::from(message.seen) * stretch >= expected.clamp(1, 200);
+            message.seen = 0;
+            if is_enough {
+                message.patience = 0;
+                message.wait = 0;
+                message.due = false;
+            } else if is_sent_by(wanted, known.autopilot) && !message.refused {
+                message.due = message.wait == 0;
+                if message.due {
+                    message.wait = (1_u8 << message.patience) - 1;
+                    message.patience = (message.patience + 1).min(PATIENCE_MAX);
+                } else {
+                    message.wait -= 1;
+                }
+                missing |= message.due;
+            }
+        }
+        if known.identified {
+            self.identity.due = false;
+        } else if self.identity.wait == 0 && !self.identity.refused {
+            self.identity.due = true;
+            self.identity.wait = (1 << self.identity.patience) - 1;
+            self.identity.patience = (self.identity.patience + 1).min(PATIENCE_MAX);
+        } else {
+            self.identity.wait = self.identity.wait.saturating_sub(1);
+        }
+        if missing && self.groups.is_some() {
+            self.groups = Some(0);
+        }
+    }
+
+    fn ask(&mut self, now: Instant, known: &Known, send: &mut impl FnMut(&Packet) -> bool) {
+        if let Some(asked) = self.asked {
+            if now.since(asked.at) < ANSWER {
+                return;
+            }
+            if asked.tries < TRIES && send(&packet(asked.what, known)) {
+                self.asked = Some(Asked { at: now, tries: asked.tries + 1, ..asked });
+                return;
+            }
+            if asked.tries < TRIES {
+                return;
+            }
+            self.asked = None;
+            self.deaf = self.deaf.saturating_add(TRIES);
+        }
+        if let Some(group) = self.groups {
+            if let Some((stream, rate)) = GROUPS.get(group) {
+                let rate = (*rate / stretch(known) as u16).max(1);
+                let Source { system, component } = known.source;
+                if send(&messages::request_data_stream(*stream, rate, system, component)) {
+                    self.groups = Some(group + 1);
+                }
+            }
+            return;
+        }
+        if known.autopilot == Autopilot::ArduPilot && (self.deaf >= DEAF || self.knows_no_intervals()) {
+            self.groups = Some(0);
+            return;
+        }
+        let next = if self.identity.due {
+            Some(What::Identity)
+        } else {
+            self.messages.iter().position(|message| message.due).map(What::Interval)
+        };
+        let Some(what) = next else { return };
+        if send(&packet(what, known)) {
+            match what {
+                What::Identity => self.identity.due = false,
+                What::Interval(index) => self.messages[index].due = false,
+            }
+            self.asked = Some(Asked { what, at: now, tries: 1 });
+        }
+    }
+
+    /// Everything that any autopilot has was refused.
+    fn knows_no_intervals(&self) -> bool {
+        let both = self.messages.iter().zip(&WANTED).filter(|(_, wanted)| wanted.1 == By::Both);
+        both.filter(|(message, _)| message.refused).count() >= 3
+    }
+}
+
+const fn is_sent_by(wanted: &Wanted, autopilot: Autopilot) -> bool {
+    matches!(
+        (wanted.1, autopilot),
+        (By::Both, _) | (By::Px4, Autopilot::Px4) | (By::ArduPilot, Autopilot::ArduPilot)
+    )
+}
+
+/// By how much all intervals are stretched so that the line carries them.
+fn stretch(known: &Known) -> u32 {
+    let sent = WANTED.iter().filter(|wanted| is_sent_by(wanted, known.autopilot));
+    let bytes_per_s: u32 = sent.map(|wanted| u32::from(wanted.2) * u32::from(wanted.3)).sum();
+    let carried = (known.baud / 10 * SHARE / 100).max(1);
+    bytes_per_s.div_ceil(carried).max(1)
+}
+
+fn packet(what: What, known: &Known) -> Packet {
+    let Source { system, component } = known.source;
+    match what {
+        What::Interval(index) => {
+            let (id, _, rate_hz, _) = WANTED[index];
+            let interval_us = 1_000_000 / u32::from(rate_hz) * stretch(known);
+            messages::command_long(SET_MESSAGE_INTERVAL, &[id as f32, interval_us as f32], system, component)
+        }
+        What::Identity => {
+            messages::command_long(REQUEST_MESSAGE, &[AUTOPILOT_VERSION as f32], system, component)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet::Fields;
+
+    /// An autopilot by script.
+    #[derive(Default)]
+    struct Script {
+        autopilot: Autopilot,
+        /// What it sends: id and how often a second.
+        streams: Vec<(u32, u32)>,
+        /// What it cannot send.
+        unknown: Vec<u32>,
+        /// Promised and never sent.
+        empty: Vec<u32>,
+        /// Does not answer commands.
+        deaf: bool,
+        /// Answers every `SET_MESSAGE_INTERVAL` with this `MAV_RESULT`.
+        refuses: Option<u8>,
+        reboots: u32,
+        identified: bool,
+        baud: u32,
+        /// What it was asked: when in ms, command (or stream with the highest bit), first parameter.
+        asked: Vec<(u64, u16, u32)>,
+    }
+
+    impl Script {
+        fn new(autopilot: Autopilot) -> Self {
+            Self { autopilot, baud: 921_600, ..Self::default() }
+        }
+
+        fn run(&mut self, asking: &mut Asking, from_s: u64, to_s: u64) {
+            for now_ms in (from_s * 1_000..to_s * 1_000).step_by(50) {
+                for (id, hz) in &self.streams {
+                    // So many a second, spread over it.
+                    let count = |ms: u64| ms * u64::from(*hz) / 1_000;
+                    (count(now_ms)..count(now_ms + 50)).for_each(|_| asking.seen(*id));
+                }
+                let known = Known {
+                    source: Source { system: 1, component: 1 },
+                    autopilot: self.autopilot,
+                    reboots: self.reboots,
+                    identified: self.identified,
+                    baud: self.baud,
+                };
+                let mut sent = Vec::new();
+                asking.tick(Instant::from_millis(now_ms), Some(&known), &mut |packet| {
+                    sent.push(packet.clone());
+                    true
+                });
+                assert!(sent.len() <= 1, "one at a time");
+                for packet in &sent {
+                    self.take(now_ms, packet, asking);
+                }
+            }
+        }
+
+        fn take(&mut self, now_ms: u64, packet: &Packet, asking: &mut Asking) {
+            let fields = Fields(packet.payload());
+            if packet.id() == 66 {
+                let (stream, rate) = (fields.u8(4), u32::from(fields.u16(0)));
+                self.asked.push((now_ms, 0x8000 | u16::from(stream), rate));
+                if stream == 10 {
+                    self.streams.push((30, rate));
+                }
+                return;
+            }
+            let (command, id, interval_us) = (fields.u16(28), fields.f32(0) as u32, fields.f32(4));
+            self.asked.push((now_ms, command, id));
+            if self.deaf {
+                return;
+            }
+            let result = match self.refuses.filter(|_| command == SET_MESSAGE_INTERVAL) {
+                Some(result) => result,
+                None if self.unknown.contains(&id) => 4,
+                None => 0,
+            };
+            if result == 0 && command == SET_MESSAGE_INTERVAL && !self.empty.contains(&id) {
+                self.streams.retain(|(stream, _)| *stream != id);
+                self.streams.push((id, (1e6 / interval_us).round() as u32));
+            }
+            self.identified |= result == 0 && command == REQUEST_MESSAGE;
+            asking.answered(command, result);
+        }
+
+        fn count(&self, command: u16, id: u32) -> usize {
+            self.asked.iter().filter(|(_, asked, of)| (*asked, *of) == (command, id)).count()
+        }
+
+        fn rate(&self, id: u32) -> Option<u32> {
+            self.streams.iter().find(|(stream, _)| *stream == id).map(|(_, hz)| *hz)
+        }
+    }
+
+    #[test]
+    fn a_px4_is_asked_for_what_is_missing_and_left_alone_with_the_rest() {
+        let mut px4 = Script { streams: vec![(30, 50), (105, 50), (1, 1)], ..Script::new(Autopilot::Px4) };
+        px4.empty = vec![290, 291];
+        let mut asking = Asking::new();
+        px4.run(&mut asking, 0, 5);
+        assert_eq!(px4.asked, [], "first it listens");
+        px4.run(&mut asking, 5, 60);
+        assert_eq!((px4.rate(30), px4.rate(105)), (Some(50), Some(50)), "never made slower");
+        assert_eq!((px4.rate(1), px4.rate(230), px4.rate(33)), (Some(2), Some(2), Some(5)));
+        assert!(px4.identified);
+        assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 193), 0, "that is ArduPilot's");
+        assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 33), 1, "what comes is not asked for again");
+        px4.run(&mut asking, 60, 3_600);
+        let promised = px4.count(SET_MESSAGE_INTERVAL, 291);
+        assert!((5..20).contains(&promised), "{promised} times asked for what never comes, in an hour");
+    }
+
+    #[test]
+    fn a_reboot_and_a_stream_that_falls_silent_are_asked_again() {
+        let mut px4 = Script::new(Autopilot::Px4);
+        let mut asking = Asking::new();
+        px4.run(&mut asking, 0, 60);
+        assert_eq!(px4.rate(33), Some(5));
+        px4.streams.clear();
+        px4.reboots = 1;
+        px4.run(&mut asking, 60, 100);
+        assert_eq!(px4.rate(33), Some(5), "after a reboot");
+        px4.streams.retain(|(id, _)| *id != 33);
+        px4.run(&mut asking, 100, 140);
+        assert_eq!(px4.rate(33), Some(5), "after silence");
+    }
+
+    #[test]
+    fn what_is_refused_is_not_asked_for_again_until_a_reboot() {
+        let mut copter = Script { unknown: vec![225, 226], ..Script::new(Autopilot::ArduPilot) };
+        let mut asking = Asking::new();
+        copter.run(&mut asking, 0, 1_000);
+        assert_eq!(
+            (copter.count(SET_MESSAGE_INTERVAL, 225), copter.count(SET_MESSAGE_INTERVAL, 226)),
+            (1, 1)
+        );
+        assert_eq!(copter.rate(193), Some(2));
+        copter.reboots = 1;
+        copter.run(&mut asking, 1_000, 1_100);
+        assert_eq!(copter.count(SET_MESSAGE_INTERVAL, 225), 2);
+    }
+
+    #[test]
+    fn an_old_ardupilot_is_asked_for_groups() {
+        for (deaf, refuses) in [(true, None), (false, Some(3))] {
+            let mut old = Script { deaf, refuses, ..Script::new(Autopilot::ArduPilot) };
+            let mut asking = Asking::new();
+            old.run(&mut asking, 0, 120);
+            for (stream, _) in GROUPS {
+                let asked =
+                    old.asked.iter().filter(|(_, what, _)| *what == 0x8000 | u16::from(stream)).count();
+                assert!(asked > 0, "group {stream}, deaf: {deaf}");
+            }
+            assert_eq!(old.rate(30), Some(8));
+            let commands = old.asked.iter().filter(|(_, what, _)| *what == SET_MESSAGE_INTERVAL).count();
+            assert!(commands <= 9, "{commands} commands that it does not know");
+        }
+    }
+
+    #[test]
+    fn a_slow_line_is_not_asked_for_more_than_it_carries() {
+        let mut px4 = Script { baud: 19_200, ..Script::new(Autopilot::Px4) };
+        let mut asking = Asking::new();
+        px4.run(&mut asking, 0, 120);
+        let bytes =
+            |id: u32| WANTED.iter().find(|wanted| wanted.0 == id).map_or(0, |wanted| u32::from(wanted.3));
+        let all: u32 = px4.streams.iter().map(|(id, hz)| hz * bytes(*id)).sum();
+        assert!(px4.streams.len() > 10 && all <= 19_200 / 10, "{all} bytes a second: {:?}", px4.streams);
+    }
+
+    #[test]
+    fn without_a_vehicle_nothing_is_asked() {
+        let mut asking = Asking::new();
+        asking.tick(Instant::from_millis(60_000), None, &mut |_| panic!("nobody is there"));
+    }
+}

@@ -1,0 +1,129 @@
+//! The messages that we send, field by field as they lie on the wire (`common.xml`).
+
+use hums_core::time::Instant;
+
+use crate::encode::{COMPONENT, Severity, TEXT_BYTES_MAX};
+use crate::packet::Packet;
+
+/// `MAV_TYPE_ONBOARD_CONTROLLER`
+const TYPE: u8 = 18;
+/// `MAV_AUTOPILOT_INVALID`: nobody takes us for a vehicle.
+const AUTOPILOT: u8 = 8;
+/// `MAV_PARAM_TYPE_REAL32`
+const REAL32: u8 = 9;
+/// Of `MAV_PROTOCOL_CAPABILITY`: `COMMAND_INT`, `FTP`, `MAVLINK2`, `PARAM_ENCODE_C_CAST`.
+const CAPABILITIES: u64 = 8 | 32 | 8_192 | 131_072;
+
+/// HEARTBEAT; `state` is a `MAV_STATE`: 3 standby, 4 active, 5 critical, 6 emergency.
+pub fn heartbeat(state: u8) -> Packet {
+    Packet::new(0).u8(4, TYPE).u8(5, AUTOPILOT).u8(7, state).u8(8, 3)
+}
+
+/// STATUSTEXT: a text for the pilot; longer than [`TEXT_BYTES_MAX`] bytes is cut.
+pub fn status_text(severity: Severity, text: &str) -> Packet {
+    Packet::new(253).u8(0, severity as u8).text(1, TEXT_BYTES_MAX, text)
+}
+
+/// `NAMED_VALUE_FLOAT`: a value that ground stations plot by its name (at most 10 bytes).
+pub fn named_float(now: Instant, name: &str, value: f32) -> Packet {
+    Packet::new(251).u32(0, now.as_millis() as u32).f32(4, value).text(8, 10, name)
+}
+
+/// `NAMED_VALUE_INT`
+pub fn named_int(now: Instant, name: &str, value: i32) -> Packet {
+    Packet::new(252).u32(0, now.as_millis() as u32).u32(4, value as u32).text(8, 10, name)
+}
+
+/// `PARAM_VALUE`
+pub fn param_value(name: &str, value: f32, index: u16, count: u16) -> Packet {
+    Packet::new(22).f32(0, value).u16(4, count).u16(6, index).text(8, 16, name).u8(24, REAL32)
+}
+
+/// `COMMAND_ACK` to the one who asked; `result` is a `MAV_RESULT`.
+pub fn command_ack(command: u16, result: u8, system: u8, component: u8) -> Packet {
+    Packet::new(77).u16(0, command).u8(2, result).u8(8, system).u8(9, component)
+}
+
+/// `COMMAND_LONG` with the first parameters given and the others zero.
+pub fn command_long(command: u16, params: &[f32], system: u8, component: u8) -> Packet {
+    let packet = Packet::new(76).u16(28, command).u8(30, system).u8(31, component);
+    params.iter().take(7).enumerate().fold(packet, |packet, (index, value)| packet.f32(4 * index, *value))
+}
+
+/// `REQUEST_DATA_STREAM`: all messages of a group at `rate_hz`.
+pub fn request_data_stream(stream: u8, rate_hz: u16, system: u8, component: u8) -> Packet {
+    Packet::new(66).u16(0, rate_hz).u8(2, system).u8(3, component).u8(4, stream).u8(5, 1)
+}
+
+/// `AUTOPILOT_VERSION` of ours: what we can, our version (major, minor, patch), the chip's own number.
+pub fn autopilot_version(version: [u8; 3], git: &str, uid: &[u8; 12]) -> Packet {
+    let [major, minor, patch] = version;
+    // The lowest byte is FIRMWARE_VERSION_TYPE: 255 is official, 0 development.
+    let number = u32::from_be_bytes([major, minor, patch, 0]);
+    let short = uid.iter().fold(0_u64, |sum, byte| sum.rotate_left(8) ^ u64::from(*byte));
+    Packet::new(148).u64(0, CAPABILITIES).u64(8, short).u32(16, number).text(36, 8, git).bytes(60, uid)
+}
+
+/// `PROTOCOL_VERSION`: MAVLink 2.0, and nothing older.
+pub fn protocol_version() -> Packet {
+    Packet::new(300).u16(0, 200).u16(2, 200).u16(4, 200)
+}
+
+/// `LOG_ENTRY`
+pub fn log_entry(id: u16, count: u16, last: u16, bytes: u32, utc_s: u32) -> Packet {
+    Packet::new(118).u32(0, utc_s).u32(4, bytes).u16(8, id).u16(10, count).u16(12, last)
+}
+
+/// `LOG_DATA`: at most 90 bytes.
+pub fn log_data(id: u16, offset: u32, data: &[u8]) -> Packet {
+    let data = data.get(..90).unwrap_or(data);
+    // The count is set last, so that a block that ends in zeros is told whole by it.
+    Packet::new(120).u32(0, offset).u16(4, id).bytes(7, data).u8(6, data.len() as u8)
+}
+
+/// `FILE_TRANSFER_PROTOCOL` to the one who asked.
+pub fn file_transfer(system: u8, component: u8, payload: &[u8]) -> Packet {
+    let payload = payload.get(..251).unwrap_or(payload);
+    Packet::new(110).u8(1, system).u8(2, component).bytes(3, payload)
+}
+
+/// Whether a target is us: our component of our system, or anything of which we are a part.
+pub const fn concerns_us(target: (u8, u8), system: u8) -> bool {
+    (target.0 == system || target.0 == 0) && (target.1 == COMPONENT || target.1 == 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::frame::{Check, Frame};
+
+    /// That the layouts are right is pymavlink's to say, in the end to end tests; here that they fit their messages.
+    #[test]
+    fn every_message_of_ours_is_as_long_as_its_definition_allows() {
+        let name = "SIXTEEN_LETTERS_";
+        let packets = [
+            heartbeat(4),
+            status_text(Severity::Warning, &"x".repeat(80)),
+            named_float(Instant::from_millis(1), "HUMS_LEVEL", 1.0),
+            named_int(Instant::from_millis(1), "HUMS_STATE", -1),
+            param_value(name, 1.0, 1, 2),
+            command_ack(512, 3, 255, 190),
+            command_long(511, &[1.0; 9], 1, 1),
+            request_data_stream(1, 4, 1, 1),
+            autopilot_version([0, 1, 2], "0123456789", &[7; 12]),
+            protocol_version(),
+            log_entry(1, 1, 1, 1, 1),
+            log_data(1, 0, &[1; 100]),
+            file_transfer(255, 190, &[1; 300]),
+        ];
+        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        for packet in packets {
+            let message = hums_dialect::message(packet.id()).expect("a message of the dialect");
+            assert!(packet.payload().len() <= usize::from(message.len_max), "{}", packet.id());
+            let mut encoder = Encoder::new();
+            let frame = Frame::parse(encoder.frame(&mut buffer, &packet)).expect("a frame");
+            assert_eq!(frame.check(), Check::Verified, "{}", packet.id());
+        }
+    }
+}

@@ -1,0 +1,307 @@
+//! What one port may send, and when: a byte budget that holds in every window of one second, the port's own line rate,
+//! and who goes first.
+//!
+//! # The budget
+//! Bytes are booked for the moment at which they will have left the port, by a model of its line: a frame begins when
+//! the one before it has left. A frame is let through when all bytes that leave the port in the second before its own
+//! beginning, together with its own, stay within its class's part of the budget. So no window of one second at the port
+//! itself ever holds more, whatever waits in the queue. Times are kept in slots of 20 ms and a slot counts whole, so at
+//! saturation up to 2 % of the budget stay unused.
+//!
+//! # Who goes first
+//! Each [`Class`] may fill the budget up to a mark of its own, so that the more urgent one always finds room above it;
+//! and only findings may wait behind more than [`BACKLOG`] of the line, so that a finding never waits longer than that.
+//! Events (the vehicle's texts and answers) and bulk (lists, logs) have half and three fifths of the budget at most, so
+//! that neither starves what is forwarded.
+
+use hums_core::time::{Instant, Span};
+
+use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+use crate::packet::Packet;
+
+/// How long the line may be busy when a frame that is no finding is added.
+pub const BACKLOG: Span = Span::from_millis(50);
+/// The same for findings, which come in bursts: no queue needs to hold more.
+const BACKLOG_FINDINGS: Span = Span::from_millis(300);
+/// A finding's text with its header, and a signature: what stays free for a critical one.
+const RESERVE: u32 = 80;
+/// The least budget that has such a reserve: below, it would leave nothing for anything else.
+const RESERVE_FROM: u32 = 400;
+
+/// How urgent a frame is, the most urgent first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// A critical finding.
+    Critical,
+    /// Any other finding.
+    Finding,
+    /// Heartbeats, and answers to those who ask.
+    Own,
+    /// What the vehicle says once: texts, answers.
+    Event,
+    /// The vehicle's frames that repeat, and our values.
+    Forward,
+    /// Lists and logs.
+    Bulk,
+}
+
+/// A part of the budget, filled evenly.
+#[derive(Clone, Copy, Debug)]
+struct Bucket {
+    /// Bytes times microseconds a second.
+    level: u64,
+    at: Instant,
+}
+
+impl Bucket {
+    const FULL: Self = Self { level: u64::MAX, at: Instant::ZERO };
+
+    /// What is in it now, in bytes; it holds one second of `bytes_per_s`.
+    fn refresh(&mut self, now: Instant, bytes_per_s: u32) -> u32 {
+        const UNIT: u64 = 1_000_000;
+        let most = u64::from(bytes_per_s) * UNIT;
+        let gained = now.since(self.at).as_micros().min(UNIT) * u64::from(bytes_per_s);
+        self.level = self.level.min(most).saturating_add(gained).min(most);
+        self.at = now;
+        (self.level / UNIT) as u32
+    }
+
+    fn take(&mut self, bytes: usize) {
+        self.level = self.level.saturating_sub(bytes as u64 * 1_000_000);
+    }
+}
+
+/// Bytes that left the port, or will, by time.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    slots: [u16; Self::SLOTS],
+    /// The latest slot that is in use.
+    newest: u64,
+}
+
+impl Window {
+    const SLOT_MICROS: u64 = 20_000;
+    /// Slots of one second.
+    const SECOND: u64 = 50;
+    /// A second, and as much of the future as may be booked: 0.3 s and the longest frame at the slowest rate.
+    const SLOTS: usize = 96;
+
+    const fn slot(at: Instant) -> u64 {
+        at.as_micros() / Self::SLOT_MICROS
+    }
+
+    fn advance(&mut self, slot: u64) {
+        for passed in 0..slot.saturating_sub(self.newest).min(Self::SLOTS as u64) {
+            self.slots[((slot - passed) % Self::SLOTS as u64) as usize] = 0;
+        }
+        self.newest = self.newest.max(slot);
+    }
+
+    /// Bytes that leave the port in the second before `start`, and later.
+    fn sum(&self, start: Instant) -> u32 {
+        let first = Self::slot(start).saturating_sub(Self::SECOND);
+        let count = (self.newest + 1).saturating_sub(first).min(Self::SLOTS as u64);
+        (0..count)
+            .map(|back| u32::from(self.slots[((self.newest - back) % Self::SLOTS as u64) as usize]))
+            .sum()
+    }
+
+    fn book(&mut self, end: Instant, bytes: usize) {
+        let slot = Self::slot(end);
+        self.advance(slot);
+        let place = &mut self.slots[(slot % Self::SLOTS as u64) as usize];
+        *place = place.saturating_add(bytes as u16);
+    }
+}
+
+/// One port's way out.
+#[derive(Clone, Debug)]
+pub struct Outlet {
+    /// Makes our frames.
+    pub encoder: Encoder,
+    window: Window,
+    events: Bucket,
+    bulk: Bucket,
+    budget: u32,
+    baud: u32,
+    /// When the line has sent everything.
+    free_at: Instant,
+}
+
+impl Outlet {
+    /// A port that may send `budget` bytes a second on a line of `baud`.
+    pub const fn new(budget: u32, baud: u32) -> Self {
+        Self {
+            encoder: Encoder::new(),
+            window: Window { slots: [0; Window::SLOTS], newest: 0 },
+            events: Bucket::FULL,
+            bulk: Bucket::FULL,
+            budget,
+            baud,
+            free_at: Instant::ZERO,
+        }
+    }
+
+    /// Another budget in bytes a second, and another line rate in baud (9,600 or more).
+    pub fn set(&mut self, budget: u32, baud: u32) {
+        self.budget = budget;
+        self.baud = baud.max(9_600);
+    }
+
+    /// The budget in bytes a second.
+    pub const fn budget(&self) -> u32 {
+        self.budget
+    }
+
+    /// Up to where a class may fill a second.
+    fn mark(&self, class: Class) -> u32 {
+        let budget = self.budget;
+        let (reserve, own) =
+            if budget >= RESERVE_FROM { (RESERVE, (budget / 10).clamp(50, 200)) } else { (0, budget / 4) };
+        match class {
+            Class::Critical => budget,
+            Class::Finding | Class::Own | Class::Event => budget - reserve,
+            Class::Forward | Class::Bulk => budget - reserve - own,
+        }
+    }
+
+    /// Whether a frame of `bytes` may go now.
+    pub fn fits(&mut self, now: Instant, class: Class, bytes: usize) -> bool {
+        self.fits_besides(now, class, bytes, 0)
+    }
+
+    /// The same, where `more` bytes shall find room in the same second.
+    pub fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
+        let start = self.free_at.max(now);
+        let busy = start.since(now);
+        let waits = match class {
+            Class::Critical | Class::Finding => busy <= BACKLOG_FINDINGS,
+            _ => busy == Span::ZERO || busy + self.duration(bytes) <= BACKLOG,
+        };
+        if !waits || bytes > GS_FRAME_BYTES_MAX {
+            return false;
+        }
+        let share = match class {
+            Class::Event => self.events.refresh(now, (self.budget / 2).max(RESERVE.min(self.budget))),
+            Class::Bulk => self.bulk.refresh(now, self.budget / 5 * 3),
+            _ => u32::MAX,
+        };
+        // Old slots are cleared before they are counted.
+        self.window.advance(Window::slot(start));
+        let wanted = (bytes + more) as u32;
+        bytes as u32 <= share && self.window.sum(start).saturating_add(wanted) <= self.mark(class)
+    }
+
+    fn duration(&self, bytes: usize) -> Span {
+        Span::from_micros(bytes as u64 * 10_000_000 / u64::from(self.baud.max(1)))
+    }
+
+    /// Sends a frame as it is, if it may go now.
+    pub fn pass(&mut self, now: Instant, class: Class, frame: &[u8], out: &mut impl FnMut(&[u8])) -> bool {
+        if !self.fits(now, class, frame.len()) {
+            return false;
+        }
+        self.free_at = self.free_at.max(now) + self.duration(frame.len());
+        self.window.book(self.free_at, frame.len());
+        match class {
+            Class::Event => self.events.take(frame.len()),
+            Class::Bulk => self.bulk.take(frame.len()),
+            _ => {}
+        }
+        out(frame);
+        true
+    }
+
+    /// Sends a message of ours, if it may go now.
+    pub fn send(&mut self, now: Instant, class: Class, packet: &Packet, out: &mut impl FnMut(&[u8])) -> bool {
+        // Signing is work: not for a frame that will not go.
+        if !self.fits(now, class, self.encoder.frame_len(packet)) {
+            return false;
+        }
+        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut encoder = self.encoder;
+        let frame = encoder.frame(&mut buffer, packet);
+        let sent = !frame.is_empty() && self.pass(now, class, frame, out);
+        if sent {
+            // Only what is sent uses a sequence number.
+            self.encoder = encoder;
+        }
+        sent
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether no window of a second holds more than `budget`, by the beginning of each frame and by its end.
+    fn assert_budget(sent: &[(u64, usize)], budget: u32, baud: u32) {
+        let mut free_us = 0;
+        let mut spans = Vec::new();
+        for (at_us, bytes) in sent {
+            let start: u64 = free_us.max(*at_us);
+            free_us = start + *bytes as u64 * 10_000_000 / u64::from(baud);
+            spans.push((start, free_us, *bytes));
+        }
+        for (first, (_, end, _)) in spans.iter().enumerate() {
+            let window =
+                spans[first..].iter().take_while(|(start, ..)| start.saturating_sub(*end) < 1_000_000);
+            let bytes: usize = window.map(|(.., bytes)| bytes).sum();
+            assert!(bytes <= budget as usize, "{bytes} of {budget} bytes in the second from {end} us");
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn every_window_of_a_second_stays_within_the_budget(
+            budget in 100_u32..5_000,
+            baud in proptest::sample::select(vec![9_600_u32, 57_600, 921_600]),
+            steps in proptest::collection::vec((0_u64..90_000, 12_usize..280, 0_usize..6), 1..400),
+        ) {
+            let mut outlet = Outlet::new(budget, baud);
+            let mut now_us = 0;
+            let mut sent = Vec::new();
+            for (step_us, bytes, class) in steps {
+                now_us += step_us;
+                let class = [Class::Critical, Class::Finding, Class::Own, Class::Event, Class::Forward, Class::Bulk][class];
+                let frame = vec![0; bytes];
+                outlet.pass(Instant::from_micros(now_us), class, &frame, &mut |frame| sent.push((now_us, frame.len())));
+            }
+            assert_budget(&sent, budget, baud);
+        }
+    }
+
+    #[test]
+    fn a_saturated_outlet_uses_its_budget() {
+        let mut outlet = Outlet::new(2_000, 57_600);
+        let mut bytes = 0;
+        for now_ms in 0..60_000 {
+            outlet.pass(Instant::from_millis(now_ms), Class::Forward, &[0; 40], &mut |frame| {
+                bytes += frame.len();
+            });
+        }
+        let mark = outlet.mark(Class::Forward) as usize;
+        assert!(bytes >= 60 * mark * 95 / 100 && bytes <= 61 * mark, "{bytes} of {} bytes", 60 * mark);
+    }
+
+    #[test]
+    fn a_critical_finding_finds_room_and_waits_less_than_the_backlog() {
+        for budget in [400, 1_000, 5_000] {
+            let mut outlet = Outlet::new(budget, 57_600);
+            for now_ms in 0..10_000 {
+                let now = Instant::from_millis(now_ms);
+                for class in [Class::Bulk, Class::Forward, Class::Event, Class::Own] {
+                    outlet.pass(now, class, &[0; 60], &mut |_| {});
+                }
+                if now_ms % 1_500 == 1_499 {
+                    let waits = outlet.free_at.since(now);
+                    assert!(
+                        outlet.pass(now, Class::Critical, &[0; 79], &mut |_| {}),
+                        "at {now_ms} ms, {budget} B/s"
+                    );
+                    assert!(waits <= BACKLOG, "{waits:?} at {now_ms} ms");
+                }
+            }
+        }
+    }
+}

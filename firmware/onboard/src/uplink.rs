@@ -1,0 +1,57 @@
+//! The uplink task's body: the ground station's bytes to frames, and each with its time into the uplink queue.
+//!
+//! As urgent as the downlink: nothing is lost while its port's ring holds (88 ms at 57,600 baud). Whoever is on the
+//! other side is a stranger, so nothing here costs more than a framer's bounded work for each byte, and a flood ends at
+//! a full queue: it keeps nobody from recording.
+
+use hums_core::time::{Instant, Span};
+use hums_link::frame::{Check, Frame};
+use hums_link::framer::Framer;
+
+use crate::queues::UplinkIn;
+
+/// A line that is silent for this long will not finish the frame it began: [`Uplink::idle`] is due.
+pub const SILENCE: Span = Span::from_millis(100);
+
+/// The ground station port's framer.
+#[derive(Debug)]
+pub struct Uplink {
+    framer: Framer,
+    frames_lost: u32,
+}
+
+impl Default for Uplink {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Uplink {
+    /// Before the first byte.
+    pub const fn new() -> Self {
+        Self { framer: Framer::new(), frames_lost: 0 }
+    }
+
+    /// Takes bytes that had come by `now`; each frame that they complete is queued with that time.
+    pub fn bytes(&mut self, now: Instant, bytes: &[u8], frames: &mut UplinkIn) {
+        let Self { framer, frames_lost } = self;
+        framer.push(bytes, &mut |frame| queue(now, &frame, frames, frames_lost));
+    }
+
+    /// The line has been silent: what waits for more bytes is decided now.
+    pub fn idle(&mut self, now: Instant, frames: &mut UplinkIn) {
+        let Self { framer, frames_lost } = self;
+        framer.idle(&mut |frame| queue(now, &frame, frames, frames_lost));
+    }
+
+    /// Frames that found the queue full, modulo 2^32.
+    pub const fn frames_lost(&self) -> u32 {
+        self.frames_lost
+    }
+}
+
+fn queue(now: Instant, frame: &Frame<'_>, frames: &mut UplinkIn, frames_lost: &mut u32) {
+    if !frames.put(now.as_micros(), frame.check() == Check::Verified, frame.bytes()) {
+        *frames_lost = frames_lost.wrapping_add(1);
+    }
+}

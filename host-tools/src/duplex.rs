@@ -1,0 +1,148 @@
+//! Both directions of a live endpoint: a reader that waits a while, and a writer.
+//!
+//! UDP answers whoever spoke last (`udpin`), or its fixed peer (`udpout`); before anyone did, bytes go nowhere, as on a
+//! UART that nothing is plugged into.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpStream, UdpSocket};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+
+use crate::endpoint::Endpoint;
+
+const CONNECT: Duration = Duration::from_secs(10);
+const WRITE: Duration = Duration::from_secs(5);
+/// A datagram that fits the smallest path without being cut up.
+const DATAGRAM_BYTES_MAX: usize = 1200;
+
+/// Anything that reads with a time limit.
+pub trait Port: Send {
+    /// As `Read::read`; silence is an error that [`is_silence`] knows.
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
+}
+
+/// Both directions.
+pub struct Duplex {
+    /// What comes.
+    pub reader: Box<dyn Port>,
+    /// What goes.
+    pub writer: Box<dyn Write + Send>,
+}
+
+/// Whether nothing came in time.
+pub fn is_silence(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+/// Opens a live endpoint; reading waits for `silence` at most.
+pub fn open(endpoint: &Endpoint, silence: Duration) -> Result<Duplex> {
+    let context = || format!("{endpoint}: cannot be opened");
+    Ok(match endpoint {
+        Endpoint::UdpIn(address) => {
+            let socket = UdpSocket::bind(address.resolve()?).with_context(context)?;
+            datagrams(socket, None, silence).with_context(context)?
+        }
+        Endpoint::UdpOut(address) => {
+            let to = address.resolve()?;
+            let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
+            let socket = UdpSocket::bind(any).with_context(context)?;
+            // Who listens learns from a first, empty datagram where to answer.
+            let _ = socket.send_to(&[], to);
+            datagrams(socket, Some(to), silence).with_context(context)?
+        }
+        Endpoint::Tcp(address) => {
+            let stream = TcpStream::connect_timeout(&address.resolve()?, CONNECT).with_context(context)?;
+            stream.set_read_timeout(Some(silence)).with_context(context)?;
+            stream.set_write_timeout(Some(WRITE)).with_context(context)?;
+            stream.set_nodelay(true).with_context(context)?;
+            let writer = stream.try_clone().with_context(context)?;
+            Duplex { reader: Box::new(Stream(stream)), writer: Box::new(writer) }
+        }
+        Endpoint::Serial { device, baud } => {
+            let reader = serialport::new(device, *baud).timeout(silence).open().with_context(context)?;
+            let writer = reader.try_clone().with_context(context)?;
+            Duplex { reader: Box::new(Stream(reader)), writer: Box::new(writer) }
+        }
+        Endpoint::File(_) | Endpoint::Standard => bail!("{endpoint} is not live: nobody there answers"),
+    })
+}
+
+fn datagrams(socket: UdpSocket, peer: Option<SocketAddr>, silence: Duration) -> io::Result<Duplex> {
+    socket.set_read_timeout(Some(silence))?;
+    let fixed = peer.is_some();
+    let peer = Arc::new(Mutex::new(peer));
+    let writer = DatagramWriter { socket: socket.try_clone()?, peer: Arc::clone(&peer) };
+    Ok(Duplex { reader: Box::new(DatagramReader { socket, peer, fixed }), writer: Box::new(writer) })
+}
+
+struct Stream<R>(R);
+
+/// What is taken from a stream at once: 11 ms of the fastest port.
+const STREAM_BYTES: usize = 1024;
+
+impl<R: Read + Send> Port for Stream<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let end = buffer.len().min(STREAM_BYTES);
+        self.0.read(buffer.get_mut(..end).unwrap_or_default())
+    }
+}
+
+struct DatagramReader {
+    socket: UdpSocket,
+    peer: Arc<Mutex<Option<SocketAddr>>>,
+    fixed: bool,
+}
+
+impl Port for DatagramReader {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.socket.recv_from(buffer) {
+            Ok((_, from)) if self.fixed && Some(from) != *lock(&self.peer) => {
+                Err(ErrorKind::WouldBlock.into())
+            }
+            Ok((count, from)) => {
+                *lock(&self.peer) = Some(from);
+                // An empty datagram is not the end of anything.
+                if count == 0 { Err(ErrorKind::WouldBlock.into()) } else { Ok(count) }
+            }
+            // The peer may come yet.
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Err(ErrorKind::WouldBlock.into()),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+struct DatagramWriter {
+    socket: UdpSocket,
+    peer: Arc<Mutex<Option<SocketAddr>>>,
+}
+
+impl Write for DatagramWriter {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let peer = *lock(&self.peer);
+        if let Some(peer) = peer {
+            for datagram in bytes.chunks(DATAGRAM_BYTES_MAX) {
+                match self.socket.send_to(datagram, peer) {
+                    // Nobody listens (yet), or the line is full: UDP loses, that is its nature.
+                    Err(error)
+                        if !matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::WouldBlock) =>
+                    {
+                        return Err(error);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn lock(peer: &Mutex<Option<SocketAddr>>) -> std::sync::MutexGuard<'_, Option<SocketAddr>> {
+    // An address is whole whatever happened to who held it.
+    peer.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,55 @@
+//! The ground station: what it gets, and what it sends, either live or from a file with its own times (`--gs-input`), which
+//! makes a conversation that repeats to the byte.
+
+use std::io::Write;
+
+use anyhow::{Context, Result};
+
+use super::arrivals::CHUNK_BYTES_MAX;
+use crate::cli::Run;
+use crate::sink::{self, Heard};
+use crate::source::{self, Chunk, Source, Timing};
+
+/// What the ground station sends.
+pub struct Ground {
+    heard: Heard,
+    stored: Option<Box<dyn Source>>,
+    next: Option<Chunk>,
+}
+
+/// Opens both directions as the command line says it.
+pub fn open(run: &Run) -> Result<(Ground, Box<dyn Write + Send>)> {
+    let (writer, heard) = match &run.gs {
+        Some(endpoint) => {
+            let ground = sink::open(endpoint)?;
+            (ground.writer, ground.heard)
+        }
+        None => (sink::nowhere(), Heard::nobody()),
+    };
+    let timing = Timing { line_rate: None };
+    let stored = run.gs_input.as_ref().map(|input| source::open(input, timing)).transpose()?;
+    Ok((Ground { heard, stored, next: None }, writer))
+}
+
+impl Ground {
+    /// What it sent by `now_us`, the oldest first; `None` when that is all.
+    pub fn until(&mut self, now_us: u64) -> Result<Option<Chunk>> {
+        if self.next.is_none()
+            && let Some(stored) = &mut self.stored
+        {
+            self.next = stored.next().context("--gs-input: cannot be read")?;
+        }
+        if let Some(chunk) = &mut self.next
+            && chunk.at_us <= now_us
+        {
+            let rest = chunk.bytes.split_off(chunk.bytes.len().min(CHUNK_BYTES_MAX));
+            let bytes = std::mem::replace(&mut chunk.bytes, rest);
+            let at_us = chunk.at_us;
+            if chunk.bytes.is_empty() {
+                self.next = None;
+            }
+            return Ok(Some(Chunk { at_us, bytes }));
+        }
+        Ok(self.heard.take().map(|bytes| Chunk { at_us: now_us, bytes }))
+    }
+}
