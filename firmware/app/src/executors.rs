@@ -6,7 +6,7 @@
 //! | 1 | the port's interrupts | moves bytes, microseconds |
 //! | 2 | the clock's interrupt | wakes tasks |
 //! | 3 | reception | the ring holds 44 ms |
-//! | 5 | monitor | the frame queue holds 80 ms |
+//! | 5 | monitor | the frame queue holds 40 ms |
 //! | 7 | downlink | an alert has 50 ms; with it requests and uplink, which only move bytes between ports and queues |
 //! | 9 | storage | the sector queue holds 2.5 s; its library waits for the card with the processor |
 

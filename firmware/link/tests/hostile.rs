@@ -2,10 +2,14 @@
 #![allow(clippy::panic, clippy::unwrap_used)]
 
 use hums_core::Monitor;
+use hums_core::component::{COMPONENTS_MAX, Label};
 use hums_core::health::Level;
-use hums_core::params::Params;
+use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey};
+use hums_core::params::{Params, TABLE};
+use hums_core::snapshot::{COLUMNS_MAX, SAMPLES};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::Instant;
+use hums_core::usage::BASELINE_FIRST;
 use hums_link::sequence::Sequences;
 use hums_link::{Framer, observe};
 use proptest::prelude::*;
@@ -59,6 +63,54 @@ fn payload() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
+/// Parameters anywhere in their ranges.
+fn params(settings: &[(usize, f32)]) -> Params {
+    let mut params = Params::defaults();
+    for (index, place) in settings {
+        let spec = &TABLE[*index];
+        // Whole numbers choose; what is out of range by rounding is refused.
+        let value = (spec.min + place * (spec.max - spec.min)).round();
+        let _ = params.set(spec.name, value);
+    }
+    params
+}
+
+/// Everything that the monitor gives away, as the firmware takes it after each tick.
+fn look(monitor: &mut Monitor, now: Instant) {
+    let sane = |counter: u8, value: f64| {
+        // A baseline may be negative: a motor slower than the others.
+        let sign = counter >= BASELINE_FIRST || value >= 0.0;
+        assert!(value.is_finite() && sign, "counter {counter} is {value}");
+    };
+    monitor.for_each_counter(sane);
+    monitor.for_each_counter_of_life(sane);
+    while monitor.take_happening().is_some() {}
+    while let Some(snapshot) = monitor.take_snapshot(now) {
+        assert!(snapshot.values().count() <= SAMPLES * COLUMNS_MAX);
+    }
+    let _ = monitor.take_request();
+    for exceedance in monitor.exceedances().iter(now) {
+        assert!(exceedance.lifetime.warnings >= exceedance.session.warnings);
+    }
+    for place in 0..COMPONENTS_MAX {
+        let used = monitor.component_used_percent(place);
+        assert!(used.is_none_or(|percent| percent >= 0.0), "{used:?}");
+    }
+    let mut replaced = false;
+    while let Some(key) = monitor.save_due(now) {
+        let mut item = [0; ITEM_BYTES_MAX];
+        let length = monitor.encode_item(key, &mut item);
+        let again = Monitor::new(Params::defaults()).restore(key, &item[..length]);
+        assert_eq!(again, Ok(()), "{key:?} does not read back");
+        monitor.saved(key);
+        // Once: it is to be saved itself.
+        if !replaced {
+            replaced = true;
+            monitor.replace_component(usize::from(key.number() % 8), Label::new("new"));
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
@@ -67,10 +119,22 @@ proptest! {
         messages in prop::collection::vec((0..USED.len(), payload(), 0..5_000_u64, any::<u8>()), 1..80),
         armed in any::<bool>(),
         autopilot in prop::sample::select(vec![3_u8, 12, 0]),
+        settings in prop::collection::vec((0..TABLE.len(), 0.0..=1.0_f32), 0..30),
+        items in prop::collection::vec((any::<u8>(), prop::collection::vec(any::<u8>(), 0..600)), 0..6),
     ) {
         let mut framer = Framer::new();
         let mut sequences = Sequences::new();
-        let mut monitor = Monitor::new(Params::defaults());
+        let mut monitor = Monitor::new(params(&settings));
+        for (number, stored) in &items {
+            if let Some(key) = ItemKey::from_number(number % 24) {
+                // Refused or taken: either must do.
+                let mut stored = stored.clone();
+                if let Some(version) = stored.first_mut() {
+                    *version = (*version).max(1);
+                }
+                let _ = monitor.restore(key, &stored);
+            }
+        }
         let mut now_ms = 0;
         let first = frame(0, 0, &heartbeat(armed, autopilot));
         for bytes in std::iter::once((first, 0)).chain(
@@ -88,9 +152,7 @@ proptest! {
             monitor.tick(now, &link, &RecorderStatus::default(), &mut |finding| {
                 assert!(finding.level != finding.previous, "{finding:?}");
             });
-            monitor.usage().for_each(|counter, value| {
-                assert!(value.is_finite() && value >= 0.0, "counter {counter} is {value}");
-            });
+            look(&mut monitor, now);
         }
     }
 

@@ -15,8 +15,8 @@ use hums_blackbox::{ENTRY_SECTORS_MAX, Header, SECTOR_BYTES, Sector, SectorSink}
 
 use crate::shelf::{Reader, Server, Shelf};
 
-/// 80 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes a fraction.
-pub const FRAME_QUEUE_BYTES: usize = 8 * 1024;
+/// 40 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes one or two.
+pub const FRAME_QUEUE_BYTES: usize = 4 * 1024;
 
 /// The outlet lets 50 ms of the port wait (288 bytes at 57,600 baud), and behind them every finding that it holds back
 /// at once: 16 texts of 79 bytes, signed and with the queue's two bytes each.

@@ -1,6 +1,6 @@
 //! The monitor task's body: frames from the queue into the record, the checks and the summary stream.
 //!
-//! Less urgent than reception, whose frames wait up to 80 ms for it; more urgent than anything that waits for a device.
+//! Less urgent than reception, whose frames wait up to 40 ms for it; more urgent than anything that waits for a device.
 //! One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] every 50 ms does
 //! what time alone asks for.
 
