@@ -196,7 +196,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Lifetime(life) => super::wear::lifetime(life),
         Record::Exceedance(exceedance) => super::wear::exceedance(exceedance),
         Record::Component(component) => vec![super::wear::component(component)],
-<<<<<<< HEAD
         Record::Keep(keep) => one(
             "HUMS_KEEP",
             vec![
@@ -205,8 +204,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("seconds", count(keep.seconds)),
             ],
         ),
-=======
->>>>>>> monitor
         Record::Snapshot(snapshot) => super::wear::snapshot(snapshot),
         Record::Protection(protection) => one(
             "HUMS_PROTECTION",
@@ -215,17 +212,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("stage", text(protection.stage.name())),
                 ("detail", count(protection.detail)),
                 ("command", count(protection.command)),
-<<<<<<< HEAD
-=======
-            ],
-        ),
-        Record::Keep(keep) => one(
-            "HUMS_KEEP",
-            vec![
-                ("all", count(u8::from(keep.all))),
-                ("from_sector", count(keep.from)),
-                ("seconds", count(keep.seconds)),
->>>>>>> monitor
             ],
         ),
         Record::Unknown { kind, version, bytes } => one(
