@@ -46,12 +46,14 @@ pub enum Command {
     Sim(Sim),
     /// The same with the real Cortex-M4 firmware image, in QEMU
     Emulate(Emulate),
-    /// Turn logs into files for other tools: tlog, CSV, JSON lines
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines, line protocol, Parquet, the thesis's tables
     Decode(Decode),
     /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
     /// Check everything that can be checked about a log or a card
     Verify(Verify),
+    /// Write a page about a flight: plots, map, findings, usage, trend; one HTML file, no network
+    Report(Report),
     /// Write one log file from a recording, without a card's file system
     Pack(Pack),
     /// List, read or set the board's parameters over MAVLink
@@ -69,6 +71,7 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --gs udpin:127.0.0.1:14551 --speed real
   hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
   hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
+  hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
 
 Raw bytes carry no times: they come as on a line at 115,200 baud. --sd is kept: a second run adds a session to it.";
 
@@ -87,7 +90,10 @@ pub struct Run {
     /// What the ground station sends, with the times that it has in this file
     #[arg(long, value_name = "SRC")]
     pub gs_input: Option<Endpoint>,
-    /// Parameters to start with: a file of `NAME VALUE` lines
+    /// The flash in which counters and parameters outlive power (32 KiB; made when missing); without it all begin anew
+    #[arg(long, value_name = "FILE")]
+    pub store: Option<PathBuf>,
+    /// Set these parameters before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
     /// As fast as possible on a virtual clock (repeatable), or in real time; live inputs are always real
@@ -117,6 +123,9 @@ pub struct FaultFlags {
     /// Power goes at the N-th 512-byte block write (torn: half of that block is old); the run ends there
     #[arg(long, value_name = "N[:torn]")]
     pub cut_after_writes: Vec<Cut>,
+    /// Power goes at the N-th word that is written to the store, or sector that is erased; the run ends there
+    #[arg(long, value_name = "N", overrides_with = "cut_store_after")]
+    pub cut_store_after: Option<u64>,
     /// The card answers nothing for MS milliseconds from T seconds on
     #[arg(long, value_name = "MS@T")]
     pub stall: Vec<Stall>,
@@ -175,6 +184,9 @@ pub struct Emulate {
     /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
     #[arg(long, value_name = "ELF")]
     pub firmware: Option<PathBuf>,
+    /// What is to go wrong in the firmware itself, when it first sends to the ground station
+    #[arg(long, value_name = "WHAT", value_parser = ["panic", "bus-fault", "silence"])]
+    pub provoke: Option<String>,
     /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
     #[arg(long)]
     pub costs: bool,
@@ -185,9 +197,12 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode card.img -o out --format tlog,csv,jsonl
   hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
   hums decode 00042.hum -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
+  hums decode cards/ -o fleet --format parquet
+  hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8086/write?db=hums
 
-Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl), unless it is a
-directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl and, for tables, OUT/LOG/ATTITUDE.csv and so on.
+Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
+it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
+OUT/LOG/ATTITUDE.csv, OUT/LOG/thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
 `-o -` is standard output.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
@@ -224,6 +239,12 @@ pub enum Format {
     Csv,
     /// An object a line, in order of time
     Jsonl,
+    /// Line protocol, with the reference system's measurement HUMS
+    Influx,
+    /// Typed columns by vehicle, date and session, for `DuckDB`, Spark, pandas
+    Parquet,
+    /// The reference system's four tables, a row a second
+    Thesis,
 }
 
 const INFO_EXAMPLES: &str = "Examples:
@@ -259,6 +280,29 @@ pub struct Verify {
     /// Print the result as one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+const REPORT_EXAMPLES: &str = "Examples:
+  hums report card.img -o report.html
+  hums report card.img -o pages/
+  hums report card.img --session 00042 -o report.html
+
+With a directory for -o each session gets a page, named after it; otherwise the newest gets one. The page compares with
+the sessions before on the same card.";
+
+/// `hums report`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = REPORT_EXAMPLES)]
+pub struct Report {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// The page to write, or a directory for a page a session
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// Only this session, by the name that `hums info` gives
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
 }
 
 const PACK_EXAMPLES: &str = "Examples:

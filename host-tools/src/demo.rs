@@ -85,6 +85,7 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         sd: card.to_owned(),
         gs_input: None,
         gs: Some(Endpoint::File(gs.to_owned())),
+        store: None,
         params: None,
         speed: None,
         json: false,
@@ -103,5 +104,5 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         Err(why) => return here(&why),
     };
     line("   recorded by the firmware itself, in QEMU")?;
-    emulate::run(&cli::Emulate { run, firmware: Some(firmware), costs: false })
+    emulate::run(&cli::Emulate { run, firmware: Some(firmware), costs: false, provoke: None })
 }

@@ -13,6 +13,7 @@ pub mod mavlink;
 pub mod outcome;
 pub mod output;
 pub mod pack;
+pub mod report;
 pub mod rng;
 pub mod run;
 pub mod sink;
@@ -49,6 +50,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Emulate(args) => run::emulate::run(args),
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
+        Command::Report(args) => report::run(args),
         Command::Pack(args) => pack::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Params(args) => talk::params::run(args),

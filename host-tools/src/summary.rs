@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use hums_blackbox::record::{Loss, Moment, Stats, UsageValue, Vehicle};
+use hums_blackbox::record::{Loss, Moment, Stats, UsageValue, Vehicle, Why};
 use hums_blackbox::{Cause, Entry, Gap, Record};
+use hums_core::component::Figures;
+use hums_core::exceedance::Crossings;
 use hums_core::time::Instant;
 
 use crate::decode::collect::lost;
@@ -63,6 +65,38 @@ pub struct BootLine {
     pub boots: u32,
 }
 
+/// Limits of a check that were crossed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExceedanceLine {
+    /// In this session.
+    pub session: Crossings,
+    /// In the airframe's life.
+    pub lifetime: Crossings,
+    /// The unit of the peaks.
+    pub unit: String,
+}
+
+/// A part that wears.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComponentLine {
+    /// What it is, and which.
+    pub kind: &'static str,
+    /// Which of its kind, from 1; 0 is all.
+    pub number: u8,
+    /// What the operator calls it.
+    pub name: String,
+    /// Its serial number.
+    pub serial: String,
+    /// Green, yellow or red.
+    pub status: &'static str,
+    /// The part of its life that is used.
+    pub used_percent: f32,
+    /// What it has run.
+    pub figures: Figures,
+    /// How often it was replaced.
+    pub replaced: u32,
+}
+
 /// All that a log holds, counted.
 #[derive(Clone, Debug, Default)]
 pub struct Contents {
@@ -82,6 +116,12 @@ pub struct Contents {
     pub findings_count: u64,
     /// The latest values of the usage counters.
     pub usage: BTreeMap<String, f64>,
+    /// The airframe's life, as recorded last.
+    pub lifetime: BTreeMap<String, f64>,
+    /// Limits that were crossed, by check and instance, as recorded last.
+    pub exceedances: BTreeMap<(String, u8), ExceedanceLine>,
+    /// Components by place, from 1, as recorded last.
+    pub components: BTreeMap<u8, ComponentLine>,
     /// Losses by what was lost: how many, the first and the last time.
     pub losses: BTreeMap<&'static str, Loss>,
     /// What of these counts as lost by the recorder.
@@ -168,13 +208,34 @@ impl Contents {
             }
             // The counters at the start are those of the sessions before.
             Record::Usage(snapshot) if snapshot.moment != Moment::Start || self.usage.is_empty() => {
-                for (number, value) in snapshot.iter() {
-                    let value = match value {
-                        UsageValue::Real(value) => value,
-                        UsageValue::Count(value) => value as f64,
-                    };
-                    self.usage.insert(usage::name(number), value);
-                }
+                self.usage.extend(named(snapshot.iter()));
+            }
+            Record::Lifetime(life) => {
+                self.lifetime.extend(named(life.iter()));
+                self.lifetime.insert("boots".to_owned(), f64::from(life.boots));
+                self.lifetime.insert("sessions".to_owned(), f64::from(life.sessions));
+            }
+            Record::Exceedance(record) => {
+                let line = ExceedanceLine {
+                    session: record.session,
+                    lifetime: record.lifetime,
+                    unit: record.unit.to_owned(),
+                };
+                self.exceedances.insert((record.check.to_owned(), record.instance), line);
+            }
+            // A part that was replaced is not there any more; its successor is recorded after it.
+            Record::Component(record) if record.why != Why::Replaced => {
+                let line = ComponentLine {
+                    kind: record.kind.name(),
+                    number: record.number,
+                    name: record.name.to_owned(),
+                    serial: record.serial.to_owned(),
+                    status: record.status.name(),
+                    used_percent: record.used_percent,
+                    figures: record.figures,
+                    replaced: record.replaced,
+                };
+                self.components.insert(record.place.saturating_add(1), line);
             }
             Record::Loss(loss) => {
                 self.lost += lost(loss);
@@ -200,6 +261,9 @@ impl Contents {
         let room = LISTED_MAX.saturating_sub(self.findings.len());
         self.findings.extend(next.findings.into_iter().take(room));
         self.usage.extend(next.usage);
+        self.lifetime.extend(next.lifetime);
+        self.exceedances.extend(next.exceedances);
+        self.components.extend(next.components);
         for loss in next.losses.values() {
             add_loss(&mut self.losses, loss);
         }
@@ -209,6 +273,13 @@ impl Contents {
         self.bad_frames += next.bad_frames;
         self.times_fell += next.times_fell;
     }
+}
+
+fn named(counters: impl Iterator<Item = (u8, UsageValue)>) -> impl Iterator<Item = (String, f64)> {
+    counters.map(|(number, value)| match value {
+        UsageValue::Real(value) => (usage::name(number), value),
+        UsageValue::Count(value) => (usage::name(number), value as f64),
+    })
 }
 
 fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {

@@ -1,6 +1,7 @@
 //! `hums verify`: every check there is, each with what it looked at and what failed.
 
 use anyhow::Result;
+use hums_blackbox::Cause;
 use serde::Serialize;
 
 use crate::cli;
@@ -103,8 +104,9 @@ impl LogJson {
             .filter(|((_, verified), _)| !verified)
             .map(|(_, count)| count.frames)
             .sum();
-        let missing: u64 = contents.gaps.iter().map(|gap| u64::from(gap.sectors_lost)).sum();
-        let useless: u64 = contents.gaps.iter().map(|gap| u64::from(gap.sectors_skipped)).sum();
+        let gaps = || contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed);
+        let missing: u64 = gaps().map(|gap| u64::from(gap.sectors_lost)).sum();
+        let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
         let checks = vec![
             check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, String::new()),
             check("sector sequence", blocks.sectors, missing, gaps_detail(log)),
@@ -138,9 +140,13 @@ impl LogJson {
 }
 
 fn gaps_detail(log: &Overview) -> String {
+    let not_kept = match log.summary.not_kept {
+        0 => String::new(),
+        times => format!("not recorded while disarmed: {times} times; "),
+    };
     match log.summary.gaps {
-        0 => log.ending().to_owned(),
-        gaps => format!("{gaps} gaps; {}", log.ending()),
+        0 => format!("{not_kept}{}", log.ending()),
+        gaps => format!("{gaps} gaps; {not_kept}{}", log.ending()),
     }
 }
 

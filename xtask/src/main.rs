@@ -8,6 +8,7 @@ mod budgets;
 mod demo;
 mod firmware;
 mod oracle;
+mod prove;
 mod repo;
 mod setup;
 mod shell;
@@ -26,6 +27,8 @@ cargo xtask COMMAND
   demo [--flight FILE] [--pc]    a recorded flight through the firmware in the emulator, and what came of it;
                                  without an emulator, or with --pc, through the same pipeline on this PC
   test [--only STEP]... [--list] everything that CI checks, or the steps named
+  prove [NAME]... [--short] [--seed N] [--runs N] [--list]
+                                 the campaigns: power cuts, damage, stalls, endurance, noise; hours, and docs/proof.md
   firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
   size                           flash and RAM of both boards against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
@@ -57,6 +60,7 @@ fn main() -> ExitCode {
 enum Command {
     Demo(demo::Options),
     Test { only: Vec<String>, list: bool },
+    Prove(Vec<String>),
     Firmware(Board),
     Size,
     Setup { dry_run: bool },
@@ -75,6 +79,8 @@ impl Command {
         match name {
             "demo" => Ok(Self::Demo(demo::Options::parse(&rest)?)),
             "test" => parse_test(&rest),
+            // The campaigns know their names and flags themselves.
+            "prove" => Ok(Self::Prove(rest.iter().map(|word| (*word).to_owned()).collect())),
             "firmware" => match rest.as_slice() {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
@@ -103,6 +109,7 @@ impl Command {
                 Ok(())
             }
             Self::Test { only, list: false } => test::run(&only),
+            Self::Prove(arguments) => prove::run(&arguments),
             Self::Firmware(board) => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
                 println!("{}", firmware::build(board)?.display());

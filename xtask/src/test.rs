@@ -8,6 +8,7 @@ use crate::budgets;
 use crate::demo;
 use crate::firmware::{self, Board};
 use crate::oracle;
+use crate::prove;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, Need};
 use crate::shell::Shell;
@@ -21,7 +22,7 @@ struct Step {
 }
 
 /// In the order in which they fail soonest.
-const STEPS: [Step; 10] = [
+const STEPS: [Step; 11] = [
     Step { name: "fmt", about: "the formatting", needs: &[Need::Rustfmt], run: fmt },
     Step {
         name: "clippy",
@@ -53,6 +54,12 @@ const STEPS: [Step; 10] = [
         about: "end to end on this PC, against pymavlink",
         needs: &[Need::Mtools, Need::Dosfstools, Need::PythonVenv],
         run: sim,
+    },
+    Step {
+        name: "prove",
+        about: "the campaigns in their short form",
+        needs: prove::NEEDS,
+        run: prove::short,
     },
     Step {
         name: "emulator",

@@ -107,6 +107,12 @@ pub(crate) fn take() -> Option<Fault> {
     })
 }
 
+/// How many starts there were since power-on, this one included.
+#[cfg(feature = "board-emulated")]
+pub(crate) fn starts() -> u32 {
+    STARTS.count.load(Ordering::Relaxed)
+}
+
 /// Counts a start; how many there were since power-on, this one included.
 pub(crate) fn count_start() -> u32 {
     let starts = if STARTS.mark.swap(MARK, Ordering::Relaxed) == MARK {

@@ -46,6 +46,7 @@ const ONCE: &str = "each task is spawned once";
 fn main() -> ! {
     // SAFETY: this is the program's first statement: nobody has touched CCM, no interrupt is unmasked.
     unsafe { memory::init() };
+    board::remember();
     let fault = fault::take();
     let boots = fault::count_start();
     let parts = board::take();

@@ -15,9 +15,9 @@ pub struct BlockCounts {
     pub sectors: u64,
     /// Copies of a sector that a fuller one supersedes.
     pub superseded: u64,
-    /// Blocks that begin as a sector does and fail their check: torn or damaged.
+    /// Blocks of this session, as far as can be told, that fail their check: torn or damaged.
     pub damaged: u64,
-    /// Sound sectors of another session: left over from an earlier file.
+    /// Sectors of another session, sound or not: left over from an earlier file.
     pub stale: u64,
     /// All zeros.
     pub empty: u64,
@@ -48,6 +48,8 @@ pub struct Assembler {
     last_number: Option<u32>,
     /// Blocks that are no sector since the sector held.
     bad_blocks: u32,
+    /// Those of them that were sectors of this session, as far as can be told.
+    bad_own: u32,
     counts: BlockCounts,
 }
 
@@ -68,7 +70,7 @@ impl Assembler {
         let header = match Header::read(block) {
             Ok(header) => header,
             Err(error) => {
-                self.count(error);
+                self.count(error, block);
                 return None;
             }
         };
@@ -91,6 +93,7 @@ impl Assembler {
             return None;
         }
         let damaged = core::mem::take(&mut self.bad_blocks);
+        self.bad_own = 0;
         let missing = number_held.map_or(u32::from(header.since_first), |number| header.number - number - 1);
         let released = self.release();
         self.held = Some(Step { header, sector, missing, damaged });
@@ -102,9 +105,10 @@ impl Assembler {
         self.release()
     }
 
-    /// Blocks since the last sector that begin as one and fail their check.
+    /// Blocks since the last sector that were sectors of this session and fail their check. What a file was before it
+    /// became a log may follow its last sector, and is no damage.
     pub const fn damaged_since(&self) -> u32 {
-        self.bad_blocks
+        self.bad_own
     }
 
     /// What was seen so far.
@@ -124,7 +128,25 @@ impl Assembler {
         Some(step)
     }
 
-    fn count(&mut self, error: NotASector) {
+    /// Whether a block that fails its check was a sector of this session. It says so where it says which one it is, and
+    /// where all that is wrong is one bit of what makes it a sector.
+    fn is_own(&self, block: &[u8; SECTOR_BYTES]) -> bool {
+        let Some(session) = self.session else { return true };
+        let sector = Sector::from_bytes(*block);
+        let last = self.held.as_ref().map(|held| held.header.number).or(self.last_number);
+        let is_next = last.is_none_or(|last| sector.number().wrapping_sub(last) <= 1);
+        sector.session() == session
+            || is_next
+            || (0..16).any(|bit| {
+                let mut block = *block;
+                block[bit / 8] ^= 1 << (bit % 8);
+                Header::read(&block).is_ok_and(|header| header.session == session)
+            })
+    }
+
+    fn count(&mut self, error: NotASector, block: &[u8; SECTOR_BYTES]) {
+        let is_own = matches!(error, NotASector::Foreign | NotASector::Damaged) && self.is_own(block);
+        self.bad_own = self.bad_own.saturating_add(u32::from(is_own));
         match error {
             NotASector::Empty => self.counts.empty += 1,
             NotASector::Foreign => {
@@ -136,7 +158,11 @@ impl Assembler {
                 self.counts.other_version += 1;
             }
             NotASector::Damaged => {
-                self.counts.damaged += 1;
+                if is_own {
+                    self.counts.damaged += 1;
+                } else {
+                    self.counts.stale += 1;
+                }
                 self.bad_blocks = self.bad_blocks.saturating_add(1);
             }
         }

@@ -4,6 +4,36 @@ use hums_core::time::Instant;
 
 use crate::record::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
 
+/// Copies `from` to the start of `to`, as far as there is room. Few bytes are copied in pieces of fixed sizes: less work
+/// than a call of `memcpy`, which the compiler makes of anything plainer.
+#[inline]
+pub(crate) fn copy_few(from: &[u8], to: &mut [u8]) {
+    if from.len() >= 64 {
+        for (place, &byte) in to.iter_mut().zip(from) {
+            *place = byte;
+        }
+        return;
+    }
+    let rest = copy_piece::<32>((from, to));
+    let rest = copy_piece::<16>(rest);
+    let rest = copy_piece::<8>(rest);
+    let rest = copy_piece::<4>(rest);
+    let rest = copy_piece::<2>(rest);
+    copy_piece::<1>(rest);
+}
+
+/// Copies `N` bytes if there are so many, and gives the rest.
+#[inline]
+fn copy_piece<'f, 't, const N: usize>((from, to): (&'f [u8], &'t mut [u8])) -> (&'f [u8], &'t mut [u8]) {
+    if from.len() < N || to.len() < N {
+        return (from, to);
+    }
+    let (bytes, from) = from.split_at(N);
+    let (places, to) = to.split_at_mut(N);
+    places.copy_from_slice(bytes);
+    (from, to)
+}
+
 /// Reads fields; beyond the end there are zeros and empty texts.
 pub(crate) struct Fields<'a> {
     rest: &'a [u8],
@@ -113,5 +143,24 @@ impl<'a> Sink<'a> {
             end -= 1;
         }
         self.u8(end as u8).bytes(&text.as_bytes()[..end])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_and_many_bytes_are_copied_as_they_are() {
+        let from: Vec<u8> = (1..=100).collect();
+        for len in 0..=from.len() {
+            for room in [0, 1, 7, 64, 100, 120] {
+                let mut to = vec![0; room];
+                copy_few(&from[..len], &mut to);
+                let copied = to.iter().zip(&from[..len]).take_while(|(a, b)| a == b).count();
+                assert!(to[copied..].iter().all(|&byte| byte == 0));
+                assert!(copied == len || room < len, "{len} into {room}: {copied}");
+            }
+        }
     }
 }

@@ -47,6 +47,11 @@ impl<const N: usize> Scratch<N> {
         self.len = 0;
     }
 
+    /// The first eight bytes, whatever of them counts.
+    pub(crate) fn first(&self) -> [u8; 8] {
+        self.bytes.first_chunk().copied().unwrap_or_default()
+    }
+
     /// The bytes, or `None` where there were more than it holds.
     pub(crate) fn bytes(&self) -> Option<&[u8]> {
         self.bytes.get(..self.len)

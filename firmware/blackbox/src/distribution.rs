@@ -32,10 +32,13 @@ const SPEED_LAST: u32 = 5;
 const _: () = assert!(USES_MAX >> SPEED_LAST == 0);
 
 /// As sure of the first symbol as it gets: where the first place stops.
-const SURE: u16 = (reach(SPEED_LAST) + 1) << SPEED_LAST;
+const SURE: u16 = 0xf800;
 
-/// By symbol, what each place gains in a step at the last speed, two in a word.
-static GAINS: [[u32; SYMBOLS / 2]; SYMBOLS] = gains();
+/// What each place gains in a step towards a symbol, two places in a word.
+type Gains = [u32; SYMBOLS / 2];
+
+/// Gains by speed (from 1 on) and symbol.
+static GAINS: [[Gains; SYMBOLS]; SPEED_LAST as usize] = gains();
 
 /// How far a step at this speed goes for the places above the symbol, beside what every place gains.
 const fn reach(speed: u32) -> u16 {
@@ -48,16 +51,15 @@ const fn gain(place: usize, symbol: usize, speed: u32) -> u16 {
     place as u16 + 1 + if place >= symbol { reach(speed) } else { 0 }
 }
 
-const fn gains() -> [[u32; SYMBOLS / 2]; SYMBOLS] {
-    let mut gains = [[0; SYMBOLS / 2]; SYMBOLS];
-    let mut symbol = 0;
-    while symbol < SYMBOLS {
-        let mut place = 0;
-        while place < USES {
-            gains[symbol][place / 2] |= (gain(place, symbol, SPEED_LAST) as u32) << (16 * (place % 2));
-            place += 1;
-        }
-        symbol += 1;
+const fn gains() -> [[Gains; SYMBOLS]; SPEED_LAST as usize] {
+    let mut gains = [[[0; SYMBOLS / 2]; SYMBOLS]; SPEED_LAST as usize];
+    let mut index = 0;
+    while index < SPEED_LAST as usize * SYMBOLS * USES {
+        let (rest, place) = (index / USES, index % USES);
+        let (speed, symbol) = (rest / SYMBOLS, rest % SYMBOLS);
+        gains[speed][symbol][place / 2] |=
+            (gain(place, symbol, speed as u32 + 1) as u32) << (16 * (place % 2));
+        index += 1;
     }
     gains
 }
@@ -111,17 +113,20 @@ impl Cdf {
     }
 
     /// Moves towards a symbol (modulo 16).
+    #[expect(clippy::inline_always, reason = "the writer's hottest path: a call more costs a tenth of it")]
     #[inline(always)]
     pub(crate) fn adapt(&mut self, symbol: usize) {
         if self.0[USES] < USES_MAX {
             self.adapt_young(symbol);
         } else if symbol != 0 || self.0[0] < SURE {
-            self.step(&GAINS[symbol % SYMBOLS], SPEED_LAST);
+            self.step(symbol, SPEED_LAST);
         }
     }
 
+    #[expect(clippy::inline_always, reason = "so that each use has its speed as a constant")]
     #[inline(always)]
-    fn step(&mut self, gains: &[u32; SYMBOLS / 2], speed: u32) {
+    fn step(&mut self, symbol: usize, speed: u32) {
+        let gains = &GAINS[(speed as usize).wrapping_sub(1) % GAINS.len()][symbol % SYMBOLS];
         let mask = u32::from(u16::MAX >> speed) * 0x0001_0001;
         for (pair, gain) in self.0.as_chunks_mut::<2>().0.iter_mut().zip(gains) {
             let word = u32::from(pair[1]) << 16 | u32::from(pair[0]);
@@ -132,12 +137,8 @@ impl Cdf {
 
     #[inline(never)]
     fn adapt_young(&mut self, symbol: usize) {
-        let symbol = symbol % SYMBOLS;
         let uses = self.0[USES];
-        let speed = u32::from(SPEEDS[usize::from(uses) % SPEEDS.len()]);
-        for (place, value) in self.0.iter_mut().enumerate() {
-            *value = *value - (*value >> speed) + gain(place, symbol, speed);
-        }
+        self.step(symbol, u32::from(SPEEDS[usize::from(uses) % SPEEDS.len()]));
         self.0[USES] = uses + 1;
     }
 }
@@ -172,7 +173,7 @@ impl Cell {
         self.0 as u32 >> 4
     }
 
-    #[inline(always)]
+    #[inline]
     pub(crate) fn adapt(&mut self, bit: bool) {
         let uses = self.uses();
         let rate = i32::from(RATES[uses as usize]);

@@ -55,6 +55,8 @@ pub enum Cause {
     UnknownLayouts(u32),
     /// Sound sectors whose content is not what a writer makes.
     Corrupt,
+    /// The vehicle was disarmed and is recorded by arming: sectors were not kept, on purpose, and a record says so.
+    Disarmed,
 }
 
 impl Cause {
@@ -65,6 +67,7 @@ impl Cause {
             Self::Damaged => "damaged",
             Self::UnknownLayouts(_) => "unknown_layouts",
             Self::Corrupt => "corrupt",
+            Self::Disarmed => "disarmed",
         }
     }
 }
@@ -123,6 +126,8 @@ pub struct LogReader {
     /// Frames of the session up to here, while the count is unbroken.
     frames_expected: Option<u32>,
     epoch_micros: Option<u64>,
+    /// Damaged blocks at the place of the last sector, where that is a partial one: one may have been the whole one.
+    damaged_partial: u32,
     /// Damaged blocks after the last sector, until they are given out as a gap.
     damaged_at_end: u32,
     summary: Summary,
@@ -163,6 +168,7 @@ impl LogReader {
             last_at: None,
             frames_expected: None,
             epoch_micros: None,
+            damaged_partial: 0,
             damaged_at_end: 0,
             summary: Summary::default(),
             state: State::Reading,
@@ -195,7 +201,7 @@ impl LogReader {
         if let Some(step) = self.assembler.end() {
             self.step(&step);
         }
-        self.damaged_at_end = self.assembler.damaged_since();
+        self.damaged_at_end = self.assembler.damaged_since().saturating_add(self.damaged_partial);
         self.state = State::Ending;
     }
 
@@ -251,6 +257,7 @@ impl LogReader {
         let header = &step.header;
         // A partial sector that no full one superseded: what came after it in that sector is lost.
         let cut = core::mem::replace(&mut self.cut, header.partial);
+        self.damaged_partial = if header.partial { step.damaged } else { 0 };
         if step.missing > 0 || cut {
             let cause = if step.damaged > 0 { Cause::Damaged } else { Cause::Missing };
             let gap = self.open(cause);

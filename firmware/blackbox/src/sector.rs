@@ -92,6 +92,11 @@ impl Sector {
         self.u32_at(11)
     }
 
+    /// The session that it names; 0 before it is sealed.
+    pub fn session(&self) -> u32 {
+        self.u32_at(7)
+    }
+
     /// Frames completed in this sector.
     pub fn frames(&self) -> u16 {
         u16::from_le_bytes([self.bytes[5], self.bytes[6]])

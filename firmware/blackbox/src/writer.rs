@@ -7,6 +7,7 @@
 
 use hums_core::time::Instant;
 
+use crate::bytes::copy_few;
 use crate::codec::{CODED_BYTES_MAX, Entry, FRAME_BYTES_MAX, Frame, Kind, Model, Out};
 use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
 use crate::layouts::{self, Layouts};
@@ -126,7 +127,8 @@ impl Writer {
         }
     }
 
-    /// Adds a frame as it was received. `verified`: its checksum is that of our definition.
+    /// Adds a frame as it was received. `verified`: its checksum was found to be that of our definition; it is not
+    /// checked again, and of a frame for which that is not so the log would have the checksum that is right.
     pub fn frame(
         &mut self,
         at: Instant,
@@ -240,41 +242,11 @@ impl Writer {
     /// Encodes an entry and adds its bytes; `false` (the model is then spoilt, the stream is not) where the group
     /// has no room for it or its code is too long.
     fn append(&mut self, entry: &Entry<'_>, plain: bool, sink: &mut impl SectorSink) -> bool {
-        let before = self.coder;
-        self.scratch.clear();
-        self.model.encode(entry, plain, &mut self.frame, &mut self.coder, &mut self.scratch);
-        let sectors_after = GROUP_SECTORS - 1 - usize::from(self.header.since_first);
-        let room = sectors_after * BODY_BYTES + (BODY_BYTES - self.header.body_bytes);
-        let Some(len) =
-            self.scratch.bytes().map(<[u8]>::len).filter(|len| len + LOOKAHEAD + FLUSH_MAX <= room)
-        else {
-            self.coder = before;
-            return false;
-        };
-        let mut done = 0;
-        let at = self.header.body_bytes;
-        if at + len < BODY_BYTES {
-            // Nearly always, and only a few bytes: less work than a call.
-            let places = self.sector.body_mut().get_mut(at..).into_iter().flatten();
-            for (place, &byte) in places.zip(self.scratch.bytes().into_iter().flatten()) {
-                *place = byte;
-            }
-            self.header.body_bytes += len;
-            done = len;
-        }
+        let Some(len) = self.encode(entry, plain) else { return false };
+        let mut done = self.add(0, len);
         while done < len {
-            let at = self.header.body_bytes;
-            let count = (len - done).min(BODY_BYTES - at);
-            let bytes = self.scratch.bytes().and_then(|bytes| bytes.get(done..done + count));
-            let places = self.sector.body_mut().get_mut(at..at + count);
-            if let (Some(places), Some(bytes)) = (places, bytes) {
-                places.copy_from_slice(bytes);
-            }
-            self.header.body_bytes += count;
-            done += count;
-            if self.header.body_bytes == BODY_BYTES {
-                self.next_sector(sink);
-            }
+            self.next_sector(sink);
+            done = self.add(done, len);
         }
         self.count(entry.kind);
         self.changed = true;
@@ -287,6 +259,40 @@ impl Writer {
             self.end_group(false, sink);
         }
         true
+    }
+
+    /// Encodes an entry; gives its length, or nothing where it has no place in the group.
+    // Apart from `append`, which is compiled with the sink's crate, and for size there.
+    #[inline(never)]
+    fn encode(&mut self, entry: &Entry<'_>, plain: bool) -> Option<usize> {
+        let before = self.coder;
+        self.scratch.clear();
+        self.model.encode(entry, plain, &mut self.frame, &mut self.coder, &mut self.scratch);
+        let sectors_after = GROUP_SECTORS - 1 - usize::from(self.header.since_first);
+        let room = sectors_after * BODY_BYTES + (BODY_BYTES - self.header.body_bytes);
+        let len = self.scratch.bytes().map(<[u8]>::len).filter(|len| len + LOOKAHEAD + FLUSH_MAX <= room);
+        if len.is_none() {
+            self.coder = before;
+        }
+        len
+    }
+
+    /// Adds coded bytes `done` to `len` to the sector in progress, as far as it has room; gives how far.
+    #[inline(never)]
+    fn add(&mut self, done: usize, len: usize) -> usize {
+        let at = self.header.body_bytes;
+        let end = len.min(done + BODY_BYTES - at);
+        let places = self.sector.body_mut().get_mut(at..);
+        let bytes = self.scratch.bytes().and_then(|bytes| bytes.get(done..end));
+        if let (Some(places), Some(bytes)) = (places, bytes) {
+            // Most entries have at most eight bytes. What is copied beyond them has no meaning yet.
+            match places.first_chunk_mut() {
+                Some(place) if end <= 8 && done == 0 => *place = self.scratch.first(),
+                _ => copy_few(bytes, places),
+            }
+        }
+        self.header.body_bytes += end - done;
+        end
     }
 
     /// An entry is complete in the sector in which the decoder finds all bytes that it reads for it.

@@ -253,6 +253,19 @@ fn recorded_flights_come_back() {
     println!("{flights} recordings; the made-up streams above stand in where there are none");
 }
 
+/// Whether the checksum is that of our definition.
+fn checks(frame: &[u8]) -> bool {
+    let (id, payload_at) = match *frame {
+        [0xfe, _, _, _, _, id, ..] => (u32::from(id), 6),
+        [0xfd, _, _, _, _, _, _, a, b, c, ..] => (u32::from_le_bytes([a, b, c, 0]), 10),
+        _ => return false,
+    };
+    let end = payload_at + usize::from(frame[1]);
+    let found = frame.get(end..end + 2).map(|bytes| u16::from(bytes[0]) | u16::from(bytes[1]) << 8);
+    hums_dialect::message(id)
+        .is_some_and(|message| found == Some(checksum(&frame[1..end], message.crc_extra)))
+}
+
 fn frames_of(tlog: &[u8]) -> Vec<Frame> {
     let (mut frames, mut rest, mut start, mut latest) = (Vec::new(), tlog, None, 0);
     while let Some((time, tail)) = rest.split_first_chunk::<8>() {
@@ -265,7 +278,7 @@ fn frames_of(tlog: &[u8]) -> Vec<Frame> {
         let time = u64::from_be_bytes(*time);
         let start = *start.get_or_insert(time);
         latest = time.saturating_sub(start).max(latest);
-        frames.push((latest / 1_000, frame.to_vec(), true));
+        frames.push((latest / 1_000, frame.to_vec(), checks(frame)));
         rest = tail;
     }
     frames

@@ -31,6 +31,18 @@ impl Quantity {
     /// How many there are.
     pub const COUNT: usize = 2 + BATTERIES_MAX + MOTORS_MAX;
 
+    /// The quantity of a place in the stored form.
+    pub const fn from_index(index: usize) -> Option<Self> {
+        const MOTORS: usize = 2 + BATTERIES_MAX;
+        match index {
+            0 => Some(Self::Vibration),
+            1 => Some(Self::HoverThrottle),
+            2..MOTORS => Some(Self::Resistance(index as u8 - 2)),
+            MOTORS..Self::COUNT => Some(Self::MotorSpeed((index - MOTORS) as u8)),
+            _ => None,
+        }
+    }
+
     /// Its place in the stored form.
     pub const fn index(self) -> usize {
         match self {
@@ -138,6 +150,14 @@ impl Baselines {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_place_is_one_quantitys() {
+        for index in 0..Quantity::COUNT {
+            assert_eq!(Quantity::from_index(index).map(Quantity::index), Some(index));
+        }
+        assert_eq!(Quantity::from_index(Quantity::COUNT), None);
+    }
 
     #[test]
     fn three_flights_make_a_baseline_and_later_ones_move_it_slowly() {

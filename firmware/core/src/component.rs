@@ -224,18 +224,28 @@ component_params! {
     Cmp8Kind Cmp8Number Cmp8Hours Cmp8Flights Cmp8Cycles Cmp8MotorHours;
 }
 
-/// Whether a component may go on.
+/// Whether a component may go on. The numbers are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Status {
     /// Well within its limits, or without any.
-    Green,
+    Green = 0,
     /// Soon due.
-    Yellow,
+    Yellow = 1,
     /// Due.
-    Red,
+    Red = 2,
 }
 
 impl Status {
+    /// The status of a stored number.
+    pub const fn from_number(number: u8) -> Self {
+        match number {
+            0 => Self::Green,
+            1 => Self::Yellow,
+            _ => Self::Red,
+        }
+    }
+
     /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
@@ -259,10 +269,8 @@ pub struct Component {
     pub number: u8,
     /// How often the part in this place was replaced.
     pub replaced: u16,
-    /// What it had run before `since`.
+    /// What it has run, less what the session counted: it came into the session, or changed, in the middle of it.
     base: Figures,
-    /// What the session had counted when `base` was right.
-    since: Figures,
 }
 
 const VERSION: u8 = 1;
@@ -280,17 +288,15 @@ impl Component {
         number: 0,
         replaced: 0,
         base: Figures::ZERO,
-        since: Figures::ZERO,
     };
 
     /// What it has run over its life.
     pub fn figures(&self, wear: &Wear<'_>) -> Figures {
-        let ran = Figures::after(wear, self.kind, self.number);
-        self.base.zip(ran.zip(self.since, |now, since| (now - since).max(0.0)), |base, ran| base + ran)
+        self.base.zip(Figures::after(wear, self.kind, self.number), |base, ran| (base + ran).max(0.0))
     }
 
     /// The part of its life that is used, percent, by the limit that trips first; `None` where it has no limit.
-    pub(crate) fn used_percent(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Option<f32> {
+    pub fn used_percent(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Option<f32> {
         let limits = PARAMS.get(place).filter(|_| self.kind != Kind::None)?;
         let figures = self.figures(wear);
         let hours = if self.kind.wears_while_powered() { figures.powered_s } else { figures.flight_s };
@@ -328,19 +334,19 @@ impl Component {
         if (kind, number) == (self.kind, self.number) {
             return false;
         }
-        self.base = if self.kind == Kind::None { self.base } else { self.figures(wear) };
-        self.since = Figures::after(wear, kind, number);
+        let ran = if self.kind == Kind::None { self.base } else { self.figures(wear) };
+        self.base = ran.zip(Figures::after(wear, kind, number), |ran, counted| ran - counted);
         (self.kind, self.number) = (kind, number);
         true
     }
 
     /// Another part is in its place: it has run nothing. Gives the old one.
     pub(crate) fn replace(&mut self, serial: Label, wear: &Wear<'_>) -> Self {
-        let old = Self { base: self.figures(wear), since: Figures::ZERO, ..*self };
+        let old = Self { base: self.figures(wear), ..*self };
         self.serial = serial;
         self.replaced = self.replaced.saturating_add(1);
-        self.base = Figures::ZERO;
-        self.since = Figures::after(wear, self.kind, self.number);
+        self.base =
+            Figures::ZERO.zip(Figures::after(wear, self.kind, self.number), |ran, counted| ran - counted);
         old
     }
 
@@ -378,7 +384,6 @@ impl Component {
                 flights: f64::from(take.u32()?),
                 cycles: amount(take.f64()?),
             },
-            since: Figures::ZERO,
         })
     }
 }
@@ -415,7 +420,6 @@ mod tests {
         ] {
             let totals = flown(hours, flights);
             let wear = Wear { totals: &totals, battery_cycles: &[] };
-            component.since = Figures::ZERO;
             component.kind = Kind::Airframe;
             assert_eq!(component.status(1, &wear, &params), status, "{hours} h, {flights} flights");
         }

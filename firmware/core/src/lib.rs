@@ -5,6 +5,8 @@
 pub mod baseline;
 pub mod component;
 pub mod derived;
+pub mod exceedance;
+pub mod exposure;
 pub mod flight;
 pub mod health;
 pub mod latest;

@@ -3,6 +3,8 @@
 use crate::baseline::{Baselines, Quantity};
 use crate::component::{COMPONENTS_MAX, Component, Figures, Kind, Label, Status};
 use crate::derived::Derived;
+use crate::exceedance::Exceedances;
+use crate::exposure::Exposure;
 use crate::flight::{Flight, FlightEvent};
 use crate::health::{Finding, Health, Inputs};
 use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Saving, Unreadable};
@@ -10,7 +12,7 @@ use crate::observation::{MOTORS_MAX, Observation, Source};
 use crate::params::Params;
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{Instant, Span};
-use crate::usage::Usage;
+use crate::usage::{Usage, baseline_number, exposure_number};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// How often [`Monitor::tick`] is to be called: a finding comes at most this much after its debounce.
@@ -28,6 +30,8 @@ pub struct Monitor {
     /// What was lived before this session.
     before: Lifetime,
     baselines: Baselines,
+    exceedances: Exceedances,
+    exposure: Exposure,
     components: [Component; COMPONENTS_MAX],
     saving: Saving,
     was_armed: bool,
@@ -47,6 +51,8 @@ impl Monitor {
             usage: Usage::new(),
             before: Lifetime::new(),
             baselines: Baselines::new(),
+            exceedances: Exceedances::new(),
+            exposure: Exposure::new(),
             components: [Component::NONE; COMPONENTS_MAX],
             saving: Saving::new(),
             was_armed: false,
@@ -83,7 +89,17 @@ impl Monitor {
             recorder,
             params: &self.params,
         };
-        self.health.step(&inputs, findings);
+        let mut crossed = false;
+        self.health.step(&inputs, &mut self.exceedances, &mut |finding| {
+            crossed = true;
+            findings(finding);
+        });
+        if crossed || self.exceedances.lasting() {
+            self.saving.change(ItemKey::Exceedances);
+        }
+        if self.exposure.step(now, &self.vehicle, &self.usage) {
+            self.saving.change(ItemKey::Exposure);
+        }
         self.step_life(event);
     }
 
@@ -95,8 +111,11 @@ impl Monitor {
             // A lifetime belongs to an airframe: this one's begins with this session.
             self.before = Lifetime { boots: self.before.boots, ..Lifetime::new() };
             self.baselines = Baselines::new();
-            self.saving.hurry(ItemKey::Lifetime);
-            self.saving.hurry(ItemKey::Baselines);
+            self.exceedances.forget_life();
+            self.exposure.forget_life();
+            for key in [ItemKey::Lifetime, ItemKey::Baselines, ItemKey::Exceedances, ItemKey::Exposure] {
+                self.saving.hurry(key);
+            }
         }
         self.before.airframe = self.before.airframe.learn(seen);
         self.saving.change(ItemKey::Lifetime);
@@ -158,6 +177,8 @@ impl Monitor {
         match key {
             ItemKey::Lifetime => self.before = Lifetime::decode(stored)?,
             ItemKey::Baselines => self.baselines = Baselines::decode(stored)?,
+            ItemKey::Exceedances => self.exceedances = Exceedances::decode(stored)?,
+            ItemKey::Exposure => self.exposure = Exposure::decode(stored)?,
             ItemKey::Component(place) => {
                 let component = Component::decode(stored)?;
                 *self.components.get_mut(usize::from(place)).ok_or(Unreadable)? = component;
@@ -181,6 +202,10 @@ impl Monitor {
         match key {
             ItemKey::Lifetime => encoded(out, |out| self.lifetime().encode(out)),
             ItemKey::Baselines => encoded(out, |out| self.baselines.encode(out)),
+            ItemKey::Exceedances => {
+                out.first_chunk_mut().map_or(0, |out| self.exceedances.encode(self.usage.until(), out))
+            }
+            ItemKey::Exposure => encoded(out, |out| self.exposure.encode(out)),
             ItemKey::Component(place) => {
                 let component = self.components.get(usize::from(place)).unwrap_or(&Component::NONE);
                 encoded(out, |out| component.encode(&self.usage.wear(), out))
@@ -204,9 +229,38 @@ impl Monitor {
         }
     }
 
+    /// Every figure of this session that has something to say: its stored number and its value.
+    pub fn for_each_counter(&self, mut each: impl FnMut(u8, f64)) {
+        self.usage.for_each(&mut each);
+        self.exposure.for_each(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
+    }
+
+    /// The same of the airframe's life, with its baselines.
+    pub fn for_each_counter_of_life(&self, mut each: impl FnMut(u8, f64)) {
+        self.lifetime().totals.for_each(&mut each);
+        self.exposure
+            .for_each_of_life(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
+        for quantity in (0..Quantity::COUNT).filter_map(Quantity::from_index) {
+            let baseline = self.baselines.get(quantity);
+            if baseline.flights > 0 {
+                each(baseline_number(quantity), f64::from(baseline.value));
+            }
+        }
+    }
+
     /// What is normal for this airframe.
     pub const fn baselines(&self) -> &Baselines {
         &self.baselines
+    }
+
+    /// Limits that were crossed.
+    pub const fn exceedances(&self) -> &Exceedances {
+        &self.exceedances
+    }
+
+    /// Time in ranges.
+    pub const fn exposure(&self) -> &Exposure {
+        &self.exposure
     }
 
     /// The components by place; those without a kind are none.
@@ -219,6 +273,11 @@ impl Monitor {
         let component = self.components.get(place).filter(|component| component.kind != Kind::None)?;
         let wear = self.usage.wear();
         Some((component.figures(&wear), component.status(place, &wear, &self.params)))
+    }
+
+    /// The part of a component's life that is used, percent; `None` where it has no limit.
+    pub fn component_used_percent(&self, place: usize) -> Option<f32> {
+        self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
     }
 
     /// Another part is in a component's place. Gives the old one with what it had run, to be recorded; `None` where

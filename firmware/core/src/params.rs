@@ -181,6 +181,9 @@ params! {
     ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "what we send to the autopilot, answers it carries on included";
     ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "1: ask the autopilot for the messages that the checks need";
     ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot";
+    RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED: 0 from power-on, 1 by arming";
+    RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before";
+    RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)";
 }
 
 impl Default for Params {

@@ -11,6 +11,7 @@
 #![cfg_attr(not(test), no_std)]
 
 mod companion;
+mod keeping;
 mod library;
 mod loss;
 pub mod monitoring;

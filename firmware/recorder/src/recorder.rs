@@ -375,7 +375,11 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             }
         })?;
         match found {
-            Some(entry) => self.mounted()?.recycle(&entry, name).map(|()| false),
+            Some(entry) => {
+                self.mounted()?.recycle(&entry, name)?;
+                self.status.count_released();
+                Ok(false)
+            }
             None => self.create_or_overwrite(name),
         }
     }

@@ -55,6 +55,7 @@ pub struct CardStatus {
     session: AtomicU32,
     segments: AtomicU32,
     segments_overwritten: AtomicU32,
+    segments_released: AtomicU32,
     blocks_written: AtomicU32,
     writes: AtomicU32,
     write_errors: AtomicU32,
@@ -85,6 +86,8 @@ pub struct CardReading {
     pub segments: u32,
     /// Segments of earlier sessions that were overwritten because the card is full.
     pub segments_overwritten: u32,
+    /// Segments of this session that were overwritten because the vehicle was disarmed and is recorded by arming.
+    pub segments_released: u32,
     /// Blocks of 512 bytes of log data that the card took.
     pub blocks_written: u32,
     /// Write commands that took them: fewer, because sectors that wait together are written together.
@@ -118,6 +121,7 @@ impl CardStatus {
             session: AtomicU32::new(0),
             segments: AtomicU32::new(0),
             segments_overwritten: AtomicU32::new(0),
+            segments_released: AtomicU32::new(0),
             blocks_written: AtomicU32::new(0),
             writes: AtomicU32::new(0),
             write_errors: AtomicU32::new(0),
@@ -141,6 +145,7 @@ impl CardStatus {
             session: self.session.load(Ordering::Relaxed),
             segments: self.segments.load(Ordering::Relaxed),
             segments_overwritten: self.segments_overwritten.load(Ordering::Relaxed),
+            segments_released: self.segments_released.load(Ordering::Relaxed),
             blocks_written: self.blocks_written.load(Ordering::Relaxed),
             writes: self.writes.load(Ordering::Relaxed),
             write_errors: self.write_errors.load(Ordering::Relaxed),
@@ -160,6 +165,10 @@ impl CardStatus {
         self.session.store(session, Ordering::Relaxed);
         self.segments.fetch_add(1, Ordering::Relaxed);
         self.segments_overwritten.fetch_add(u32::from(overwrote), Ordering::Relaxed);
+    }
+
+    pub(crate) fn count_released(&self) {
+        self.segments_released.fetch_add(1, Ordering::Relaxed);
     }
 
     pub(crate) fn count_blocks(&self, blocks: u32) {

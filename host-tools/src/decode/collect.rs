@@ -1,14 +1,18 @@
 //! A group's entries as text, made by many threads at once.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Lost};
 use hums_blackbox::{Entry, Gap, Record};
 use hums_core::time::Instant;
+use hums_link::{self as link, Check, observe};
 
-use super::Formats;
-use super::record::{Cell, Row, rows};
+use super::Context;
+use super::influx::{Lines, Observed};
+use super::parquet::Batches;
+use super::record::{Cell, CellType, Row, rows};
 use super::text::{push_csv_cells, push_hex, push_integer, push_json_object, push_json_text};
 use crate::cli;
 use crate::logs::reader::Collect;
@@ -28,6 +32,31 @@ pub enum Table {
     Unknown(u32),
     /// The monitor's own.
     Hums(&'static str),
+}
+
+impl Table {
+    /// The table of a frame; `known` says that its definition is ours.
+    pub fn of(frame: &Frame<'_>, known: bool) -> Self {
+        match (known, frame.message()) {
+            (true, _) => Self::Message(frame.id),
+            (false, Some(_)) => Self::Unverified(frame.id),
+            (false, None) => Self::Unknown(frame.id),
+        }
+    }
+
+    /// Its file's name, without an ending.
+    pub fn file_name(self) -> String {
+        let name = |id| {
+            hums_dialect::message(id)
+                .map_or_else(|| format!("UNKNOWN_{id}"), |message| message.name.to_owned())
+        };
+        match self {
+            Self::Message(id) => name(id),
+            Self::Unverified(id) => format!("UNVERIFIED_{}", name(id)),
+            Self::Unknown(id) => format!("UNKNOWN_{id}"),
+            Self::Hums(name) => name.to_owned(),
+        }
+    }
 }
 
 /// Which entries are wanted.
@@ -56,19 +85,36 @@ impl Selection {
         Ok(())
     }
 
-    fn has_time(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        let boot = at.as_micros();
-        let utc = epoch_us.map(|epoch| epoch.saturating_add(boot));
-        let compare = |when: When| match when {
-            When::SinceStart(limit) => Some(boot.cmp(&limit)),
-            When::Utc(limit) => utc.map(|utc| utc.cmp(&limit)),
-        };
-        self.from.and_then(compare).is_none_or(std::cmp::Ordering::is_ge)
-            && self.to.and_then(compare).is_none_or(std::cmp::Ordering::is_le)
+    /// Whether this time is wanted.
+    pub fn has_time(&self, at: Instant, epoch_us: Option<u64>) -> bool {
+        !self.is_before(at, epoch_us) && !self.is_after(at, epoch_us)
+    }
+
+    /// Whether any of a gap is in the time wanted.
+    pub fn overlaps(&self, gap: &Gap, epoch_us: Option<u64>) -> bool {
+        !gap.to.is_some_and(|to| self.is_before(to, epoch_us))
+            && !gap.from.is_some_and(|from| self.is_after(from, epoch_us))
+    }
+
+    fn is_before(&self, at: Instant, epoch_us: Option<u64>) -> bool {
+        self.from.and_then(|from| compare(at, from, epoch_us)).is_some_and(Ordering::is_lt)
+    }
+
+    fn is_after(&self, at: Instant, epoch_us: Option<u64>) -> bool {
+        self.to.and_then(|to| compare(at, to, epoch_us)).is_some_and(Ordering::is_gt)
     }
 
     fn has_id(&self, id: u32) -> bool {
         self.ids.is_empty() || self.ids.contains(&id)
+    }
+}
+
+/// How a time lies to a limit; `None` where one is UTC and the other cannot be.
+fn compare(at: Instant, limit: When, epoch_us: Option<u64>) -> Option<Ordering> {
+    let boot = at.as_micros();
+    match limit {
+        When::SinceStart(limit) => Some(boot.cmp(&limit)),
+        When::Utc(limit) => Some(epoch_us?.saturating_add(boot).cmp(&limit)),
     }
 }
 
@@ -88,12 +134,10 @@ fn id_of(name: &str) -> Result<u32> {
     })
 }
 
-/// One group as text.
+/// One group as text and columns.
 #[derive(Debug)]
 pub struct Collected<'a> {
-    formats: Formats,
-    epoch_us: Option<u64>,
-    selection: &'a Selection,
+    context: &'a Context,
     /// Bytes of the tlog.
     pub tlog: Vec<u8>,
     /// Lines of the JSON output.
@@ -102,6 +146,12 @@ pub struct Collected<'a> {
     pub tables: BTreeMap<Table, Vec<u8>>,
     /// A header for each table of the monitor's own.
     pub headers: BTreeMap<&'static str, Vec<&'static str>>,
+    /// Points of the line protocol.
+    pub influx: Lines,
+    /// Columns of the Parquet output.
+    pub parquet: Batches,
+    /// What the vehicle told, for what can only be made in order.
+    pub observed: Vec<Observed>,
     /// Frames written.
     pub frames: u64,
     /// Records written.
@@ -112,50 +162,65 @@ pub struct Collected<'a> {
 
 impl<'a> Collected<'a> {
     /// Nothing yet.
-    pub fn new(formats: Formats, epoch_us: Option<u64>, selection: &'a Selection) -> Self {
+    pub fn new(context: &'a Context) -> Self {
         Self {
-            formats,
-            epoch_us,
-            selection,
+            context,
             tlog: Vec::new(),
             jsonl: Vec::new(),
             tables: BTreeMap::new(),
             headers: BTreeMap::new(),
+            influx: Lines::default(),
+            parquet: Batches::default(),
+            observed: Vec::new(),
             frames: 0,
             records: 0,
             losses: 0,
         }
     }
 
-    fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool) {
+    fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool, wanted: bool) {
+        let formats = self.context.formats;
+        if formats.influx || formats.thesis {
+            self.observe(at, bytes, verified);
+        }
         let Peek::Frame(frame) = peek(bytes) else { return };
-        if !self.selection.has_id(frame.id) {
+        if !wanted || !self.context.selection.has_id(frame.id) {
             return;
         }
         self.frames += 1;
-        if self.formats.tlog {
-            let utc = self.epoch_us.unwrap_or(0).saturating_add(at.as_micros());
+        if formats.tlog {
+            let utc = self.context.epoch_us.unwrap_or(0).saturating_add(at.as_micros());
             self.tlog.extend_from_slice(&utc.to_be_bytes());
             self.tlog.extend_from_slice(bytes);
         }
         let known =
             if verified { frame.message().map(|message| Payload::new(message, frame.payload)) } else { None };
-        if self.formats.csv {
+        if formats.csv {
             self.csv_frame(at, &frame, known.as_ref());
         }
-        if self.formats.jsonl {
+        if formats.jsonl {
             self.json_frame(at, &frame, known.as_ref());
+        }
+        if formats.influx {
+            self.influx.frame(&self.context.tags, at, &frame, known.as_ref());
+        }
+        if formats.parquet {
+            self.parquet.frame(at, self.context.epoch_us, &frame, known.as_ref());
+        }
+    }
+
+    /// Whether wanted or not: what is wanted later depends on what the vehicle was before.
+    fn observe(&mut self, at: Instant, bytes: &[u8], verified: bool) {
+        let check = if verified { Check::Verified } else { Check::Unverified };
+        let told = link::Frame::again(bytes, check).and_then(|frame| observe(&frame));
+        if let Some((source, observation)) = told {
+            self.observed.push(Observed { at, source, observation });
         }
     }
 
     fn csv_frame(&mut self, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
-        let table = match (known, frame.message()) {
-            (Some(_), _) => Table::Message(frame.id),
-            (None, Some(_)) => Table::Unverified(frame.id),
-            (None, None) => Table::Unknown(frame.id),
-        };
-        let out = self.tables.entry(table).or_default();
-        push_times_csv(out, at, self.epoch_us);
+        let out = self.tables.entry(Table::of(frame, known.is_some())).or_default();
+        push_times_csv(out, at, self.context.epoch_us);
         for number in [frame.system, frame.component] {
             out.push(b',');
             push_integer(out, u64::from(number));
@@ -173,7 +238,7 @@ impl<'a> Collected<'a> {
 
     fn json_frame(&mut self, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
         let out = &mut self.jsonl;
-        push_times_json(out, at, self.epoch_us);
+        push_times_json(out, at, self.context.epoch_us);
         for (name, number) in [(&b",\"system\":"[..], frame.system), (b",\"component\":", frame.component)] {
             out.extend_from_slice(name);
             push_integer(out, u64::from(number));
@@ -200,26 +265,32 @@ impl<'a> Collected<'a> {
     pub fn rows(&mut self, at: Instant, rows: &[Row]) {
         for row in rows {
             self.records += 1;
-            if self.formats.csv {
+            if self.context.formats.csv {
                 self.headers
                     .entry(row.table)
                     .or_insert_with(|| row.cells.iter().map(|(name, _)| *name).collect());
                 let out = self.tables.entry(Table::Hums(row.table)).or_default();
-                push_times_csv(out, at, self.epoch_us);
+                push_times_csv(out, at, self.context.epoch_us);
                 for (_, cell) in &row.cells {
                     out.push(b',');
                     cell.push_csv(out);
                 }
                 out.push(b'\n');
             }
-            if self.formats.jsonl {
+            if self.context.formats.jsonl {
                 let out = &mut self.jsonl;
-                push_times_json(out, at, self.epoch_us);
+                push_times_json(out, at, self.context.epoch_us);
                 out.extend_from_slice(b",\"record\":");
                 push_json_text(out, row.table.as_bytes());
                 out.extend_from_slice(b",\"fields\":");
                 row.push_json_object(out);
                 out.extend_from_slice(b"}\n");
+            }
+            if self.context.formats.influx {
+                self.influx.row(&self.context.tags, at, row);
+            }
+            if self.context.formats.parquet {
+                self.parquet.row(at, self.context.epoch_us, row);
             }
         }
     }
@@ -227,10 +298,7 @@ impl<'a> Collected<'a> {
     /// Adds a gap.
     pub fn gap(&mut self, gap: &Gap) {
         let from = gap.from.unwrap_or(Instant::ZERO);
-        // A gap counts where any of it is in the time asked for.
-        let overlaps = self.selection.has_time(from, self.epoch_us)
-            || gap.to.is_none_or(|to| self.selection.has_time(to, self.epoch_us));
-        if overlaps {
+        if self.context.selection.overlaps(gap, self.context.epoch_us) {
             self.rows(from, &[gap_row(gap)]);
         }
     }
@@ -242,12 +310,11 @@ impl Collect for Collected<'_> {
         if let Entry::Record { record: Record::Loss(loss), .. } = entry {
             self.losses += lost(loss);
         }
-        if !self.selection.has_time(at, self.epoch_us) {
-            return;
-        }
+        let wanted = self.context.selection.has_time(at, self.context.epoch_us);
         match entry {
-            Entry::Frame { bytes, verified, .. } => self.frame(at, bytes, *verified),
-            Entry::Record { record, .. } => self.rows(at, &rows(record)),
+            Entry::Frame { bytes, verified, .. } => self.frame(at, bytes, *verified, wanted),
+            Entry::Record { record, .. } if wanted => self.rows(at, &rows(record)),
+            Entry::Record { .. } => {}
         }
     }
 }
@@ -262,8 +329,8 @@ pub fn lost(loss: &Loss) -> u64 {
 
 /// A gap as a row.
 pub fn gap_row(gap: &Gap) -> Row {
-    let time = |at: Option<Instant>| at.map_or(Cell::Text(String::new()), Cell::Time);
-    let frames = gap.frames.map_or(Cell::Text(String::new()), |frames| Cell::Count(u64::from(frames)));
+    let time = |at: Option<Instant>| at.map_or(Cell::Unknown(CellType::Time), Cell::Time);
+    let frames = gap.frames.map_or(Cell::Unknown(CellType::Count), |frames| Cell::Count(u64::from(frames)));
     Row::new(
         "HUMS_GAP",
         vec![

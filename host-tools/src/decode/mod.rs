@@ -5,16 +5,32 @@
 //! | `tlog` | every frame bit for bit, UTC before it | one file a log |
 //! | `csv` | a table for each message type, `HUMS_*` tables for the monitor's own records and for gaps | one file a table |
 //! | `jsonl` | everything in order, an object a line | one file a log |
+//! | `influx` | line protocol: the reference system's measurement, every frame, every record | one file a log |
+//! | `parquet` | typed columns, the tables of `csv` | one file a table, by vehicle, date and session |
+//! | `thesis` | the reference system's four tables | four files a log |
 //!
-//! A log is read once; its groups are turned to text in parallel and written in order.
+//! A log is read once (twice where its vehicle must be known first); its groups are turned to text and columns in
+//! parallel and written in order. Several logs go side by side, few enough that memory stays bounded.
+//!
+//! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
 
 pub mod collect;
+pub mod columns;
+pub mod identity;
+pub mod influx;
+pub mod parquet;
 pub mod record;
+pub mod reference;
+pub mod side_by_side;
 pub mod text;
+pub mod thesis;
 pub mod usage;
+mod wear;
 pub mod write;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -24,6 +40,9 @@ use crate::logs::{self, Log, reader};
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::output;
 use collect::{Collected, Selection};
+use identity::Identity;
+use influx::Tags;
+use side_by_side::side_by_side;
 use write::{Destination, Writers};
 
 /// Runs `hums decode`.
@@ -41,26 +60,32 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let standard_output = args.output == Path::new("-");
     if standard_output && (found.logs.len() != 1 || !formats.is_single_file()) {
         return Err(usage_error(format!(
-            "-o -: standard output takes one log in one format of a single file (tlog or jsonl); there are {} logs",
+            "-o -: standard output takes one log in one format of a single file (tlog, jsonl or influx); there are {} \
+             logs",
             found.logs.len()
         )));
     }
     if found.logs.is_empty() {
         eprintln!("hums: no log is in there, so nothing was written");
     }
-    for log in &found.logs {
-        let destination = if standard_output {
-            Destination::Standard
-        } else {
-            Destination::new(&args.output, log, found.logs.len(), formats)
-        };
-        outcome = outcome.and(decode(log, destination, formats, &selection)?);
-    }
+    let task = Task { formats, selection, output: &args.output, standard_output, logs: found.logs.len() };
+    let sessions = Mutex::new(BTreeSet::new());
+    side_by_side(
+        &found.logs,
+        |log| task.decode(log, &sessions),
+        |done| {
+            let done = done?;
+            done.remarks.iter().for_each(|remark| eprintln!("hums: {remark}"));
+            outcome = outcome.and(done.outcome);
+            done.lines.iter().try_for_each(|line| output::line(line))
+        },
+    )?;
     Ok(outcome)
 }
 
 /// Which formats are asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools, reason = "any set of formats can be asked for")]
 pub struct Formats {
     /// A ground station's log.
     pub tlog: bool,
@@ -68,49 +93,129 @@ pub struct Formats {
     pub csv: bool,
     /// Objects.
     pub jsonl: bool,
+    /// Line protocol.
+    pub influx: bool,
+    /// Columns.
+    pub parquet: bool,
+    /// The reference system's tables.
+    pub thesis: bool,
 }
 
 impl Formats {
     fn new(formats: &[Format]) -> Self {
         let has = |format| formats.contains(&format);
-        Self { tlog: has(Format::Tlog), csv: has(Format::Csv), jsonl: has(Format::Jsonl) }
+        Self {
+            tlog: has(Format::Tlog),
+            csv: has(Format::Csv),
+            jsonl: has(Format::Jsonl),
+            influx: has(Format::Influx),
+            parquet: has(Format::Parquet),
+            thesis: has(Format::Thesis),
+        }
     }
 
     /// Whether a log becomes exactly one file.
     pub fn is_single_file(self) -> bool {
-        !self.csv && self.tlog != self.jsonl
+        let single = u8::from(self.tlog) + u8::from(self.jsonl) + u8::from(self.influx);
+        single == 1 && !self.csv && !self.parquet && !self.thesis
     }
 }
 
-fn decode(log: &Log, destination: Destination, formats: Formats, selection: &Selection) -> Result<Outcome> {
-    let epoch_us = reader::epoch(log)?;
-    if epoch_us.is_none() {
-        selection.check_without_utc(&log.name)?;
-        eprintln!(
-            "hums: {}: no frame told the time of day: UTC columns are empty, and tlog times count from power-on as 1970",
-            log.name
-        );
-    }
-    let to_standard_output = matches!(destination, Destination::Standard);
-    let mut writers = Writers::new(destination, formats, epoch_us)?;
-    let bar = progress_bar(log);
-    let new = || Collected::new(formats, epoch_us, selection);
-    let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
-    bar.finish_and_clear();
-    let written = writers.finish()?;
-    let lossy = summary.gaps > 0 || summary.blocks.damaged > 0 || written.losses > 0;
-    if !to_standard_output {
-        for line in written.lines {
-            output::line(&line)?;
+/// What all parts of one log's decoding need to know.
+#[derive(Clone, Debug, Default)]
+pub struct Context {
+    /// What to write.
+    pub formats: Formats,
+    /// UTC at power-on, microseconds since 1970.
+    pub epoch_us: Option<u64>,
+    /// What of it is wanted.
+    pub selection: Selection,
+    /// Who flew and when, where a format asks for it.
+    pub identity: Identity,
+    /// The same for the line protocol.
+    pub tags: Tags,
+}
+
+/// What to do with each log.
+struct Task<'a> {
+    formats: Formats,
+    selection: Selection,
+    output: &'a Path,
+    standard_output: bool,
+    logs: usize,
+}
+
+/// A log's outcome, to be told in the logs' order.
+struct Done {
+    outcome: Outcome,
+    /// What was written.
+    lines: Vec<String>,
+    /// What there is to say of it.
+    remarks: Vec<String>,
+}
+
+impl Task<'_> {
+    /// `sessions` are the sessions whose Parquet tables are taken.
+    fn decode(&self, log: &Log, sessions: &Mutex<BTreeSet<PathBuf>>) -> Result<Done> {
+        let mut remarks = Vec::new();
+        let mut context =
+            Context { formats: self.formats, selection: self.selection.clone(), ..Context::default() };
+        context.epoch_us = reader::epoch(log)?;
+        if context.epoch_us.is_none() {
+            context.selection.check_without_utc(&log.name)?;
+            remarks.push(format!(
+                "{}: no frame told the time of day: UTC columns are empty, and tlog times count from power-on as 1970",
+                log.name
+            ));
         }
+        let mut parquet = None;
+        if self.formats.influx || self.formats.parquet {
+            context.identity = Identity::of(log)?;
+            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+        }
+        if self.formats.parquet {
+            let dir = partition(self.output, &context.identity);
+            if sessions.lock().is_ok_and(|mut sessions| sessions.insert(dir.clone())) {
+                parquet = Some(dir);
+            } else {
+                context.formats.parquet = false;
+                remarks.push(format!(
+                    "{}: is the same session as another log here; its Parquet tables are written once",
+                    log.name
+                ));
+            }
+        }
+        let destination = if self.standard_output {
+            Destination::Standard
+        } else {
+            Destination::new(self.output, log, self.logs, self.formats)
+        };
+        let mut writers = Writers::new(&context, destination, parquet)?;
+        let bar = progress_bar(log);
+        let new = || Collected::new(&context);
+        let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
+        bar.finish_and_clear();
+        let written = writers.finish()?;
+        let lossy = summary.gaps > 0 || summary.blocks.damaged > 0 || written.losses > 0;
+        if lossy {
+            remarks.push(format!(
+                "{}: {} gaps, {} frames missing, {} damaged sectors, {} frames or records lost while recording",
+                log.name, summary.gaps, summary.frames_missing, summary.blocks.damaged, written.losses
+            ));
+        }
+        let lines = if self.standard_output { Vec::new() } else { written.lines };
+        Ok(Done { outcome: Outcome::lossy(lossy), lines, remarks })
     }
-    if lossy {
-        eprintln!(
-            "hums: {}: {} gaps, {} frames missing, {} damaged sectors, {} frames or records lost while recording",
-            log.name, summary.gaps, summary.frames_missing, summary.blocks.damaged, written.losses
-        );
-    }
-    Ok(Outcome::lossy(lossy))
+}
+
+/// The directory of a session's Parquet tables, named as the tools that read them expect.
+fn partition(output: &Path, identity: &Identity) -> PathBuf {
+    // Hive's word for "null", which every reader of this layout knows.
+    let date = identity.date.as_deref().unwrap_or("__HIVE_DEFAULT_PARTITION__");
+    output
+        .join(format!("vehicle={}", identity.vehicle))
+        .join(format!("date={date}"))
+        .join(format!("session={}", identity.session))
 }
 
 /// A bar over the log's bytes, on a terminal only.
@@ -124,7 +229,7 @@ pub fn progress_bar(log: &Log) -> ProgressBar {
 }
 
 /// A path inside `dir` for a log's name, which may have directories of its own.
-fn inside(dir: &Path, name: &str) -> PathBuf {
+pub(crate) fn inside(dir: &Path, name: &str) -> PathBuf {
     name.split('/')
         .filter(|part| !matches!(*part, "" | "." | ".."))
         .fold(dir.to_owned(), |path, part| path.join(part))

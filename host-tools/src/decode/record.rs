@@ -23,6 +23,27 @@ pub enum Cell {
     Text(String),
     /// Bytes.
     Hex(Vec<u8>),
+    /// Not known; it would be of this type.
+    Unknown(CellType),
+}
+
+/// The type of a cell, which is that of its column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellType {
+    /// [`Cell::Count`]
+    Count,
+    /// [`Cell::Single`]
+    Single,
+    /// [`Cell::Double`]
+    Double,
+    /// [`Cell::Time`]
+    Time,
+    /// [`Cell::Flag`]
+    Flag,
+    /// [`Cell::Text`]
+    Text,
+    /// [`Cell::Hex`]
+    Hex,
 }
 
 /// One row: the table and its columns, always the same ones for a table.
@@ -172,6 +193,17 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Note(note) => {
             one("HUMS_NOTE", vec![("severity", count(note.severity)), ("text", text(note.text))])
         }
+        Record::Lifetime(life) => super::wear::lifetime(life),
+        Record::Exceedance(exceedance) => super::wear::exceedance(exceedance),
+        Record::Component(component) => vec![super::wear::component(component)],
+        Record::Keep(keep) => one(
+            "HUMS_KEEP",
+            vec![
+                ("all", count(u8::from(keep.all))),
+                ("from_sector", count(keep.from)),
+                ("seconds", count(keep.seconds)),
+            ],
+        ),
         Record::Unknown { kind, version, bytes } => one(
             "HUMS_UNKNOWN",
             vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],
@@ -214,7 +246,21 @@ pub fn event_name(number: u8) -> &'static str {
 }
 
 impl Cell {
-    /// As a CSV cell.
+    /// Its type.
+    pub fn cell_type(&self) -> CellType {
+        match self {
+            Self::Count(_) => CellType::Count,
+            Self::Single(_) => CellType::Single,
+            Self::Double(_) => CellType::Double,
+            Self::Time(_) => CellType::Time,
+            Self::Flag(_) => CellType::Flag,
+            Self::Text(_) => CellType::Text,
+            Self::Hex(_) => CellType::Hex,
+            Self::Unknown(cell_type) => *cell_type,
+        }
+    }
+
+    /// As a CSV cell; what is not known is empty.
     pub fn push_csv(&self, out: &mut Vec<u8>) {
         match self {
             Self::Count(value) => push_integer(out, *value),
@@ -224,6 +270,7 @@ impl Cell {
             Self::Flag(value) => out.extend_from_slice(if *value { b"true" } else { b"false" }),
             Self::Text(text) => push_csv_text(out, text.as_bytes()),
             Self::Hex(bytes) => push_hex(out, bytes),
+            Self::Unknown(_) => {}
         }
     }
 
@@ -238,6 +285,7 @@ impl Cell {
                 push_hex(out, bytes);
                 out.push(b'"');
             }
+            Self::Unknown(_) => out.extend_from_slice(b"null"),
             plain => plain.push_csv(out),
         }
     }

@@ -86,7 +86,7 @@ fn special(value: f64) -> &'static [u8] {
 }
 
 /// A number that is no NaN and not infinite.
-fn push_finite(out: &mut Vec<u8>, scalar: Scalar) {
+pub fn push_finite(out: &mut Vec<u8>, scalar: Scalar) {
     match scalar {
         Scalar::Unsigned(value) => push_integer(out, value),
         Scalar::Signed(value) => out.extend_from_slice(itoa::Buffer::new().format(value).as_bytes()),

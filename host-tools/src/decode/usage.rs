@@ -1,13 +1,47 @@
 //! The names of usage counters, with their units, by the number that a log stores.
 
+use hums_core::baseline::Quantity;
 use hums_core::usage::{CounterName, counter_name};
 
-/// The name of a counter, for instance `flight_time_s` or `motor0_run_time_s`; `counter_123` where this program does
-/// not know it.
+/// The name of a counter, for instance `flight_time_s`, `motor0_run_time_s` or `esc_temperature_45_to_60_degc_s`;
+/// `counter_123` where this program does not know it.
 pub fn name(number: u8) -> String {
     match counter_name(number) {
         Some(CounterName::Vehicle(name)) => name.to_owned(),
         Some(CounterName::Motor(name, motor)) => format!("motor{motor}_{name}"),
+        Some(CounterName::Exposure(quantity, from, to)) => {
+            let (name, unit) = (quantity.name(), quantity.unit());
+            let range = match (from.is_finite(), to.is_finite()) {
+                (false, _) => format!("below_{to}"),
+                (true, false) => format!("from_{from}"),
+                (true, true) => format!("{from}_to_{to}"),
+            };
+            format!("{name}_{}_{unit}_s", range.replace('.', "_"))
+        }
+        Some(CounterName::Baseline(quantity)) => match quantity {
+            Quantity::Vibration => "baseline_vibration_m_s2".to_owned(),
+            Quantity::HoverThrottle => "baseline_hover_throttle".to_owned(),
+            Quantity::Resistance(battery) => format!("baseline_battery{battery}_resistance_ohm"),
+            Quantity::MotorSpeed(motor) => format!("baseline_motor{motor}_speed_off_percent"),
+        },
         None => format!("counter_{number}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn every_number_has_a_name_of_its_own_and_ranges_say_their_ends() {
+        let names: HashSet<String> = (0..=u8::MAX).map(name).collect();
+        assert_eq!(names.len(), 256);
+        for range in
+            ["vibration_below_1_m_s2_s", "vibration_1_to_2_5_m_s2_s", "esc_temperature_from_110_degc_s"]
+        {
+            assert!(names.contains(range), "{range}");
+        }
     }
 }

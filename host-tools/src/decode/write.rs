@@ -5,12 +5,16 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context as _, Result};
 use hums_blackbox::Gap;
 
-use super::collect::{Collected, Selection, Table};
+use super::collect::{Collected, Table, gap_row};
+use super::influx::{Clock, Lines};
+use super::parquet::ParquetTables;
+use super::reference::Reference;
 use super::text::columns;
-use super::{Formats, inside};
+use super::thesis::Thesis;
+use super::{Context, Formats, inside};
 use crate::logs::Log;
 use crate::logs::reader::Deliver;
 use crate::output::{self, Stdout};
@@ -39,27 +43,67 @@ impl Destination {
         Self::Named(inside(output, &log.name))
     }
 
-    fn open(&self, extension: &str) -> Result<(Box<dyn Write>, PathBuf)> {
-        let path = match self {
-            Self::Standard => return Ok((Box::new(BufWriter::new(Stdout::new())), PathBuf::from("-"))),
-            Self::File(path) => path.clone(),
-            Self::Named(name) => {
-                // Appended, not replaced: a log's own name may have a dot in it.
-                let mut name = name.clone().into_os_string();
-                name.push(format!(".{extension}"));
-                PathBuf::from(name)
-            }
-        };
-        Ok((Box::new(create(&path)?), path))
+    /// The path of the single file with this extension; `None` is standard output.
+    fn path(&self, extension: &str) -> Option<PathBuf> {
+        match self {
+            Self::Standard => None,
+            Self::File(path) => Some(path.clone()),
+            Self::Named(name) => Some(appended(name, extension)),
+        }
+    }
+
+    /// The directory of the tables. A single file has none.
+    fn dir(&self) -> Option<&Path> {
+        match self {
+            Self::Standard | Self::File(_) => None,
+            Self::Named(dir) => Some(dir),
+        }
     }
 }
 
-fn create(path: &Path) -> Result<BufWriter<File>> {
+/// Appended, not replaced: a log's own name may have a dot in it.
+fn appended(name: &Path, extension: &str) -> PathBuf {
+    let mut name = name.to_owned().into_os_string();
+    name.push(format!(".{extension}"));
+    PathBuf::from(name)
+}
+
+/// A single file, open.
+struct Single {
+    out: Box<dyn Write + Send>,
+    path: PathBuf,
+}
+
+impl Single {
+    fn open(destination: &Destination, extension: &str) -> Result<Self> {
+        match destination.path(extension) {
+            None => Ok(Self { out: Box::new(BufWriter::new(Stdout::new())), path: PathBuf::from("-") }),
+            Some(path) => Ok(Self { out: Box::new(create(&path)?), path }),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        write(&mut self.out, bytes, &self.path)
+    }
+
+    fn finish(mut self) -> Result<PathBuf> {
+        settle(self.out.flush(), &self.path)?;
+        Ok(self.path)
+    }
+}
+
+/// Makes a file, and its directory where there is none.
+pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
     if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-        fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
+        make_directory(dir)?;
     }
     let file = File::create(path).with_context(|| format!("{}: cannot be written", path.display()))?;
     Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
+}
+
+/// Makes a directory, unless it is there.
+pub(super) fn make_directory(dir: &Path) -> Result<()> {
+    fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
 /// What was written.
@@ -72,50 +116,110 @@ pub struct Written {
 }
 
 /// The open files of one log.
-pub struct Writers {
+pub struct Writers<'a> {
+    context: &'a Context,
     destination: Destination,
-    formats: Formats,
-    epoch_us: Option<u64>,
-    selection: Selection,
-    tlog: Option<(Box<dyn Write>, PathBuf)>,
-    jsonl: Option<(Box<dyn Write>, PathBuf)>,
+    tlog: Option<Single>,
+    jsonl: Option<Single>,
+    influx: Option<Influx>,
+    thesis: Option<Thesis>,
+    parquet: Option<ParquetTables>,
     tables: BTreeMap<Table, BufWriter<File>>,
     headers: BTreeMap<&'static str, Vec<&'static str>>,
+    /// A tlog has no place for gaps: they lie beside it.
+    gaps: Option<Single>,
     frames: u64,
     records: u64,
     losses: u64,
 }
 
-impl Writers {
-    /// Opens what is sure to be written; tables are opened when they get their first row.
-    pub fn new(destination: Destination, formats: Formats, epoch_us: Option<u64>) -> Result<Self> {
-        let open = |wanted: bool, extension| wanted.then(|| destination.open(extension)).transpose();
-        let (tlog, jsonl) = (open(formats.tlog, "tlog")?, open(formats.jsonl, "jsonl")?);
-        if let (true, Destination::Named(dir)) = (formats.csv, &destination) {
-            fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
+/// The line protocol's file, and what only can be told in order.
+struct Influx {
+    file: Single,
+    messages: Clock,
+    quantities: Clock,
+    reference: Reference,
+    points: Vec<u8>,
+}
+
+impl Influx {
+    /// The frames of a group as they are, and what they told of the reference system's quantities.
+    fn put(&mut self, context: &Context, collected: &Collected<'_>) -> Result<()> {
+        self.points.clear();
+        self.messages.write(&collected.influx, context.epoch_us, &mut self.points);
+        let mut lines = Lines::default();
+        for observed in &collected.observed {
+            let own = self.reference.observe(observed.at, observed.source, &observed.observation);
+            if own && context.selection.has_time(observed.at, context.epoch_us) {
+                lines.observed(&context.tags, observed.at, &self.reference, &observed.observation);
+            }
         }
+        self.quantities.write(&lines, context.epoch_us, &mut self.points);
+        self.file.write(&self.points)
+    }
+}
+
+impl<'a> Writers<'a> {
+    /// Opens what is sure to be written; tables are opened when they get their first row.
+    pub fn new(context: &'a Context, destination: Destination, parquet: Option<PathBuf>) -> Result<Self> {
+        let formats = context.formats;
+        let open =
+            |wanted: bool, extension| wanted.then(|| Single::open(&destination, extension)).transpose();
+        let (tlog, jsonl) = (open(formats.tlog, "tlog")?, open(formats.jsonl, "jsonl")?);
+        let influx = open(formats.influx, "lp")?.map(|file| Influx {
+            file,
+            messages: Clock::default(),
+            quantities: Clock::default(),
+            reference: Reference::new(),
+            points: Vec::new(),
+        });
+        let mut thesis = None;
+        if let Some(dir) = destination.dir() {
+            if formats.csv {
+                make_directory(dir)?;
+            }
+            if formats.thesis {
+                let dir = dir.join("thesis");
+                thesis = Some(Thesis::new(&dir, context.selection.clone(), context.epoch_us)?);
+            }
+        }
+        let about = [
+            ("hums.vehicle", context.identity.vehicle.clone()),
+            ("hums.session", context.identity.session.clone()),
+        ];
+        let parquet = parquet.map(|dir| ParquetTables::new(dir, &about)).transpose()?;
         Ok(Self {
+            context,
             destination,
-            formats,
-            epoch_us,
-            selection: Selection::default(),
             tlog,
             jsonl,
+            influx,
+            thesis,
+            parquet,
             tables: BTreeMap::new(),
             headers: BTreeMap::new(),
+            gaps: None,
             frames: 0,
             records: 0,
             losses: 0,
         })
     }
 
-    fn put(&mut self, collected: &Collected<'_>) -> Result<()> {
+    fn put(&mut self, collected: Collected<'_>) -> Result<()> {
         self.frames += collected.frames;
         self.records += collected.records;
         self.losses += collected.losses;
         for (file, bytes) in [(&mut self.tlog, &collected.tlog), (&mut self.jsonl, &collected.jsonl)] {
-            if let Some((file, path)) = file {
-                write(file, bytes, path)?;
+            if let Some(file) = file {
+                file.write(bytes)?;
+            }
+        }
+        if let Some(influx) = &mut self.influx {
+            influx.put(self.context, &collected)?;
+        }
+        if let Some(thesis) = &mut self.thesis {
+            for observed in &collected.observed {
+                thesis.observe(observed.at, observed.source, &observed.observation)?;
             }
         }
         for (name, columns) in &collected.headers {
@@ -124,12 +228,15 @@ impl Writers {
         for (table, lines) in &collected.tables {
             self.table(*table, lines)?;
         }
-        Ok(())
+        match &mut self.parquet {
+            Some(parquet) => parquet.put(collected.parquet),
+            None => Ok(()),
+        }
     }
 
     fn table(&mut self, table: Table, lines: &[u8]) -> Result<()> {
-        let Destination::Named(dir) = &self.destination else { return Ok(()) };
-        let path = dir.join(format!("{}.csv", file_name(table)));
+        let Some(dir) = self.destination.dir() else { return Ok(()) };
+        let path = dir.join(format!("{}.csv", table.file_name()));
         if let Some(file) = self.tables.get_mut(&table) {
             return write(file, lines, &path);
         }
@@ -144,48 +251,77 @@ impl Writers {
         Ok(())
     }
 
+    /// A gap beside the tlog, in a table of its own.
+    fn gap_beside_tlog(&mut self, gap: &Gap) -> Result<()> {
+        let Some(path) = self.destination.path("tlog").filter(|_| self.tlog.is_some()) else { return Ok(()) };
+        let row = gap_row(gap);
+        let first = self.gaps.is_none();
+        let path = appended(&path, "gaps.csv");
+        let file = match &mut self.gaps {
+            Some(file) => file,
+            none => none.insert(Single { out: Box::new(create(&path)?), path }),
+        };
+        let mut line = Vec::new();
+        if first {
+            let names: Vec<&str> = row.cells.iter().map(|(name, _)| *name).collect();
+            line.extend_from_slice(names.join(",").as_bytes());
+            line.push(b'\n');
+        }
+        for (place, (_, cell)) in row.cells.iter().enumerate() {
+            if place > 0 {
+                line.push(b',');
+            }
+            cell.push_csv(&mut line);
+        }
+        line.push(b'\n');
+        file.write(&line)
+    }
+
     /// Writes what is still held, and says what was written.
     pub fn finish(mut self) -> Result<Written> {
         let mut lines = Vec::new();
-        for (mut file, path) in [self.tlog.take(), self.jsonl.take()].into_iter().flatten() {
-            settle(file.flush(), &path)?;
-            lines.push(format!("{}: {} frames", path.display(), self.frames));
+        let (frames, records) = (self.frames, self.records);
+        let singles = [self.tlog.take(), self.jsonl.take(), self.influx.take().map(|influx| influx.file)];
+        for file in singles.into_iter().flatten() {
+            lines.push(format!("{}: {frames} frames", file.finish()?.display()));
         }
-        if let (true, Destination::Named(dir)) = (self.formats.csv, &self.destination) {
+        if let Some(file) = self.gaps.take() {
+            lines.push(format!("{}: gaps", file.finish()?.display()));
+        }
+        if let (true, Some(dir)) = (self.context.formats.csv, self.destination.dir()) {
             for (table, file) in &mut self.tables {
-                settle(file.flush(), &dir.join(file_name(*table)))?;
+                settle(file.flush(), &dir.join(table.file_name()))?;
             }
             let tables = self.tables.len();
-            let (frames, records) = (self.frames, self.records);
+            lines.push(format!("{}: {tables} tables, {frames} frames, {records} records", dir.display()));
+        }
+        if let (Some(thesis), Some(dir)) = (&mut self.thesis, self.destination.dir()) {
+            thesis.finish()?;
+            lines.push(format!("{}: {} seconds", dir.join("thesis").display(), thesis.rows));
+        }
+        if let Some(parquet) = self.parquet.take() {
+            let (dir, tables) = parquet.finish()?;
             lines.push(format!("{}: {tables} tables, {frames} frames, {records} records", dir.display()));
         }
         Ok(Written { lines, losses: self.losses })
     }
 }
 
-impl<'a> Deliver<Collected<'a>> for Writers {
+impl<'a> Deliver<Collected<'a>> for Writers<'a> {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
-        let selection = self.selection.clone();
-        let mut collected = Collected::new(self.formats, self.epoch_us, &selection);
+        let mut collected = Collected::new(self.context);
         collected.gap(gap);
-        self.put(&collected)
+        if self.context.selection.overlaps(gap, self.context.epoch_us) {
+            self.gap_beside_tlog(gap)?;
+        }
+        if let Some(thesis) = &mut self.thesis {
+            thesis.gap(gap)?;
+        }
+        self.put(collected)
     }
 
     fn group(&mut self, collected: Collected<'a>) -> Result<()> {
-        self.put(&collected)
-    }
-}
-
-/// A table's file, without `.csv`.
-fn file_name(table: Table) -> String {
-    let name = |id| {
-        hums_dialect::message(id).map_or_else(|| format!("UNKNOWN_{id}"), |message| message.name.to_owned())
-    };
-    match table {
-        Table::Message(id) => name(id),
-        Table::Unverified(id) => format!("UNVERIFIED_{}", name(id)),
-        Table::Unknown(id) => format!("UNKNOWN_{id}"),
-        Table::Hums(name) => name.to_owned(),
+        self.put(collected)
     }
 }
 
@@ -209,7 +345,8 @@ fn write(file: &mut impl Write, bytes: &[u8], path: &Path) -> Result<()> {
     settle(file.write_all(bytes), path)
 }
 
-fn settle(result: std::io::Result<()>, path: &Path) -> Result<()> {
+/// An error in terms of the file; a reader of standard output that has gone ends it quietly.
+pub(super) fn settle(result: std::io::Result<()>, path: &Path) -> Result<()> {
     match result {
         Err(error) if output::is_reader_gone(&error) => Err(crate::outcome::ReaderGone.into()),
         result => result.with_context(|| format!("{}: cannot be written", path.display())),

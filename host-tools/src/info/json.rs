@@ -63,6 +63,9 @@ pub struct LogJson {
     findings_count: u64,
     findings: Vec<FindingJson>,
     usage: serde_json::Map<String, serde_json::Value>,
+    lifetime: serde_json::Map<String, serde_json::Value>,
+    exceedances: Vec<ExceedanceJson>,
+    components: Vec<ComponentJson>,
     log_bytes: u64,
     tlog_bytes: u64,
     ratio: f64,
@@ -132,6 +135,79 @@ struct FindingJson {
     unit: String,
 }
 
+#[derive(Debug, Serialize)]
+struct ExceedanceJson {
+    check: String,
+    instance: u8,
+    unit: String,
+    session: CrossingsJson,
+    lifetime: CrossingsJson,
+}
+
+#[derive(Debug, Serialize)]
+struct CrossingsJson {
+    warnings: u16,
+    criticals: u16,
+    warning_s: f64,
+    critical_s: f64,
+    peak: Option<f32>,
+}
+
+#[derive(Debug, Serialize)]
+struct ComponentJson {
+    place: u8,
+    kind: &'static str,
+    number: u8,
+    name: String,
+    serial: String,
+    status: &'static str,
+    /// `null` where it has no limit.
+    used_percent: Option<f32>,
+    powered_s: f64,
+    flight_s: f64,
+    motor_s: f64,
+    flights: f64,
+    cycles: f64,
+    replaced: u32,
+}
+
+fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
+    let crossings = |of: &hums_core::exceedance::Crossings| CrossingsJson {
+        warnings: of.warnings,
+        criticals: of.criticals,
+        warning_s: f64::from(of.warning_tenths) / 10.0,
+        critical_s: f64::from(of.critical_tenths) / 10.0,
+        peak: finite(of.peak),
+    };
+    let json = |((check, instance), line): (&(String, u8), &crate::summary::ExceedanceLine)| ExceedanceJson {
+        check: check.clone(),
+        instance: *instance,
+        unit: line.unit.clone(),
+        session: crossings(&line.session),
+        lifetime: crossings(&line.lifetime),
+    };
+    contents.exceedances.iter().map(json).collect()
+}
+
+fn components(contents: &Contents) -> Vec<ComponentJson> {
+    let json = |(place, line): (&u8, &crate::summary::ComponentLine)| ComponentJson {
+        place: *place,
+        kind: line.kind,
+        number: line.number,
+        name: line.name.clone(),
+        serial: line.serial.clone(),
+        status: line.status,
+        used_percent: finite(line.used_percent),
+        powered_s: line.figures.powered_s,
+        flight_s: line.figures.flight_s,
+        motor_s: line.figures.motor_s,
+        flights: line.figures.flights,
+        cycles: line.figures.cycles,
+        replaced: line.replaced,
+    };
+    contents.components.iter().map(json).collect()
+}
+
 pub(super) fn finite(value: f32) -> Option<f32> {
     value.is_finite().then_some(value)
 }
@@ -171,6 +247,9 @@ impl LogJson {
             findings_count: contents.findings_count,
             findings: findings(log),
             usage: contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),
+            lifetime: contents.lifetime.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),
+            exceedances: exceedances(contents),
+            components: components(contents),
             log_bytes: log.log_bytes(),
             tlog_bytes: contents.tlog_bytes(),
             ratio: log.ratio(),

@@ -2,11 +2,14 @@
 //!
 //! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use hums_blackbox::Cause;
 use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
+use super::wear;
 use crate::logs;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
 use crate::utc::iso8601;
@@ -36,6 +39,7 @@ pub fn text(log: &Overview) -> String {
     findings_text(&mut text, log);
     gaps_text(&mut text, log);
     usage_text(&mut text, log);
+    wear::text(&mut text, log);
     messages_text(&mut text, log);
     text
 }
@@ -137,7 +141,12 @@ fn gaps_text(text: &mut String, log: &Overview) {
             summary.gaps
         );
     }
-    for gap in contents.gaps.iter().take(SHOWN_MAX) {
+    for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
+        let time = |at: Option<Instant>| at.map_or(0.0, Instant::as_secs_f64);
+        let (from, to) = (time(gap.from), time(gap.to));
+        let _ = writeln!(text, "    from {from:.3} to {to:.3} s: not recorded: disarmed");
+    }
+    for gap in contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed).take(SHOWN_MAX) {
         let time = |at: Option<Instant>, none: &str| {
             at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
         };
@@ -148,7 +157,7 @@ fn gaps_text(text: &mut String, log: &Overview) {
             "    from {} to {}: {}, {} sectors lost, {} more of no use, {frames} frames missing",
             time(gap.from, "the beginning"),
             time(gap.to, "the end"),
-            gap.cause.name(),
+            words(gap.cause),
             gap.sectors_lost,
             gap.sectors_skipped
         );
@@ -163,13 +172,33 @@ fn gaps_text(text: &mut String, log: &Overview) {
     }
 }
 
+/// Why something is missing.
+fn words(cause: Cause) -> &'static str {
+    match cause {
+        Cause::Missing => "sectors are not there (never written, overwritten or lost)",
+        Cause::Damaged => "sectors are damaged",
+        Cause::UnknownLayouts(_) => {
+            "written with message layouts that this program does not know; take a newer hums"
+        }
+        Cause::Corrupt => "sectors hold what no recorder writes",
+        Cause::Disarmed => "not recorded: disarmed",
+    }
+}
+
 fn usage_text(text: &mut String, log: &Overview) {
     if !log.contents.usage.is_empty() {
-        text.push_str("  usage\n");
+        text.push_str("  usage                                     session           life\n");
     }
-    for (name, value) in &log.contents.usage {
-        let number = if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.3}") };
-        let _ = writeln!(text, "    {name:<28} {number:>14}");
+    let number = |value: Option<&f64>| match value {
+        None => String::new(),
+        Some(value) if value.fract() == 0.0 => format!("{value:.0}"),
+        Some(value) => format!("{value:.3}"),
+    };
+    let Contents { usage, lifetime, .. } = &log.contents;
+    let names: BTreeSet<_> = usage.keys().chain(lifetime.keys()).collect();
+    for name in names {
+        let (session, life) = (number(usage.get(name)), number(lifetime.get(name)));
+        let _ = writeln!(text, "{}", format!("    {name:<34} {session:>14} {life:>14}").trim_end());
     }
 }
 

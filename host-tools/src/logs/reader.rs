@@ -2,6 +2,7 @@
 //! gaps between them. Memory is bounded by a batch of groups, whatever the log's size.
 
 use anyhow::Result;
+use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Record};
 use hums_core::time::Instant;
 use rayon::prelude::*;
@@ -42,6 +43,8 @@ pub struct Summary {
     pub gaps: u64,
     /// Frames that are known to be missing.
     pub frames_missing: u64,
+    /// Gaps that are none: what a disarmed vehicle sent was not kept, on purpose.
+    pub not_kept: u64,
     /// Groups whose first entry came before the last one of the group before.
     pub times_fell: u64,
     /// What the blocks were.
@@ -106,11 +109,16 @@ struct Decoded<C> {
     last: Option<Instant>,
     error: Option<GroupError>,
     ends_partial: bool,
+    /// Where it ends so: damaged blocks at that place, one of which may have been the whole sector.
+    damaged_partial: u32,
     closed: bool,
+    /// What its records say of what is kept: the first and the last one.
+    keeps: Option<(Keep, Keep)>,
 }
 
 fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: C) -> Decoded<C> {
     let (mut error, mut begun, mut frames, mut last) = (None, None, 0, None);
+    let mut keeps: Option<(Keep, Keep)> = None;
     for step in group {
         if let Err(why) = decoder.push(&step.header, &step.sector) {
             error = error.or(Some(why));
@@ -124,6 +132,9 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
                     let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
                     last = Some(at);
                     frames += u32::from(matches!(entry, Entry::Frame { .. }));
+                    if let Entry::Record { record: Record::Keep(keep), .. } = entry {
+                        keeps = Some((keeps.map_or(keep, |(first, _)| first), keep));
+                    }
                     collected.entry(&entry);
                 }
                 Err(why) => error = error.or(Some(why)),
@@ -143,7 +154,9 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
         last,
         error,
         ends_partial: group.last().is_some_and(|step| step.header.partial),
+        damaged_partial: group.last().filter(|step| step.header.partial).map_or(0, |step| step.damaged),
         closed: group.last().is_some_and(|step| step.header.closed),
+        keeps,
     }
 }
 
@@ -154,20 +167,32 @@ struct Stitch {
     open: Option<Gap>,
     /// Frames of the session up to here, modulo 2^32, while the count is unbroken.
     expected: Option<u32>,
+    /// The number of the sector that would follow.
+    next_number: u32,
     cut: bool,
+    damaged_partial: u32,
+    /// What the last record about it said is kept.
+    keep: Option<Keep>,
 }
 
 impl Stitch {
     fn take<C>(&mut self, group: Decoded<C>, deliver: &mut impl Deliver<C>) -> Result<()> {
         let begins_late = self.summary.groups == 0 && self.open.is_none() && group.number > 0;
         let cut = std::mem::replace(&mut self.cut, group.ends_partial);
+        self.damaged_partial = group.damaged_partial;
         if group.missing > 0 || cut || begins_late {
-            let cause = if group.damaged { Cause::Damaged } else { Cause::Missing };
+            let cause = match group.damaged {
+                true => Cause::Damaged,
+                false if self.is_wanted(&group, begins_late) => Cause::Disarmed,
+                false => Cause::Missing,
+            };
             let missing = if begins_late { group.number } else { group.missing.max(u32::from(cut)) };
             let gap = self.gap(cause);
             gap.sectors_lost = gap.sectors_lost.saturating_add(missing);
         }
         self.summary.closed = group.closed;
+        self.next_number = group.number.wrapping_add(group.sectors);
+        self.keep = group.keeps.map(|(_, last)| last).or(self.keep);
         match group.begun {
             None => self.skip(&group),
             Some((start, frames_before)) => {
@@ -197,6 +222,15 @@ impl Stitch {
         Ok(())
     }
 
+    /// Whether what is missing before this group was not kept, on purpose: a record before the gap or in this group
+    /// says so. Before a log's first group nothing is missing that such a log would have.
+    fn is_wanted<C>(&self, group: &Decoded<C>, begins_late: bool) -> bool {
+        let before = self.keep.filter(|keep| !keep.all);
+        let after = group.keeps.map(|(first, _)| first);
+        begins_late && after.is_some()
+            || before.into_iter().chain(after).any(|keep| keep.from <= self.next_number)
+    }
+
     /// Nothing of a group could be decoded.
     fn skip<C>(&mut self, group: &Decoded<C>) {
         let gap = self.gap(group.error.map_or(Cause::Missing, cause_of));
@@ -212,12 +246,17 @@ impl Stitch {
     }
 
     fn close<C>(&mut self, gap: Gap, deliver: &mut impl Deliver<C>) -> Result<()> {
-        self.summary.gaps += 1;
-        self.summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
+        if gap.cause == Cause::Disarmed {
+            self.summary.not_kept += 1;
+        } else {
+            self.summary.gaps += 1;
+            self.summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
+        }
         deliver.gap(&gap)
     }
 
     fn end<C>(&mut self, damaged: u32, deliver: &mut impl Deliver<C>) -> Result<()> {
+        let damaged = damaged.saturating_add(self.damaged_partial);
         if damaged > 0 {
             let gap = self.gap(Cause::Damaged);
             gap.sectors_lost = gap.sectors_lost.saturating_add(damaged);

@@ -6,9 +6,11 @@
 pub mod arrivals;
 pub mod emulate;
 pub mod ground;
+mod params;
 pub mod qemu;
 pub mod report;
 pub mod sim;
+mod store;
 
 use std::fs::File;
 use std::path::Path;

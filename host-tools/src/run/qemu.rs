@@ -9,16 +9,20 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use serde::Deserialize;
 use tempfile::TempDir;
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
 /// The first version that models this chip's memory.
 const VERSION_MIN: u32 = 8;
+/// The firmware is to be started again.
+const EXIT_AGAIN: i32 = 3;
 /// How long the firmware may take until it listens.
 const BOOT: Duration = Duration::from_mins(1);
 /// How long it may take to work off what was sent and to close the log.
@@ -63,7 +67,66 @@ const FROM_GS: u32 = 1 << 31;
 enum Line {
     Ready,
     Result(String),
+    Again(Again),
 }
+
+/// The firmware was reset, or its power went, and is to be started again.
+#[derive(Debug, Deserialize)]
+pub struct Again {
+    /// `reset` or `power`.
+    pub what: String,
+    /// When, in microseconds since its start.
+    pub at_us: u64,
+    /// How many bytes of its input it took out of the port.
+    pub taken: u64,
+    /// Frames that came in.
+    pub frames_in: u64,
+    /// Bytes that came in.
+    pub bytes_in: u64,
+    /// Bytes of them that belong to no frame.
+    pub bytes_not_frames: u64,
+    /// Blocks of the card that were written.
+    pub blocks_written: u64,
+    /// Memory that survived.
+    #[serde(skip)]
+    pub survived: Option<Vec<u8>>,
+}
+
+/// How a start of the firmware ended.
+pub enum Ended {
+    /// In order: its counters, one JSON object.
+    Done(String),
+    /// It goes on with another start.
+    Again(Again),
+}
+
+/// Where the bytes of a port go; it outlives a start.
+pub type Ground = Arc<Mutex<Box<dyn Write + Send>>>;
+
+/// What a start of the firmware needs.
+pub struct Start<'a> {
+    /// The image.
+    pub firmware: &'a Path,
+    /// The card's image.
+    pub card: &'a Path,
+    /// The store's flash.
+    pub store: &'a Path,
+    /// Where the bytes for the ground station go.
+    pub gs: Ground,
+    /// Where the bytes for the autopilot go.
+    pub autopilot: Ground,
+    /// Further arguments, `key=value`.
+    pub arguments: Vec<String>,
+    /// It counts the instructions of each stage.
+    pub costs: bool,
+    /// Memory that survived the reset before this start.
+    pub survived: Option<Vec<u8>>,
+}
+
+/// The count of a feed's record that is the end of the power.
+const POWER_OFF: u32 = u32::MAX;
+/// The file in the emulator's directory through which memory survives a reset.
+const SURVIVED: &str = "uninit";
 
 /// The firmware, running.
 pub struct Qemu {
@@ -81,21 +144,21 @@ pub struct Qemu {
 }
 
 impl Qemu {
-    /// Starts the firmware and waits until it listens. `costs`: it counts the instructions of each stage.
-    pub fn start(
-        firmware: &Path,
-        card: &Path,
-        gs: Box<dyn Write + Send>,
-        autopilot: Box<dyn Write + Send>,
-        costs: bool,
-    ) -> Result<Self> {
+    /// Starts the firmware and waits until it listens.
+    pub fn start(start: Start<'_>) -> Result<Self> {
         let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
         let at = |name: &str| dir.path().join(name);
         // Links keep the paths in QEMU's argument short and free of characters that it would read.
-        let card = std::path::absolute(card)?;
-        symlink(&card, at("card")).with_context(|| format!("{}: cannot be linked", card.display()))?;
+        for (path, link) in [(start.card, "card"), (start.store, "store")] {
+            let path = std::path::absolute(path)?;
+            symlink(&path, at(link)).with_context(|| format!("{}: cannot be linked", path.display()))?;
+        }
+        if let Some(survived) = &start.survived {
+            std::fs::write(at(SURVIVED), survived)
+                .context("what survived the reset cannot be handed over")?;
+        }
         make_fifo(&at("feed"))?;
-        let mut child = command(firmware, dir.path(), costs)
+        let mut child = command(&start, dir.path())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -107,14 +170,14 @@ impl Qemu {
         // It waits for this one before it starts the firmware, so that not one byte is missed.
         let ground = qemu.connect("gs")?;
         qemu.ground = Some(ground.try_clone().context("the ground station's port")?);
-        qemu.downlink = Some(forward(ground, gs));
+        qemu.downlink = Some(forward(ground, start.gs));
         let uart = qemu.connect("ap")?;
         // What is sent to the autopilot must be read, or the emulator would wait for that.
-        let _ = forward(uart.try_clone().context("the autopilot's port")?, autopilot);
+        let _ = forward(uart.try_clone().context("the autopilot's port")?, start.autopilot);
         qemu.uart = Some(uart);
         match qemu.lines.recv_timeout(BOOT) {
             Ok(Line::Ready) => {}
-            Ok(Line::Result(_)) | Err(RecvTimeoutError::Disconnected) => {
+            Ok(Line::Result(_) | Line::Again(_)) | Err(RecvTimeoutError::Disconnected) => {
                 let why = qemu.end()?;
                 bail!("the firmware ended before it listened{why}");
             }
@@ -144,38 +207,54 @@ impl Qemu {
         }
     }
 
-    /// "At this time these bytes have arrived."
-    pub fn arrive(&mut self, at_us: u64, bytes: &[u8]) -> Result<()> {
+    /// "At this time these bytes have arrived." `false`: it is being reset, and takes no more.
+    pub fn arrive(&mut self, at_us: u64, bytes: &[u8]) -> Result<bool> {
         self.give(at_us, bytes, false)
     }
 
     /// The same for bytes of the ground station.
-    pub fn hear(&mut self, at_us: u64, bytes: &[u8]) -> Result<()> {
+    pub fn hear(&mut self, at_us: u64, bytes: &[u8]) -> Result<bool> {
         self.give(at_us, bytes, true)
     }
 
-    fn give(&mut self, at_us: u64, bytes: &[u8], from_gs: bool) -> Result<()> {
-        let mut record = [0; 12];
-        record[..8].copy_from_slice(&at_us.to_le_bytes());
-        let count = bytes.len() as u32 | if from_gs { FROM_GS } else { 0 };
-        record[8..].copy_from_slice(&count.to_le_bytes());
-        let port = if from_gs { &mut self.ground } else { &mut self.uart };
-        let sent = match (&mut self.feed, port) {
-            (Some(feed), Some(uart)) => feed.write_all(&record).and_then(|()| uart.write_all(bytes)),
-            _ => Ok(()),
-        };
-        if let Err(error) = sent {
-            let why = self.end()?;
-            bail!("the firmware stopped taking bytes ({error}){why}");
+    fn give(&mut self, at_us: u64, bytes: &[u8], from_gs: bool) -> Result<bool> {
+        match self.send(at_us, bytes, if from_gs { FROM_GS } else { 0 }) {
+            Ok(()) => Ok(true),
+            // It said so before it ended; its lines may still be on their way.
+            Err(_) if self.child.wait()?.code() == Some(EXIT_AGAIN) => Ok(false),
+            Err(error) => {
+                let why = self.end()?;
+                bail!("the firmware stopped taking bytes ({error}){why}")
+            }
         }
+    }
+
+    /// "At this time power goes."
+    pub fn power_off(&mut self, at_us: u64) -> Result<()> {
+        // Where it is reset before, that is how it ends.
+        let _ = self.send(at_us, &[], POWER_OFF);
         Ok(())
     }
 
-    /// No more bytes: the firmware closes the log and prints its counters, one JSON object.
-    pub fn finish(mut self) -> Result<String> {
+    /// A record of the feed, its count with these bits, and the bytes at their port.
+    fn send(&mut self, at_us: u64, bytes: &[u8], bits: u32) -> std::io::Result<()> {
+        let mut record = [0; 12];
+        record[..8].copy_from_slice(&at_us.to_le_bytes());
+        record[8..].copy_from_slice(&(bytes.len() as u32 | bits).to_le_bytes());
+        let port = if bits == FROM_GS { &mut self.ground } else { &mut self.uart };
+        match (&mut self.feed, port) {
+            (Some(feed), Some(uart)) => feed.write_all(&record).and_then(|()| uart.write_all(bytes)),
+            _ => Ok(()),
+        }
+    }
+
+    /// No more bytes: the firmware closes the log and prints its counters, one JSON object; or it goes on with another
+    /// start.
+    pub fn finish(mut self) -> Result<Ended> {
         self.feed = None;
         let result = match self.lines.recv_timeout(SHUTDOWN) {
-            Ok(Line::Result(json)) => Some(json),
+            Ok(Line::Result(json)) => Some(Ended::Done(json)),
+            Ok(Line::Again(again)) => Some(Ended::Again(again)),
             Ok(Line::Ready) | Err(RecvTimeoutError::Disconnected) => None,
             Err(RecvTimeoutError::Timeout) => {
                 bail!("the firmware did not end within {SHUTDOWN:?} after its input")
@@ -188,11 +267,16 @@ impl Qemu {
         {
             result.context("--gs: cannot be written")?;
         }
-        if let (Some(0), Some(json)) = (status.code(), result) {
-            Ok(json)
-        } else {
-            let why = self.end()?;
-            bail!("the firmware failed{why}")
+        match (status.code(), result) {
+            (Some(0), Some(done @ Ended::Done(_))) => Ok(done),
+            (Some(EXIT_AGAIN), Some(Ended::Again(mut again))) => {
+                again.survived = std::fs::read(self.dir.path().join(SURVIVED)).ok();
+                Ok(Ended::Again(again))
+            }
+            _ => {
+                let why = self.end()?;
+                bail!("the firmware failed{why}")
+            }
         }
     }
 
@@ -232,26 +316,27 @@ impl Drop for Qemu {
     }
 }
 
-fn command(firmware: &Path, dir: &Path, costs: bool) -> Command {
+fn command(start: &Start<'_>, dir: &Path) -> Command {
     let socket =
         |id: &str, more: &str| format!("socket,id={id},path={},server=on,{more}", escaped(&dir.join(id)));
-    let arguments = format!(
-        "enable=on,target=native,arg=\"sd={}\" \"feed={}\" \"cost={}\"",
-        escaped(&dir.join("card")),
-        escaped(&dir.join("feed")),
-        u8::from(costs)
-    );
+    let mut arguments = "enable=on,target=native,arg=\"resets=1\"".to_owned();
+    for (key, file) in [("sd", "card"), ("store", "store"), ("feed", "feed")] {
+        let _ = write!(arguments, " \"{key}={}\"", escaped(&dir.join(file)));
+    }
+    for argument in start.arguments.iter().chain(start.costs.then(|| "cost=1".to_owned()).iter()) {
+        let _ = write!(arguments, " \"{argument}\"");
+    }
     let mut command = Command::new(PROGRAM);
     command
         .args(["-M", "netduinoplus2", "-nodefaults", "-display", "none", "-monitor", "none", "-kernel"])
-        .arg(firmware)
+        .arg(start.firmware)
         // The mux puts a buffer before the UART, which quadruples its pace; -echr takes its escape byte away.
         .args(["-chardev", &socket("ap", "wait=off,mux=on"), "-serial", "chardev:ap", "-echr", "256"])
         .args(["-chardev", &socket("gs", "wait=on"), "-serial", "chardev:gs"])
         .args(["-semihosting-config", &arguments])
         .current_dir(dir)
         // With this its clock counts instructions, as the firmware takes it for granted when it counts costs.
-        .args(if costs { &["-icount", "shift=3"][..] } else { &[] })
+        .args(if start.costs { &["-icount", "shift=3"][..] } else { &[] })
         // Ctrl-C is for this program, which then lets the firmware close its log.
         .process_group(0);
     command
@@ -278,6 +363,9 @@ fn listen(child: &mut Child) -> Result<(Receiver<Line>, JoinHandle<String>)> {
             let sent = match line.as_str() {
                 "ready" => sender.send(Line::Ready),
                 json if json.starts_with('{') => sender.send(Line::Result(json.to_owned())),
+                line if again(line).is_some() => {
+                    again(line).map_or(Ok(()), |again| sender.send(Line::Again(again)))
+                }
                 message => {
                     eprintln!("firmware: {message}");
                     Ok(())
@@ -297,7 +385,12 @@ fn listen(child: &mut Child) -> Result<(Receiver<Line>, JoinHandle<String>)> {
     Ok((lines, complaints))
 }
 
-fn forward(mut from: UnixStream, mut to: Box<dyn Write + Send>) -> JoinHandle<std::io::Result<u64>> {
+/// What it says when it is to be started again.
+fn again(line: &str) -> Option<Again> {
+    serde_json::from_str(line.strip_prefix("again ")?).ok()
+}
+
+fn forward(mut from: UnixStream, to: Ground) -> JoinHandle<std::io::Result<u64>> {
     std::thread::spawn(move || {
         let mut buffer = [0; 4096];
         let mut total = 0;
@@ -309,6 +402,7 @@ fn forward(mut from: UnixStream, mut to: Box<dyn Write + Send>) -> JoinHandle<st
                 Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
                 Err(_) => break,
             };
+            let mut to = to.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             to.write_all(buffer.get(..got).unwrap_or_default())?;
             to.flush()?;
             total += got as u64;

@@ -149,7 +149,7 @@ impl Report {
         );
         let _ = writeln!(text, "ground   {} frames, {} bytes", self.gs_frames, self.gs_bytes);
         if self.power_cut {
-            let _ = writeln!(text, "power    was cut at a block write, as asked");
+            let _ = writeln!(text, "power    was cut, as asked");
         }
         for finding in &self.findings {
             let Finding { subsystem, check, instance, level, time_s, .. } = finding;

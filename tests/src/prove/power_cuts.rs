@@ -13,6 +13,7 @@ use hums::card::sim::Written;
 use hums::logs::fat::CardFile;
 use hums::logs::{Log, on_card};
 use hums::run::sim::power_on;
+use hums_blackbox::Cause;
 use hums_core::params::Params;
 use rayon::prelude::*;
 
@@ -37,6 +38,8 @@ struct Scenario {
     /// Sessions that are on the card before.
     earlier: u32,
     seconds: f64,
+    /// Seconds before those in which the vehicle is not armed yet.
+    disarmed_s: f64,
     /// When the card is out, in seconds.
     out: Option<(f64, f64)>,
     /// Parameters that are not at their defaults.
@@ -54,6 +57,7 @@ const NEW_CARD: Scenario = Scenario {
     card_mib: 64,
     earlier: 0,
     seconds: 20.0,
+    disarmed_s: 0.0,
     out: None,
     params: &[],
 };
@@ -64,6 +68,13 @@ const SPLIT: Scenario =
 const SPLIT_FULL: Scenario = Scenario { name: "a log that is split on a full card", earlier: 18, ..SPLIT };
 const RETURN: Scenario =
     Scenario { name: "a card that was taken out and put back", out: Some((5.0, 6.5)), ..LATER };
+
+const BY_ARMING: Scenario = Scenario {
+    name: "a log by arming",
+    disarmed_s: 25.0,
+    params: &[("REC_MODE", 1.0), ("REC_BEFORE", 5.0), ("REC_AFTER", 0.0)],
+    ..LATER
+};
 
 const SCENARIOS: &[Scenario] = &[
     NEW_CARD,
@@ -81,6 +92,10 @@ const SCENARIOS: &[Scenario] = &[
     RETURN,
     Scenario { flight: PX4, ..RETURN },
     Scenario { flight: FAULTS, ..RETURN },
+    BY_ARMING,
+    Scenario { flight: SIGNED, ..BY_ARMING },
+    Scenario { flight: FAULTS, seconds: 60.0, ..BY_ARMING },
+    Scenario { name: "a log by arming on a full card", card_mib: 34, earlier: 18, ..BY_ARMING },
 ];
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
@@ -152,7 +167,7 @@ struct Session {
     trace: Vec<Written>,
     /// The names of the session's own logs, and what its sectors name.
     logs: BTreeSet<String>,
-    session: u32,
+    sealed_as: u32,
     arrivals_us: Vec<u64>,
     hashes: Vec<u64>,
     data_start: u32,
@@ -169,7 +184,12 @@ impl Session {
         }
         let (before, files) = (card.content()?, card.walk()?.files);
         let logs_before: BTreeSet<_> = on_card(&card.path()).into_iter().map(|log| log.name).collect();
-        let stream = Stream::of_flight(&own(scenario.flight), FULL_RATE)?.for_seconds(scenario.seconds);
+        let stream = Stream::of_flight(&own(scenario.flight), FULL_RATE)?;
+        let stream = if scenario.disarmed_s > 0.0 {
+            stream.after_waiting(scenario.disarmed_s, scenario.seconds)?
+        } else {
+            stream.for_seconds(scenario.seconds)
+        };
 
         let micros = |seconds: f64| (seconds * 1e6) as u64;
         let out = scenario.out.map(|(from, to)| CardOut { from_us: micros(from), to_us: micros(to) });
@@ -182,6 +202,8 @@ impl Session {
         let boots = scenario.earlier + 1;
         let done = power_on(&device, &params, boots, stream.chunks(), |_| Ok(()))?;
         ensure!(done.stats.frames_lost == 0 && done.frames_left == 0, "frames were lost: {:?}", done.stats);
+        let drops = done.card.segments_released > 0;
+        ensure!(drops == (scenario.disarmed_s > 0.0), "{} segments dropped", done.card.segments_released);
         let trace = device.take_trace();
         ensure!(trace.len() > 200, "only {} block writes", trace.len());
 
@@ -191,7 +213,7 @@ impl Session {
         let logs: Vec<Log> =
             on_card(&card.path()).into_iter().filter(|log| !logs_before.contains(&log.name)).collect();
         let first = logs.first().context("the session left no log")?;
-        let session = Record::of(first)?.summary.session.context("the session's log is empty")?;
+        let sealed_as = Record::of(first)?.summary.session.context("the session's log is empty")?;
         let mut owners = BTreeMap::new();
         for (index, file) in files.iter().enumerate() {
             for extent in &file.extents {
@@ -209,7 +231,7 @@ impl Session {
             overwritten,
             owners,
             logs: logs.into_iter().map(|log| log.name).collect(),
-            session,
+            sealed_as,
             arrivals_us: stream.arrivals_us(),
             hashes: stream.hashes(),
             data_start: layout.data_start,
@@ -336,15 +358,16 @@ impl Session {
         let (mut count, mut next, mut last_us) = (0, 0, 0);
         for log in on_card(&self.card.path()).iter().filter(|log| self.logs.contains(&log.name)) {
             let record = Record::of(log)?;
-            if record.summary.session != Some(self.session) {
+            if record.summary.session != Some(self.sealed_as) {
                 // No sector of it was written yet: what is there is left over from the log that made room.
                 continue;
             }
             let mut gaps = record.gaps.iter().peekable();
             for (index, frame) in record.frames.iter().enumerate() {
                 while let Some((_, gap)) = gaps.next_if(|(before, _)| *before == index) {
-                    ensure!(gap.from.is_none(), "a gap before the cut: {gap:?}");
-                    next += gap.frames.unwrap_or(0) as usize;
+                    let is_wanted = gap.from.is_none() && gap.cause == Cause::Disarmed;
+                    ensure!(is_wanted, "a gap before the cut: {gap:?}");
+                    next = gap.frames.context("a gap of unknown length")? as usize;
                 }
                 let arrival_us = *self.arrivals_us.get(next).context("more frames than went in")?;
                 ensure!(self.hashes[next] == frame.hash, "frame {next} is not the one that went in");

@@ -18,6 +18,7 @@ pub struct Figures {
 }
 
 impl Figures {
+    #[expect(clippy::needless_pass_by_value, reason = "numbers, and texts that are made for this")]
     pub(super) fn fact(&mut self, what: impl Into<String>, figure: impl ToString) {
         self.facts.push((what.into(), figure.to_string()));
     }

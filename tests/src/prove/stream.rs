@@ -59,6 +59,19 @@ impl Stream {
         Self { bytes, frames: places, is_signed: self.is_signed, baud: self.baud }
     }
 
+    /// So many seconds of what the vehicle sends before it is armed, and then these seconds of everything.
+    pub(super) fn after_waiting(&self, waiting_s: f64, seconds: f64) -> Result<Self> {
+        let armed = self.frames.iter().position(|frame| is_armed(&self.bytes[frame.clone()]));
+        let armed = armed.context("it is never armed")?;
+        let places = self.frames[..armed].to_vec();
+        let mut both = Self { bytes: self.bytes.clone(), frames: places, ..*self }.for_seconds(waiting_s);
+        let all = self.for_seconds(seconds);
+        let start = both.bytes.len();
+        both.bytes.extend_from_slice(&all.bytes);
+        both.frames.extend(all.frames.iter().map(|frame| start + frame.start..start + frame.end));
+        Ok(both)
+    }
+
     /// How long it takes on the line, in seconds.
     pub(super) fn seconds(&self) -> f64 {
         self.bytes.len() as f64 * 10.0 / self.baud as f64
@@ -88,6 +101,15 @@ impl Stream {
     fn at_us(&self, end: usize) -> u64 {
         end as u64 * 10 * 1_000_000 / self.baud
     }
+}
+
+/// Whether a frame is a heartbeat with `MAV_MODE_FLAG_SAFETY_ARMED`.
+fn is_armed(frame: &[u8]) -> bool {
+    let (id, mode) = match frame {
+        [0xFE, ..] => (frame.get(5..6), frame.get(6 + 6)),
+        _ => (frame.get(7..10), frame.get(10 + 6)),
+    };
+    id.is_some_and(|id| id.iter().all(|byte| *byte == 0)) && mode.is_some_and(|mode| mode & 0x80 != 0)
 }
 
 /// 64 bits of these bytes.

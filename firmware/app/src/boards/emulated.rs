@@ -14,15 +14,17 @@
 //! | `log` | where defmt's messages go |
 //! | `seed` | a number that stands for the true random number of a real board |
 //! | `provoke` | `panic`, `bus-fault` or `silence`: that fault, when the downlink sends first (see [`provoke`]) |
+//! | `resets` | `1`: the host starts the emulator again after a reset, and the start goes on where the last one was (see [`reset`]) |
 //! | `cost` | `1`: tell the instructions of each stage; QEMU must run with `-icount shift=3` |
 //!
-//! Exit codes: 0 done, 2 no feed, 101 a fault, 102 all tasks wait for ever.
+//! Exit codes: 0 done, 2 no feed, 3 to be started again, 101 a fault, 102 all tasks wait for ever.
 
 mod card;
 mod clock;
 mod feed;
 mod log;
 mod provoke;
+mod reset;
 mod store;
 mod uart;
 
@@ -60,6 +62,8 @@ const PATH_BYTES: usize = 512;
 
 /// There was no feed, or it cannot be opened.
 const EXIT_NO_FEED: i32 = 2;
+/// The host is to start the emulator again.
+const EXIT_AGAIN: i32 = 3;
 /// As Rust programs end that panic.
 const EXIT_FAULT: i32 = 101;
 /// All tasks wait, and nothing will ever come.
@@ -93,7 +97,15 @@ struct Arguments {
     log: CString<PATH_BYTES>,
     seed: u32,
     tell_costs: bool,
+    resets: bool,
     provoked: provoke::Fault,
+}
+
+/// Memory that survives a reset.
+pub(crate) fn remember() {
+    if Arguments::read().resets {
+        reset::remember();
+    }
 }
 
 /// Reads the arguments, opens what they name and switches the ports on.
@@ -101,7 +113,10 @@ pub(crate) fn take() -> Parts {
     start_systick();
     let arguments = Arguments::read();
     TELL_COSTS.store(arguments.tell_costs, Ordering::Relaxed);
-    provoke::arm(arguments.provoked);
+    // Once: what it came to is what the next start shows.
+    if fault::starts() <= 1 {
+        provoke::arm(arguments.provoked);
+    }
     log::open(File::create(arguments.log.as_c_str()).ok());
     let image = File::options().read(true).write(true).open(arguments.card.as_c_str());
     let store = File::options().read(true).write(true).open(arguments.store.as_c_str());
@@ -122,7 +137,7 @@ pub(crate) fn take() -> Parts {
         idle: Idle { feed: Feed::new(feed) },
         boot: Boot {
             id: [0; 12],
-            cause: ResetCause::PowerOn,
+            cause: reset::cause(),
             cause_register: 0,
             entropy: arguments.seed.wrapping_add(1),
         },
@@ -140,6 +155,7 @@ impl Arguments {
                 "store" => set_path(&mut arguments.store, value),
                 "log" => set_path(&mut arguments.log, value),
                 "seed" => arguments.seed = value.parse().unwrap_or_default(),
+                "resets" => arguments.resets = value == "1",
                 "cost" => arguments.tell_costs = value == "1",
                 "provoke" => arguments.provoked = provoke::Fault::named(value).unwrap_or_default(),
                 _ => println!("unknown argument: {}", key),
@@ -203,6 +219,9 @@ impl Idle {
             match self.feed.peek() {
                 Some(arrival) if arrival.time_us.max(clock::now_us()) < alarm_us => {
                     clock::advance(arrival.time_us);
+                    if arrival.is_power_off() {
+                        reset::power_off();
+                    }
                     uart::receive(arrival.from_gs, arrival.bytes);
                     self.feed.take();
                 }
@@ -220,7 +239,7 @@ impl Idle {
             }
             if now_ms() > BITES_AT_MS.load(Ordering::Relaxed) {
                 println!("the watchdog bites");
-                restart();
+                reset::reset(ResetCause::Watchdog);
             }
         }
     }
@@ -283,10 +302,7 @@ impl core::fmt::Display for Costs<'_> {
     }
 }
 
-/// Ends the emulator and says why: the host's files are as they were, so a start anew would not be one.
+/// Starts anew, or ends the emulator and says why where nobody starts it again.
 pub(crate) fn restart() -> ! {
-    if let Some(fault) = fault::take() {
-        println!("fault: {fault}");
-    }
-    process::exit(EXIT_FAULT);
+    reset::reset(ResetCause::Software)
 }

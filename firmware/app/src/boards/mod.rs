@@ -6,6 +6,7 @@
 //! | name | what |
 //! |---|---|
 //! | `NAME` | the board's name |
+//! | `remember()` | brings back memory that survives a reset, where the machine does not do so itself; first of all |
 //! | `take() -> Parts` | starts the machine; to be called once, first |
 //! | `Parts` | `autopilot` and `gs` (each [`Receive`] and [`Transmit`]), `card` (`CardDevice`), `store` (`NorFlash`, two sectors), `led`, `watchdog`, `idle`, `boot` ([`Boot`]) |
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |

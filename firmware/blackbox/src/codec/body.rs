@@ -12,6 +12,11 @@ use crate::coder::Coder;
 /// What is known of all payloads.
 pub(super) struct Body {
     pub(super) elements: Elements,
+    pub(super) common: Common,
+}
+
+/// What the elements know in common.
+pub(super) struct Common {
     pub(super) distributions: Distributions,
     pub(super) texts: Texts,
     registers: [f32; REGISTERS],
@@ -23,21 +28,22 @@ impl Body {
     pub(super) const fn new() -> Self {
         Self {
             elements: Elements::new(),
-            distributions: Distributions::new(),
-            texts: Texts::new(),
-            registers: [0.0; REGISTERS],
-            clock_us: 0,
-            clock_ms: 0,
+            common: Common {
+                distributions: Distributions::new(),
+                texts: Texts::new(),
+                registers: [0.0; REGISTERS],
+                clock_us: 0,
+                clock_ms: 0,
+            },
         }
     }
 
     pub(super) fn reset(&mut self) {
         self.elements.reset();
-        self.distributions.reset();
-        self.texts.reset();
-        self.registers = [0.0; REGISTERS];
-        self.clock_us = 0;
-        self.clock_ms = 0;
+        self.common.distributions.reset();
+        self.common.texts.reset();
+        self.common.registers = [0.0; REGISTERS];
+        (self.common.clock_us, self.common.clock_ms) = (0, 0);
     }
 
     /// All of the payload.
@@ -57,7 +63,7 @@ impl Body {
             let mut before = 0;
             for at in end..usize::from(len) {
                 let byte = frame.payload.get(at).copied()?;
-                let byte = self.texts.model.byte(coder, byte, before, at as u8, 3);
+                let byte = self.common.texts.model.byte(coder, byte, before, at as u8, 3);
                 frame.payload[at] = byte;
                 before = before << 8 | u32::from(byte);
             }
@@ -76,16 +82,10 @@ impl Body {
         calm: bool,
     ) -> Option<usize> {
         let limit = limit(slot);
-        let mut context = Context {
-            elapsed_ms,
-            clock_us: self.clock_us,
-            clock_ms: self.clock_ms,
-            neighbour: None,
-            link: None,
-        };
-        let mut offset = 0;
+        let (clock_us, clock_ms) = (self.common.clock_us, self.common.clock_ms);
+        let mut context = Context { elapsed_ms, clock_us, clock_ms, neighbour: None, link: None };
+        let (mut offset, mut quiet) = (0, 0);
         let mut link = usize::from(slot.links);
-        let mut quiet = false;
         let mut elements = self.elements.list.get_mut(elements_in(slot))?.iter_mut();
         while let Some(element) = elements.next() {
             let (what, size) = (element.what, usize::from(element.size));
@@ -93,73 +93,38 @@ impl Body {
                 break;
             }
             let place = frame.place(offset);
-            let last = element.last;
             let stays = calm && element.is_quiet();
-            if stays && what != What::Text {
-                let upper = if what.is_wide() { elements.next()?.last } else { 0 };
-                if !C::WRITES {
-                    let value = u64::from(upper) << 32 | u64::from(last);
-                    place.get_mut(..size)?.copy_from_slice(value.to_le_bytes().get(..size)?);
-                }
-                quiet = true;
-                offset += size;
-                continue;
-            }
             match what {
+                What::Text => {
+                    let text = frame.payload.get_mut(offset..offset + size)?;
+                    self.common.texts.code(coder, element, text, stays)?;
+                }
+                _ if stays => {
+                    if !C::WRITES {
+                        let upper = if what.is_wide() { elements.as_slice().first()?.last } else { 0 };
+                        put(place, u64::from(upper) << 32 | u64::from(element.last), size);
+                    }
+                }
                 What::Integer1 | What::Integer2 | What::Integer4 => {
                     let bits = word(place) & (u32::MAX >> (32 - 8 * size));
-                    let value = self.distributions.integer(coder, element, bits);
-                    if !C::WRITES {
-                        put(place, value, size);
-                    }
+                    let value = self.common.distributions.integer(coder, element, bits);
                     if element.has_links() {
-                        let (_, publishes) = links_at(&mut link, slot.key.id, offset);
-                        publish(&mut self.registers, publishes, element);
+                        self.common.publish(links_at(&mut link, slot.key.id, offset).1, element);
                     }
-                }
-                What::Millis | What::Micros => {
-                    let aux = element.aux;
-                    let value = self.distributions.time(coder, element, word(place), &context);
-                    let mut step_us = value.wrapping_sub(last);
-                    if what == What::Millis {
-                        self.clock_ms = value;
-                        step_us = step_us.wrapping_mul(1_000);
-                    }
-                    self.clock_us = advanced(self.clock_us, aux.wrapping_add(step_us));
                     if !C::WRITES {
-                        put(place, value, 4);
+                        put(place, u64::from(value), size);
                     }
                 }
+                What::Millis | What::Micros => self.common.time(coder, element, place, &context),
                 What::Float => {
                     let mut links = (None, None);
                     if element.has_links() {
                         links = links_at(&mut link, slot.key.id, offset);
                     }
-                    context.link = links
-                        .0
-                        .and_then(|link| Some(self.registers.get(usize::from(link.register))? * link.scale));
-                    let value = self.distributions.float(coder, element, word(place), &context);
-                    context.neighbour = Some((f32::from_bits(value), f32::from_bits(last)));
-                    publish(&mut self.registers, links.1, element);
-                    if !C::WRITES {
-                        put(place, value, 4);
-                    }
+                    self.common.float(coder, element, place, &mut context, links);
                 }
                 What::Wide | What::WideTime => {
-                    let (aux, upper) = (element.aux, elements.next()?);
-                    let bits = u64::from_le_bytes(*place);
-                    let value = self.distributions.wide(coder, element, upper, bits, &context);
-                    if what == What::WideTime {
-                        let step_us = (value as u32).wrapping_sub(last);
-                        self.clock_us = advanced(self.clock_us, aux.wrapping_add(step_us));
-                    }
-                    if !C::WRITES {
-                        *place = value.to_le_bytes();
-                    }
-                }
-                What::Text => {
-                    let text = frame.payload.get_mut(offset..offset + size)?;
-                    self.texts.code(coder, element, text, stays)?;
+                    self.common.wide(coder, element, elements.next()?, place, &context);
                 }
                 What::Instance => {
                     let instance = slot.key.instance.get(..size)?;
@@ -167,10 +132,10 @@ impl Body {
                 }
                 What::Upper => {}
             }
-            quiet |= element.is_quiet();
+            quiet |= element.quiet_bits();
             offset += size;
         }
-        slot.quiet = quiet;
+        slot.quiet = Element::any_quiet(quiet);
         Some(offset)
     }
 
@@ -187,18 +152,18 @@ impl Body {
     fn stays(&self, slot: &Slot, frame: &mut Frame) -> Option<bool> {
         let limit = limit(slot);
         let mut offset = 0;
-        let mut elements = self.elements.list.get(elements_in(slot))?.iter();
-        while let Some(element) = elements.next() {
+        let elements = self.elements.list.get(elements_in(slot))?;
+        for (index, element) in elements.iter().enumerate() {
             let size = usize::from(element.size);
             if offset + size > limit {
                 break;
             }
-            let upper = if element.what.is_wide() { elements.next() } else { None };
             if element.is_quiet() {
                 let place = frame.place(offset);
-                let same = match (element.what, upper) {
-                    (What::Text, _) => self.texts.last(element) == frame.payload.get(offset..offset + size),
-                    (_, Some(upper)) => {
+                let same = match element.what {
+                    What::Text => self.common.texts.last(element) == frame.payload.get(offset..offset + size),
+                    What::Wide | What::WideTime => {
+                        let upper = elements.get(index + 1)?;
                         u64::from_le_bytes(*place) == u64::from(upper.last) << 32 | u64::from(element.last)
                     }
                     _ => word(place) & (u32::MAX >> (32 - 8 * size)) == element.last,
@@ -235,7 +200,7 @@ impl Body {
             let place = &mut frame.payload[offset..offset + size];
             match element.what {
                 What::Instance => place.copy_from_slice(&slot.key.instance[..size]),
-                What::Text => match self.texts.last(element) {
+                What::Text => match self.common.texts.last(element) {
                     Some(text) => place.copy_from_slice(text),
                     None => return false,
                 },
@@ -252,6 +217,91 @@ impl Body {
         frame.len <= offset || slot.length == Length::Trimmed
     }
 }
+
+impl Common {
+    #[inline]
+    fn time<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        element: &mut Element,
+        place: &mut [u8; 8],
+        context: &Context,
+    ) {
+        let (last, at_last) = (element.last, element.aux);
+        let value = self.distributions.time(coder, element, word(place), context);
+        let mut step_us = value.wrapping_sub(last);
+        if element.what == What::Millis {
+            self.clock_ms = value;
+            step_us = step_us.wrapping_mul(1_000);
+        }
+        self.advance(at_last.wrapping_add(step_us));
+        if !C::WRITES {
+            put(place, u64::from(value), 4);
+        }
+    }
+
+    #[inline]
+    fn wide<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        element: &mut Element,
+        upper: &mut Element,
+        place: &mut [u8; 8],
+        context: &Context,
+    ) {
+        let (last, at_last) = (element.last, element.aux);
+        let value = self.distributions.wide(coder, element, upper, u64::from_le_bytes(*place), context);
+        if element.what == What::WideTime {
+            self.advance(at_last.wrapping_add((value as u32).wrapping_sub(last)));
+        }
+        if !C::WRITES {
+            put(place, value, 8);
+        }
+    }
+
+    #[inline]
+    fn float<C: Coder>(
+        &mut self,
+        coder: &mut C,
+        element: &mut Element,
+        place: &mut [u8; 8],
+        context: &mut Context,
+        (consults, publishes): Links,
+    ) {
+        context.link = match consults {
+            Some(link) => self.registers.get(usize::from(link.register)).map(|known| known * link.scale),
+            None => None,
+        };
+        let last = element.last;
+        let value = self.distributions.float(coder, element, word(place), context);
+        context.neighbour = Some((f32::from_bits(value), f32::from_bits(last)));
+        self.publish(publishes, element);
+        if !C::WRITES {
+            put(place, u64::from(value), 4);
+        }
+    }
+
+    /// A time field proposes to move the clock: only forward, and not by more than ten seconds; anything else is no
+    /// advance of a clock.
+    #[inline]
+    fn advance(&mut self, proposed_us: u32) {
+        if proposed_us.wrapping_sub(self.clock_us) < 10_000_000 {
+            self.clock_us = proposed_us;
+        }
+    }
+
+    #[inline]
+    fn publish(&mut self, link: Option<&Link>, element: &Element) {
+        if let Some(link) = link
+            && let Some(register) = self.registers.get_mut(usize::from(link.register))
+        {
+            *register = element.number() * link.scale;
+        }
+    }
+}
+
+/// The links of a field: the one to consult and the one to publish.
+type Links = (Option<&'static Link>, Option<&'static Link>);
 
 fn elements_in(slot: &Slot) -> Range<usize> {
     let first = usize::from(slot.elements);
@@ -273,30 +323,14 @@ fn word(place: &[u8; 8]) -> u32 {
 
 /// The lower `size` bytes of a value.
 #[inline]
-fn put(place: &mut [u8; 8], value: u32, size: usize) {
+fn put(place: &mut [u8; 8], value: u64, size: usize) {
     for (place, byte) in place.iter_mut().zip(value.to_le_bytes()).take(size) {
         *place = byte;
     }
 }
 
-/// A clock that a time field proposes to move: only forward, and not by more than ten seconds; anything else is no
-/// advance of a clock.
-#[inline]
-fn advanced(clock_us: u32, proposed_us: u32) -> u32 {
-    if proposed_us.wrapping_sub(clock_us) < 10_000_000 { proposed_us } else { clock_us }
-}
-
-#[inline]
-fn publish(registers: &mut [f32; REGISTERS], link: Option<&Link>, element: &Element) {
-    if let Some(link) = link
-        && let Some(register) = registers.get_mut(usize::from(link.register))
-    {
-        *register = element.number() * link.scale;
-    }
-}
-
-/// The links of the field at an offset, the one to consult and the one to publish; moves on to them.
-fn links_at(at: &mut usize, id: u32, offset: usize) -> (Option<&'static Link>, Option<&'static Link>) {
+/// The links of the field at an offset; moves on to them.
+fn links_at(at: &mut usize, id: u32, offset: usize) -> Links {
     let mut found = (None, None);
     while let Some(link) = LINKS.get(*at).filter(|link| link.id == id && usize::from(link.offset) <= offset) {
         if usize::from(link.offset) == offset {

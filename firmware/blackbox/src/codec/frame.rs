@@ -2,6 +2,7 @@
 //! coded as plain bytes.
 
 use super::ENTRY_BYTES_MAX;
+use crate::bytes::copy_few;
 
 pub(crate) const PAYLOAD_BYTES_MAX: usize = 255;
 pub(crate) const SIGNATURE_BYTES: usize = 13;
@@ -67,7 +68,9 @@ impl Frame {
 
     /// Keeps `len` bytes of the payload; clears what a frame before left beyond.
     fn clear_payload(&mut self, len: usize) {
-        if let Some(beyond) = self.payload.get_mut(len..self.used.max(len)) {
+        if len < self.used
+            && let Some(beyond) = self.payload.get_mut(len..self.used)
+        {
             beyond.fill(0);
         }
         // Whoever fills it in says less.
@@ -96,7 +99,7 @@ impl Frame {
             _ => return None,
         }
         let (payload, rest) = rest.split_at_checked(frame.len)?;
-        copy(payload, &mut frame.payload);
+        copy_few(payload, &mut frame.payload);
         frame.clear_payload(frame.len);
         frame.used = frame.len;
         let (checksum, signature) = rest.split_first_chunk()?;
@@ -158,22 +161,6 @@ impl Frame {
     pub(crate) fn trimmed(&self, full: usize) -> usize {
         let payload = &self.payload[..full.min(PAYLOAD_BYTES_MAX)];
         payload.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1)
-    }
-}
-
-/// Copies a payload, word by word: it is short, and seldom lies at a word's border.
-#[inline]
-fn copy(from: &[u8], to: &mut [u8; PAYLOAD_BYTES_MAX + 9]) {
-    let mut at = 0;
-    let (words, rest) = from.as_chunks::<4>();
-    for word in words {
-        if let Some(place) = to.get_mut(at..at + 4) {
-            place.copy_from_slice(word);
-        }
-        at += 4;
-    }
-    for (place, &byte) in to.iter_mut().skip(at).zip(rest) {
-        *place = byte;
     }
 }
 

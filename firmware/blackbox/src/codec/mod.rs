@@ -165,7 +165,7 @@ impl Model {
 
     /// Which slot a frame belongs to; `None` where there is no room for it in the model.
     fn route(&mut self, frame: &Frame) -> Option<(Next, Key)> {
-        if let Some(slot) = self.slots.find_guessed(frame) {
+        if let Some(slot) = self.slots.find_guessed(frame).or_else(|| self.slots.find(frame)) {
             return Some((Next::Slot(slot), NO_KEY));
         }
         let sender = self.slots.sender(frame.system, frame.component)?;
@@ -173,9 +173,6 @@ impl Model {
         let layout = self.layouts.find(key.id).and_then(|place| self.layouts.at(place));
         if let Some((offset, size)) = layout.and_then(describe::instance_of) {
             key.instance[..size].copy_from_slice(frame.payload.get(offset..offset + size)?);
-        }
-        if let Some(slot) = self.slots.find(&key) {
-            return Some((Next::Slot(slot), NO_KEY));
         }
         self.slots.has_room().then_some((Next::NewSlot, key))
     }
@@ -201,7 +198,7 @@ impl Model {
             *place = if raw {
                 coder.bits16(u32::from(*place), 8) as u8
             } else {
-                self.body.texts.model.byte(coder, *place, before, 0, 0)
+                self.body.common.texts.model.byte(coder, *place, before, 0, 0)
             };
             before = before << 8 | u32::from(*place);
         }
@@ -220,9 +217,9 @@ impl Model {
         let cdf = match slot {
             Some(slot) => {
                 if slot.times == 0 && slot.frames > 0 {
-                    slot.times = self.body.distributions.claim(self.times.renewed());
+                    slot.times = self.body.common.distributions.claim(self.times.renewed());
                 }
-                self.body.distributions.get(slot.times).unwrap_or(&mut self.times)
+                self.body.common.distributions.get(slot.times).unwrap_or(&mut self.times)
             }
             None => &mut self.times,
         };

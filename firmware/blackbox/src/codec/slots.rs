@@ -265,10 +265,10 @@ impl Slots {
             && (slot.instance_size == 0 || slot.is_instance(frame))
     }
 
-    /// The slot of this key.
-    pub(crate) fn find(&self, key: &Key) -> Option<u8> {
-        let known = self.list.get(..usize::from(self.used))?;
-        known.iter().position(|slot| slot.key == *key).map(|index| index as u8)
+    /// The slot of this frame.
+    #[inline(never)]
+    pub(crate) fn find(&self, frame: &Frame) -> Option<u8> {
+        (0..self.used).find(|&slot| self.is_of(slot, frame))
     }
 
     pub(crate) fn add(&mut self, slot: Slot) -> Option<u8> {

@@ -33,12 +33,8 @@ impl TextModel {
         above: u8,
         matched: u32,
     ) -> u8 {
-        let seeds = [
-            hash(before & 0x00ff_ffff, 0x1000_0001),
-            hash(before & 0xffff, 0x2000_0003),
-            hash(before & 0xff, 0x3000_0005),
-            hash(u32::from(above) << 2 | matched.min(3), 0x4000_0007),
-        ];
+        let seeds =
+            [hash(before & 0xffff, 0x2000_0003), hash(u32::from(above) << 2 | matched.min(3), 0x4000_0007)];
         let mut value = u32::from(byte);
         let upper = self.nibble(coder, seeds, value >> 4);
         value = self.nibble(coder, seeds.map(|seed| seed ^ (16 + upper)), value & 15);
@@ -47,7 +43,7 @@ impl TextModel {
 
     /// Four bits, the highest first. Each context has a row of cells for them, one for each way they may begin.
     #[inline]
-    fn nibble<C: Coder>(&mut self, coder: &mut C, seeds: [u32; 4], value: u32) -> u32 {
+    fn nibble<C: Coder>(&mut self, coder: &mut C, seeds: [u32; 2], value: u32) -> u32 {
         let rows = seeds.map(|seed| (hash(seed, 0x9e37_79b1) >> 25) as usize % ROWS);
         let mut node = 1_usize;
         for shift in [3, 2, 1, 0] {
@@ -69,7 +65,7 @@ fn hash(value: u32, salt: u32) -> u32 {
 }
 
 /// The probability that the contexts make together: each counts by how often it was used and how sure it is.
-fn mix(cells: [Cell; 4]) -> u32 {
+fn mix(cells: [Cell; 2]) -> u32 {
     let (mut sum, mut weights) = (2_048_u32, 1_u32);
     for cell in cells {
         let sure = cell.one().abs_diff(2_048) >> 6;

@@ -6,17 +6,21 @@
 
 mod boot;
 mod finding;
+mod keep;
 mod loss;
 mod usage;
 mod vehicle;
+mod wear;
 
 use core::fmt;
 
 pub use boot::{Boot, Fault};
 pub use finding::{Event, FindingRecord, Note};
+pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
-pub use usage::{Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
+pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
 pub use vehicle::{Clock, Parameter, Vehicle};
+pub use wear::{Component, Exceedance, Why};
 
 use crate::bytes::{Fields, Sink};
 
@@ -59,6 +63,14 @@ pub enum Record<'a> {
     Event(Event<'a>),
     /// Kind 11: free text.
     Note(Note<'a>),
+    /// Kind 12: the airframe's life.
+    Lifetime(Lifetime<'a>),
+    /// Kind 13: limits of one check that were crossed.
+    Exceedance(Exceedance<'a>),
+    /// Kind 14: a part that wears.
+    Component(Component<'a>),
+    /// Kind 15: what of the session is kept, where not all of it is.
+    Keep(Keep),
     /// A kind that this reader does not know.
     Unknown {
         /// The stored kind.
@@ -98,6 +110,10 @@ impl<'a> Record<'a> {
             Self::Fault(fault) => fault.store(&mut sink),
             Self::Event(event) => event.store(&mut sink),
             Self::Note(note) => note.store(&mut sink),
+            Self::Lifetime(lifetime) => lifetime.store(&mut sink),
+            Self::Exceedance(exceedance) => exceedance.store(&mut sink),
+            Self::Component(component) => component.store(&mut sink),
+            Self::Keep(keep) => keep.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
                 sink.u8(*kind).u8(*version).bytes(bytes);
             }
@@ -123,6 +139,10 @@ impl<'a> Record<'a> {
             9 => Self::Fault(Fault::read(fields)),
             10 => Self::Event(Event::read(fields)),
             11 => Self::Note(Note::read(fields)),
+            12 => Self::Lifetime(Lifetime::read(fields)),
+            13 => Self::Exceedance(Exceedance::read(fields)),
+            14 => Self::Component(Component::read(fields)),
+            15 => Self::Keep(Keep::read(fields)),
             _ => unknown,
         }
     }
@@ -130,6 +150,8 @@ impl<'a> Record<'a> {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::component::{Figures, Kind, Status};
+    use hums_core::exceedance::Crossings;
     use hums_core::health::{Level, Subsystem};
     use hums_core::time::Instant;
 
@@ -196,6 +218,33 @@ mod tests {
         }));
         reads_back(Record::Event(Event { number: 5, text: "look" }));
         reads_back(Record::Note(Note { severity: 6, text: "grüß" }));
+        let life = hums_core::lifetime::Lifetime { boots: 7, sessions: 5, ..Default::default() };
+        reads_back(Record::Lifetime(Lifetime::new(Moment::Start, &life, &entries)));
+        let crossings =
+            |peak| Crossings { warnings: 3, criticals: 1, warning_tenths: 99, critical_tenths: 12, peak };
+        reads_back(Record::Exceedance(Exceedance {
+            moment: Moment::End,
+            check: "vibration",
+            instance: 2,
+            unit: "m/s2",
+            session: crossings(61.5),
+            lifetime: crossings(70.25),
+        }));
+        reads_back(Record::Component(Component {
+            why: Why::Replaced,
+            place: 7,
+            kind: Kind::Propeller,
+            number: 4,
+            status: Status::Red,
+            replaced: 3,
+            name: "prop 4",
+            serial: "SN 1",
+            figures: Figures { flight_s: 3_600.5, flights: 12.0, ..Figures::ZERO },
+            used_percent: 101.0,
+            by: (255, 190),
+            new_serial: "SN 2",
+        }));
+        reads_back(Record::Keep(Keep { all: true, from: 70_000, seconds: 30 }));
         reads_back(Record::Unknown { kind: 200, version: 3, bytes: &[1, 2, 3] });
     }
 

@@ -18,6 +18,7 @@ mod structure;
 pub use check::{Check, Reading, Side, State, When};
 pub use finding::{Finding, Level, Subsystem};
 
+use crate::exceedance::Exceedances;
 use crate::flight::Flight;
 use crate::params::{Param, Params};
 use crate::status::{LinkReading, RecorderStatus};
@@ -113,9 +114,14 @@ impl Health {
     }
 
     /// One step of all checks, at least every 50 ms; each change of level is a finding.
-    pub fn step(&mut self, inputs: &Inputs<'_>, findings: &mut impl FnMut(&Finding)) {
+    pub fn step(
+        &mut self,
+        inputs: &Inputs<'_>,
+        exceedances: &mut Exceedances,
+        findings: &mut impl FnMut(&Finding),
+    ) {
         let latched = inputs.params.get(Param::Latch) >= 0.5 && inputs.vehicle.armed();
-        for (check, instance, state) in self.each_mut() {
+        for (place, check, instance, state) in self.each_mut() {
             let applies = match check.when {
                 When::Always => true,
                 When::Armed => inputs.vehicle.armed(),
@@ -124,6 +130,9 @@ impl Health {
             let reading = (check.read)(inputs, instance);
             let before = *state;
             let Some(change) = state.step(check, inputs.now, reading, applies, inputs.params) else {
+                if let (Some(Level::Warning | Level::Critical), Some(reading)) = (state.level(), reading) {
+                    exceedances.note(place, instance, check.side, reading.value);
+                }
                 continue;
             };
             let falls = matches!(change.previous, Level::Warning | Level::Critical)
@@ -132,7 +141,7 @@ impl Health {
                 *state = before;
                 continue;
             }
-            findings(&Finding {
+            let finding = Finding {
                 at: inputs.now,
                 subsystem: check.subsystem,
                 check: check.name,
@@ -142,15 +151,19 @@ impl Health {
                 value: change.value,
                 limit: change.limit,
                 unit: check.unit,
-            });
+            };
+            exceedances.change(place, check.side, &finding);
+            findings(&finding);
         }
     }
 
-    fn each_mut(&mut self) -> impl Iterator<Item = (&'static Check, u8, &mut State)> {
-        checks()
-            .flat_map(|check| (0..check.instances).map(move |instance| (check, instance)))
+    /// Each check by its place among all, and its instances.
+    fn each_mut(&mut self) -> impl Iterator<Item = (u8, &'static Check, u8, &mut State)> {
+        (0..)
+            .zip(checks())
+            .flat_map(|(place, check)| (0..check.instances).map(move |instance| (place, check, instance)))
             .zip(&mut self.states)
-            .map(|((check, instance), state)| (check, instance, state))
+            .map(|((place, check, instance), state)| (place, check, instance, state))
     }
 
     /// Every check instance that has had something to say, with its level.

@@ -21,6 +21,11 @@ impl<'a> Put<'a> {
         self
     }
 
+    /// Bytes written.
+    pub(crate) const fn len(&self) -> usize {
+        self.at
+    }
+
     pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
         self.bytes(&[value])
     }
@@ -52,6 +57,10 @@ pub(crate) struct Take<'a>(&'a [u8]);
 impl<'a> Take<'a> {
     pub(crate) const fn new(stored: &'a [u8]) -> Self {
         Self(stored)
+    }
+
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Unreadable> {

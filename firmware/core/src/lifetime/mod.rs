@@ -14,10 +14,12 @@ mod bytes;
 mod saving;
 
 pub(crate) use bytes::{Put, Take};
-pub use saving::Saving;
+pub use saving::{EVERY, Saving};
 
 use crate::baseline::Baselines;
 use crate::component::{COMPONENTS_MAX, Component};
+use crate::exceedance::Exceedances;
+use crate::exposure::Exposure;
 use crate::usage::{Form, Totals, UsageCounter};
 
 /// The longest item. Each has its own length.
@@ -25,6 +27,8 @@ pub const ITEM_BYTES_MAX: usize = 512;
 
 const _: () = assert!(Lifetime::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Baselines::BYTES <= ITEM_BYTES_MAX);
+const _: () = assert!(Exceedances::BYTES <= ITEM_BYTES_MAX);
+const _: () = assert!(Exposure::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Component::BYTES <= ITEM_BYTES_MAX);
 
 /// What a stored item is. The numbers are stored and never change meaning.
@@ -34,6 +38,10 @@ pub enum ItemKey {
     Lifetime,
     /// 2: [`Baselines`].
     Baselines,
+    /// 3: [`Exceedances`].
+    Exceedances,
+    /// 4: [`Exposure`].
+    Exposure,
     /// 16 to 23: a [`Component`], by its place from 0.
     Component(u8),
 }
@@ -45,12 +53,12 @@ impl ItemKey {
     const COMPONENT_FIRST: u8 = 16;
 
     /// All keys, by number.
-    pub const ALL: [Self; 2 + COMPONENTS_MAX] = {
-        let mut all = [Self::Lifetime; 2 + COMPONENTS_MAX];
-        all[1] = Self::Baselines;
+    pub const ALL: [Self; 4 + COMPONENTS_MAX] = {
+        let mut all = [Self::Lifetime; 4 + COMPONENTS_MAX];
+        (all[1], all[2], all[3]) = (Self::Baselines, Self::Exceedances, Self::Exposure);
         let mut place = 0;
         while place < COMPONENTS_MAX {
-            all[2 + place] = Self::Component(place as u8);
+            all[4 + place] = Self::Component(place as u8);
             place += 1;
         }
         all
@@ -61,6 +69,8 @@ impl ItemKey {
         match self {
             Self::Lifetime => 1,
             Self::Baselines => 2,
+            Self::Exceedances => 3,
+            Self::Exposure => 4,
             Self::Component(place) => Self::COMPONENT_FIRST + place,
         }
     }
@@ -70,6 +80,8 @@ impl ItemKey {
         match number {
             1 => Some(Self::Lifetime),
             2 => Some(Self::Baselines),
+            3 => Some(Self::Exceedances),
+            4 => Some(Self::Exposure),
             _ => match number.checked_sub(Self::COMPONENT_FIRST) {
                 Some(place) if (place as usize) < COMPONENTS_MAX => Some(Self::Component(place)),
                 _ => None,
@@ -82,7 +94,9 @@ impl ItemKey {
         match self {
             Self::Lifetime => 0,
             Self::Baselines => 1,
-            Self::Component(place) => 2 + place as usize,
+            Self::Exceedances => 2,
+            Self::Exposure => 3,
+            Self::Component(place) => 4 + place as usize,
         }
     }
 }

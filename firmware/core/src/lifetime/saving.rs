@@ -7,7 +7,7 @@ use crate::time::{Instant, Span};
 /// The first save: late enough for the store to be ready and the vehicle to be heard.
 const FIRST: Span = Span::from_secs(10);
 /// What a power cut may cost at most; flash sets it: `hums_onboard::persist` has the sums.
-const EVERY: Span = Span::from_secs(15 * 60);
+pub const EVERY: Span = Span::from_secs(15 * 60);
 
 /// What waits to be saved.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,7 @@
 //! The counters: their stored numbers, their names, which carry the unit, and how they add up over sessions.
 
+use crate::baseline::Quantity as Normal;
+use crate::exposure::{BINS, Quantity as Exposed};
 use crate::observation::MOTORS_MAX;
 
 /// How a counter adds up over sessions, and its stored form.
@@ -152,13 +154,35 @@ pub const MOTOR_TIME_FIRST: u8 = 100;
 /// Counters one a motor: revolutions from this number on, motor by motor.
 pub const MOTOR_REVOLUTIONS_FIRST: u8 = 120;
 
+/// Time in ranges: seconds from this number on, quantity by quantity and range by range.
+pub const EXPOSURE_FIRST: u8 = 140;
+/// Baselines: from this number on, by [`crate::baseline::Quantity::index`].
+pub const BASELINE_FIRST: u8 = 200;
+
+const _: () = assert!(EXPOSURE_FIRST as usize + BINS * Exposed::ALL.len() <= BASELINE_FIRST as usize);
+const _: () = assert!(BASELINE_FIRST as usize + Normal::COUNT <= 256);
+
 /// What a stored counter number means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CounterName {
     /// A counter of the vehicle.
     Vehicle(&'static str),
     /// A counter of one motor, numbered from 0: name and motor.
     Motor(&'static str, u8),
+    /// Seconds that a quantity stood from the first figure to the second; infinite where the range has no end.
+    Exposure(Exposed, f32, f32),
+    /// A baseline.
+    Baseline(Normal),
+}
+
+/// The number of the time that a quantity stood in a range.
+pub const fn exposure_number(quantity: Exposed, bin: usize) -> u8 {
+    EXPOSURE_FIRST + quantity as u8 * BINS as u8 + bin as u8
+}
+
+/// The number of a baseline.
+pub const fn baseline_number(quantity: Normal) -> u8 {
+    BASELINE_FIRST + quantity.index() as u8
 }
 
 /// The meaning of a stored counter number; `None` for one that a later version wrote.
@@ -169,6 +193,16 @@ pub fn counter_name(number: u8) -> Option<CounterName> {
     }
     if let Some(motor) = motor(MOTOR_REVOLUTIONS_FIRST) {
         return Some(CounterName::Motor("revolutions", motor));
+    }
+    if let Some(quantity) = number.checked_sub(BASELINE_FIRST) {
+        return Normal::from_index(usize::from(quantity)).map(CounterName::Baseline);
+    }
+    if let Some(range) = number.checked_sub(EXPOSURE_FIRST) {
+        let quantity = Exposed::ALL.get(usize::from(range) / BINS)?;
+        let (edges, bin) = (quantity.edges(), usize::from(range) % BINS);
+        let from = bin.checked_sub(1).map_or(f32::NEG_INFINITY, |below| edges[below]);
+        let to = edges.get(bin).copied().unwrap_or(f32::INFINITY);
+        return Some(CounterName::Exposure(*quantity, from, to));
     }
     UsageCounter::ALL
         .iter()
@@ -181,6 +215,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn ranges_and_baselines_are_named_by_their_numbers() {
+        let first = exposure_number(Exposed::Vibration, 0);
+        let name = counter_name(first);
+        assert_eq!(name, Some(CounterName::Exposure(Exposed::Vibration, f32::NEG_INFINITY, 1.0)));
+        let last = counter_name(exposure_number(Exposed::Current, BINS - 1));
+        assert_eq!(last, Some(CounterName::Exposure(Exposed::Current, 160.0, f32::INFINITY)));
+        let motor = Normal::MotorSpeed(11);
+        assert_eq!(counter_name(baseline_number(motor)), Some(CounterName::Baseline(motor)));
+    }
+
+    #[test]
     fn every_counter_has_a_number_of_its_own_and_a_name() {
         let mut count = 0;
         for number in 0..=255 {
@@ -189,6 +234,9 @@ mod tests {
                 assert!(!matches!(name, CounterName::Vehicle("")), "{number}");
             }
         }
-        assert_eq!(count, UsageCounter::ALL.len() + 2 * MOTORS_MAX);
+        assert_eq!(
+            count,
+            UsageCounter::ALL.len() + 2 * MOTORS_MAX + BINS * Exposed::ALL.len() + Normal::COUNT
+        );
     }
 }

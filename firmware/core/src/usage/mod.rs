@@ -6,7 +6,8 @@ mod drawn;
 mod totals;
 
 pub use counters::{
-    CounterName, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter, counter_name,
+    BASELINE_FIRST, CounterName, EXPOSURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST,
+    UsageCounter, baseline_number, counter_name, exposure_number,
 };
 pub use totals::{MotorTotals, Totals};
 
@@ -41,6 +42,8 @@ const LOAD_CYCLES: [UsageCounter; 7] = [
 #[derive(Clone, Copy, Debug)]
 pub struct Usage {
     last: Option<Instant>,
+    /// The discharge current now.
+    current_a: Option<f32>,
     /// All but what is worked out when it is asked for: the cycles of the load factor.
     totals: Totals,
     /// The fastest descent near the ground of this second and of the three before.
@@ -70,6 +73,7 @@ impl Usage {
     pub const fn new() -> Self {
         Self {
             last: None,
+            current_a: None,
             totals: Totals::nothing(),
             sinks_mps: [0.0; 4],
             sinks_second: 0,
@@ -173,6 +177,7 @@ impl Usage {
 
     fn step_battery(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
         let drawn = drawn(now, vehicle);
+        self.current_a = drawn.current_a;
         let charge_ah = f64::from(drawn.current_a.unwrap_or(0.0)) * step_s / 3_600.0;
         self.totals.add(UsageCounter::Charge, charge_ah);
         self.totals.add(UsageCounter::Energy, f64::from(drawn.power_w) * step_s / 3_600.0);
@@ -241,6 +246,16 @@ impl Usage {
             Some(bin) => Some(self.load_cycles.cycles(bin)),
             None => self.totals.value(counter),
         }
+    }
+
+    /// The time of the last step.
+    pub(crate) fn until(&self) -> Instant {
+        self.last.unwrap_or_default()
+    }
+
+    /// The discharge current of all batteries together, as of the last step.
+    pub(crate) const fn current_a(&self) -> Option<f32> {
+        self.current_a
     }
 
     /// What components wear by.

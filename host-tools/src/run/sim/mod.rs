@@ -15,19 +15,20 @@ use std::time::Instant as WallClock;
 
 use anyhow::{Context, Result, bail};
 use hums_blackbox::record::{Boot, Stats};
-use hums_core::params::{ParamError, Params};
+use hums_core::params::Params;
 use hums_recorder::status::CardReading;
 use pipeline::{Memory, Outside, Pipeline};
 
 use super::arrivals::Arrivals;
 use super::ground::{self, Ground};
 use super::report::Report;
-use super::{check_standard_output, drive, pace, prepare_card};
+use super::store::{self, FileFlash};
+use super::{check_standard_output, drive, pace, params, prepare_card};
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::logs;
-use crate::outcome::{Outcome, usage};
+use crate::outcome::Outcome;
 use crate::run::Machine as _;
 use crate::source::Chunk;
 
@@ -36,15 +37,20 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     let run = &args.run;
     check_standard_output(run)?;
     let (speed, live) = pace(run)?;
-    let params = read_params(run.params.as_deref())?;
-    let (mut arrivals, image) = Arrivals::open(run, args.tap.as_deref(), || {
-        prepare_card(&run.sd, run.faults.card_size, run.faults.seed)
+    let params = params::read(run.params.as_deref())?;
+    let (mut arrivals, (image, flash)) = Arrivals::open(run, args.tap.as_deref(), || {
+        let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
+        Ok((card, store::open(run.store.as_deref(), &params)?))
     })?;
+    if let Some(step) = run.faults.cut_store_after {
+        flash.cut_after(step, run.faults.seed);
+    }
     let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
     let (mut ground, gs) = ground::open(run)?;
     let mut world = World {
         card: &card,
+        flash: &flash,
         gs,
         autopilot: arrivals.take_autopilot(),
         report: Report::default(),
@@ -57,11 +63,14 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     };
     world.reboots.sort_unstable();
     let start = WallClock::now();
-    while world.power_on(&mut arrivals, &mut ground, &params, |arrivals, ground, machine| {
+    while world.power_on(&mut arrivals, &mut ground, |arrivals, ground, machine| {
         drive(arrivals, ground, speed, live, start, machine)
     })? {}
     if let Some(error) = card.take_image_error() {
         bail!("{}: {error}", run.sd.display());
+    }
+    if let Some(error) = flash.take_error() {
+        bail!("--store: {error}");
     }
     world.gs.flush().context("--gs: cannot be written")?;
     if let Some(remark) = arrivals.remark() {
@@ -82,34 +91,6 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
     SimCard::new(image, faults)
 }
 
-/// Parameters from a file of `NAME VALUE` lines; commas and tabs separate as well, `#` begins a comment.
-fn read_params(path: Option<&Path>) -> Result<Params> {
-    let mut params = Params::defaults();
-    let Some(path) = path else { return Ok(params) };
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("--params {}: cannot be read", path.display()))?;
-    for (index, line) in text.lines().enumerate() {
-        let place = format!("--params {}, line {}", path.display(), index + 1);
-        let line = line.split('#').next().unwrap_or_default();
-        let mut words = line.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
-        let Some(name) = words.next() else { continue };
-        let value = words.next().and_then(|word| word.parse().ok());
-        let (Some(value), None) = (value, words.next()) else {
-            return Err(usage(format!("{place}: wants NAME VALUE, for instance CELL_WARN 3.6")));
-        };
-        match params.set(name, value) {
-            Ok(()) => {}
-            Err(ParamError::UnknownName) => {
-                return Err(usage(format!("{place}: there is no parameter {name}")));
-            }
-            Err(ParamError::OutOfRange { min, max }) => {
-                return Err(usage(format!("{place}: {name} takes {min} to {max}, not {value}")));
-            }
-        }
-    }
-    Ok(params)
-}
-
 /// Records chunks until there are none, on a card that may hold anything, as one power-on: for those who ask more of
 /// the recorder than the command line does. `boots` tells one power-on on a card from another.
 ///
@@ -126,6 +107,7 @@ pub fn power_on(
     let mut autopilot = std::io::sink();
     let outside = Outside {
         card,
+        flash: &store::open(None, &[])?,
         gs: &mut gs,
         autopilot: &mut autopilot,
         findings: &mut findings,
@@ -169,9 +151,10 @@ fn identity(boots: u32) -> Boot<'static> {
     }
 }
 
-/// What outlives a power-on: the card, the ground station, and what is told at the end.
+/// What outlives a power-on: the card, the store, the ground station, and what is told at the end.
 struct World<'a> {
     card: &'a SimCard,
+    flash: &'a FileFlash,
     gs: Box<dyn Write + Send>,
     autopilot: Box<dyn Write + Send>,
     report: Report,
@@ -192,13 +175,13 @@ impl World<'_> {
         &mut self,
         arrivals: &mut Arrivals,
         ground: &mut Ground,
-        params: &Params,
         drive: impl FnOnce(&mut Arrivals, &mut Ground, &mut Pipeline<'_, '_>) -> Result<bool>,
     ) -> Result<bool> {
         self.boots += 1;
-        let mut memory = Memory::new(params);
+        let mut memory = Memory::new(&Params::defaults());
         let outside = Outside {
             card: self.card,
+            flash: self.flash,
             gs: &mut *self.gs,
             autopilot: &mut *self.autopilot,
             findings: &mut self.report.findings,
@@ -216,7 +199,7 @@ impl World<'_> {
         let stats = pipeline.stats();
         self.overwritten |= pipeline.has_overwritten();
         self.add(&stats, lost);
-        let cut = self.card.is_dead();
+        let cut = self.card.is_dead() || self.flash.is_dead();
         self.report.power_cut |= cut;
         // A sector in the queue may be on the card in part: only the card tells how much of it.
         self.frames_on_card &= ended && !cut && lost == 0;

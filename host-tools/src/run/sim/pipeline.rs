@@ -10,10 +10,13 @@ use hums_core::Monitor;
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_onboard::monitoring::TICK;
+use hums_onboard::persist::Kept;
 use hums_onboard::port::PortReading;
 use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
 use hums_onboard::uplink::{self, Uplink};
-use hums_onboard::{Monitoring, PortStatus, Reception, Service, Storage};
+use hums_onboard::{
+    Handover, Keeper, Mailbox, Monitoring, PortStatus, Reception, Service, Storage, StoreStatus,
+};
 use hums_recorder::status::CardReading;
 use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
 
@@ -21,6 +24,7 @@ use crate::card::SimCard;
 use crate::card::sim::CardError;
 use crate::run::Machine;
 use crate::run::report::Finding;
+use crate::run::store::FileFlash;
 use crate::source::Chunk;
 
 /// A line that is silent for this long will not finish the frame it began.
@@ -34,6 +38,8 @@ const CARD_PATIENCE: Span = Span::from_secs(5);
 pub(super) struct Memory {
     card_status: CardStatus,
     port_status: PortStatus,
+    store_status: StoreStatus,
+    mailbox: Mailbox,
     held: HeldBlocks,
     queues: Box<Queues>,
     writer: Box<Writer>,
@@ -45,6 +51,8 @@ impl Memory {
         Self {
             card_status: CardStatus::new(),
             port_status: PortStatus::new(),
+            store_status: StoreStatus::new(),
+            mailbox: Mailbox::new(),
             held: HeldBlocks::new(),
             queues: Box::new(Queues::new()),
             writer: Box::new(Writer::new()),
@@ -63,6 +71,7 @@ impl Memory {
 /// What is around the board.
 pub(super) struct Outside<'a, 'w> {
     pub(super) card: &'a SimCard,
+    pub(super) flash: &'a FileFlash,
     pub(super) gs: &'w mut (dyn Write + Send),
     pub(super) autopilot: &'w mut (dyn Write + Send),
     pub(super) findings: &'w mut Vec<Finding>,
@@ -103,6 +112,8 @@ pub(super) struct Pipeline<'a, 'w> {
     uplink: Uplink,
     monitoring: Monitoring<'a>,
     storage: Storage<'a, Slot<'a>>,
+    keeper: Keeper<'a, FileFlash>,
+    handover: Handover<'a>,
     /// Since this power-on, as all that follow.
     now: Instant,
     tick_at: Instant,
@@ -141,7 +152,7 @@ impl Machine for Pipeline<'_, '_> {
             self.silent_at = Some(self.now + SILENCE);
             self.drain()?;
         }
-        Ok(!self.outside.card.is_dead())
+        Ok(!self.is_dead())
     }
 
     fn hear(&mut self, chunk: &Chunk) -> Result<bool> {
@@ -156,7 +167,7 @@ impl Machine for Pipeline<'_, '_> {
         self.uplink.bytes(self.now, &chunk.bytes, &mut self.ends.uplink_in);
         self.uplink_silent_at = Some(self.now + uplink::SILENCE);
         self.listen()?;
-        Ok(!self.outside.card.is_dead())
+        Ok(!self.is_dead())
     }
 }
 
@@ -167,11 +178,18 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         identity: Boot<'a>,
         entropy: u32,
     ) -> Self {
-        let Memory { card_status, port_status, held, queues, writer, monitor } = memory;
+        let Memory { card_status, port_status, store_status, mailbox, held, queues, writer, monitor } =
+            memory;
+        let (items_in, items_out) = mailbox.split();
+        let mut keeper = Keeper::mount(Some(outside.flash.clone()), items_out, store_status);
+        keeper.turn_ahead();
+        keeper.load(monitor);
         Self {
             slot_status: card_status,
             port_status,
             ends: queues.split(),
+            keeper,
+            handover: Handover::new(items_in, store_status, monitor.params()),
             reception: Reception::new(port_status),
             uplink: Uplink::new(),
             monitoring: Monitoring::new(monitor, writer, identity, card_status, port_status),
@@ -213,7 +231,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
                 }
                 Event::Storage => self.storage(),
             }
-            if self.outside.card.is_dead() {
+            if self.is_dead() {
                 return Ok(false);
             }
         }
@@ -267,6 +285,10 @@ impl<'a, 'w> Pipeline<'a, 'w> {
                 unit: finding.unit.to_owned(),
             });
         });
+        let frames = self.port_status.read().frames;
+        self.handover.step(self.now, self.monitoring.monitor_mut(), frames);
+        self.note();
+        self.keep(false);
         self.after_monitor()
     }
 
@@ -323,10 +345,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     pub(super) fn finish(&mut self) -> Result<u64> {
         self.reception.idle(self.now, &mut self.ends.frames_in);
         self.drain()?;
+        self.save_all();
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
         self.monitoring.finish(self.now, sectors_in, gs_in);
         let patience = self.now + CARD_PATIENCE;
-        while !self.storage.is_done(&self.ends.sectors_out) && !self.outside.card.is_dead() {
+        while !self.storage.is_done(&self.ends.sectors_out) && !self.is_dead() {
             let at = self.storage_at.unwrap_or(self.now).max(self.now);
             if at > patience && self.slot_is_empty() {
                 break;
@@ -348,6 +371,32 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         Ok(self.storage.abandon(&mut self.ends.sectors_out))
     }
 
+    /// Hands over everything that is to outlive power, as fast as the store takes it.
+    fn save_all(&mut self) {
+        while !self.handover.finish(self.now, self.monitoring.monitor_mut()) && !self.is_dead() {
+            self.keep(true);
+        }
+        self.keep(true);
+        self.note();
+    }
+
+    /// Saves what was handed over.
+    fn keep(&mut self, may_erase: bool) {
+        while !self.is_dead() && self.keeper.service(may_erase) == Kept::Took {}
+    }
+
+    /// Records what is new about the store.
+    fn note(&mut self) {
+        while let Some(news) = self.handover.news() {
+            self.monitoring.note(self.now, news.severity, news.text, &mut self.ends.sectors_in);
+        }
+    }
+
+    /// Whether power has gone at a write that the command line chose.
+    fn is_dead(&self) -> bool {
+        self.outside.card.is_dead() || self.outside.flash.is_dead()
+    }
+
     fn slot_is_empty(&self) -> bool {
         self.slot_status.read().state != hums_recorder::CardState::Recording
     }
@@ -359,9 +408,10 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         stats
     }
 
-    /// Whether old segments were overwritten.
+    /// Whether the card no longer holds all that was logged: old segments were overwritten.
     pub(super) fn has_overwritten(&self) -> bool {
-        self.slot_status.read().segments_overwritten > 0
+        let card = self.slot_status.read();
+        card.segments_overwritten + card.segments_released > 0
     }
 }
 

@@ -2,10 +2,14 @@
 //!
 //! A record is 12 bytes, little endian: `u64` microseconds since power-on, `u32` count of bytes that arrive then.
 //! The bytes themselves come through USART1, or through USART2 where the count's highest bit is set: then they are the
-//! ground station's. A count of 0 only moves the clock. Times that go back count as now.
+//! ground station's. A count of 0 only moves the clock, and one of [`POWER_OFF`] is the end of the power. Times that go
+//! back count as now.
 
 use semihosting::fs::File;
 use semihosting::io::Read;
+
+/// A count that is none: power goes at this time.
+const POWER_OFF: u32 = u32::MAX;
 
 const RECORD_BYTES: usize = 12;
 /// Records read from the host at a time; a FIFO may give fewer.
@@ -32,6 +36,13 @@ pub(crate) struct Feed {
     start: usize,
     end: usize,
     ended: bool,
+}
+
+impl Arrival {
+    /// Whether it says that power goes.
+    pub(crate) const fn is_power_off(&self) -> bool {
+        self.from_gs && self.bytes == POWER_OFF & !FROM_GS
+    }
 }
 
 impl Feed {

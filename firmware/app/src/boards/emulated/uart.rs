@@ -41,6 +41,8 @@ struct Inbox<const BYTES: usize> {
     received: Mutex<RefCell<Vec<u8, BYTES>>>,
     /// Bytes still due of the current piece.
     due: AtomicU32,
+    /// Bytes taken since the start.
+    taken: AtomicU32,
     waker: AtomicWaker,
 }
 
@@ -80,6 +82,11 @@ pub(super) fn init() -> ((AutopilotRx, AutopilotTx), (GsRx, GsTx)) {
     (autopilot, (PortRx(&GS), GsTx { baud: GS_BAUD }))
 }
 
+/// Bytes taken out of the autopilot's port since the start: what the host need not send again after a reset.
+pub(super) fn taken() -> u32 {
+    AUTOPILOT.taken.load(Ordering::Relaxed)
+}
+
 /// Takes `count` bytes from the autopilot's port, or from the ground station's, piece by piece, and lets the port's task
 /// have each piece. Returns when all are in; the caller is idle, so no task waits meanwhile.
 pub(super) fn receive(from_gs: bool, count: u32) {
@@ -93,7 +100,8 @@ pub(super) fn receive(from_gs: bool, count: u32) {
 impl<const BYTES: usize> Inbox<BYTES> {
     const fn new(registers: pac::usart::Usart) -> Self {
         let received = Mutex::new(RefCell::new(Vec::new()));
-        Self { registers, received, due: AtomicU32::new(0), waker: AtomicWaker::new() }
+        let [due, taken] = [const { AtomicU32::new(0) }; 2];
+        Self { registers, received, due, taken, waker: AtomicWaker::new() }
     }
 
     fn fetch(&self, count: u32) {
@@ -124,6 +132,7 @@ impl<const BYTES: usize> Inbox<BYTES> {
                 // Never full: a piece is asked for when the one before is gone.
                 let _ = received.push(self.registers.dr().read().dr() as u8);
                 due -= 1;
+                self.taken.fetch_add(1, Ordering::Relaxed);
             }
         });
         if due == 0 {

@@ -51,16 +51,15 @@ impl Distributions {
             element.aux = linked.to_bits();
         }
         let (coded, step) = coded;
-        let value = match coded {
-            Some(value) => value,
-            None => {
-                let (best, cost) = if link.is_some() {
-                    element.costs.cheapest::<PREDICTIONS>()
-                } else {
-                    element.costs.cheapest::<{ AS_NEIGHBOUR + 1 }>()
-                };
-                self.difference(coder, element, guesses[best], cost, value)
-            }
+        let value = if let Some(value) = coded {
+            value
+        } else {
+            let costs = element.costs;
+            let (best, cost) = match link {
+                Some(_) => costs.cheapest::<PREDICTIONS>(),
+                None => costs.cheapest::<{ AS_NEIGHBOUR + 1 }>(),
+            };
+            self.difference(coder, element, guesses[best], cost, value)
         };
         let now = order(value);
         let [first @ .., as_link, linked] = guesses;

@@ -110,6 +110,18 @@ impl Element {
         self.quiet & QUIET != 0
     }
 
+    /// Bits of which one is set where it is quiet: `any_quiet` tells of them, or-ed for many elements.
+    #[inline]
+    pub(crate) const fn quiet_bits(&self) -> u8 {
+        self.quiet
+    }
+
+    /// Whether one of the elements was quiet whose bits were or-ed.
+    #[inline]
+    pub(crate) const fn any_quiet(bits: u8) -> bool {
+        bits & QUIET != 0
+    }
+
     /// Whether the table of links names it.
     #[inline]
     pub(crate) const fn has_links(&self) -> bool {

@@ -1,22 +1,26 @@
 //! `hums emulate`: the firmware image of the emulated board, in QEMU.
 
+mod board;
+
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
+use board::{Board, Earlier, Fixed};
 use serde::Deserialize;
 
-use super::qemu::{self, Qemu};
+use super::qemu;
 use super::report::Report;
-use super::{Machine, arrivals::Arrivals, check_standard_output, drive, ground, pace, prepare_card};
+use super::{arrivals::Arrivals, check_standard_output, drive, ground, pace, params, prepare_card, store};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::{Outcome, usage};
-use crate::source::Chunk;
 
 /// The environment variable that names the image as `--firmware` does.
 const FIRMWARE_VARIABLE: &str = "HUMS_FIRMWARE";
@@ -32,32 +36,54 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let (speed, live) = pace(run)?;
     qemu::check()?;
     let firmware = firmware(args.firmware.as_deref())?;
-    let mut arrivals =
-        Arrivals::open(run, None, || prepare_card(&run.sd, run.faults.card_size, run.faults.seed))?.0;
+    let params = params::read(run.params.as_deref())?;
+    let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
+    // The board's flash is a file in any case; without --store it ends with the run.
+    let store = run.store.clone().unwrap_or_else(|| dir.path().join("store"));
+    let mut arrivals = Arrivals::open(run, None, || {
+        prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
+        store::open(Some(&store), &params).map(drop)
+    })?
+    .0;
     let earlier = logs::on_card(&run.sd).len();
+    let mut reboots = VecDeque::from(run.faults.reboot_at.clone());
+    reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run)?;
-    let mut qemu = Qemu::start(&firmware, &run.sd, gs, arrivals.take_autopilot(), args.costs)?;
-    drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut qemu)?;
-    let json = qemu.finish()?;
+    let mut board = Board::start(Fixed {
+        firmware,
+        card: run.sd.clone(),
+        store,
+        gs: Arc::new(Mutex::new(gs)),
+        autopilot: Arc::new(Mutex::new(arrivals.take_autopilot())),
+        costs: args.costs,
+        provoke: args.provoke.clone(),
+        reboots,
+    })?;
+    drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)?;
+    let (json, before) = board.finish()?;
     if let Some(remark) = arrivals.remark() {
         eprintln!("hums: {remark}");
     }
     let counters: Counters = serde_json::from_str(&json)
         .with_context(|| format!("the firmware's counters are not understood: {json}"))?;
     let mut report = counters.into_report();
-    report.read_card(&run.sd, earlier)?;
+    let frames = report.read_card(&run.sd, earlier)?;
+    before.add_to(&mut report, frames);
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }
 
-impl Machine for Qemu {
-    fn arrive(&mut self, chunk: &Chunk) -> Result<bool> {
-        Qemu::arrive(self, chunk.at_us, &chunk.bytes)?;
-        Ok(true)
-    }
-
-    fn hear(&mut self, chunk: &Chunk) -> Result<bool> {
-        Qemu::hear(self, chunk.at_us, &chunk.bytes)?;
-        Ok(true)
+impl Earlier {
+    /// What came in before the last start, and what of it is on the card, which alone knows that.
+    fn add_to(&self, report: &mut Report, frames_on_card: u64) {
+        if self.starts == 0 {
+            return;
+        }
+        report.frames_in += self.frames_in;
+        report.bytes_in += self.bytes_in;
+        report.bytes_not_frames += self.bytes_not_frames;
+        report.blocks_written += self.blocks_written;
+        report.frames_logged = frames_on_card.min(report.frames_in);
+        report.frames_lost = report.frames_in - report.frames_logged;
     }
 }
 
@@ -66,10 +92,10 @@ fn check_flags(run: &cli::Run) -> Result<()> {
     let faults = &run.faults;
     let given = [
         ("--cut-after-writes", !faults.cut_after_writes.is_empty()),
+        ("--cut-store-after", faults.cut_store_after.is_some()),
         ("--stall", !faults.stall.is_empty()),
         ("--card-out", !faults.card_out.is_empty()),
         ("--write-error", faults.write_error.is_some()),
-        ("--reboot-at", !faults.reboot_at.is_empty()),
     ];
     for (flag, given) in given {
         if given {
@@ -77,11 +103,6 @@ fn check_flags(run: &cli::Run) -> Result<()> {
                 "{flag} works with hums sim only: the emulated board writes to the image file itself"
             )));
         }
-    }
-    if run.params.is_some() {
-        return Err(usage(
-            "--params works with hums sim only: the emulated board starts with its own parameters",
-        ));
     }
     Ok(())
 }

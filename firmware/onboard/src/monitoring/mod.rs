@@ -4,24 +4,27 @@
 //! One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] every 50 ms does
 //! what time alone asks for.
 
+mod figures;
+mod records;
+
 use hums_blackbox::record::{
-    Boot, Clock, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Stats,
-    USAGE_ENTRIES_MAX, Usage, UsageValue, Vehicle as VehicleRecord,
+    Boot, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
-use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, monitor};
 use hums_link::frame::{Check, Frame};
 use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
-use hums_recorder::status::{CardReading, CardState, CardStatus};
+use hums_recorder::status::{CardReading, CardStatus};
 
 use crate::companion::Companion;
+use crate::keeping::Keeping;
 use crate::loss::Losses;
 use crate::port::{PortReading, PortStatus};
-use crate::queues::{FramesOut, GsIn, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS, SectorsIn};
+use crate::queues::{FramesOut, GsIn, SectorsIn};
+use figures::Sums;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = monitor::TICK;
@@ -31,22 +34,9 @@ const PARTIAL: Span = Span::from_millis(200);
 const STATS: Span = Span::from_secs(10);
 /// How often usage is recorded.
 const USAGE: Span = Span::from_secs(60);
-/// How long a card may take to be found before it counts as missing.
-const START: Span = Span::from_secs(3);
-/// A UTC that differs more than this from the one that is recorded is recorded anew.
-const CLOCK_STEP_MICROS: u64 = 1_000_000;
 
 /// What the board knows of itself: what the first record of a log says.
 pub type Identity<'a> = Boot<'a>;
-
-/// Sums in 64 bits of what the port counts in 32.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    bytes: u64,
-    bytes_not_frames: u64,
-    frames: u64,
-    frames_lost: u64,
-}
 
 /// What happens to a frame, one after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,6 +65,7 @@ pub struct Monitoring<'a> {
     /// UTC of power-on as it was recorded last, microseconds since 1970.
     epoch_micros: Option<u64>,
     losses: Losses,
+    keeping: Keeping,
     port_before: PortReading,
     card_before: CardReading,
     sums: Sums,
@@ -107,6 +98,7 @@ impl<'a> Monitoring<'a> {
             vehicle: VehicleRecord::default(),
             epoch_micros: None,
             losses: Losses::new(),
+            keeping: Keeping::new(),
             port_before: PortReading::default(),
             card_before: card.read(),
             sums: Sums::default(),
@@ -120,6 +112,14 @@ impl<'a> Monitoring<'a> {
 
     /// Writes what a log begins with: who records, and every parameter that is not at its default.
     pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        self.keep(now, sectors);
+        self.heading(now, sectors);
+        self.record_usage(now, Moment::Start, sectors);
+    }
+
+    /// What each file of a log says of itself: one that is read alone, because those before it made room, misses
+    /// nothing but their time.
+    fn heading(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let boot = Record::Boot(self.identity);
         self.record(now, &boot, sectors);
         let params = *self.monitor.params();
@@ -131,7 +131,18 @@ impl<'a> Monitoring<'a> {
                 self.record(now, &Record::Parameter(parameter), sectors);
             }
         }
-        self.record_usage(now, Moment::Start, sectors);
+        self.vehicle = VehicleRecord::default();
+    }
+
+    /// What of the record is to be kept, by whether the vehicle is armed.
+    fn keep(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        let Self { keeping, monitor, card, writer, .. } = self;
+        let armed = monitor.vehicle().armed();
+        keeping.tick(now, monitor.params(), armed, card, writer, sectors);
+        if self.keeping.takes_new_file(self.card) {
+            self.heading(now, sectors);
+            self.record_usage(now, Moment::Periodic, sectors);
+        }
     }
 
     /// Records how the boot before this one ended. To be called after [`Self::start`].
@@ -195,6 +206,7 @@ impl<'a> Monitoring<'a> {
         if self.card.take_group_wanted() && !self.writer.restart(sectors) {
             self.card.want_group();
         }
+        self.keep(now, sectors);
         self.count_losses(now, sectors);
         self.check(now, sectors, gs, findings);
         self.record_vehicle(now, sectors);
@@ -239,27 +251,6 @@ impl<'a> Monitoring<'a> {
         self.record(now, &Record::Note(Note { severity, text }), sectors);
     }
 
-    /// The pipeline's figures since power-on.
-    pub fn stats(&self, gs: &GsIn) -> Stats {
-        let card = self.card.read();
-        let counters = self.writer.counters();
-        let card_lost = u64::from(card.frames_lost);
-        Stats {
-            frames_in: self.sums.frames,
-            frames_logged: counters.frames.saturating_sub(card_lost),
-            frames_lost: self.sums.frames_lost + self.refused + card_lost,
-            bytes_in: self.sums.bytes,
-            bytes_not_frames: self.sums.bytes_not_frames,
-            bytes_logged: counters.sectors * hums_blackbox::SECTOR_BYTES as u64,
-            blocks_written: u64::from(card.blocks_written),
-            queue_bytes_max: (self.queue_sectors_max * hums_blackbox::SECTOR_BYTES) as u64,
-            queue_bytes_capacity: SECTOR_QUEUE_BYTES as u64,
-            sd_stall_ms_max: u64::from(card.stall_ms_max),
-            gs_frames: gs.frames(),
-            gs_bytes: gs.bytes(),
-        }
-    }
-
     fn check(
         &mut self,
         now: Instant,
@@ -271,11 +262,7 @@ impl<'a> Monitoring<'a> {
         let recorder = self.recorder_status(now, sectors);
         let Self { monitor, writer, summary, losses, .. } = self;
         monitor.tick(now, &link, &recorder, &mut |finding| {
-            let record = Record::Finding(FindingRecord::from(finding));
-            let written = sectors.with_reserve(|sink| writer.record(now, &record, sink));
-            if written.is_err() {
-                losses.count(now, Lost::Records, 1);
-            }
+            write(now, &Record::Finding(FindingRecord::from(finding)), writer, losses, sectors);
             if finding.level == Level::Critical {
                 // Marks the place for whoever looks through the record.
                 let event = Record::Event(Event { number: 1, text: finding.check });
@@ -286,47 +273,6 @@ impl<'a> Monitoring<'a> {
         });
     }
 
-    fn recorder_status(&self, now: Instant, sectors: &SectorsIn) -> RecorderStatus {
-        let card = self.card.read();
-        let recording = match card.state {
-            _ if self.companion.stopped => Recording::Stopped,
-            CardState::Recording => Recording::Running,
-            CardState::Unknown if now.since(Instant::ZERO) < START => Recording::Starting,
-            CardState::Finished => Recording::Starting,
-            _ => Recording::Stopped,
-        };
-        RecorderStatus {
-            recording,
-            queue: sectors.len() as f32 / SECTOR_QUEUE_SECTORS as f32,
-            frames_lost: self.sums.frames_lost + self.refused + u64::from(card.frames_lost),
-            stall: self.card.stall(now),
-            write_errors: u64::from(card.write_errors),
-            room: card.room_permille.map(|permille| permille as f32 / 1000.0),
-        }
-    }
-
-    fn count_losses(&mut self, now: Instant, sectors: &SectorsIn) {
-        let port = self.port.read();
-        let new = port.since(self.port_before);
-        self.port_before = port;
-        self.sums.bytes += u64::from(new.bytes);
-        self.sums.bytes_not_frames += u64::from(new.bytes_not_frames);
-        self.sums.frames += u64::from(new.frames);
-        self.sums.frames_lost += u64::from(new.frames_lost);
-        self.losses.count(now, Lost::UartOverrun, u64::from(new.overrun));
-        self.losses.count(now, Lost::NotFrames, u64::from(new.bytes_not_frames));
-        self.losses.count(now, Lost::DamagedFrames, u64::from(new.damaged));
-        self.losses.count(now, Lost::QueueFull, u64::from(new.frames_lost));
-        let card = self.card.read();
-        self.losses.count(
-            now,
-            Lost::Card,
-            u64::from(card.frames_lost.wrapping_sub(self.card_before.frames_lost)),
-        );
-        self.card_before = card;
-        self.queue_sectors_max = self.queue_sectors_max.max(sectors.deepest());
-    }
-
     fn losses_to_record(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
         let Self { losses, writer, .. } = self;
         losses.flush(now, all, |loss| {
@@ -334,57 +280,9 @@ impl<'a> Monitoring<'a> {
         });
     }
 
-    fn record_vehicle(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        let vehicle = self.monitor.vehicle();
-        let (Some(source), Some(heartbeat)) = (vehicle.source, vehicle.heartbeat.get()) else { return };
-        let identity = vehicle.identity.get().copied().unwrap_or_default();
-        let record = VehicleRecord {
-            system: source.system,
-            component: source.component,
-            autopilot: heartbeat.autopilot_number,
-            vehicle_type: heartbeat.type_number,
-            firmware: identity.firmware,
-            uid: identity.uid,
-        };
-        if record != self.vehicle && self.record(now, &Record::Vehicle(record), sectors) {
-            self.vehicle = record;
-        }
-    }
-
-    /// UTC as soon as the autopilot knows it; the reader dates the whole session with it.
-    fn record_clock(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        let time = &self.monitor.vehicle().time;
-        let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) else {
-            return;
-        };
-        let clock = Clock { boot: at, utc_micros, source: 1 };
-        let epoch_micros = clock.epoch_micros();
-        if self.epoch_micros.is_some_and(|known| known.abs_diff(epoch_micros) <= CLOCK_STEP_MICROS) {
-            return;
-        }
-        if self.record(now, &Record::Clock(clock), sectors) {
-            self.epoch_micros = Some(epoch_micros);
-            self.card.set_utc_secs((utc_micros / 1_000_000).min(u64::from(u32::MAX)) as u32);
-        }
-    }
-
-    fn record_usage(&mut self, now: Instant, moment: Moment, sectors: &mut SectorsIn) {
-        self.usage_at = now;
-        let mut entries = heapless::Vec::<_, USAGE_ENTRIES_MAX>::new();
-        self.monitor.usage().for_each(|number, value| {
-            // Never full: the table of counters is shorter.
-            let _ = entries.push((number, UsageValue::Real(value)));
-        });
-        self.record(now, &Record::Usage(Usage::new(moment, &entries)), sectors);
-    }
-
     /// Writes a record, from the reserve if need be; a record that still finds no room is a counted loss.
     pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
-        let written = sectors.with_reserve(|sink| self.writer.record(now, record, sink)).is_ok();
-        if !written {
-            self.losses.count(now, Lost::Records, 1);
-        }
-        written
+        write(now, record, self.writer, &mut self.losses, sectors)
     }
 
     /// Gives storage a copy of the sector in progress, unless full sectors keep it busy anyway.
@@ -398,4 +296,19 @@ impl<'a> Monitoring<'a> {
             sectors.put(&copy);
         }
     }
+}
+
+/// As [`Monitoring::record`], where the monitor is in use.
+fn write(
+    now: Instant,
+    record: &Record<'_>,
+    writer: &mut Writer,
+    losses: &mut Losses,
+    sectors: &mut SectorsIn,
+) -> bool {
+    let written = sectors.with_reserve(|sink| writer.record(now, record, sink)).is_ok();
+    if !written {
+        losses.count(now, Lost::Records, 1);
+    }
+    written
 }

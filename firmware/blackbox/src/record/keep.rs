@@ -1,0 +1,26 @@
+//! What of a session is kept, where not all of it is.
+
+use crate::bytes::{Fields, Sink};
+
+/// Which sectors are kept. While a vehicle that is recorded by arming is disarmed, only the last while is: every group
+/// of that time says so, and so does the one in which it ends. A reader that misses sectors from `from` up to this
+/// record knows that they are missing on purpose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Keep {
+    /// From here on everything is kept; otherwise only the last while, until a record says `all`.
+    pub all: bool,
+    /// The number of the sector from which on only the last while is kept, or was until now.
+    pub from: u32,
+    /// How much is kept at least, in seconds.
+    pub seconds: u32,
+}
+
+impl Keep {
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(15).u8(u8::from(self.all)).u32(self.from).u32(self.seconds);
+    }
+
+    pub(super) fn read(fields: &mut Fields<'_>) -> Self {
+        Self { all: fields.u8() != 0, from: fields.u32(), seconds: fields.u32() }
+    }
+}

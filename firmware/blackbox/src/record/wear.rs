@@ -1,0 +1,160 @@
+//! What was exceeded, and what wears: limits that were crossed, and components.
+
+use hums_core::component::{Figures, Kind, Status};
+use hums_core::exceedance::{self, Crossings};
+
+use super::Moment;
+use crate::bytes::{Fields, Sink};
+
+/// Limits of one check that were crossed: of the session and of the airframe's life.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exceedance<'a> {
+    /// When it was taken.
+    pub moment: Moment,
+    /// The check's stable name.
+    pub check: &'a str,
+    /// Which one, where there are several.
+    pub instance: u8,
+    /// The unit of the peaks.
+    pub unit: &'a str,
+    /// Of this session.
+    pub session: Crossings,
+    /// Of the airframe's life, this session included.
+    pub lifetime: Crossings,
+}
+
+impl<'a> Exceedance<'a> {
+    /// To be written.
+    pub const fn new(moment: Moment, of: &exceedance::Exceedance) -> Self {
+        Self {
+            moment,
+            check: of.check.name,
+            instance: of.instance,
+            unit: of.check.unit,
+            session: of.session,
+            lifetime: of.lifetime,
+        }
+    }
+
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(13).u8(self.moment as u8).name(self.check).u8(self.instance).name(self.unit);
+        for crossings in [self.session, self.lifetime] {
+            sink.u32(u32::from(crossings.warnings)).u32(u32::from(crossings.criticals));
+            sink.u32(crossings.warning_tenths).u32(crossings.critical_tenths);
+            sink.u32(crossings.peak.to_bits());
+        }
+    }
+
+    pub(super) fn read(fields: &mut Fields<'a>) -> Self {
+        let moment = Moment::from_number(fields.u8());
+        let (check, instance, unit) = (fields.text(), fields.u8(), fields.text());
+        let mut crossings = || Crossings {
+            warnings: fields.u32().try_into().unwrap_or(u16::MAX),
+            criticals: fields.u32().try_into().unwrap_or(u16::MAX),
+            warning_tenths: fields.u32(),
+            critical_tenths: fields.u32(),
+            peak: f32::from_bits(fields.u32()),
+        };
+        Self { moment, check, instance, unit, session: crossings(), lifetime: crossings() }
+    }
+}
+
+/// Why a component is recorded. The numbers are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Why {
+    /// As it stood at the start of the session.
+    Start = 0,
+    /// As it stands, or stood at the end.
+    #[default]
+    Status = 1,
+    /// It was replaced: the figures are those of the old part.
+    Replaced = 2,
+    /// It got a name or a serial number.
+    Named = 3,
+}
+
+impl Why {
+    /// The name that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Status => "status",
+            Self::Replaced => "replaced",
+            Self::Named => "named",
+        }
+    }
+
+    const fn from_number(number: u8) -> Self {
+        match number {
+            0 => Self::Start,
+            2 => Self::Replaced,
+            3 => Self::Named,
+            _ => Self::Status,
+        }
+    }
+}
+
+/// A part that wears, and what it has run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Component<'a> {
+    /// Why it is recorded.
+    pub why: Why,
+    /// Its place, from 0.
+    pub place: u8,
+    /// What it is.
+    pub kind: Kind,
+    /// Which of its kind, from 1; 0 is all.
+    pub number: u8,
+    /// Green, yellow or red.
+    pub status: Status,
+    /// How often the part in this place was replaced.
+    pub replaced: u32,
+    /// What the operator calls it.
+    pub name: &'a str,
+    /// Its serial number.
+    pub serial: &'a str,
+    /// What it has run.
+    pub figures: Figures,
+    /// The part of its life that is used, percent; NaN where it has no limit.
+    pub used_percent: f32,
+    /// Who replaced or named it: MAVLink system and component id; 0, 0 for the monitor itself.
+    pub by: (u8, u8),
+    /// The new part's serial number, where it was replaced.
+    pub new_serial: &'a str,
+}
+
+impl<'a> Component<'a> {
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(14).u8(self.why as u8).u8(self.place).u8(self.kind as u8).u8(self.number);
+        sink.u8(self.status as u8).u32(self.replaced).name(self.name).name(self.serial);
+        let Figures { powered_s, flight_s, motor_s, flights, cycles } = self.figures;
+        for figure in [powered_s, flight_s, motor_s, flights, cycles] {
+            sink.u64(figure.to_bits());
+        }
+        sink.u32(self.used_percent.to_bits()).u8(self.by.0).u8(self.by.1).name(self.new_serial);
+    }
+
+    pub(super) fn read(fields: &mut Fields<'a>) -> Self {
+        Self {
+            why: Why::from_number(fields.u8()),
+            place: fields.u8(),
+            kind: Kind::from_number(fields.u8()),
+            number: fields.u8(),
+            status: Status::from_number(fields.u8()),
+            replaced: fields.u32(),
+            name: fields.text(),
+            serial: fields.text(),
+            figures: Figures {
+                powered_s: f64::from_bits(fields.u64()),
+                flight_s: f64::from_bits(fields.u64()),
+                motor_s: f64::from_bits(fields.u64()),
+                flights: f64::from_bits(fields.u64()),
+                cycles: f64::from_bits(fields.u64()),
+            },
+            used_percent: f32::from_bits(fields.u32()),
+            by: (fields.u8(), fields.u8()),
+            new_serial: fields.text(),
+        }
+    }
+}

@@ -1,0 +1,379 @@
+//! Exceedances: how often a limit was crossed, how far and for how long, for each check and instance, in this session
+//! and over the airframe's life.
+//!
+//! Bounded: [`EXCEEDANCES_MAX`] checks and instances. One more is counted as left out, unless it is critical and another
+//! never was: that one makes room.
+
+use crate::health::{Check, Finding, Level, Side, checks};
+use crate::lifetime::{Put, Take, Unreadable};
+use crate::time::Instant;
+
+/// Checks and instances that are kept.
+pub const EXCEEDANCES_MAX: usize = 24;
+
+/// Crossings of one check's limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossings {
+    /// How often a warning began.
+    pub warnings: u16,
+    /// How often it became critical.
+    pub criticals: u16,
+    /// How long it was a warning, tenths of a second.
+    pub warning_tenths: u32,
+    /// How long it was critical, tenths of a second.
+    pub critical_tenths: u32,
+    /// The worst value, in the check's unit; NaN before there was one.
+    pub peak: f32,
+}
+
+impl Default for Crossings {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Crossings {
+    const NONE: Self =
+        Self { warnings: 0, criticals: 0, warning_tenths: 0, critical_tenths: 0, peak: f32::NAN };
+
+    /// Whether anything was exceeded at all.
+    pub const fn happened(&self) -> bool {
+        self.warnings > 0 || self.criticals > 0
+    }
+
+    fn join(self, other: Self, side: Side) -> Self {
+        Self {
+            warnings: self.warnings.saturating_add(other.warnings),
+            criticals: self.criticals.saturating_add(other.criticals),
+            warning_tenths: self.warning_tenths.saturating_add(other.warning_tenths),
+            critical_tenths: self.critical_tenths.saturating_add(other.critical_tenths),
+            peak: worse(self.peak, other.peak, side),
+        }
+    }
+
+    fn extend(&mut self, level: Level, tenths: u32) {
+        match level {
+            Level::Warning => self.warning_tenths = self.warning_tenths.saturating_add(tenths),
+            Level::Critical => self.critical_tenths = self.critical_tenths.saturating_add(tenths),
+            _ => {}
+        }
+    }
+}
+
+/// The worse of two values; what is no number is none.
+const fn worse(known: f32, value: f32, side: Side) -> f32 {
+    match side {
+        Side::Above => known.max(value),
+        Side::Below => known.min(value),
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// Its place among all checks.
+    check: u8,
+    instance: u8,
+    /// [`Level::Ok`] while nothing is exceeded.
+    level: Level,
+    /// Since when it has had that level, tenths of a second since power-on.
+    since_tenths: u32,
+    session: Crossings,
+    before: Crossings,
+}
+
+/// All exceedances.
+#[derive(Clone, Copy, Debug)]
+pub struct Exceedances {
+    entries: [Option<Entry>; EXCEEDANCES_MAX],
+    left_out: u16,
+}
+
+/// One check's exceedances.
+#[derive(Clone, Copy, Debug)]
+pub struct Exceedance {
+    /// Which check.
+    pub check: &'static Check,
+    /// Which one, where there are several.
+    pub instance: u8,
+    /// Of this session.
+    pub session: Crossings,
+    /// Of the airframe's life, this session included.
+    pub lifetime: Crossings,
+}
+
+const VERSION: u8 = 1;
+const ENTRY_BYTES: usize = 4 + 1 + 2 + 2 + 4 + 4 + 4;
+
+impl Default for Exceedances {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Exceedances {
+    /// The longest stored form: version, then of each entry the FNV-1a hash of the check's name (u32),
+    /// instance, warnings and criticals (u16), tenths of a second of both (u32), peak (f32).
+    pub const BYTES: usize = 1 + EXCEEDANCES_MAX * ENTRY_BYTES;
+
+    /// Nothing exceeded.
+    pub const fn new() -> Self {
+        Self { entries: [None; EXCEEDANCES_MAX], left_out: 0 }
+    }
+
+    /// Takes a check's change of level; `check` is its place among all checks.
+    pub(crate) fn change(&mut self, check: u8, side: Side, finding: &Finding) {
+        let Some(entry) = self.entry(check, finding) else { return };
+        let now_tenths = tenths(finding.at);
+        entry.session.extend(entry.level, now_tenths.saturating_sub(entry.since_tenths));
+        let rises = |level: Level| finding.level == level && rank(finding.previous) < rank(level);
+        if rises(Level::Warning) {
+            entry.session.warnings = entry.session.warnings.saturating_add(1);
+        } else if rises(Level::Critical) {
+            entry.session.criticals = entry.session.criticals.saturating_add(1);
+        }
+        if rank(finding.level) > 0 {
+            entry.session.peak = worse(entry.session.peak, finding.value, side);
+        }
+        entry.level = finding.level;
+        entry.since_tenths = now_tenths;
+    }
+
+    /// Takes the value of a check whose limit is exceeded.
+    pub(crate) fn note(&mut self, check: u8, instance: u8, side: Side, value: f32) {
+        let entries = self.entries.iter_mut().flatten();
+        if let Some(entry) =
+            entries.into_iter().find(|entry| (entry.check, entry.instance) == (check, instance))
+        {
+            entry.session.peak = worse(entry.session.peak, value, side);
+        }
+    }
+
+    /// The entry of a check and instance, a new one where there is none.
+    fn entry(&mut self, check: u8, finding: &Finding) -> Option<&mut Entry> {
+        let same = |entry: &Option<Entry>| {
+            entry.is_some_and(|entry| (entry.check, entry.instance) == (check, finding.instance))
+        };
+        let free = |entry: &Option<Entry>| entry.is_none();
+        let lesser = |entry: &Option<Entry>| {
+            finding.level == Level::Critical
+                && entry.is_some_and(|entry| entry.session.criticals == 0 && entry.before.criticals == 0)
+        };
+        let known = self.entries.iter().position(same);
+        if known.is_none() && rank(finding.level) == 0 {
+            return None;
+        }
+        let place = known
+            .or_else(|| self.entries.iter().position(free))
+            .or_else(|| self.entries.iter().position(lesser));
+        let Some(place) = place else {
+            self.left_out = self.left_out.saturating_add(1);
+            return None;
+        };
+        let entry = &mut self.entries[place];
+        if known.is_none() {
+            self.left_out = self.left_out.saturating_add(u16::from(entry.is_some()));
+            *entry = None;
+        }
+        Some(entry.get_or_insert(Entry {
+            check,
+            instance: finding.instance,
+            level: Level::Ok,
+            since_tenths: tenths(finding.at),
+            session: Crossings::NONE,
+            before: Crossings::NONE,
+        }))
+    }
+
+    /// Whatever was exceeded, with what lasts counted up to now.
+    pub fn iter(&self, now: Instant) -> impl Iterator<Item = Exceedance> {
+        self.entries.iter().flatten().filter_map(move |entry| {
+            let check = checks().nth(usize::from(entry.check))?;
+            let mut session = entry.session;
+            session.extend(entry.level, tenths(now).saturating_sub(entry.since_tenths));
+            let lifetime = entry.before.join(session, check.side);
+            Some(Exceedance { check, instance: entry.instance, session, lifetime })
+        })
+    }
+
+    /// Whether anything is exceeded now.
+    pub(crate) fn lasting(&self) -> bool {
+        self.entries.iter().flatten().any(|entry| rank(entry.level) > 0)
+    }
+
+    /// Checks that found no room.
+    pub const fn left_out(&self) -> u16 {
+        self.left_out
+    }
+
+    /// It is another airframe: what was before this session was not its own.
+    pub(crate) fn forget_life(&mut self) {
+        for entry in self.entries.iter_mut().flatten() {
+            entry.before = Crossings::NONE;
+        }
+        for place in &mut self.entries {
+            if place.is_some_and(|entry| entry.session.warnings == 0 && entry.session.criticals == 0) {
+                *place = None;
+            }
+        }
+    }
+
+    /// Writes the stored form; gives its length, which is that of the entries in use.
+    pub fn encode(&self, now: Instant, out: &mut [u8; Self::BYTES]) -> usize {
+        let mut put = Put::new(out);
+        put.u8(VERSION);
+        for exceedance in self.iter(now) {
+            let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } =
+                exceedance.lifetime;
+            put.u32(hash(exceedance.check.name)).u8(exceedance.instance).u16(warnings).u16(criticals);
+            put.u32(warning_tenths).u32(critical_tenths).f32(peak);
+        }
+        put.len()
+    }
+
+    /// Reads the stored form, of this version or a later one. A check that there is no longer is left out.
+    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
+        let mut take = Take::new(stored);
+        if take.u8()? < VERSION {
+            return Err(Unreadable);
+        }
+        let mut exceedances = Self::new();
+        for place in &mut exceedances.entries {
+            if take.is_empty() {
+                break;
+            }
+            let (name, instance) = (take.u32()?, take.u8()?);
+            let before = Crossings {
+                warnings: take.u16()?,
+                criticals: take.u16()?,
+                warning_tenths: take.u32()?,
+                critical_tenths: take.u32()?,
+                peak: take.f32()?,
+            };
+            let check = checks().position(|check| hash(check.name) == name && instance < check.instances);
+            *place = check.map(|check| Entry {
+                check: check as u8,
+                instance,
+                level: Level::Ok,
+                since_tenths: 0,
+                session: Crossings::NONE,
+                before,
+            });
+        }
+        Ok(exceedances)
+    }
+}
+
+/// 32 bits of tenths last 13 years.
+const fn tenths(at: Instant) -> u32 {
+    (at.as_millis() / 100) as u32
+}
+
+/// Not knowing exceeds nothing.
+const fn rank(level: Level) -> u8 {
+    match level {
+        Level::Warning => 1,
+        Level::Critical => 2,
+        Level::Ok | Level::Advisory | Level::Stale => 0,
+    }
+}
+
+/// FNV-1a, 32 bits: a check's name in four bytes.
+const fn hash(name: &str) -> u32 {
+    let mut hash = 0x811C_9DC5_u32;
+    let mut index = 0;
+    while index < name.len() {
+        hash = (hash ^ name.as_bytes()[index] as u32).wrapping_mul(0x0100_0193);
+        index += 1;
+    }
+    hash
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::health::Subsystem;
+
+    const TILT: u8 = 3;
+
+    fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
+        Finding {
+            at: Instant::from_millis(at_ms),
+            subsystem: Subsystem::Attitude,
+            check: "tilt",
+            instance: 0,
+            level,
+            previous,
+            value,
+            limit: 45.0,
+            unit: "deg",
+        }
+    }
+
+    #[test]
+    fn a_crossing_is_counted_with_its_peak_and_its_time() {
+        let mut exceedances = Exceedances::new();
+        exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
+        exceedances.note(TILT, 0, Side::Above, 55.0);
+        exceedances.change(TILT, Side::Above, &finding(12_000, Level::Warning, Level::Critical, 62.0));
+        exceedances.note(TILT, 0, Side::Above, 70.0);
+        exceedances.note(TILT, 0, Side::Above, f32::NAN);
+        exceedances.change(TILT, Side::Above, &finding(13_500, Level::Critical, Level::Warning, 50.0));
+        exceedances.change(TILT, Side::Above, &finding(14_500, Level::Warning, Level::Ok, 20.0));
+        exceedances.change(TILT, Side::Above, &finding(20_000, Level::Ok, Level::Warning, 46.0));
+        let tilt = exceedances.iter(Instant::from_millis(21_000)).next().expect("exceeded");
+        let expected =
+            Crossings { warnings: 2, criticals: 1, warning_tenths: 40, critical_tenths: 15, peak: 70.0 };
+        assert_eq!(tilt.session, expected);
+    }
+
+    #[test]
+    fn not_knowing_is_neither_a_crossing_nor_a_time() {
+        let mut exceedances = Exceedances::new();
+        exceedances.change(TILT, Side::Above, &finding(1_000, Level::Ok, Level::Stale, f32::NAN));
+        assert_eq!(exceedances.iter(Instant::from_millis(2_000)).count(), 0);
+        exceedances.change(TILT, Side::Above, &finding(3_000, Level::Stale, Level::Warning, 50.0));
+        exceedances.change(TILT, Side::Above, &finding(4_000, Level::Warning, Level::Stale, f32::NAN));
+        let tilt = exceedances.iter(Instant::from_millis(99_000)).next().expect("exceeded");
+        assert_eq!((tilt.session.warnings, tilt.session.warning_tenths), (1, 10));
+    }
+
+    #[test]
+    fn a_life_adds_up_over_sessions() {
+        let mut stored = [0; Exceedances::BYTES];
+        let mut length = 0;
+        for session in 1..=3_u8 {
+            let mut exceedances = Exceedances::decode(&stored[..length]).unwrap_or_default();
+            exceedances.change(
+                TILT,
+                Side::Above,
+                &finding(0, Level::Ok, Level::Warning, f32::from(4 - session.min(3))),
+            );
+            let now = Instant::from_millis(2_000);
+            let tilt = exceedances.iter(now).next().expect("exceeded");
+            assert_eq!((tilt.session.warnings, tilt.lifetime.warnings), (1, u16::from(session)));
+            assert_eq!((tilt.lifetime.warning_tenths, tilt.lifetime.peak), (20 * u32::from(session), 3.0));
+            length = exceedances.encode(now, &mut stored);
+        }
+    }
+
+    #[test]
+    fn one_too_many_is_counted_and_a_critical_one_makes_room() {
+        let mut exceedances = Exceedances::new();
+        for instance in 0..30 {
+            let warning = Finding { instance, ..finding(0, Level::Ok, Level::Warning, 50.0) };
+            exceedances.change(TILT, Side::Above, &warning);
+        }
+        assert_eq!(exceedances.left_out(), 6);
+        let critical = Finding { instance: 31, ..finding(0, Level::Ok, Level::Critical, 70.0) };
+        exceedances.change(TILT, Side::Above, &critical);
+        let kept = exceedances.iter(Instant::ZERO).any(|exceedance| exceedance.instance == 31);
+        assert!(kept && exceedances.left_out() == 7);
+    }
+
+    #[test]
+    fn no_two_checks_have_the_same_hash() {
+        let mut hashes: Vec<u32> = checks().map(|check| hash(check.name)).collect();
+        hashes.sort_unstable();
+        assert!(hashes.windows(2).all(|pair| pair[0] != pair[1]) && hashes[0] != 0);
+    }
+}

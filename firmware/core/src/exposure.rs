@@ -1,0 +1,265 @@
+//! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
+
+use crate::lifetime::{Put, Take, Unreadable};
+use crate::time::{Instant, Span};
+use crate::units::Celsius;
+use crate::usage::Usage;
+use crate::vehicle::Vehicle;
+
+/// Ranges of a quantity.
+pub const BINS: usize = 8;
+/// A value holds this long.
+const FRESH: Span = Span::from_secs(5);
+/// Hotter than anything that still measures: garbage.
+const CELSIUS_MAX: f32 = 1_000.0;
+
+/// A quantity that ages a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Quantity {
+    /// The hottest ESC.
+    EscTemperature = 0,
+    /// The hottest battery.
+    BatteryTemperature = 1,
+    /// The autopilot's processor.
+    McuTemperature = 2,
+    /// Vibration while armed, on the autopilot's own scale.
+    Vibration = 3,
+    /// The current of all batteries together while armed.
+    Current = 4,
+}
+
+impl Quantity {
+    /// All quantities, by number.
+    pub const ALL: [Self; 5] = [
+        Self::EscTemperature,
+        Self::BatteryTemperature,
+        Self::McuTemperature,
+        Self::Vibration,
+        Self::Current,
+    ];
+
+    /// The name that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::EscTemperature => "esc_temperature",
+            Self::BatteryTemperature => "battery_temperature",
+            Self::McuTemperature => "mcu_temperature",
+            Self::Vibration => "vibration",
+            Self::Current => "current",
+        }
+    }
+
+    /// The unit of its ranges, as names spell it.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::EscTemperature | Self::BatteryTemperature | Self::McuTemperature => "degc",
+            Self::Vibration => "m_s2",
+            Self::Current => "a",
+        }
+    }
+
+    /// Where one range ends and the next begins. Stored counts are by range: these never change.
+    pub const fn edges(self) -> [f32; BINS - 1] {
+        match self {
+            Self::EscTemperature => [30.0, 45.0, 60.0, 75.0, 90.0, 100.0, 110.0],
+            Self::BatteryTemperature => [0.0, 15.0, 30.0, 40.0, 50.0, 60.0, 75.0],
+            Self::McuTemperature => [0.0, 30.0, 45.0, 60.0, 75.0, 85.0, 100.0],
+            Self::Vibration => [1.0, 2.5, 5.0, 10.0, 15.0, 30.0, 60.0],
+            Self::Current => [1.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0],
+        }
+    }
+
+    fn value(self, now: Instant, vehicle: &Vehicle, usage: &Usage) -> Option<f32> {
+        let hottest = |temperature: Option<Celsius>, other: Option<f32>| match (temperature, other) {
+            (Some(Celsius(one)), Some(other)) if one.abs() <= CELSIUS_MAX => Some(other.max(one)),
+            (Some(Celsius(one)), None) if one.abs() <= CELSIUS_MAX => Some(one),
+            _ => other,
+        };
+        match self {
+            Self::EscTemperature => {
+                let motors = vehicle.motors.iter();
+                let fresh = motors.filter(|motor| motor.at.is_some_and(|at| now.since(at) <= FRESH));
+                fresh.fold(None, |hot, motor| hottest(motor.esc.temperature, hot))
+            }
+            Self::BatteryTemperature => {
+                let batteries = vehicle.batteries.iter().filter_map(|slot| slot.within(now, FRESH));
+                batteries.fold(None, |hot, battery| hottest(battery.temperature, hot))
+            }
+            Self::McuTemperature => {
+                hottest(vehicle.processor.within(now, FRESH).and_then(|mcu| mcu.temperature), None)
+            }
+            Self::Vibration => {
+                let vibration = vehicle.vibration.within(now, FRESH).filter(|_| vehicle.armed())?;
+                vibration.levels.into_iter().flatten().reduce(f32::max)
+            }
+            Self::Current => usage.current_a().filter(|_| vehicle.armed()),
+        }
+        .filter(|value| value.is_finite())
+    }
+}
+
+/// Tenths of a second in each range of each quantity.
+type Tenths = [[u32; BINS]; Quantity::ALL.len()];
+
+/// Time in ranges.
+#[derive(Clone, Copy, Debug)]
+pub struct Exposure {
+    last: Option<Instant>,
+    session: Tenths,
+    before: Tenths,
+}
+
+/// How often the time in ranges is counted.
+const EVERY: Span = Span::from_millis(100);
+/// Longer steps are gaps: nothing is known of what happened in them.
+const STEP_MAX: Span = Span::from_secs(2);
+const VERSION: u8 = 1;
+
+impl Default for Exposure {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Exposure {
+    /// Length of the stored form: version, then tenths of a second (u32) in each range of each quantity.
+    pub const BYTES: usize = 1 + 4 * BINS * Quantity::ALL.len();
+
+    /// No time at all.
+    pub const fn new() -> Self {
+        let none = [[0; BINS]; Quantity::ALL.len()];
+        Self { last: None, session: none, before: none }
+    }
+
+    /// One step, after usage; `true` where it counted.
+    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, usage: &Usage) -> bool {
+        let step = self.last.map_or(Span::ZERO, |last| now.since(last));
+        if self.last.is_some() && step < EVERY {
+            return false;
+        }
+        // Whole tenths are counted; the rest goes into the next step.
+        let tenths = (step.as_millis() / 100) as u32;
+        let rest = step.as_micros() % 100_000;
+        self.last = Some(Instant::from_micros(now.as_micros() - rest));
+        if step > STEP_MAX {
+            return false;
+        }
+        let mut counted = false;
+        for (quantity, bins) in Quantity::ALL.into_iter().zip(&mut self.session) {
+            if let Some(value) = quantity.value(now, vehicle, usage) {
+                let bin = quantity.edges().iter().take_while(|edge| value >= **edge).count();
+                bins[bin] = bins[bin].saturating_add(tenths);
+                counted = true;
+            }
+        }
+        counted
+    }
+
+    /// Every range that the session was in: quantity, range, seconds.
+    pub fn for_each(&self, each: impl FnMut(Quantity, usize, f64)) {
+        visit(&self.session, each);
+    }
+
+    /// Every range that the airframe was in, this session included.
+    pub fn for_each_of_life(&self, each: impl FnMut(Quantity, usize, f64)) {
+        visit(&self.lifetime(), each);
+    }
+
+    fn lifetime(&self) -> Tenths {
+        let mut both = self.before;
+        for (sum, session) in both.iter_mut().flatten().zip(self.session.iter().flatten()) {
+            *sum = sum.saturating_add(*session);
+        }
+        both
+    }
+
+    /// It is another airframe: what was before this session was not its own.
+    pub(crate) fn forget_life(&mut self) {
+        self.before = [[0; BINS]; Quantity::ALL.len()];
+    }
+
+    /// Writes the stored form.
+    pub fn encode(&self, out: &mut [u8; Self::BYTES]) {
+        let mut put = Put::new(out);
+        put.u8(VERSION);
+        self.lifetime().iter().flatten().for_each(|tenths| {
+            put.u32(*tenths);
+        });
+    }
+
+    /// Reads the stored form, of this version or a later one.
+    pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
+        let mut take = Take::new(stored);
+        if take.u8()? < VERSION {
+            return Err(Unreadable);
+        }
+        let mut exposure = Self::new();
+        for tenths in exposure.before.iter_mut().flatten() {
+            *tenths = take.u32()?;
+        }
+        Ok(exposure)
+    }
+}
+
+fn visit(tenths: &Tenths, mut each: impl FnMut(Quantity, usize, f64)) {
+    for (quantity, bins) in Quantity::ALL.into_iter().zip(tenths) {
+        for (bin, tenths) in bins.iter().enumerate().filter(|(_, tenths)| **tenths > 0) {
+            each(quantity, bin, f64::from(*tenths) / 10.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::{Heartbeat, Observation, Processor, Source};
+
+    const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+    fn heat(exposure: &mut Exposure, from_ms: u64, to_ms: u64, celsius: f32) {
+        let mut vehicle = Vehicle::unknown();
+        vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(Heartbeat::default()));
+        for now_ms in (from_ms..to_ms).step_by(50) {
+            let now = Instant::from_millis(now_ms);
+            let processor = Processor { temperature: Some(Celsius(celsius)), voltage: None };
+            vehicle.observe(now, AUTOPILOT, &Observation::Processor(processor));
+            exposure.step(now, &vehicle, &Usage::new());
+        }
+    }
+
+    fn seen(exposure: &Exposure) -> Vec<(usize, f64)> {
+        let mut seen = Vec::new();
+        exposure.for_each_of_life(|quantity, bin, seconds| {
+            assert_eq!(quantity, Quantity::McuTemperature);
+            seen.push((bin, seconds));
+        });
+        seen
+    }
+
+    #[test]
+    fn time_goes_to_the_range_of_the_value_and_adds_up_over_sessions() {
+        let mut exposure = Exposure::new();
+        heat(&mut exposure, 0, 10_050, -5.0);
+        heat(&mut exposure, 10_050, 20_050, 45.0);
+        heat(&mut exposure, 20_050, 21_050, f32::NAN);
+        heat(&mut exposure, 21_050, 22_050, 1e9);
+        heat(&mut exposure, 90_000, 90_500, 200.0);
+        assert_eq!(seen(&exposure), [(0, 10.0), (3, 10.0), (7, 0.4)]);
+        let mut stored = [0; Exposure::BYTES];
+        exposure.encode(&mut stored);
+        let mut exposure = Exposure::decode(&stored).expect("readable");
+        heat(&mut exposure, 0, 1_050, 45.0);
+        assert_eq!(seen(&exposure), [(0, 10.0), (3, 11.0), (7, 0.4)]);
+        let mut session = 0.0;
+        exposure.for_each(|_, _, seconds| session += seconds);
+        assert_eq!(session.to_bits(), 1.0_f64.to_bits());
+    }
+
+    #[test]
+    fn ranges_ascend() {
+        for quantity in Quantity::ALL {
+            assert!(quantity.edges().is_sorted(), "{quantity:?}");
+        }
+    }
+}

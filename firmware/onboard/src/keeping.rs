@@ -1,0 +1,97 @@
+//! What of the record is kept: all of it from power-on, or what is around the times when the vehicle is armed.
+//!
+//! Recording by arming records all the time too, because only so is there something to keep of the time before arming;
+//! but while the vehicle is disarmed storage is told to keep the last while only ([`CardStatus::wait_from`]), and each
+//! group of sectors says so, for whoever reads the log and misses the rest.
+
+use hums_blackbox::record::Keep;
+use hums_blackbox::{Record, Writer};
+use hums_core::params::{Param, Params};
+use hums_core::time::{Instant, Span};
+use hums_recorder::CardStatus;
+
+use crate::queues::SectorsIn;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// Just powered on.
+    Fresh,
+    /// Everything is kept.
+    All,
+    /// From this sector on, the last while.
+    Last { from: u32 },
+}
+
+/// Decides what is kept.
+#[derive(Debug)]
+pub(crate) struct Keeping {
+    state: State,
+    /// When the vehicle was armed last.
+    armed_at: Option<Instant>,
+    /// What the record does not say yet.
+    due: Option<Keep>,
+    /// The group that says that only the last while is kept.
+    group: u64,
+    /// Files that storage has begun.
+    files: u32,
+}
+
+impl Keeping {
+    pub(crate) const fn new() -> Self {
+        Self { state: State::Fresh, armed_at: None, due: None, group: 0, files: 0 }
+    }
+
+    /// Every tick, and once before the first record. `write` gives access to writer and queue.
+    pub(crate) fn tick(
+        &mut self,
+        now: Instant,
+        params: &Params,
+        armed: bool,
+        card: &CardStatus,
+        writer: &mut Writer,
+        sectors: &mut SectorsIn<'_>,
+    ) {
+        if armed {
+            self.armed_at = Some(now);
+        }
+        let span = |param| Span::from_millis((params.get(param) * 1000.0) as u64);
+        let by_arming = params.get(Param::RecMode) > 0.5;
+        let lately = self.armed_at.is_some_and(|at| armed || now.since(at) < span(Param::RecAfter));
+        let (before, all) = (span(Param::RecBefore), !by_arming || lately);
+        let keep = |all, from| Keep { all, from, seconds: (before.as_millis() / 1000) as u32 };
+        match self.state {
+            State::Fresh | State::All if all => self.state = State::All,
+            State::Fresh | State::All => {
+                // The file ends here in order; what comes begins another one, and says first what it is.
+                let is_fresh = self.state == State::Fresh;
+                if is_fresh || sectors.with_reserve(|sink| writer.finish(sink)) {
+                    let from = writer.counters().sectors as u32;
+                    card.wait_from(from, before);
+                    self.state = State::Last { from };
+                    self.due = Some(keep(false, from));
+                }
+            }
+            State::Last { from } if all => {
+                card.keep_all();
+                self.state = State::All;
+                self.due = Some(keep(true, from));
+            }
+            State::Last { from } if writer.counters().groups != self.group => {
+                self.due = Some(keep(false, from));
+            }
+            State::Last { .. } => {}
+        }
+        if let Some(due) = self.due
+            && sectors.with_reserve(|sink| writer.record(now, &Record::Keep(due), sink)).is_ok()
+        {
+            self.due = None;
+            self.group = writer.counters().groups;
+        }
+    }
+
+    /// Whether storage has begun a file since the last call, other than the first one.
+    pub(crate) fn takes_new_file(&mut self, card: &CardStatus) -> bool {
+        let before = core::mem::replace(&mut self.files, card.read().segments);
+        before != 0 && before != self.files
+    }
+}

@@ -1,0 +1,359 @@
+//! Typed columns for the tools that read a whole fleet as one table: `DuckDB`, Spark, `DataFusion`, pandas.
+//!
+//! ```text
+//! OUT/vehicle=uid-0031002a3035510a/date=2026-11-21/session=s1a2b3c4d/ATTITUDE.parquet
+//! ```
+//! One file for each message type and for each table of the monitor's own, below what is known of the session: these
+//! tools read `vehicle`, `date` and `session` as columns. Columns keep the type that was sent (arrays are lists, `char`
+//! arrays text); the fields' metadata has their `units` and `enum`. Each table begins with `boot_s`, seconds since the
+//! monitor's power-on, and `utc`, null where nobody told it; those of frames go on with `system` and `component`.
+//!
+//! Memory is bounded: what waits to be encoded is at most [`PENDING_MAX`], and when the row groups in work are more
+//! than [`WRITERS_MAX`], the largest are written out.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
+use arrow_array::{ArrayRef, Float64Array, RecordBatch, TimestampMicrosecondArray, UInt8Array};
+use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
+use hums_core::time::Instant;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::Compression;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use rayon::prelude::*;
+
+use super::collect::Table;
+use super::columns::{Column, TextColumn, cell_array, cell_data_type};
+use super::record::Row;
+use super::write::make_directory;
+use crate::mavlink::frame::Frame;
+use crate::mavlink::values::Payload;
+
+/// Bytes of columns that wait to be encoded, all tables together.
+const PENDING_MAX: usize = 2 << 20;
+/// Bytes of row groups in work, all tables together.
+const WRITERS_MAX: usize = 12 << 20;
+/// Rows of a row group at most: what engines like to read at once.
+const GROUP_ROWS: usize = 128 * 1024;
+/// Bytes of a page and of a column's dictionary at most.
+const PAGE_BYTES: usize = 64 * 1024;
+
+/// Names that every table has: its own first columns, and those that its place among the directories adds.
+const TAKEN: [&str; 5] = ["boot_s", "utc", "vehicle", "date", "session"];
+/// Names that tables of frames have besides.
+const TAKEN_FRAMES: [&str; 2] = ["system", "component"];
+
+/// One group's entries as columns.
+#[derive(Debug, Default)]
+pub struct Batches {
+    frames: BTreeMap<Table, FrameColumns>,
+    rows: BTreeMap<&'static str, RowColumns>,
+}
+
+/// The columns of frames of one type.
+#[derive(Debug)]
+struct FrameColumns {
+    times: Times,
+    system: Vec<u8>,
+    component: Vec<u8>,
+    fields: Vec<Column>,
+    /// Where the definition is not ours: the payload as hexadecimal digits, after its sequence number.
+    opaque: Option<(Vec<u8>, TextColumn)>,
+}
+
+#[derive(Debug, Default)]
+struct Times {
+    boot_s: Vec<f64>,
+    utc_us: Vec<Option<i64>>,
+}
+
+impl Times {
+    fn push(&mut self, at: Instant, epoch_us: Option<u64>) {
+        self.boot_s.push(at.as_secs_f64());
+        let utc = epoch_us.and_then(|epoch| i64::try_from(epoch.saturating_add(at.as_micros())).ok());
+        self.utc_us.push(utc);
+    }
+
+    fn arrays(self) -> Vec<ArrayRef> {
+        let utc = TimestampMicrosecondArray::from(self.utc_us).with_timezone("UTC");
+        vec![Arc::new(Float64Array::from(self.boot_s)), Arc::new(utc)]
+    }
+
+    fn fields() -> Vec<Field> {
+        let utc = DataType::Timestamp(TimeUnit::Microsecond, Some("UTC".into()));
+        vec![
+            with_units(Field::new("boot_s", DataType::Float64, false), "s", ""),
+            Field::new("utc", utc, true),
+        ]
+    }
+}
+
+/// Rows of one table of the monitor's own.
+#[derive(Debug, Default)]
+struct RowColumns {
+    times: Times,
+    rows: Vec<Row>,
+}
+
+impl Batches {
+    /// Adds a frame.
+    pub fn frame(&mut self, at: Instant, epoch_us: Option<u64>, frame: &Frame<'_>, known: Option<&Payload>) {
+        let table = Table::of(frame, known.is_some());
+        let columns = self.frames.entry(table).or_insert_with(|| FrameColumns::new(frame, known.is_some()));
+        columns.times.push(at, epoch_us);
+        columns.system.push(frame.system);
+        columns.component.push(frame.component);
+        if let Some(payload) = known {
+            for (column, (_, value)) in columns.fields.iter_mut().zip(payload.fields()) {
+                column.push(value);
+            }
+        }
+        if let Some((sequence, hex)) = &mut columns.opaque {
+            sequence.push(frame.sequence);
+            let mut digits = Vec::new();
+            super::text::push_hex(&mut digits, frame.payload);
+            hex.push(&digits);
+        }
+    }
+
+    /// Adds a row of the monitor's own.
+    pub fn row(&mut self, at: Instant, epoch_us: Option<u64>, row: &Row) {
+        let columns = self.rows.entry(row.table).or_default();
+        columns.times.push(at, epoch_us);
+        columns.rows.push(row.clone());
+    }
+
+    /// Each table's rows.
+    fn finish(self) -> impl Iterator<Item = (Table, Result<RecordBatch>)> {
+        let frames = self.frames.into_iter().map(|(table, columns)| (table, columns.batch(table)));
+        let rows = self.rows.into_iter().map(|(name, columns)| (Table::Hums(name), columns.batch()));
+        frames.chain(rows)
+    }
+}
+
+impl FrameColumns {
+    fn new(frame: &Frame<'_>, known: bool) -> Self {
+        let fields = frame.message().filter(|_| known).map(|message| message.fields).unwrap_or_default();
+        Self {
+            times: Times::default(),
+            system: Vec::new(),
+            component: Vec::new(),
+            fields: fields.iter().map(Column::of).collect(),
+            opaque: (!known).then(Default::default),
+        }
+    }
+
+    fn batch(self, table: Table) -> Result<RecordBatch> {
+        let mut arrays = self.times.arrays();
+        arrays.push(Arc::new(UInt8Array::from(self.system)));
+        arrays.push(Arc::new(UInt8Array::from(self.component)));
+        arrays.extend(self.fields.into_iter().map(Column::array));
+        if let Some((sequence, hex)) = self.opaque {
+            arrays.push(Arc::new(UInt8Array::from(sequence)));
+            arrays.push(hex.array());
+        }
+        Ok(RecordBatch::try_new(frame_schema(table), arrays)?)
+    }
+}
+
+/// The columns of a table of frames.
+fn frame_schema(table: Table) -> SchemaRef {
+    let mut fields = Times::fields();
+    let byte = |name| Field::new(name, DataType::UInt8, false);
+    fields.extend([byte("system"), byte("component")]);
+    if let Table::Message(id) = table {
+        for field in hums_dialect::message(id).map(|message| message.fields).unwrap_or_default() {
+            let arrow =
+                Field::new(column_name(field.name, &TAKEN_FRAMES), Column::of(field).data_type(), false);
+            fields.push(with_units(arrow, field.units, field.enumeration));
+        }
+    } else {
+        fields.extend([byte("sequence"), Field::new("payload", DataType::Utf8, false)]);
+    }
+    Arc::new(Schema::new(fields))
+}
+
+/// A column under its own name, unless that is taken.
+fn column_name(name: &str, taken: &[&str]) -> String {
+    let taken = TAKEN.contains(&name) || taken.contains(&name);
+    if taken { format!("{name}_field") } else { name.to_owned() }
+}
+
+fn with_units(field: Field, units: &str, enumeration: &str) -> Field {
+    let known = [("units", units), ("enum", enumeration)];
+    let metadata: HashMap<String, String> = known
+        .into_iter()
+        .filter(|(_, value)| !value.is_empty())
+        .map(|(name, value)| (name.to_owned(), value.to_owned()))
+        .collect();
+    field.with_metadata(metadata)
+}
+
+impl RowColumns {
+    fn batch(self) -> Result<RecordBatch> {
+        let mut fields = Times::fields();
+        let mut arrays = self.times.arrays();
+        let first = self.rows.first().map(|row| row.cells.as_slice()).unwrap_or_default();
+        for (place, (name, cell)) in first.iter().enumerate() {
+            let data_type = cell_data_type(name, cell.cell_type());
+            // `at[s]` as a name would need quoting in every query.
+            let (plain, units) =
+                name.strip_suffix(']').and_then(|name| name.split_once('[')).unwrap_or((name, ""));
+            let plain = if units.is_empty() { plain.to_owned() } else { format!("{plain}_{units}") };
+            let cells = self.rows.iter().map(|row| row.cells.get(place).map(|(_, cell)| cell));
+            arrays.push(cell_array(&data_type, cells));
+            fields.push(with_units(Field::new(column_name(&plain, &[]), data_type, true), units, ""));
+        }
+        Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)?)
+    }
+}
+
+/// The tables of one session, open.
+pub struct ParquetTables {
+    dir: PathBuf,
+    properties: WriterProperties,
+    tables: BTreeMap<Table, TableFile>,
+    pending_bytes: usize,
+}
+
+struct TableFile {
+    path: PathBuf,
+    writer: ArrowWriter<File>,
+    pending: Vec<RecordBatch>,
+}
+
+impl ParquetTables {
+    /// Tables in `dir`; `about` goes into each file's metadata.
+    pub fn new(dir: PathBuf, about: &[(&str, String)]) -> Result<Self> {
+        make_directory(&dir)?;
+        let about =
+            about.iter().map(|(name, value)| KeyValue::new((*name).to_owned(), value.clone())).collect();
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::SNAPPY)
+            .set_max_row_group_row_count(Some(GROUP_ROWS))
+            .set_data_page_size_limit(PAGE_BYTES)
+            .set_dictionary_page_size_limit(PAGE_BYTES)
+            .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_key_value_metadata(Some(about))
+            .build();
+        Ok(Self { dir, properties, tables: BTreeMap::new(), pending_bytes: 0 })
+    }
+
+    /// Takes a group's columns.
+    pub fn put(&mut self, batches: Batches) -> Result<()> {
+        for (table, batch) in batches.finish() {
+            let batch = batch.with_context(|| format!("{}: its columns do not fit", table.file_name()))?;
+            self.pending_bytes += batch.get_array_memory_size();
+            if let Some(file) = self.tables.get_mut(&table) {
+                file.pending.push(batch);
+            } else {
+                let file = TableFile::create(&self.dir, table, batch, &self.properties)?;
+                self.tables.insert(table, file);
+            }
+        }
+        if self.pending_bytes > PENDING_MAX { self.encode() } else { Ok(()) }
+    }
+
+    /// Encodes what waits, each table by itself.
+    fn encode(&mut self) -> Result<()> {
+        self.pending_bytes = 0;
+        self.tables.par_iter_mut().try_for_each(|(_, file)| file.encode())?;
+        let mut bytes: usize = self.tables.values().map(|file| file.writer.memory_size()).sum();
+        while bytes > WRITERS_MAX {
+            let Some(largest) = self.tables.values_mut().max_by_key(|file| file.writer.memory_size()) else {
+                break;
+            };
+            let before = largest.writer.memory_size();
+            largest.writer.flush().with_context(|| cannot_write(&largest.path))?;
+            let freed = before.saturating_sub(largest.writer.memory_size());
+            if freed == 0 {
+                break;
+            }
+            bytes -= freed;
+        }
+        Ok(())
+    }
+
+    /// Writes what is still held, and each file's end; gives the directory and how many tables there are.
+    pub fn finish(mut self) -> Result<(PathBuf, usize)> {
+        self.encode()?;
+        let tables = self.tables.len();
+        let tables_done: Result<Vec<()>> = self
+            .tables
+            .into_par_iter()
+            .map(|(_, file)| file.writer.close().map(|_| ()).with_context(|| cannot_write(&file.path)))
+            .collect();
+        tables_done?;
+        Ok((self.dir, tables))
+    }
+}
+
+impl TableFile {
+    fn create(dir: &Path, table: Table, first: RecordBatch, properties: &WriterProperties) -> Result<Self> {
+        let path = dir.join(format!("{}.parquet", table.file_name()));
+        let file = File::create(&path).with_context(|| cannot_write(&path))?;
+        let writer = ArrowWriter::try_new(file, first.schema(), Some(properties.clone()))
+            .with_context(|| cannot_write(&path))?;
+        Ok(Self { path, writer, pending: vec![first] })
+    }
+
+    fn encode(&mut self) -> Result<()> {
+        for batch in self.pending.drain(..) {
+            self.writer.write(&batch).with_context(|| cannot_write(&self.path))?;
+        }
+        Ok(())
+    }
+}
+
+fn cannot_write(path: &Path) -> String {
+    format!("{}: cannot be written", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_message_has_two_columns_of_one_name() {
+        for message in hums_dialect::messages() {
+            let schema = frame_schema(Table::Message(message.id));
+            let mut names: Vec<&str> = schema.fields().iter().map(|field| field.name().as_str()).collect();
+            names.extend(["vehicle", "date", "session"]);
+            let count = names.len();
+            names.sort_unstable();
+            names.dedup();
+            assert_eq!(names.len(), count, "{}", message.name);
+        }
+    }
+
+    #[test]
+    fn every_message_makes_a_batch_of_its_schema() {
+        for message in hums_dialect::messages() {
+            let mut batches = Batches::default();
+            let frame = Frame {
+                bytes: &[],
+                id: message.id,
+                sequence: 0,
+                system: 1,
+                component: 1,
+                payload: &[0x5a; 255],
+                check: crate::mavlink::frame::Check::Good,
+            };
+            let payload = Payload::new(message, frame.payload);
+            batches.frame(Instant::from_millis(5), Some(7), &frame, Some(&payload));
+            batches.frame(Instant::from_millis(6), None, &frame, Some(&payload));
+            let (_, batch) = batches.finish().next().expect("a table");
+            let batch = batch.expect(message.name);
+            assert_eq!(
+                (batch.num_rows(), batch.num_columns()),
+                (2, 4 + message.fields.len()),
+                "{}",
+                message.name
+            );
+        }
+    }
+}

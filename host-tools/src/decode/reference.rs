@@ -1,0 +1,382 @@
+//! From what a vehicle says to the quantities of the reference system: the one place that maps them, for the line
+//! protocol (`influx`) and for the four tables (`thesis`), whichever autopilot speaks.
+//!
+//! The quantities come from the same observation model that the firmware checks health with, so its scales and its
+//! "unknown" values hold here too: ESC values from `ESC_STATUS` and `ESC_INFO` (PX4) or `ESC_TELEMETRY_*` (ArduPilot),
+//! the battery from `BATTERY_STATUS` or, where that is silent, `SYS_STATUS`, and so on.
+//! A value older than [`AGE_MAX`] is no value: better an empty cell than a stale number.
+
+use hums_core::flight::Flight;
+use hums_core::observation::{Esc, Observation, Source};
+use hums_core::time::{Instant, Span};
+use hums_core::units::{MetresPerSecond, MetresPerSecond2};
+use hums_core::vehicle::Vehicle;
+
+use crate::mavlink::values::Scalar;
+
+/// Slow streams come every 2 to 5 s.
+const AGE_MAX: Span = Span::from_secs(10);
+
+/// Motors of the reference system's tables.
+pub const MOTORS: usize = 4;
+
+/// One of the reference system's quantities. Motors count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Seconds since take-off; stays after landing until the next take-off. 0 before the first.
+    FlightTime,
+    /// What is left of the battery, percent.
+    BatteryPercent,
+    /// Battery voltage, V.
+    BatteryVolts,
+    /// Temperature of the air at its sensor, degC.
+    Temperature,
+    /// Static pressure, hPa.
+    Pressure,
+    /// Specific force forward, right or down (0, 1, 2), m/s2.
+    Acceleration(usize),
+    /// Its length, m/s2.
+    AccelerationModule,
+    /// Velocity north, east or down (0, 1, 2), m/s.
+    Velocity(usize),
+    /// Its length, m/s.
+    VelocityModule,
+    /// Speed over ground as the GNSS receiver says it, m/s.
+    GnssSpeed,
+    /// Above mean sea level, m.
+    Altitude,
+    /// Degrees, north positive.
+    Latitude,
+    /// Degrees, east positive.
+    Longitude,
+    /// Through the air, m/s.
+    AirSpeed,
+    /// Over ground, m/s.
+    GroundSpeed,
+    /// Degrees from north.
+    Heading,
+    /// Percent.
+    Throttle,
+    /// The display's altitude, m.
+    HudAltitude,
+    /// Upwards, m/s.
+    ClimbRate,
+    /// Of a motor, 1/min.
+    EscRpm(usize),
+    /// At an ESC, V.
+    EscVoltage(usize),
+    /// Of a motor, A.
+    EscCurrent(usize),
+    /// `ESC_FAILURE_FLAGS`
+    EscFailures(usize),
+    /// Errors that an ESC counted.
+    EscErrors(usize),
+    /// Of an ESC, degC.
+    EscTemperature(usize),
+}
+
+/// What of an ESC the reference system shows.
+const ESC: [fn(usize) -> Quantity; 6] = [
+    Quantity::EscRpm,
+    Quantity::EscVoltage,
+    Quantity::EscCurrent,
+    Quantity::EscFailures,
+    Quantity::EscErrors,
+    Quantity::EscTemperature,
+];
+
+impl Quantity {
+    /// The name of its field in the reference system's measurement `HUMS`; `None` where that has none.
+    pub fn field(self) -> Option<String> {
+        let axis = |names: [&str; 3], axis: usize| names.get(axis).map(|name| (*name).to_owned());
+        Some(match self {
+            Self::FlightTime => "Flight Time".into(),
+            Self::BatteryPercent => "Battery (%)".into(),
+            Self::BatteryVolts => "Battery (V)".into(),
+            Self::Temperature => "Temp".into(),
+            Self::Pressure => "Air Pressure".into(),
+            Self::Acceleration(at) => return axis(["Front Accel", "Right Accel", "Down Accel"], at),
+            Self::AccelerationModule => "Accel Module".into(),
+            Self::Velocity(at) => return axis(["North Velocity", "East Velocity", "Down Velocity"], at),
+            Self::VelocityModule => "Velocity Module".into(),
+            Self::GnssSpeed => "Velocity".into(),
+            Self::Altitude => "Altitude".into(),
+            Self::Latitude => "Latitude".into(),
+            Self::Longitude => "Longitude".into(),
+            Self::AirSpeed => "Air Speed (m/s)".into(),
+            Self::GroundSpeed => "groundspeed".into(),
+            Self::Heading => "heading".into(),
+            Self::Throttle => "Throttle (%)".into(),
+            Self::HudAltitude => return None,
+            Self::ClimbRate => "Climb Rate (m/s)".into(),
+            Self::EscRpm(motor) => format!("esc_rpm{motor}"),
+            Self::EscVoltage(motor) => format!("esc_voltage{motor}"),
+            Self::EscCurrent(motor) => format!("esc_current{motor}"),
+            Self::EscFailures(motor) => format!("esc_fail{motor}"),
+            Self::EscErrors(motor) => format!("esc{motor}_fails"),
+            Self::EscTemperature(motor) => format!("esc_temperature{motor}"),
+        })
+    }
+}
+
+/// The vehicle as the reference system sees it, replayed from its observations.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    vehicle: Vehicle,
+    flight: Flight,
+    /// Of the last flight that has ended.
+    flown: Span,
+    heard: Option<Instant>,
+}
+
+impl Default for Reference {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Reference {
+    /// Nothing heard yet.
+    pub const fn new() -> Self {
+        Self {
+            vehicle: Vehicle::unknown(),
+            flight: Flight::grounded(),
+            flown: Span::from_secs(0),
+            heard: None,
+        }
+    }
+
+    /// Takes an observation; `false` where it is not of the vehicle.
+    pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
+        if !self.vehicle.observe(at, source, observation) {
+            return false;
+        }
+        self.heard = Some(at);
+        let since = self.flight.airborne_since();
+        self.flight.step(at, &self.vehicle);
+        match (since, self.flight.airborne_since()) {
+            (Some(since), None) => self.flown = at.since(since),
+            (None, Some(_)) => self.flown = Span::ZERO,
+            _ => {}
+        }
+        true
+    }
+
+    /// The vehicle.
+    pub const fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
+    /// Whether it flies, and since when.
+    pub const fn flight(&self) -> &Flight {
+        &self.flight
+    }
+
+    /// When the vehicle was heard last.
+    pub const fn heard(&self) -> Option<Instant> {
+        self.heard
+    }
+
+    /// A quantity as it is known now.
+    pub fn value(&self, now: Instant, quantity: Quantity) -> Option<Scalar> {
+        let single = |value: f32| Some(Scalar::Single(value));
+        let vehicle = &self.vehicle;
+        let gnss = || vehicle.gnss.first().and_then(|gnss| gnss.within(now, AGE_MAX));
+        let global = || vehicle.global.within(now, AGE_MAX);
+        let hud = || vehicle.hud.within(now, AGE_MAX);
+        let air = || vehicle.air.within(now, AGE_MAX);
+        let position = || gnss().and_then(|gnss| gnss.position).or_else(|| global()?.position);
+        match quantity {
+            Quantity::FlightTime => {
+                let flown = self.flight.airborne_since().map_or(self.flown, |since| now.since(since));
+                Some(Scalar::Double(flown.as_micros() as f64 / 1e6))
+            }
+            Quantity::BatteryPercent | Quantity::BatteryVolts => self.battery(now, quantity),
+            Quantity::Temperature => single(air()?.temperature?.0),
+            Quantity::Pressure => single(air()?.pressure?.0),
+            Quantity::Acceleration(axis) => single(self.acceleration(now)?.get(axis)?.0),
+            Quantity::AccelerationModule => single(norm(self.acceleration(now)?.map(|part| part.0))),
+            Quantity::Velocity(axis) => single(self.velocity(now)?.get(axis)?.0),
+            Quantity::VelocityModule => single(norm(self.velocity(now)?.map(|part| part.0))),
+            Quantity::GnssSpeed => single(gnss()?.speed?.0),
+            Quantity::Altitude => {
+                let fused = || global().map(|global| global.altitude);
+                single(gnss().and_then(|gnss| gnss.altitude).or_else(fused)?.0)
+            }
+            Quantity::Latitude => Some(Scalar::Double(position()?.latitude_deg)),
+            Quantity::Longitude => Some(Scalar::Double(position()?.longitude_deg)),
+            Quantity::AirSpeed => single(hud()?.airspeed?.0),
+            Quantity::GroundSpeed => single(hud()?.groundspeed?.0),
+            Quantity::Heading => single(hud()?.heading_deg?),
+            Quantity::Throttle => single(percent(hud()?.throttle?.0)),
+            Quantity::HudAltitude => single(hud()?.altitude?.0),
+            Quantity::ClimbRate => single(hud()?.climb?.0),
+            Quantity::EscRpm(motor) => single(self.esc(now, motor)?.rpm?.0),
+            Quantity::EscVoltage(motor) => single(self.esc(now, motor)?.voltage?.0),
+            Quantity::EscCurrent(motor) => single(self.esc(now, motor)?.current?.0),
+            Quantity::EscFailures(motor) => Some(Scalar::Unsigned(self.esc(now, motor)?.failures?.into())),
+            Quantity::EscErrors(motor) => Some(Scalar::Unsigned(self.esc(now, motor)?.errors?.into())),
+            Quantity::EscTemperature(motor) => single(self.esc(now, motor)?.temperature?.0),
+        }
+    }
+
+    fn acceleration(&self, now: Instant) -> Option<[MetresPerSecond2; 3]> {
+        self.vehicle.imu.within(now, AGE_MAX)?.acceleration
+    }
+
+    fn velocity(&self, now: Instant) -> Option<[MetresPerSecond; 3]> {
+        let local = self.vehicle.local.within(now, AGE_MAX).map(|local| local.velocity);
+        local.or_else(|| self.vehicle.global.within(now, AGE_MAX).map(|global| global.velocity))
+    }
+
+    /// The first battery, or what the autopilot's status says of it.
+    fn battery(&self, now: Instant, quantity: Quantity) -> Option<Scalar> {
+        let battery = self.vehicle.batteries.first().and_then(|battery| battery.within(now, AGE_MAX));
+        let system = || self.vehicle.system.within(now, AGE_MAX);
+        if quantity == Quantity::BatteryVolts {
+            let volts = battery.and_then(|battery| battery.voltage).or_else(|| system()?.voltage);
+            return Some(Scalar::Single(volts?.0));
+        }
+        let remaining = battery.and_then(|battery| battery.remaining).or_else(|| system()?.remaining);
+        Some(Scalar::Single(percent(remaining?.0)))
+    }
+
+    fn esc(&self, now: Instant, motor: usize) -> Option<&Esc> {
+        let motor = self.vehicle.motors.get(motor)?;
+        motor.at.filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)
+    }
+
+    /// The quantities that an observation has just told anew. A motor is `Some` where all of them are that motor's.
+    pub fn told_by(&self, observation: &Observation) -> Vec<(Option<usize>, Vec<Quantity>)> {
+        let one = |quantities: &[Quantity]| vec![(None, quantities.to_vec())];
+        let imu = [
+            Quantity::Acceleration(0),
+            Quantity::Acceleration(1),
+            Quantity::Acceleration(2),
+            Quantity::AccelerationModule,
+        ];
+        let air = [Quantity::Temperature, Quantity::Pressure];
+        let velocity =
+            [Quantity::Velocity(0), Quantity::Velocity(1), Quantity::Velocity(2), Quantity::VelocityModule];
+        let position = [Quantity::Altitude, Quantity::Latitude, Quantity::Longitude];
+        match observation {
+            Observation::Heartbeat(_) => one(&[Quantity::FlightTime]),
+            Observation::Battery(battery) if self.is_first(battery.id) => {
+                one(&[Quantity::BatteryPercent, Quantity::BatteryVolts])
+            }
+            Observation::SystemStatus(_) if self.vehicle.batteries[0].get().is_none() => {
+                one(&[Quantity::BatteryPercent, Quantity::BatteryVolts])
+            }
+            Observation::Air(_) => one(&air),
+            Observation::Imu(sensor) if sensor.instance == 0 => one(&imu),
+            Observation::ImuAndAir(..) => one(&[&imu[..], &air].concat()),
+            Observation::LocalPosition(_) => one(&velocity),
+            Observation::GlobalPosition(_) => {
+                let mut quantities = Vec::new();
+                if self.vehicle.local.get().is_none() {
+                    quantities.extend(velocity);
+                }
+                if self.vehicle.gnss[0].get().is_none() {
+                    quantities.extend(position);
+                }
+                one(&quantities)
+            }
+            Observation::Gnss(gnss) if gnss.instance == 0 => {
+                one(&[&[Quantity::GnssSpeed][..], &position].concat())
+            }
+            Observation::Hud(_) => one(&[
+                Quantity::AirSpeed,
+                Quantity::GroundSpeed,
+                Quantity::Heading,
+                Quantity::Throttle,
+                Quantity::ClimbRate,
+            ]),
+            Observation::Escs(group) => {
+                let motors = group.escs.iter().enumerate().filter(|(_, esc)| esc.is_some());
+                let motors = motors.map(|(place, _)| usize::from(group.first) + place);
+                motors.map(|motor| (Some(motor), ESC.map(|of| of(motor)).to_vec())).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn is_first(&self, battery: u8) -> bool {
+        self.vehicle.batteries[0].get().is_some_and(|first| first.id == battery)
+    }
+}
+
+/// A whole percentage, which the way through a fraction must not make 92.99999.
+fn percent(fraction: f32) -> f32 {
+    (fraction * 100.0).round()
+}
+
+fn norm([x, y, z]: [f32; 3]) -> f32 {
+    (x * x + y * y + z * z).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::observation::{Battery, EscGroup, GlobalPosition, Heartbeat, SystemStatus, VehicleKind};
+    use hums_core::units::{Fraction, Metres, Rpm, Volts};
+
+    use super::*;
+
+    const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+    fn known() -> Reference {
+        let mut reference = Reference::new();
+        let heartbeat = Heartbeat { kind: VehicleKind::Rotorcraft, armed: true, ..Heartbeat::default() };
+        assert!(reference.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat)));
+        reference
+    }
+
+    #[test]
+    fn the_status_tells_of_the_battery_where_no_battery_does() {
+        let mut reference = known();
+        let system = SystemStatus {
+            voltage: Some(Volts(15.78)),
+            remaining: Some(Fraction(0.93)),
+            ..SystemStatus::default()
+        };
+        let now = Instant::from_millis(5);
+        reference.observe(now, AUTOPILOT, &Observation::SystemStatus(system));
+        assert_eq!(reference.value(now, Quantity::BatteryVolts), Some(Scalar::Single(15.78)));
+        assert_eq!(reference.value(now, Quantity::BatteryPercent), Some(Scalar::Single(93.0)));
+        let battery = Battery { voltage: Some(Volts(15.5)), ..Battery::default() };
+        reference.observe(now, AUTOPILOT, &Observation::Battery(battery));
+        assert_eq!(reference.value(now, Quantity::BatteryVolts), Some(Scalar::Single(15.5)));
+        assert!(
+            reference.told_by(&Observation::SystemStatus(system)).is_empty(),
+            "the battery itself is heard"
+        );
+    }
+
+    #[test]
+    fn an_old_value_is_no_value() {
+        let mut reference = known();
+        let esc = Esc { rpm: Some(Rpm(4_350.0)), ..Esc::default() };
+        let group = EscGroup { first: 0, escs: [Some(esc), None, None, None] };
+        reference.observe(Instant::ZERO, AUTOPILOT, &Observation::Escs(group));
+        let rpm = |seconds: u64| reference.value(Instant::from_millis(seconds * 1000), Quantity::EscRpm(0));
+        assert_eq!((rpm(10), rpm(11)), (Some(Scalar::Single(4_350.0)), None));
+        assert_eq!(reference.value(Instant::ZERO, Quantity::EscRpm(1)), None);
+    }
+
+    #[test]
+    fn flight_time_counts_from_take_off_and_stays_after_landing() {
+        let mut reference = known();
+        let heights_m = |second: u64| if (10..40).contains(&second) { 20.0 } else { 0.0 };
+        let mut times = Vec::new();
+        for tick in 0..600 {
+            let now = Instant::from_millis(tick * 100);
+            let relative_altitude = Metres(heights_m(tick / 10));
+            let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
+            reference.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
+            times.push(reference.value(now, Quantity::FlightTime).map(Scalar::as_f64));
+        }
+        assert_eq!(times[50], Some(0.0), "on the ground");
+        assert_eq!(times[300], Some(20.0), "in the air");
+        // A landing is believed after two seconds on the ground.
+        assert_eq!(times[599], Some(32.0), "down again");
+    }
+}

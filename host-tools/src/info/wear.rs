@@ -1,0 +1,49 @@
+//! What was exceeded, and what wears, for people.
+
+use std::fmt::Write as _;
+
+use hums_core::exceedance::Crossings;
+
+use super::json::finite;
+use crate::summary::Overview;
+
+/// Exceedances and components of a log.
+pub(super) fn text(text: &mut String, log: &Overview) {
+    let contents = &log.contents;
+    if !contents.exceedances.is_empty() {
+        text.push_str(
+            "  exceeded                 of         warnings      for  criticals      for        peak\n",
+        );
+    }
+    for ((check, instance), line) in &contents.exceedances {
+        for (of, crossings) in [("session", &line.session), ("life", &line.lifetime)] {
+            if of == "session" && !crossings.happened() {
+                continue;
+            }
+            let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } = *crossings;
+            let seconds = |tenths: u32| format!("{:.1} s", f64::from(tenths) / 10.0);
+            let peak = finite(peak).map_or_else(String::new, |peak| format!("{peak:.6} {}", line.unit));
+            let _ = writeln!(
+                text,
+                "    {:<22} {of:<8} {warnings:>10} {:>8} {criticals:>10} {:>8}  {peak:>10}",
+                format!("{check}[{instance}]"),
+                seconds(warning_tenths),
+                seconds(critical_tenths),
+            );
+        }
+    }
+    if !contents.components.is_empty() {
+        text.push_str("  components\n");
+    }
+    for (place, line) in &contents.components {
+        let number = if line.number == 0 { String::new() } else { format!(" {}", line.number) };
+        let used = finite(line.used_percent)
+            .map_or_else(|| "no limit".to_owned(), |percent| format!("{percent:.1} % used"));
+        let (hours, motor_hours) = (line.figures.flight_s / 3_600.0, line.figures.motor_s / 3_600.0);
+        let _ = writeln!(
+            text,
+            "    {place} {}{number} {} {}: {}, {used}; {hours:.2} h in the air, {motor_hours:.2} h turning, {} flights, {:.2} cycles",
+            line.kind, line.name, line.serial, line.status, line.figures.flights, line.figures.cycles
+        );
+    }
+}

@@ -1,0 +1,97 @@
+//! `hums report`: one page for each session, whole in itself: no network, no file beside it.
+//!
+//! [`series`] samples what the vehicle told, so that a page of hours stays below a few megabytes; [`replay`] reads the
+//! log in order and finds flights and phases with the firmware's own rules; [`trend`] compares with the sessions before
+//! on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them (`assets/`).
+//!
+//! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
+//! own policy lets no other script run and loads nothing.
+
+pub mod page;
+pub mod replay;
+pub mod series;
+pub mod trend;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::cli;
+use crate::decode::{inside, side_by_side::side_by_side};
+use crate::logs::{self, Log};
+use crate::outcome::Outcome;
+use crate::output;
+use crate::summary::Overview;
+
+/// Runs `hums report`.
+pub fn run(args: &cli::Report) -> Result<Outcome> {
+    let found = logs::find(&args.inputs)?;
+    for remark in &found.remarks {
+        eprintln!("hums: {remark}");
+    }
+    let mut outcome = Outcome::lossy(found.images.iter().any(|image| !image.damage.is_empty()));
+    let mut overviews = Vec::new();
+    side_by_side(&found.logs, Overview::of, |overview| {
+        overviews.push(overview?);
+        Ok(())
+    })?;
+    let wanted = wanted(args, &found.logs)?;
+    for &index in &wanted.sessions {
+        let (Some(log), Some(overview)) = (found.logs.get(index), overviews.get(index)) else { continue };
+        let earlier = overviews.get(..index).unwrap_or_default();
+        let html = page::html(overview, &replay::Replay::of(log)?, &trend::of(overview, earlier))?;
+        let path = wanted.path(log);
+        if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
+            fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
+        }
+        fs::write(&path, &html).with_context(|| format!("{}: cannot be written", path.display()))?;
+        output::line(&format!("{}: session {}, {} bytes", path.display(), log.name, html.len()))?;
+        outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
+    }
+    if wanted.sessions.len() < found.logs.len() && args.session.is_none() {
+        eprintln!(
+            "hums: this is the newest of {} sessions; -o DIR/ writes a page for each, --session NAME one of them",
+            found.logs.len()
+        );
+    }
+    Ok(outcome)
+}
+
+/// Which sessions get a page, and where.
+struct Wanted {
+    sessions: Vec<usize>,
+    output: PathBuf,
+    directory: bool,
+}
+
+fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
+    let Some(last) = logs.len().checked_sub(1) else {
+        bail!("no log is in there, so there is nothing to report")
+    };
+    let says_directory =
+        args.output.is_dir() || args.output.as_os_str().to_string_lossy().ends_with(['/', '\\']);
+    let sessions = match &args.session {
+        Some(name) => {
+            let Some(index) = logs.iter().position(|log| log.name == *name) else {
+                let names: Vec<&str> = logs.iter().map(|log| log.name.as_str()).collect();
+                bail!("there is no session {name}; there is {}", names.join(", "));
+            };
+            vec![index]
+        }
+        None if says_directory => (0..logs.len()).collect(),
+        None => vec![last],
+    };
+    Ok(Wanted { sessions, output: args.output.clone(), directory: says_directory })
+}
+
+impl Wanted {
+    fn path(&self, log: &Log) -> PathBuf {
+        if !self.directory {
+            return self.output.clone();
+        }
+        let mut path = inside(Path::new(&self.output), &log.name).into_os_string();
+        path.push(".html");
+        path.into()
+    }
+}

@@ -1,0 +1,89 @@
+//! The session against those before it on the same card.
+
+use serde::Serialize;
+
+use crate::summary::Overview;
+use crate::utc::iso8601;
+
+/// Sessions before this one that are compared with at most.
+const EARLIER_MAX: usize = 30;
+
+/// Counters that are worth following from session to session, with title and decimals. What is counted over a session
+/// is divided by its time in the air where that makes sessions comparable.
+const FOLLOWED: [(&str, &str, &str, bool); 9] = [
+    ("flight_time_s", "Time in the air", "s", false),
+    ("vibration_max_m_s2", "Vibration, highest", "m/s\u{b2}", false),
+    ("voltage_min_v", "Battery voltage, lowest", "V", false),
+    ("current_max_a", "Battery current, highest", "A", false),
+    ("charge_ah", "Charge per hour in the air", "Ah/h", true),
+    ("energy_wh", "Energy per hour in the air", "Wh/h", true),
+    ("load_factor_max_g", "Load factor, highest", "g", false),
+    ("touchdown_max_m_s", "Touchdown, fastest", "m/s", false),
+    ("hard_landings", "Hard landings", "", false),
+];
+/// A shorter flight tells nothing per hour, seconds.
+const FLIGHT_MIN_S: f64 = 30.0;
+
+/// The comparison.
+#[derive(Debug, Serialize)]
+pub struct Trend {
+    /// The sessions, oldest first; the last is the one reported.
+    sessions: Vec<SessionJson>,
+    rows: Vec<RowJson>,
+}
+
+#[derive(Debug, Serialize)]
+struct SessionJson {
+    name: String,
+    start_utc: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct RowJson {
+    title: &'static str,
+    unit: &'static str,
+    /// One a session; `null` where it has none.
+    values: Vec<Option<f64>>,
+}
+
+/// Compares a session with those before it of the same vehicle, as far as the vehicle is known.
+pub fn of(this: &Overview, earlier: &[Overview]) -> Trend {
+    let of_vehicle = |other: &&Overview| match (this.contents.vehicle, other.contents.vehicle) {
+        (Some(this), Some(other)) => (this.system, this.uid) == (other.system, other.uid),
+        _ => true,
+    };
+    let mut sessions: Vec<&Overview> = earlier.iter().filter(of_vehicle).collect();
+    sessions.drain(..sessions.len().saturating_sub(EARLIER_MAX));
+    sessions.push(this);
+    let name = |log: &&Overview| SessionJson {
+        name: log.name.clone(),
+        start_utc: log.summary.first.and_then(|first| log.utc_us(first)).map(iso8601),
+    };
+    let mut rows: Vec<RowJson> = FOLLOWED
+        .iter()
+        .map(|&(counter, title, unit, hourly)| RowJson {
+            title,
+            unit,
+            values: sessions.iter().map(|log| value(log, counter, hourly)).collect(),
+        })
+        .collect();
+    let findings = sessions.iter().map(|log| Some(worrying(log))).collect();
+    rows.push(RowJson { title: "Findings, warning or worse", unit: "", values: findings });
+    rows.retain(|row| row.values.iter().any(Option::is_some));
+    Trend { sessions: sessions.iter().map(name).collect(), rows }
+}
+
+fn value(log: &Overview, counter: &str, hourly: bool) -> Option<f64> {
+    let value = log.contents.usage.get(counter).copied()?;
+    if !hourly {
+        return Some(value);
+    }
+    let flown_s =
+        log.contents.usage.get("flight_time_s").copied().filter(|flown_s| *flown_s >= FLIGHT_MIN_S)?;
+    Some(value / flown_s * 3600.0)
+}
+
+fn worrying(log: &Overview) -> f64 {
+    let findings = log.contents.findings.iter();
+    findings.filter(|finding| matches!(finding.level, "warning" | "critical")).count() as f64
+}

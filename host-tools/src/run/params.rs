@@ -1,0 +1,108 @@
+//! `--params FILE`: parameters as ground stations keep them in files.
+//!
+//! | program | a line |
+//! |---|---|
+//! | Mission Planner | `NAME,VALUE` |
+//! | MAVProxy, ArduPilot | `NAME VALUE` |
+//! | QGroundControl | `SYSTEM COMPONENT NAME VALUE TYPE`, with tabs; lines of other components than ours are left out |
+//!
+//! `#` begins a comment.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use hums_core::params::{ParamError, ParamSpec, Params, TABLE};
+
+use crate::outcome::usage;
+
+/// Our MAVLink component, as QGroundControl's files name it.
+const COMPONENT: &str = "191";
+
+/// The parameters that a file sets, in its order; none where there is no file.
+pub(super) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
+    let Some(path) = path else { return Ok(Vec::new()) };
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("--params {}: cannot be read", path.display()))?;
+    let mut params = Vec::new();
+    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        match parameter(line) {
+            Ok(parameter) => params.extend(parameter),
+            Err(why) => {
+                return Err(usage(format!("--params {}, line {}: {why}", path.display(), index + 1)));
+            }
+        }
+    }
+    Ok(params)
+}
+
+/// What a line sets, if anything; `Err` says what is wrong with it.
+fn parameter(line: &str) -> Result<Option<(&'static ParamSpec, f32)>, String> {
+    let line = line.split('#').next().unwrap_or_default();
+    let words: Vec<&str> =
+        line.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty()).collect();
+    let (name, value) = match *words {
+        [] => return Ok(None),
+        [name, value] | [_, COMPONENT, name, value, _] => (name, value),
+        [system, component, _, _, kind] if [system, component, kind].iter().all(|word| is_number(word)) => {
+            return Ok(None);
+        }
+        _ => return Err("wants NAME VALUE, for instance CELL_VOLT_WARN 3.6".to_owned()),
+    };
+    let Some(spec) = TABLE.iter().find(|spec| spec.name == name) else {
+        return Err(format!("there is no parameter {name}"));
+    };
+    let number = value.parse().ok().filter(|number| {
+        // The table itself decides.
+        !matches!(Params::defaults().set(name, *number), Err(ParamError::OutOfRange { .. }))
+    });
+    let ParamSpec { min, max, unit, .. } = spec;
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    number
+        .map(|number| Some((spec, number)))
+        .ok_or_else(|| format!("{name} takes {min} to {max}{unit}, not {value}"))
+}
+
+fn is_number(word: &str) -> bool {
+    word.parse::<u32>().is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(line: &str) -> Option<(&'static str, f32)> {
+        parameter(line).expect(line).map(|(spec, value)| (spec.name, value))
+    }
+
+    #[test]
+    fn the_files_of_every_ground_station_are_read() {
+        for line in [
+            "CELL_VOLT_WARN,3.5",
+            "CELL_VOLT_WARN 3.5",
+            "  CELL_VOLT_WARN\t3.50 # lipo",
+            "1\t191\tCELL_VOLT_WARN\t3.5\t9",
+        ] {
+            assert_eq!(set(line), Some(("CELL_VOLT_WARN", 3.5)), "{line}");
+        }
+        for line in ["", "  ", "# Onboard parameters for Vehicle 1", "1\t1\tARMING_CHECK\t1\t6"] {
+            assert_eq!(set(line), None, "{line}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_the_range() {
+        for (line, why) in [
+            ("CELL_VOLT_WARN", "wants NAME VALUE"),
+            ("CELL_VOLT_WARN 3.5 3.6", "wants NAME VALUE"),
+            ("CELL_VOLT_WARN 9", "CELL_VOLT_WARN takes 0 to 4.5 V, not 9"),
+            ("CELL_VOLT_WARN nan", "CELL_VOLT_WARN takes 0 to 4.5 V, not nan"),
+            ("CELL_VOLT_WARN high", "CELL_VOLT_WARN takes 0 to 4.5 V, not high"),
+            ("BAT_CELLS 99", "BAT_CELLS takes 0 to 14, not 99"),
+            ("cell_volt_warn 3.5", "there is no parameter cell_volt_warn"),
+            ("1 191 NO_SUCH 1 9", "there is no parameter NO_SUCH"),
+        ] {
+            let error = parameter(line).expect_err(line);
+            assert!(error.contains(why), "{line}: {error}");
+        }
+    }
+}

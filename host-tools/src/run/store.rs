@@ -1,0 +1,128 @@
+//! `--store FILE`: the flash in which counters and parameters outlive power, the same for `sim` and `emulate`.
+
+use std::cell::RefCell;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::rc::Rc;
+
+use anyhow::{Context, Result, anyhow, bail};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+use hums_core::params::ParamSpec;
+use hums_store::sim::SimFlash;
+use hums_store::{Key, Store, param_value};
+
+/// A sector of the board's flash.
+const SECTOR: usize = 16 * 1024;
+/// Two of them are the store.
+const BYTES: usize = 2 * SECTOR;
+
+/// Opens the file and makes it where it is missing, and sets parameters in it as a ground station would have. Without a
+/// path everything ends with the run.
+pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<FileFlash> {
+    let (bytes, file) = match path {
+        Some(path) => read(path)?,
+        None => (Vec::new(), None),
+    };
+    let flash = FileFlash(Rc::new(RefCell::new(Inside { flash: SimFlash::with(&bytes), file, error: None })));
+    flash.write_out(0, BYTES);
+    if !params.is_empty() {
+        let context = |error| anyhow!("--params: cannot be stored: {error:?}");
+        let (mut store, _) = Store::mount(flash.clone()).map_err(context)?;
+        store.allow_erase(true);
+        for (spec, value) in params {
+            let Some((bytes, length)) = param_value(spec.name, *value) else { continue };
+            store.save(Key::param(spec.name), bytes.get(..length).unwrap_or_default()).map_err(context)?;
+        }
+    }
+    match flash.take_error() {
+        Some(error) => Err(error).context("--store: cannot be written"),
+        None => Ok(flash),
+    }
+}
+
+/// What the file holds, and the file for writing.
+fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
+    if path.is_dir() {
+        bail!("--store {}: is a directory", path.display());
+    }
+    let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
+    let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
+    let mut file = file.with_context(context)?;
+    let mut bytes = Vec::new();
+    Read::by_ref(&mut file).take(BYTES as u64 + 1).read_to_end(&mut bytes).with_context(context)?;
+    if !bytes.is_empty() && bytes.len() != BYTES {
+        bail!("--store {}: is no store, which has {BYTES} bytes; name a new file", path.display());
+    }
+    Ok((bytes, Some(file)))
+}
+
+/// Flash whose content is written through to a file. Clones are the same flash.
+#[derive(Clone, Debug)]
+pub(super) struct FileFlash(Rc<RefCell<Inside>>);
+
+#[derive(Debug)]
+struct Inside {
+    flash: SimFlash<SECTOR>,
+    file: Option<File>,
+    error: Option<io::Error>,
+}
+
+impl FileFlash {
+    /// Power goes in the middle of the `steps`-th word or erase from now on.
+    pub(super) fn cut_after(&self, steps: u64, seed: u64) {
+        self.0.borrow_mut().flash.cut_after(steps, seed);
+    }
+
+    /// Whether power has gone.
+    pub(super) fn is_dead(&self) -> bool {
+        self.0.borrow().flash.is_dead()
+    }
+
+    /// The error of the file itself, if there was one.
+    pub(super) fn take_error(&self) -> Option<io::Error> {
+        self.0.borrow_mut().error.take()
+    }
+
+    fn write_out(&self, from: usize, to: usize) {
+        let Inside { flash, file, error } = &mut *self.0.borrow_mut();
+        let (Some(file), Some(bytes)) = (file, flash.bytes().get(from..to)) else { return };
+        let written = file.seek(SeekFrom::Start(from as u64)).and_then(|_| file.write_all(bytes));
+        if let Err(why) = written {
+            error.get_or_insert(why);
+        }
+    }
+}
+
+impl ErrorType for FileFlash {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for FileFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        self.0.borrow_mut().flash.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        BYTES
+    }
+}
+
+impl NorFlash for FileFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        let outcome = self.0.borrow_mut().flash.write(offset, bytes);
+        self.write_out(offset as usize, offset as usize + bytes.len());
+        outcome
+    }
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        let outcome = self.0.borrow_mut().flash.erase(from, to);
+        self.write_out(from as usize, to as usize);
+        outcome
+    }
+}

@@ -1,0 +1,305 @@
+//! The formats for databases and for the reference system, read back.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float32Type, UInt32Type};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use tempfile::TempDir;
+
+fn flight(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name)
+}
+
+#[track_caller]
+fn hums(dir: &Path, line: &str, code: i32) -> String {
+    let mut command = assert_cmd::Command::cargo_bin("hums").expect("the program");
+    let output = command.current_dir(dir).args(line.split_whitespace()).output().expect("it runs");
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "hums {line}\n{error}");
+    String::from_utf8_lossy(&output.stdout).into_owned() + &error
+}
+
+/// A directory with a flight packed as `NAME.hum`.
+fn packed(names: &[&str]) -> TempDir {
+    let dir = tempfile::tempdir().expect("a directory");
+    for name in names {
+        let (from, stem) = (flight(name), name.split('.').next().unwrap_or(name));
+        hums(dir.path(), &format!("pack {} -o {stem}.hum", from.display()), 0);
+    }
+    dir
+}
+
+/// The files below a directory, by name.
+fn files(dir: &Path, ending: &str) -> BTreeMap<String, PathBuf> {
+    let mut found = BTreeMap::new();
+    let mut waiting = vec![dir.to_owned()];
+    while let Some(dir) = waiting.pop() {
+        for entry in fs::read_dir(dir).expect("a directory") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                waiting.push(path);
+            } else if let Some(name) = path.file_name().and_then(|name| name.to_str()?.strip_suffix(ending)) {
+                found.insert(name.to_owned(), path);
+            }
+        }
+    }
+    found
+}
+
+/// Each number as `N` and its decimals: `-1.13 m/s2; 5s` becomes `N.2 m/sN; Ns`.
+fn shape(line: &str) -> String {
+    let mut out = String::new();
+    let mut rest = line;
+    while let Some(c) = rest.chars().next() {
+        let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
+        let sign = usize::from(c == '-');
+        let whole = digits(&rest[sign..]);
+        if whole == 0 {
+            out.push(c);
+            rest = &rest[c.len_utf8()..];
+            continue;
+        }
+        rest = &rest[sign + whole..];
+        out.push('N');
+        let decimals = rest.strip_prefix('.').map_or(0, digits);
+        if decimals > 0 {
+            out.push('.');
+            out += &decimals.to_string();
+            rest = &rest[1 + decimals..];
+        }
+    }
+    out
+}
+
+/// From the thesis, but with the seven decimals that ours has in a position.
+const EXAMPLE: &str = "15s; 93 %; 15.78 V; 11.77 C; 954.92 hPa; 3.62, 0.08, -0.08 m/s; 3.62 m/s; 3.19 m/s; \
+     -1.13, 0.07, -9.64 m/s2; 9.71 m/s2; 488.13 m; 47.4000000 deg; 8.5500000 deg";
+
+#[test]
+fn a_second_of_flight_has_the_format_of_the_reference_systems_example() {
+    for name in ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"] {
+        let dir = packed(&[name]);
+        let stem = name.split('.').next().expect("a stem");
+        hums(dir.path(), &format!("decode {stem}.hum -o out --format thesis"), 0);
+        let tables = files(&dir.path().join("out"), ".csv");
+        let rows = |name: &str| -> Vec<String> {
+            fs::read_to_string(&tables[name]).expect(name).lines().map(str::to_owned).collect()
+        };
+        let values = rows("flightvalues");
+        let flying = values.iter().filter(|row| shape(row) == shape(EXAMPLE)).count();
+        assert!(flying > 200, "{name}: {flying} of {} rows", values.len());
+        assert!(values.iter().all(|row| row.split("; ").count() == 13), "{name}");
+        // One row a second, and the same seconds in all tables.
+        let seconds: Vec<u64> = values[1..]
+            .iter()
+            .map(|row| row.split_once('s').expect("a time").0.parse().expect("seconds"))
+            .collect();
+        assert!(seconds.windows(2).all(|pair| pair[1] == pair[0] + 1), "{name}: {seconds:?}");
+        for (table, columns) in [("esc_status", 12), ("esc_info", 12), ("vfr_hud", 6)] {
+            let table = rows(table);
+            assert_eq!(table.len(), values.len(), "{name}");
+            assert!(table.iter().all(|row| row.split("; ").count() == columns), "{name}");
+        }
+        assert_eq!(
+            shape(&rows("esc_status")[100]),
+            "N; N; N; N; N.2; N.2; N.2; N.2; N.2; N.2; N.2; N.2",
+            "{name}"
+        );
+    }
+}
+
+/// A line of the protocol: measurement, tags, fields, time.
+fn point(line: &str) -> (String, BTreeMap<String, String>, BTreeMap<String, String>, u64) {
+    let (mut parts, mut part, mut quoted, mut escaped) = (Vec::new(), String::new(), false, false);
+    for c in line.chars() {
+        match c {
+            _ if escaped => escaped = false,
+            '\\' => escaped = true,
+            '"' => quoted = !quoted,
+            ' ' if !quoted => {
+                parts.push(std::mem::take(&mut part));
+                continue;
+            }
+            _ => {}
+        }
+        part.push(c);
+    }
+    parts.push(part);
+    let [head, fields, time] = parts.try_into().expect("measurement and tags, fields, time");
+    let (mut pieces, mut piece, mut quoted, mut escaped) = (Vec::new(), String::new(), false, false);
+    for c in (fields + ",").chars() {
+        match c {
+            _ if escaped => escaped = false,
+            '\\' => escaped = true,
+            '"' => quoted = !quoted,
+            ',' if !quoted => {
+                pieces.push(std::mem::take(&mut piece));
+                continue;
+            }
+            _ => {}
+        }
+        piece.push(c);
+    }
+    let pair = |text: &str| {
+        let (key, value) = text.split_once('=').expect("key=value");
+        (key.replace('\\', ""), value.to_owned())
+    };
+    let mut head = head.split(',');
+    let name = head.next().expect("a measurement").to_owned();
+    (
+        name,
+        head.map(pair).collect(),
+        pieces.iter().map(|piece| pair(piece)).collect(),
+        time.parse().expect("ns"),
+    )
+}
+
+#[test]
+fn the_reference_systems_field_names_are_kept_for_both_autopilots() {
+    const BOTH: [&str; 23] = [
+        "Flight Time",
+        "Battery (%)",
+        "Battery (V)",
+        "Temp",
+        "Air Pressure",
+        "Front Accel",
+        "Right Accel",
+        "Down Accel",
+        "Accel Module",
+        "North Velocity",
+        "East Velocity",
+        "Down Velocity",
+        "Velocity Module",
+        "Velocity",
+        "Altitude",
+        "Latitude",
+        "Longitude",
+        "Throttle (%)",
+        "Climb Rate (m/s)",
+        "groundspeed",
+        "heading",
+        "esc_rpm0",
+        "esc_voltage3",
+    ];
+    for (name, own) in [
+        ("px4_hil_quad_low.tlog", &["esc_fail0", "esc3_fails", "esc_temperature2", "esc_current1"][..]),
+        ("ap_quad_guided.tlog", &["Air Speed (m/s)", "esc_current3"]),
+    ] {
+        let dir = packed(&[name]);
+        let stem = name.split('.').next().expect("a stem");
+        hums(dir.path(), &format!("decode {stem}.hum -o out.lp --format influx"), 0);
+        let text = fs::read_to_string(dir.path().join("out.lp")).expect("points");
+        let (mut seen, mut times) = (BTreeSet::new(), BTreeSet::new());
+        for line in text.lines() {
+            let (measurement, tags, fields, time) = point(line);
+            assert!(tags["session"].starts_with('s') && tags["vehicle"] == "system-1", "{line}");
+            if measurement == "HUMS" {
+                seen.extend(fields.into_keys());
+            }
+            assert!(times.insert((measurement, tags, time)), "a point would replace another: {line}");
+        }
+        for field in BOTH.iter().chain(own) {
+            assert!(seen.contains(*field), "{name}: {field} is not in {seen:?}");
+        }
+    }
+}
+
+#[test]
+fn a_motors_points_say_which_motor() {
+    let dir = packed(&["px4_hil_quad_low.tlog"]);
+    let text = hums(dir.path(), "decode px4_hil_quad_low.hum -o - --format influx", 0);
+    let lines: Vec<_> = text.lines().filter(|line| line.starts_with("HUMS,")).map(point).collect();
+    for motor in 0..4 {
+        let field = format!("esc_rpm{motor}");
+        let of_motor: Vec<_> = lines.iter().filter(|(_, _, fields, _)| fields.contains_key(&field)).collect();
+        assert!(of_motor.len() > 1000, "{field}");
+        assert!(of_motor.iter().all(|(_, tags, _, _)| tags["motor"] == motor.to_string()), "{field}");
+    }
+}
+
+#[test]
+fn parquet_keeps_types_units_and_every_value() {
+    let dir = packed(&["px4_hil_quad_low.tlog"]);
+    hums(dir.path(), "decode px4_hil_quad_low.hum -o out --format parquet,csv", 0);
+    let tables = files(&dir.path().join("out"), ".parquet");
+    let path = tables["ATTITUDE"].to_string_lossy().into_owned();
+    assert!(path.contains("/vehicle=system-1/date=2026-11-20/session=s"), "{path}");
+    let csv =
+        fs::read_to_string(dir.path().join("out/px4_hil_quad_low/ATTITUDE.csv")).expect("the same as CSV");
+    let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let builder =
+        ParquetRecordBatchReaderBuilder::try_new(File::open(&path).expect("a file")).expect("Parquet");
+    let roll = builder.schema().field_with_name("roll").expect("roll").clone();
+    assert_eq!(roll.metadata().get("units").map(String::as_str), Some("rad"));
+    let mut at = 0;
+    for batch in builder.build().expect("a reader") {
+        let batch = batch.expect("rows");
+        let time = batch.column_by_name("time_boot_ms").expect("a column").as_primitive::<UInt32Type>();
+        let roll = batch.column_by_name("roll").expect("a column").as_primitive::<Float32Type>();
+        for row in 0..batch.num_rows() {
+            assert_eq!(rows[at][4].parse(), Ok(time.value(row)));
+            assert_eq!(rows[at][5].parse(), Ok(roll.value(row)));
+            at += 1;
+        }
+    }
+    assert_eq!(at, rows.len());
+    // As many rows in every table as in the CSV's.
+    for (name, csv) in files(&dir.path().join("out"), ".csv") {
+        let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(&tables[&name]).expect("a file"));
+        let parquet = builder.expect(&name).metadata().file_metadata().num_rows();
+        let lines = fs::read_to_string(csv).expect("text").lines().count() as i64 - 1;
+        assert!(parquet == lines || name == "STATUSTEXT", "{name}: {parquet} and {lines}");
+    }
+}
+
+#[test]
+fn a_gap_is_in_every_format() {
+    let dir = packed(&["px4_hil_quad_low.tlog"]);
+    let path = dir.path().join("px4_hil_quad_low.hum");
+    let mut log = fs::read(&path).expect("a log");
+    log[150 * 512 + 100] ^= 0x04;
+    fs::write(&path, log).expect("written");
+    hums(dir.path(), "decode px4_hil_quad_low.hum -o out --format tlog,csv,jsonl,influx,parquet,thesis", 3);
+    let read = |name: &str| fs::read_to_string(dir.path().join("out").join(name)).expect(name);
+    let gap = "corrupt,1,";
+    let line = read("px4_hil_quad_low/HUMS_GAP.csv");
+    assert!(line.contains("damaged,1,"), "{gap}: {line}");
+    assert_eq!(read("px4_hil_quad_low.tlog.gaps.csv").lines().count(), 2);
+    assert!(read("px4_hil_quad_low.jsonl").contains("\"HUMS_GAP\""));
+    assert!(read("px4_hil_quad_low.lp").lines().any(|line| line.starts_with("HUMS_GAP,")));
+    assert_eq!(read("px4_hil_quad_low/thesis/gaps.csv").lines().count(), 2);
+    assert!(files(&dir.path().join("out"), ".parquet").contains_key("HUMS_GAP"));
+    // The seconds of the gap have no row.
+    let values = read("px4_hil_quad_low/thesis/flightvalues.csv");
+    let seconds: Vec<u64> =
+        values.lines().skip(1).filter_map(|row| row.split_once('s')?.0.parse().ok()).collect();
+    assert!(seconds.windows(2).any(|pair| pair[1] > pair[0] + 1), "{seconds:?}");
+}
+
+#[test]
+fn several_logs_side_by_side_are_what_each_is_alone() {
+    let dir = packed(&["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]);
+    fs::copy(dir.path().join("px4_hil_quad_low.hum"), dir.path().join("again.hum")).expect("copied");
+    let said = hums(dir.path(), "decode . -o all --format csv,influx,parquet", 0);
+    assert!(said.contains("is the same session as another log here"), "{said}");
+    for stem in ["px4_hil_quad_low", "ap_quad_guided"] {
+        hums(dir.path(), &format!("decode {stem}.hum -o alone/{stem} --format csv,influx"), 0);
+        let one = |folder: &str, ending: &str| files(&dir.path().join(folder), ending);
+        let (all, alone) = (one(&format!("all/{stem}"), ".csv"), one(&format!("alone/{stem}"), ".csv"));
+        assert!(alone.len() > 30, "{stem}");
+        assert_eq!(all.keys().collect::<Vec<_>>(), alone.keys().collect::<Vec<_>>(), "{stem}");
+        for (name, path) in alone {
+            assert!(fs::read(path).expect("text") == fs::read(&all[&name]).expect("text"), "{stem}/{name}");
+        }
+        let lines = |path: String| fs::read(dir.path().join(path)).expect("points");
+        assert!(lines(format!("all/{stem}.lp")) == lines(format!("alone/{stem}/{stem}.lp")), "{stem}");
+    }
+    let sessions: BTreeSet<_> = files(&dir.path().join("all"), ".parquet")
+        .values()
+        .map(|path| path.parent().map(Path::to_owned))
+        .collect();
+    assert!(!sessions.is_empty());
+}

@@ -1,0 +1,317 @@
+"""Reads what `hums decode` wrote with readers that are not ours, and compares every field of every message with what
+pymavlink reads from the recording itself.
+
+usage: readback.py DIALECT.py RECORDING OUT INFLUXD        prints JSON
+
+OUT is the folder of one log, decoded as csv, jsonl, influx and parquet. The readers are Python's csv and json, pyarrow,
+and InfluxDB (INFLUXD is the program), which takes every point of the line protocol and is asked for them again.
+A number may differ from pymavlink's by nothing at all: each format prints what reads back as the same number.
+"""
+
+import collections
+import csv
+import glob
+import json
+import math
+import os
+import re
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.parse
+import urllib.request
+
+import pyarrow.parquet
+
+from manifest import Reader, frame_at, is_tlog, load_dialect
+
+csv.field_size_limit(1 << 24)
+
+
+def messages_of(data, dialect):
+    """Each verified message in order."""
+    reader, at, tlog = Reader(dialect), 0, is_tlog(data)
+    skip = 8 if tlog else 0
+    while at + skip < len(data):
+        found = frame_at(data, at + skip)
+        if found is None:
+            at += 1
+            continue
+        length, message_id = found
+        frame = data[at + skip:at + skip + length]
+        if message_id in dialect.mavlink_map:
+            try:
+                message = reader.mav.decode(bytearray(frame))
+            except dialect.MAVError:
+                message = None
+            if message is not None and message.get_msgId() == message_id:
+                yield message
+                at += skip + length
+                continue
+        at += skip + length if tlog else 1
+
+
+def fields_of(message):
+    """Field names with values: a number, a list of numbers, or text up to its first NUL."""
+    fields = {}
+    for name, kind in zip(message.fieldnames, message.fieldtypes):
+        value = getattr(message, name)
+        if kind == "char":
+            raw = getattr(message, f"_{name}_raw", value)
+            raw = raw.encode("latin-1") if isinstance(raw, str) else bytes(raw)
+            value = raw.split(b"\0", 1)[0].decode("utf-8", "replace")
+        elif isinstance(value, (list, tuple)):
+            value = list(value)
+        fields[name] = (kind, value)
+    return fields
+
+
+def same_number(kind, expected, found):
+    if found is None:
+        return False
+    if kind == "float":
+        if math.isnan(expected):
+            return math.isnan(found)
+        return struct.pack("f", found) == struct.pack("f", expected) or found == expected
+    if kind == "double":
+        return found == expected or (math.isnan(expected) and math.isnan(found))
+    return found == expected
+
+
+class Comparison:
+    """Counts what was compared, and keeps the first differences."""
+
+    def __init__(self):
+        self.values = collections.Counter()
+        self.differences = []
+
+    def check(self, form, where, kind, expected, found):
+        self.values[form] += 1
+        same = found == expected if kind == "char" else same_number(kind, expected, found)
+        if not same and len(self.differences) < 20:
+            self.differences.append(f"{form} {where}: {expected!r} became {found!r}")
+
+    def field(self, form, where, kind, expected, get):
+        """`get(index)` is the value found; the index is None for what is no array."""
+        if isinstance(expected, list):
+            for index, element in enumerate(expected):
+                self.check(form, f"{where}[{index}]", kind, element, get(index))
+        else:
+            self.check(form, where, kind, expected, get(None))
+
+    def equal(self, what, expected, found):
+        if expected != found and len(self.differences) < 20:
+            self.differences.append(f"{what}: {expected!r} became {found!r}")
+
+
+def number(kind, text):
+    return float(text) if kind in ("float", "double") else int(text)
+
+
+def columns_of(header):
+    """Column by field and index; the units after the name are for people."""
+    columns = {}
+    for place, name in enumerate(header[4:], 4):
+        found = re.match(r"^(\w+)(?:\[(\d+)\](?=$|\[))?", name)
+        columns[found.group(1), None if found.group(2) is None else int(found.group(2))] = place
+    return columns
+
+
+def compare_csv(out, expected, comparison):
+    for name, messages in expected.items():
+        with open(os.path.join(out["tables"], f"{name}.csv"), newline="", encoding="utf-8") as file:
+            rows = csv.reader(file)
+            columns = columns_of(next(rows))
+            count = 0
+            for row, message in zip(rows, messages):
+                count += 1
+                comparison.equal(f"csv {name} sender", message["sender"], (int(row[2]), int(row[3])))
+                for field, (kind, value) in message["fields"].items():
+                    def get(index, field=field, kind=kind, row=row):
+                        text = row[columns[field, index]]
+                        return text if kind == "char" else number(kind, text)
+                    comparison.field("csv", f"{name}.{field}", kind, value, get)
+            comparison.equal(f"csv {name} rows", len(messages), count + sum(1 for _ in rows))
+
+
+def compare_jsonl(out, expected, comparison):
+    waiting = {name: iter(messages) for name, messages in expected.items()}
+    counts = collections.Counter()
+    special = {"Infinity": math.inf, "-Infinity": -math.inf, None: math.nan}
+    with open(out["jsonl"], encoding="utf-8") as file:
+        for line in file:
+            entry = json.loads(line)
+            if "message" not in entry or entry.get("verified") is False:
+                continue
+            name = entry["message"]
+            counts[name] += 1
+            message = next(waiting.get(name, iter(())), None)
+            if message is None:
+                continue
+            for field, (kind, value) in message["fields"].items():
+                def get(index, field=field, kind=kind, entry=entry):
+                    found = entry["fields"][field] if index is None else entry["fields"][field][index]
+                    return special.get(found, found) if kind in ("float", "double") else found
+                comparison.field("jsonl", f"{name}.{field}", kind, value, get)
+    for name, messages in expected.items():
+        comparison.equal(f"jsonl {name} objects", len(messages), counts[name])
+
+
+def compare_parquet(out, expected, comparison):
+    for name, messages in expected.items():
+        table = pyarrow.parquet.ParquetFile(out["parquet"][name]).read()
+        comparison.equal(f"parquet {name} rows", len(messages), table.num_rows)
+        columns = {column: table.column(column).to_pylist() for column in table.column_names}
+        for row, message in enumerate(messages):
+            for field, (kind, value) in message["fields"].items():
+                column = columns.get(f"{field}_field") or columns[field]
+                def get(index, column=column, row=row):
+                    return column[row] if index is None else column[row][index]
+                comparison.field("parquet", f"{name}.{field}", kind, value, get)
+
+
+class Influx:
+    """InfluxDB with an empty database in a folder of its own."""
+
+    def __init__(self, program, folder):
+        ports = []
+        for _ in range(2):
+            with socket.socket() as probe:
+                probe.bind(("127.0.0.1", 0))
+                ports.append(probe.getsockname()[1])
+        config = os.path.join(folder, "influxdb.conf")
+        with open(config, "w", encoding="utf-8") as file:
+            file.write(f"""reporting-disabled = true
+bind-address = "127.0.0.1:{ports[0]}"
+[meta]
+dir = "{folder}/meta"
+[data]
+dir = "{folder}/data"
+wal-dir = "{folder}/wal"
+query-log-enabled = false
+[http]
+bind-address = "127.0.0.1:{ports[1]}"
+log-enabled = false
+max-row-limit = 0
+[monitor]
+store-enabled = false
+""")
+        self.url = f"http://127.0.0.1:{ports[1]}"
+        self.log = open(os.path.join(folder, "log"), "wb")
+        self.server = subprocess.Popen([program, "run", "-config", config], stdout=self.log, stderr=self.log)
+        for _ in range(200):
+            try:
+                self.ask("SHOW DATABASES")
+                break
+            except OSError:
+                time.sleep(0.1)
+        self.ask("CREATE DATABASE hums")
+
+    def ask(self, question):
+        body = urllib.parse.urlencode({"q": question, "db": "hums", "epoch": "ns"}).encode()
+        with urllib.request.urlopen(f"{self.url}/query", body, timeout=120) as answer:
+            result = json.load(answer)["results"][0]
+        if "error" in result:
+            sys.exit(f"{question}: {result['error']}")
+        return result.get("series", [])
+
+    def take(self, lines):
+        request = urllib.request.Request(f"{self.url}/write?db=hums", b"".join(lines))
+        try:
+            urllib.request.urlopen(request, timeout=120).close()
+        except urllib.error.HTTPError as error:
+            sys.exit(f"InfluxDB refuses points: {error.read().decode()}")
+
+    def end(self):
+        self.server.terminate()
+        self.server.wait(30)
+        self.log.close()
+
+
+def compare_influx(out, expected, comparison, program):
+    with tempfile.TemporaryDirectory() as folder:
+        influx = Influx(program, folder)
+        try:
+            points, batch = collections.Counter(), []
+            with open(out["influx"], "rb") as file:
+                for line in file:
+                    points[re.match(rb"[^, ]+", line).group().decode()] += 1
+                    batch.append(line)
+                    if len(batch) == 5000:
+                        influx.take(batch)
+                        batch = []
+            influx.take(batch)
+            taken = sum(compare_measurement(influx, name, count, expected.get(name), comparison)
+                        for name, count in points.items())
+            comparison.equal("influx points", sum(points.values()), taken)
+            return taken
+        finally:
+            influx.end()
+
+
+def compare_measurement(influx, name, count, messages, comparison):
+    """Asks for all points of a measurement; rows come in order of time, which is that of the record."""
+    series = influx.ask(f'SELECT * FROM "{name}"')
+    columns = {column: place for place, column in enumerate(series[0]["columns"])} if series else {}
+    rows = series[0]["values"] if series else []
+    comparison.equal(f"influx {name} points", count, len(rows))
+    for row, message in zip(rows, messages or []):
+        for field, (kind, value) in message["fields"].items():
+            def get(index, field=field, kind=kind, row=row):
+                # A tag of the same name makes the database call the field `name_1`.
+                key = field if index is None else f"{field}[{index}]"
+                place = columns.get(f"{key}_1", columns.get(key)) if key in ("system", "component", "session") \
+                    else columns.get(key)
+                found = None if place is None else row[place]
+                if kind in ("float", "double"):
+                    return math.nan if found is None else found
+                return int(found) if kind == "uint64_t" and found is not None else found
+            # The protocol has no infinity: such a field is left out, as NaN is.
+            finite = lambda v: math.nan if isinstance(v, float) and math.isinf(v) else v
+            value = [finite(v) for v in value] if isinstance(value, list) else finite(value)
+            if kind == "char":
+                value = value.replace("\n", " ").replace("\r", " ")
+            comparison.field("influx", f"{name}.{field}", kind, value, get)
+    return len(rows)
+
+
+def main():
+    if len(sys.argv) != 5:
+        sys.exit(__doc__)
+    dialect = load_dialect(sys.argv[1])
+    with open(sys.argv[2], "rb") as file:
+        data = file.read()
+    expected = collections.defaultdict(list)
+    for message in messages_of(data, dialect):
+        expected[message.get_type()].append({
+            "sender": (message.get_srcSystem(), message.get_srcComponent()),
+            "fields": fields_of(message),
+        })
+    folder = sys.argv[3]
+    one = lambda pattern: next(iter(glob.glob(os.path.join(folder, pattern))))
+    parquet = glob.glob(os.path.join(folder, "vehicle=*/date=*/session=*/*.parquet"))
+    out = {
+        "tables": os.path.dirname(one("*/HEARTBEAT.csv")),
+        "jsonl": one("*.jsonl"),
+        "influx": one("*.lp"),
+        "parquet": {os.path.basename(path).removesuffix(".parquet"): path for path in parquet},
+    }
+    comparison = Comparison()
+    compare_csv(out, expected, comparison)
+    compare_jsonl(out, expected, comparison)
+    compare_parquet(out, expected, comparison)
+    points = compare_influx(out, expected, comparison, sys.argv[4])
+    print(json.dumps({
+        "messages": sum(map(len, expected.values())),
+        "types": len(expected),
+        "values": comparison.values,
+        "points": points,
+        "differences": comparison.differences,
+    }))
+
+
+if __name__ == "__main__":
+    main()
