@@ -13,7 +13,7 @@ use crate::outcome::Outcome;
 use crate::output::line;
 use crate::run::{emulate, qemu, sim};
 use crate::summary::Overview;
-use crate::{decode, info};
+use crate::{decode, info, report};
 
 /// The flight that is shown, inside the source tree: a whole flight of a PX4 quadcopter.
 const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
@@ -42,6 +42,8 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         message: Vec::new(),
     };
     let read = decode::run(&arguments)?;
+    let page = args.dir.join("report.html");
+    report::run(&cli::Report { inputs: vec![card.clone()], output: page.clone(), session: None })?;
     line("")?;
     line("3. what it says of the flight")?;
     for log in &logs::find(std::slice::from_ref(&card))?.logs {
@@ -52,6 +54,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     for (what, path) in [
         ("the SD card's image", &card),
         ("the decoded flight", &decoded),
+        ("a page about it", &page),
         ("what the ground station got", &gs),
     ] {
         line(&format!("   {what:<28} {}", shown(path)))?;

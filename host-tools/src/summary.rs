@@ -137,6 +137,8 @@ pub struct Contents {
     /// Entries whose time is before the entry before, within a group.
     pub times_fell: u64,
     last_at: Option<Instant>,
+    /// Whether checksums are looked at again.
+    checks: bool,
 }
 
 impl Contents {
@@ -170,7 +172,7 @@ impl Contents {
             return;
         };
         self.not_frames += u64::from(frame.bytes.len() != bytes.len());
-        self.bad_frames += u64::from(verified && frame.check == Check::Bad);
+        self.bad_frames += u64::from(self.checks && verified && frame.check() == Check::Bad);
         let count = self.messages.entry((frame.id, verified)).or_default();
         count.frames += 1;
         count.bytes += bytes.len() as u64;
@@ -331,11 +333,22 @@ pub struct Overview {
 }
 
 impl Overview {
-    /// Reads a log through.
+    /// Reads a log through. That frames are what the monitor received is the record's own word; see
+    /// [`Overview::verified`].
     pub fn of(log: &Log) -> Result<Self> {
+        Self::read(log, false)
+    }
+
+    /// Reads a log through and looks at every frame's own checksum again.
+    pub fn verified(log: &Log) -> Result<Self> {
+        Self::read(log, true)
+    }
+
+    fn read(log: &Log, checks: bool) -> Result<Self> {
         let bar = progress_bar(log);
-        let mut contents = Contents::default();
-        let summary = read(log, Contents::default, &mut contents, |blocks| bar.set_position(blocks * 512))?;
+        let new = || Contents { checks, ..Contents::default() };
+        let mut contents = new();
+        let summary = read(log, new, &mut contents, |blocks| bar.set_position(blocks * 512))?;
         bar.finish_and_clear();
         if contents.epoch_us.is_none() {
             // The clock record itself may be in a part that cannot be read; group starts repeat it.

@@ -5,6 +5,7 @@ use hums_blackbox::Cause;
 use serde::Serialize;
 
 use crate::cli;
+use crate::decode::side_by_side::side_by_side;
 use crate::info::json::{ImageJson, images_json};
 use crate::logs::{self, find::Image};
 use crate::outcome::Outcome;
@@ -26,8 +27,8 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
             print(&[check])?;
         }
     }
-    for log in &found.logs {
-        let overview = Overview::of(log)?;
+    side_by_side(&found.logs, Overview::verified, |overview| {
+        let overview = overview?;
         let log = LogJson::new(&overview);
         json.ok &= log.ok;
         if !args.json {
@@ -35,7 +36,8 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
             print(&log.checks)?;
         }
         json.logs.push(log);
-    }
+        Ok(())
+    })?;
     let ok = json.ok;
     if args.json {
         output::json(&json)?;

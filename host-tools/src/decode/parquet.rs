@@ -342,7 +342,6 @@ mod tests {
                 system: 1,
                 component: 1,
                 payload: &[0x5a; 255],
-                check: crate::mavlink::frame::Check::Good,
             };
             let payload = Payload::new(message, frame.payload);
             batches.frame(Instant::from_millis(5), Some(7), &frame, Some(&payload));

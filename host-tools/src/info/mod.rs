@@ -7,6 +7,7 @@ mod wear;
 use anyhow::Result;
 
 use crate::cli;
+use crate::decode::side_by_side::side_by_side;
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output;
@@ -27,16 +28,16 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&image_text(image))?;
         }
     }
-    for log in &found.logs {
-        let overview = Overview::of(log)?;
+    side_by_side(&found.logs, Overview::of, |overview| {
+        let overview = overview?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
         if args.json {
             logs.push(LogJson::new(&overview));
-        } else {
-            output::line(text(&overview).trim_end())?;
-            output::line("")?;
+            return Ok(());
         }
-    }
+        output::line(text(&overview).trim_end())?;
+        output::line("")
+    })?;
     if args.json {
         output::json(&InfoJson { images: images_json(&found), logs })?;
     } else if found.logs.is_empty() {

@@ -61,7 +61,7 @@ fn count_votes(bytes: &[u8]) -> i32 {
     let mut at = 0;
     while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty()) {
         match peek(rest) {
-            Peek::Frame(frame) if frame.check == Check::Good => {
+            Peek::Frame(frame) if frame.check() == Check::Good => {
                 let next = at + frame.bytes.len();
                 let begins =
                     |at: usize| bytes.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));

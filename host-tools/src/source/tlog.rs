@@ -111,7 +111,7 @@ fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
         None => ended && after.is_empty(),
         Some(next) => after.first() == Some(&0) && matches!(peek(next), Peek::Frame(_) | Peek::Short),
     };
-    (frame.check == Check::Good || followed).then_some((time_us, length))
+    (frame.check() == Check::Good || followed).then_some((time_us, length))
 }
 
 /// Recorded times as arrival times.

@@ -1,0 +1,214 @@
+//! How fast a card becomes an answer, as ratios in one run, and how much memory a long log takes.
+//!
+//! ```text
+//! answer_speed HUMS PYTHON RECORDING.tlog...      the ratios: pymavlink's mavlogdump and gzip beside it
+//! answer_speed HUMS --long MIB RECORDING.tlog     memory: a log of so many MiB, made of one recording over and over
+//! ```
+//! For instance: `cargo run --release -p hums-tests --bin answer_speed -- target/release/hums target/venv/bin/python
+//! tests/flights/ap_quad_guided.tlog`.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result, bail};
+use hums_blackbox::{Header, Preamble, SECTOR_BYTES, Sector};
+use hums_tests::child;
+
+/// A program is run this often, and the fastest counts: what else the machine does only ever adds.
+const RUNS: u32 = 5;
+/// Nothing here takes longer, but for a long log on a busy machine.
+const LIMIT: Duration = Duration::from_hours(2);
+/// Where a group's sector holds its start in ms, and the frames before it.
+const START_AT: usize = 15 + 4;
+const FRAMES_AT: usize = 15 + 10;
+const NUMBER_AT: usize = 11;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match *words.as_slice() {
+        [hums, "--long", mib, recording] => long(Path::new(hums), mib, Path::new(recording)),
+        [hums, python, ref recordings @ ..] if !recordings.is_empty() => {
+            recordings.iter().try_for_each(|one| ratios(Path::new(hums), Path::new(python), Path::new(one)))
+        }
+        _ => {
+            eprintln!(
+                "usage: answer_speed HUMS PYTHON RECORDING.tlog... | answer_speed HUMS --long MIB RECORDING.tlog"
+            );
+            return ExitCode::from(2);
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The fastest of some runs.
+fn fastest(runs: u32, mut command: impl FnMut() -> Command) -> Result<Duration> {
+    let mut best = Duration::MAX;
+    for _ in 0..runs {
+        let start = Instant::now();
+        let status = command().stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status()?;
+        if !matches!(status.code(), Some(0 | 3)) {
+            bail!("{:?} ended with {status}", command());
+        }
+        best = best.min(start.elapsed());
+    }
+    Ok(best)
+}
+
+fn ratios(hums: &Path, python: &Path, recording: &Path) -> Result<()> {
+    let dir = tempfile::tempdir()?;
+    let log = dir.path().join("log.hum");
+    let pack = Command::new(hums).arg("pack").arg(recording).arg("-o").arg(&log).output()?;
+    if !matches!(pack.status.code(), Some(0 | 3)) {
+        bail!("hums pack: {}", String::from_utf8_lossy(&pack.stderr));
+    }
+    let types = types(python, recording)?;
+    let list = types.iter().cloned().collect::<Vec<_>>().join(",");
+    let dump = fastest(1, || {
+        let mut command = Command::new(python);
+        command
+            .args(["-m", "pymavlink.tools.mavlogdump", "--format", "csv", "--types", &list])
+            .arg(recording);
+        command
+    })?;
+    let out = dir.path().join("out");
+    let decode = fastest(RUNS, || {
+        let mut command = Command::new(hums);
+        command.arg("decode").arg(&log).arg("-o").arg(&out).args(["--format", "csv"]);
+        for name in &types {
+            command.args(["--message", name]);
+        }
+        command
+    })?;
+    let gz = dir.path().join("flight.tlog.gz");
+    let packed = Command::new("gzip").arg("-c").arg(recording).output().context("gzip")?;
+    fs::write(&gz, packed.stdout)?;
+    let gunzip = fastest(RUNS, || {
+        let mut command = Command::new("gzip");
+        command.arg("-dc").arg(&gz);
+        command
+    })?;
+    let info = fastest(RUNS, || {
+        let mut command = Command::new(hums);
+        command.arg("info").arg(&log);
+        command
+    })?;
+    let name = recording.file_name().unwrap_or_default().to_string_lossy();
+    let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    println!(
+        "{name}: {} types; csv: mavlogdump {:.0} ms, hums {:.1} ms: {:.0} times faster; info {:.1} ms, gzip -d {:.1} ms: {:.2} of its time",
+        types.len(),
+        ms(dump),
+        ms(decode),
+        dump.as_secs_f64() / decode.as_secs_f64(),
+        ms(info),
+        ms(gunzip),
+        info.as_secs_f64() / gunzip.as_secs_f64(),
+    );
+    Ok(())
+}
+
+/// The types that pymavlink's own dialect knows in a recording.
+fn types(python: &Path, recording: &Path) -> Result<BTreeSet<String>> {
+    const SCRIPT: &str = "import sys
+from pymavlink import mavutil
+log = mavutil.mavlink_connection(sys.argv[1], dialect='ardupilotmega')
+types = set()
+while (message := log.recv_msg()) is not None:
+    types.add(message.get_type())
+print('\\n'.join(sorted(t for t in types if t != 'BAD_DATA' and not t.startswith('UNKNOWN'))))";
+    let output = Command::new(python).args(["-c", SCRIPT]).arg(recording).output()?;
+    let types: BTreeSet<String> =
+        String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect();
+    if types.is_empty() {
+        bail!(
+            "pymavlink finds nothing in {}: {}",
+            recording.display(),
+            String::from_utf8_lossy(&output.stderr)
+        );
+    }
+    Ok(types)
+}
+
+/// A long log as a recorder would have made it: groups of one recording over and over, later each time.
+fn long(hums: &Path, mib: &str, recording: &Path) -> Result<()> {
+    let bytes = mib.parse::<u64>().context("MIB is a number")? << 20;
+    let dir = tempfile::tempdir()?;
+    let (log, short) = (dir.path().join("long.hum"), dir.path().join("short.hum"));
+    Command::new(hums).arg("pack").arg(recording).arg("-o").arg(&short).output()?;
+    let (written, frames) = lengthen(&short, &log, bytes)?;
+    println!("a log of {} MiB with {frames} frames", written >> 20);
+    for (what, arguments) in [
+        ("info", &["info"][..]),
+        ("decode to jsonl", &["decode", "-o", "-", "--format", "jsonl"]),
+        ("decode to csv, one type", &["decode", "-o", "OUT", "--format", "csv", "--message", "HEARTBEAT"]),
+        (
+            "decode to parquet, one type",
+            &["decode", "-o", "OUT", "--format", "parquet", "--message", "ATTITUDE"],
+        ),
+    ] {
+        let out = dir.path().join("out");
+        let mut command = Command::new("sh");
+        // What it prints is not kept: a long log is hundreds of gigabytes of text.
+        let words: Vec<PathBuf> = arguments
+            .iter()
+            .map(|word| if *word == "OUT" { out.clone() } else { PathBuf::from(word) })
+            .collect();
+        command.args(["-c", "exec \"$@\" > /dev/null", "sh"]).arg(hums).args(words).arg(&log);
+        let start = Instant::now();
+        let outcome = child::run(&mut command, LIMIT).expect_code(&[0]);
+        println!(
+            "{what}: {:.1} MiB of memory at most, {:.0} s",
+            outcome.memory_kib_max as f64 / 1024.0,
+            start.elapsed().as_secs_f64()
+        );
+    }
+    Ok(())
+}
+
+/// Writes the whole groups of `short` again and again, with their numbers, times and frame counts going on.
+fn lengthen(short: &Path, long: &Path, bytes: u64) -> Result<(u64, u64)> {
+    let data = fs::read(short)?;
+    let sectors: Vec<[u8; SECTOR_BYTES]> =
+        data.chunks_exact(SECTOR_BYTES).filter_map(|chunk| chunk.try_into().ok()).collect();
+    // The last group ends early: it would not be followed by another in the middle of a log.
+    let last = sectors.iter().rposition(|sector| Header::read(sector).is_ok_and(|h| h.since_first == 0));
+    let whole = sectors.get(..last.unwrap_or(0)).filter(|whole| !whole.is_empty()).context("too short")?;
+    let session = Header::read(&whole[0]).map(|header| header.session).unwrap_or(0);
+    let end_ms = Preamble::read(&sectors[whole.len()][15..]).context("a group's start")?.start_ms;
+    let frames: u64 = whole.iter().filter_map(|s| Header::read(s).ok()).map(|h| u64::from(h.frames)).sum();
+    let mut out = BufWriter::new(File::create(long)?);
+    let (mut number, mut round, mut written) = (0_u32, 0_u64, 0_u64);
+    while written < bytes {
+        for block in whole {
+            let mut block = *block;
+            let starts = Header::read(&block).is_ok_and(|header| header.since_first == 0);
+            block[NUMBER_AT..NUMBER_AT + 4].copy_from_slice(&number.to_le_bytes());
+            if starts {
+                let preamble = Preamble::read(&block[15..]).context("a group's start")?;
+                let start_ms = preamble.start_ms + round * end_ms;
+                block[START_AT..START_AT + 6].copy_from_slice(&start_ms.to_le_bytes()[..6]);
+                let before = preamble.frames_before.wrapping_add((round * frames) as u32);
+                block[FRAMES_AT..FRAMES_AT + 4].copy_from_slice(&before.to_le_bytes());
+            }
+            let mut sector = Sector::from_bytes(block);
+            sector.seal(session);
+            out.write_all(sector.bytes())?;
+            number = number.wrapping_add(1);
+            written += SECTOR_BYTES as u64;
+        }
+        round += 1;
+    }
+    out.flush()?;
+    Ok((written, round * frames))
+}
