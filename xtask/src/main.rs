@@ -4,9 +4,11 @@
 //! not it says what to type and goes on as far as that goes. Nothing here is needed to use `hums` itself.
 
 mod apt;
+mod bench;
 mod budgets;
 mod demo;
 mod firmware;
+mod fuzz;
 mod oracle;
 mod repo;
 mod setup;
@@ -27,6 +29,8 @@ cargo xtask COMMAND
                                  without an emulator, or with --pc, through the same pipeline on this PC
   test [--only STEP]... [--list] everything that CI checks, or the steps named
   firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
+  bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
+  fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   size                           flash and RAM of both boards against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
   manifest                       make tests/flights/manifest.json anew with pymavlink
@@ -58,6 +62,8 @@ enum Command {
     Demo(demo::Options),
     Test { only: Vec<String>, list: bool },
     Firmware(Board),
+    Bench(Vec<bench::Bench>),
+    Fuzz { seconds: u32 },
     Size,
     Setup { dry_run: bool },
     Manifest,
@@ -75,6 +81,8 @@ impl Command {
         match name {
             "demo" => Ok(Self::Demo(demo::Options::parse(&rest)?)),
             "test" => parse_test(&rest),
+            "bench" => Ok(Self::Bench(bench::Bench::parse(&rest)?)),
+            "fuzz" => Ok(Self::Fuzz { seconds: fuzz::parse(&rest)? }),
             "firmware" => match rest.as_slice() {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
@@ -108,6 +116,8 @@ impl Command {
                 println!("{}", firmware::build(board)?.display());
                 Ok(())
             }
+            Self::Bench(what) => bench::run(&what),
+            Self::Fuzz { seconds } => fuzz::run(seconds),
             Self::Size => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
                 budgets::check_all()
