@@ -4,9 +4,11 @@
 //! not it says what to type and goes on as far as that goes. Nothing here is needed to use `hums` itself.
 
 mod apt;
+mod bench;
 mod budgets;
 mod demo;
 mod firmware;
+mod fuzz;
 mod oracle;
 mod prove;
 mod repo;
@@ -30,6 +32,8 @@ cargo xtask COMMAND
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, noise; hours, and docs/proof.md
   firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
+  bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
+  fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   size                           flash and RAM of both boards against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
   manifest                       make tests/flights/manifest.json anew with pymavlink
@@ -62,6 +66,8 @@ enum Command {
     Test { only: Vec<String>, list: bool },
     Prove(Vec<String>),
     Firmware(Board),
+    Bench(Vec<bench::Bench>),
+    Fuzz { seconds: u32 },
     Size,
     Setup { dry_run: bool },
     Manifest,
@@ -81,6 +87,8 @@ impl Command {
             "test" => parse_test(&rest),
             // The campaigns know their names and flags themselves.
             "prove" => Ok(Self::Prove(rest.iter().map(|word| (*word).to_owned()).collect())),
+            "bench" => Ok(Self::Bench(bench::Bench::parse(&rest)?)),
+            "fuzz" => Ok(Self::Fuzz { seconds: fuzz::parse(&rest)? }),
             "firmware" => match rest.as_slice() {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
@@ -115,6 +123,8 @@ impl Command {
                 println!("{}", firmware::build(board)?.display());
                 Ok(())
             }
+            Self::Bench(what) => bench::run(&what),
+            Self::Fuzz { seconds } => fuzz::run(seconds),
             Self::Size => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
                 budgets::check_all()

@@ -1,0 +1,52 @@
+//! Any file through the reader of logs: it comes to its end, and says of each block what it was.
+
+use hums_blackbox::{Header, Item, LogReader, SECTOR_BYTES, Sector};
+
+/// Takes the first byte's lowest bit for whether checks are made right, so that what is inside is reached; the others
+/// for the file.
+pub fn check(data: &[u8]) {
+    let Some((&mode, file)) = data.split_first() else { return };
+    let mut blocks: Vec<[u8; SECTOR_BYTES]> = file.as_chunks().0.to_vec();
+    if mode & 1 != 0 {
+        for block in &mut blocks {
+            let session = u32::from_le_bytes([block[7], block[8], block[9], block[10]]);
+            let mut sector = Sector::from_bytes(*block);
+            sector.seal(session);
+            *block = *sector.bytes();
+        }
+    }
+    // Each block completes no more entries than it says, and ends no more than one gap or begins one.
+    let said: u64 =
+        blocks.iter().filter_map(|block| Some(u64::from(Header::read(block).ok()?.entries()))).sum();
+    let items_max = said + 2 * blocks.len() as u64 + 4;
+    let mut reader = Box::new(LogReader::new());
+    let (mut items, mut entries, mut gaps) = (0, 0, 0);
+    let mut feed = blocks.iter();
+    let end = loop {
+        match feed.next() {
+            Some(block) => reader.feed(block),
+            None => reader.end(),
+        }
+        let mut end = None;
+        while let Some(item) = reader.next() {
+            items += 1;
+            assert!(items <= items_max, "more items than there can be");
+            match item {
+                Item::Frame { .. } | Item::Record { .. } => entries += 1,
+                Item::Gap(_) => gaps += 1,
+                Item::End(summary) => {
+                    end = Some(summary);
+                    break;
+                }
+            }
+        }
+        if let Some(end) = end {
+            break end;
+        }
+    };
+    assert_eq!(end.frames + end.records, entries);
+    assert_eq!(end.gaps, gaps);
+    let seen = end.blocks;
+    let kinds = seen.sectors + seen.superseded + seen.damaged + seen.stale + seen.empty + seen.foreign;
+    assert_eq!((seen.blocks, kinds), (blocks.len() as u64, blocks.len() as u64));
+}

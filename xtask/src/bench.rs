@@ -1,0 +1,295 @@
+//! `cargo xtask bench`: what the record takes, each figure beside what is asked for.
+//!
+//! Recordings are those of `tests/flights` and of the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes and
+//! costs repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail};
+use serde_json::Value;
+
+use crate::firmware::{self, Board};
+use crate::repo;
+use crate::setup::{self, Need};
+use crate::shell::Shell;
+use crate::test::build_hums;
+
+/// The processor's clock, Hz.
+const CLOCK_HZ: f64 = 168e6;
+/// Bytes of MAVLink a second at 921,600 baud.
+const BYTES_PER_S: f64 = 92_160.0;
+/// Cycles that an instruction takes: the emulator counts instructions only.
+const CYCLES_PER_INSTRUCTION: f64 = 1.5;
+/// What the encoder may take of the processor.
+const LOAD_MAX: f64 = 0.10;
+/// How fast decoding is to be, as a part of the speed of `gzip -d`.
+const AGAINST_GZIP_MIN: f64 = 0.4;
+/// Pairs of runs that are compared.
+const ROUNDS: usize = 9;
+
+/// What to measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bench {
+    Sizes,
+    Speed,
+    Cost,
+}
+
+impl Bench {
+    pub(crate) const ALL: [Self; 3] = [Self::Sizes, Self::Speed, Self::Cost];
+
+    pub(crate) fn parse(words: &[&str]) -> Result<Vec<Self>> {
+        if words.is_empty() {
+            return Ok(Self::ALL.to_vec());
+        }
+        let parse = |word: &&str| match *word {
+            "sizes" => Ok(Self::Sizes),
+            "speed" => Ok(Self::Speed),
+            "cost" => Ok(Self::Cost),
+            other => bail!("bench measures sizes, speed or cost, not {other}"),
+        };
+        words.iter().map(parse).collect()
+    }
+}
+
+/// Measures; an error where a figure that is checked misses its target.
+pub(crate) fn run(what: &[Bench]) -> Result<()> {
+    setup::ensure(&[Need::Linker], false).require_all()?;
+    let flights = flights()?;
+    let mut missed = Vec::new();
+    for bench in what {
+        let done = match bench {
+            Bench::Sizes => sizes(&flights),
+            Bench::Speed => speed(&flights),
+            Bench::Cost => cost(&flights),
+        };
+        if let Err(error) = done {
+            missed.push(format!("{bench:?}: {error:#}").to_lowercase());
+        }
+    }
+    if missed.is_empty() { Ok(()) } else { bail!("{}", missed.join("; ")) }
+}
+
+/// All recordings, in order of their names.
+fn flights() -> Result<Vec<PathBuf>> {
+    let more = std::env::var_os("HUMS_FLIGHTS").unwrap_or_default();
+    let more = std::env::split_paths(&more).filter(|folder| !folder.as_os_str().is_empty());
+    let mut flights: Vec<PathBuf> = Vec::new();
+    for folder in std::iter::once(repo::root().join("tests/flights")).chain(more) {
+        let entries = fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+        for entry in entries {
+            let path = entry?.path();
+            let is_recording =
+                path.extension().is_some_and(|extension| extension == "tlog" || extension == "raw");
+            // The same recording may lie in two of the folders.
+            if is_recording && !flights.iter().any(|known| known.file_name() == path.file_name()) {
+                flights.push(path);
+            }
+        }
+    }
+    flights.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
+    Ok(flights)
+}
+
+/// Those that the means and the emulator take: tlogs that are not signed.
+fn unsigned(flights: &[PathBuf]) -> impl Iterator<Item = &PathBuf> {
+    flights.iter().filter(|path| path.extension().is_some_and(|extension| extension == "tlog"))
+}
+
+fn name(flight: &Path) -> String {
+    flight.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn sizes(flights: &[PathBuf]) -> Result<()> {
+    println!("\nSizes\n");
+    Shell::cargo()
+        .args(["run", "--quiet", "--release", "-p", "hums-blackbox", "--example", "sizes", "--"])
+        .args(flights)
+        .run()
+        .context("a size misses its target, or xz is missing")
+}
+
+/// Decodes logs and unpacks the same tlogs, one after the other on one core, several times.
+fn speed(flights: &[PathBuf]) -> Result<()> {
+    println!("\nSpeed of decoding to tlog, median of {ROUNDS} rounds\n");
+    build_hums()?;
+    let folder = work_folder()?;
+    println!(
+        "{:22} {:>10} {:>10} {:>7}  {:>12} {:>6}",
+        "recording", "gzip -d", "one core", "ratio", "all cores", "times"
+    );
+    let (mut all_ratios, mut all_gains) = (Vec::new(), Vec::new());
+    for flight in unsigned(flights) {
+        let (log, zipped) = (folder.join("flight.hum"), folder.join("flight.tlog.gz"));
+        let done = Command::new(repo::hums()).arg("pack").arg(flight).arg("-o").arg(&log).output()?;
+        if !log.is_file() || !done.status.success() {
+            bail!("hums pack {}: {}", flight.display(), String::from_utf8_lossy(&done.stderr));
+        }
+        let gzip = Command::new("gzip").arg("-c").arg(flight).stdout(File::create(&zipped)?).status();
+        gzip.context("gzip cannot be started")?;
+        let bytes = fs::metadata(flight)?.len() as f64;
+        let decode = |threads: Option<&str>| {
+            let mut command = on_one_core(repo::hums().as_os_str(), threads.is_some());
+            command.arg("decode").arg(&log).args(["--format", "tlog", "-o", "-"]);
+            if let Some(threads) = threads {
+                command.env("RAYON_NUM_THREADS", threads);
+            }
+            seconds(command)
+        };
+        let unzip = || {
+            let mut command = on_one_core("gzip".as_ref(), true);
+            command.arg("-dc").arg(&zipped);
+            seconds(command)
+        };
+        let (mut rounds, mut gains) = (Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            let (gzip_s, one_s, all_s) = (unzip()?, decode(Some("1"))?, decode(None)?);
+            rounds.push((gzip_s / one_s, gzip_s, one_s));
+            gains.push((one_s / all_s, all_s));
+        }
+        rounds.sort_by(|a, b| a.0.total_cmp(&b.0));
+        gains.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let ((ratio, gzip_s, one_s), (gain, all_s)) = (rounds[ROUNDS / 2], gains[ROUNDS / 2]);
+        let rate = |seconds: f64| format!("{:.0} MB/s", bytes / seconds / 1e6);
+        println!(
+            "{:22} {:>10} {:>10} {ratio:7.2}  {:>12} {gain:6.2}",
+            name(flight),
+            rate(gzip_s),
+            rate(one_s),
+            rate(all_s)
+        );
+        all_ratios.push(ratio);
+        all_gains.push(gain);
+    }
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    println!(
+        "median ratio to gzip -d on one core: {:.2} (asked: {AGAINST_GZIP_MIN})",
+        median(&mut all_ratios)
+    );
+    println!("median gain by {cores} cores: {:.2}", median(&mut all_gains));
+    Ok(())
+}
+
+/// A program on the first core only, where `taskset` is there to see to it.
+fn on_one_core(program: &std::ffi::OsStr, one: bool) -> Command {
+    let pinned = one && Command::new("taskset").arg("--version").output().is_ok();
+    if !pinned {
+        return Command::new(program);
+    }
+    let mut command = Command::new("taskset");
+    command.args(["-c", "0"]).arg(program);
+    command
+}
+
+fn seconds(mut command: Command) -> Result<f64> {
+    let start = Instant::now();
+    let output = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).output()?;
+    if !output.status.success() {
+        bail!("{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    Ok(start.elapsed().as_secs_f64())
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Runs recordings through the firmware in the emulator, which counts the instructions of each stage.
+fn cost(flights: &[PathBuf]) -> Result<()> {
+    println!("\nInstructions on a Cortex-M4, by stage\n");
+    setup::ensure(&[Need::FirmwareTarget, Need::Qemu], false).require_all()?;
+    let image = firmware::build(Board::Emulated)?;
+    build_hums()?;
+    let card = work_folder()?.join("card.img");
+    let mut dearest = ("none".to_owned(), 0.0);
+    for flight in unsigned(flights) {
+        let _ = fs::remove_file(&card);
+        let (json, _) = Shell::new(repo::hums())
+            .args(["emulate", "--json", "--costs", "--firmware"])
+            .arg(&image)
+            .arg("--input")
+            .arg(flight)
+            .arg("--sd")
+            .arg(&card)
+            .output_and_code()?;
+        let report: Value = serde_json::from_str(&json).context("the report of hums emulate")?;
+        let per_byte = print_costs(&name(flight), &report)?;
+        if per_byte > dearest.1 {
+            dearest = (name(flight), per_byte);
+        }
+    }
+    let (flight, per_byte) = dearest;
+    let load = load(per_byte);
+    println!(
+        "encoding the dearest, {flight}: {per_byte:.1} instructions a byte, {:.2} % of {} MHz at {} kB/s and \
+         {CYCLES_PER_INSTRUCTION} cycles an instruction (asked: at most {} %)",
+        load * 100.0,
+        CLOCK_HZ / 1e6,
+        BYTES_PER_S / 1e3,
+        LOAD_MAX * 100.0
+    );
+    if load > LOAD_MAX {
+        bail!("encoding takes {:.2} % of the processor", load * 100.0);
+    }
+    Ok(())
+}
+
+/// One recording's stages; gives what encoding a byte takes.
+fn print_costs(flight: &str, report: &Value) -> Result<f64> {
+    let number = |key: &str| report[key].as_f64().filter(|&number| number > 0.0);
+    let (Some(bytes), Some(frames)) = (number("bytes_in"), number("frames_in")) else {
+        bail!("the emulator received nothing of {flight}")
+    };
+    let stages = report["instructions"].as_object().context("the firmware does not count instructions")?;
+    println!("{flight}: {frames} frames, {bytes} bytes");
+    for (stage, count) in stages {
+        let count = count.as_f64().unwrap_or(f64::NAN);
+        println!(
+            "  {stage:10} {:8.1} a byte {:9.0} a frame {:7.2} % of the processor",
+            count / bytes,
+            count / frames,
+            load(count / bytes) * 100.0
+        );
+    }
+    Ok(report["instructions"]["encode"].as_f64().context("no stage encode")? / bytes)
+}
+
+/// The part of the processor that so many instructions a byte take on the fastest line.
+fn load(instructions_per_byte: f64) -> f64 {
+    instructions_per_byte * BYTES_PER_S * CYCLES_PER_INSTRUCTION / CLOCK_HZ
+}
+
+fn work_folder() -> Result<PathBuf> {
+    let folder = repo::target().join("bench");
+    fs::create_dir_all(&folder)?;
+    Ok(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_or_some_are_measured_and_a_mistyped_one_is_not_ignored() {
+        assert_eq!(Bench::parse(&[]).unwrap(), Bench::ALL);
+        assert_eq!(Bench::parse(&["cost", "sizes"]).unwrap(), [Bench::Cost, Bench::Sizes]);
+        assert!(Bench::parse(&["size"]).is_err());
+    }
+
+    #[test]
+    fn the_load_that_is_asked_for_is_some_121_instructions_a_byte() {
+        assert!(load(121.0) <= LOAD_MAX && load(122.0) > LOAD_MAX);
+    }
+
+    #[test]
+    fn costs_are_those_of_the_stage() {
+        let report = r#"{"bytes_in": 100, "frames_in": 4, "instructions": {"encode": 9000, "tick": 1}}"#;
+        let report: Value = serde_json::from_str(report).unwrap();
+        assert!((print_costs("flight", &report).unwrap() - 90.0).abs() < 1e-9);
+        assert!(print_costs("flight", &Value::Null).is_err());
+    }
+}
