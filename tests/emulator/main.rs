@@ -7,6 +7,8 @@
 
 #[cfg(feature = "emulator")]
 mod flights;
+#[cfg(feature = "emulator")]
+mod persistence;
 
 /// Said past the test harness, which would keep it to itself: what was not tested is no success.
 #[cfg(not(feature = "emulator"))]

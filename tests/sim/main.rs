@@ -9,6 +9,7 @@ mod companion;
 mod downlink;
 mod hostile_input;
 mod noise;
+mod persistence;
 mod power_cut;
 mod round_trip;
 

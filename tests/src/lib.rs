@@ -6,6 +6,7 @@
 //! * [`frames`] reads MAVLink frames with a few lines of its own and the checksum seeds of pymavlink.
 //! * [`flights`] knows the recordings and what pymavlink found in them; [`oracle`] asks it about others.
 //! * [`prove`] are the campaigns, thousands of cases each.
+//! * [`store`] reads what outlives power.
 //! * [`damage`] makes noise; [`fat`] checks a card's file system with the system's own tools.
 #![allow(
     clippy::missing_panics_doc,
@@ -22,3 +23,4 @@ pub mod frames;
 pub mod oracle;
 pub mod program;
 pub mod prove;
+pub mod store;

@@ -6,10 +6,11 @@
 
 mod figures;
 mod happenings;
+mod notices;
 mod records;
 
 use hums_blackbox::record::{
-    Boot, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Vehicle as VehicleRecord,
+    Boot, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
@@ -29,6 +30,7 @@ pub use happenings::By;
 
 use figures::Sums;
 use happenings::CRITICAL;
+use notices::Notices;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = monitor::TICK;
@@ -69,6 +71,7 @@ pub struct Monitoring<'a> {
     /// UTC of power-on as it was recorded last, microseconds since 1970.
     epoch_micros: Option<u64>,
     losses: Losses,
+    notices: Notices,
     keeping: Keeping,
     port_before: PortReading,
     card_before: CardReading,
@@ -102,6 +105,7 @@ impl<'a> Monitoring<'a> {
             vehicle: VehicleRecord::default(),
             epoch_micros: None,
             losses: Losses::new(),
+            notices: Notices::new(),
             keeping: Keeping::new(),
             port_before: PortReading::default(),
             card_before: card.read(),
@@ -226,6 +230,7 @@ impl<'a> Monitoring<'a> {
             self.record_usage(now, Moment::Periodic, sectors);
         }
         self.partial(now, sectors);
+        self.tell_notices(now, gs);
         self.summary.tick(now, self.monitor, &mut |bytes| gs.tell(bytes));
         self.converse(now, sectors, gs);
     }
@@ -249,11 +254,6 @@ impl<'a> Monitoring<'a> {
     /// What the monitor knows, to be changed: what is restored, saved, set.
     pub const fn monitor_mut(&mut self) -> &mut Monitor {
         self.monitor
-    }
-
-    /// Records a text of our own; `severity` is a `MAV_SEVERITY`.
-    pub fn note(&mut self, now: Instant, severity: u8, text: &str, sectors: &mut SectorsIn) {
-        self.record(now, &Record::Note(Note { severity, text }), sectors);
     }
 
     fn check(

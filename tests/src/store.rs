@@ -1,0 +1,43 @@
+//! What a store's file holds, read with the firmware's own crates: there is no other reader.
+
+use std::fs;
+use std::path::Path;
+
+use hums_core::lifetime::{ItemKey, Lifetime};
+use hums_store::sim::SimFlash;
+use hums_store::{Found, Store, param};
+
+/// What outlived power.
+#[derive(Debug, Default)]
+pub struct Stored {
+    /// The counters over the airframe's life.
+    pub lifetime: Option<Lifetime>,
+    /// Parameters that were set.
+    pub params: Vec<(String, f32)>,
+}
+
+impl Stored {
+    /// Reads the file; it must be a store in order.
+    pub fn read(path: &Path) -> Self {
+        let flash = SimFlash::<16_384>::with(&fs::read(path).unwrap());
+        let (mut store, found) = Store::mount(flash).unwrap_or_else(|why| panic!("{why:?}"));
+        assert_eq!(found, Found::Kept, "{}", path.display());
+        let mut stored = Self::default();
+        let read = store.for_each(|key, value| {
+            if key.is_param() {
+                let (name, value) = param(value).unwrap();
+                stored.params.retain(|(other, _)| other != name);
+                stored.params.push((name.to_owned(), value));
+            } else if key.number() == Some(ItemKey::Lifetime.number()) {
+                stored.lifetime = Some(Lifetime::decode(value).unwrap());
+            }
+        });
+        assert!(read.is_ok());
+        stored
+    }
+
+    /// The counters, which must be there.
+    pub fn lifetime(&self) -> &Lifetime {
+        self.lifetime.as_ref().unwrap()
+    }
+}
