@@ -189,7 +189,9 @@ mod tests {
         assert!((1000..=2048).contains(&grid.intervals), "{grid:?}");
         let series = &store.plot(Plot::Height, 1, |_| String::new())[0];
         assert_eq!(series.steps.len(), grid.intervals);
-        let place = |wanted: f64| series.values.iter().position(|value| (value - wanted).abs() < 0.01).expect("kept") / 2;
+        let place = |wanted: f64| {
+            series.values.iter().position(|value| (value - wanted).abs() < 0.01).expect("kept") / 2
+        };
         let at = |second: f64| (second / grid.interval_s) as usize;
         assert_eq!((place(99.0), place(-99.0)), (at(777.0), at(55_555.0)));
     }
