@@ -213,6 +213,9 @@ pub struct Decode {
     /// Logs, card images, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
     /// The file or directory to write
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
@@ -258,6 +261,9 @@ pub struct Info {
     /// Logs, card images, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
     /// Print the result as one JSON object
     #[arg(long)]
     pub json: bool,
@@ -277,6 +283,9 @@ pub struct Verify {
     /// Logs, card images, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
     /// Print the result as one JSON object
     #[arg(long)]
     pub json: bool,

@@ -34,6 +34,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     line("2. what was on the SD card")?;
     let decoded = args.dir.join("decoded");
     let arguments = cli::Decode {
+        salvage: false,
         inputs: vec![card.clone()],
         output: decoded.clone(),
         format: vec![Format::Tlog, Format::Csv],
@@ -46,7 +47,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     report::run(&cli::Report { inputs: vec![card.clone()], output: page.clone(), session: None })?;
     line("")?;
     line("3. what it says of the flight")?;
-    for log in &logs::find(std::slice::from_ref(&card))?.logs {
+    for log in &logs::find(std::slice::from_ref(&card), false)?.logs {
         line(info::text::text(&Overview::of(log)?).trim_end())?;
     }
     line("")?;

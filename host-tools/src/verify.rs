@@ -14,7 +14,7 @@ use crate::summary::Overview;
 
 /// Runs `hums verify`.
 pub fn run(args: &cli::Verify) -> Result<Outcome> {
-    let found = logs::find(&args.inputs)?;
+    let found = logs::find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }

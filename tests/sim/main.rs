@@ -4,6 +4,7 @@
 //! failing card and power cuts may do and may not.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod by_arming;
 mod card_trouble;
 mod companion;
 mod downlink;
@@ -12,6 +13,7 @@ mod noise;
 mod persistence;
 mod power_cut;
 mod round_trip;
+mod salvage;
 
 /// Said past the test harness, which would keep it to itself: what was not tested is no success.
 #[cfg(not(feature = "oracle"))]

@@ -49,7 +49,7 @@ use write::{Destination, Writers};
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let selection = Selection::new(args)?;
     let formats = Formats::new(&args.format);
-    let found = logs::find(&args.inputs)?;
+    let found = logs::find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }

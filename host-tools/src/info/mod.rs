@@ -17,7 +17,7 @@ use text::{image_text, text};
 
 /// Runs `hums info`.
 pub fn run(args: &cli::Info) -> Result<Outcome> {
-    let found = logs::find(&args.inputs)?;
+    let found = logs::find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }

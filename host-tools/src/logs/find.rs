@@ -63,16 +63,16 @@ pub enum Content {
     Other,
 }
 
-/// Finds all logs in `inputs`.
-pub fn find(inputs: &[PathBuf]) -> Result<Found> {
+/// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says.
+pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     let mut found = Found::default();
     for input in inputs {
         let before = found.logs.len();
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
         if about.is_dir() {
-            directory(input, &mut found)?;
+            directory(input, salvage, &mut found)?;
         } else {
-            named_file(input, &mut found)?;
+            named_file(input, salvage, &mut found)?;
         }
         if found.logs.len() == before && !found.images.iter().any(|image| &image.path == input) {
             bail!("{}: no log of HUMS is in there", input.display());
@@ -92,10 +92,10 @@ pub fn find(inputs: &[PathBuf]) -> Result<Found> {
 }
 
 /// A file that the user named: it must be something.
-fn named_file(path: &Path, found: &mut Found) -> Result<()> {
+fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     match look(path)? {
         Content::Log => found.logs.push(whole_file(path)?),
-        Content::Image => image(path, found)?,
+        Content::Image => image(path, salvage, found)?,
         Content::Empty => bail!("{}: is empty", path.display()),
         Content::Newer(version) => bail!(
             "{}: is a log of format version {version}, which this program is too old for; take a newer hums",
@@ -160,7 +160,7 @@ fn whole_file(path: &Path) -> Result<Log> {
 }
 
 /// Walks a directory: segments of one session in one directory are one log.
-fn directory(root: &Path, found: &mut Found) -> Result<()> {
+fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let mut waiting = vec![(root.to_owned(), 0)];
     while let Some((dir, depth)) = waiting.pop() {
         let context = || format!("{}: cannot be read", dir.display());
@@ -179,7 +179,7 @@ fn directory(root: &Path, found: &mut Found) -> Result<()> {
             } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Content::Log)))
             {
                 sessions.entry(name.session).or_default().push((name, path));
-            } else if let Err(error) = directory_file(&path, found) {
+            } else if let Err(error) = directory_file(&path, salvage, found) {
                 found.remarks.push(format!("{error:#}"));
             }
         }
@@ -201,12 +201,12 @@ fn directory(root: &Path, found: &mut Found) -> Result<()> {
 }
 
 /// A file that happens to lie in a directory: what is not ours is passed over.
-fn directory_file(path: &Path, found: &mut Found) -> Result<()> {
+fn directory_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     match look(path)? {
         Content::Log => found.logs.push(whole_file(path)?),
         Content::Image if is_card(path)? => {
             let before = found.logs.len();
-            image(path, found)?;
+            image(path, salvage, found)?;
             let stem = path.file_stem().map_or("card".into(), |stem| stem.to_string_lossy());
             for log in found.logs.iter_mut().skip(before) {
                 log.name = format!("{stem}/{}", log.name);
@@ -245,7 +245,7 @@ pub fn on_card(path: &Path) -> Vec<Log> {
 }
 
 /// The logs on a card: by its file system, or where that does not tell, by looking at every block.
-fn image(path: &Path, found: &mut Found) -> Result<()> {
+fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let context = || format!("{}: cannot be read", path.display());
     let file = File::open(path).with_context(context)?;
     let device = ReadOnlyImage::new(file.try_clone().with_context(context)?).with_context(context)?;
@@ -261,7 +261,7 @@ fn image(path: &Path, found: &mut Found) -> Result<()> {
         Err(error) => about.damage.push(error.to_string()),
     }
     // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead.
-    if found.logs.len() == before || !about.damage.is_empty() {
+    if salvage || found.logs.len() == before || !about.damage.is_empty() {
         found.logs.truncate(before);
         let logs = scan(path, file.metadata().with_context(context)?.len())?;
         if logs.is_empty() && !about.damage.is_empty() {

@@ -26,7 +26,7 @@ use crate::summary::Overview;
 
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
-    let found = logs::find(&args.inputs)?;
+    let found = logs::find(&args.inputs, false)?;
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }

@@ -31,7 +31,8 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         let done =
             power_on(&device, &Params::defaults(), 1, stream.chunks(), |_| Ok(())).context(name.clone())?;
         let stats = done.stats;
-        ensure!(stats.sd_stall_ms_max >= STALL_MS, "{name}: the card never stood still");
+        // The write that meets it comes a little after it has begun.
+        ensure!(stats.sd_stall_ms_max >= STALL_MS - 250, "{name}: the card never stood still");
         ensure!(
             stream.is_signed || stats.frames_lost + done.frames_left == 0,
             "{name}: {} frames lost, queue {} of {} bytes",

@@ -1,0 +1,197 @@
+//! Logs on cards whose file system is gone, files that were deleted, logs that a newer one has partly overwritten: what
+//! is there comes out, and what is missing is told with its times.
+
+use std::fs::{self, File};
+use std::os::unix::fs::FileExt as _;
+use std::path::Path;
+use std::process::Command;
+
+use hums_tests::flights::{Manifest, OWN, own, stream};
+use hums_tests::frames::{self, Frame};
+use hums_tests::program::{Decoded, Machine, Recording, hums};
+use serde_json::Value;
+
+const BLOCK: u64 = 512;
+
+/// Where things are on the card, in bytes: the partition, its FAT, its clusters.
+struct Places {
+    partition: u64,
+    fat: u64,
+    data: u64,
+}
+
+fn places(image: &Path) -> Places {
+    let file = File::open(image).unwrap();
+    let number = |at: u64, bytes: usize| {
+        let mut word = [0; 8];
+        file.read_exact_at(&mut word[..bytes], at).unwrap();
+        u64::from_le_bytes(word)
+    };
+    let partition = number(446 + 8, 4) * BLOCK;
+    let fat = partition + number(partition + 14, 2) * BLOCK;
+    let data = fat + number(partition + 36, 4) * number(partition + 16, 1) * BLOCK;
+    Places { partition, fat, data }
+}
+
+fn zero(image: &Path, from: u64, to: u64) {
+    let file = File::options().write(true).open(image).unwrap();
+    file.write_all_at(&vec![0; (to - from) as usize], from).unwrap();
+}
+
+/// `info --json` or `verify --json`, which must end with this code.
+fn json(command: &str, image: &Path, flags: &[&str], code: i32) -> Value {
+    let arguments = [command.as_ref(), "--json".as_ref(), image.as_os_str()];
+    let outcome = hums(arguments.into_iter().chain(flags.iter().map(AsRef::as_ref))).expect_code(&[code]);
+    serde_json::from_str(&outcome.text()).unwrap()
+}
+
+/// What destroys the file system, by name.
+const WRECKS: [(&str, fn(&Path)); 4] = [
+    ("the FAT is zeros", |image| {
+        let Places { fat, data, .. } = places(image);
+        zero(image, fat, data);
+    }),
+    ("the directory is zeros", |image| {
+        let Places { data, .. } = places(image);
+        zero(image, data, data + 4 * BLOCK);
+    }),
+    ("the partition table is zeros", |image| zero(image, 0, BLOCK)),
+    ("the volume's first blocks are zeros", |image| {
+        let Places { partition, .. } = places(image);
+        zero(image, partition, partition + 8 * BLOCK);
+    }),
+];
+
+#[test]
+fn a_card_without_a_file_system_gives_all_that_is_on_it() {
+    let manifest = Manifest::own();
+    for name in OWN {
+        let recording = Recording::make(Machine::Sim, &own(name), &["--card-size", "64"]);
+        let data = fs::read(own(name)).unwrap();
+        let input = manifest.frames_of(&own(name), &data);
+        let stream = stream(manifest.found(&own(name)).is_tlog, &data, &input);
+        for (what, wreck) in WRECKS {
+            let image = recording.image().with_file_name("wreck.img");
+            fs::copy(recording.image(), &image).unwrap();
+            wreck(&image);
+            eprintln!("{name}: {what}");
+            // An empty directory is no damage that can be seen: the card then says that it is empty.
+            let code = if what.contains("directory") { 0 } else { 3 };
+            let info = json("info", &image, &[], code);
+            assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{what}: {info}");
+            assert_eq!(info["logs"][0]["gaps_count"], 0, "{what}: the log itself is whole");
+            json("verify", &image, &[], code);
+            let decoded = Decoded::of(&image, &[code]);
+            frames::assert_same(&input, &decoded.frames(&manifest.seeds), &stream);
+        }
+    }
+}
+
+#[test]
+fn a_deleted_log_is_found_again() {
+    let manifest = Manifest::own();
+    for name in OWN {
+        let recording = Recording::make(Machine::Sim, &own(name), &["--card-size", "64"]);
+        let whole = recording.decode(&[0]);
+        let whole = whole.frames(&manifest.seeds);
+        let image = recording.image();
+        record_more(&image, &own("px4_hil_quad_low.tlog"));
+        let drive = format!("{}@@{}", image.display(), places(&image).partition);
+        let deleted = Command::new("mdel").args(["-i", &drive, "::/00001_00.HUM"]).status().unwrap();
+        assert!(deleted.success());
+        let logs = json("info", &image, &[], 0);
+        assert_eq!(logs["logs"].as_array().unwrap().len(), 1, "the file system knows of one");
+        let found = json("info", &image, &["--salvage"], 0);
+        assert_eq!(found["logs"].as_array().unwrap().len(), 2, "{name}: {found}");
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let decode =
+            ["decode".as_ref(), image.as_os_str(), "--salvage".as_ref(), "-o".as_ref(), out.as_os_str()];
+        hums(decode.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_code(&[0]);
+        let tlogs: Vec<_> =
+            fs::read_dir(&out).unwrap().map(|file| fs::read(file.unwrap().path()).unwrap()).collect();
+        let is_whole = |tlog: &Vec<u8>| {
+            let frames = frames::of_tlog(tlog, &manifest.seeds, true);
+            frames.len() == whole.len() && frames.iter().zip(&whole).all(|(a, b)| a.bytes == b.bytes)
+        };
+        assert!(tlogs.iter().any(is_whole), "{name}: the deleted log is not among them");
+    }
+}
+
+/// Records one more session on a card.
+fn record_more(image: &Path, flight: &Path) {
+    let sim = ["sim".as_ref(), "--json".as_ref(), "--input".as_ref(), flight.as_os_str(), "--sd".as_ref()];
+    hums(sim.into_iter().chain([image.as_os_str()])).expect_code(&[0]);
+}
+
+#[test]
+fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_mixes_with_it() {
+    let manifest = Manifest::own();
+    let dir = tempfile::tempdir().unwrap();
+    let (short, old) = (dir.path().join("short.raw"), own("px4_hil_quad_low.tlog"));
+    let data = fs::read(&old).unwrap();
+    let input = manifest.frames_of(&old, &data);
+    fs::write(&short, stream(true, &data, &input[..400])).unwrap();
+    // The smallest card holds sixteen segments: the first one makes room for the last session.
+    let recording = Recording::make(Machine::Sim, &old, &["--card-size", "34"]);
+    let image = recording.image();
+    for _ in 0..40 {
+        record_more(&image, &short);
+        let logs = json("info", &image, &[], 0)["logs"].as_array().unwrap().clone();
+        if logs[0]["name"] != "00001" {
+            break;
+        }
+    }
+    let logs = json("info", &image, &[], 0)["logs"].as_array().unwrap().clone();
+    assert_ne!(logs[0]["name"], "00001", "the oldest is not overwritten yet");
+    let newest = Decoded::of(&image, &[0]);
+    let newest = frames::of_tlog(newest.tlogs().last().unwrap(), &manifest.seeds, true);
+    assert_eq!(newest.len(), 400);
+    assert!(newest.iter().zip(&input).all(|(a, b)| a.bytes == b.bytes));
+
+    // What the newest one left of the oldest is there, from the group after the last overwritten one on.
+    let found = json("info", &image, &["--salvage"], 3);
+    let with_gaps: Vec<&Value> =
+        found["logs"].as_array().unwrap().iter().filter(|log| log["gaps_count"] != 0).collect();
+    assert_eq!(with_gaps.len(), 1, "only the oldest misses anything: {found}");
+    let gap = &with_gaps[0]["gaps"][0];
+    assert_eq!((&gap["from_s"], &gap["cause"]), (&Value::Null, &"missing".into()), "its beginning");
+    assert!(gap["to_s"].as_f64().unwrap() > 0.0 && gap["frames"].as_u64().unwrap() > 0, "{gap}");
+    let out = dir.path().join("out");
+    let decode = ["decode".as_ref(), image.as_os_str(), "--salvage".as_ref(), "-o".as_ref(), out.as_os_str()];
+    hums(decode.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_code(&[3]);
+    let rest = out.join(format!("{}.tlog", with_gaps[0]["name"].as_str().unwrap()));
+    let rest = fs::read(rest).unwrap();
+    let rest: Vec<Frame<'_>> = frames::of_tlog(&rest, &manifest.seeds, true);
+    let from = input.len() - rest.len();
+    assert!(from > 0 && !rest.is_empty());
+    assert!(rest.iter().zip(&input[from..]).all(|(a, b)| a.bytes == b.bytes), "the end of the flight");
+    assert_eq!(gap["frames"].as_u64(), Some(from as u64), "as many as the gap says are missing");
+}
+
+#[test]
+fn a_file_that_held_something_else_before_is_no_damage() {
+    let manifest = Manifest::own();
+    let path = own("px4_hil_quad_low.tlog");
+    let recording = Recording::make(Machine::Sim, &path, &["--card-size", "64"]);
+    let image = recording.image();
+    // The same session on a card whose free clusters are full of a photograph.
+    let Places { data, .. } = places(&image);
+    let mut content = fs::read(&image).unwrap();
+    let noise = hums_tests::damage::Random::new(3).bytes(1 << 20);
+    for (index, block) in content[data as usize + (64 << 10)..].chunks_exact_mut(512).enumerate() {
+        if block.iter().all(|byte| *byte == 0) {
+            let at = index * 512 % noise.len();
+            block.copy_from_slice(&noise[at..at + 512]);
+        }
+    }
+    fs::write(&image, &content).unwrap();
+    let info = json("info", &image, &[], 0);
+    assert_eq!(info["logs"][0]["gaps_count"], 0, "{info}");
+    json("verify", &image, &[], 0);
+    let input = fs::read(&path).unwrap();
+    assert_eq!(
+        Decoded::of(&image, &[0]).frames(&manifest.seeds).len(),
+        manifest.frames_of(&path, &input).len()
+    );
+}
