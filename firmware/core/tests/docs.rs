@@ -1,0 +1,183 @@
+//! The documents that the tables make: `docs/parameters.md` and the table of checks in `docs/health.md` are what the
+//! code says, and `docs/usage.md` knows every counter. `HUMS_WRITE_DOCS=1 cargo test -p hums-core --test docs` writes
+//! the first two.
+#![allow(clippy::panic, clippy::unwrap_used)]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+
+use hums_core::exposure;
+use hums_core::health::{Check, Side, When, checks};
+use hums_core::params::{Param, Params, TABLE};
+use hums_core::time::Span;
+use hums_core::usage::UsageCounter;
+
+/// What each check reads, and where its limits come from where no parameter says it.
+const INPUTS: &[(&str, &str)] = &[
+    ("batt_remaining", "BATTERY_STATUS; SYS_STATUS where no battery reports itself"),
+    (
+        "cell_voltage",
+        "BATTERY_STATUS: the lowest cell, or the pack by its cells; SYS_STATUS likewise; armed and lithium",
+    ),
+    ("cell_deviation", "BATTERY_STATUS: highest less lowest cell"),
+    ("cell_dev_lasting", "BATTERY_STATUS: the same for a minute"),
+    ("batt_resistance", "BATTERY_STATUS: slope of voltage over current, against its baseline"),
+    ("batt_fault", "BATTERY_STATUS: fault bits set"),
+    ("batt_temperature", "BATTERY_STATUS"),
+    ("rail_5v_low", "POWER_STATUS"),
+    ("rail_5v_high", "POWER_STATUS"),
+    ("battery_due", "components of kind battery: percent of the limit that trips first"),
+    ("esc_silent", "ESC_STATUS, ESC_INFO, ESC_TELEMETRY: silence beyond three of its own intervals"),
+    ("esc_temperature", "ESC_INFO, ESC_TELEMETRY"),
+    ("esc_failure", "ESC_INFO: failure flags; 1 any, 2 motor stuck or ESC failed"),
+    ("esc_errors", "ESC_INFO: error count, a minute; wraps are no errors"),
+    ("motor_loss", "ESC_STATUS, ESC_TELEMETRY: current in percent of the others' mean, throttle above 20 %"),
+    ("motor_imbalance", "ESC_STATUS, ESC_TELEMETRY: speed against the others' mean, in steady flight"),
+    ("motor_trend", "the same with its sign, against its baseline"),
+    ("throttle_trend", "VFR_HUD: throttle in hover, above its baseline"),
+    ("drive_due", "components of kind motor, propeller, ESC"),
+    ("cylinder_head", "EFI_STATUS"),
+    ("exhaust_gas", "EFI_STATUS"),
+    ("fuel_pressure", "EFI_STATUS"),
+    ("engine_due", "components of kind engine"),
+    ("vibration", "VIBRATION of ArduPilot: the worst axis"),
+    ("vibration_px4", "VIBRATION of PX4: the accelerometer metric"),
+    ("clipping", "VIBRATION: clipped samples since take-off"),
+    ("load_factor", "SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity"),
+    ("vibration_trend", "VIBRATION in steady flight, above its baseline"),
+    ("airframe_due", "components of kind airframe, other"),
+    ("ekf_variance", "EKF_STATUS_REPORT: the largest variance"),
+    ("ekf_failsafe", "EKF_STATUS_REPORT: the second largest of compass, velocity, position"),
+    ("ekf_test_ratio", "ESTIMATOR_STATUS: the largest test ratio"),
+    ("gps_satellites", "GPS_RAW_INT, GPS2_RAW"),
+    ("gps_hdop", "GPS_RAW_INT, GPS2_RAW"),
+    ("gps_accuracy", "GPS_RAW_INT, GPS2_RAW: horizontal accuracy"),
+    ("gps_fix", "GPS_RAW_INT, GPS2_RAW: fix type, of a receiver that had one"),
+    ("gps_jamming", "GNSS_INTEGRITY"),
+    ("gps_spoofing", "GNSS_INTEGRITY"),
+    ("heartbeat", "HEARTBEAT of the autopilot: its age"),
+    ("frames_lost", "sequence numbers on the autopilot's port, ten seconds"),
+    ("rc_rssi", "RC_CHANNELS; device scale"),
+    ("radio_rssi", "RADIO_STATUS; device scale"),
+    ("radio_margin", "RADIO_STATUS: signal above noise, the worse end"),
+    ("load", "SYS_STATUS"),
+    ("mcu_temperature", "MCU_STATUS"),
+    ("autopilot_reboot", "ATTITUDE, SYSTEM_TIME: a boot time that falls, for 30 s"),
+    ("autopilot_state", "HEARTBEAT: MAV_STATE"),
+    ("sensors", "SYS_STATUS: sensors present and enabled that are not healthy"),
+    ("roll", "ATTITUDE"),
+    ("pitch", "ATTITUDE"),
+    ("recording", "our recorder: 1 not recording, 2 not recording while armed"),
+    ("record_queue", "our recorder: the sector queue"),
+    ("record_lost", "our recorder: frames lost, ten seconds"),
+    ("card_stall", "our recorder: how long the card has kept it waiting"),
+    ("card_errors", "our recorder: block writes that the card refused, ten seconds"),
+    ("card_room", "our recorder: the share of the card that logs can have"),
+    ("card_due", "components of kind card"),
+];
+
+fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name)
+}
+
+/// The document is `wanted`, or becomes it where that is asked for.
+#[track_caller]
+fn assert_is(name: &str, wanted: &str) {
+    if std::env::var_os("HUMS_WRITE_DOCS").is_some() {
+        fs::write(path(name), wanted).unwrap();
+    }
+    let found = fs::read_to_string(path(name)).unwrap_or_default();
+    assert!(found == wanted, "docs/{name} is not what the code says: write it anew (see this test's file)");
+}
+
+fn number(value: f32) -> String {
+    if value.is_nan() { "off".to_owned() } else { format!("{value}") }
+}
+
+#[test]
+fn the_parameters_are_documented_as_they_are() {
+    let mut text = "# Parameters\n\n\
+        Made from the table in `firmware/core/src/params.rs` by `firmware/core/tests/docs.rs`. Set by `hums sim --params FILE`, by a\n\
+        ground station over MAVLink, and kept over power-off. A change is recorded with who made it and applies at once.\n\n\
+        | name | unit | default | range | what it is, where the default comes from |\n|---|---|---|---|---|\n"
+        .to_owned();
+    for spec in TABLE {
+        let (unit, default) = (spec.unit, number(spec.default));
+        let _ = writeln!(
+            text,
+            "| {} | {unit} | {default} | {} to {} | {} |",
+            spec.name, spec.min, spec.max, spec.source
+        );
+    }
+    assert_is("parameters.md", &text);
+}
+
+fn limit(param: Option<Param>) -> String {
+    param.map_or_else(
+        || "–".to_owned(),
+        |param| {
+            let spec = &TABLE[param as usize];
+            format!("{} ({})", number(Params::defaults().get(param)), spec.name)
+        },
+    )
+}
+
+fn seconds(span: Span) -> String {
+    format!("{} s", span.as_secs_f32())
+}
+
+fn row(check: &Check) -> String {
+    let input = INPUTS.iter().find(|(name, _)| *name == check.name);
+    let (_, input) = input.unwrap_or_else(|| panic!("{}: say in INPUTS what it reads", check.name));
+    let side = if check.side == Side::Above { ">" } else { "<" };
+    let when = match check.when {
+        When::Always => "always",
+        When::Armed => "armed",
+        When::InFlight => "in flight",
+    };
+    let source = check.critical.or(check.warn).map_or("", |param| TABLE[param as usize].source);
+    format!(
+        "| {} | {} | {input} | {when} | {side} | {} | {} | {} | {}, {} | {} | {} | {source} |",
+        check.subsystem.name(),
+        check.name,
+        check.unit,
+        limit(check.warn),
+        limit(check.critical),
+        seconds(check.debounce_warn),
+        seconds(check.debounce_critical),
+        check.hysteresis,
+        check.stale_after.map_or_else(|| "–".to_owned(), seconds),
+    )
+}
+
+#[test]
+fn every_check_is_documented_as_it_is() {
+    const BEGIN: &str = "<!-- checks: made by firmware/core/tests/docs.rs -->\n";
+    const END: &str = "<!-- end of checks -->\n";
+    let mut table = "| subsystem | check | reads | when | bad | unit | warning | critical | debounce | hysteresis | stale after | source |\n\
+        |---|---|---|---|---|---|---|---|---|---|---|---|\n"
+        .to_owned();
+    for check in checks() {
+        let _ = writeln!(table, "{}", row(check));
+    }
+    let found = fs::read_to_string(path("health.md")).unwrap();
+    let (before, rest) = found.split_once(BEGIN).expect("docs/health.md has a place for the checks");
+    let (_, after) = rest.split_once(END).expect("and it ends");
+    assert_is("health.md", &format!("{before}{BEGIN}{table}{END}{after}"));
+    for (name, _) in INPUTS {
+        assert!(checks().any(|check| check.name == *name), "there is no check {name}");
+    }
+}
+
+#[test]
+fn every_counter_is_documented() {
+    let text = fs::read_to_string(path("usage.md")).unwrap();
+    for counter in UsageCounter::ALL {
+        let cell = format!("| `{}` |", counter.name());
+        assert!(text.contains(&cell), "docs/usage.md does not say what {} is", counter.name());
+    }
+    for quantity in exposure::Quantity::ALL {
+        assert!(text.contains(&format!("`{}_", quantity.name())), "docs/usage.md does not know {quantity:?}");
+    }
+}
