@@ -303,3 +303,45 @@ fn several_logs_side_by_side_are_what_each_is_alone() {
         .collect();
     assert!(!sessions.is_empty());
 }
+
+/// A frame of an id that no dialect has, with a checksum that some definition would make.
+fn private_frame(id: u32, sequence: u8) -> Vec<u8> {
+    let [low, middle, high, _] = id.to_le_bytes();
+    let mut frame = vec![0xfd, 4, 0, 0, sequence, 1, 1, low, middle, high, 1, 2, 3, sequence];
+    let crc = frame[1..].iter().chain(&[77]).fold(0xffff_u16, |crc, byte| {
+        let x = byte ^ (crc as u8);
+        let x = u16::from(x ^ (x << 4));
+        (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
+    });
+    frame.extend(crc.to_le_bytes());
+    frame
+}
+
+#[test]
+fn more_ids_than_files_can_be_open_lose_nothing() {
+    const IDS: u32 = 600;
+    let mut tlog = Vec::new();
+    let mut time_us = 1_700_000_000_000_000_u64;
+    for round in 0..3 {
+        for id in 0..IDS {
+            time_us += 1000;
+            tlog.extend(time_us.to_be_bytes());
+            tlog.extend(private_frame(0x00ab_0000 + id, (round * IDS + id) as u8));
+        }
+    }
+    let dir = tempfile::tempdir().expect("a directory");
+    fs::write(dir.path().join("private.tlog"), tlog).expect("written");
+    hums(dir.path(), "pack private.tlog -o private.hum", 0);
+    hums(dir.path(), "decode private.hum -o out --format csv,parquet", 0);
+    let tables = files(&dir.path().join("out"), ".csv");
+    let unknown: Vec<_> = tables.iter().filter(|(name, _)| name.starts_with("UNKNOWN_")).collect();
+    assert_eq!(unknown.len() as u32, IDS);
+    for (name, path) in unknown {
+        let text = fs::read_to_string(path).expect("a table");
+        assert_eq!(text.lines().count(), 1 + 3, "{name}: {text}");
+        assert_eq!(text.matches("payload").count(), 1, "{name} has one header");
+    }
+    let parquet = files(&dir.path().join("out"), ".parquet");
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(&parquet["UNKNOWN"]).expect("a file"));
+    assert_eq!(builder.expect("Parquet").metadata().file_metadata().num_rows(), i64::from(3 * IDS));
+}

@@ -5,6 +5,7 @@ use anyhow::Result;
 use hums_blackbox::record::Vehicle;
 use hums_blackbox::{Entry, Gap, Record};
 use hums_core::observation::Observation;
+use hums_core::time::Instant;
 use hums_link::{Check, Frame, observe};
 
 use crate::logs::Log;
@@ -20,7 +21,12 @@ pub struct Identity {
     pub date: Option<String>,
     /// `s1a2b3c4d`: the session that the sectors name, which is as good as unique.
     pub session: String,
+    /// What tells two logs of equal names apart.
+    pub extent: Extent,
 }
+
+/// Frames, and the times of the first and the last entry.
+pub type Extent = (u64, Option<Instant>, Option<Instant>);
 
 impl Identity {
     /// Reads a log through for it.
@@ -38,7 +44,8 @@ impl Identity {
             epoch(log)?.zip(summary.first).map(|(epoch, first)| epoch.saturating_add(first.as_micros()));
         let session =
             summary.session.map_or_else(|| "unknown".to_owned(), |session| format!("s{session:08x}"));
-        Ok(Self { vehicle, date: utc_us.map(|utc| iso8601(utc).chars().take(10).collect()), session })
+        let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
+        Ok(Self { vehicle, date, session, extent: (summary.frames, summary.first, summary.last) })
     }
 }
 

@@ -28,7 +28,7 @@ pub mod usage;
 mod wear;
 pub mod write;
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -40,7 +40,7 @@ use crate::logs::{self, Log, reader};
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::output;
 use collect::{Collected, Selection};
-use identity::Identity;
+use identity::{Extent, Identity};
 use influx::Tags;
 use side_by_side::side_by_side;
 use write::{Destination, Writers};
@@ -69,7 +69,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
         eprintln!("hums: no log is in there, so nothing was written");
     }
     let task = Task { formats, selection, output: &args.output, standard_output, logs: found.logs.len() };
-    let sessions = Mutex::new(BTreeSet::new());
+    let sessions = Mutex::new(Sessions::new());
     side_by_side(
         &found.logs,
         |log| task.decode(log, &sessions),
@@ -156,7 +156,7 @@ struct Done {
 
 impl Task<'_> {
     /// `sessions` are the sessions whose Parquet tables are taken.
-    fn decode(&self, log: &Log, sessions: &Mutex<BTreeSet<PathBuf>>) -> Result<Done> {
+    fn decode(&self, log: &Log, sessions: &Mutex<Sessions>) -> Result<Done> {
         let mut remarks = Vec::new();
         let mut context =
             Context { formats: self.formats, selection: self.selection.clone(), ..Context::default() };
@@ -174,10 +174,10 @@ impl Task<'_> {
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
         }
         if self.formats.parquet {
-            let dir = partition(self.output, &context.identity);
-            if sessions.lock().is_ok_and(|mut sessions| sessions.insert(dir.clone())) {
-                parquet = Some(dir);
-            } else {
+            parquet = sessions.lock().ok().and_then(|mut sessions| {
+                claim(&mut sessions, &partition(self.output, &context.identity), context.identity.extent)
+            });
+            if parquet.is_none() {
                 context.formats.parquet = false;
                 remarks.push(format!(
                     "{}: is the same session as another log here; its Parquet tables are written once",
@@ -208,6 +208,30 @@ impl Task<'_> {
     }
 }
 
+/// Sessions by the directory of their Parquet tables.
+type Sessions = BTreeMap<PathBuf, Extent>;
+
+/// A directory for a session, unless it is there already: a card and a copy of it are one session. Another session of
+/// the same name (of a board without a source of randomness) gets a number.
+fn claim(sessions: &mut Sessions, dir: &Path, extent: Extent) -> Option<PathBuf> {
+    let names = std::iter::once(dir.to_owned()).chain((2..).map(|number| {
+        let mut name = dir.to_owned().into_os_string();
+        name.push(format!("-{number}"));
+        PathBuf::from(name)
+    }));
+    for name in names {
+        match sessions.get(&name) {
+            Some(known) if *known == extent => return None,
+            Some(_) => {}
+            None => {
+                sessions.insert(name.clone(), extent);
+                return Some(name);
+            }
+        }
+    }
+    None
+}
+
 /// The directory of a session's Parquet tables, named as the tools that read them expect.
 fn partition(output: &Path, identity: &Identity) -> PathBuf {
     // Hive's word for "null", which every reader of this layout knows.
@@ -233,4 +257,19 @@ pub(crate) fn inside(dir: &Path, name: &str) -> PathBuf {
     name.split('/')
         .filter(|part| !matches!(*part, "" | "." | ".."))
         .fold(dir.to_owned(), |path, part| path.join(part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copy_of_a_session_is_told_from_another_session_of_its_name() {
+        let mut sessions = Sessions::new();
+        let mut claim = |frames| claim(&mut sessions, Path::new("session=s1"), (frames, None, None));
+        assert_eq!(claim(5), Some(PathBuf::from("session=s1")));
+        assert_eq!(claim(5), None, "a copy");
+        assert_eq!(claim(6), Some(PathBuf::from("session=s1-2")), "another");
+        assert_eq!(claim(6), None, "its copy");
+    }
 }

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
-use arrow_array::{ArrayRef, Float64Array, RecordBatch, TimestampMicrosecondArray, UInt8Array};
+use arrow_array::{ArrayRef, Float64Array, RecordBatch, TimestampMicrosecondArray, UInt8Array, UInt32Array};
 use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
 use hums_core::time::Instant;
 use parquet::arrow::ArrowWriter;
@@ -61,8 +61,26 @@ struct FrameColumns {
     system: Vec<u8>,
     component: Vec<u8>,
     fields: Vec<Column>,
-    /// Where the definition is not ours: the payload as hexadecimal digits, after its sequence number.
-    opaque: Option<(Vec<u8>, TextColumn)>,
+    /// Where the definition is not ours.
+    opaque: Option<Opaque>,
+}
+
+/// Frames as they came. All ids are in one table: there are 16 million of them, and files are few.
+#[derive(Debug, Default)]
+struct Opaque {
+    ids: Vec<u32>,
+    sequences: Vec<u8>,
+    /// Payloads as hexadecimal digits.
+    payloads: TextColumn,
+}
+
+/// The table of a frame: one for all ids without a definition of ours, and one for those made with another.
+fn table_of(frame: &Frame<'_>, known: bool) -> Table {
+    match Table::of(frame, known) {
+        Table::Unknown(_) => Table::Hums("UNKNOWN"),
+        Table::Unverified(_) => Table::Hums("UNVERIFIED"),
+        table => table,
+    }
 }
 
 #[derive(Debug, Default)]
@@ -102,7 +120,7 @@ struct RowColumns {
 impl Batches {
     /// Adds a frame.
     pub fn frame(&mut self, at: Instant, epoch_us: Option<u64>, frame: &Frame<'_>, known: Option<&Payload>) {
-        let table = Table::of(frame, known.is_some());
+        let table = table_of(frame, known.is_some());
         let columns = self.frames.entry(table).or_insert_with(|| FrameColumns::new(frame, known.is_some()));
         columns.times.push(at, epoch_us);
         columns.system.push(frame.system);
@@ -112,11 +130,12 @@ impl Batches {
                 column.push(value);
             }
         }
-        if let Some((sequence, hex)) = &mut columns.opaque {
-            sequence.push(frame.sequence);
+        if let Some(opaque) = &mut columns.opaque {
+            opaque.ids.push(frame.id);
+            opaque.sequences.push(frame.sequence);
             let mut digits = Vec::new();
             super::text::push_hex(&mut digits, frame.payload);
-            hex.push(&digits);
+            opaque.payloads.push(&digits);
         }
     }
 
@@ -152,9 +171,10 @@ impl FrameColumns {
         arrays.push(Arc::new(UInt8Array::from(self.system)));
         arrays.push(Arc::new(UInt8Array::from(self.component)));
         arrays.extend(self.fields.into_iter().map(Column::array));
-        if let Some((sequence, hex)) = self.opaque {
-            arrays.push(Arc::new(UInt8Array::from(sequence)));
-            arrays.push(hex.array());
+        if let Some(opaque) = self.opaque {
+            arrays.push(Arc::new(UInt32Array::from(opaque.ids)));
+            arrays.push(Arc::new(UInt8Array::from(opaque.sequences)));
+            arrays.push(opaque.payloads.array());
         }
         Ok(RecordBatch::try_new(frame_schema(table), arrays)?)
     }
@@ -172,7 +192,8 @@ fn frame_schema(table: Table) -> SchemaRef {
             fields.push(with_units(arrow, field.units, field.enumeration));
         }
     } else {
-        fields.extend([byte("sequence"), Field::new("payload", DataType::Utf8, false)]);
+        let id = Field::new("id", DataType::UInt32, false);
+        fields.extend([id, byte("sequence"), Field::new("payload", DataType::Utf8, false)]);
     }
     Arc::new(Schema::new(fields))
 }

@@ -1,6 +1,6 @@
 //! The files of the output formats.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -21,6 +21,8 @@ use crate::output::{self, Stdout};
 
 /// Room for a group's lines of a busy message; there may be some hundred of these.
 const BUFFER_BYTES: usize = 16 * 1024;
+/// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
+const OPEN_MAX: usize = 256;
 
 /// Where a log's files go.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -125,6 +127,8 @@ pub struct Writers<'a> {
     thesis: Option<Thesis>,
     parquet: Option<ParquetTables>,
     tables: BTreeMap<Table, BufWriter<File>>,
+    /// Tables that have their header; not all of them are open.
+    begun: BTreeSet<Table>,
     headers: BTreeMap<&'static str, Vec<&'static str>>,
     /// A tlog has no place for gaps: they lie beside it.
     gaps: Option<Single>,
@@ -197,6 +201,7 @@ impl<'a> Writers<'a> {
             thesis,
             parquet,
             tables: BTreeMap::new(),
+            begun: BTreeSet::new(),
             headers: BTreeMap::new(),
             gaps: None,
             frames: 0,
@@ -240,13 +245,25 @@ impl<'a> Writers<'a> {
         if let Some(file) = self.tables.get_mut(&table) {
             return write(file, lines, &path);
         }
-        let mut file = create(&path)?;
-        let own = match table {
-            Table::Hums(name) => self.headers.get(name).map(Vec::as_slice).unwrap_or_default(),
-            _ => &[],
+        let mut file = if self.begun.contains(&table) {
+            let file = File::options().append(true).open(&path);
+            BufWriter::new(file.with_context(|| format!("{}: cannot be written", path.display()))?)
+        } else {
+            let mut file = create(&path)?;
+            let own = match table {
+                Table::Hums(name) => self.headers.get(name).map(Vec::as_slice).unwrap_or_default(),
+                _ => &[],
+            };
+            write(&mut file, header(table, own).as_bytes(), &path)?;
+            self.begun.insert(table);
+            file
         };
-        write(&mut file, header(table, own).as_bytes(), &path)?;
         write(&mut file, lines, &path)?;
+        if self.tables.len() >= OPEN_MAX
+            && let Some((closed, mut file)) = self.tables.pop_last()
+        {
+            settle(file.flush(), &dir.join(closed.file_name()))?;
+        }
         self.tables.insert(table, file);
         Ok(())
     }
@@ -292,7 +309,7 @@ impl<'a> Writers<'a> {
             for (table, file) in &mut self.tables {
                 settle(file.flush(), &dir.join(table.file_name()))?;
             }
-            let tables = self.tables.len();
+            let tables = self.begun.len();
             lines.push(format!("{}: {tables} tables, {frames} frames, {records} records", dir.display()));
         }
         if let (Some(thesis), Some(dir)) = (&mut self.thesis, self.destination.dir()) {
