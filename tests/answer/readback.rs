@@ -31,10 +31,14 @@ fn compare(recording: &Path) {
 
 #[test]
 fn every_field_of_every_message_of_our_recordings_reads_back_the_same() {
-    OWN.iter().for_each(|name| compare(&own(name)));
+    for name in OWN {
+        compare(&own(name));
+    }
 }
 
 #[test]
 fn every_field_of_every_message_of_further_recordings_reads_back_the_same() {
-    more().iter().for_each(|path| compare(path));
+    for path in more() {
+        compare(&path);
+    }
 }

@@ -99,14 +99,17 @@ fn a_flights_page_shows_the_flight() {
     assert_pointed_values(&recording.image(), &shown);
 }
 
+/// The values of a pixel's width and of an interval on both sides.
+const AROUND_S: f64 = 1.6;
+
+/// A plot, a line of it, the message it is of, how finely it is printed, and the value of the message's fields.
+type Line = (&'static str, &'static str, &'static str, f64, fn(&Value) -> f64);
+
 /// Where the mouse points, a line says what the vehicle said there.
 fn assert_pointed_values(image: &Path, shown: &Value) {
     let mut decode = command(["decode".as_ref(), image.as_os_str()]);
     let jsonl = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
-    // The values of a pixel's width and of an interval on both sides.
-    const AROUND_S: f64 = 1.6;
-    type Line<'a> = (&'a str, &'a str, &'a str, f64, fn(&Value) -> f64);
-    let lines: [Line<'_>; 4] = [
+    let lines: [Line; 4] = [
         ("Height", "Height", "GLOBAL_POSITION_INT", 0.01, |fields| {
             fields["relative_alt"].as_f64().unwrap() / 1e3
         }),

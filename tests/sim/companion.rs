@@ -138,7 +138,7 @@ impl Lossy {
                         }
                     }
                     Err(error) => {
-                        assert!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+                        assert!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut));
                     }
                 }
                 if let (Ok(count), Some(peer)) = (server.recv(&mut buffer), peer)

@@ -45,8 +45,11 @@ fn json(command: &str, image: &Path, flags: &[&str], code: i32) -> Value {
     serde_json::from_str(&outcome.text()).unwrap()
 }
 
+/// Destroys an image's file system.
+type Wreck = fn(&Path);
+
 /// What destroys the file system, by name.
-const WRECKS: [(&str, fn(&Path)); 4] = [
+const WRECKS: [(&str, Wreck); 4] = [
     ("the FAT is zeros", |image| {
         let Places { fat, data, .. } = places(image);
         zero(image, fat, data);

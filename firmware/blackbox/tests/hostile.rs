@@ -34,7 +34,7 @@ impl Random {
     /// A copy of some of the bytes, with a few of many kinds of damage.
     fn damaged(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
-        for _ in 0..1 + self.below(8) {
+        for _ in 0..=self.below(8) {
             let (at, len) = (self.below(bytes.len()), self.below(64));
             let end = (at + len).min(bytes.len());
             match self.below(6) {
@@ -77,15 +77,12 @@ fn the_decoder_bears_any_stream() {
     let stream = stream();
     for round in 0..1_500 {
         let entries = (round % 300) as u16;
-        let body = match round % 3 {
-            0 => {
-                let len = random.below(3_000);
-                random.bytes(len)
-            }
-            _ => {
-                let len = random.below(6_000);
-                random.damaged(&stream[..len])
-            }
+        let body = if round % 3 == 0 {
+            let len = random.below(3_000);
+            random.bytes(len)
+        } else {
+            let len = random.below(6_000);
+            random.damaged(&stream[..len])
         };
         decoder::check(&[&entries.to_le_bytes(), &body[..]].concat());
     }

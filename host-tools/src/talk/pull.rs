@@ -173,13 +173,12 @@ impl Ftp {
             let before = have;
             let end = pieces.iter().map(|(at, data)| *at + data.len() as u32).max().unwrap_or(have);
             while have < end {
-                let data = match pieces.get(&have) {
-                    Some(data) => data.clone(),
+                let data = if let Some(data) = pieces.get(&have) {
+                    data.clone()
+                } else {
                     // Up to the next piece that came.
-                    None => {
-                        let next = pieces.range(have..).next().map_or(end, |(at, _)| *at);
-                        self.piece(have, next - have)?
-                    }
+                    let next = pieces.range(have..).next().map_or(end, |(at, _)| *at);
+                    self.piece(have, next - have)?
                 };
                 file.write_all(&data).with_context(context)?;
                 have += data.len() as u32;

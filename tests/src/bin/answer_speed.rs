@@ -184,7 +184,7 @@ fn lengthen(short: &Path, long: &Path, bytes: u64) -> Result<(u64, u64)> {
     // The last group ends early: it would not be followed by another in the middle of a log.
     let last = sectors.iter().rposition(|sector| Header::read(sector).is_ok_and(|h| h.since_first == 0));
     let whole = sectors.get(..last.unwrap_or(0)).filter(|whole| !whole.is_empty()).context("too short")?;
-    let session = Header::read(&whole[0]).map(|header| header.session).unwrap_or(0);
+    let session = Header::read(&whole[0]).map_or(0, |header| header.session);
     let end_ms = Preamble::read(&sectors[whole.len()][15..]).context("a group's start")?.start_ms;
     let frames: u64 = whole.iter().filter_map(|s| Header::read(s).ok()).map(|h| u64::from(h.frames)).sum();
     let mut out = BufWriter::new(File::create(long)?);
