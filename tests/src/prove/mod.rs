@@ -7,6 +7,7 @@
 mod card;
 mod damage;
 mod endurance;
+mod memory;
 mod noise;
 mod power_cuts;
 mod record;
@@ -16,6 +17,7 @@ mod stream;
 
 use anyhow::Result;
 
+pub use memory::Counting;
 pub use report::{Figures, Provenance, write as write_report};
 
 /// How much is tried.
