@@ -1,6 +1,6 @@
 //! `cargo xtask bench`: what the record takes, each figure beside what is asked for.
 //!
-//! Recordings are those of `tests/flights` and of the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes and
+//! Recordings are those of `tests/flights` and below the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes and
 //! costs repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
 
 use std::fs::{self, File};
@@ -79,19 +79,27 @@ fn flights() -> Result<Vec<PathBuf>> {
     let more = std::env::split_paths(&more).filter(|folder| !folder.as_os_str().is_empty());
     let mut flights: Vec<PathBuf> = Vec::new();
     for folder in std::iter::once(repo::root().join("tests/flights")).chain(more) {
-        let entries = fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
-        for entry in entries {
-            let path = entry?.path();
-            let is_recording =
-                path.extension().is_some_and(|extension| extension == "tlog" || extension == "raw");
-            // The same recording may lie in two of the folders.
-            if is_recording && !flights.iter().any(|known| known.file_name() == path.file_name()) {
-                flights.push(path);
-            }
-        }
+        collect(&folder, &mut flights)?;
     }
     flights.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     Ok(flights)
+}
+
+/// The recordings in this folder and in those below it.
+fn collect(folder: &Path, flights: &mut Vec<PathBuf>) -> Result<()> {
+    let entries = fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    for entry in entries {
+        let path = entry?.path();
+        let is_recording =
+            path.extension().is_some_and(|extension| extension == "tlog" || extension == "raw");
+        if path.is_dir() {
+            collect(&path, flights)?;
+        } else if is_recording && !flights.iter().any(|known| known.file_name() == path.file_name()) {
+            // The same recording may lie in two of the folders.
+            flights.push(path);
+        }
+    }
+    Ok(())
 }
 
 /// Those that the means and the emulator take: tlogs that are not signed.
