@@ -28,6 +28,10 @@ use crate::flights::own;
 /// What a cut may cost at most.
 const LOSS_MAX_US: u64 = 200_000;
 
+/// No smaller part of a block is new by itself: an entry of the FAT has four bytes, and no file system of this kind
+/// stands half of one.
+const WORD: usize = 4;
+
 /// A card that is back is found within a second, and has what waited for it within half of one.
 const CATCH_UP_US: u64 = 1_500_000;
 
@@ -159,9 +163,10 @@ enum Tear {
 }
 
 impl Tear {
-    /// In the middle, or after any byte.
+    /// In the middle, or between any two words.
     fn by_chance(random: &mut Random) -> Self {
-        let at = if random.chance(0.5) { BLOCK / 2 } else { 1 + random.below(BLOCK as u64 - 1) as usize };
+        let words = (BLOCK / WORD) as u64;
+        let at = if random.chance(0.5) { BLOCK / 2 } else { WORD * (1 + random.below(words - 1)) as usize };
         if random.chance(0.5) { Self::Before(at) } else { Self::From(at) }
     }
 
