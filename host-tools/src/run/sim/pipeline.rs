@@ -413,6 +413,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         stats
     }
 
+    /// Parameters as they are now.
+    pub(super) fn params(&self) -> Params {
+        *self.monitoring.monitor().params()
+    }
+
     /// Whether the card no longer holds all that was logged: old segments were overwritten.
     pub(super) fn has_overwritten(&self) -> bool {
         let card = self.slot_status.read();
