@@ -250,7 +250,11 @@ impl Hostile {
                 self.waiting.extend(old);
                 return;
             }
-            _ => at_target(Packet::new(122), 0),
+            // As much as there can be.
+            _ if self.rng.chance(0.5) => {
+                Packet::new(23).f32(0, 5_000.0).u8(4, 1).u8(5, 191).text(6, 16, "GS_BUDGET")
+            }
+            _ => Packet::new(23).f32(0, 57_600.0).u8(4, 1).u8(5, 191).text(6, 16, "GS_BAUD"),
         };
         self.say(&packet);
     }
@@ -267,7 +271,10 @@ impl Hostile {
         if self.rng.chance(0.2) {
             return self.random_bytes(16);
         }
-        let mut name = TABLE[self.below(TABLE.len() as u64) as usize].name.as_bytes().to_vec();
+        // Who turns his own port off is not heard any longer, and that would be the end of the attack.
+        let name =
+            Some(TABLE[self.below(TABLE.len() as u64) as usize].name).filter(|name| *name != "GS_PATH");
+        let mut name = name.unwrap_or("GS_BUDGET").as_bytes().to_vec();
         name.resize(16, 0);
         name
     }
