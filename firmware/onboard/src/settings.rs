@@ -130,7 +130,7 @@ impl Monitoring<'_> {
             _ if long => false,
             Ok(Line::Nothing) => true,
             Ok(Line::Set(name, value)) => {
-                value.parse().is_ok_and(|value| self.set_by_link(now, name, value, (0, 0), sectors))
+                param_line::value(value).is_some_and(|value| self.set_by_link(now, name, value, (0, 0), sectors))
             }
             Ok(Line::Wrong) | Err(_) => false,
         };
