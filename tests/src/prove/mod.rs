@@ -8,6 +8,7 @@ mod card;
 mod damage;
 mod endurance;
 mod hostile_gs;
+mod memory;
 mod noise;
 mod power_cuts;
 mod record;
@@ -17,6 +18,7 @@ mod stream;
 
 use anyhow::Result;
 
+pub use memory::Counting;
 pub use report::{Figures, Provenance, write as write_report};
 
 /// How much is tried.
