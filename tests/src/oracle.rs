@@ -86,6 +86,24 @@ pub fn companion(port: u16) -> Value {
     serde_json::from_str(&said).expect("companion.py prints JSON")
 }
 
+/// Talks to the box at this UDP port with pymavlink's signing; `state` is what a run leaves for the next one: see
+/// `tests/oracle/signing.py`.
+pub fn signing(port: u16, state: &Path) -> Value {
+    json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
+}
+
+/// Plays the autopilot (`px4` or `ardupilot`) at one UDP port of the box and the ground station at the other: see
+/// `tests/oracle/vehicle.py`.
+pub fn vehicle(autopilot: u16, ground: u16, kind: &str) -> Value {
+    let arguments = [autopilot.to_string(), ground.to_string(), kind.to_owned()];
+    json(&ask("vehicle.py", &arguments.map(PathBuf::from)))
+}
+
+/// Sits at MAVProxy's prompt: see `tests/oracle/gs_mavproxy.py`.
+pub fn mavproxy(port: u16, folder: &Path) -> Value {
+    json(&run("gs_mavproxy.py", &[PathBuf::from(port.to_string()), folder.to_owned()]))
+}
+
 /// Downloads the oldest log to `out` as a ground station does, `loss` of all frames lost: see
 /// `tests/oracle/log_download.py`.
 pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {
