@@ -14,6 +14,7 @@ mod persistence;
 mod power_cut;
 mod round_trip;
 mod salvage;
+mod usage;
 
 /// Said past the test harness, which would keep it to itself: what was not tested is no success.
 #[cfg(not(feature = "oracle"))]
