@@ -477,7 +477,7 @@ mod tests {
         let params = params(&[("CMP1_KIND", 2.0), ("CMP1_NUMBER", 1.0)]);
         let totals = flown(1.0, 2.0);
         let wear = Wear { totals: &totals, battery_cycles: &[0.75] };
-        let session = Session::now(5, true, totals, &wear, &Exposure::new());
+        let session = Session::now(5, true, &totals, &wear, &Exposure::new());
         let none = Totals::nothing();
         let mut component = Component { name: Label::new("pack A"), ..Component::NONE };
         component.describe(0, &Wear { totals: &none, battery_cycles: &[] }, &params);

@@ -268,7 +268,7 @@ mod tests {
         heat(&mut exposure, 90_000, 90_500, 200.0);
         assert_eq!(seen(&exposure), [(0, 10.0), (3, 10.0), (7, 0.4)]);
         let wear = Wear { totals: &Totals::nothing(), battery_cycles: &[] };
-        let session = Session::now(7, true, Totals::nothing(), &wear, &exposure);
+        let session = Session::now(7, true, &Totals::nothing(), &wear, &exposure);
         let mut stored = [0; Exposure::BYTES];
         exposure.encode(8, &mut stored);
         let mut exposure = Exposure::decode(&stored).expect("readable");

@@ -329,7 +329,7 @@ impl Monitor {
             }
             ItemKey::Session => {
                 let (totals, wear) = (self.usage.totals(), self.usage.wear());
-                Session::now(self.boots(), self.heard(), totals, &wear, &self.exposure).encode(out)
+                Session::now(self.boots(), self.heard(), &totals, &wear, &self.exposure).encode(out)
             }
         }
     }

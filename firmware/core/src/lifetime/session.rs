@@ -62,12 +62,18 @@ impl Session {
     };
 
     /// The session as it stands.
-    pub(crate) fn now(boots: u32, heard: bool, totals: Totals, wear: &Wear<'_>, exposure: &Exposure) -> Self {
+    pub(crate) fn now(
+        boots: u32,
+        heard: bool,
+        totals: &Totals,
+        wear: &Wear<'_>,
+        exposure: &Exposure,
+    ) -> Self {
         let mut battery_cycles = [0.0; BATTERIES_MAX];
         for (to, cycles) in battery_cycles.iter_mut().zip(wear.battery_cycles) {
             *to = *cycles;
         }
-        Self { boots, heard, totals, battery_cycles, exposure: *exposure.session() }
+        Self { boots, heard, totals: *totals, battery_cycles, exposure: *exposure.session() }
     }
 
     /// What components wore by it.
