@@ -18,7 +18,7 @@ use tempfile::TempDir;
 
 /// `hums sim` in real time, with a ground station's port.
 struct Board {
-    dir: TempDir,
+    dir: Option<TempDir>,
     child: Child,
     port: u16,
 }
@@ -36,11 +36,19 @@ impl Board {
         command.arg(own("ap_quad_guided.tlog")).arg("--sd").arg(dir.path().join("card.img"));
         command.args(["--gs", &format!("udpin:127.0.0.1:{port}")]).args(flags);
         let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-        Self { dir, child, port }
+        Self { dir: Some(dir), child, port }
     }
 
     /// Ends it in order, as Ctrl-C does, and gives everything that its log holds, a line each.
-    fn end(mut self) -> String {
+    fn end(self) -> String {
+        let dir = self.switch_off();
+        let image = dir.path().join("card.img");
+        let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()];
+        hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0]).text()
+    }
+
+    /// Ends it, and leaves the folder with its card and its store.
+    fn switch_off(mut self) -> TempDir {
         let kill = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
         assert!(kill.success());
         let start = Instant::now();
@@ -48,17 +56,7 @@ impl Board {
             assert!(start.elapsed() < Duration::from_secs(30), "it does not end");
             std::thread::sleep(Duration::from_millis(20));
         }
-        let image = self.dir.path().join("card.img");
-        hums([
-            "decode".as_ref(),
-            image.as_os_str(),
-            "-o".as_ref(),
-            "-".as_ref(),
-            "--format".as_ref(),
-            "jsonl".as_ref(),
-        ])
-        .expect_code(&[0])
-        .text()
+        self.dir.take().expect("it is switched off once")
     }
 }
 
@@ -101,6 +99,45 @@ fn a_ground_station_lists_reads_sets_and_commands() {
     for recorded in ["BAT_REM_WARN", "recording stopped by 255/190", "recording started by 255/190"] {
         assert!(log.contains(recorded), "the record does not tell: {recorded}");
     }
+}
+
+#[test]
+fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_after_power_off() {
+    let dir = tempfile::tempdir().unwrap();
+    let (params, store, state) =
+        (dir.path().join("params.txt"), dir.path().join("store"), dir.path().join("state"));
+    fs::write(&params, "GS_BUDGET 5000\nSIGN_PORT 1\nGS_SIGN 2\n").unwrap();
+    let (params, store) = (params.display().to_string(), store.display().to_string());
+
+    let board = Board::start_in(dir, &["--params", &params, "--store", &store]);
+    let first = oracle::signing(board.port, &state);
+    let dir = board.switch_off();
+    assert_eq!((&first["before"], &first["plain"]["signed"]), (&20.0.into(), &0.into()), "{first}");
+    assert_eq!(first["key"], "HUMS: signing key set", "{first}");
+
+    let board = Board::start_in(dir, &["--store", &store]);
+    let second = oracle::signing(board.port, &state);
+    let dir = board.switch_off();
+    assert_eq!(second["replayed_after_power_off"], serde_json::json!([24.0]), "{second}");
+    assert_eq!(second["stamps_go_on"], true, "{second}");
+
+    for (said, stays) in [(&first, 20.0), (&second, 24.0)] {
+        let sealed = &said["sealed"];
+        assert!(sealed["signed"].as_u64() > Some(3), "{said}");
+        assert_eq!(sealed["good"], sealed["signed"], "{said}");
+        assert_eq!([&sealed["unsigned"], &sealed["wrong"], &sealed["bad"]], [0, 0, 0], "{said}");
+        assert_eq!((&sealed["rises"], &said["unsigned_list"]), (&true.into(), &true.into()), "{said}");
+        // MAV_RESULT 2 is denied.
+        assert_eq!((&said["unsigned_set"], &said["unsigned_command"]), (&stays.into(), &2.into()), "{said}");
+        assert_eq!((&said["signed_set"], &said["signed_command"]), (&21.0.into(), &true.into()), "{said}");
+        assert_eq!(said["wrong_key"], serde_json::json!([23.0]), "{said}");
+        assert_eq!(said["replayed"], serde_json::json!([23.0, 23.0]), "{said}");
+        assert_eq!(said["after"], 24.0, "{said}");
+    }
+    // The key is on the card in no form.
+    let card = fs::read(dir.path().join("card.img")).unwrap();
+    let key: Vec<u8> = (1..33).collect();
+    assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
 }
 
 /// A UDP link that loses every tenth datagram, each way.

@@ -82,6 +82,12 @@ pub fn companion(port: u16) -> Value {
     serde_json::from_str(&said).expect("companion.py prints JSON")
 }
 
+/// Talks to the box at this UDP port with pymavlink's signing; `state` is what a run leaves for the next one: see
+/// `tests/oracle/signing.py`.
+pub fn signing(port: u16, state: &Path) -> Value {
+    json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
+}
+
 /// Downloads the oldest log to `out` as a ground station does, `loss` of all frames lost: see
 /// `tests/oracle/log_download.py`.
 pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {

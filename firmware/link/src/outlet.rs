@@ -18,7 +18,9 @@
 use hums_core::time::{Instant, Span};
 
 use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+use crate::frame::SIGNATURE;
 use crate::packet::Packet;
+use crate::signing::Seal;
 
 /// How long the line may be busy when a frame that is no finding is added.
 pub const BACKLOG: Span = Span::from_millis(50);
@@ -122,6 +124,8 @@ impl Window {
 pub struct Outlet {
     /// Makes our frames.
     pub encoder: Encoder,
+    /// Signs them, where they are to be signed.
+    pub seal: Option<Seal>,
     window: Window,
     events: Bucket,
     bulk: Bucket,
@@ -143,6 +147,7 @@ impl Outlet {
     pub const fn new(budget: u32, baud: u32) -> Self {
         Self {
             encoder: Encoder::new(),
+            seal: None,
             window: Window { slots: [0; Window::SLOTS], newest: 0 },
             events: Bucket::FULL,
             bulk: Bucket::FULL,
@@ -242,12 +247,16 @@ impl Outlet {
     /// Sends a message of ours, if it may go now.
     pub fn send(&mut self, now: Instant, class: Class, packet: &Packet, out: &mut impl FnMut(&[u8])) -> bool {
         // Signing is work: not for a frame that will not go.
-        if !self.fits(now, class, self.encoder.frame_len(packet)) {
+        let tail = if self.seal.is_some() { SIGNATURE } else { 0 };
+        if !self.fits(now, class, self.encoder.frame_len(packet) + tail) {
             return false;
         }
         let mut buffer = [0; GS_FRAME_BYTES_MAX];
         let mut encoder = self.encoder;
-        let frame = encoder.frame(&mut buffer, packet);
+        let frame = match &mut self.seal {
+            Some(seal) => encoder.frame_signed(&mut buffer, packet, now, seal),
+            None => encoder.frame(&mut buffer, packet),
+        };
         let sent = !frame.is_empty() && self.pass(now, class, frame, out);
         if sent {
             // Only what is sent uses a sequence number.

@@ -358,13 +358,15 @@ pub fn text(finding: &Finding) -> Text {
     let words = health::words(finding.check);
     let number = finding.instance + 1;
     let Finding { value, limit, unit, .. } = *finding;
+    // Room is for what tells something.
+    let digits = if value.abs() < 1_000.0 { 2 } else { 0 };
     match (finding.level, health::instances(finding.check)) {
         (Level::Ok, 0 | 1) => Text::new(format_args!("HUMS: ok again: {words}")),
         (Level::Ok, _) => Text::new(format_args!("HUMS: ok again: {words} #{number}")),
         (Level::Stale, 0 | 1) => Text::new(format_args!("HUMS: no data: {words}")),
         (Level::Stale, _) => Text::new(format_args!("HUMS: no data: {words} #{number}")),
-        (_, 0 | 1) => Text::new(format_args!("HUMS: {words} {value:.2} {unit} (limit {limit})")),
-        _ => Text::new(format_args!("HUMS: {words} #{number} {value:.2} {unit} (limit {limit})")),
+        (_, 0 | 1) => Text::new(format_args!("HUMS: {words} {value:.digits$} {unit} (limit {limit})")),
+        _ => Text::new(format_args!("HUMS: {words} #{number} {value:.digits$} {unit} (limit {limit})")),
     }
 }
 
@@ -463,7 +465,9 @@ mod tests {
             for level in Level::ALL {
                 let finding =
                     Finding { check: check.name, unit: check.unit, value: -1234.5, ..finding(level) };
-                assert!(text(&finding).as_str().len() < 50, "{}", text(&finding).as_str());
+                let told = text(&finding);
+                let has_end = matches!(level, Level::Ok | Level::Stale) || told.as_str().ends_with(')');
+                assert!(has_end && told.as_str().len() <= 50, "{}", told.as_str());
             }
         }
     }

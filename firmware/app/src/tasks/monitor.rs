@@ -105,6 +105,7 @@ fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
 /// Hands over everything that is to outlive power, as fast as the store takes it.
 async fn save_all(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     links::ENDING.signal(());
+    body.save_signing(now(), handover);
     while !handover.finish(now(), body.monitor_mut()) {
         wake_others();
         links::STORED.wait().await;
@@ -137,6 +138,7 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
             );
         });
         handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
+        body.save_signing(now(), handover);
     });
     note(body, ends, handover);
 }

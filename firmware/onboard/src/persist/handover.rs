@@ -98,6 +98,16 @@ impl<'a> Handover<'a> {
         None
     }
 
+    /// Hands over an item of somebody else's; `false` when it found no room.
+    pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
+        self.items.put(key, value)
+    }
+
+    /// How often the store was found unreadable since power-on, and made anew: what is in it has to be put again.
+    pub fn remade(&self) -> u32 {
+        self.status.read().remade
+    }
+
     /// Each parameter that is not as it is stored; `false` when one found no room.
     fn put_params(&mut self, params: &Params) -> bool {
         let Self { items, stored, .. } = self;

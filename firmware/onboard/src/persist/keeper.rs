@@ -90,6 +90,12 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         self.look_for_room();
     }
 
+    /// A stored item of somebody else's, by its number; how long it is, 0 where there is none.
+    pub fn item(&mut self, number: u8, out: &mut [u8]) -> usize {
+        let got = self.store.as_mut().map(|store| store.get(Key::item(number), out));
+        got.and_then(Result::ok).flatten().unwrap_or(0)
+    }
+
     /// Saves one item. An erase is allowed while nothing can be missed, or if `may_erase` says so.
     pub fn service(&mut self, may_erase: bool) -> Kept {
         let Self { store, items, status, waits, .. } = self;

@@ -184,15 +184,18 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let mut keeper = Keeper::mount(Some(outside.flash.clone()), items_out, store_status);
         keeper.turn_ahead();
         keeper.load(monitor);
+        let handover = Handover::new(items_in, store_status, monitor.params());
+        let mut monitoring = Monitoring::new(monitor, writer, identity, card_status, port_status);
+        monitoring.restore_signing(&mut keeper);
         Self {
             slot_status: card_status,
             port_status,
             ends: queues.split(),
             keeper,
-            handover: Handover::new(items_in, store_status, monitor.params()),
+            handover,
             reception: Reception::new(port_status),
             uplink: Uplink::new(),
-            monitoring: Monitoring::new(monitor, writer, identity, card_status, port_status),
+            monitoring,
             storage: Storage::new(Slot(outside.card), card_status, held, entropy),
             outside,
             now: Instant::ZERO,
@@ -287,6 +290,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         });
         let frames = self.port_status.read().frames;
         self.handover.step(self.now, self.monitoring.monitor_mut(), frames);
+        self.monitoring.save_signing(self.now, &mut self.handover);
         self.note();
         self.keep(false);
         self.after_monitor()
@@ -373,6 +377,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
 
     /// Hands over everything that is to outlive power, as fast as the store takes it.
     fn save_all(&mut self) {
+        self.monitoring.save_signing(self.now, &mut self.handover);
         while !self.handover.finish(self.now, self.monitoring.monitor_mut()) && !self.is_dead() {
             self.keep(true);
         }
