@@ -72,6 +72,11 @@ pub fn manifest(files: &[PathBuf]) -> Manifest {
     Manifest::parse(&ask("manifest.py", files))
 }
 
+/// Usage of these recordings as pymavlink's messages have it: see `tests/oracle/usage.py`.
+pub fn usage(files: &[PathBuf]) -> Value {
+    json(&ask("usage.py", files))
+}
+
 /// Parses a stream to the ground station strictly and tells what was in it: see `tests/oracle/gs_stream.py`.
 ///
 /// # Panics
