@@ -75,7 +75,7 @@ def main():
     out = {"detected": prompt.expect(r"Detected vehicle 1:191", 20)}
 
     def show(name):
-        return prompt.ask(f"param show {name}", rf"{name}\s+(\S+)", 4, 2)
+        return prompt.ask(f"param show {name}", rf"{name} {{2,}}(\S+)", 4, 2)
 
     out["received"] = prompt.ask("param fetch", r"Received (\d+) parameters", 15, 2)
     out["shown"] = show("GS_BUDGET")
