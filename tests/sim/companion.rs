@@ -226,7 +226,7 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let unsigned = hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[1]);
     assert!(unsigned.stderr.contains("no answer"), "{}", unsigned.stderr);
     let key = folder.join("key.txt");
-    fs::write(&key, "a passphrase of this flight\n").unwrap();
+    fs::write(&key, "passphrase-of-this-flight\n").unwrap();
     let key = key.to_str().unwrap();
     let got =
         hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]).text();
