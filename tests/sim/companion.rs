@@ -234,6 +234,9 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let gone = hums(["params", "sign", "--remove", "--key", key, "--link", &address]).expect_code(&[0]);
     assert_eq!(gone.text(), "key removed\n");
     hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[0]);
+    let set = hums(["params", "sign", "--key", key, "--link", &address]).expect_code(&[0]);
+    assert_eq!(set.text(), "key set\n");
+    hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]);
 }
 
 #[test]
