@@ -15,6 +15,8 @@ mod persistence;
 mod power_cut;
 mod round_trip;
 mod salvage;
+mod second_decoder;
+mod usage;
 
 /// Said past the test harness, which would keep it to itself: what was not tested is no success.
 #[cfg(not(feature = "oracle"))]

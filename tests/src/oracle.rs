@@ -24,11 +24,15 @@ fn ask(script: &str, files: &[PathBuf]) -> String {
 }
 
 fn run(script: &str, arguments: &[PathBuf]) -> String {
+    outcome(script, arguments).text()
+}
+
+fn outcome(script: &str, arguments: &[PathBuf]) -> child::Outcome {
     let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
     command.arg(root().join("tests/oracle").join(script)).args(arguments);
     // The repository stays as it is: no compiled scripts in it.
     command.env("PYTHONDONTWRITEBYTECODE", "1");
-    child::run(&mut command, LIMIT).expect_code(&[0]).text()
+    child::run(&mut command, LIMIT).expect_code(&[0])
 }
 
 fn json(text: &str) -> Value {
@@ -46,6 +50,11 @@ pub fn readback(recording: &Path, out: &Path) -> Value {
     json(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
 }
 
+/// Decodes a log to `tlog` or `jsonl` by the format document alone: see `tests/oracle/hums_log`.
+pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
+    outcome("hums_log", &[PathBuf::from("--format"), PathBuf::from(format), log.to_owned()]).stdout
+}
+
 /// Runs a document's queries in a folder: see `tests/oracle/fleet.py`.
 pub fn fleet(document: &Path, folder: &Path) -> Value {
     json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
@@ -61,6 +70,11 @@ pub fn browser(page: &Path) -> Value {
 /// What pymavlink finds in these recordings.
 pub fn manifest(files: &[PathBuf]) -> Manifest {
     Manifest::parse(&ask("manifest.py", files))
+}
+
+/// Usage of these recordings as pymavlink's messages have it: see `tests/oracle/usage.py`.
+pub fn usage(files: &[PathBuf]) -> Value {
+    json(&ask("usage.py", files))
 }
 
 /// Parses a stream to the ground station strictly and tells what was in it: see `tests/oracle/gs_stream.py`.
