@@ -88,6 +88,12 @@ pub fn signing(port: u16, state: &Path) -> Value {
     json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
 }
 
+/// An autopilot in flight whose battery runs empty, and its pilot, at these UDP ports: see `tests/oracle/autopilot.py`.
+pub fn autopilot(autopilot: u16, gs: u16, pilot: &str) -> Value {
+    let arguments = [autopilot.to_string(), gs.to_string(), pilot.to_owned()];
+    json(&ask("autopilot.py", &arguments.map(PathBuf::from)))
+}
+
 /// Downloads the oldest log to `out` as a ground station does, `loss` of all frames lost: see
 /// `tests/oracle/log_download.py`.
 pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {
