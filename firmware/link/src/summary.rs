@@ -239,7 +239,7 @@ impl Summary {
             self.outlet.encoder.set_system(source.system);
         }
         let params = monitor.params();
-        self.outlet.set(params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32);
+        self.outlet.set(now, params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32);
         self.tell(now, out);
         if self.heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
             && self.outlet.send(now, Class::Own, &heartbeat(monitor), out)
@@ -519,7 +519,7 @@ mod tests {
     #[test]
     fn a_critical_finding_overtakes_those_that_wait() {
         let mut summary = Summary::new(&Params::defaults());
-        summary.outlet.set(0, 57_600);
+        summary.outlet.set(Instant::ZERO, 0, 57_600);
         for level in [Level::Warning, Level::Stale, Level::Critical, Level::Warning] {
             summary.finding(Instant::ZERO, &finding(level), &mut |_| panic!("there is no budget"));
         }

@@ -103,6 +103,11 @@ impl Companion {
 }
 
 impl Monitoring<'_> {
+    /// The line rates that count now, in baud: of the ground station's port and of the autopilot's.
+    pub const fn bauds(&self) -> (u32, u32) {
+        (self.summary.outlet.baud(), self.companion.outlet.baud())
+    }
+
     /// Takes one frame of the ground station from its queue; `false` when there is none.
     pub fn uplink(
         &mut self,
@@ -245,7 +250,7 @@ impl Monitoring<'_> {
             *protect = Some(request);
         }
         let params = monitor.params();
-        outlet.set(params.get(Param::ApBudget) as u32, params.get(Param::ApBaud) as u32);
+        outlet.set(now, params.get(Param::ApBudget) as u32, params.get(Param::ApBaud) as u32);
         let mut out = |bytes: &[u8]| gs.autopilot.put(bytes);
         if let Some(source) = monitor.vehicle().source {
             outlet.encoder.set_system(source.system);

@@ -170,8 +170,11 @@ impl Monitoring<'_> {
             "GS_SIGN" | "AP_SIGN" => self.companion.secure.signing.key().is_some(),
             _ => false,
         };
+        // With another rate at its port nothing is recorded any longer.
+        let deafens = name == "AP_BAUD" && self.monitor.vehicle().armed();
         match trust {
             Trust::Refused => false,
+            _ if deafens => false,
             Trust::Signed => true,
             Trust::Open => !guards || self.is_trusted(port),
         }

@@ -129,9 +129,8 @@ impl Monitoring<'_> {
         let set = match core::str::from_utf8(&line).map(param_line::read) {
             _ if long => false,
             Ok(Line::Nothing) => true,
-            Ok(Line::Set(name, value)) => {
-                value.parse().is_ok_and(|value| self.set_by_link(now, name, value, (0, 0), sectors))
-            }
+            Ok(Line::Set(name, value)) => param_line::value(value)
+                .is_some_and(|value| self.set_by_link(now, name, value, (0, 0), sectors)),
             Ok(Line::Wrong) | Err(_) => false,
         };
         if !set {
