@@ -27,6 +27,8 @@ const CYCLES_PER_INSTRUCTION: f64 = 1.5;
 const LOAD_MAX: f64 = 0.10;
 /// How fast decoding is to be, as a part of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;
+/// Steps of all checks, usage and trends, a second.
+const TICKS_PER_S: f64 = 20.0;
 /// The line on which costs are counted: at a slower one what is done by the clock is a larger part of each byte.
 const BAUD: &str = "921600";
 /// What is counted at least, in seconds of that line, so that a short recording shows more than its start.
@@ -307,6 +309,17 @@ fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
             count / bytes,
             count / frames,
             load(count / bytes) * 100.0
+        );
+    }
+    if let (Some(powered_s), Some(steps)) =
+        (report["usage"]["powered_time_s"].as_f64(), stages.get("tick").and_then(Value::as_f64))
+    {
+        let step = steps / (powered_s * TICKS_PER_S);
+        let load = step * TICKS_PER_S * CYCLES_PER_INSTRUCTION / CLOCK_HZ;
+        println!(
+            "  {:10} {step:8.0} instructions every 50 ms {:11.2} % of the processor",
+            "a step",
+            load * 100.0
         );
     }
     Ok((report["instructions"]["encode"].as_f64().context("no stage encode")?, bytes))
