@@ -33,7 +33,9 @@ const LIMITS: [(&str, f32); 5] = [
 
 fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     let mut params = Params::defaults();
-    settings.iter().for_each(|(name, value)| params.set(name, *value).unwrap());
+    for (name, value) in settings {
+        params.set(name, *value).unwrap();
+    }
     let mut monitor = Monitor::new(params);
     let mut findings = Vec::new();
     for now_ms in (0..END_MS).step_by(50) {
