@@ -226,7 +226,7 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let unsigned = hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[1]);
     assert!(unsigned.stderr.contains("no answer"), "{}", unsigned.stderr);
     let key = folder.join("key.txt");
-    fs::write(&key, "a passphrase of this flight\n").unwrap();
+    fs::write(&key, "passphrase-of-this-flight\n").unwrap();
     let key = key.to_str().unwrap();
     let got =
         hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]).text();
@@ -234,6 +234,9 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let gone = hums(["params", "sign", "--remove", "--key", key, "--link", &address]).expect_code(&[0]);
     assert_eq!(gone.text(), "key removed\n");
     hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[0]);
+    let set = hums(["params", "sign", "--key", key, "--link", &address]).expect_code(&[0]);
+    assert_eq!(set.text(), "key set\n");
+    hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]);
 }
 
 #[test]
