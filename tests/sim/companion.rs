@@ -193,6 +193,9 @@ fn a_px4_is_asked_for_what_is_missing_and_its_radio_is_shared() {
     assert!(said["version_asked"].as_u64() >= Some(1), "{said}");
     assert!(said["asked_again"].as_u64() >= Some(10), "after a reboot: {said}");
     assert_what_passes(&said, &dir);
+    // Announced, cancelled, accepted, and what the autopilot was asked until then: system, component, confirmation.
+    assert_eq!(said["cancelled"], serde_json::json!([true, true, false, []]), "{said}");
+    assert_eq!(said["asked_for"], serde_json::json!([true, false, true, [[1, 1, 0]]]), "{said}");
 }
 
 #[test]
