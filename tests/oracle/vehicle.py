@@ -224,23 +224,30 @@ def protecting(vehicle, out):
     """In flight with an empty battery it asks to return, unless somebody cancels that."""
     ground = vehicle.ground
 
-    def told(text, seconds):
+    def heard(wanted, seconds):
         def seen():
-            return any(frame[7] == 253 and text.encode() in frame for frame in ground.heard)
+            return any(wanted(frame) for frame in ground.heard)
 
         vehicle.run(seconds, seen)
         return seen()
 
+    def told(text, seconds):
+        return heard(lambda frame: frame[7] == 253 and text.encode() in frame, seconds)
+
     for name, value in ((b"PROT_ACTION", 1.0), (b"PROT_DELAY", 6.0)):
-        ground.mav.param_set_send(1, OURS, name, value, 9)
+        for _ in range(5):
+            ground.heard.clear()
+            ground.mav.param_set_send(1, OURS, name, value, 9)
+            if heard(lambda frame, name=name: frame[7] == 22 and name in frame, 2):
+                break
     for flight in ("cancelled", "asked_for"):
         ground.heard.clear()
         vehicle.flies = True
-        announced = told("return in 6 s", 20)
+        announced = told("return in 6 s", 60)
         if flight == "cancelled":
             ground.mav.command_long_send(1, OURS, 31011, 0, 0, 0, 0, 0, 0, 0, 0)
-            told("cancelled by command", 2)
-        accepted = told("return accepted", 9)
+            told("cancelled by command", 5)
+        accepted = told("return accepted", 9 if flight == "cancelled" else 30)
         out[flight] = [announced, told("cancelled by command", 0.1), accepted, vehicle.returns[:]]
         # On the ground again, disarmed: the next flight is another one.
         vehicle.flies = False
