@@ -71,15 +71,12 @@ fn heading(text: &mut String, log: &Overview) {
             boot.version, boot.git, boot.board, boot.reset
         );
     }
-    let _ = writeln!(
-        text,
-        "  frames   {} in {} bytes, {} records; as a tlog {} bytes: {:.2} times smaller",
-        contents.frames(),
-        log.log_bytes(),
-        contents.records,
-        contents.tlog_bytes(),
-        log.ratio()
-    );
+    let (frames, records) = (contents.frames(), contents.records);
+    let _ = write!(text, "  frames   {frames} in {} bytes, {records} records", log.log_bytes());
+    if frames > 0 {
+        let _ = write!(text, "; as a tlog {} bytes: {:.2} times smaller", contents.tlog_bytes(), log.ratio());
+    }
+    text.push('\n');
 }
 
 fn findings_text(text: &mut String, log: &Overview) {
@@ -111,15 +108,21 @@ fn sentence(finding: &FindingLine) -> String {
         _ => format!(" {}", u16::from(*instance) + 1),
     };
     let mut sentence = format!("{subsystem}: {words}{number}");
-    if finite(*value).is_some() {
-        let _ = write!(sentence, ", {value} {unit}");
+    if let Some(value) = finite(*value) {
+        let _ = write!(sentence, ", {} {unit}", short(value.into()));
         sentence.truncate(sentence.trim_end().len());
     }
-    if finite(*limit).is_some() {
-        let _ = write!(sentence, " (limit {limit})");
+    if let Some(limit) = finite(*limit) {
+        let _ = write!(sentence, " (limit {})", short(limit.into()));
     }
     let _ = write!(sentence, "; was {previous} [{check}]");
     sentence
+}
+
+/// To three decimals, and no more than it needs.
+fn short(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 fn more(text: &mut String, count: u64, listed: usize) {
@@ -193,11 +196,7 @@ fn usage_text(text: &mut String, log: &Overview) {
     if !log.contents.usage.is_empty() {
         text.push_str("  usage                                     session           life\n");
     }
-    let number = |value: Option<&f64>| match value {
-        None => String::new(),
-        Some(value) if value.fract() == 0.0 => format!("{value:.0}"),
-        Some(value) => format!("{value:.3}"),
-    };
+    let number = |value: Option<&f64>| value.map_or_else(String::new, |&value| short(value));
     let Contents { usage, lifetime, .. } = &log.contents;
     let names: BTreeSet<_> = usage.keys().chain(lifetime.keys()).collect();
     for name in names {
