@@ -261,10 +261,8 @@ def compare_measurement(influx, name, count, messages, comparison):
     for row, message in zip(rows, messages or []):
         for field, (kind, value) in message["fields"].items():
             def get(index, field=field, kind=kind, row=row):
-                # A tag of the same name makes the database call the field `name_1`.
-                key = field if index is None else f"{field}[{index}]"
-                place = columns.get(f"{key}_1", columns.get(key)) if key in ("system", "component", "session") \
-                    else columns.get(key)
+                name = f"{field}_field" if field in ("time", "vehicle", "session", "system", "component") else field
+                place = columns.get(name if index is None else f"{name}[{index}]")
                 found = None if place is None else row[place]
                 if kind in ("float", "double"):
                     return math.nan if found is None else found

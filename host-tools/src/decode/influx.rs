@@ -13,6 +13,8 @@
 //! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a message may
 //! come twice: the second one's time is a nanosecond later, so that none replaces another.
 
+use std::borrow::Cow;
+
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use hums_dialect::{Field, Kind};
@@ -229,12 +231,13 @@ impl<'a> Fields<'a> {
     }
 
     fn value(&mut self, field: &Field, value: Value<'_>) {
+        let name = free_name(field.name);
         match value {
-            Value::Scalar(scalar) => self.scalar(field, field.name, scalar),
-            Value::Text(text) => self.text(field.name, &String::from_utf8_lossy(text)),
+            Value::Scalar(scalar) => self.scalar(field, &name, scalar),
+            Value::Text(text) => self.text(&name, &String::from_utf8_lossy(text)),
             Value::Array(values) => {
                 for (place, scalar) in values.iter().enumerate() {
-                    self.scalar(field, &format!("{}[{place}]", field.name), scalar);
+                    self.scalar(field, &format!("{name}[{place}]"), scalar);
                 }
             }
         }
@@ -288,6 +291,15 @@ impl<'a> Fields<'a> {
             }
             Cell::Unknown(_) => {}
         }
+    }
+}
+
+/// The name of a message's field, with `_field` behind it where the database or our tags have that name already: a
+/// field called `time` would be dropped.
+fn free_name(name: &str) -> Cow<'_, str> {
+    match name {
+        "time" | "vehicle" | "session" | "system" | "component" => Cow::Owned(format!("{name}_field")),
+        _ => Cow::Borrowed(name),
     }
 }
 
