@@ -1,6 +1,9 @@
 //! The codec, from outside: whatever a link carries comes back bit for bit, with its times.
 #![allow(clippy::panic, reason = "that is how a test fails")]
 
+mod common;
+
+use common::Random;
 use hums_blackbox::record::{Clock, Note};
 use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, SectorSink, Writer};
 use hums_core::time::Instant;
@@ -61,21 +64,7 @@ fn round_trip(frames: &[Frame]) -> usize {
     card.0.len() * SECTOR_BYTES
 }
 
-/// A small generator of numbers (xorshift), so that streams are repeatable.
-struct Random(u64);
-
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0
-    }
-
-    fn below(&mut self, limit: usize) -> usize {
-        (self.next() >> 16) as usize % limit
-    }
-
     fn chance(&mut self, one_in: usize) -> bool {
         self.below(one_in) == 0
     }

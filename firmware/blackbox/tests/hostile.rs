@@ -10,23 +10,12 @@ mod reader;
 #[path = "../../../fuzz/src/round_trip.rs"]
 mod round_trip;
 
+mod common;
+
+use common::Random;
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
 
-/// A small generator of numbers (xorshift).
-struct Random(u64);
-
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0
-    }
-
-    fn below(&mut self, limit: usize) -> usize {
-        (self.next() >> 16) as usize % limit.max(1)
-    }
-
     fn bytes(&mut self, len: usize) -> Vec<u8> {
         (0..len).map(|_| (self.next() >> 24) as u8).collect()
     }
