@@ -157,7 +157,7 @@ impl Monitoring<'_> {
         let what = if may { "logs erased" } else { "erasing refused in flight, asked" };
         self.tell_event(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
         if may {
-            self.companion.library.erases = true;
+            self.companion.downloads.erases = true;
             self.companion.replies.push(port, Reply::Erased);
             self.changed(trust);
         }

@@ -70,7 +70,7 @@ pub(crate) struct Companion {
     pub(crate) replies: Replies,
     pub(crate) limits: [Limiter; 2],
     heartbeat_at: Option<Instant>,
-    pub(crate) library: Library,
+    pub(crate) downloads: Library,
     /// The log that is open over FTP.
     file: Option<LogName>,
     /// Somebody stopped the record.
@@ -97,7 +97,7 @@ impl Companion {
             replies: Replies::new(),
             limits: [Limiter::new(); 2],
             heartbeat_at: None,
-            library: Library::new(),
+            downloads: Library::new(),
             file: None,
             stopped: false,
             secure: Secure::new(),
@@ -212,8 +212,8 @@ impl Monitoring<'_> {
             Request::LogErase if asked.target.1 != 0 => self.erase(now, port, trust, by, sectors),
             // Of the broadcasts of a vehicle only those that name us: the autopilot has logs and files of its own.
             ref about_logs if asked.target.1 != 0 => {
-                let Companion { library, file, .. } = &mut self.companion;
-                library.asked(port, by, about_logs, file);
+                let Companion { downloads, file, .. } = &mut self.companion;
+                downloads.asked(port, by, about_logs, file);
             }
             _ => {}
         }

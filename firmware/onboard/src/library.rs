@@ -174,22 +174,22 @@ impl Monitoring<'_> {
         if self.companion.settings.is_reading() {
             return;
         }
-        if self.companion.library.erases {
-            let ticket = self.companion.library.next_ticket();
-            self.companion.library.erases =
+        if self.companion.downloads.erases {
+            let ticket = self.companion.downloads.next_ticket();
+            self.companion.downloads.erases =
                 !gs.shelf.want(Want { ticket, which: Which::At(0), what: What::Erase });
-            self.companion.library.asked = false;
+            self.companion.downloads.asked = false;
         }
         // Bounded by the port's budget; a number all the same.
         for _ in 0..64 {
-            let Some(mut job) = self.companion.library.job else {
+            let Some(mut job) = self.companion.downloads.job else {
                 while gs.shelf.answer(|_, _| true) {}
                 return;
             };
             let step = if job.kind.want().is_none() {
                 self.step(now, &mut job, None, gs)
             } else {
-                let ticket = self.companion.library.ticket;
+                let ticket = self.companion.downloads.ticket;
                 let mut seen = None;
                 // A copy, because to send needs everything else.
                 let there = gs.shelf.answer(|answer, data| {
@@ -210,10 +210,10 @@ impl Monitoring<'_> {
                 self.step(now, &mut job, Some((&answer, &data)), gs)
             };
             match step {
-                Step::Done => self.companion.library.job = None,
+                Step::Done => self.companion.downloads.job = None,
                 Step::Wait | Step::Next => {
-                    self.companion.library.job = Some(job);
-                    self.companion.library.asked = false;
+                    self.companion.downloads.job = Some(job);
+                    self.companion.downloads.asked = false;
                 }
             }
             if matches!(step, Step::Wait) {
@@ -223,7 +223,7 @@ impl Monitoring<'_> {
     }
 
     fn want(&mut self, job: &Job, gs: &mut GsIn) {
-        let library = &mut self.companion.library;
+        let library = &mut self.companion.downloads;
         if let Some((which, what)) = job.kind.want().filter(|_| !library.asked) {
             library.ticket = library.ticket.wrapping_add(1);
             library.asked = gs.shelf.want(Want { ticket: library.ticket, which, what });

@@ -85,7 +85,7 @@ impl Monitoring<'_> {
 
     fn read_on(&mut self, now: Instant, offset: u32, sectors: &mut SectorsIn, gs: &mut GsIn) {
         let Some(ticket) = self.companion.settings.ticket else {
-            let ticket = self.companion.library.next_ticket();
+            let ticket = self.companion.downloads.next_ticket();
             if gs.shelf.want(Want { ticket, which: Which::Settings, what: What::Data(offset) }) {
                 self.companion.settings.ticket = Some(ticket);
             }
