@@ -4,10 +4,13 @@
 //! checks see of the same. Its recorder is its own to judge.
 
 use hums_core::health::{self, EXPECTED, Level, Subsystem, When};
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use serde::Serialize;
 
 use super::craft::{Craft, words};
+
+/// As long as a heartbeat may be missed.
+const SILENT: Span = Span::from_secs(5);
 
 /// One subsystem.
 #[derive(Debug, Serialize)]
@@ -24,7 +27,10 @@ pub struct Part {
 
 /// The whole vehicle's level, by whoever knows best.
 pub fn overall(craft: &Craft, now: Instant) -> &'static str {
-    craft.companion.overall(now).unwrap_or_else(|| craft.monitor.health().overall()).name()
+    let here = || {
+        if is_silent(craft, now) { Level::Stale } else { craft.monitor.health().overall() }
+    };
+    craft.companion.overall(now).unwrap_or_else(here).name()
 }
 
 /// All subsystems, in the order of [`Subsystem::ALL`].
@@ -35,7 +41,10 @@ pub fn of(craft: &Craft, now: Instant) -> Vec<Part> {
 fn part(craft: &Craft, now: Instant, subsystem: Subsystem) -> Part {
     let onboard = craft.companion.level(now, subsystem);
     let recorder = subsystem == Subsystem::Recorder;
-    let here = if recorder { Level::Stale } else { craft.monitor.health().subsystem(subsystem) };
+    let silent = is_silent(craft, now);
+    // Of a vehicle that is silent one thing is known: that it is.
+    let unknown = recorder || (silent && subsystem != Subsystem::Link);
+    let here = if unknown { Level::Stale } else { craft.monitor.health().subsystem(subsystem) };
     let level = onboard.unwrap_or(here);
     let by = match onboard {
         Some(_) => "on board",
@@ -48,10 +57,17 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem) -> Part {
         (Some("idle"), waits_for(subsystem).to_owned())
     } else if unknown && !EXPECTED.contains(&subsystem) {
         (Some("none"), "nothing is heard of any".to_owned())
+    } else if silent && level == Level::Stale && !recorder {
+        (None, format!("nothing heard for {} s", now.since(craft.heard).as_millis() / 1000))
     } else {
         (None, reason(craft, subsystem, level, here))
     };
     Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason }
+}
+
+/// Whether nothing at all has been heard of the vehicle for a while.
+fn is_silent(craft: &Craft, now: Instant) -> bool {
+    now.since(craft.heard) > SILENT
 }
 
 /// Whether none of its checks has anything to say.

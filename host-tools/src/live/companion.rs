@@ -91,6 +91,11 @@ impl Companion {
         self.named && self.heard.is_some_and(|at| now.since(at) <= GONE)
     }
 
+    /// Whether there ever was one on this link.
+    pub fn known(&self) -> bool {
+        self.named
+    }
+
     /// Its word on the whole vehicle, while it is heard.
     pub fn overall(&self, now: Instant) -> Option<Level> {
         self.overall.filter(|_| self.present(now))

@@ -23,6 +23,12 @@ use crate::decode::reference::Reference;
 
 /// `STATUSTEXT`
 const STATUSTEXT: u32 = 253;
+/// By then a HUMS on board has told of itself.
+const SETTLE: Span = Span::from_secs(5);
+/// When the whole vehicle is silent for so long, that its ESCs are says nothing of them.
+const SILENT: Span = Span::from_secs(1);
+/// The check of that.
+const ESC_SILENT: &str = "esc_silent";
 /// How often the link's figures are kept for their plot.
 const LINK_EVERY: Span = Span::from_secs(1);
 
@@ -52,6 +58,7 @@ pub struct Craft {
     /// What its components say in words.
     texts: Texts,
     sequences: Sequences,
+    began: Instant,
     link_at: Instant,
 }
 
@@ -71,6 +78,7 @@ impl Craft {
             loss: None,
             texts: Texts::default(),
             sequences: Sequences::new(),
+            began: at,
             link_at: at,
         }
     }
@@ -82,9 +90,9 @@ impl Craft {
         if Some(Source { system: frame.system(), component: frame.component() }) == self.counted(at) {
             self.missing += u64::from(lost);
         }
-        let before = self.companion.present(at);
+        let before = self.companion.known();
         self.companion.frame(at, frame);
-        if !before && self.companion.present(at) {
+        if !before && self.companion.known() {
             // What was missing until now was left out by it.
             self.missing = 0;
         }
@@ -136,12 +144,13 @@ impl Craft {
     }
 
     /// Whose sequence numbers tell what the link loses: a HUMS on board thins out what it forwards, which is no loss, so
-    /// its own count where there is one.
+    /// its own count where there is one. Whether there is one shows within some seconds.
     fn counted(&self, now: Instant) -> Option<Source> {
         let autopilot = self.monitor.vehicle().source?;
-        let component =
-            if self.companion.present(now) { hums_link::encode::COMPONENT } else { autopilot.component };
-        Some(Source { component, ..autopilot })
+        if self.companion.known() {
+            return Some(Source { component: hums_link::encode::COMPONENT, ..autopilot });
+        }
+        (now.since(self.began) >= SETTLE).then_some(autopilot)
     }
 
     /// What time alone asks for, every [`hums_core::monitor::TICK`].
@@ -157,11 +166,15 @@ impl Craft {
         let recorder = RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() };
         // A HUMS on board passes on what the radio can carry: that a stream is thin here says nothing of the vehicle.
         let thin = self.companion.present(now);
+        let cut_off = now.since(self.heard) >= SILENT;
         let Self { monitor, worries, .. } = self;
         monitor.tick(now, &link, &recorder, &mut |finding| {
             let silence = finding.level == Level::Stale
                 || (finding.level == Level::Ok && finding.previous == Level::Stale);
             if finding.subsystem == Subsystem::Recorder || (thin && silence) {
+                return;
+            }
+            if cut_off && finding.check == ESC_SILENT {
                 return;
             }
             let key = (finding.check, finding.instance);

@@ -43,7 +43,7 @@ export const words = (name) => name.replace(/_/g, " ");
 export const panel = (id, title, body, options = {}) => {
   const corner = el("span", { class: "corner" });
   const node = el("section", { class: `panel ${options.class ?? ""}`, "data-panel": id, "aria-label": title },
-    el("h3", {}, title, options.unit ? el("small", {}, options.unit) : null, corner), body);
+    el("h3", {}, el("span", { class: "name" }, title), options.unit ? el("small", {}, options.unit) : null, corner), body);
   return {
     node,
     // Takes values as the server sends them: [value, age in ms, 1 where that is stale].
