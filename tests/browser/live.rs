@@ -51,7 +51,7 @@ fn cut(recording: &Path, from_s: f64, to: &Path) -> PathBuf {
 fn last<'a>(frames: &'a [Value], message: &str, by_s: f64) -> &'a Value {
     let of_vehicle = |frame: &&Value| frame["message"] == message && frame["component"] == 1;
     let by = |frame: &&Value| frame["time_boot"].as_f64().unwrap() <= by_s;
-    let found = frames.iter().filter(of_vehicle).filter(by).next_back();
+    let found = frames.iter().filter(of_vehicle).rfind(by);
     &found.unwrap_or_else(|| panic!("no {message} by {by_s} s"))["fields"]
 }
 
@@ -292,14 +292,10 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
 fn ask(address: &str, path: &str, headers: &[(&str, &str)]) -> String {
     let host = address.trim_start_matches("http://").trim_end_matches('/');
     let mut stream = TcpStream::connect(host).unwrap();
-    let has_host = headers.iter().any(|(name, _)| *name == "Host");
-    let mut request = format!("GET {path} HTTP/1.1\r\n");
-    if !has_host {
-        request += &format!("Host: {host}\r\n");
-    }
-    for (name, value) in headers {
-        request += &format!("{name}: {value}\r\n");
-    }
+    let own = [("Host", host)].into_iter().filter(|_| headers.iter().all(|(name, _)| *name != "Host"));
+    let lines: Vec<String> =
+        own.chain(headers.iter().copied()).map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+    let request = format!("GET {path} HTTP/1.1\r\n{}", lines.concat());
     stream.write_all(format!("{request}\r\n").as_bytes()).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
     let mut line = String::new();

@@ -77,7 +77,7 @@ mod tests {
             }
         }
         let (_, page) = find("index.html").expect("it is there");
-        for (name, ..) in ASSETS.iter().filter(|(name, ..)| name.ends_with(".css")) {
+        for (name, ..) in ASSETS.iter().filter(|(_, kind, _)| *kind == STYLE) {
             assert!(page.contains(name), "nobody asks for {name}");
         }
     }

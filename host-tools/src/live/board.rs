@@ -58,7 +58,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem) -> Part {
     } else if unknown && !EXPECTED.contains(&subsystem) {
         (Some("none"), "nothing is heard of any".to_owned())
     } else if silent && level == Level::Stale && !recorder {
-        (None, format!("nothing heard for {} s", now.since(craft.heard).as_millis() / 1000))
+        (None, format!("silent for {} s", now.since(craft.heard).as_millis() / 1000))
     } else {
         (None, reason(craft, subsystem, level, here))
     };

@@ -54,12 +54,14 @@ pub struct Rate {
     pub frames_s: f64,
 }
 
-impl Rate {
+impl Default for Rate {
     /// From now on.
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self { since: Wall::now(), frames: 0, frames_s: 0.0 }
     }
+}
 
+impl Rate {
     /// So many frames there were until now.
     pub fn count(&mut self, frames: u64) {
         let passed = self.since.elapsed().as_secs_f64();
@@ -87,7 +89,7 @@ impl Feed {
             start: Wall::now(),
             epoch_us: u64::try_from(now.as_micros()).unwrap_or(0),
             heard: None,
-            rate: Rate::new(),
+            rate: Rate::default(),
         })
     }
 

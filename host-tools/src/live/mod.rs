@@ -62,7 +62,7 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
     let (hub, commands) = Hub::new();
     interrupt::watch();
-    let follower = follow(args, params, &hub, commands, influx)?;
+    let follower = follow(args, &params, &hub, commands, influx)?;
     let page = page_address(address, token.as_deref());
     println!("{page}");
     if args.open {
@@ -88,7 +88,7 @@ type Follower = JoinHandle<Result<Option<Influx>>>;
 /// Starts the thread that follows the vehicle; what is wrong with the source is told at once.
 fn follow(
     args: &cli::Live,
-    params: Params,
+    params: &Params,
     hub: &Arc<Hub>,
     commands: Receiver<hub::Command>,
     influx: Option<Influx>,
@@ -96,11 +96,11 @@ fn follow(
     let thread = std::thread::Builder::new().name("vehicle".to_owned());
     let hub = Arc::clone(hub);
     let started = if args.input.is_live() {
-        let feed = Feed::open(&args.input, params, hub, influx)?;
+        let feed = Feed::open(&args.input, *params, hub, influx)?;
         thread.spawn(move || Ok(feed.run()))
     } else {
         let opened = recording::open(&args.input)?;
-        let player = Player::new(&args.input.to_string(), params, hub, commands, influx);
+        let player = Player::new(&args.input.to_string(), *params, hub, commands, influx);
         thread.spawn(move || player.run(opened))
     };
     started.context("no thread")

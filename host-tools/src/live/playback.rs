@@ -78,7 +78,7 @@ impl Player {
             speed: 1.0,
             ..SourceJson::default()
         };
-        let (rate, timeline) = (Rate::new(), Arc::default());
+        let (rate, timeline) = (Rate::default(), Arc::default());
         Self { hub, commands, params, source, epoch_us: None, influx, rate, epoch: 0, timeline }
     }
 
@@ -142,7 +142,7 @@ impl Player {
         let start = start.unwrap_or_default();
         (self.source.start_s, self.source.end_s) = (start.as_secs_f64(), end.as_secs_f64());
         self.timeline = timeline(hub);
-        self.rate = Rate::new();
+        self.rate = Rate::default();
         Ok(Loaded { spool: writer.finish()?, copies, start, end, frames })
     }
 
@@ -153,7 +153,7 @@ impl Player {
         let mut now = loaded.start;
         self.source.phase = if loaded.frames == 0 { "ended" } else { "playing" };
         if loaded.frames == 0 {
-            self.source.words = "there is no frame in it".to_owned();
+            "there is no frame in it".clone_into(&mut self.source.words);
         }
         let (mut before, mut turn) = (Wall::now(), Wall::now());
         while !interrupt::requested() {
@@ -196,7 +196,6 @@ impl Player {
     ) -> Result<()> {
         match command {
             Command::Pause if self.source.phase == "playing" => self.source.phase = "paused",
-            Command::Pause => {}
             Command::Play => {
                 if self.source.phase == "ended" {
                     self.seek(loaded.start, loaded, world, now)?;
@@ -211,7 +210,8 @@ impl Player {
                     self.source.phase = "paused";
                 }
             }
-            Command::Speed(_) | Command::Seek(_) => {}
+            // Nothing to be paused, and times that are no numbers.
+            Command::Pause | Command::Speed(_) | Command::Seek(_) => {}
         }
         Ok(())
     }

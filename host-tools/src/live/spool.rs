@@ -110,7 +110,7 @@ mod tests {
             writer.push(Spooled { at, check: Check::Verified, bytes: &bytes }).expect("room");
         }
         let mut spool = writer.finish().expect("a file");
-        let mut count = |spool: &mut Spool, until_ms| {
+        let count = |spool: &mut Spool, until_ms| {
             let mut count = 0;
             while let Some(frame) = spool.next_until(Instant::from_millis(until_ms)).expect("a file") {
                 assert!(frame.at <= Instant::from_millis(until_ms));

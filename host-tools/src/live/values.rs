@@ -52,8 +52,11 @@ impl Default for Told {
     }
 }
 
+/// A name of the page's, and the quantity of a motor.
+type OfMotor = (&'static str, fn(usize) -> Quantity);
+
 /// What of an ESC is shown.
-const ESC: [(&str, fn(usize) -> Quantity); 6] = [
+const ESC: [OfMotor; 6] = [
     ("rpm", Quantity::EscRpm),
     ("volts", Quantity::EscVoltage),
     ("amperes", Quantity::EscCurrent),
@@ -117,6 +120,9 @@ impl Serialize for Shown {
     }
 }
 
+/// Takes a value by its name: when it came, what it is, how old it may be.
+type Put<'a> = dyn FnMut(&'static str, Option<Instant>, Option<f32>, Span) + 'a;
+
 /// Everything that is known now, by name.
 #[derive(Debug)]
 pub struct Values<'a> {
@@ -141,34 +147,48 @@ impl<'a> Values<'a> {
                 each(name, Shown::new(now, at, value, *limit));
             }
         }
-        let mut single = |name, at: Option<Instant>, value: Option<f32>, limit| {
+        let mut put = |name, at: Option<Instant>, value: Option<f32>, limit| {
             if let (Some(at), Some(value)) = (at, value) {
                 each(name, Shown::new(now, at, Scalar::Single(value), limit));
             }
         };
-        let vehicle = craft.monitor.vehicle();
+        self.motion(&mut put);
+        self.condition(&mut put);
+        self.power(&mut put);
+        self.radio(&mut put);
+        self.engine(&mut put);
+    }
+
+    /// Attitude, height, and where the receiver thinks it is.
+    fn motion(&self, put: &mut Put<'_>) {
+        let vehicle = self.craft.monitor.vehicle();
         let attitude = &vehicle.attitude;
         if let Some(angles) = attitude.get() {
             for (name, angle) in [("roll", angles.roll), ("pitch", angles.pitch), ("yaw", angles.yaw)] {
-                single(name, attitude.at(), Some(angle.0.to_degrees()), MOTION);
+                put(name, attitude.at(), Some(angle.0.to_degrees()), MOTION);
             }
         }
         let height = vehicle.global.get().map(|global| global.relative_altitude.0);
-        single("height", vehicle.global.at(), height, MOTION);
+        put("height", vehicle.global.at(), height, MOTION);
         let gnss = &vehicle.gnss[0];
         if let Some(fix) = gnss.get() {
-            single("fix", gnss.at(), Some(f32::from(fix.fix)), SLOW);
-            single("satellites", gnss.at(), fix.satellites.map(f32::from), SLOW);
-            single("hdop", gnss.at(), fix.hdop, SLOW);
-            single("accuracy", gnss.at(), fix.accuracy.map(|metres| metres.0), SLOW);
+            put("fix", gnss.at(), Some(f32::from(fix.fix)), SLOW);
+            put("satellites", gnss.at(), fix.satellites.map(f32::from), SLOW);
+            put("hdop", gnss.at(), fix.hdop, SLOW);
+            put("accuracy", gnss.at(), fix.accuracy.map(|metres| metres.0), SLOW);
         }
+    }
+
+    /// Vibration and estimator.
+    fn condition(&self, put: &mut Put<'_>) {
+        let vehicle = self.craft.monitor.vehicle();
         if let Some(vibration) = vehicle.vibration.get() {
             let names = ["vibration_0", "vibration_1", "vibration_2"];
             for (name, level) in names.into_iter().zip(vibration.levels) {
-                single(name, vehicle.vibration.at(), level, SLOW);
+                put(name, vehicle.vibration.at(), level, SLOW);
             }
-            let clips = vibration.clips.iter().sum::<u32>();
-            single("clips", vehicle.vibration.at(), Some(clips as f32), SLOW);
+            let clips = vibration.clips.iter().fold(0_u32, |sum, clips| sum.saturating_add(*clips));
+            put("clips", vehicle.vibration.at(), Some(clips as f32), SLOW);
         }
         if let Some(estimator) = vehicle.estimator.get() {
             let figures = [
@@ -178,54 +198,66 @@ impl<'a> Values<'a> {
                 ("ekf_compass", estimator.compass),
             ];
             for (name, figure) in figures {
-                single(name, vehicle.estimator.at(), figure, SLOW);
+                put(name, vehicle.estimator.at(), figure, SLOW);
             }
         }
-        let battery = &vehicle.batteries[0];
-        let (from_battery, system) = (battery.get(), vehicle.system.get());
-        let amperes = from_battery.and_then(|battery| battery.current);
-        match amperes {
-            Some(amperes) => single("battery_amperes", battery.at(), Some(amperes.0), SLOW),
-            None => {
-                let amperes = system.and_then(|system| system.current).map(|amperes| amperes.0);
-                single("battery_amperes", vehicle.system.at(), amperes, SLOW);
-            }
+    }
+
+    /// Battery, rails, the autopilot's computer.
+    fn power(&self, put: &mut Put<'_>) {
+        let vehicle = self.craft.monitor.vehicle();
+        let (battery, system) = (&vehicle.batteries[0], &vehicle.system);
+        if let Some(amperes) = battery.get().and_then(|battery| battery.current) {
+            put("battery_amperes", battery.at(), Some(amperes.0), SLOW);
+        } else {
+            let amperes = system.get().and_then(|system| system.current).map(|amperes| amperes.0);
+            put("battery_amperes", system.at(), amperes, SLOW);
         }
-        if let Some(known) = from_battery {
-            single("battery_consumed", battery.at(), known.consumed.map(|charge| charge.0), SLOW);
-            single("battery_celsius", battery.at(), known.temperature.map(|celsius| celsius.0), SLOW);
+        if let Some(known) = battery.get() {
+            put("battery_consumed", battery.at(), known.consumed.map(|charge| charge.0), SLOW);
+            put("battery_celsius", battery.at(), known.temperature.map(|celsius| celsius.0), SLOW);
         }
-        let load = system.and_then(|system| system.load).map(|load| load.0 * 100.0);
-        single("load", vehicle.system.at(), load, SLOW);
+        let load = system.get().and_then(|system| system.load).map(|load| load.0 * 100.0);
+        put("load", system.at(), load, SLOW);
         if let Some(rails) = vehicle.rails.get() {
-            single("rail_5v", vehicle.rails.at(), rails.vcc.map(|volts| volts.0), SLOW);
-            single("rail_servo", vehicle.rails.at(), rails.servo.map(|volts| volts.0), SLOW);
+            put("rail_5v", vehicle.rails.at(), rails.vcc.map(|volts| volts.0), SLOW);
+            put("rail_servo", vehicle.rails.at(), rails.servo.map(|volts| volts.0), SLOW);
         }
         let processor = vehicle.processor.get().and_then(|processor| processor.temperature);
-        single("processor_celsius", vehicle.processor.at(), processor.map(|celsius| celsius.0), SLOW);
+        put("processor_celsius", vehicle.processor.at(), processor.map(|celsius| celsius.0), SLOW);
+    }
+
+    fn radio(&self, put: &mut Put<'_>) {
+        let vehicle = self.craft.monitor.vehicle();
         let rssi = vehicle.rc.get().and_then(|rc| rc.rssi).map(f32::from);
-        single("rc_rssi", vehicle.rc.at(), rssi, SLOW);
+        put("rc_rssi", vehicle.rc.at(), rssi, SLOW);
         if let Some(radio) = vehicle.radio.get() {
-            single("radio_rssi", vehicle.radio.at(), radio.rssi.map(f32::from), SLOW);
-            single("radio_remote_rssi", vehicle.radio.at(), radio.remote_rssi.map(f32::from), SLOW);
-            single("radio_noise", vehicle.radio.at(), radio.noise.map(f32::from), SLOW);
+            put("radio_rssi", vehicle.radio.at(), radio.rssi.map(f32::from), SLOW);
+            put("radio_remote_rssi", vehicle.radio.at(), radio.remote_rssi.map(f32::from), SLOW);
+            put("radio_noise", vehicle.radio.at(), radio.noise.map(f32::from), SLOW);
         }
-        if let Some(engine) = vehicle.engine.get() {
+    }
+
+    /// A combustion engine, and what speed sensors there are.
+    fn engine(&self, put: &mut Put<'_>) {
+        let engine = &self.craft.monitor.vehicle().engine;
+        if let Some(known) = engine.get() {
             let figures = [
-                ("engine_rpm", engine.rpm.map(|rpm| rpm.0)),
-                ("engine_load", engine.load.map(|load| load.0 * 100.0)),
-                ("engine_fuel_flow", engine.fuel_flow),
-                ("engine_fuel_consumed", engine.fuel_consumed),
-                ("engine_head_celsius", engine.cylinder_head.map(|celsius| celsius.0)),
+                ("engine_rpm", known.rpm.map(|rpm| rpm.0)),
+                ("engine_load", known.load.map(|load| load.0 * 100.0)),
+                ("engine_fuel_flow", known.fuel_flow),
+                ("engine_fuel_consumed", known.fuel_consumed),
+                ("engine_head_celsius", known.cylinder_head.map(|celsius| celsius.0)),
             ];
             for (name, figure) in figures {
-                single(name, vehicle.engine.at(), figure, SLOW);
+                put(name, engine.at(), figure, SLOW);
             }
         }
-        for ((at, rpm), name) in
-            craft.speed_sensors.iter().flatten().zip(["speed_sensor_0", "speed_sensor_1"])
-        {
-            single(name, Some(*at), Some(*rpm), SLOW);
+        let names = ["speed_sensor_0", "speed_sensor_1"];
+        for (sensor, name) in self.craft.speed_sensors.iter().zip(names) {
+            if let Some((at, rpm)) = sensor {
+                put(name, Some(*at), Some(*rpm), SLOW);
+            }
         }
     }
 }
@@ -253,21 +285,21 @@ impl Serialize for Motors<'_> {
         let Values { craft, now } = self.0;
         let heard = |motor: usize| ESC.iter().any(|(_, of)| craft.told.get(of(motor)).is_some());
         let count = (0..MOTORS_MAX).rev().find(|motor| heard(*motor)).map_or(0, |last| last + 1);
-        serializer.collect_seq((0..count).map(|motor| Motor { craft, now, motor }))
+        serializer.collect_seq((0..count).map(|number| Motor { craft, now, number }))
     }
 }
 
 struct Motor<'a> {
     craft: &'a Craft,
     now: Instant,
-    motor: usize,
+    number: usize,
 }
 
 impl Serialize for Motor<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for (name, of) in ESC {
-            if let Some((at, value)) = self.craft.told.get(of(self.motor)) {
+            if let Some((at, value)) = self.craft.told.get(of(self.number)) {
                 map.serialize_entry(name, &Shown::new(self.now, at, value, SLOW))?;
             }
         }

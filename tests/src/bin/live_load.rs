@@ -12,6 +12,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use anyhow::{Context as _, Result, anyhow};
 use hums_tests::flights::Manifest;
 use hums_tests::frames::of_tlog;
 use hums_tests::live::{Live, free_port, send};
@@ -30,12 +31,17 @@ fn main() -> ExitCode {
         eprintln!("SECONDS and MESSAGES_PER_SECOND are numbers");
         return ExitCode::from(2);
     };
-    measure(Path::new(hums), seconds.max(2 * LOOK_S + 10), rate, Path::new(recording));
-    ExitCode::SUCCESS
+    match measure(Path::new(hums), seconds.max(2 * LOOK_S + 10), rate, Path::new(recording)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
 }
 
-fn measure(hums: &Path, seconds: u32, rate: f64, recording: &Path) {
-    let data = std::fs::read(recording).unwrap();
+fn measure(hums: &Path, seconds: u32, rate: f64, recording: &Path) -> Result<()> {
+    let data = std::fs::read(recording).with_context(|| recording.display().to_string())?;
     let frames = of_tlog(&data, &Manifest::own().seeds, false);
     let frames: Vec<Vec<u8>> =
         frames.iter().filter(|frame| frame.verified).map(|frame| frame.bytes.to_vec()).collect();
@@ -43,8 +49,8 @@ fn measure(hums: &Path, seconds: u32, rate: f64, recording: &Path) {
     let live = Live::start_at(hums, &["--input", &format!("udpin:127.0.0.1:{port}")]);
     let address = live.address.clone();
     let count = (f64::from(seconds) * rate) as usize;
+    let socket = UdpSocket::bind("127.0.0.1:0")?;
     let sender = std::thread::spawn(move || {
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         let put = |frame: &[u8]| drop(socket.send_to(frame, ("127.0.0.1", port)));
         send(frames.iter().map(Vec::as_slice).cycle().take(count), rate, put, |_| ());
     });
@@ -52,15 +58,15 @@ fn measure(hums: &Path, seconds: u32, rate: f64, recording: &Path) {
     page.open(&address, "dark", 1440, 900);
     page.wait("return document.documentElement.dataset.ready === 'true'", 60);
     let start = Instant::now();
-    let before = live.program.cost().unwrap();
+    let before = live.program.cost().context("it has ended")?;
     let first = page.frames_ms(LOOK_S);
     let last_at = Duration::from_secs(u64::from(seconds - LOOK_S - 8));
     std::thread::sleep(last_at.saturating_sub(start.elapsed()));
     let last = page.frames_ms(LOOK_S);
-    let after = live.program.cost().unwrap();
+    let after = live.program.cost().context("it has ended")?;
     let share = (after.0 - before.0) / start.elapsed().as_secs_f64() * 100.0;
     let heard = page.read()["values"]["link:rate"].clone();
-    sender.join().unwrap();
+    sender.join().map_err(|_| anyhow!("the vehicle has failed"))?;
     let (code, words) = live.interrupt(Duration::from_secs(30));
     println!("messages a second   {rate:.0}, for {seconds} s; the page says {heard}");
     println!(
@@ -79,6 +85,7 @@ fn measure(hums: &Path, seconds: u32, rate: f64, recording: &Path) {
         );
     }
     println!("ended with          {code:?} {words}");
+    Ok(())
 }
 
 fn mb(kib: u64) -> f64 {
