@@ -11,7 +11,7 @@ use hums_tests::live::{Running, free_port};
 use serde_json::Value;
 
 /// A database may read its own files for a while before it answers.
-const START: Duration = Duration::from_secs(60);
+const START: Duration = Duration::from_mins(1);
 
 /// Which one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,12 +82,12 @@ impl Database {
     pub(crate) fn end(&mut self) {
         let mut running = self.running.take().unwrap();
         running.signal(if self.kind == Kind::Influx { "KILL" } else { "TERM" });
-        running.end(Duration::from_secs(60));
+        running.end(Duration::from_mins(1));
     }
 
     fn get(&self, path: &str) -> std::io::Result<(u16, String)> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
-        stream.set_read_timeout(Some(Duration::from_secs(60)))?;
+        stream.set_read_timeout(Some(Duration::from_mins(1)))?;
         // HTTP 1.0: the answer ends with the connection.
         write!(stream, "GET {path} HTTP/1.0\r\nHost: 127.0.0.1\r\n\r\n")?;
         let mut answer = String::new();
@@ -99,7 +99,8 @@ impl Database {
 
     /// `InfluxDB`: the answer to a question.
     pub(crate) fn ask(&self, question: &str) -> Vec<Value> {
-        let question: String = question.bytes().map(|byte| format!("%{byte:02X}")).collect();
+        let bytes: Vec<String> = question.bytes().map(|byte| format!("%{byte:02X}")).collect();
+        let question = bytes.concat();
         let (code, body) = self.get(&format!("/query?db=hums&epoch=ns&q={question}")).unwrap();
         assert_eq!(code, 200, "{body}");
         let answer: Value = serde_json::from_str(&body).unwrap();

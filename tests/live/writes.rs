@@ -50,7 +50,7 @@ fn fly(database: &mut Database, flags: &[&str]) -> (u64, BTreeMap<u32, u64>) {
         _ => {}
     });
     std::thread::sleep(Duration::from_secs(1));
-    let (code, words) = live.interrupt(Duration::from_secs(60));
+    let (code, words) = live.interrupt(Duration::from_mins(1));
     assert_eq!(code, Some(0), "{words}");
     let written = words.split_whitespace().next().and_then(|word| word.parse().ok());
     (written.unwrap_or_else(|| panic!("no count: {words}")), counts)
