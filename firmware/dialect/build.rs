@@ -197,9 +197,16 @@ fn render(messages: &BTreeMap<u32, Message>) -> Result<String> {
         if max > 255 {
             return Err(format!("{}: {max} bytes do not fit a frame", message.name).into());
         }
+        let offset = |name: &str| -> usize {
+            let at = message.fields.iter().position(|field| field.name == name && field.kind == "U8");
+            let before = |at| &message.fields[..at];
+            at.map_or(255, |at| before(at).iter().map(|field| field.size * field.array.unwrap_or(1)).sum())
+        };
+        let (system, component) = (offset("target_system"), offset("target_component"));
         writeln!(
             out,
             "    Message {{ id: {id}, crc_extra: {}, len_base: {min}, len_max: {max}, \
+             target_system: {system}, target_component: {component}, \
              #[cfg(feature = \"names\")] name: {:?}, fields: &[",
             crc_extra(message),
             message.name

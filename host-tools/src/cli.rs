@@ -382,6 +382,7 @@ const PARAMS_EXAMPLES: &str = "Examples:
   hums params list --link serial:/dev/ttyUSB0:57600
   hums params get GS_BUDGET BAT_REM_WARN --link udpin:0.0.0.0:14550
   hums params set GS_BUDGET 1000 --link tcp:192.168.1.5:5760
+  hums params sign --key key.txt --link serial:/dev/ttyUSB0:57600
 
 The list is lines of NAME VALUE, which `hums sim --params` reads back.";
 
@@ -400,6 +401,9 @@ pub struct Link {
     /// Where the board is: udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub link: Endpoint,
+    /// Sign what is sent with the key in this file: 64 hexadecimal digits, or a passphrase as Mission Planner takes it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
 }
 
 /// What to do with parameters.
@@ -422,6 +426,15 @@ pub enum ParamsAction {
         /// Where the board is.
         #[command(flatten)]
         at: Link,
+    },
+    /// Give the board the key of --key, over the port that its `SIGN_PORT` trusts
+    Sign {
+        /// Where the board is.
+        #[command(flatten)]
+        at: Link,
+        /// Take the key away
+        #[arg(long)]
+        remove: bool,
     },
     /// Set one; fails where the board keeps another value
     Set {

@@ -21,7 +21,8 @@ fn compare(recording: &Path) {
     eprintln!("{name}: {found}");
     assert_eq!(found["differences"], serde_json::json!([]), "{name}");
     let values = &found["values"];
-    assert!(values["csv"].as_u64().unwrap() > 10 * found["messages"].as_u64().unwrap(), "{name}: {found}");
+    // A comparison of nothing would find no differences either.
+    assert!(values["csv"].as_u64().unwrap() > 4 * found["messages"].as_u64().unwrap(), "{name}: {found}");
     for format in ["jsonl", "parquet", "influx"] {
         assert_eq!(values[format], values["csv"], "{name}: {format} has other values than csv");
     }

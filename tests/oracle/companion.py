@@ -133,6 +133,11 @@ def main():
     out["preflight"] = result(peer.command(401))
     out["stop"] = result(peer.command(2511))
     out["record"] = result(peer.command(2510))
+    # 31010: another part is in this component's place; 31011: cancel the protective action.
+    out["no_component"] = result(peer.command(31010, 1))
+    put("CMP1_KIND", 4.0)
+    out["replaced"] = result(peer.command(31010, 1))
+    out["nothing_to_cancel"] = result(peer.command(31011))
     out["for_the_autopilot"] = result(
         peer.ask(lambda: mav.command_long_send(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0), peer.ack(400), 1.0, 2)
     )

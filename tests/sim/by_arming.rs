@@ -22,8 +22,10 @@ fn params(dir: &Path, text: &str) -> PathBuf {
 /// Whether a frame is the autopilot's heartbeat, and whether it says armed.
 fn armed(frame: &Frame<'_>) -> Option<bool> {
     let header = if frame.bytes[0] == 0xFE { 6 } else { 10 };
-    let is_autopilot = frame.bytes[header + 5] != 8;
-    (frame.id == 0 && is_autopilot).then(|| frame.bytes[header + 6] & ARMED_BIT != 0)
+    // MAVLink 2 sends no zeros at a payload's end.
+    let byte = |at: usize| frame.bytes.get(header + at).copied().unwrap_or(0);
+    let is_autopilot = byte(5) != 8;
+    (frame.id == 0 && is_autopilot).then(|| byte(6) & ARMED_BIT != 0)
 }
 
 fn tlogs(image: &Path, dir: &Path) -> Vec<Vec<u8>> {
@@ -34,6 +36,7 @@ fn tlogs(image: &Path, dir: &Path) -> Vec<Vec<u8>> {
         return vec![fs::read(out).unwrap()];
     }
     let mut files: Vec<_> = fs::read_dir(out).unwrap().map(|file| file.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "tlog"));
     files.sort();
     files.iter().map(|file| fs::read(file).unwrap()).collect()
 }

@@ -1,6 +1,7 @@
 //! The box as a companion, against a ground station of pymavlink's.
 #![cfg(feature = "oracle")]
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::ErrorKind;
 use std::net::UdpSocket;
@@ -18,9 +19,14 @@ use tempfile::TempDir;
 
 /// `hums sim` in real time, with a ground station's port.
 struct Board {
-    dir: TempDir,
+    dir: Option<TempDir>,
     child: Child,
     port: u16,
+}
+
+/// Free a moment ago: the next one to ask gets another.
+fn free_port() -> u16 {
+    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
 impl Board {
@@ -30,17 +36,29 @@ impl Board {
 
     /// On the card that lies in `dir`, if one does.
     fn start_in(dir: TempDir, flags: &[&str]) -> Self {
-        // Free a moment ago: the next one to ask gets another.
-        let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        Self::start_with(own("ap_quad_guided.tlog").as_os_str(), dir, flags)
+    }
+
+    /// With another input.
+    fn start_with(input: &OsStr, dir: TempDir, flags: &[&str]) -> Self {
+        let port = free_port();
         let mut command: Command = program::command(["sim", "--json", "--speed", "real", "--input"]);
-        command.arg(own("ap_quad_guided.tlog")).arg("--sd").arg(dir.path().join("card.img"));
+        command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.args(["--gs", &format!("udpin:127.0.0.1:{port}")]).args(flags);
         let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-        Self { dir, child, port }
+        Self { dir: Some(dir), child, port }
     }
 
     /// Ends it in order, as Ctrl-C does, and gives everything that its log holds, a line each.
-    fn end(mut self) -> String {
+    fn end(self) -> String {
+        let dir = self.switch_off();
+        let image = dir.path().join("card.img");
+        let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()];
+        hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0]).text()
+    }
+
+    /// Ends it, and leaves the folder with its card and its store.
+    fn switch_off(mut self) -> TempDir {
         let kill = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
         assert!(kill.success());
         let start = Instant::now();
@@ -48,17 +66,7 @@ impl Board {
             assert!(start.elapsed() < Duration::from_secs(30), "it does not end");
             std::thread::sleep(Duration::from_millis(20));
         }
-        let image = self.dir.path().join("card.img");
-        hums([
-            "decode".as_ref(),
-            image.as_os_str(),
-            "-o".as_ref(),
-            "-".as_ref(),
-            "--format".as_ref(),
-            "jsonl".as_ref(),
-        ])
-        .expect_code(&[0])
-        .text()
+        self.dir.take().expect("it is switched off once")
     }
 }
 
@@ -90,7 +98,9 @@ fn a_ground_station_lists_reads_sets_and_commands() {
     }
     // MAV_RESULT: 0 accepted, 3 unsupported.
     assert_eq!(said["unsupported"], 3);
-    for accepted in ["version_ack", "stop", "record"] {
+    // 2 denied, 4 failed.
+    assert_eq!((&said["no_component"], &said["nothing_to_cancel"]), (&2.into(), &4.into()), "{said}");
+    for accepted in ["version_ack", "stop", "record", "replaced"] {
         assert_eq!(said[accepted], 0, "{accepted}: {said}");
     }
     // COMMAND_INT, FTP, MAVLink 2, C_CAST.
@@ -101,6 +111,175 @@ fn a_ground_station_lists_reads_sets_and_commands() {
     for recorded in ["BAT_REM_WARN", "recording stopped by 255/190", "recording started by 255/190"] {
         assert!(log.contains(recorded), "the record does not tell: {recorded}");
     }
+}
+
+#[test]
+fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_after_power_off() {
+    let dir = tempfile::tempdir().unwrap();
+    let (params, store, state) =
+        (dir.path().join("params.txt"), dir.path().join("store"), dir.path().join("state"));
+    fs::write(&params, "GS_BUDGET 5000\nSIGN_PORT 1\nGS_SIGN 2\n").unwrap();
+    let (params, store) = (params.display().to_string(), store.display().to_string());
+
+    let board = Board::start_in(dir, &["--params", &params, "--store", &store]);
+    let first = oracle::signing(board.port, &state);
+    let dir = board.switch_off();
+    assert_eq!((&first["before"], &first["plain"]["signed"]), (&20.0.into(), &0.into()), "{first}");
+    assert_eq!(first["key"], "HUMS: signing key set", "{first}");
+
+    let board = Board::start_in(dir, &["--store", &store]);
+    let second = oracle::signing(board.port, &state);
+    let dir = board.switch_off();
+    assert_eq!(second["replayed_after_power_off"], serde_json::json!([24.0]), "{second}");
+    assert_eq!(second["stamps_go_on"], true, "{second}");
+
+    for (said, stays) in [(&first, 20.0), (&second, 24.0)] {
+        let sealed = &said["sealed"];
+        assert!(sealed["signed"].as_u64() > Some(3), "{said}");
+        assert_eq!(sealed["good"], sealed["signed"], "{said}");
+        assert_eq!([&sealed["unsigned"], &sealed["wrong"], &sealed["bad"]], [0, 0, 0], "{said}");
+        assert_eq!((&sealed["rises"], &said["unsigned_list"]), (&true.into(), &true.into()), "{said}");
+        // MAV_RESULT 2 is denied.
+        assert_eq!((&said["unsigned_set"], &said["unsigned_command"]), (&stays.into(), &2.into()), "{said}");
+        assert_eq!((&said["signed_set"], &said["signed_command"]), (&21.0.into(), &true.into()), "{said}");
+        assert_eq!(said["wrong_key"], serde_json::json!([23.0]), "{said}");
+        assert_eq!(said["replayed"], serde_json::json!([23.0, 23.0]), "{said}");
+        assert_eq!(said["after"], 24.0, "{said}");
+    }
+    // The key is on the card in no form.
+    let card = fs::read(dir.path().join("card.img")).unwrap();
+    let key: Vec<u8> = (1..33).collect();
+    assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
+}
+
+/// Both ports are pymavlink's: an autopilot of the test's own and a ground station.
+fn between_autopilot_and_ground_station(kind: &str) -> (Value, TempDir) {
+    let (dir, _) = card_with_a_log();
+    let params = dir.path().join("params.txt");
+    fs::write(&params, "GS_BUDGET 5000\nGS_PASS 1\n").unwrap();
+    let autopilot = free_port();
+    let input = format!("udpin:127.0.0.1:{autopilot}");
+    let board = Board::start_with(input.as_ref(), dir, &["--params", params.to_str().unwrap()]);
+    let said = oracle::vehicle(autopilot, board.port, kind);
+    (said, board.switch_off())
+}
+
+fn assert_what_passes(said: &Value, dir: &TempDir) {
+    for (passes, expected) in [("up", true), ("down", true), ("stays_up", false), ("stays_down", false)] {
+        for (name, passed) in said[passes].as_object().unwrap() {
+            assert_eq!(passed, &Value::from(expected), "{passes} {name}: {said}");
+        }
+    }
+    // The bytes of the key that passed by at both ports.
+    let key: Vec<u8> = (0..32).collect();
+    let card = fs::read(dir.path().join("card.img")).unwrap();
+    assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
+    let (before, after) = (said["logs_before"].as_array().unwrap(), said["logs_after"].as_array().unwrap());
+    assert_eq!((before.len(), after.len()), (2, 1), "erased but for the one in work: {said}");
+    // It is not offered any longer, and still there for whoever has the card.
+    let image = dir.path().join("card.img");
+    let info = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[0, 3]).text();
+    assert!(info.contains("00001_00.HUM"), "{info}");
+}
+
+#[test]
+fn a_px4_is_asked_for_what_is_missing_and_its_radio_is_shared() {
+    let (said, dir) = between_autopilot_and_ground_station("px4");
+    let asked: Vec<u64> = said["asked"].as_array().unwrap().iter().filter_map(Value::as_u64).collect();
+    // SYSTEM_TIME comes unasked; VIBRATION is refused by this one, and not asked for again.
+    assert!(asked.contains(&30) && asked.contains(&291) && !asked.contains(&2), "{said}");
+    assert!(!asked.contains(&11_030), "that is ArduPilot's: {said}");
+    assert_eq!((&said["times_asked"], &said["groups"]), (&1.into(), &serde_json::json!([])), "{said}");
+    assert!(said["version_asked"].as_u64() >= Some(1), "{said}");
+    assert!(said["asked_again"].as_u64() >= Some(10), "after a reboot: {said}");
+    assert_what_passes(&said, &dir);
+}
+
+#[test]
+fn an_ardupilot_that_knows_no_intervals_is_asked_for_groups_and_its_radio_is_shared() {
+    let (said, dir) = between_autopilot_and_ground_station("ardupilot");
+    assert_eq!(said["groups"], serde_json::json!([1, 2, 3, 6, 10, 11, 12]), "{said}");
+    assert!(said["asked"].as_array().unwrap().len() <= 5, "refused often enough: {said}");
+    assert!(said["asked_again"].as_u64() >= Some(7), "after a reboot: {said}");
+    assert_what_passes(&said, &dir);
+}
+
+#[test]
+fn mavproxy_lists_sets_downloads_and_signs() {
+    let (dir, card) = card_with_a_log();
+    let params = dir.path().join("params.txt");
+    fs::write(&params, "GS_BUDGET 5000\nSIGN_PORT 1\nGS_SIGN 2\n").unwrap();
+    let folder = dir.path().join("mavproxy");
+    let board = Board::start_in(dir, &["--params", params.to_str().unwrap()]);
+    let said = oracle::mavproxy(board.port, &folder);
+    assert_eq!(said["detected"], "Detected vehicle 1:191", "{said}");
+    let count = said["received"].as_str().and_then(|count| count.parse().ok());
+    assert_eq!(count, Some(hums_core::params::TABLE.len()), "{said}");
+    assert_eq!((&said["shown"], &said["set"]), (&"5000.0".into(), &"33.0".into()), "{said}");
+    assert_eq!(said["refused"], "33.0", "{said}");
+    assert_eq!(said["logs"], "2", "{said}");
+    assert_on_card(&folder.join("log.bin"), &card);
+    assert_eq!((&said["key"], &said["signed"]), (&"HUMS: signing key set".into(), &"34.0".into()), "{said}");
+
+    // Unsigned nothing is told any longer; with the passphrase our own tool may.
+    let address = format!("udpout:127.0.0.1:{}", board.port);
+    let unsigned = hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[1]);
+    assert!(unsigned.stderr.contains("no answer"), "{}", unsigned.stderr);
+    let key = folder.join("key.txt");
+    fs::write(&key, "a passphrase of this flight\n").unwrap();
+    let key = key.to_str().unwrap();
+    let got =
+        hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]).text();
+    assert_eq!(got, "BAT_REM_WARN 34\n");
+    let gone = hums(["params", "sign", "--remove", "--key", key, "--link", &address]).expect_code(&[0]);
+    assert_eq!(gone.text(), "key removed\n");
+    hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[0]);
+}
+
+#[test]
+fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let image = dir.path().join("card.img");
+    let recording = own("px4_hil_quad_low.tlog");
+    let record = |expected: &[i32]| {
+        let input = recording.as_os_str();
+        hums(["sim".as_ref(), "--input".as_ref(), input, "--sd".as_ref(), image.as_os_str()])
+            .expect_code(expected);
+    };
+    record(&[0]);
+    let text = dir.path().join("PARAMS.TXT");
+    let long = "x".repeat(300);
+    let lines = format!(
+        "# of this airframe {long}\nBAT_REM_WARN,31\r\nSIGN_PORT 2\n1\t1\tARMING_CHECK\t1\t6\nNO_SUCH 1\n\
+         BAT_REM_CRIT 1000\n{long}\nCELL_VOLT_CRIT 3.25"
+    );
+    fs::write(&text, lines).unwrap();
+    let card = fs::read(&image).unwrap();
+    let start = u32::from_le_bytes(card[454..458].try_into().unwrap()) * 512;
+    let drive = format!("{}@@{start}", image.display());
+    let copied = Command::new("mcopy").args(["-i", &drive]).arg(&text).arg("::PARAMS.TXT").status().unwrap();
+    assert!(copied.success());
+    record(&[0]);
+    let out = dir.path().join("out");
+    hums([
+        "decode".as_ref(),
+        image.as_os_str(),
+        "-o".as_ref(),
+        out.as_os_str(),
+        "--format".as_ref(),
+        "jsonl".as_ref(),
+    ])
+    .expect_code(&[0]);
+    let second = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).max().unwrap();
+    let log = fs::read_to_string(second).unwrap();
+    for (name, value) in [("BAT_REM_WARN", "31.0"), ("SIGN_PORT", "2.0"), ("CELL_VOLT_CRIT", "3.25")] {
+        let set = log.lines().any(|line| line.contains(name) && line.contains(value));
+        assert!(set, "{name} is not set to {value}");
+    }
+    for told in ["line 5 is refused", "line 6 is refused", "line 7 is refused", "PARAMS.TXT has lines"] {
+        assert!(log.contains(told), "{told}");
+    }
+    assert!(!log.contains("line 1 is refused") && !log.contains("line 4 is refused"));
 }
 
 /// A UDP link that loses every tenth datagram, each way.

@@ -4,6 +4,7 @@
 //! failing card and power cuts may do and may not.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod budget;
 mod by_arming;
 mod card_trouble;
 mod companion;
@@ -14,6 +15,8 @@ mod persistence;
 mod power_cut;
 mod round_trip;
 mod salvage;
+mod second_decoder;
+mod usage;
 
 /// Said past the test harness, which would keep it to itself: what was not tested is no success.
 #[cfg(not(feature = "oracle"))]

@@ -80,6 +80,83 @@ fn whatever_word_of_the_store_power_goes_at_the_counters_are_the_old_or_the_new_
     assert!(cuts >= 20, "{cuts} of 40 cuts were met");
 }
 
+/// Seconds of a line of the decoded record.
+fn time_s(line: &str) -> f64 {
+    let entry: serde_json::Value = serde_json::from_str(line).unwrap();
+    entry["time_boot"].as_f64().unwrap_or_default()
+}
+
+#[test]
+fn power_that_goes_at_any_moment_of_a_flight_costs_two_minutes_of_it_at_most() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut random = Random::new(11);
+    let mut cuts_in_flight = 0;
+    for (flight, blocks) in [("ap_quad_faults.tlog", 2_800), (FLIGHT, 1_900)] {
+        for cut in 0..12 {
+            let store = dir.path().join(format!("{flight}.{cut}"));
+            let at = (100 + random.below(blocks)).to_string();
+            let flags = ["--store", store.to_str().unwrap(), "--cut-after-writes", &at];
+            let recording = Recording::attempt(Machine::Sim, &own(flight), &flags).expect_code(&[0, 3]);
+            let text = records(&recording.image(), dir.path());
+            let event =
+                |name: &str| text.lines().find(|line| line.contains("HUMS_EVENT") && line.contains(name));
+            let Some(take_off_s) = event("\"take_off\"").map(time_s) else { continue };
+            let end_s =
+                event("\"landing\",\"text\":\"\"").or_else(|| text.lines().last()).map(time_s).unwrap();
+            cuts_in_flight += u32::from(event("\"landing\",\"text\":\"\"").is_none());
+            let kept = Stored::read(&store);
+            let lifetime = kept.lifetime.unwrap_or_default();
+            let kept_s = lifetime.totals.raw(UsageCounter::Flight);
+            let flown_s = end_s - take_off_s;
+            // What is in the record may be a second behind, and a take-off is seen half a second late.
+            assert!(
+                (flown_s - 121.0..flown_s + 2.0).contains(&kept_s),
+                "{flight}, cut at {at}: {kept_s} s of {flown_s} s are kept"
+            );
+        }
+    }
+    assert!(cuts_in_flight >= 10, "{cuts_in_flight}");
+}
+
+#[test]
+fn components_wear_from_flight_to_flight_until_they_are_due_and_info_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, file) = (dir.path().join("store.bin"), dir.path().join("hums.param"));
+    // The airframe is due after 504 s; a flight takes 232. Motor 2 has hours to spare.
+    let text = "CMP1_KIND 1\nCMP1_HOURS 0.14\nCMP2_KIND 3\nCMP2_NUMBER 2\nCMP2_MOT_HOURS 100\n";
+    fs::write(&file, text).unwrap();
+    let mut seen = Vec::new();
+    for _ in 0..3 {
+        let recording = fly(&store, &["--params", file.to_str().unwrap()]).expect_code(&[0]);
+        let info =
+            hums(["info".as_ref(), recording.image().as_os_str(), "--json".as_ref()]).expect_code(&[0]);
+        let info: serde_json::Value = serde_json::from_str(&info.text()).unwrap();
+        let components = info.to_string();
+        let status = |place: u64| component_status(&info, place).unwrap_or_else(|| panic!("{components}"));
+        let due = recording.json()["findings"].to_string().contains("airframe_due");
+        seen.push((status(1), status(2), due));
+    }
+    let expected = [("green", "green", false), ("yellow", "green", true), ("red", "green", true)];
+    assert_eq!(seen, expected.map(|(first, second, due)| (first.to_owned(), second.to_owned(), due)));
+}
+
+/// What `hums info --json` says of a component.
+fn component_status(info: &serde_json::Value, place: u64) -> Option<String> {
+    match info {
+        serde_json::Value::Object(fields) => {
+            let status = fields.get("status").and_then(|status| status.as_str());
+            match (fields.get("place").and_then(serde_json::Value::as_u64), status) {
+                (Some(found), Some(status)) if found == place => Some(status.to_owned()),
+                _ => fields.values().find_map(|value| component_status(value, place)),
+            }
+        }
+        serde_json::Value::Array(values) => {
+            values.iter().rev().find_map(|value| component_status(value, place))
+        }
+        _ => None,
+    }
+}
+
 #[test]
 fn parameters_that_were_set_once_stay() {
     let dir = tempfile::tempdir().unwrap();

@@ -25,11 +25,15 @@ fn ask(script: &str, files: &[PathBuf]) -> String {
 }
 
 fn run(script: &str, arguments: &[PathBuf]) -> String {
+    outcome(script, arguments).text()
+}
+
+fn outcome(script: &str, arguments: &[PathBuf]) -> child::Outcome {
     let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
     command.arg(root().join("tests/oracle").join(script)).args(arguments);
     // The repository stays as it is: no compiled scripts in it.
     command.env("PYTHONDONTWRITEBYTECODE", "1");
-    child::run(&mut command, LIMIT).expect_code(&[0]).text()
+    child::run(&mut command, LIMIT).expect_code(&[0])
 }
 
 fn parse(text: &str) -> Value {
@@ -45,6 +49,11 @@ fn program(variable: &str, path: &str) -> PathBuf {
 pub fn readback(recording: &Path, out: &Path) -> Value {
     let influxd = program("HUMS_INFLUXD", "/usr/bin/influxd");
     parse(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
+}
+
+/// Decodes a log to `tlog` or `jsonl` by the format document alone: see `tests/oracle/hums_log`.
+pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
+    outcome("hums_log", &[PathBuf::from("--format"), PathBuf::from(format), log.to_owned()]).stdout
 }
 
 /// Runs a document's queries in a folder: see `tests/oracle/fleet.py`.
@@ -161,6 +170,11 @@ pub fn manifest(files: &[PathBuf]) -> Manifest {
     Manifest::parse(&ask("manifest.py", files))
 }
 
+/// Usage of these recordings as pymavlink's messages have it: see `tests/oracle/usage.py`.
+pub fn usage(files: &[PathBuf]) -> Value {
+    json(&ask("usage.py", files))
+}
+
 /// Parses a stream to the ground station strictly and tells what was in it: see `tests/oracle/gs_stream.py`.
 ///
 /// # Panics
@@ -173,6 +187,24 @@ pub fn ground_station(stream: &Path) -> Value {
 pub fn companion(port: u16) -> Value {
     let said = ask("companion.py", &[PathBuf::from(port.to_string())]);
     serde_json::from_str(&said).expect("companion.py prints JSON")
+}
+
+/// Talks to the box at this UDP port with pymavlink's signing; `state` is what a run leaves for the next one: see
+/// `tests/oracle/signing.py`.
+pub fn signing(port: u16, state: &Path) -> Value {
+    json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
+}
+
+/// Plays the autopilot (`px4` or `ardupilot`) at one UDP port of the box and the ground station at the other: see
+/// `tests/oracle/vehicle.py`.
+pub fn vehicle(autopilot: u16, ground: u16, kind: &str) -> Value {
+    let arguments = [autopilot.to_string(), ground.to_string(), kind.to_owned()];
+    json(&ask("vehicle.py", &arguments.map(PathBuf::from)))
+}
+
+/// Sits at MAVProxy's prompt: see `tests/oracle/gs_mavproxy.py`.
+pub fn mavproxy(port: u16, folder: &Path) -> Value {
+    json(&run("gs_mavproxy.py", &[PathBuf::from(port.to_string()), folder.to_owned()]))
 }
 
 /// Downloads the oldest log to `out` as a ground station does, `loss` of all frames lost: see

@@ -3,14 +3,14 @@
 use std::fs;
 use std::path::Path;
 
-use hums_core::lifetime::{ItemKey, Lifetime};
+use hums_core::lifetime::{ItemKey, Lifetime, Session};
 use hums_store::sim::SimFlash;
 use hums_store::{Found, Store, param};
 
 /// What outlived power.
 #[derive(Debug, Default)]
 pub struct Stored {
-    /// The counters over the airframe's life.
+    /// The counters over the airframe's life, the last session included.
     pub lifetime: Option<Lifetime>,
     /// Parameters that were set.
     pub params: Vec<(String, f32)>,
@@ -22,7 +22,7 @@ impl Stored {
         let flash = SimFlash::<16_384>::with(&fs::read(path).unwrap());
         let (mut store, found) = Store::mount(flash).unwrap_or_else(|why| panic!("{why:?}"));
         assert_eq!(found, Found::Kept, "{}", path.display());
-        let mut stored = Self::default();
+        let (mut stored, mut session) = (Self::default(), None);
         let read = store.for_each(|key, value| {
             if key.is_param() {
                 let (name, value) = param(value).unwrap();
@@ -30,9 +30,14 @@ impl Stored {
                 stored.params.push((name.to_owned(), value));
             } else if key.number() == Some(ItemKey::Lifetime.number()) {
                 stored.lifetime = Some(Lifetime::decode(value).unwrap());
+            } else if key.number() == Some(ItemKey::Session.number()) {
+                session = Some(Session::decode(value).unwrap());
             }
         });
         assert!(read.is_ok());
+        if let (Some(lifetime), Some(session)) = (&mut stored.lifetime, session) {
+            lifetime.add(&session);
+        }
         stored
     }
 

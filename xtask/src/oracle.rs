@@ -30,21 +30,21 @@ pub(crate) fn dialect() -> PathBuf {
 
 /// Makes the environment and the dialect unless they are there already.
 pub(crate) fn prepare() -> Result<()> {
-    let requirements = repo::root().join(FOLDER).join("requirements.txt");
-    let wanted = fs::read_to_string(&requirements).with_context(|| format!("{}", requirements.display()))?;
+    let [requirements, alone] =
+        ["requirements.txt", "requirements-alone.txt"].map(|name| repo::root().join(FOLDER).join(name));
+    let read = |path: &PathBuf| fs::read_to_string(path).with_context(|| format!("{}", path.display()));
+    let wanted = read(&requirements)? + &read(&alone)?;
     // The stamp is written last, so an interrupted installation is made anew.
     let stamp = venv().join("requirements.txt");
     if fs::read_to_string(&stamp).ok().as_deref() != Some(&wanted) {
         Shell::new("python3").args(["-m", "venv", "--clear"]).arg(venv()).run()?;
-        let pip = Shell::new(python()).args([
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-            "-r",
-        ]);
-        pip.arg(&requirements).run().context("pymavlink cannot be installed: is there a network?")?;
+        let pip =
+            || Shell::new(python()).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+        let install = |pip: Shell, list: &PathBuf| {
+            pip.arg("-r").arg(list).run().context("pymavlink cannot be installed: is there a network?")
+        };
+        install(pip(), &requirements)?;
+        install(pip().arg("--no-deps"), &alone)?;
         fs::write(&stamp, &wanted)?;
     }
     let definitions = definitions()?;

@@ -77,6 +77,7 @@ fn main() -> ! {
     let monitoring = MONITORING.init_with(|| {
         Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
     });
+    monitoring.restore_signing(keeper);
 
     let on = executors::start();
     let (autopilot_rx, autopilot_tx) = parts.autopilot;

@@ -5,7 +5,7 @@
 //! first yellow, and from [`Param::CompRed`] percent red. Replacing one is recorded with the old part's figures.
 
 use crate::health::Subsystem;
-use crate::lifetime::{Put, Take, Unreadable, amount, tenths};
+use crate::lifetime::{Put, Session, Take, Unreadable};
 use crate::observation::MOTORS_MAX;
 use crate::params::{Param, Params};
 use crate::usage::{Totals, UsageCounter};
@@ -156,6 +156,9 @@ impl Figures {
 
     /// What a part of this kind and number has run in a session.
     pub fn after(wear: &Wear<'_>, kind: Kind, number: u8) -> Self {
+        if kind == Kind::None {
+            return Self::ZERO;
+        }
         let total = |counter| wear.totals.value(counter).unwrap_or(0.0);
         let motors = &wear.totals.motors;
         let motor_s = match usize::from(number) {
@@ -271,14 +274,17 @@ pub struct Component {
     pub replaced: u16,
     /// What it has run, less what the session counted: it came into the session, or changed, in the middle of it.
     base: Figures,
+    /// Before which power-on; stored items only.
+    as_of: u32,
 }
 
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 impl Component {
     /// Length of the stored form: version, kind, number, replaced, name, serial, then powered, flight and motor time in
-    /// tenths of a second (u32), flights (u32) and cycles (f64).
-    pub const BYTES: usize = 1 + 1 + 1 + 2 + 2 * LABEL_BYTES + 4 * 4 + 8;
+    /// tenths of a second (i32), flights (i32) and cycles (f64), which may be negative: what the session had counted
+    /// when it came into it; and, since version 2, which power-on it is as of (u32).
+    pub const BYTES: usize = 1 + 1 + 1 + 2 + 2 * LABEL_BYTES + 4 * 4 + 8 + 4;
 
     /// No component.
     pub const NONE: Self = Self {
@@ -288,6 +294,7 @@ impl Component {
         number: 0,
         replaced: 0,
         base: Figures::ZERO,
+        as_of: 0,
     };
 
     /// What it has run over its life.
@@ -334,8 +341,7 @@ impl Component {
         if (kind, number) == (self.kind, self.number) {
             return false;
         }
-        let ran = if self.kind == Kind::None { self.base } else { self.figures(wear) };
-        self.base = ran.zip(Figures::after(wear, kind, number), |ran, counted| ran - counted);
+        self.base = self.figures(wear).zip(Figures::after(wear, kind, number), |ran, counted| ran - counted);
         (self.kind, self.number) = (kind, number);
         true
     }
@@ -355,42 +361,65 @@ impl Component {
         self.base
     }
 
-    /// Writes the stored form.
-    pub fn encode(&self, wear: &Wear<'_>, out: &mut [u8; Self::BYTES]) {
-        let figures = self.figures(wear);
+    /// Whether it is to be saved anew, because it was stored as of an earlier power-on.
+    pub(crate) const fn begin(&mut self, boots: u32) -> bool {
+        let begins = self.as_of != boots;
+        self.as_of = boots;
+        begins
+    }
+
+    /// Adds the session that was saved last, if it is not in it already.
+    pub(crate) fn add(&mut self, session: &Session) {
+        if session.boots == self.as_of {
+            self.base = self.figures(&session.wear());
+        }
+    }
+
+    /// Writes the stored form, as of the beginning of this power-on.
+    pub fn encode(&self, boots: u32, out: &mut [u8; Self::BYTES]) {
+        let Figures { powered_s, flight_s, motor_s, flights, cycles } = self.base;
+        let tenths = |seconds: f64| libm::round(seconds * 10.0) as i32 as u32;
         let mut put = Put::new(out);
         put.u8(VERSION).u8(self.kind as u8).u8(self.number).u16(self.replaced);
         put.bytes(&self.name.0).bytes(&self.serial.0);
-        put.u32(tenths(figures.powered_s)).u32(tenths(figures.flight_s)).u32(tenths(figures.motor_s));
-        put.u32(figures.flights as u32).f64(figures.cycles);
+        put.u32(tenths(powered_s)).u32(tenths(flight_s)).u32(tenths(motor_s));
+        put.u32(flights as i32 as u32).f64(cycles).u32(boots);
     }
 
-    /// Reads the stored form, of this version or a later one, at the start of a session.
+    /// Reads the stored form, of this version or another one, at the start of a session.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut take = Take::new(stored);
-        if take.u8()? < VERSION {
+        let version = take.u8()?;
+        if version == 0 {
             return Err(Unreadable);
         }
-        Ok(Self {
+        let signed = |number: u32| f64::from(number as i32);
+        let mut component = Self {
             kind: Kind::from_number(take.u8()?),
             number: take.u8()?,
             replaced: take.u16()?,
             name: Label::of(take.array::<LABEL_BYTES>()?.into_iter()),
             serial: Label::of(take.array::<LABEL_BYTES>()?.into_iter()),
             base: Figures {
-                powered_s: f64::from(take.u32()?) / 10.0,
-                flight_s: f64::from(take.u32()?) / 10.0,
-                motor_s: f64::from(take.u32()?) / 10.0,
-                flights: f64::from(take.u32()?),
-                cycles: amount(take.f64()?),
+                powered_s: signed(take.u32()?) / 10.0,
+                flight_s: signed(take.u32()?) / 10.0,
+                motor_s: signed(take.u32()?) / 10.0,
+                flights: signed(take.u32()?),
+                cycles: Some(take.f64()?).filter(|cycles| cycles.is_finite()).unwrap_or(0.0),
             },
-        })
+            as_of: 0,
+        };
+        if version >= VERSION {
+            component.as_of = take.u32()?;
+        }
+        Ok(component)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exposure::Exposure;
 
     fn params(set: &[(&str, f32)]) -> Params {
         let mut params = Params::defaults();
@@ -444,23 +473,29 @@ mod tests {
     }
 
     #[test]
-    fn a_component_reads_back_with_what_the_session_added() {
+    fn a_component_reads_back_and_the_session_is_added_once() {
         let params = params(&[("CMP1_KIND", 2.0), ("CMP1_NUMBER", 1.0)]);
         let totals = flown(1.0, 2.0);
         let wear = Wear { totals: &totals, battery_cycles: &[0.75] };
+        let session = Session::now(5, true, &totals, &wear, &Exposure::new());
         let none = Totals::nothing();
         let mut component = Component { name: Label::new("pack A"), ..Component::NONE };
         component.describe(0, &Wear { totals: &none, battery_cycles: &[] }, &params);
-        let mut stored = [0; Component::BYTES];
-        component.encode(&wear, &mut stored);
-        let read = Component::decode(&stored).expect("readable");
-        assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", Kind::Battery, 1));
-        assert_eq!(
-            read.ran(),
-            Figures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 }
-        );
-        for cut in 0..Component::BYTES {
-            assert_eq!(Component::decode(&stored[..cut]), Err(Unreadable));
+        let ran = Figures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 };
+        let mut replaced = component;
+        replaced.replace(Label::new("pack B"), &wear);
+        for (component, boots, expected) in
+            [(component, 5, ran), (component, 6, Figures::ZERO), (replaced, 5, Figures::ZERO)]
+        {
+            let mut stored = [0; Component::BYTES];
+            component.encode(boots, &mut stored);
+            let mut read = Component::decode(&stored).expect("readable");
+            assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", Kind::Battery, 1));
+            read.add(&session);
+            assert_eq!(read.ran(), expected, "as of power-on {boots}");
+            for cut in 0..Component::BYTES {
+                assert_eq!(Component::decode(&stored[..cut]), Err(Unreadable));
+            }
         }
     }
 

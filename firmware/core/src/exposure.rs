@@ -1,6 +1,6 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
-use crate::lifetime::{Put, Take, Unreadable};
+use crate::lifetime::{Put, Session, Take, Unreadable};
 use crate::time::{Instant, Span};
 use crate::units::Celsius;
 use crate::usage::Usage;
@@ -100,7 +100,7 @@ impl Quantity {
 }
 
 /// Tenths of a second in each range of each quantity.
-type Tenths = [[u32; BINS]; Quantity::ALL.len()];
+pub(crate) type Tenths = [[u32; BINS]; Quantity::ALL.len()];
 
 /// Time in ranges.
 #[derive(Clone, Copy, Debug)]
@@ -108,13 +108,15 @@ pub struct Exposure {
     last: Option<Instant>,
     session: Tenths,
     before: Tenths,
+    /// Before which power-on.
+    as_of: u32,
 }
 
 /// How often the time in ranges is counted.
 const EVERY: Span = Span::from_millis(100);
 /// Longer steps are gaps: nothing is known of what happened in them.
 const STEP_MAX: Span = Span::from_secs(2);
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 impl Default for Exposure {
     fn default() -> Self {
@@ -123,37 +125,35 @@ impl Default for Exposure {
 }
 
 impl Exposure {
-    /// Length of the stored form: version, then tenths of a second (u32) in each range of each quantity.
-    pub const BYTES: usize = 1 + 4 * BINS * Quantity::ALL.len();
+    /// Length of the stored form: version, then tenths of a second (u32) in each range of each quantity, and, since
+    /// version 2, which power-on it is as of (u32).
+    pub const BYTES: usize = 1 + 4 * BINS * Quantity::ALL.len() + 4;
 
     /// No time at all.
     pub const fn new() -> Self {
         let none = [[0; BINS]; Quantity::ALL.len()];
-        Self { last: None, session: none, before: none }
+        Self { last: None, session: none, before: none, as_of: 0 }
     }
 
-    /// One step, after usage; `true` where it counted.
-    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, usage: &Usage) -> bool {
+    /// One step, after usage.
+    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, usage: &Usage) {
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
         if self.last.is_some() && step < EVERY {
-            return false;
+            return;
         }
         // Whole tenths are counted; the rest goes into the next step.
         let tenths = (step.as_millis() / 100) as u32;
         let rest = step.as_micros() % 100_000;
         self.last = Some(Instant::from_micros(now.as_micros() - rest));
         if step > STEP_MAX {
-            return false;
+            return;
         }
-        let mut counted = false;
         for (quantity, bins) in Quantity::ALL.into_iter().zip(&mut self.session) {
             if let Some(value) = quantity.value(now, vehicle, usage) {
                 let bin = quantity.edges().iter().take_while(|edge| value >= **edge).count();
                 bins[bin] = bins[bin].saturating_add(tenths);
-                counted = true;
             }
         }
-        counted
     }
 
     /// Every range that the session was in: quantity, range, seconds.
@@ -179,24 +179,43 @@ impl Exposure {
         self.before = [[0; BINS]; Quantity::ALL.len()];
     }
 
-    /// Writes the stored form.
-    pub fn encode(&self, out: &mut [u8; Self::BYTES]) {
-        let mut put = Put::new(out);
-        put.u8(VERSION);
-        self.lifetime().iter().flatten().for_each(|tenths| {
-            put.u32(*tenths);
-        });
+    /// What this session has counted.
+    pub(crate) const fn session(&self) -> &Tenths {
+        &self.session
     }
 
-    /// Reads the stored form, of this version or a later one.
+    /// Adds the session that was saved last, if it is not in it already.
+    pub(crate) fn add(&mut self, session: &Session) {
+        if session.boots == self.as_of {
+            for (sum, tenths) in self.before.iter_mut().flatten().zip(session.exposure().iter().flatten()) {
+                *sum = sum.saturating_add(*tenths);
+            }
+        }
+    }
+
+    /// Writes the stored form, as of the beginning of this power-on.
+    pub fn encode(&self, boots: u32, out: &mut [u8; Self::BYTES]) {
+        let mut put = Put::new(out);
+        put.u8(VERSION);
+        self.before.iter().flatten().for_each(|tenths| {
+            put.u32(*tenths);
+        });
+        put.u32(boots);
+    }
+
+    /// Reads the stored form, of this version or another one.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut take = Take::new(stored);
-        if take.u8()? < VERSION {
+        let version = take.u8()?;
+        if version == 0 {
             return Err(Unreadable);
         }
         let mut exposure = Self::new();
         for tenths in exposure.before.iter_mut().flatten() {
             *tenths = take.u32()?;
+        }
+        if version >= VERSION {
+            exposure.as_of = take.u32()?;
         }
         Ok(exposure)
     }
@@ -213,7 +232,9 @@ fn visit(tenths: &Tenths, mut each: impl FnMut(Quantity, usize, f64)) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::component::Wear;
     use crate::observation::{Heartbeat, Observation, Processor, Source};
+    use crate::usage::Totals;
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -246,9 +267,15 @@ mod tests {
         heat(&mut exposure, 21_050, 22_050, 1e9);
         heat(&mut exposure, 90_000, 90_500, 200.0);
         assert_eq!(seen(&exposure), [(0, 10.0), (3, 10.0), (7, 0.4)]);
+        let wear = Wear { totals: &Totals::nothing(), battery_cycles: &[] };
+        let session = Session::now(7, true, &Totals::nothing(), &wear, &exposure);
         let mut stored = [0; Exposure::BYTES];
-        exposure.encode(&mut stored);
+        exposure.encode(8, &mut stored);
         let mut exposure = Exposure::decode(&stored).expect("readable");
+        exposure.add(&session);
+        assert_eq!(seen(&exposure), [], "it is in it");
+        exposure.as_of = 7;
+        exposure.add(&session);
         heat(&mut exposure, 0, 1_050, 45.0);
         assert_eq!(seen(&exposure), [(0, 10.0), (3, 11.0), (7, 0.4)]);
         let mut session = 0.0;

@@ -8,7 +8,7 @@ use crate::exposure::Exposure;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
 use crate::health::{Finding, Health, Inputs, Subsystem};
-use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Saving, Unreadable};
+use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Saving, Session, Unreadable};
 use crate::observation::{MOTORS_MAX, Observation, Source};
 use crate::params::Params;
 use crate::protect::{Protect, Request};
@@ -141,9 +141,7 @@ impl Monitor {
         if crossed || self.exceedances.lasting() {
             self.saving.change(ItemKey::Exceedances);
         }
-        if self.exposure.step(now, &self.vehicle, &self.usage) {
-            self.saving.change(ItemKey::Exposure);
-        }
+        self.exposure.step(now, &self.vehicle, &self.usage);
         self.step_protect(now, event);
         self.step_life(event);
         self.step_happenings(now, event);
@@ -227,21 +225,27 @@ impl Monitor {
                 self.saving.hurry(key);
             }
         }
-        self.before.airframe = self.before.airframe.learn(seen);
-        self.saving.change(ItemKey::Lifetime);
+        let airframe = self.before.airframe.learn(seen);
+        if airframe != self.before.airframe {
+            self.before.airframe = airframe;
+            self.saving.hurry(ItemKey::Lifetime);
+        }
+        self.saving.change(ItemKey::Session);
         if event == Some(FlightEvent::Landing) || (self.before_tick.armed && !self.vehicle.armed()) {
             self.saving.hurry_all();
         }
     }
 
     fn describe_component(&mut self, place: usize) {
+        let boots = self.boots();
         let Self { usage, params, components, saving, .. } = self;
         let wear = usage.wear();
         let Some(component) = components.get_mut(place) else { return };
         let key = ItemKey::Component(place as u8);
         if component.describe(place, &wear, params) {
             saving.hurry(key);
-        } else if component.kind != Kind::None {
+        }
+        if component.kind != Kind::None && component.begin(boots) {
             saving.change(key);
         }
     }
@@ -276,8 +280,8 @@ impl Monitor {
         &mut self.params
     }
 
-    /// Takes an item that was saved in an earlier session; to be called before the first tick. One that cannot be read
-    /// is as if there were none.
+    /// Takes an item that was saved in an earlier session; to be called before the first tick, and for
+    /// [`ItemKey::Session`] once and last. One that cannot be read is as if there were none.
     pub fn restore(&mut self, key: ItemKey, stored: &[u8]) -> Result<(), Unreadable> {
         match key {
             ItemKey::Lifetime => self.before = Lifetime::decode(stored)?,
@@ -288,13 +292,19 @@ impl Monitor {
                 let component = Component::decode(stored)?;
                 *self.components.get_mut(usize::from(place)).ok_or(Unreadable)? = component;
             }
+            ItemKey::Session => {
+                let session = Session::decode(stored)?;
+                self.before.add(&session);
+                self.exposure.add(&session);
+                self.components.iter_mut().for_each(|component| component.add(&session));
+            }
         }
         Ok(())
     }
 
-    /// The item to be saved next, if any is due; the same until it is [`Self::saved`].
-    pub fn save_due(&mut self, now: Instant) -> Option<ItemKey> {
-        self.saving.due(now)
+    /// The item to be saved next, if any is due; the same until it is [`Self::saved`]. To be saved in this order.
+    pub fn save_due(&mut self, now: Instant, room: Room) -> Option<ItemKey> {
+        self.saving.due(now, self.vehicle.armed(), room)
     }
 
     /// Everything that changed is due: the session ends, or the power is about to go.
@@ -305,15 +315,21 @@ impl Monitor {
     /// Writes an item as it is to be saved; gives its length.
     pub fn encode_item(&self, key: ItemKey, out: &mut [u8; ITEM_BYTES_MAX]) -> usize {
         match key {
-            ItemKey::Lifetime => encoded(out, |out| self.lifetime().encode(out)),
+            ItemKey::Lifetime => {
+                encoded(out, |out| Lifetime { boots: self.boots(), ..self.before }.encode(out))
+            }
             ItemKey::Baselines => encoded(out, |out| self.baselines.encode(out)),
             ItemKey::Exceedances => {
                 out.first_chunk_mut().map_or(0, |out| self.exceedances.encode(self.usage.until(), out))
             }
-            ItemKey::Exposure => encoded(out, |out| self.exposure.encode(out)),
+            ItemKey::Exposure => encoded(out, |out| self.exposure.encode(self.boots(), out)),
             ItemKey::Component(place) => {
                 let component = self.components.get(usize::from(place)).unwrap_or(&Component::NONE);
-                encoded(out, |out| component.encode(&self.usage.wear(), out))
+                encoded(out, |out| component.encode(self.boots(), out))
+            }
+            ItemKey::Session => {
+                let (totals, wear) = (self.usage.totals(), self.usage.wear());
+                Session::now(self.boots(), self.heard(), &totals, &wear, &self.exposure).encode(out)
             }
         }
     }
@@ -323,13 +339,21 @@ impl Monitor {
         self.saving.saved(key);
     }
 
+    /// Which power-on this is, from 1.
+    const fn boots(&self) -> u32 {
+        self.before.boots.saturating_add(1)
+    }
+
+    const fn heard(&self) -> bool {
+        self.vehicle.source.is_some()
+    }
+
     /// The airframe's life, this session included.
     pub fn lifetime(&self) -> Lifetime {
-        let heard = self.vehicle.source.is_some();
         Lifetime {
             airframe: self.before.airframe,
-            boots: self.before.boots.saturating_add(1),
-            sessions: self.before.sessions.saturating_add(u32::from(heard)),
+            boots: self.boots(),
+            sessions: self.before.sessions.saturating_add(u32::from(self.heard())),
             totals: self.before.totals.join(&self.usage.totals()),
         }
     }

@@ -190,11 +190,12 @@ params! {
     GsPath "GS_PATH" "" 1.0 0.0 2.0 "0: no summary, 1: a radio at the GS port, 2: through the autopilot";
     GsBaud "GS_BAUD" "baud" 57_600.0 9_600.0 921_600.0 "what SiK radios come with";
     GsPass "GS_PASS" "" 0.0 0.0 1.0 "1: what is not for us passes between ground station and autopilot";
-    GsSign "GS_SIGN" "" 0.0 0.0 2.0 "1: our frames are signed, 2: and unsigned settings and commands refused";
+    GsSign "GS_SIGN" "" 0.0 0.0 2.0 "with a key, 1: our frames are signed, 2: and whatever is asked unsigned is refused";
     ApBaud "AP_BAUD" "baud" 921_600.0 9_600.0 921_600.0 "PX4 TELEM2, ArduPilot SERIAL2 for companions";
     ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "what we send to the autopilot, answers it carries on included";
     ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "1: ask the autopilot for the messages that the checks need";
     ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot";
+    SignPort "SIGN_PORT" "" 0.0 0.0 2.0 "the port that may bring a key: 0 none, 1 the ground station's, 2 the autopilot's";
     RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED: 0 from power-on, 1 by arming";
     RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before";
     RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)";

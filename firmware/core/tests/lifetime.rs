@@ -6,14 +6,14 @@ use std::collections::BTreeMap;
 use hums_core::Monitor;
 use hums_core::baseline::{Baselines, Quantity};
 use hums_core::component::{Kind, Label, Status};
-use hums_core::lifetime::{EVERY, ITEM_BYTES_MAX, ItemKey};
+use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::observation::{
-    AutopilotIdentity, GlobalPosition, Heartbeat, Observation, Source, VehicleKind,
+    AutopilotIdentity, Battery, Esc, EscGroup, GlobalPosition, Heartbeat, Observation, Source, VehicleKind,
 };
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
-use hums_core::time::{Instant, Span};
-use hums_core::units::{Metres, MetresPerSecond};
+use hums_core::time::Instant;
+use hums_core::units::{Amperes, Metres, MetresPerSecond, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 
 /// A store that keeps what it is given.
@@ -32,18 +32,49 @@ impl Store {
     /// Saves what is due; gives the keys.
     fn save(&mut self, monitor: &mut Monitor, now: Instant) -> Vec<ItemKey> {
         let mut keys = Vec::new();
-        while let Some(key) = monitor.save_due(now) {
-            let mut item = [0; ITEM_BYTES_MAX];
-            let length = monitor.encode_item(key, &mut item);
-            self.0.insert(key.number(), item[..length].to_vec());
-            monitor.saved(key);
+        while let Some(key) = self.save_one(monitor, now) {
             keys.push(key);
         }
         keys
     }
+
+    fn save_one(&mut self, monitor: &mut Monitor, now: Instant) -> Option<ItemKey> {
+        let key = monitor.save_due(now, Room::Enough)?;
+        let mut item = [0; ITEM_BYTES_MAX];
+        let length = monitor.encode_item(key, &mut item);
+        self.0.insert(key.number(), item[..length].to_vec());
+        monitor.saved(key);
+        Some(key)
+    }
 }
 
-/// Flies from `from_s` to `to_s`, at 10 m/s, armed a second before.
+/// One tick of a flight from `from_s` to `to_s`, at 10 m/s, armed a second before, that draws 20 A and has one ESC.
+fn step(monitor: &mut Monitor, now_ms: u64, from_s: u64, to_s: u64, vehicle: (u8, u64)) {
+    let now = Instant::from_millis(now_ms);
+    let source = Source { system: vehicle.0, component: 1 };
+    let flies = (from_s * 1_000..to_s * 1_000).contains(&now_ms);
+    let armed = (from_s * 1_000 - 1_000..to_s * 1_000 + 1_000).contains(&now_ms);
+    let heartbeat = Heartbeat { armed, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
+    let position = GlobalPosition {
+        relative_altitude: Metres(if flies { 20.0 } else { 0.0 }),
+        velocity: [if flies { 10.0 } else { 0.0 }, 0.0, 0.0].map(MetresPerSecond),
+        ..GlobalPosition::default()
+    };
+    let current = Some(Amperes(if flies { 20.0 } else { 0.5 }));
+    let esc = Esc { rpm: Some(Rpm(if flies { 6_000.0 } else { 0.0 })), current, ..Esc::default() };
+    for observation in [
+        Observation::Heartbeat(heartbeat),
+        Observation::Identity(AutopilotIdentity { uid: vehicle.1, firmware: 0 }),
+        Observation::GlobalPosition(position),
+        Observation::Battery(Battery { voltage: Some(Volts(15.0)), current, ..Battery::default() }),
+        Observation::Escs(EscGroup { first: 0, escs: [Some(esc), None, None, None] }),
+    ] {
+        monitor.observe(now, source, &observation);
+    }
+    monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
+}
+
+/// Flies from `from_s` to `to_s`, and saves what is due at each tick.
 fn run(
     monitor: &mut Monitor,
     store: &mut Store,
@@ -52,23 +83,10 @@ fn run(
     to_s: u64,
     vehicle: (u8, u64),
 ) -> Vec<(u64, ItemKey)> {
-    let source = Source { system: vehicle.0, component: 1 };
     let mut saves = Vec::new();
     for now_ms in (0..seconds * 1_000).step_by(50) {
         let now = Instant::from_millis(now_ms);
-        let flies = (from_s * 1_000..to_s * 1_000).contains(&now_ms);
-        let armed = (from_s * 1_000 - 1_000..to_s * 1_000 + 1_000).contains(&now_ms);
-        let heartbeat = Heartbeat { armed, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
-        monitor.observe(now, source, &Observation::Heartbeat(heartbeat));
-        let identity = AutopilotIdentity { uid: vehicle.1, firmware: 0 };
-        monitor.observe(now, source, &Observation::Identity(identity));
-        let position = GlobalPosition {
-            relative_altitude: Metres(if flies { 20.0 } else { 0.0 }),
-            velocity: [if flies { 10.0 } else { 0.0 }, 0.0, 0.0].map(MetresPerSecond),
-            ..GlobalPosition::default()
-        };
-        monitor.observe(now, source, &Observation::GlobalPosition(position));
-        monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
+        step(monitor, now_ms, from_s, to_s, vehicle);
         saves.extend(store.save(monitor, now).into_iter().map(|key| (now_ms / 1_000, key)));
     }
     saves
@@ -94,18 +112,113 @@ fn sessions_add_up_and_the_greatest_stays() {
     }
 }
 
+/// What of a life may not be lost, and not be counted twice: sums, in the order in which they are compared.
+fn sums(monitor: &Monitor) -> Vec<f64> {
+    let life = monitor.lifetime();
+    let counters = [
+        UsageCounter::Powered,
+        UsageCounter::Armed,
+        UsageCounter::Flight,
+        UsageCounter::Flights,
+        UsageCounter::Landings,
+        UsageCounter::Distance,
+        UsageCounter::Energy,
+        UsageCounter::BatteryCycles,
+        UsageCounter::Cruise,
+    ];
+    let mut sums: Vec<f64> = counters.into_iter().map(|counter| life.totals.raw(counter)).collect();
+    sums.extend([life.totals.motors[0].seconds, life.totals.motors[0].revolutions / 100.0]);
+    monitor.exposure().for_each_of_life(|_, bin, seconds| {
+        if bin == 4 {
+            sums.push(seconds);
+        }
+    });
+    for place in 0..3 {
+        let (figures, _) = monitor.component_figures(place).unwrap();
+        sums.extend([figures.powered_s, figures.flight_s, figures.flights, figures.cycles, figures.motor_s]);
+    }
+    sums
+}
+
+/// Three components, by hours, cycles and motor hours.
+fn with_components() -> Params {
+    let mut params = Params::defaults();
+    for (name, value) in [
+        ("CMP1_KIND", 1.0),
+        ("CMP2_KIND", 2.0),
+        ("CMP2_NUMBER", 1.0),
+        ("CMP3_KIND", 3.0),
+        ("BAT_CAPACITY", 5.0),
+    ] {
+        params.set(name, value).unwrap();
+    }
+    params
+}
+
 #[test]
-fn a_cut_costs_what_it_may_and_nothing_after_a_landing() {
+fn power_that_goes_at_any_moment_costs_two_minutes_at_most_and_counts_nothing_twice() {
+    const CRUISE_M_S: f64 = 10.0;
+    let params = with_components();
+    let mut store = Store::default();
+    // A first flight, whole, then a second one of 20 minutes that is cut at every fifth second, and at each item.
+    run(&mut store.start(&params), &mut store, 100, 20, 80, (1, 7));
+    let mut monitor = store.start(&params);
+    let mut before = sums(&monitor);
+    let mut saved_at_ms = 0;
+    let mut cuts = 0;
+    for now_ms in (0..1_300_000).step_by(50) {
+        step(&mut monitor, now_ms, 30, 1_230, (1, 7));
+        let live = sums(&monitor);
+        let mut saved = 0;
+        loop {
+            let key = store.save_one(&mut monitor, Instant::from_millis(now_ms));
+            if key.is_some() || now_ms.is_multiple_of(5_000) {
+                let again = sums(&store.start(&params));
+                assert_eq!(again.len(), live.len());
+                cuts += 1;
+                for (index, ((again, live), before)) in again.iter().zip(&live).zip(&before).enumerate() {
+                    // Tenths of a second are rounded, once a session; and nothing goes back.
+                    assert!(*again <= live + 0.2, "{now_ms} ms, {key:?}: sum {index} is {again} of {live}");
+                    assert!(
+                        *again >= before - 0.2,
+                        "{now_ms} ms, {key:?}: sum {index} was {before}, is {again}"
+                    );
+                    let armed = (29_000..1_231_000).contains(&now_ms);
+                    let cost =
+                        if armed { EVERY_ARMED } else { EVERY }.as_millis() as f64 / 1_000.0 * CRUISE_M_S;
+                    assert!(live - again <= cost + 1.0, "{now_ms} ms: sum {index} is {again} of {live}");
+                }
+                before = again;
+            }
+            let Some(key) = key else { break };
+            saved += 1;
+            saved_at_ms = now_ms;
+            assert!(now_ms < 1_232_500 || key != ItemKey::Lifetime, "it is saved once a session");
+        }
+        assert!(saved <= 7, "{saved} items at once");
+    }
+    assert!(cuts > 250, "{cuts}");
+    assert!((1_230_000..1_240_000).contains(&saved_at_ms), "the last at disarming: {saved_at_ms}");
+}
+
+#[test]
+fn a_flight_saves_little_until_it_lands() {
     let mut store = Store::default();
     let mut monitor = store.start(&Params::defaults());
-    let saves = run(&mut monitor, &mut store, 2_100, 20, 200, (1, 7));
-    let lifetime: Vec<u64> =
-        saves.iter().filter(|(_, key)| *key == ItemKey::Lifetime).map(|(at_s, _)| *at_s).collect();
-    assert_eq!(lifetime[0], 10, "the boot itself");
-    assert!(lifetime.windows(2).all(|pair| Span::from_secs(pair[1] - pair[0]) <= EVERY), "{lifetime:?}");
+    let saves = run(&mut monitor, &mut store, 2_100, 20, 1_820, (1, 7));
+    let times = |wanted: ItemKey| -> Vec<u64> {
+        saves.iter().filter(|(_, key)| *key == wanted).map(|(at_s, _)| *at_s).collect()
+    };
+    let session = times(ItemKey::Session);
+    assert_eq!(session[0], 10, "the boot itself");
+    let armed = session.windows(2).filter(|pair| pair[1] <= 1_820);
+    assert!(armed.into_iter().all(|pair| pair[1] - pair[0] <= 121), "{session:?}");
     // Landed (seen within 2 s of it, or at disarming).
-    assert!(lifetime.iter().any(|at_s| (200..=202).contains(at_s)), "{lifetime:?}");
-    assert!(lifetime.len() < 10, "{lifetime:?}");
+    assert!(session.iter().any(|at_s| (1_820..=1_822).contains(at_s)), "{session:?}");
+    assert!(session.len() <= 20, "{session:?}");
+    assert!(times(ItemKey::Lifetime).len() <= 2, "its owner, and as of this session");
+    let bytes = store.0[&ItemKey::Session.number()].len();
+    assert!(bytes <= 160, "{bytes} bytes");
     let again = store.start(&Params::defaults());
     assert_eq!(total(&again, UsageCounter::Landings), 1.0);
 }

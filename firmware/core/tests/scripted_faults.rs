@@ -1,16 +1,18 @@
-//! Scripted faults in a simulated flight: each is found within its debounce plus 100 ms, and its end is seen.
+//! Scripted faults in a simulated flight: each is found within its debounce plus 100 ms, and cleared when it has been
+//! well for two seconds, by more than the hysteresis.
 #![allow(clippy::panic, clippy::unwrap_used)]
 
 mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::health::{Finding, Level};
+use hums_core::health::{CLEAR, Finding, Level};
 use hums_core::observation::{Observation, SystemTime};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
 use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Celsius, Fraction, Volts};
+use hums_core::usage::UsageCounter;
 
 /// When the fault begins and ends in each script.
 const FAULT_MS: u64 = 20_000;
@@ -51,7 +53,8 @@ fn found(findings: &[Finding], check: &str, instance: u8, level: Level, debounce
     );
     let last = findings.iter().rfind(mine).expect("there is one");
     assert_eq!(last.level, Level::Ok, "{check} is not cleared: {last:?}");
-    assert!(last.at.as_millis() >= END_MS, "{check} cleared at {:?}, before the fault ended", last.at);
+    let cleared_ms = last.at.as_millis().saturating_sub(END_MS + CLEAR.as_millis());
+    assert!(last.at.as_millis() >= END_MS && cleared_ms <= 100, "{check} cleared at {:?}", last.at);
     let others = findings.iter().filter(|finding| finding.check != check && !also.contains(&finding.check));
     assert_eq!(others.count(), 0, "{findings:?}");
 }
@@ -94,6 +97,9 @@ fn one_esc_that_falls_silent() {
     assert!((21_900..=22_100).contains(&critical.at.as_millis()), "{critical:?}");
     let warning = findings.iter().find(|finding| finding.level == Level::Warning).expect("found");
     assert!((20_200..=20_400).contains(&warning.at.as_millis()), "{warning:?}");
+    let last = findings.last().expect("there are some");
+    assert_eq!((last.check, last.level), ("esc_silent", Level::Ok));
+    assert!((END_MS + 2_000..=END_MS + 2_100).contains(&last.at.as_millis()), "{last:?}");
 }
 
 #[test]
@@ -158,6 +164,12 @@ fn an_autopilot_that_falls_silent_makes_everything_else_stale() {
         let stale = findings.iter().any(|finding| finding.check == check && finding.level == Level::Stale);
         assert!(stale, "{check} stayed as it was without any data");
     }
+    // It is heard again with the first heartbeat, and what it says is believed at once.
+    for check in ["heartbeat", "batt_remaining", "ekf_variance", "vibration", "load", "roll"] {
+        let last = findings.iter().rfind(|finding| finding.check == check).expect("there");
+        assert_eq!(last.level, Level::Ok, "{last:?}");
+        assert!((END_MS..=END_MS + 2_100).contains(&last.at.as_millis()), "{last:?}");
+    }
 }
 
 #[test]
@@ -166,6 +178,52 @@ fn an_autopilot_that_restarts() {
     let reboot = findings.iter().find(|finding| finding.check == "autopilot_reboot").expect("found");
     assert_eq!(reboot.level, Level::Critical);
     assert!((FAULT_MS..=FAULT_MS + 100).contains(&reboot.at.as_millis()), "{reboot:?}");
+    // It is told for 30 s, and then it has been well for two.
+    let cleared = findings.iter().rfind(|finding| finding.check == "autopilot_reboot").expect("there");
+    assert_eq!(cleared.level, Level::Ok);
+    assert!((FAULT_MS + 32_000..=FAULT_MS + 32_200).contains(&cleared.at.as_millis()), "{cleared:?}");
+}
+
+#[test]
+fn what_comes_back_by_less_than_the_hysteresis_stays_bad() {
+    type Script = fn(u64, &mut Quad);
+    /// Bad for the first half of the fault; then back, by less than the hysteresis.
+    const BACK_MS: u64 = 60_000;
+    let cases: [(&str, Script); 8] = [
+        ("cell_voltage", |now_ms, quad| {
+            quad.battery.voltage = Some(Volts(if now_ms < BACK_MS { 13.2 } else { 14.1 }));
+        }),
+        ("batt_remaining", |now_ms, quad| {
+            quad.battery.remaining = Some(Fraction(if now_ms < BACK_MS { 0.05 } else { 0.075 }));
+        }),
+        ("esc_temperature", |now_ms, quad| {
+            let temperature = Some(Celsius(if now_ms < BACK_MS { 120.0 } else { 108.0 }));
+            quad.escs[2].as_mut().unwrap().temperature = temperature;
+        }),
+        ("motor_loss", |now_ms, quad| {
+            // Percent of the others' 5 A.
+            let current = Some(Amperes(if now_ms < BACK_MS { 0.0 } else { 0.7 }));
+            quad.escs[1].as_mut().unwrap().current = current;
+        }),
+        ("ekf_failsafe", |now_ms, quad| {
+            let velocity = Some(if now_ms < BACK_MS { 0.9 } else { 0.77 });
+            (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), velocity);
+        }),
+        ("vibration", |now_ms, quad| {
+            quad.vibration.levels[2] = Some(if now_ms < BACK_MS { 70.0 } else { 58.0 });
+        }),
+        ("roll", |now_ms, quad| quad.roll = if now_ms < BACK_MS { 1.2 } else { 1.0 }),
+        ("load", |now_ms, quad| {
+            quad.system.load = Some(Fraction(if now_ms < BACK_MS { 0.97 } else { 0.94 }));
+        }),
+    ];
+    for (check, script) in cases {
+        let findings = fly(script);
+        let mine = || findings.iter().filter(|finding| finding.check == check);
+        let critical = mine().find(|finding| finding.level == Level::Critical).expect(check);
+        let next = mine().find(|finding| finding.at > critical.at).expect(check);
+        assert!(next.at.as_millis() >= END_MS, "{check} fell to {:?} at {:?}", next.level, next.at);
+    }
 }
 
 #[test]
@@ -208,29 +266,43 @@ fn an_error_counter_that_wraps_is_no_flood_of_errors() {
 }
 
 #[test]
-fn errors_that_rise() {
+fn errors_that_rise_are_counted_a_minute_across_the_end_of_their_counter() {
     let findings = fly(|now_ms, quad| {
-        quad.escs[0].as_mut().unwrap().errors = Some(((now_ms - FAULT_MS) / 100) as u32);
+        // Two a second, through the counter's end: more than the limit of ten a minute in the sixth second.
+        quad.escs[0].as_mut().unwrap().errors =
+            Some((u32::MAX - 3).wrapping_add(((now_ms - FAULT_MS) / 500) as u32));
     });
     let errors = findings.iter().find(|finding| finding.check == "esc_errors").expect("found");
     assert_eq!((errors.level, errors.instance), (Level::Warning, 0));
+    let after_ms = errors.at.as_millis() - FAULT_MS;
+    // Eleven after 5.5 s, and a second of debounce.
+    assert!((6_500..=6_600).contains(&after_ms), "{after_ms}");
+    assert_eq!(findings.iter().filter(|finding| finding.level == Level::Warning).count(), 1, "{findings:?}");
 }
 
 #[test]
-fn utc_that_jumps_is_no_fault() {
+fn a_clock_that_jumps_is_no_fault_and_counts_no_time() {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
     for now_ms in (0..30_000).step_by(100) {
         let now = Instant::from_millis(now_ms);
-        let quad = Quad::healthy();
+        let mut quad = Quad::healthy();
+        quad.boot_offset_ms = if now_ms < 20_000 { 100_000 } else { 3_700_000 };
         for observation in quad.says(now_ms) {
             monitor.observe(now, AUTOPILOT, &observation);
         }
         let utc_micros = Some(if now_ms < 15_000 { 1_700_000_000_000_000 } else { 1_400_000_000_000_000 });
-        let time = SystemTime { boot_ms: (now_ms + 100_000) as u32, utc_micros };
+        // The autopilot's own clock jumps as well: forward, which no restart does.
+        let jump_ms = if now_ms < 20_000 { 100_000 } else { 3_700_000 };
+        let time = SystemTime { boot_ms: (now_ms + jump_ms) as u32, utc_micros };
         monitor.observe(now, AUTOPILOT, &Observation::SystemTime(time));
         let link = LinkReading { frames_lost: Some(0.0), at: now };
         monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
     }
     assert_eq!(findings, []);
+    let usage = monitor.usage();
+    for counter in [UsageCounter::Armed, UsageCounter::Flight] {
+        let counted_s = usage.value(counter).unwrap();
+        assert!((25.0..=30.0).contains(&counted_s), "{}: {counted_s}", counter.name());
+    }
 }

@@ -41,7 +41,7 @@ fn fly(
         let link = LinkReading { frames_lost: Some(0.0), at: now };
         monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
     }
-    assert!(monitor.save_due(Instant::from_millis(100_000)).is_some());
+    assert!(monitor.save_due(Instant::from_millis(100_000), hums_core::lifetime::Room::Enough).is_some());
     let mut item = [0; ITEM_BYTES_MAX];
     let length = monitor.encode_item(ItemKey::Baselines, &mut item);
     (findings, monitor, item[..length].to_vec())

@@ -102,11 +102,20 @@ pub struct Message {
     pub len_base: u8,
     /// Payload bytes with the extension fields: the longest payload of a MAVLink 2 frame (0 to 255).
     pub len_max: u8,
+    /// Where in the payload the system lies whom it is for; [`Message::NO_TARGET`] where it names none.
+    pub target_system: u8,
+    /// The same for the component.
+    pub target_component: u8,
     /// As in the definition, for instance `HEARTBEAT`.
     #[cfg(feature = "names")]
     pub name: &'static str,
     /// The fields in wire order, extensions last.
     pub fields: &'static [Field],
+}
+
+impl Message {
+    /// No field of the message is a target.
+    pub const NO_TARGET: u8 = u8::MAX;
 }
 
 /// The definition of a message id, or `None` where the dialect has none.

@@ -2,9 +2,12 @@
 
 use core::fmt::{self, Write as _};
 
+use hums_core::time::Instant;
+
 use crate::crc;
-use crate::frame::{CHECKSUM, HEADER_V2, START_V2};
+use crate::frame::{CHECKSUM, HEADER_V2, INCOMPAT_SIGNED, SIGNATURE, START_V2};
 use crate::packet::Packet;
+use crate::signing::Seal;
 
 /// `MAV_COMP_ID_ONBOARD_COMPUTER`
 pub const COMPONENT: u8 = 191;
@@ -55,25 +58,47 @@ impl Encoder {
         self.sequence = sequence;
     }
 
-    /// The bytes of the frame that carries `packet`.
+    /// The bytes of the frame that carries `packet`, without a signature.
     pub fn frame_len(&self, packet: &Packet) -> usize {
         HEADER_V2 + packet.payload().len() + CHECKSUM
     }
 
     /// The frame that carries `packet`; empty for a message that no definition of ours knows.
     pub fn frame<'a>(&mut self, out: &'a mut [u8; GS_FRAME_BYTES_MAX], packet: &Packet) -> &'a [u8] {
-        let Some(message) = hums_dialect::message(packet.id()) else { return &[] };
+        let len = self.put(out, packet, 0);
+        out.get(..len).unwrap_or_default()
+    }
+
+    /// The same, signed.
+    pub fn frame_signed<'a>(
+        &mut self,
+        out: &'a mut [u8; GS_FRAME_BYTES_MAX],
+        packet: &Packet,
+        now: Instant,
+        seal: &mut Seal,
+    ) -> &'a [u8] {
+        let len = self.put(out, packet, INCOMPAT_SIGNED);
+        if len == 0 {
+            return &[];
+        }
+        let tail = seal.sign(now, &out[..len]);
+        out[len..len + SIGNATURE].copy_from_slice(&tail);
+        &out[..len + SIGNATURE]
+    }
+
+    fn put(&mut self, out: &mut [u8; GS_FRAME_BYTES_MAX], packet: &Packet, incompat: u8) -> usize {
+        let Some(message) = hums_dialect::message(packet.id()) else { return 0 };
         let payload = packet.payload();
         let [id0, id1, id2, _] = packet.id().to_le_bytes();
         let len = payload.len() as u8;
-        let header = [START_V2, len, 0, 0, self.sequence, self.system, self.component, id0, id1, id2];
+        let header = [START_V2, len, incompat, 0, self.sequence, self.system, self.component, id0, id1, id2];
         self.sequence = self.sequence.wrapping_add(1);
         let end = HEADER_V2 + payload.len();
         out[..HEADER_V2].copy_from_slice(&header);
         out[HEADER_V2..end].copy_from_slice(payload);
         let sum = crc::step(crc::update(crc::START, &out[1..end]), message.crc_extra);
         out[end..end + CHECKSUM].copy_from_slice(&sum.to_le_bytes());
-        &out[..end + CHECKSUM]
+        end + CHECKSUM
     }
 }
 

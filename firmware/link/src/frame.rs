@@ -19,7 +19,7 @@ pub const SIGNATURE: usize = 13;
 pub const FRAME_MAX: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
 
 /// The only incompatibility flag there is: the frame is signed.
-const INCOMPAT_SIGNED: u8 = 1;
+pub(crate) const INCOMPAT_SIGNED: u8 = 1;
 
 /// What the checksum says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -187,10 +187,28 @@ impl<'a> Frame<'a> {
         self.header.version
     }
 
-    /// Whether a signature follows the checksum. It is carried, not verified: the key is the ground station's.
+    /// Whether a signature follows the checksum. It is carried, not verified: see [`crate::signing`].
     #[inline]
     pub const fn signed(&self) -> bool {
         self.header.signed
+    }
+
+    /// System and component whom it is for, 0 for all; `None` where its message names nobody, or is not known.
+    pub fn target(&self) -> Option<(u8, u8)> {
+        let message = hums_dialect::message(self.id()).filter(|_| self.check == Check::Verified)?;
+        if message.target_system == hums_dialect::Message::NO_TARGET {
+            return None;
+        }
+        let payload = self.payload();
+        // What MAVLink 2 leaves out at the end is zero.
+        let at = |offset: u8| payload.get(usize::from(offset)).copied().unwrap_or(0);
+        Some((at(message.target_system), at(message.target_component)))
+    }
+
+    /// What a signature is about (all bytes from the first to the checksum), and what follows them: link id, stamp and
+    /// hash. `None` where it is not signed.
+    pub fn signature(&self) -> Option<(&'a [u8], &'a [u8; SIGNATURE])> {
+        self.bytes.split_last_chunk().filter(|_| self.header.signed)
     }
 
     /// The payload as sent: MAVLink 2 leaves out zeros at the end.

@@ -11,9 +11,11 @@ pub mod messages;
 mod observe;
 pub mod outlet;
 pub mod packet;
+pub mod param_line;
 pub mod request;
 mod seen;
 pub mod sequence;
+pub mod signing;
 pub mod summary;
 pub mod text;
 

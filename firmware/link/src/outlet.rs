@@ -6,7 +6,7 @@
 //! the one before it has left. A frame is let through when all bytes that leave the port in the second before its own
 //! beginning, together with its own, stay within its class's part of the budget. So no window of one second at the port
 //! itself ever holds more, whatever waits in the queue. Times are kept in slots of 20 ms and a slot counts whole, so at
-//! saturation up to 2 % of the budget stay unused.
+//! saturation up to 4 % of the budget stay unused.
 //!
 //! # Who goes first
 //! Each [`Class`] may fill the budget up to a mark of its own, so that the more urgent one always finds room above it;
@@ -18,7 +18,9 @@
 use hums_core::time::{Instant, Span};
 
 use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+use crate::frame::SIGNATURE;
 use crate::packet::Packet;
+use crate::signing::Seal;
 
 /// How long the line may be busy when a frame that is no finding is added.
 pub const BACKLOG: Span = Span::from_millis(50);
@@ -84,8 +86,8 @@ struct Window {
 
 impl Window {
     const SLOT_MICROS: u64 = 20_000;
-    /// Slots of one second.
-    const SECOND: u64 = 50;
+    /// Slots of one second, and one more: a port that is a little ahead of its model, or behind, stays within the budget.
+    const SECOND: u64 = 51;
     /// A second, and as much of the future as may be booked: 0.3 s and the longest frame at the slowest rate.
     const SLOTS: usize = 96;
 
@@ -122,6 +124,8 @@ impl Window {
 pub struct Outlet {
     /// Makes our frames.
     pub encoder: Encoder,
+    /// Signs them, where they are to be signed.
+    pub seal: Option<Seal>,
     window: Window,
     events: Bucket,
     bulk: Bucket,
@@ -129,6 +133,9 @@ pub struct Outlet {
     forward: Bucket,
     budget: u32,
     baud: u32,
+    /// The line is to get another rate, and nothing is added until it is empty: what waits would leave at another time
+    /// than it is booked for.
+    changing: bool,
     /// When the line has sent everything.
     free_at: Instant,
     /// When bulk had something to send last.
@@ -143,21 +150,32 @@ impl Outlet {
     pub const fn new(budget: u32, baud: u32) -> Self {
         Self {
             encoder: Encoder::new(),
+            seal: None,
             window: Window { slots: [0; Window::SLOTS], newest: 0 },
             events: Bucket::FULL,
             bulk: Bucket::FULL,
             forward: Bucket::FULL,
             budget,
             baud,
+            changing: false,
             free_at: Instant::ZERO,
             bulk_at: None,
         }
     }
 
-    /// Another budget in bytes a second, and another line rate in baud (9,600 or more).
-    pub fn set(&mut self, budget: u32, baud: u32) {
+    /// Another budget in bytes a second, at once; and another line rate in baud (9,600 or more), once the line is empty.
+    pub fn set(&mut self, now: Instant, budget: u32, baud: u32) {
         self.budget = budget;
-        self.baud = baud.max(9_600);
+        let baud = baud.max(9_600);
+        self.changing = baud != self.baud && now < self.free_at;
+        if !self.changing {
+            self.baud = baud;
+        }
+    }
+
+    /// The line rate in baud that counts now.
+    pub const fn baud(&self) -> u32 {
+        self.baud
     }
 
     /// The budget in bytes a second.
@@ -194,7 +212,7 @@ impl Outlet {
         if class == Class::Bulk {
             self.bulk_at = Some(now);
         }
-        if !waits || bytes > GS_FRAME_BYTES_MAX {
+        if !waits || self.changing || bytes > GS_FRAME_BYTES_MAX {
             return false;
         }
         let share = match class {
@@ -212,8 +230,10 @@ impl Outlet {
         bytes as u32 <= share && self.window.sum(start).saturating_add(wanted) <= self.mark(class)
     }
 
+    /// Ten bits a byte, and 2 % for the pauses between frames: a port that is slower than its model would fall behind
+    /// for good where the budget is more than the line carries.
     fn duration(&self, bytes: usize) -> Span {
-        Span::from_micros(bytes as u64 * 10_000_000 / u64::from(self.baud.max(1)))
+        Span::from_micros(bytes as u64 * 10_200_000 / u64::from(self.baud.max(1)))
     }
 
     /// The longest frame of bulk that finds its way in time: half of the line's backlog, and of a second's share.
@@ -242,12 +262,16 @@ impl Outlet {
     /// Sends a message of ours, if it may go now.
     pub fn send(&mut self, now: Instant, class: Class, packet: &Packet, out: &mut impl FnMut(&[u8])) -> bool {
         // Signing is work: not for a frame that will not go.
-        if !self.fits(now, class, self.encoder.frame_len(packet)) {
+        let tail = if self.seal.is_some() { SIGNATURE } else { 0 };
+        if !self.fits(now, class, self.encoder.frame_len(packet) + tail) {
             return false;
         }
         let mut buffer = [0; GS_FRAME_BYTES_MAX];
         let mut encoder = self.encoder;
-        let frame = encoder.frame(&mut buffer, packet);
+        let frame = match &mut self.seal {
+            Some(seal) => encoder.frame_signed(&mut buffer, packet, now, seal),
+            None => encoder.frame(&mut buffer, packet),
+        };
         let sent = !frame.is_empty() && self.pass(now, class, frame, out);
         if sent {
             // Only what is sent uses a sequence number.
@@ -296,6 +320,18 @@ mod tests {
             }
             assert_budget(&sent, budget, baud);
         }
+    }
+
+    #[test]
+    fn another_line_rate_waits_until_the_line_is_empty() {
+        let mut outlet = Outlet::new(5_000, 9_600);
+        assert!(outlet.pass(Instant::ZERO, Class::Own, &[0; 96], &mut |_| {}));
+        outlet.set(Instant::from_millis(50), 5_000, 57_600);
+        assert!(!outlet.pass(Instant::from_millis(50), Class::Critical, &[0; 12], &mut |_| {}));
+        assert_eq!(outlet.baud(), 9_600, "96 bytes take 0.1 s");
+        outlet.set(Instant::from_millis(110), 5_000, 57_600);
+        assert_eq!(outlet.baud(), 57_600);
+        assert!(outlet.pass(Instant::from_millis(110), Class::Critical, &[0; 12], &mut |_| {}));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use heapless::Deque;
 
 use crate::frame::{Check, Frame};
 use crate::packet::Fields;
+use crate::signing::Key;
 
 /// Answers that may wait; further questions of a busy asker are dropped, and asked again.
 const REPLIES_MAX: usize = 12;
@@ -47,7 +48,7 @@ pub enum Request<'a> {
     /// `FILE_TRANSFER_PROTOCOL`: what is in it.
     File(&'a [u8]),
     /// `SETUP_SIGNING`: a key (all zeros: none), and the time that counts from now on.
-    Key([u8; 32], u64),
+    Key(Key, u64),
 }
 
 /// A request with whom it is for.
@@ -79,7 +80,7 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
         119 => (target(10), Request::LogData(fields.u16(8), fields.u32(0), fields.u32(4))),
         121 => (target(0), Request::LogErase),
         122 => (target(0), Request::LogEnd),
-        256 => (target(8), Request::Key(fields.bytes(10), fields.u64(0))),
+        256 => (target(8), Request::Key(Key(fields.bytes(10)), fields.u64(0))),
         _ => return None,
     };
     Some(Asked { target, request })
@@ -102,6 +103,10 @@ pub enum Reply {
     Preflight,
     /// Recording was stopped, as a text.
     Stopped,
+    /// Logs are being erased, as a text.
+    Erased,
+    /// A signing key was set (or, `false`, removed), as a text.
+    Keyed(bool),
 }
 
 /// Answers in line, and lists of parameters under way.

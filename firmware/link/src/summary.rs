@@ -239,7 +239,7 @@ impl Summary {
             self.outlet.encoder.set_system(source.system);
         }
         let params = monitor.params();
-        self.outlet.set(params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32);
+        self.outlet.set(now, params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32);
         self.tell(now, out);
         if self.heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
             && self.outlet.send(now, Class::Own, &heartbeat(monitor), out)
@@ -358,13 +358,15 @@ pub fn text(finding: &Finding) -> Text {
     let words = health::words(finding.check);
     let number = finding.instance + 1;
     let Finding { value, limit, unit, .. } = *finding;
+    // Room is for what tells something.
+    let digits = if value.abs() < 1_000.0 { 2 } else { 0 };
     match (finding.level, health::instances(finding.check)) {
         (Level::Ok, 0 | 1) => Text::new(format_args!("HUMS: ok again: {words}")),
         (Level::Ok, _) => Text::new(format_args!("HUMS: ok again: {words} #{number}")),
         (Level::Stale, 0 | 1) => Text::new(format_args!("HUMS: no data: {words}")),
         (Level::Stale, _) => Text::new(format_args!("HUMS: no data: {words} #{number}")),
-        (_, 0 | 1) => Text::new(format_args!("HUMS: {words} {value:.2} {unit} (limit {limit})")),
-        _ => Text::new(format_args!("HUMS: {words} #{number} {value:.2} {unit} (limit {limit})")),
+        (_, 0 | 1) => Text::new(format_args!("HUMS: {words} {value:.digits$} {unit} (limit {limit})")),
+        _ => Text::new(format_args!("HUMS: {words} #{number} {value:.digits$} {unit} (limit {limit})")),
     }
 }
 
@@ -463,7 +465,9 @@ mod tests {
             for level in Level::ALL {
                 let finding =
                     Finding { check: check.name, unit: check.unit, value: -1234.5, ..finding(level) };
-                assert!(text(&finding).as_str().len() < 50, "{}", text(&finding).as_str());
+                let told = text(&finding);
+                let has_end = matches!(level, Level::Ok | Level::Stale) || told.as_str().ends_with(')');
+                assert!(has_end && told.as_str().len() <= 50, "{}", told.as_str());
             }
         }
     }
@@ -515,7 +519,7 @@ mod tests {
     #[test]
     fn a_critical_finding_overtakes_those_that_wait() {
         let mut summary = Summary::new(&Params::defaults());
-        summary.outlet.set(0, 57_600);
+        summary.outlet.set(Instant::ZERO, 0, 57_600);
         for level in [Level::Warning, Level::Stale, Level::Critical, Level::Warning] {
             summary.finding(Instant::ZERO, &finding(level), &mut |_| panic!("there is no budget"));
         }

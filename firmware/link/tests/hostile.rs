@@ -4,7 +4,7 @@
 use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Label};
 use hums_core::health::Level;
-use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey};
+use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::params::{Params, TABLE};
 use hums_core::snapshot::{COLUMNS_MAX, SAMPLES};
 use hums_core::status::{LinkReading, RecorderStatus};
@@ -97,7 +97,7 @@ fn look(monitor: &mut Monitor, now: Instant) {
         assert!(used.is_none_or(|percent| percent >= 0.0), "{used:?}");
     }
     let mut replaced = false;
-    while let Some(key) = monitor.save_due(now) {
+    while let Some(key) = monitor.save_due(now, Room::Enough) {
         let mut item = [0; ITEM_BYTES_MAX];
         let length = monitor.encode_item(key, &mut item);
         let again = Monitor::new(Params::defaults()).restore(key, &item[..length]);
@@ -126,7 +126,7 @@ proptest! {
         let mut sequences = Sequences::new();
         let mut monitor = Monitor::new(params(&settings));
         for (number, stored) in &items {
-            if let Some(key) = ItemKey::from_number(number % 24) {
+            if let Some(key) = ItemKey::from_number(number % 25) {
                 // Refused or taken: either must do.
                 let mut stored = stored.clone();
                 if let Some(version) = stored.first_mut() {

@@ -5,15 +5,12 @@
 //! port that it came from, within that port's budget. What is asked can change settings, stop the record and ask for
 //! data, and nothing else; a flood of it is cut by [`Limiter`] and by the line of answers, which is short.
 
-use core::fmt::Write as _;
-
-use hums_blackbox::record::{Event, Parameter, Record};
-use hums_core::Monitor;
-use hums_core::health::Level;
+use hums_blackbox::record::{Parameter, Record};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::{Instant, Span};
+use hums_core::{Monitor, protect};
 use hums_link::asking::{Asking, Known};
-use hums_link::encode::{Severity, Text};
+use hums_link::encode::COMPONENT;
 use hums_link::frame::{Check, Frame};
 use hums_link::messages;
 use hums_link::outlet::{Class, Outlet};
@@ -22,9 +19,12 @@ use hums_link::request::{self, Port, Replies, Reply, Request};
 use hums_link::summary;
 use hums_recorder::LogName;
 
+use crate::commands;
 use crate::library::Library;
-use crate::monitoring::{Identity, Monitoring};
+use crate::monitoring::Monitoring;
 use crate::queues::{GsIn, Path, SectorsIn, UplinkOut};
+use crate::secure::{Secure, Trust};
+use crate::settings::Settings;
 
 /// How often the autopilot hears of us: it routes only to those it has heard.
 const HEARTBEAT: Span = Span::from_secs(1);
@@ -34,27 +34,9 @@ const REQUESTS_PER_S: u32 = 5;
 /// Frames of the ground station that one tick looks at: a flood waits in its queue, and is lost there.
 const FRAMES_A_TICK: u32 = 16;
 
-/// `MAV_CMD`: `REQUEST_PROTOCOL_VERSION`, `REQUEST_AUTOPILOT_CAPABILITIES`, `REQUEST_MESSAGE`.
-const CMD_PROTOCOL: u16 = 519;
-const CMD_CAPABILITIES: u16 = 520;
-const CMD_MESSAGE: u16 = 512;
-/// `RUN_PREARM_CHECKS`: may it fly, as far as we know?
-const CMD_PREFLIGHT: u16 = 401;
-/// `LOGGING_START`, `LOGGING_STOP`
-const CMD_RECORD: u16 = 2510;
-const CMD_STOP: u16 = 2511;
-/// `MAV_RESULT`
-const ACCEPTED: u8 = 0;
-const TEMPORARILY_REJECTED: u8 = 1;
-const UNSUPPORTED: u8 = 3;
-const FAILED: u8 = 4;
-
-/// Number of the event that records a command.
-const EVENT_COMMAND: u8 = 2;
-
 /// So many at once, and so many a second.
 #[derive(Clone, Copy, Debug)]
-struct Limiter {
+pub(crate) struct Limiter {
     left: u32,
     at: Instant,
 }
@@ -64,7 +46,7 @@ impl Limiter {
         Self { left: REQUESTS_MAX, at: Instant::ZERO }
     }
 
-    fn allows(&mut self, now: Instant) -> bool {
+    pub(crate) fn allows(&mut self, now: Instant) -> bool {
         let gained = now.since(self.at).as_millis() * u64::from(REQUESTS_PER_S) / 1_000;
         if gained > 0 {
             self.left = (u64::from(self.left) + gained).min(u64::from(REQUESTS_MAX)) as u32;
@@ -80,16 +62,24 @@ impl Limiter {
 #[derive(Clone, Debug)]
 pub(crate) struct Companion {
     /// The autopilot port's way out.
-    outlet: Outlet,
+    pub(crate) outlet: Outlet,
     asking: Asking,
-    replies: Replies,
-    limits: [Limiter; 2],
+    pub(crate) replies: Replies,
+    pub(crate) limits: [Limiter; 2],
     heartbeat_at: Option<Instant>,
     pub(crate) library: Library,
     /// The log that is open over FTP.
     file: Option<LogName>,
     /// Somebody stopped the record.
     pub(crate) stopped: bool,
+    pub(crate) secure: Secure,
+    /// What the protective action asks of the autopilot, until it is sent.
+    protect: Option<protect::Request>,
+    /// Frames that passed through for others, and found no room.
+    pub(crate) not_passed: u32,
+    /// When a frame of a definition that we do not have was passed down last.
+    pub(crate) passed_at: Option<Instant>,
+    pub(crate) settings: Settings,
 }
 
 impl Companion {
@@ -103,11 +93,21 @@ impl Companion {
             library: Library::new(),
             file: None,
             stopped: false,
+            secure: Secure::new(),
+            protect: None,
+            not_passed: 0,
+            passed_at: None,
+            settings: Settings::new(),
         }
     }
 }
 
 impl Monitoring<'_> {
+    /// The line rates that count now, in baud: of the ground station's port and of the autopilot's.
+    pub const fn bauds(&self) -> (u32, u32) {
+        (self.summary.outlet.baud(), self.companion.outlet.baud())
+    }
+
     /// Takes one frame of the ground station from its queue; `false` when there is none.
     pub fn uplink(
         &mut self,
@@ -124,13 +124,14 @@ impl Monitoring<'_> {
             let check = if verified { Check::Verified } else { Check::Unverified };
             if let Some(frame) = Frame::again(bytes, check) {
                 self.asked(now, Port::Gs, &frame, sectors);
+                self.pass_up(now, &frame, gs);
             }
             self.answer(now, gs);
         })
     }
 
     /// Looks at a frame of the autopilot's port: an answer to us, a question, or what we need to know is there.
-    pub(crate) fn heard(&mut self, now: Instant, frame: &Frame<'_>, sectors: &mut SectorsIn) {
+    pub(crate) fn heard(&mut self, now: Instant, frame: &Frame<'_>, sectors: &mut SectorsIn, gs: &mut GsIn) {
         let vehicle = self.monitor.vehicle().source;
         if vehicle
             .is_some_and(|source| (source.system, source.component) == (frame.system(), frame.component()))
@@ -145,6 +146,7 @@ impl Monitoring<'_> {
             }
         }
         self.asked(now, Port::Autopilot, frame, sectors);
+        self.pass_down(now, frame, gs);
     }
 
     fn asked(&mut self, now: Instant, port: Port, frame: &Frame<'_>, sectors: &mut SectorsIn) {
@@ -154,33 +156,53 @@ impl Monitoring<'_> {
             return;
         }
         let by = (frame.system(), frame.component());
-        let replies = &mut self.companion.replies;
+        if by == (system, COMPONENT) {
+            // Our own, that came back; or somebody who says that he is us.
+            return;
+        }
+        if let Request::Key(key, stamp) = asked.request {
+            // Never for all, says the guide: only for who is named.
+            if asked.target == (system, COMPONENT) {
+                self.key_brought(now, port, key, stamp, by, sectors);
+            }
+            return;
+        }
+        let trust = self.trust(now, port, frame);
         match asked.request {
-            Request::ParamList => replies.list(port, TABLE.len() as u16),
-            Request::ParamAt(index) if usize::from(index) < TABLE.len() => {
-                replies.push(port, Reply::Param(index));
-            }
-            Request::ParamNamed(name) => {
-                if let Some(index) = index_of(name) {
-                    replies.push(port, Reply::Param(index));
-                }
-            }
             Request::ParamSet(name, value) => {
                 let Some(index) = index_of(name) else { return };
-                if self.companion.limits[port as usize].allows(now) {
-                    // Refused or not, the answer is the value that counts now.
-                    let _ = self.set_by_link(now, name, value, by, sectors);
+                let may = self.may_set(port, name, trust) && self.companion.limits[port as usize].allows(now);
+                // Refused or not, the answer is the value that counts now.
+                if may && self.set_by_link(now, name, value, by, sectors) {
+                    self.changed(trust);
                 }
                 self.companion.replies.push(port, Reply::Param(index));
             }
             // What is for all components of the vehicle is for the autopilot to answer, unless it is a question.
-            Request::Command(command, params) if asked.target.1 != 0 || command == CMD_MESSAGE => {
+            Request::Command(command, params) if asked.target.1 != 0 || command == commands::MESSAGE => {
                 let broadcast = asked.target.1 == 0;
-                let result = self.command(now, port, command, params, by, sectors);
-                if !broadcast || result == ACCEPTED {
+                let result = match trust {
+                    Trust::Refused => commands::DENIED,
+                    _ => self.command(now, port, command, params, by, sectors),
+                };
+                if result == commands::ACCEPTED {
+                    self.changed(trust);
+                }
+                if !broadcast || result == commands::ACCEPTED {
                     self.companion.replies.push(port, Reply::Ack(command, result, by));
                 }
             }
+            _ if trust == Trust::Refused => {}
+            Request::ParamList => self.companion.replies.list(port, TABLE.len() as u16),
+            Request::ParamAt(index) if usize::from(index) < TABLE.len() => {
+                self.companion.replies.push(port, Reply::Param(index));
+            }
+            Request::ParamNamed(name) => {
+                if let Some(index) = index_of(name) {
+                    self.companion.replies.push(port, Reply::Param(index));
+                }
+            }
+            Request::LogErase if asked.target.1 != 0 => self.erase(now, port, trust, by, sectors),
             // Of the broadcasts of a vehicle only those that name us: the autopilot has logs and files of its own.
             ref about_logs if asked.target.1 != 0 => {
                 let Companion { library, file, .. } = &mut self.companion;
@@ -190,69 +212,8 @@ impl Monitoring<'_> {
         }
     }
 
-    /// Does what a command says; its `MAV_RESULT`.
-    fn command(
-        &mut self,
-        now: Instant,
-        port: Port,
-        command: u16,
-        params: [f32; 2],
-        by: (u8, u8),
-        sectors: &mut SectorsIn,
-    ) -> u8 {
-        let mut reply = |reply| {
-            self.companion.replies.push(port, reply);
-            ACCEPTED
-        };
-        match (command, params[0] as u32) {
-            (CMD_CAPABILITIES, _) | (CMD_MESSAGE, 148) => reply(Reply::Version),
-            (CMD_PROTOCOL, _) | (CMD_MESSAGE, 300) => reply(Reply::Protocol),
-            (CMD_MESSAGE, 0) => reply(Reply::Heartbeat),
-            (CMD_PREFLIGHT, _) => {
-                reply(Reply::Preflight);
-                if preflight(self.monitor).is_none() { ACCEPTED } else { FAILED }
-            }
-            (CMD_RECORD | CMD_STOP, _) => {
-                if !self.companion.limits[port as usize].allows(now) {
-                    return TEMPORARILY_REJECTED;
-                }
-                if command == CMD_STOP && self.monitor.vehicle().armed() {
-                    return TEMPORARILY_REJECTED;
-                }
-                self.stop_or_record(now, command == CMD_STOP, port, by, sectors);
-                ACCEPTED
-            }
-            _ => UNSUPPORTED,
-        }
-    }
-
-    /// Never unnoticed: it is an event in the record, a text on the ground station, and a finding for as long as it
-    /// lasts; and it ends when the vehicle is armed.
-    fn stop_or_record(
-        &mut self,
-        now: Instant,
-        stop: bool,
-        port: Port,
-        by: (u8, u8),
-        sectors: &mut SectorsIn,
-    ) {
-        if self.companion.stopped == stop {
-            return;
-        }
-        self.companion.stopped = stop;
-        let mut text = Text::default();
-        let what = if stop { "stopped" } else { "started" };
-        // Fits: 50 characters.
-        let _ = write!(text, "recording {what} by {}/{}", by.0, by.1);
-        let event = Event { number: EVENT_COMMAND, text: text.as_str() };
-        self.record(now, &Record::Event(event), sectors);
-        if stop {
-            self.companion.replies.push(port, Reply::Stopped);
-        }
-    }
-
-    /// Sets a parameter because somebody on a port asked for it: recorded, and in force at once.
-    fn set_by_link(
+    /// Sets a parameter because somebody asked for it: recorded, and in force at once. `false` where it is refused.
+    pub(crate) fn set_by_link(
         &mut self,
         now: Instant,
         name: &str,
@@ -282,10 +243,14 @@ impl Monitoring<'_> {
         if self.companion.stopped && self.monitor.vehicle().armed() {
             self.stop_or_record(now, false, Port::Gs, (0, 0), sectors);
         }
+        self.seal(gs.path());
         let Self { companion, monitor, .. } = self;
-        let Companion { outlet, asking, heartbeat_at, .. } = companion;
+        let Companion { outlet, asking, heartbeat_at, protect, .. } = companion;
+        if let Some(request) = monitor.take_request() {
+            *protect = Some(request);
+        }
         let params = monitor.params();
-        outlet.set(params.get(Param::ApBudget) as u32, params.get(Param::ApBaud) as u32);
+        outlet.set(now, params.get(Param::ApBudget) as u32, params.get(Param::ApBaud) as u32);
         let mut out = |bytes: &[u8]| gs.autopilot.put(bytes);
         if let Some(source) = monitor.vehicle().source {
             outlet.encoder.set_system(source.system);
@@ -296,10 +261,18 @@ impl Monitoring<'_> {
                 *heartbeat_at = Some(now);
             }
         }
+        // The protective action: what the autopilot answers is the monitor's to see.
+        if let (Some(request), Some(source)) = (*protect, monitor.vehicle().source) {
+            let packet = messages::command_long(request.command, &[], source.system, source.component);
+            if outlet.send(now, Class::Critical, &packet.u8(32, request.confirmation), &mut out) {
+                *protect = None;
+            }
+        }
         if params.get(Param::ApStreams) > 0.5 {
             let known = known(monitor);
             asking.tick(now, known.as_ref(), &mut |packet| outlet.send(now, Class::Own, packet, &mut out));
         }
+        self.settings(now, sectors, gs);
         self.answer(now, gs);
     }
 
@@ -307,14 +280,14 @@ impl Monitoring<'_> {
     fn answer(&mut self, now: Instant, gs: &mut GsIn) {
         for _ in 0..self.companion.replies.len() {
             let Some((port, reply)) = self.companion.replies.first() else { break };
-            let packet = packet(reply, self.monitor, &self.identity);
+            let packet = commands::packet(reply, self.monitor, &self.identity);
             let sent = self.send(now, port, Class::Own, &packet, gs);
             self.companion.replies.done(sent);
         }
         let count = TABLE.len() as u16;
         for port in Port::ALL {
             while let Some(index) = self.companion.replies.listed(port) {
-                let packet = packet(Reply::Param(index), self.monitor, &self.identity);
+                let packet = commands::packet(Reply::Param(index), self.monitor, &self.identity);
                 if !self.send(now, port, Class::Bulk, &packet, gs) {
                     break;
                 }
@@ -363,7 +336,7 @@ impl Monitoring<'_> {
     }
 }
 
-fn index_of(name: &str) -> Option<u16> {
+pub(crate) fn index_of(name: &str) -> Option<u16> {
     TABLE.iter().position(|spec| spec.name == name).map(|index| index as u16)
 }
 
@@ -382,54 +355,9 @@ fn known(monitor: &Monitor) -> Option<Known> {
     })
 }
 
-/// The first thing that stands against a flight.
-fn preflight(monitor: &Monitor) -> Option<&'static str> {
-    let bad = |level| matches!(level, Level::Warning | Level::Critical);
-    monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, ..)| check.name)
-}
-
-fn packet(reply: Reply, monitor: &Monitor, identity: &Identity<'_>) -> Packet {
-    match reply {
-        Reply::Param(index) => match monitor.params().iter().nth(usize::from(index)) {
-            Some((spec, value)) => messages::param_value(spec.name, value, index, TABLE.len() as u16),
-            // Only indices of the table are put in line.
-            None => messages::heartbeat(0),
-        },
-        Reply::Ack(command, result, (system, component)) => {
-            messages::command_ack(command, result, system, component)
-        }
-        Reply::Version => messages::autopilot_version(version(identity.version), identity.git, &identity.uid),
-        Reply::Protocol => messages::protocol_version(),
-        Reply::Heartbeat => summary::heartbeat(monitor),
-        Reply::Preflight => match preflight(monitor) {
-            Some(check) => {
-                let words = hums_core::health::words(check);
-                messages::status_text(
-                    Severity::Warning,
-                    Text::new(format_args!("HUMS: not ready: {words}")).as_str(),
-                )
-            }
-            None => messages::status_text(Severity::Info, "HUMS: ready"),
-        },
-        Reply::Stopped => messages::status_text(Severity::Warning, "HUMS: recording stopped by command"),
-    }
-}
-
-/// `1.2.3` as three numbers.
-fn version(text: &str) -> [u8; 3] {
-    let mut numbers = text.split(['.', '-', '+']).map(|part| part.parse().unwrap_or(0));
-    [(); 3].map(|()| numbers.next().unwrap_or(0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_version_is_three_numbers_whatever_it_says() {
-        assert_eq!(version("1.22.3"), [1, 22, 3]);
-        assert_eq!((version("0.1.0-rc1"), version("")), ([0, 1, 0], [0, 0, 0]));
-    }
 
     #[test]
     fn a_flood_of_settings_is_cut_to_a_few_a_second() {

@@ -10,15 +10,19 @@
 //! [`queues`] is the home of all queues, with their capacities and what happens when each is full.
 #![cfg_attr(not(test), no_std)]
 
+mod commands;
 mod companion;
 mod keeping;
 mod library;
 mod loss;
 pub mod monitoring;
+mod pass;
 pub mod persist;
 pub mod port;
 pub mod queues;
 pub mod reception;
+mod secure;
+mod settings;
 pub mod shelf;
 pub mod storage;
 pub mod supervisor;

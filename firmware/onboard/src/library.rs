@@ -35,6 +35,8 @@ pub(crate) struct Library {
     ticket: u16,
     /// What is wanted next has been asked for.
     asked: bool,
+    /// Earlier logs are to be erased.
+    pub(crate) erases: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +74,13 @@ enum Step {
 
 impl Library {
     pub(crate) const fn new() -> Self {
-        Self { job: None, ticket: 0, asked: false }
+        Self { job: None, ticket: 0, asked: false, erases: false }
+    }
+
+    /// For somebody else's question.
+    pub(crate) const fn next_ticket(&mut self) -> u16 {
+        self.ticket = self.ticket.wrapping_add(1);
+        self.ticket
     }
 
     fn begin(&mut self, port: Port, by: (u8, u8), kind: Kind) {
@@ -163,6 +171,15 @@ impl Kind {
 impl Monitoring<'_> {
     /// Goes on with the conversation as far as the card's answers and the port's budget allow.
     pub(crate) fn lend(&mut self, now: Instant, gs: &mut GsIn) {
+        if self.companion.settings.is_reading() {
+            return;
+        }
+        if self.companion.library.erases {
+            let ticket = self.companion.library.next_ticket();
+            self.companion.library.erases =
+                !gs.shelf.want(Want { ticket, which: Which::At(0), what: What::Erase });
+            self.companion.library.asked = false;
+        }
         // Bounded by the port's budget; a number all the same.
         for _ in 0..64 {
             let Some(mut job) = self.companion.library.job else {

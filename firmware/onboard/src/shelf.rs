@@ -31,15 +31,19 @@ pub enum What {
     Length,
     /// Bytes from an offset on.
     Data(u32),
+    /// That all earlier logs are no longer offered, and make room first. Not answered.
+    Erase,
 }
 
-/// A log, by its place in the directory from 0, or by its name.
+/// A log, by its place in the directory from 0 (erased ones left out), or by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Which {
     /// By its place.
     At(u16),
     /// By its name.
     Named(LogName),
+    /// No log: the file of parameters, `PARAMS.TXT`.
+    Settings,
 }
 
 /// Something wanted; the ticket comes back with the answer.
@@ -85,7 +89,10 @@ impl Shelf {
     pub(crate) fn split(&mut self) -> (Reader<'_>, Server<'_>) {
         let (wants_in, wants_out) = self.wants.split();
         let reader = Reader { wants: wants_in, answers: self.answers.framed_consumer() };
-        (reader, Server { wants: wants_out, answers: self.answers.framed_producer(), last: None })
+        (
+            reader,
+            Server { wants: wants_out, answers: self.answers.framed_producer(), last: None, erases: false },
+        )
     }
 }
 
@@ -121,6 +128,8 @@ pub struct Server<'a> {
     answers: FramedProducer<&'a Churrasco<ANSWER_BYTES>>,
     /// The log that was read last.
     last: Option<(Answer, Segment)>,
+    /// Logs are being erased, one at a call.
+    erases: bool,
 }
 
 impl Answer {
@@ -153,12 +162,22 @@ impl Answer {
 impl Server<'_> {
     /// Whether somebody waits for an answer.
     pub fn is_wanted(&self) -> bool {
-        self.wants.ready()
+        self.erases || self.wants.ready()
     }
 
     /// Answers one want, if there is one and room for its answer; whether there was.
     pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
+        if self.erases {
+            self.last = None;
+            self.erases = erase_next(recorder);
+            return true;
+        }
         let Some(want) = self.wants.peek().copied() else { return false };
+        if want.what == What::Erase {
+            let _ = self.wants.dequeue();
+            self.erases = true;
+            return true;
+        }
         let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
         let _ = self.wants.dequeue();
         let mut answer = Answer {
@@ -180,7 +199,7 @@ impl Server<'_> {
                     let to = grant.get_mut(HEAD..).unwrap_or_default();
                     data = copy(card, &mut segment, answer.bytes, offset, to);
                 }
-                self.last = Some((answer, segment));
+                self.last = Some((answer, segment)).filter(|_| want.which != Which::Settings);
             }
         }
         if let Some(head) = grant.get_mut(..HEAD) {
@@ -189,6 +208,19 @@ impl Server<'_> {
         grant.commit((HEAD + data) as u16);
         true
     }
+}
+
+/// Hides one log of an earlier session; `false` when there is none, or the card does not take it.
+fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>) -> bool {
+    let session = recorder.log_name().map(|name| name.session);
+    let Some(card) = recorder.card() else { return false };
+    let mut next = None;
+    let looked = card.logs(|entry| {
+        if !entry.hidden && Some(entry.name.session) != session {
+            next = Some(entry);
+        }
+    });
+    looked.is_ok() && next.is_some_and(|entry| card.hide(&entry).is_ok())
 }
 
 /// The log that is wanted, from the directory unless it is the one that was read last.
@@ -200,17 +232,28 @@ fn find<D: BlockDevice>(
     if let (Some((answer, segment)), What::Data(_)) = (last, want.what) {
         let same = match want.which {
             Which::At(index) => answer.found == Some(index),
-            Which::Named(name) => answer.name == name,
+            Which::Named(name) => answer.name == name && answer.found.is_some(),
+            Which::Settings => false,
         };
         if same {
             return Some((answer, Some(segment)));
         }
     }
+    if want.which == Which::Settings {
+        let (segment, bytes) = card.text(b"PARAMS", b"TXT").ok()?;
+        let answer =
+            Answer { ticket: want.ticket, count: 0, found: Some(0), name: segment.name, bytes, offset: 0 };
+        return Some((answer, Some(segment)));
+    }
     let (mut count, mut found) = (0_u16, None);
     card.logs(|entry| {
+        if entry.hidden {
+            return;
+        }
         let wanted = match want.which {
             Which::At(index) => index == count,
             Which::Named(name) => name == entry.name,
+            Which::Settings => false,
         };
         if wanted {
             found = Some((count, entry.name));

@@ -19,6 +19,9 @@ type Manager<'a, D> = VolumeManager<Gate<'a, D>, FatClock<'a>, 1, 1, 1>;
 /// Directory blocks that a root directory may have before it counts as going in circles: 64 K entries.
 const DIRECTORY_BLOCKS_MAX: u32 = 4_096;
 
+/// The attribute of a file that lists do not show.
+const HIDDEN: u8 = 2;
+
 /// Why a card operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CardError<E> {
@@ -81,6 +84,8 @@ pub struct LogEntry {
     pub name: LogName,
     /// The file's length in bytes: what is allocated, not what is written.
     pub bytes: u32,
+    /// It was erased over a link ([`Card::hide`]): not offered any longer, and there until its room is wanted.
+    pub hidden: bool,
     block: BlockIdx,
     offset: u32,
 }
@@ -189,7 +194,8 @@ impl<'a, D: BlockDevice> Card<'a, D> {
             let name = LogName::from_short(entry.name.base_name(), entry.name.extension());
             if let Some(name) = name.filter(|_| !entry.attributes.is_directory()) {
                 let (block, offset) = (entry.entry_block, entry.entry_offset);
-                each(LogEntry { name, bytes: entry.size, block, offset });
+                let hidden = entry.attributes.is_hidden();
+                each(LogEntry { name, bytes: entry.size, hidden, block, offset });
             }
             ControlFlow::Continue(())
         })?;
@@ -244,23 +250,45 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     /// Gives an existing segment a new name in one block write, and opens it to be written anew.
     pub fn recycle(&mut self, old: &LogEntry, name: LogName) -> Result<(), CardError<D::Error>> {
         self.open = None;
-        let short = name.short();
+        self.change_entry(old, |entry| {
+            if let Some((short, attributes)) = entry.split_first_chunk_mut() {
+                *short = name.short();
+                attributes[0] &= !HIDDEN;
+            }
+        })?;
+        self.open(name)
+    }
+
+    /// Marks a segment as hidden, in one block write: it stays as it is, and the open one stays open.
+    pub fn hide(&mut self, segment: &LogEntry) -> Result<(), CardError<D::Error>> {
+        let open = self.open;
+        self.change_entry(segment, |entry| entry[LogName::SHORT_BYTES] |= HIDDEN)?;
+        self.open = open;
+        Ok(())
+    }
+
+    /// Changes name and attributes of a directory entry that is still as it was.
+    fn change_entry(
+        &mut self,
+        old: &LogEntry,
+        change: impl FnOnce(&mut [u8; LogName::SHORT_BYTES + 1]),
+    ) -> Result<(), CardError<D::Error>> {
         let old_short = old.name.short();
         let at = old.offset as usize;
-        let renamed = self.manager()?.device(|gate| {
+        let changed = self.manager()?.device(|gate| {
             let mut block = [Block::new()];
             gate.allow_reads(1);
             gate.read(&mut block, old.block)?;
-            let entry = block[0].get_mut(at..at + LogName::SHORT_BYTES).ok_or(GateError::Refused)?;
-            if entry != old_short {
+            let entry = block[0].get_mut(at..).and_then(|entry| entry.first_chunk_mut());
+            let entry = entry.ok_or(GateError::Refused)?;
+            if entry.first_chunk() != Some(&old_short) {
                 return Err(GateError::Refused);
             }
-            entry.copy_from_slice(&short);
+            change(entry);
             gate.write(&block, old.block)
         });
         self.reopen()?;
-        renamed?;
-        self.open(name)
+        Ok(changed?)
     }
 
     /// Finds an existing segment.
@@ -271,14 +299,40 @@ impl<'a, D: BlockDevice> Card<'a, D> {
                 found = Some(entry);
             }
         })?;
-        let entry = found.ok_or(CardError::NotFound)?;
+        self.place(&found.ok_or(CardError::NotFound)?)
+    }
+
+    fn place(&self, entry: &LogEntry) -> Result<Segment, CardError<D::Error>> {
         let mut block = [Block::new()];
         self.manager()?.device(|gate| gate.read(&mut block, entry.block))?;
         let at = entry.offset as usize;
         let word =
             |at: usize| Some(u32::from(u16::from_le_bytes([*block[0].get(at)?, *block[0].get(at + 1)?])));
         let (Some(high), Some(low)) = (word(at + 20), word(at + 26)) else { return Err(CardError::Damaged) };
-        Ok(Segment { name, bytes: entry.bytes, chain: Chain::new((high << 16 | low) & 0x0FFF_FFFF) })
+        Ok(Segment {
+            name: entry.name,
+            bytes: entry.bytes,
+            chain: Chain::new((high << 16 | low) & 0x0FFF_FFFF),
+        })
+    }
+
+    /// Finds a file of somebody else's in the root directory, for reading; how long it is.
+    pub fn text(&self, base: &[u8], extension: &[u8]) -> Result<(Segment, u32), CardError<D::Error>> {
+        let mut found = None;
+        self.manager()?.iterate_dir(self.root, |entry| {
+            let is_it = entry.name.base_name() == base && entry.name.extension() == extension;
+            if is_it && !entry.attributes.is_directory() {
+                let (block, offset) = (entry.entry_block, entry.entry_offset);
+                let name = LogName { session: 0, segment: 0 };
+                found = Some(LogEntry { name, bytes: entry.size, hidden: false, block, offset });
+            }
+            ControlFlow::Continue(())
+        })?;
+        let entry = found.ok_or(CardError::NotFound)?;
+        let segment = self.place(&entry)?;
+        // Its last block is read whole.
+        let bytes = entry.bytes.checked_next_multiple_of(Block::LEN_U32).unwrap_or(u32::MAX);
+        Ok((Segment { bytes, ..segment }, entry.bytes))
     }
 
     /// Opens an existing segment for writing in place.

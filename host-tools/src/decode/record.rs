@@ -255,6 +255,7 @@ pub fn event_name(number: u8) -> &'static str {
         9 => "phase",
         10 => "autopilot_reboot",
         11 => "other_airframe",
+        12 => "by_link",
         _ => "other",
     }
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use hums_blackbox::Cause;
+use hums_core::health;
 use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
@@ -89,33 +90,36 @@ fn findings_text(text: &mut String, log: &Overview) {
     }
     let _ = writeln!(text, "  findings {}", contents.findings_count);
     for finding in contents.findings.iter().take(SHOWN_MAX) {
-        let FindingNumbers { value, limit } = finding_numbers(finding);
         let _ = writeln!(
             text,
-            "    {:>9.3} s  {:<8}  {} {}[{}]  was {}{value}{limit}",
+            "    {:>9.3} s  {:<8}  {}",
             finding.at.as_secs_f64(),
             finding.level,
-            finding.subsystem,
-            finding.check,
-            finding.instance,
-            finding.previous
+            sentence(finding)
         );
     }
     more(text, contents.findings_count, contents.findings.len());
 }
 
-struct FindingNumbers {
-    value: String,
-    limit: String,
-}
-
-fn finding_numbers(finding: &FindingLine) -> FindingNumbers {
-    let unit = &finding.unit;
-    let number = |before: &str, value: f32| match finite(value) {
-        Some(value) => format!(", {before}{value:.6} {unit}").trim_end().to_owned(),
-        None => String::new(),
+/// What was found, in the words that the pilot saw, and the check that found it.
+fn sentence(finding: &FindingLine) -> String {
+    let FindingLine { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
+    let known = health::checks().find(|known| known.name == *check);
+    let words = known.map_or(check.as_str(), |check| check.words);
+    let number = match known.map_or(0, |check| check.instances) {
+        0 | 1 => String::new(),
+        _ => format!(" {}", u16::from(*instance) + 1),
     };
-    FindingNumbers { value: number("", finding.value), limit: number("limit ", finding.limit) }
+    let mut sentence = format!("{subsystem}: {words}{number}");
+    if finite(*value).is_some() {
+        let _ = write!(sentence, ", {value} {unit}");
+        sentence.truncate(sentence.trim_end().len());
+    }
+    if finite(*limit).is_some() {
+        let _ = write!(sentence, " (limit {limit})");
+    }
+    let _ = write!(sentence, "; was {previous} [{check}]");
+    sentence
 }
 
 fn more(text: &mut String, count: u64, listed: usize) {

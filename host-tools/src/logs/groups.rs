@@ -14,13 +14,20 @@ pub struct Groups<'a> {
     assembler: Assembler,
     group: Group,
     ended: bool,
+    ends_short: bool,
 }
 
 impl<'a> Groups<'a> {
     /// The groups of a log.
     pub fn new(log: &'a Log) -> Self {
         let assembler = log.session.map_or_else(Assembler::new, Assembler::for_session);
-        Self { blocks: log.blocks(), assembler, group: Vec::new(), ended: false }
+        Self {
+            blocks: log.blocks(),
+            assembler,
+            group: Vec::new(),
+            ended: false,
+            ends_short: log.ends_short(),
+        }
     }
 
     /// The next group; `None` at the end.
@@ -53,8 +60,8 @@ impl<'a> Groups<'a> {
         self.assembler.session()
     }
 
-    /// Blocks after the last sector that begin as one and fail their check.
+    /// Blocks after the last sector that were sectors of the session and fail their check, or end too soon.
     pub fn damaged_at_end(&self) -> u32 {
-        self.assembler.damaged_since()
+        self.assembler.damaged_since().max(u32::from(self.ends_short))
     }
 }

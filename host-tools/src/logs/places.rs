@@ -42,6 +42,12 @@ impl Log {
         self.pieces.iter().flat_map(|piece| &piece.extents).map(|extent| extent.length).sum()
     }
 
+    /// Whether it ends within a block, as only a copy does that was cut short.
+    pub fn ends_short(&self) -> bool {
+        let last = self.pieces.last().and_then(|piece| piece.extents.last());
+        last.is_some_and(|extent| extent.length % BLOCK_BYTES as u64 != 0)
+    }
+
     /// The blocks, in order.
     pub fn blocks(&self) -> Blocks<'_> {
         Blocks { log: self, piece: 0, extent: 0, offset: 0, file: None, buffer: Vec::new(), at: 0 }

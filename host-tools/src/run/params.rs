@@ -1,22 +1,12 @@
-//! `--params FILE`: parameters as ground stations keep them in files.
-//!
-//! | program | a line |
-//! |---|---|
-//! | Mission Planner | `NAME,VALUE` |
-//! | MAVProxy, ArduPilot | `NAME VALUE` |
-//! | QGroundControl | `SYSTEM COMPONENT NAME VALUE TYPE`, with tabs; lines of other components than ours are left out |
-//!
-//! `#` begins a comment.
+//! `--params FILE`: parameters as ground stations keep them in files ([`hums_link::param_line`]).
 
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use hums_core::params::{ParamError, ParamSpec, Params, TABLE};
+use hums_link::param_line::{self, Line};
 
 use crate::outcome::usage;
-
-/// Our MAVLink component, as QGroundControl's files name it.
-const COMPONENT: &str = "191";
 
 /// The parameters that a file sets, in its order; none where there is no file.
 pub(crate) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
@@ -24,7 +14,7 @@ pub(crate) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("--params {}: cannot be read", path.display()))?;
     let mut params = Vec::new();
-    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+    for (index, line) in text.lines().enumerate() {
         match parameter(line) {
             Ok(parameter) => params.extend(parameter),
             Err(why) => {
@@ -37,16 +27,10 @@ pub(crate) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>
 
 /// What a line sets, if anything; `Err` says what is wrong with it.
 fn parameter(line: &str) -> Result<Option<(&'static ParamSpec, f32)>, String> {
-    let line = line.split('#').next().unwrap_or_default();
-    let words: Vec<&str> =
-        line.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty()).collect();
-    let (name, value) = match *words {
-        [] => return Ok(None),
-        [name, value] | [_, COMPONENT, name, value, _] => (name, value),
-        [system, component, _, _, kind] if [system, component, kind].iter().all(|word| is_number(word)) => {
-            return Ok(None);
-        }
-        _ => return Err("wants NAME VALUE, for instance CELL_VOLT_WARN 3.6".to_owned()),
+    let (name, value) = match param_line::read(line) {
+        Line::Nothing => return Ok(None),
+        Line::Set(name, value) => (name, value),
+        Line::Wrong => return Err("wants NAME VALUE, for instance CELL_VOLT_WARN 3.6".to_owned()),
     };
     let Some(spec) = TABLE.iter().find(|spec| spec.name == name) else {
         return Err(format!("there is no parameter {name}"));
@@ -60,10 +44,6 @@ fn parameter(line: &str) -> Result<Option<(&'static ParamSpec, f32)>, String> {
     number
         .map(|number| Some((spec, number)))
         .ok_or_else(|| format!("{name} takes {min} to {max}{unit}, not {value}"))
-}
-
-fn is_number(word: &str) -> bool {
-    word.parse::<u32>().is_ok()
 }
 
 #[cfg(test)]

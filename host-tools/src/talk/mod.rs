@@ -4,15 +4,18 @@ pub mod params;
 pub mod pull;
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
 use hums_link::encode::{COMPONENT, Encoder, GS_FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
+use hums_link::signing::{Clock, Key, Seal, stamp};
 use hums_link::{Check, Frame, Framer};
 
+use crate::cli::Link;
 use crate::duplex::{self, Duplex};
-use crate::endpoint::Endpoint;
 use crate::interrupt;
 use crate::outcome::usage;
 
@@ -25,12 +28,17 @@ const CONNECT: Duration = Duration::from_secs(15);
 /// How often we say that we are there: radios and UDP peers learn from it where to answer.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
+/// Our link id: unlike a ground station's first, so that each counts its own time.
+const LINK: u8 = 17;
 
 /// A conversation with one board.
 pub struct Client {
     duplex: Duplex,
     framer: Framer,
     encoder: Encoder,
+    /// Signs what we send, in this PC's time.
+    seal: Option<Seal>,
+    begun: Instant,
     /// The system that the board is part of.
     system: u8,
     frames: VecDeque<Vec<u8>>,
@@ -39,16 +47,20 @@ pub struct Client {
 
 impl Client {
     /// Opens the link and waits for the board's heartbeat.
-    pub fn connect(endpoint: &Endpoint) -> Result<Self> {
+    pub fn connect(link: &Link) -> Result<Self> {
+        let endpoint = &link.link;
         if !endpoint.is_live() {
             return Err(usage(format!("--link {endpoint}: a file does not answer; give udp, tcp or serial")));
         }
+        let seal = link.key.as_deref().map(key).transpose()?.map(|key| Seal::new(key, LINK, our_time(), 0));
         let duplex = duplex::open(endpoint, READ)?;
         interrupt::watch();
         let mut client = Self {
             duplex,
             framer: Framer::new(),
             encoder: Encoder::of(SYSTEM, OUR_COMPONENT),
+            seal,
+            begun: Instant::now(),
             system: 0,
             frames: VecDeque::new(),
             heartbeat_at: None,
@@ -71,7 +83,11 @@ impl Client {
     /// Sends a message.
     pub fn send(&mut self, packet: &Packet) -> Result<()> {
         let mut buffer = [0; GS_FRAME_BYTES_MAX];
-        let frame = self.encoder.frame(&mut buffer, packet);
+        let now = hums_core::time::Instant::from_micros(self.begun.elapsed().as_micros() as u64);
+        let frame = match &mut self.seal {
+            Some(seal) => self.encoder.frame_signed(&mut buffer, packet, now, seal),
+            None => self.encoder.frame(&mut buffer, packet),
+        };
         self.duplex.writer.write_all(frame).and_then(|()| self.duplex.writer.flush()).context("--link")
     }
 
@@ -137,6 +153,37 @@ impl Client {
         framer.push(buffer.get(..count).unwrap_or_default(), &mut |frame| keep(frames, &frame));
         Ok(())
     }
+}
+
+/// What a key file holds: 64 hexadecimal digits, or a passphrase.
+pub fn key(path: &Path) -> Result<Key> {
+    let text =
+        fs::read_to_string(path).with_context(|| format!("--key {}: cannot be read", path.display()))?;
+    let text = text.trim_end_matches(['\r', '\n']);
+    if text.is_empty() {
+        return Err(usage(format!("--key {}: is empty", path.display())));
+    }
+    let digits = text.as_bytes().as_chunks::<2>();
+    let bytes: Option<Vec<u8>> = digits
+        .0
+        .iter()
+        .map(|pair| std::str::from_utf8(pair).ok().and_then(|pair| u8::from_str_radix(pair, 16).ok()))
+        .collect();
+    let exact = bytes.filter(|_| digits.1.is_empty()).and_then(|bytes| <[u8; 32]>::try_from(bytes).ok());
+    Ok(exact.map_or_else(|| Key::of_passphrase(text), Key))
+}
+
+/// This PC's time, as signatures count it.
+pub fn stamp_now() -> u64 {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    stamp(since_1970.as_micros() as u64)
+}
+
+/// A clock that begins with it.
+fn our_time() -> Clock {
+    let mut clock = Clock::default();
+    clock.is_at_least(hums_core::time::Instant::ZERO, stamp_now());
+    clock
 }
 
 fn keep(frames: &mut VecDeque<Vec<u8>>, frame: &Frame<'_>) {

@@ -7,11 +7,13 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use hums_link::Frame;
 use hums_link::packet::{Fields, Packet};
+use hums_link::signing::{KEY_BYTES, Key};
 
 use super::Client;
-use crate::cli::{self, ParamsAction};
-use crate::outcome::Outcome;
+use crate::cli::{self, Link, ParamsAction};
+use crate::outcome::{Outcome, usage};
 use crate::output::Stdout;
+use crate::talk;
 
 /// A silence of this long in a list means that what is missing was lost.
 const GAP: Duration = Duration::from_millis(1_500);
@@ -33,7 +35,7 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
     let mut out = Stdout::new();
     match &args.action {
         ParamsAction::List { at, json } => {
-            let values = list(&mut Client::connect(&at.link)?)?;
+            let values = list(&mut Client::connect(at)?)?;
             if *json {
                 let object: serde_json::Map<_, _> =
                     values.iter().map(|value| (value.name.clone(), f64::from(value.value).into())).collect();
@@ -45,14 +47,18 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             }
         }
         ParamsAction::Get { names, at } => {
-            let mut client = Client::connect(&at.link)?;
+            let mut client = Client::connect(at)?;
             for name in names {
                 let value = read(&mut client, name)?;
                 writeln!(out, "{name} {}", value.value)?;
             }
         }
+        ParamsAction::Sign { at, remove } => {
+            sign(at, *remove)?;
+            writeln!(out, "{}", if *remove { "key removed" } else { "key set" })?;
+        }
         ParamsAction::Set { name, value, at } => {
-            let mut client = Client::connect(&at.link)?;
+            let mut client = Client::connect(at)?;
             let (system, component) = client.target();
             let packet =
                 Packet::new(23).f32(0, *value).u8(4, system).u8(5, component).text(6, 16, name).u8(22, 9);
@@ -67,6 +73,27 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
     }
     out.flush()?;
     Ok(Outcome::Done)
+}
+
+/// Brings the board the key, or takes it away. The board answers with a text.
+fn sign(at: &Link, remove: bool) -> Result<()> {
+    let path = at.key.as_deref();
+    let key = match path {
+        Some(path) => talk::key(path)?,
+        None if remove => Key([0; KEY_BYTES]),
+        None => return Err(usage("params sign: which key? --key FILE")),
+    };
+    // Unsigned: the board does not know the key yet, and does not ask over the port that it trusts.
+    let mut client = Client::connect(&Link { key: None, ..at.clone() })?;
+    let key = if remove { Key([0; KEY_BYTES]) } else { key };
+    let (system, component) = client.target();
+    let packet = Packet::new(256).u64(0, talk::stamp_now()).u8(8, system).u8(9, component).bytes(10, &key.0);
+    let text = if remove { "HUMS: signing key removed" } else { "HUMS: signing key set" };
+    let said = client.ask(&packet, ANSWER, TRIES, |frame| {
+        let fields = Fields(frame.payload());
+        (frame.id() == 253 && fields.text(1, 50) == Some(text)).then_some(())
+    })?;
+    said.context("the board does not take the key: does its SIGN_PORT trust this port? See docs/companion.md")
 }
 
 fn value_of(frame: &Frame<'_>) -> Option<Param> {

@@ -72,7 +72,7 @@ struct Ftp {
 /// Runs `hums pull`.
 pub fn run(args: &cli::Pull) -> Result<Outcome> {
     fs::create_dir_all(&args.output).with_context(|| format!("{}: cannot be made", args.output.display()))?;
-    let mut ftp = Ftp { client: Client::connect(&args.at.link)?, sequence: 0 };
+    let mut ftp = Ftp { client: Client::connect(&args.at)?, sequence: 0 };
     ftp.ask(RESET, 0, 0, b"")?;
     let mut logs = ftp.list()?;
     logs.sort();

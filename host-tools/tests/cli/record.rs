@@ -28,7 +28,9 @@ fn a_run_repeats_to_the_byte_and_its_counters_add_up() {
     let number = |key: &str| json[key].as_u64().expect(key);
     assert_eq!(number("frames_in"), number("frames_logged") + number("frames_lost"));
     assert_eq!(number("gs_bytes"), read("a.gs").len() as u64);
-    assert!(number("bytes_not_frames") > 0 && number("sd_stall_ms_max") >= 700, "{json}");
+    // A write begins at the latest 200 ms after the card stands still.
+    assert!((500..=750).contains(&number("sd_stall_ms_max")), "{json}");
+    assert!(number("bytes_not_frames") > 0, "{json}");
     assert!(number("queue_bytes_max") <= number("queue_bytes_capacity"));
 }
 
@@ -161,6 +163,8 @@ fn a_tcp_server_is_listened_to_until_it_closes() {
     sender.join().expect("the server");
     assert_eq!(json["frames_in"], 2000);
     let mut datagram = [0; 2048];
+    // The first, empty one only says where to answer.
+    assert_eq!(ground.recv(&mut datagram).expect("a datagram"), 0);
     assert!(ground.recv(&mut datagram).is_ok_and(|got| got > 8), "nothing reached the ground station");
 }
 

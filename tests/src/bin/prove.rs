@@ -7,7 +7,10 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use hums_tests::flights::root;
-use hums_tests::prove::{CAMPAIGNS, Campaign, Options, Provenance, write_report};
+use hums_tests::prove::{CAMPAIGNS, Campaign, Counting, Options, Provenance, write_report};
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
 
 const USAGE: &str = "prove [NAME...] [--short] [--seed N] [--runs N] [--no-report] [--list]";
 

@@ -1,7 +1,7 @@
 //! Bits flip anywhere in a log.
 //!
-//! A log is recorded once. Then a bit, or a burst of some, is flipped in the image, the log is read, and the bits are
-//! put back: what comes out is compared with what came out of the log as it was.
+//! A log is recorded once, and read: every frame that went in comes out. Then a bit, or a burst of some, is flipped in
+//! the image, the log is read, and the bits are put back: what comes out is compared with what came out before.
 
 use std::collections::BTreeSet;
 
@@ -79,11 +79,14 @@ struct Subject {
 impl Subject {
     fn record(flight: &str) -> Result<Self> {
         let card = Card::new(64)?;
-        let done = card.record(&Stream::of_flight(&own(flight), FULL_RATE)?.for_seconds(SECONDS), 1)?;
+        let stream = Stream::of_flight(&own(flight), FULL_RATE)?.for_seconds(SECONDS);
+        let done = card.record(&stream, 1)?;
         ensure!(done.stats.frames_lost == 0, "frames were lost");
         let log = on_card(&card.path()).pop().context("no log")?;
         let whole = Record::of(&log)?;
         ensure!(whole.gaps.is_empty() && whole.summary.blocks.damaged == 0, "damaged before any damage");
+        let came_out: Vec<_> = whole.frames.iter().map(|frame| frame.hash).collect();
+        ensure!(came_out == stream.hashes(), "what came out is not what went in");
         let all = log.pieces.iter().flat_map(|piece| &piece.extents).flat_map(|extent| {
             let first = (extent.start / BLOCK as u64) as u32;
             first..first + (extent.length / BLOCK as u64) as u32

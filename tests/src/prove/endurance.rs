@@ -11,6 +11,7 @@ use hums::source::Chunk;
 use hums_core::params::Params;
 
 use super::card::Card;
+use super::memory::held_bytes;
 use super::record::Record;
 use super::stream::Stream;
 use super::{Figures, Options};
@@ -35,8 +36,8 @@ const BEHIND_MS_MAX: u64 = 200;
 /// Of the card's space, what the newest data has at least: one segment of sixteen is being overwritten, and the file
 /// system takes some.
 const KEPT_MIN: f64 = 0.8;
-/// What the process may have grown by, in KiB, between looks at the card.
-const GROWTH_KIB_MAX: u64 = 8 << 10;
+/// What may be allocated beyond that of the second look at the card, in bytes: the list of looks, a file's name.
+const GROWTH_BYTES_MAX: usize = 64 << 10;
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let form = if options.short { &SHORT } else { &LONG };
@@ -64,9 +65,9 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     ensure!(done.stats.frames_lost == 0, "{} frames lost", done.stats.frames_lost);
     ensure!(done.card.segments_overwritten > 0, "the card never became full");
     // Before the second look what reading the card keeps for the next time is there already.
-    let early = seen.get(1).context("looked too rarely")?.memory_kib;
-    let late = seen.iter().skip(2).map(|about| about.memory_kib).max().unwrap_or(early);
-    ensure!(late <= early + GROWTH_KIB_MAX, "memory grew from {early} to {late} KiB");
+    let early = seen.get(1).context("looked too rarely")?.held_bytes;
+    let late = seen.iter().skip(2).map(|about| about.held_bytes).max().unwrap_or(early);
+    ensure!(late <= early + GROWTH_BYTES_MAX, "memory grew from {early} to {late} bytes");
 
     let mut figures = Figures::default();
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
@@ -87,8 +88,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     });
     figures
         .fact("log behind the line at most, ms", seen.iter().map(|about| about.behind_ms).max().unwrap_or(0));
-    figures
-        .fact("memory at the first look and at most later, MiB", format!("{}, {}", early >> 10, late >> 10));
+    figures.fact("bytes allocated at the second look and at most later", format!("{early}, {late}"));
     figures.fact("`fsck.vfat -n` at the end", "clean");
     Ok(figures)
 }
@@ -131,12 +131,12 @@ struct About {
     kept_ms: u64,
     behind_ms: u64,
     is_full: bool,
-    memory_kib: u64,
+    held_bytes: usize,
 }
 
 /// The newest data is on the card, without a hole, up to this moment.
 fn look(path: &Path, form: &Form, now_us: u64) -> Result<About> {
-    let memory_kib = memory_kib();
+    let held_bytes = held_bytes().context("this program does not count what it allocates")?;
     let logs = on_card(path);
     let log = logs.last().context("no log")?;
     let record = Record::of(log)?;
@@ -149,12 +149,5 @@ fn look(path: &Path, form: &Form, now_us: u64) -> Result<About> {
     ensure!(behind_ms <= BEHIND_MS_MAX, "the log is {behind_ms} ms behind");
     let kept = record.summary.blocks.sectors as f64 * 512.0 / (form.card_mib << 20) as f64;
     ensure!(!is_full || kept >= KEPT_MIN, "only {kept:.2} of the card holds the newest data");
-    Ok(About { kept_ms: last.at_ms - first.at_ms, behind_ms, is_full, memory_kib })
-}
-
-/// What this process has resident now, in KiB.
-fn memory_kib() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap_or_default();
-    line.split_whitespace().nth(1).and_then(|number| number.parse().ok()).unwrap_or(0)
+    Ok(About { kept_ms: last.at_ms - first.at_ms, behind_ms, is_full, held_bytes })
 }

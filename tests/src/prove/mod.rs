@@ -7,6 +7,8 @@
 mod card;
 mod damage;
 mod endurance;
+mod hostile_gs;
+mod memory;
 mod noise;
 mod power_cuts;
 mod record;
@@ -16,6 +18,7 @@ mod stream;
 
 use anyhow::Result;
 
+pub use memory::Counting;
 pub use report::{Figures, Provenance, write as write_report};
 
 /// How much is tried.
@@ -70,6 +73,13 @@ pub const CAMPAIGNS: &[Campaign] = &[
         name: "endurance",
         about: "24 hours at 20 kB/s on a card of 64 MiB: the newest data is always there, and memory stays as it is",
         run: endurance::run,
+    },
+    Campaign {
+        name: "hostile-gs",
+        about: "24 hours of a ground station that sends noise, floods, forged and malformed frames at full rate: no panic, \
+                no frame of the record is lost, no second has more bytes than the budget, and nothing that wants the \
+                key is done without it",
+        run: hostile_gs::run,
     },
     Campaign {
         name: "noise",

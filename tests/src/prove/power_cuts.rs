@@ -1,8 +1,9 @@
 //! Power goes at any block write.
 //!
 //! A session is recorded once, at full rate, with every block write kept. Then its beginning is played back onto the
-//! card as it was before, up to a write chosen by chance, that one whole or in half, and the card is looked at: as many
-//! cuts as are wanted from one recording, each exactly what the card would hold.
+//! card as it was before, up to a write chosen by chance, that one whole or in part, and the card is looked at: as many
+//! cuts as are wanted from one recording, each exactly what the card would hold. What is decoded is compared with the
+//! frames that went in, one by one and in order, and with when each arrived.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,6 +27,10 @@ use crate::flights::own;
 
 /// What a cut may cost at most.
 const LOSS_MAX_US: u64 = 200_000;
+
+/// No smaller part of a block is new by itself: an entry of the FAT has four bytes, and no file system of this kind
+/// stands half of one.
+const WORD: usize = 4;
 
 /// A card that is back is found within a second, and has what waited for it within half of one.
 const CATCH_UP_US: u64 = 1_500_000;
@@ -147,12 +152,34 @@ struct Outcome {
     loss_us_max: u64,
 }
 
-/// Which half of the block is new.
+/// What of the block is new.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Tear {
     Whole,
-    FirstHalf,
-    SecondHalf,
+    /// The bytes before this one.
+    Before(usize),
+    /// The bytes from this one on.
+    From(usize),
+}
+
+impl Tear {
+    /// In the middle, or between any two words.
+    fn by_chance(random: &mut Random) -> Self {
+        let words = (BLOCK / WORD) as u64;
+        let at = if random.chance(0.5) { BLOCK / 2 } else { WORD * (1 + random.below(words - 1)) as usize };
+        if random.chance(0.5) { Self::Before(at) } else { Self::From(at) }
+    }
+
+    /// What the card holds then.
+    fn apply(self, old: &[u8; BLOCK], new: &[u8; BLOCK]) -> [u8; BLOCK] {
+        let mut block = *new;
+        match self {
+            Self::Whole => {}
+            Self::Before(at) => block[at..].copy_from_slice(&old[at..]),
+            Self::From(at) => block[..at].copy_from_slice(&old[..at]),
+        }
+        block
+    }
 }
 
 /// A session that was recorded, on the card as it was before it.
@@ -266,19 +293,14 @@ impl Session {
         let mut cuts: Vec<_> = (0..count)
             .map(|index| {
                 let write = random.below(self.trace.len() as u64) as usize;
-                let tear = match (index % 2, random.below(2)) {
-                    (0, _) => Tear::Whole,
-                    (_, 0) => Tear::FirstHalf,
-                    _ => Tear::SecondHalf,
-                };
-                (write, tear)
+                (write, if index % 2 == 0 { Tear::Whole } else { Tear::by_chance(&mut random) })
             })
             .collect();
         // Few writes are about the file system: each of them counts, whole and torn.
         let metadata = (0..self.trace.len()).filter(|index| self.is_metadata(&self.trace[*index]));
         let sample: Vec<_> = metadata.step_by(1 + self.trace.len() / 2_000).collect();
         for (index, write) in sample.into_iter().enumerate().take(count as usize / 4) {
-            cuts.push((write, if index % 2 == 0 { Tear::Whole } else { Tear::FirstHalf }));
+            cuts.push((write, if index % 2 == 0 { Tear::Whole } else { Tear::by_chance(&mut random) }));
         }
         cuts.sort_unstable();
         cuts
@@ -294,13 +316,7 @@ impl Session {
             done = index;
             let write = self.trace[index].clone();
             let old = self.card.read_block(write.block)?;
-            let mut block = write.bytes;
-            match tear {
-                Tear::Whole => {}
-                Tear::FirstHalf => block[BLOCK / 2..].copy_from_slice(&old[BLOCK / 2..]),
-                Tear::SecondHalf => block[..BLOCK / 2].copy_from_slice(&old[..BLOCK / 2]),
-            }
-            self.card.write_block(write.block, &block)?;
+            self.card.write_block(write.block, &tear.apply(&old, &write.bytes))?;
             let what = || format!("cut at write {index}, {tear:?}, block {}", write.block);
             self.look(index, &mut outcome).with_context(what)?;
             self.card.write_block(write.block, &old)?;

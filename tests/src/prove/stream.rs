@@ -21,7 +21,7 @@ pub(super) struct Stream {
     pub(super) bytes: Vec<u8>,
     /// Where each frame lies.
     pub(super) frames: Vec<Range<usize>>,
-    /// Whether any frame is signed.
+    /// Whether most frames are signed.
     pub(super) is_signed: bool,
     baud: u64,
 }
@@ -33,7 +33,8 @@ impl Stream {
         let seeds = &Manifest::own().seeds;
         let is_tlog = path.extension().is_some_and(|kind| kind == "tlog");
         let found = if is_tlog { frames::of_tlog(&data, seeds, false) } else { frames::of_raw(&data, seeds) };
-        let is_signed = found.iter().any(|frame| frame.bytes[0] == 0xFD && frame.bytes[2] & 1 == 1);
+        let signed = found.iter().filter(|frame| frame.bytes[0] == 0xFD && frame.bytes[2] & 1 == 1);
+        let is_signed = 2 * signed.count() > found.len();
         let (mut bytes, mut places) = (Vec::new(), Vec::new());
         for frame in found {
             let start = bytes.len();

@@ -5,7 +5,6 @@ use core::sync::atomic::Ordering;
 
 use embassy_futures::select::{Either4, select4};
 use embassy_time::Ticker;
-use hums_core::params::Param;
 use hums_onboard::monitoring::{Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
 use hums_onboard::{Handover, Task};
@@ -105,6 +104,7 @@ fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
 /// Hands over everything that is to outlive power, as fast as the store takes it.
 async fn save_all(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     links::ENDING.signal(());
+    body.save_signing(now(), handover);
     while !handover.finish(now(), body.monitor_mut()) {
         wake_others();
         links::STORED.wait().await;
@@ -121,9 +121,9 @@ fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
 }
 
 fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
-    let params = body.monitor().params();
-    BAUD_GS.store(params.get(Param::GsBaud) as u32, Ordering::Relaxed);
-    BAUD_AUTOPILOT.store(params.get(Param::ApBaud) as u32, Ordering::Relaxed);
+    let (gs, autopilot) = body.bauds();
+    BAUD_GS.store(gs, Ordering::Relaxed);
+    BAUD_AUTOPILOT.store(autopilot, Ordering::Relaxed);
     let Ends { sectors, gs, .. } = ends;
     measure(Stage::Tick, || {
         body.tick(now(), sectors, gs, &mut |finding| {
@@ -137,6 +137,7 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
             );
         });
         handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
+        body.save_signing(now(), handover);
     });
     note(body, ends, handover);
 }

@@ -11,16 +11,17 @@ const ROW: usize = 16;
 const ROWS: usize = 128;
 
 pub(crate) struct TextModel {
-    rows: [[Cell; ROW]; ROWS],
+    /// Row after row.
+    cells: [Cell; ROWS * ROW],
 }
 
 impl TextModel {
     pub(crate) const fn new() -> Self {
-        Self { rows: [[Cell::EVEN; ROW]; ROWS] }
+        Self { cells: [Cell::EVEN; ROWS * ROW] }
     }
 
     pub(crate) fn reset(&mut self) {
-        self.rows = [[Cell::EVEN; ROW]; ROWS];
+        self.cells = [Cell::EVEN; ROWS * ROW];
     }
 
     /// One byte after `before` (the last three, the latest lowest), where the text before had `above`, and `matched`
@@ -42,17 +43,18 @@ impl TextModel {
     }
 
     /// Four bits, the highest first. Each context has a row of cells for them, one for each way they may begin.
-    #[inline]
+    #[inline(never)]
     fn nibble<C: Coder>(&mut self, coder: &mut C, seeds: [u32; 2], value: u32) -> u32 {
-        let rows = seeds.map(|seed| (hash(seed, 0x9e37_79b1) >> 25) as usize % ROWS);
-        let mut node = 1_usize;
-        for shift in [3, 2, 1, 0] {
-            let cells = rows.map(|row| self.rows[row][node % ROW]);
-            let bit = coder.bit(mix(cells), value >> shift & 1 != 0);
-            for (row, mut cell) in rows.into_iter().zip(cells) {
-                cell.adapt(bit);
-                self.rows[row][node % ROW] = cell;
-            }
+        let [first, second] = seeds.map(|seed| (hash(seed, 0x9e37_79b1) >> 25) as usize * ROW);
+        let (mut node, mut rest) = (1, value << 28);
+        while node < ROW {
+            // The remainders say that no index is beyond the end; none ever is.
+            let (at, other) = ((first + node) % (ROWS * ROW), (second + node) % (ROWS * ROW));
+            let (cell, other_cell) = (self.cells[at], self.cells[other]);
+            let bit = coder.bit(mix(cell, other_cell), rest >> 31 != 0);
+            rest <<= 1;
+            self.cells[at] = cell.adapted(bit);
+            self.cells[other] = other_cell.adapted(bit);
             node = node << 1 | usize::from(bit);
         }
         node as u32 & 15
@@ -64,14 +66,14 @@ fn hash(value: u32, salt: u32) -> u32 {
     x ^ (x >> 15)
 }
 
-/// The probability that the contexts make together: each counts by how often it was used and how sure it is.
-fn mix(cells: [Cell; 2]) -> u32 {
-    let (mut sum, mut weights) = (2_048_u32, 1_u32);
-    for cell in cells {
+/// The probability that two contexts make together: each counts by how often it was used and how sure it is.
+#[inline]
+fn mix(cell: Cell, other: Cell) -> u32 {
+    let weight = |cell: Cell| {
         let sure = cell.one().abs_diff(2_048) >> 6;
-        let weight = cell.uses() * (1 + sure * sure);
-        sum += cell.one() * weight;
-        weights += weight;
-    }
-    (sum / weights).clamp(16, 4_080)
+        cell.uses() * (1 + sure * sure)
+    };
+    let weights = [weight(cell), weight(other)];
+    let sum = 2_048 + cell.one() * weights[0] + other.one() * weights[1];
+    (sum / (1 + weights[0] + weights[1])).clamp(16, 4_080)
 }

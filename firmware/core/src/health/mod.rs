@@ -15,7 +15,7 @@ mod propulsion;
 mod recorder;
 mod structure;
 
-pub use check::{Check, Reading, Side, State, When};
+pub use check::{CLEAR, Check, Reading, Side, State, When};
 pub use finding::{Finding, Level, Subsystem};
 
 use crate::baseline::{Baselines, Quantity};

@@ -122,7 +122,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| super::departure(inputs, Quantity::HoverThrottle),
         ..ESC
     },
-    Check { name: "drive_due", words: "motor, prop or ESC due", ..super::due(Subsystem::Propulsion) },
+    Check { name: "drive_due", words: "motor/prop/ESC due", ..super::due(Subsystem::Propulsion) },
 ];
 
 fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {

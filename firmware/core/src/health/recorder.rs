@@ -70,7 +70,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "card_room",
-        words: "card full of other files",
+        words: "other files on card",
         unit: "%",
         side: Side::Below,
         warn: Some(Param::RecRoomWarn),

@@ -42,6 +42,15 @@ impl<'a> Put<'a> {
         self.bytes(&value.to_le_bytes())
     }
 
+    /// LEB128: seven bits a byte, the lowest first; the last one has the top bit clear.
+    pub(crate) fn variable(&mut self, mut value: u32) -> &mut Self {
+        while value >= 0x80 {
+            self.u8(value as u8 | 0x80);
+            value >>= 7;
+        }
+        self.u8(value as u8)
+    }
+
     pub(crate) fn f32(&mut self, value: f32) -> &mut Self {
         self.bytes(&value.to_le_bytes())
     }
@@ -83,6 +92,23 @@ impl<'a> Take<'a> {
 
     pub(crate) fn u64(&mut self) -> Result<u64, Unreadable> {
         self.array().map(u64::from_le_bytes)
+    }
+
+    /// As [`Put::variable`]; what is too large for 32 bits is not of ours.
+    pub(crate) fn variable(&mut self) -> Result<u32, Unreadable> {
+        let mut value = 0;
+        for shift in (0..u32::BITS).step_by(7) {
+            let byte = self.u8()?;
+            let bits = u32::from(byte & 0x7F);
+            if bits << shift >> shift != bits {
+                return Err(Unreadable);
+            }
+            value |= bits << shift;
+            if byte & 0x80 == 0 {
+                return Ok(value);
+            }
+        }
+        Err(Unreadable)
     }
 
     pub(crate) fn f32(&mut self) -> Result<f32, Unreadable> {

@@ -1,6 +1,9 @@
 //! What outlives power: totals over an airframe's life, its baselines, and its components, as items of bytes that a
 //! store keeps.
 //!
+//! Counters of the life before this session are saved once, at its beginning; what the session itself has counted is one
+//! short item of its own ([`Session`]), saved often.
+//!
 //! An item is a version byte and then fields, little endian. A later version only appends, so version n reads what
 //! n + 1 wrote, and n + 1 reads what n wrote with nothing counted in what is missing. The store guards the bytes (a
 //! checksum, two copies); what is decoded here is checked again only so far as no figure can be nonsense.
@@ -12,9 +15,11 @@
 
 mod bytes;
 mod saving;
+mod session;
 
 pub(crate) use bytes::{Put, Take};
-pub use saving::{EVERY, Saving};
+pub use saving::{EVERY, EVERY_ARMED, Room, Saving};
+pub use session::Session;
 
 use crate::baseline::Baselines;
 use crate::component::{COMPONENTS_MAX, Component};
@@ -30,6 +35,7 @@ const _: () = assert!(Baselines::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Exceedances::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Exposure::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Component::BYTES <= ITEM_BYTES_MAX);
+const _: () = assert!(Session::BYTES_MAX <= ITEM_BYTES_MAX);
 
 /// What a stored item is. The numbers are stored and never change meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -44,6 +50,8 @@ pub enum ItemKey {
     Exposure,
     /// 16 to 23: a [`Component`], by its place from 0.
     Component(u8),
+    /// 24: a [`Session`], saved after and restored after all others: it is added to them.
+    Session,
 }
 
 impl ItemKey {
@@ -51,10 +59,12 @@ impl ItemKey {
     pub const COUNT: usize = Self::ALL.len();
 
     const COMPONENT_FIRST: u8 = 16;
+    const SESSION: u8 = 24;
 
     /// All keys, by number.
-    pub const ALL: [Self; 4 + COMPONENTS_MAX] = {
-        let mut all = [Self::Lifetime; 4 + COMPONENTS_MAX];
+    pub const ALL: [Self; 5 + COMPONENTS_MAX] = {
+        let mut all = [Self::Session; 5 + COMPONENTS_MAX];
+        all[0] = Self::Lifetime;
         (all[1], all[2], all[3]) = (Self::Baselines, Self::Exceedances, Self::Exposure);
         let mut place = 0;
         while place < COMPONENTS_MAX {
@@ -72,6 +82,7 @@ impl ItemKey {
             Self::Exceedances => 3,
             Self::Exposure => 4,
             Self::Component(place) => Self::COMPONENT_FIRST + place,
+            Self::Session => Self::SESSION,
         }
     }
 
@@ -82,6 +93,7 @@ impl ItemKey {
             2 => Some(Self::Baselines),
             3 => Some(Self::Exceedances),
             4 => Some(Self::Exposure),
+            Self::SESSION => Some(Self::Session),
             _ => match number.checked_sub(Self::COMPONENT_FIRST) {
                 Some(place) if (place as usize) < COMPONENTS_MAX => Some(Self::Component(place)),
                 _ => None,
@@ -97,6 +109,7 @@ impl ItemKey {
             Self::Exceedances => 2,
             Self::Exposure => 3,
             Self::Component(place) => 4 + place as usize,
+            Self::Session => 4 + COMPONENTS_MAX,
         }
     }
 }
@@ -134,7 +147,8 @@ impl Airframe {
     }
 }
 
-/// Totals over an airframe's life.
+/// Totals over an airframe's life. Stored, they are as of the beginning of power-on [`Self::boots`], to which the stored
+/// [`Session`] of that power-on is added.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lifetime {
     /// Whose life it is.

@@ -1,13 +1,36 @@
-//! Which item is to be saved, and when: soon after power-on (the boot itself counts), at landing and disarming, every
-//! quarter of an hour while it changes, and at once where somebody did something by hand.
+//! Which item is to be saved, and when.
+//!
+//! | what | when |
+//! |---|---|
+//! | everything that changed | 10 s after power-on (the boot itself counts), at landing and disarming, every quarter of an hour, at the end |
+//! | the session's counters | armed, every two minutes as well; in a power-on of more than an hour, every thirtieth of it |
+//! | what somebody changed by hand | at once |
+//!
+//! The life before this session does not change any more, so after the first save only the session's counters (160 bytes
+//! of a quad), exceedances and baselines are saved again. In T hours armed the counters are saved 30 (1 + ln T) times:
+//! 30 in one hour, 63 in three, 81 in five and a half; flash sets it, and `hums_onboard::persist` has the sums.
 
 use super::ItemKey;
 use crate::time::{Instant, Span};
 
 /// The first save: late enough for the store to be ready and the vehicle to be heard.
 const FIRST: Span = Span::from_secs(10);
-/// What a power cut may cost at most; flash sets it: `hums_onboard::persist` has the sums.
+/// What changes is saved at least so often.
 pub const EVERY: Span = Span::from_secs(15 * 60);
+/// What a power cut in flight costs at most of the counters, in the first hour of a power-on.
+pub const EVERY_ARMED: Span = Span::from_secs(2 * 60);
+/// Afterwards: this part of the time since power-on.
+const EVERY_PART: u64 = 30;
+
+/// Whether the store has room to spare.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Room {
+    /// As much as is needed.
+    #[default]
+    Enough,
+    /// Only what landing and disarming need: nothing is saved by time alone.
+    Reserve,
+}
 
 /// What waits to be saved.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +40,7 @@ pub struct Saving {
     /// Of these, the ones whose time has come.
     due: u16,
     next: Instant,
+    session_at: Instant,
 }
 
 const _: () = assert!(ItemKey::COUNT <= 16);
@@ -28,9 +52,14 @@ impl Default for Saving {
 }
 
 impl Saving {
-    /// Nothing to save yet.
+    /// What adds up over sessions is as of this one now.
     pub const fn new() -> Self {
-        Self { changed: 0, due: 0, next: Instant::from_micros(FIRST.as_micros()) }
+        Self {
+            changed: Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
+            due: 0,
+            next: Instant::from_micros(FIRST.as_micros()),
+            session_at: Instant::ZERO,
+        }
     }
 
     const fn bit(key: ItemKey) -> u16 {
@@ -54,15 +83,25 @@ impl Saving {
     }
 
     /// The item to be saved next; the same until it is [`Self::saved`].
-    pub(crate) fn due(&mut self, now: Instant) -> Option<ItemKey> {
-        if now >= self.next {
-            self.next = now + EVERY;
-            self.hurry_all();
+    pub(crate) fn due(&mut self, now: Instant, armed: bool, room: Room) -> Option<ItemKey> {
+        if room == Room::Enough {
+            if now >= self.next {
+                self.next = now + EVERY;
+                self.hurry_all();
+            }
+            let every = EVERY_ARMED.max(Span::from_micros(now.as_micros() / EVERY_PART));
+            if armed && now.since(self.session_at) >= every {
+                self.due |= self.changed & Self::bit(ItemKey::Session);
+            }
         }
         if self.due == 0 {
             return None;
         }
-        ItemKey::ALL.into_iter().find(|key| self.due & Self::bit(*key) != 0)
+        let due = ItemKey::ALL.into_iter().find(|key| self.due & Self::bit(*key) != 0);
+        if due == Some(ItemKey::Session) {
+            self.session_at = now;
+        }
+        due
     }
 
     /// The item's bytes are on their way.
@@ -76,20 +115,58 @@ impl Saving {
 mod tests {
     use super::*;
 
+    const NOTHING: Option<ItemKey> = None;
+
+    /// Everything that is due.
+    fn take(saving: &mut Saving, at_s: u64, armed: bool) -> Vec<ItemKey> {
+        let mut keys = Vec::new();
+        while let Some(key) = saving.due(Instant::from_millis(at_s * 1_000), armed, Room::Enough) {
+            saving.saved(key);
+            keys.push(key);
+        }
+        keys
+    }
+
     #[test]
     fn a_change_waits_for_its_time_and_a_hand_does_not() {
         let mut saving = Saving::new();
-        saving.change(ItemKey::Lifetime);
-        assert_eq!(saving.due(Instant::from_millis(9_999)), None);
-        assert_eq!(saving.due(Instant::from_millis(10_000)), Some(ItemKey::Lifetime));
-        assert_eq!(saving.due(Instant::from_millis(10_050)), Some(ItemKey::Lifetime), "until it is saved");
-        saving.saved(ItemKey::Lifetime);
-        assert_eq!(saving.due(Instant::from_millis(10_100)), None);
-        saving.change(ItemKey::Lifetime);
+        assert_eq!(saving.due(Instant::from_millis(9_999), false, Room::Enough), NOTHING);
+        let first = Some(ItemKey::Lifetime);
+        assert_eq!(saving.due(Instant::from_millis(10_000), false, Room::Enough), first);
+        assert_eq!(saving.due(Instant::from_millis(10_050), false, Room::Enough), first, "until it is saved");
+        assert_eq!(take(&mut saving, 11, false), [ItemKey::Lifetime, ItemKey::Exposure]);
+        saving.change(ItemKey::Exceedances);
         saving.hurry(ItemKey::Component(3));
-        assert_eq!(saving.due(Instant::from_millis(20_000)), Some(ItemKey::Component(3)));
-        saving.saved(ItemKey::Component(3));
-        assert_eq!(saving.due(Instant::from_millis(909_999)), None);
-        assert_eq!(saving.due(Instant::from_millis(910_000)), Some(ItemKey::Lifetime));
+        assert_eq!(take(&mut saving, 20, false), [ItemKey::Component(3)]);
+        assert_eq!(take(&mut saving, 909, false), []);
+        assert_eq!(take(&mut saving, 910, false), [ItemKey::Exceedances]);
+    }
+
+    #[test]
+    fn armed_the_session_is_saved_every_two_minutes_and_in_a_long_one_every_thirtieth_of_it() {
+        let mut saving = Saving::new();
+        let mut times_s = Vec::new();
+        for at_s in 0..20_000 {
+            saving.change(ItemKey::Session);
+            if take(&mut saving, at_s, true).contains(&ItemKey::Session) {
+                times_s.push(at_s);
+            }
+        }
+        for pair in times_s.windows(2) {
+            assert!(pair[1] - pair[0] <= 120.max(pair[1] / 30 + 1), "{pair:?}");
+        }
+        // 30 (1 + ln 5.6), and one each quarter of an hour.
+        assert!((80..=110).contains(&times_s.len()), "{}", times_s.len());
+    }
+
+    #[test]
+    fn what_is_left_for_the_landing_is_not_used_by_time_alone() {
+        let mut saving = Saving::new();
+        take(&mut saving, 10, true);
+        saving.change(ItemKey::Session);
+        let at = Instant::from_millis(2_000_000);
+        assert_eq!(saving.due(at, true, Room::Reserve), NOTHING);
+        saving.hurry_all();
+        assert_eq!(saving.due(at, true, Room::Reserve), Some(ItemKey::Session));
     }
 }

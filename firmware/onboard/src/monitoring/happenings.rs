@@ -29,6 +29,7 @@ impl Monitoring<'_> {
                 Happening::OtherAirframe => (11, "the stored lifetime was another one's"),
                 Happening::Protect(step) => {
                     self.record(now, &Record::Protection(Protection::new(&step)), sectors);
+                    self.announce(step);
                     continue;
                 }
             };

@@ -63,7 +63,7 @@ pub struct Monitoring<'a> {
     pub(crate) summary: Summary,
     pub(crate) companion: Companion,
     sequences: Sequences,
-    card: &'a CardStatus,
+    pub(crate) card: &'a CardStatus,
     port: &'a PortStatus,
     pub(crate) identity: Identity<'a>,
     /// The vehicle as it was recorded last.
@@ -186,19 +186,26 @@ impl<'a> Monitoring<'a> {
         begin: &mut impl FnMut(Step),
     ) {
         begin(Step::Encode);
-        if !self.companion.stopped && self.writer.frame(at, bytes, verified, sectors).is_err() {
+        let key = Frame::again(bytes, Check::Unverified).filter(|frame| frame.id() == crate::secure::SETUP);
+        if let Some(frame) = key {
+            self.withhold(at, &frame, sectors);
+        } else if !self.companion.stopped && self.writer.frame(at, bytes, verified, sectors).is_err() {
             self.refused += 1;
             self.losses.count(at, Lost::QueueFull, 1);
         }
         begin(Step::Observe);
         // What is not ours by its checksum is recorded but not believed.
         let check = if verified { Check::Verified } else { Check::Unverified };
-        let Some(frame) = Frame::again(bytes, check).filter(|_| verified) else { return };
+        let Some(frame) = Frame::again(bytes, check) else { return };
+        if !verified {
+            self.pass_down(at, &frame, gs);
+            return;
+        }
         self.sequences.frame(at, &frame);
         if let Some((source, observation)) = hums_link::observe(&frame) {
             self.monitor.observe(at, source, &observation);
         }
-        self.heard(at, &frame, sectors);
+        self.heard(at, &frame, sectors, gs);
         begin(Step::Summary);
         self.summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
     }

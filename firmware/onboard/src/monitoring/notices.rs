@@ -1,6 +1,8 @@
-//! Texts of our own that are no findings: recorded at once, and told to the ground station when its budget allows.
+//! Texts of our own that are no findings: recorded at once, and told to the ground station when its budget allows. Those
+//! of the protective action are as urgent as a critical finding: the pilot has seconds to cancel it.
 
 use hums_blackbox::record::{Note, Record};
+use hums_core::protect::Step;
 use hums_core::time::Instant;
 use hums_link::encode::Severity;
 use hums_link::messages;
@@ -14,8 +16,17 @@ const WAITING_MAX: usize = 4;
 /// `MAV_SEVERITY` of what a pilot need not hear of, and whatever is milder.
 const INFO: u8 = 6;
 
+/// A text that is still to be told.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Notice {
+    /// `MAV_SEVERITY` and the text.
+    Text(u8, &'static str),
+    /// A step of the protective action.
+    Protection(Step),
+}
+
 /// Texts that are still to be told.
-pub(crate) type Notices = heapless::Vec<(u8, &'static str), WAITING_MAX>;
+pub(crate) type Notices = heapless::Vec<Notice, WAITING_MAX>;
 
 impl Monitoring<'_> {
     /// Records a text of our own, and tells the ground station; `severity` is a `MAV_SEVERITY`.
@@ -23,17 +34,39 @@ impl Monitoring<'_> {
         self.record(now, &Record::Note(Note { severity, text }), sectors);
         if severity < INFO {
             // Full: the record has it.
-            let _ = self.notices.push((severity, text));
+            let _ = self.notices.push(Notice::Text(severity, text));
         }
+    }
+
+    /// Tells what the protective action does, before whatever else waits.
+    pub(super) fn announce(&mut self, step: Step) {
+        let notices = &mut self.notices;
+        let is_text = |notice: &Notice| matches!(notice, Notice::Text(..));
+        if notices.is_full() {
+            // One less urgent, or the oldest: the record has them all.
+            notices.remove(if notices.last().is_some_and(is_text) { WAITING_MAX - 1 } else { 0 });
+        }
+        let place = notices.iter().position(is_text).unwrap_or(notices.len());
+        // There is room.
+        let _ = notices.insert(place, Notice::Protection(step));
     }
 
     /// Tells what waits, as far as the budget allows.
     pub(super) fn tell_notices(&mut self, now: Instant, gs: &mut GsIn) {
         let Self { notices, summary, .. } = self;
-        while let Some((severity, text)) = notices.first() {
-            let severity = if *severity < 5 { Severity::Warning } else { Severity::Notice };
-            let packet = messages::status_text(severity, text);
-            if !summary.outlet.send(now, Class::Finding, &packet, &mut |bytes| gs.tell(bytes)) {
+        while let Some(notice) = notices.first() {
+            let (class, packet) = match notice {
+                Notice::Text(severity, text) => {
+                    let severity = if *severity < 5 { Severity::Warning } else { Severity::Notice };
+                    (Class::Finding, messages::status_text(severity, text))
+                }
+                Notice::Protection(step) => {
+                    let (severity, text) = step.text();
+                    let severity = if severity <= 2 { Severity::Critical } else { Severity::Notice };
+                    (Class::Critical, messages::status_text(severity, &text))
+                }
+            };
+            if !summary.outlet.send(now, class, &packet, &mut |bytes| gs.tell(bytes)) {
                 return;
             }
             notices.remove(0);

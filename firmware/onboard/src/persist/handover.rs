@@ -3,7 +3,7 @@
 use core::sync::atomic::Ordering;
 
 use hums_core::Monitor;
-use hums_core::lifetime::ITEM_BYTES_MAX;
+use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
 use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
 use hums_store::{Key, param_value};
@@ -83,6 +83,12 @@ impl<'a> Handover<'a> {
             self.stored = Params::defaults();
             return news(3, "HUMS: store unreadable, made anew");
         }
+        if told.room != now.room {
+            told.room = now.room;
+            if now.room == Room::Reserve {
+                return news(5, "HUMS: store nearly full, saved again at landing");
+            }
+        }
         if newer(&mut told.refused, now.refused) {
             return news(5, "HUMS: store full, saving waits for the ground");
         }
@@ -90,6 +96,16 @@ impl<'a> Handover<'a> {
             return news(4, "HUMS: an item could not be saved");
         }
         None
+    }
+
+    /// Hands over an item of somebody else's; `false` when it found no room.
+    pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
+        self.items.put(key, value)
+    }
+
+    /// How often the store was found unreadable since power-on, and made anew: what is in it has to be put again.
+    pub fn remade(&self) -> u32 {
+        self.status.read().remade
     }
 
     /// Each parameter that is not as it is stored; `false` when one found no room.
@@ -112,7 +128,7 @@ impl<'a> Handover<'a> {
 
     /// Each item that is due; `false` when one found no room.
     fn put_items(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
-        while let Some(key) = monitor.save_due(now) {
+        while let Some(key) = monitor.save_due(now, self.status.read().room) {
             let mut bytes = [0; ITEM_BYTES_MAX];
             let length = monitor.encode_item(key, &mut bytes);
             if !self.items.put(Key::item(key.number()), bytes.get(..length).unwrap_or_default()) {

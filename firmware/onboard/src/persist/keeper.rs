@@ -2,12 +2,20 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
-use hums_core::lifetime::ItemKey;
+use hums_core::baseline::Baselines;
+use hums_core::exceedance::Exceedances;
+use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room, Session};
 use hums_core::params::ParamError;
 use hums_store::{Error, Found, Key, Saved, Store, param};
 
 use super::mailbox::MailboxOut;
 use super::status::{StoreState, StoreStatus, count};
+
+/// What part of a sector is free before a flight, at the least.
+const AHEAD: (usize, usize) = (5, 8);
+/// What landing and disarming need: all exceedances, the baselines, and the session's counters twice.
+const RESERVE: usize = 1_280;
+const _: () = assert!(Exceedances::BYTES + Baselines::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16 <= RESERVE);
 
 /// What one call of [`Keeper::service`] did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +35,8 @@ pub struct Keeper<'a, F: NorFlash> {
     pub(crate) status: &'a StoreStatus,
     /// The oldest item has been counted as waiting.
     waits: bool,
+    /// What there is to do while it is quiet has been done.
+    turned: bool,
 }
 
 impl<'a, F: NorFlash> Keeper<'a, F> {
@@ -45,41 +55,58 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
             });
             Some(store)
         });
-        Self { store, items, status, waits: false }
+        Self { store, items, status, waits: false, turned: false }
     }
 
-    /// Makes half a sector free where less is. Takes an erase: not after a reset that may have come in flight.
+    /// Makes [`AHEAD`] of a sector free where less is. Takes an erase: not after a reset that may have come in flight.
     pub fn turn_ahead(&mut self) {
         if let Some(store) = &mut self.store
-            && store.turn_ahead(F::ERASE_SIZE / 2).is_err()
+            && store.turn_ahead(F::ERASE_SIZE * AHEAD.0 / AHEAD.1).is_err()
         {
             count(&self.status.failed);
         }
+        self.look_for_room();
     }
 
-    /// Gives the monitor everything that is stored. An item that cannot be read is counted, and is as if there were none.
+    /// Gives the monitor everything that is stored, the last session after all else: it is added to the others. An item
+    /// that cannot be read is counted, and is as if there were none.
     pub fn load(&mut self, monitor: &mut Monitor) {
+        const SESSION: Key = Key::item(ItemKey::Session.number());
         let Self { store: Some(store), status, .. } = self else { return };
         let outcome = store.for_each(|key, value| {
-            if !restore(monitor, key, value) {
+            if key != SESSION && !restore(monitor, key, value) {
                 count(&status.unreadable);
             }
         });
         if outcome.is_err() {
             count(&status.unreadable);
         }
+        let mut session = [0; ITEM_BYTES_MAX];
+        match store.get(SESSION, &mut session) {
+            Ok(None) => {}
+            Ok(Some(length)) if restore(monitor, SESSION, session.get(..length).unwrap_or_default()) => {}
+            Ok(Some(_)) | Err(_) => count(&status.unreadable),
+        }
+        self.look_for_room();
+    }
+
+    /// A stored item of somebody else's, by its number; how long it is, 0 where there is none.
+    pub fn item(&mut self, number: u8, out: &mut [u8]) -> usize {
+        let got = self.store.as_mut().map(|store| store.get(Key::item(number), out));
+        got.and_then(Result::ok).flatten().unwrap_or(0)
     }
 
     /// Saves one item. An erase is allowed while nothing can be missed, or if `may_erase` says so.
     pub fn service(&mut self, may_erase: bool) -> Kept {
-        let Self { store, items, status, waits } = self;
+        let Self { store, items, status, waits, .. } = self;
         let Some(store) = store else {
             return items.oldest(|_, _| (Kept::Took, true)).unwrap_or(Kept::Idle);
         };
-        if *waits && !may_erase && !status.is_quiet() {
+        let quiet = status.is_quiet();
+        if *waits && !may_erase && !quiet {
             return Kept::Waits;
         }
-        store.allow_erase(may_erase || status.is_quiet());
+        store.allow_erase(may_erase || quiet);
         let kept = items.oldest(|key, value| match store.save(key, value) {
             Ok(saved) => {
                 count(&status.saved);
@@ -100,7 +127,25 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         if *waits && !waited {
             count(&status.refused);
         }
-        kept.unwrap_or(Kept::Idle)
+        let kept = kept.unwrap_or(Kept::Idle);
+        if kept == Kept::Took {
+            self.look_for_room();
+        } else if quiet && !self.turned {
+            // Between two flights is the time: the next one has room then.
+            self.turned = true;
+            self.turn_ahead();
+        }
+        self.turned &= quiet;
+        kept
+    }
+
+    /// Tells the monitor whether there is room to spare.
+    fn look_for_room(&mut self) {
+        if let Some(store) = &mut self.store
+            && let Ok(room) = store.room()
+        {
+            self.status.set_room(if room < RESERVE { Room::Reserve } else { Room::Enough });
+        }
     }
 }
 

@@ -13,21 +13,32 @@
 //!
 //! # What a save costs
 //! A word of the STM32F405's flash takes 16 µs to write and 100 µs at most (datasheet, table 40), in which the processor
-//! gets no instruction out of the flash; between two words everything more urgent goes on. So a save of all lifetime
-//! counters, 95 words, delays nobody by more than 0.1 ms, and the ports' rings hold 44 ms.
+//! gets no instruction out of the flash; between two words everything more urgent goes on. So a save of the session's
+//! counters, 43 words, delays nobody by more than 0.1 ms, and the ports' rings hold 44 ms.
 //!
-//! An erase takes 0.25 to 0.5 s. It is done at power-on before reception begins ([`Keeper::turn_ahead`]: at least half
-//! a sector is free afterwards), and otherwise only while nothing can be missed: disarmed, and no frame for
-//! [`handover::QUIET`]. A save that would need one in flight stays in the mailbox, and what comes after it with
-//! its owner; it is counted and told.
+//! An erase takes 0.25 to 0.5 s. It is done at power-on before reception begins ([`Keeper::turn_ahead`]: at least five
+//! eighths of a sector are free afterwards), and otherwise only while nothing can be missed: disarmed, and no frame for
+//! [`handover::QUIET`]. Then room is made for the next flight. A save that would need an erase in flight stays in the
+//! mailbox, and what comes after it with its owner; it is counted and told.
 //!
 //! # How long a sector lasts
-//! The lifetime counters take about 400 bytes, the baselines 100, a component 80: 0.8 KB for an airframe with four
-//! components. In flight what changed is saved every 15 minutes (`hums_core::lifetime`), so that the half sector that
-//! is free at the least lasts 8 KB / 0.8 KB / 4 = 2.5 hours of one power-on, and a whole one twice as long; whoever flies
-//! on loses nothing as long as power stays. A short flight takes 2 KB: one save after power-on, one for landing and one
-//! for disarming. So there is an erase at every fourth power-on or so, and the 10,000 erases that each of the two sectors
-//! stands (datasheet, table 41) last for 80,000 flights.
+//! | item | bytes in the flash | how often |
+//! |---|---|---|
+//! | lifetime | 320 | once a power-on |
+//! | exposure | 180 | once a power-on |
+//! | a component | 78 | once a power-on |
+//! | the session's counters, of a quad | 170 | in flight every two minutes, after an hour every thirtieth of the time; twice at the end of a flight |
+//! | baselines | 116 | a landing that taught something |
+//! | exceedances | 36 with one, 520 with 24 | a quarter of an hour in which a limit was crossed, and landing |
+//!
+//! A power-on with four components begins with 0.8 KB. Of the 10 KB that are free at the least, 1.25 KB are kept for
+//! landing and disarming ([`Room::Reserve`](hums_core::lifetime::Room)), and so 8 KB are left for 46 saves in flight: 1.7
+//! hours, after which nothing is saved until the landing; a sector just begun, with 14 KB, lasts for 70 saves: 3.8 hours.
+//! Whoever flies on loses nothing as long as power stays.
+//!
+//! A flight of 20 minutes takes 3 KB with all of this. So there is an erase at every second power-on or so, and the
+//! 10,000 erases that each of the two sectors stands (datasheet, table 41) last for 40,000 flights: ten a day for eleven
+//! years.
 
 pub mod handover;
 pub mod keeper;

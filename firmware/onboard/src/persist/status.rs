@@ -2,6 +2,8 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
+use hums_core::lifetime::Room;
+
 /// What the store is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
@@ -29,6 +31,7 @@ pub struct StoreStatus {
     pub(crate) failed: AtomicU32,
     pub(crate) remade: AtomicU32,
     pub(crate) quiet: AtomicBool,
+    reserve_only: AtomicBool,
 }
 
 /// A reading of [`StoreStatus`]; counters since power-on.
@@ -46,6 +49,8 @@ pub struct StoreReading {
     pub failed: u32,
     /// Times that it was found unreadable later, and made anew.
     pub remade: u32,
+    /// Whether there is room to spare.
+    pub room: Room,
 }
 
 impl StoreStatus {
@@ -59,6 +64,7 @@ impl StoreStatus {
             failed: AtomicU32::new(0),
             remade: AtomicU32::new(0),
             quiet: AtomicBool::new(false),
+            reserve_only: AtomicBool::new(false),
         }
     }
 
@@ -77,12 +83,17 @@ impl StoreStatus {
             refused: self.refused.load(Ordering::Relaxed),
             failed: self.failed.load(Ordering::Relaxed),
             remade: self.remade.load(Ordering::Relaxed),
+            room: if self.reserve_only.load(Ordering::Relaxed) { Room::Reserve } else { Room::Enough },
         }
     }
 
     /// Whether an erase would make nobody miss anything, as the monitor sees it.
     pub fn is_quiet(&self) -> bool {
         self.quiet.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn set_room(&self, room: Room) {
+        self.reserve_only.store(room == Room::Reserve, Ordering::Relaxed);
     }
 
     pub(crate) fn set_state(&self, state: StoreState) {

@@ -9,9 +9,14 @@ use hums_store::sim::SimFlash;
 use super::keeper::{Keeper, Kept};
 use super::{Handover, Mailbox, StoreStatus};
 use hums_core::Monitor;
-use hums_core::lifetime::ItemKey;
+use hums_core::lifetime::{ItemKey, Room};
+use hums_core::observation::{
+    Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind,
+};
 use hums_core::params::Params;
 use hums_core::time::Instant;
+use hums_core::units::{Amperes, Celsius, Rpm, Volts};
+use hums_core::usage::UsageCounter;
 use hums_store::{Key, Store, param_value};
 
 type Flash = SimFlash<16384>;
@@ -110,6 +115,7 @@ fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
         }
         assert_eq!((keeper.service(false), keeper.service(false)), (Kept::Waits, Kept::Waits));
         assert_eq!(keeper.status.read().refused, 1);
+        assert!(handover.news().is_some_and(|news| news.text.contains("nearly full")));
         assert!(handover.news().is_some_and(|news| news.text.contains("waits")));
         assert_eq!(handover.news(), None);
         assert_eq!((keeper.service(true), keeper.service(true)), (Kept::Took, Kept::Idle));
@@ -118,6 +124,96 @@ fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
     });
     session(&mut flash, |monitor, _, _| {
         assert!((monitor.params().get(Param::CellVoltWarn) - 4.25).abs() < 1e-6);
+    });
+}
+
+/// One second of a vehicle that is in the air, or on the ground and disarmed.
+fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover, frames: u32) {
+    let now = Instant::from_millis(second * 1_000);
+    let source = Source { system: 1, component: 1 };
+    let heartbeat = Heartbeat { armed: flies, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
+    monitor.observe(now, source, &Observation::Heartbeat(heartbeat));
+    let landed = if flies { LandedState::InAir } else { LandedState::OnGround };
+    monitor.observe(now, source, &Observation::Landed(landed));
+    let current = Some(Amperes(if flies { 20.0 } else { 0.5 }));
+    let temperature = Some(Celsius(30.0 + (second / 60 % 60) as f32));
+    let battery = Battery { voltage: Some(Volts(15.0)), current, temperature, ..Battery::default() };
+    monitor.observe(now, source, &Observation::Battery(battery));
+    let esc =
+        Esc { rpm: Some(Rpm(if flies { 6_000.0 } else { 0.0 })), current, temperature, ..Esc::default() };
+    monitor.observe(now, source, &Observation::Escs(EscGroup { first: 0, escs: [Some(esc); 4] }));
+    monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
+    handover.step(now, monitor, frames);
+}
+
+/// Flies from the 20th second to the end; how many seconds of it the flash has after each.
+fn fly(flash: &mut Flash, seconds: u64) -> Vec<u64> {
+    let mut kept = Vec::new();
+    let mut copies = Vec::new();
+    session(flash, |monitor, handover, keeper| {
+        let before = monitor.lifetime().totals.raw(UsageCounter::Flight);
+        for second in 0..seconds {
+            live(second, (20..seconds - 5).contains(&second), monitor, handover, second as u32);
+            while keeper.service(false) == Kept::Took {}
+            assert_eq!(keeper.status.read().refused, 0, "nothing waits for an erase");
+            copies.push((second, before, keeper.status.read().saved));
+        }
+        let count = |counter| monitor.lifetime().totals.raw(counter) as u32;
+        assert_eq!(count(UsageCounter::Landings), count(UsageCounter::Flights));
+    });
+    kept.extend(copies.windows(2).filter(|pair| pair[0].2 != pair[1].2).map(|pair| pair[1].0));
+    kept
+}
+
+#[test]
+fn flights_of_an_hour_are_saved_every_two_minutes_and_whole_ones_at_landing_without_an_erase() {
+    let mut flash = Flash::blank();
+    for flight in 1..=5 {
+        let saves = fly(&mut flash, 3_600);
+        assert!(saves.windows(2).all(|pair| pair[1] - pair[0] <= 121), "{saves:?}");
+        session(&mut flash, |monitor, _, _| {
+            let life = monitor.lifetime().totals;
+            assert_eq!(life.raw(UsageCounter::Landings) as u32, flight);
+            let flown_s = life.raw(UsageCounter::Flight);
+            assert!((flown_s - 3_575.0 * f64::from(flight)).abs() < 5.0, "{flown_s}");
+        });
+    }
+}
+
+#[test]
+fn a_flight_of_many_hours_uses_what_there_is_and_its_landing_is_saved_all_the_same() {
+    let mut flash = Flash::blank();
+    for flight in 1..=3 {
+        let saves = fly(&mut flash, 10 * 3_600);
+        let first_gap = saves.windows(2).find(|pair| pair[1] - pair[0] > 121.max(pair[1] / 30 + 1));
+        let until_s = first_gap.map_or(saves[saves.len() - 2], |pair| pair[0]);
+        assert!(until_s > 6_000, "flight {flight}: every two minutes until {until_s} s only: {saves:?}");
+        session(&mut flash, |monitor, _, _| {
+            assert_eq!(monitor.lifetime().totals.raw(UsageCounter::Landings) as u32, flight);
+        });
+    }
+}
+
+#[test]
+fn between_two_flights_room_is_made_for_the_next_one() {
+    let mut flash = Flash::blank();
+    session(&mut flash, |monitor, handover, keeper| {
+        let mut second = 0;
+        for flight in 0..6 {
+            for _ in 0..3_600 {
+                live(second, true, monitor, handover, second as u32);
+                while keeper.service(false) == Kept::Took {}
+                second += 1;
+            }
+            assert_eq!(keeper.status.read().refused, 0, "flight {flight}");
+            // Frames end: the autopilot is switched off.
+            for _ in 0..20 {
+                live(second, false, monitor, handover, u32::MAX);
+                while keeper.service(false) == Kept::Took {}
+                second += 1;
+            }
+            assert_eq!(keeper.status.read().room, Room::Enough, "flight {flight}");
+        }
     });
 }
 

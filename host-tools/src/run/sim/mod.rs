@@ -6,6 +6,7 @@
 //!
 //! Power-on is the moment of the first input byte.
 
+pub mod both_ports;
 mod pipeline;
 
 use std::fs::File;

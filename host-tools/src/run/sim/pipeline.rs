@@ -7,7 +7,7 @@ use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_blackbox::Writer;
 use hums_blackbox::record::{Boot, Stats};
 use hums_core::Monitor;
-use hums_core::params::{Param, Params};
+use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 use hums_onboard::persist::Kept;
@@ -135,6 +135,8 @@ enum Event {
     Silence,
     UplinkSilence,
     Tick,
+    /// The ground station's port has sent a frame, and takes the next one without a pause.
+    Port,
     Storage,
 }
 
@@ -184,15 +186,18 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let mut keeper = Keeper::mount(Some(outside.flash.clone()), items_out, store_status);
         keeper.turn_ahead();
         keeper.load(monitor);
+        let handover = Handover::new(items_in, store_status, monitor.params());
+        let mut monitoring = Monitoring::new(monitor, writer, identity, card_status, port_status);
+        monitoring.restore_signing(&mut keeper);
         Self {
             slot_status: card_status,
             port_status,
             ends: queues.split(),
             keeper,
-            handover: Handover::new(items_in, store_status, monitor.params()),
+            handover,
             reception: Reception::new(port_status),
             uplink: Uplink::new(),
-            monitoring: Monitoring::new(monitor, writer, identity, card_status, port_status),
+            monitoring,
             storage: Storage::new(Slot(outside.card), card_status, held, entropy),
             outside,
             now: Instant::ZERO,
@@ -229,6 +234,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
                     self.tick_at = self.tick_at + TICK;
                     self.tick()?;
                 }
+                Event::Port => self.send_gs()?,
                 Event::Storage => self.storage(),
             }
             if self.is_dead() {
@@ -245,7 +251,8 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let silence = self.silent_at.map(|at| (at, Event::Silence));
         let storage = self.storage_at.map(|at| (at, Event::Storage));
         let uplink = self.uplink_silent_at.map(|at| (at, Event::UplinkSilence));
-        let events = [silence, Some((self.tick_at, Event::Tick)), uplink, storage];
+        let port = (self.gs_at > self.now).then_some((self.gs_at, Event::Port));
+        let events = [silence, Some((self.tick_at, Event::Tick)), uplink, port, storage];
         // `min_by_key` keeps the first of equals.
         events.into_iter().flatten().min_by_key(|(at, _)| *at)
     }
@@ -287,6 +294,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         });
         let frames = self.port_status.read().frames;
         self.handover.step(self.now, self.monitoring.monitor_mut(), frames);
+        self.monitoring.save_signing(self.now, &mut self.handover);
         self.note();
         self.keep(false);
         self.after_monitor()
@@ -309,7 +317,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             let _ = self.outside.autopilot.write_all(frame.get(..length).unwrap_or_default());
             let _ = self.outside.autopilot.flush();
         }
-        let baud = (self.monitoring.monitor().params().get(Param::GsBaud) as u64).max(1);
+        let baud = u64::from(self.monitoring.bauds().0.max(1));
         while self.gs_at <= self.now {
             let Some(length) = self.ends.gs_out.take(&mut frame) else { break };
             let bits = length as u64 * 10;
@@ -373,6 +381,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
 
     /// Hands over everything that is to outlive power, as fast as the store takes it.
     fn save_all(&mut self) {
+        self.monitoring.save_signing(self.now, &mut self.handover);
         while !self.handover.finish(self.now, self.monitoring.monitor_mut()) && !self.is_dead() {
             self.keep(true);
         }
@@ -406,6 +415,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let mut stats = self.monitoring.stats(&self.ends.gs_in);
         catch_up(&mut stats, self.port_status.read());
         stats
+    }
+
+    /// Parameters as they are now.
+    pub(super) fn params(&self) -> Params {
+        *self.monitoring.monitor().params()
     }
 
     /// Whether the card no longer holds all that was logged: old segments were overwritten.

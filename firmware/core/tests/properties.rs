@@ -1,0 +1,458 @@
+//! Nothing that a vehicle can say, in whatever order, at whatever time and however often, panics or overflows, spoils a
+//! figure, or makes what is not known look healthy. (From bytes on: `hums-link`'s `tests/hostile.rs`.)
+#![allow(clippy::panic, clippy::unwrap_used)]
+
+use hums_core::Monitor;
+use hums_core::health::{EXPECTED, Level, Subsystem};
+use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
+use hums_core::observation::{
+    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CommandAck, Engine, Esc, EscGroup,
+    Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState,
+    LocalPosition, Observation, Processor, RadioControl, Rails, Source, SpeedSensor, SystemStatus,
+    SystemTime, TelemetryRadio, VehicleKind, Vibration, VibrationScale,
+};
+use hums_core::params::{Params, TABLE};
+use hums_core::status::{LinkReading, RecorderStatus, Recording};
+use hums_core::time::{Instant, Span};
+use hums_core::units::{
+    AmpereHours, Amperes, Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
+    Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
+};
+use hums_core::usage::BASELINE_FIRST;
+
+const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+/// What values are like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Values {
+    /// Anything: sane, extreme, or no number at all.
+    Any,
+    /// Not one of them is known: missing, or no finite number.
+    Unknown,
+}
+
+/// Makes observations (splitmix64: the same ones each time).
+struct Random {
+    state: u64,
+    values: Values,
+}
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, bound: u64) -> u64 {
+        self.next() % bound
+    }
+
+    fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+        from[self.below(from.len() as u64) as usize]
+    }
+
+    fn f32(&mut self) -> f32 {
+        const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+        const EXTREME: [f32; 8] = [f32::MAX, f32::MIN, f32::MIN_POSITIVE, -0.0, 0.0, 1e9, -1e9, 65_535.0];
+        match self.below(4) {
+            _ if self.values == Values::Unknown => self.pick(&BAD),
+            0 => self.pick(&BAD),
+            1 => self.pick(&EXTREME),
+            2 => f32::from_bits(self.next() as u32),
+            _ => self.below(2_000) as f32 / 10.0 - 50.0,
+        }
+    }
+
+    fn u32(&mut self) -> u32 {
+        match self.below(3) {
+            0 => self.pick(&[0, 1, u32::MAX, u32::MAX - 1, 1 << 31]),
+            1 => self.below(100) as u32,
+            _ => self.next() as u32,
+        }
+    }
+
+    fn maybe<T>(&mut self, value: impl FnOnce(&mut Self) -> T) -> Option<T> {
+        (self.below(4) != 0).then(|| value(self))
+    }
+
+    fn float<T>(&mut self, unit: fn(f32) -> T) -> Option<T> {
+        self.maybe(|random| unit(random.f32()))
+    }
+
+    /// A whole number, which itself cannot say that it is unknown.
+    fn whole<T>(&mut self, from: fn(u32) -> T) -> Option<T> {
+        if self.values == Values::Unknown {
+            return None;
+        }
+        self.maybe(|random| from(random.u32()))
+    }
+
+    fn vector<T>(&mut self, unit: fn(f32) -> T) -> [T; 3] {
+        [(); 3].map(|()| unit(self.f32()))
+    }
+
+    fn source(&mut self) -> Source {
+        if self.below(8) == 0 {
+            Source { system: self.next() as u8, component: self.next() as u8 }
+        } else {
+            AUTOPILOT
+        }
+    }
+
+    fn heartbeat(&mut self) -> Heartbeat {
+        use VehicleKind::{Other, Plane, Rotorcraft, Surface, Vtol};
+        Heartbeat {
+            autopilot: self.pick(&[Autopilot::ArduPilot, Autopilot::Px4, Autopilot::Other]),
+            kind: self.pick(&[Rotorcraft, Plane, Vtol, Surface, Other]),
+            armed: self.below(2) == 0,
+            state: self.next() as u8,
+            mode: self.u32(),
+            ..Heartbeat::default()
+        }
+    }
+
+    fn battery(&mut self) -> Battery {
+        Battery {
+            id: self.pick(&[0, 0, 1, 2, 255]),
+            cells: [(); CELLS_MAX].map(|()| self.float(Volts)),
+            voltage: self.float(Volts),
+            current: self.float(Amperes),
+            consumed: self.float(AmpereHours),
+            energy: self.float(WattHours),
+            remaining: self.float(Fraction),
+            temperature: self.float(Celsius),
+            faults: self.u32(),
+            lithium: self.below(4) != 0,
+        }
+    }
+
+    fn escs(&mut self) -> EscGroup {
+        let first = self.pick(&[0, 0, 4, 8, 9, 11, 200, 255]);
+        let escs = [(); 4].map(|()| {
+            self.maybe(|random| Esc {
+                rpm: random.float(Rpm),
+                voltage: random.float(Volts),
+                current: random.float(Amperes),
+                temperature: random.float(Celsius),
+                failures: random.whole(|number| number as u16),
+                errors: random.whole(|number| number),
+            })
+        });
+        EscGroup { first, escs }
+    }
+
+    fn gnss(&mut self) -> Gnss {
+        Gnss {
+            instance: self.pick(&[0, 0, 1, 2, 255]),
+            fix: self.whole(|number| number as u8).unwrap_or(0),
+            satellites: self.whole(|number| number as u8),
+            hdop: self.float(|value| value),
+            accuracy: self.float(Metres),
+            position: self.maybe(|random| Position {
+                latitude_deg: random.u32() as i32 as f64 / 1e7,
+                longitude_deg: f64::NAN,
+            }),
+            altitude: self.float(Metres),
+            speed: self.float(MetresPerSecond),
+        }
+    }
+
+    fn imu(&mut self) -> Imu {
+        Imu {
+            instance: self.pick(&[0, 0, 1, 2, 255]),
+            acceleration: self.maybe(|random| random.vector(MetresPerSecond2)),
+            rate: self.maybe(|random| random.vector(RadiansPerSecond)),
+            temperature: self.float(Celsius),
+        }
+    }
+
+    fn air(&mut self) -> Air {
+        Air { pressure: self.float(Hectopascals), temperature: self.float(Celsius) }
+    }
+
+    fn observation(&mut self) -> Observation {
+        use LandedState::{InAir, Landing, OnGround, TakingOff, Unknown};
+        match self.below(28) {
+            0..=2 => Observation::Heartbeat(self.heartbeat()),
+            3 => Observation::SystemStatus(SystemStatus {
+                load: self.float(Fraction),
+                voltage: self.float(Volts),
+                current: self.float(Amperes),
+                remaining: self.float(Fraction),
+                unhealthy: self.u32(),
+            }),
+            4 => Observation::SystemTime(SystemTime {
+                utc_micros: self.maybe(Self::next),
+                boot_ms: self.u32(),
+            }),
+            5 => Observation::Gnss(self.gnss()),
+            6 => {
+                let jamming = self.whole(|number| number as u8).unwrap_or(0);
+                let spoofing = self.whole(|number| number as u8).unwrap_or(0);
+                Observation::GnssIntegrity(GnssIntegrity { jamming, spoofing, ..GnssIntegrity::default() })
+            }
+            7 => Observation::Imu(self.imu()),
+            8 => Observation::Air(self.air()),
+            9 => Observation::ImuAndAir(self.imu(), self.air()),
+            10 => {
+                let [roll, pitch, yaw] = self.vector(Radians);
+                Observation::Attitude(Attitude { roll, pitch, yaw, boot_ms: self.maybe(Self::u32) })
+            }
+            11 => Observation::LocalPosition(LocalPosition {
+                position: self.vector(Metres),
+                velocity: self.vector(MetresPerSecond),
+            }),
+            12 | 13 => Observation::GlobalPosition(GlobalPosition {
+                relative_altitude: Metres(self.f32()),
+                altitude: Metres(self.f32()),
+                velocity: self.vector(MetresPerSecond),
+                ..GlobalPosition::default()
+            }),
+            14 => Observation::Hud(Hud {
+                airspeed: self.float(MetresPerSecond),
+                groundspeed: self.float(MetresPerSecond),
+                heading_deg: self.float(|value| value),
+                throttle: self.float(Fraction),
+                altitude: self.float(Metres),
+                climb: self.float(MetresPerSecond),
+            }),
+            15 => Observation::RadioControl(RadioControl { rssi: self.whole(|number| number as u8) }),
+            16 => Observation::TelemetryRadio(TelemetryRadio {
+                rssi: self.whole(|number| number as u8),
+                remote_rssi: self.whole(|number| number as u8),
+                noise: self.whole(|number| number as u8),
+                remote_noise: self.whole(|number| number as u8),
+                errors: self.u32() as u16,
+            }),
+            17 => Observation::Rails(Rails { vcc: self.float(Volts), servo: self.float(Volts) }),
+            18 => Observation::Battery(self.battery()),
+            19 => Observation::Estimator(Estimator {
+                scale: self.pick(&[EstimatorScale::Variance, EstimatorScale::TestRatio]),
+                velocity: self.float(|value| value),
+                position_horizontal: self.float(|value| value),
+                position_vertical: self.float(|value| value),
+                compass: self.float(|value| value),
+                flags: self.u32() as u16,
+            }),
+            20 => Observation::Vibration(Vibration {
+                scale: self.pick(&[VibrationScale::PerAxis, VibrationScale::Px4Metrics]),
+                levels: [(); 3].map(|()| self.float(|value| value)),
+                clips: [(); 3].map(|()| self.u32()),
+            }),
+            21 | 22 => Observation::Escs(self.escs()),
+            23 => Observation::Engine(Engine {
+                healthy: self.below(2) == 0,
+                rpm: self.float(Rpm),
+                cylinder_head: self.float(Celsius),
+                exhaust: self.float(Celsius),
+                fuel_pressure: self.float(Hectopascals),
+                ..Engine::default()
+            }),
+            24 => Observation::SpeedSensors([(); 2].map(|()| {
+                self.maybe(|random| SpeedSensor { index: random.next() as u8, rpm: Rpm(random.f32()) })
+            })),
+            25 => Observation::Landed(self.pick(&[Unknown, OnGround, InAir, TakingOff, Landing])),
+            26 => Observation::Processor(Processor {
+                temperature: self.float(Celsius),
+                voltage: self.float(Volts),
+            }),
+            _ => self.rare(),
+        }
+    }
+
+    fn rare(&mut self) -> Observation {
+        match self.below(4) {
+            0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.u32() }),
+            1 => Observation::CommandAck(CommandAck {
+                command: self.pick(&[20, 21]),
+                result: self.next() as u8,
+            }),
+            2 => Observation::MissionReached(self.u32() as u16),
+            _ => Observation::FlightInformation { flight: self.next(), takeoff_boot_ms: self.u32() },
+        }
+    }
+
+    /// Parameters anywhere in their ranges.
+    fn params(&mut self) -> Params {
+        let mut params = Params::defaults();
+        for _ in 0..self.below(40) {
+            let spec = &TABLE[self.below(TABLE.len() as u64) as usize];
+            let part = self.below(1_001) as f32 / 1_000.0;
+            // Whole numbers choose; what is out of range by rounding is refused.
+            let _ = params.set(spec.name, (spec.min + part * (spec.max - spec.min)).round());
+        }
+        params
+    }
+
+    fn link(&mut self) -> LinkReading {
+        LinkReading { frames_lost: self.maybe(Self::f32), at: Instant::from_micros(self.next() >> 20) }
+    }
+
+    fn recorder(&mut self) -> RecorderStatus {
+        RecorderStatus {
+            recording: self.pick(&[Recording::Starting, Recording::Running, Recording::Stopped]),
+            queue: self.f32(),
+            frames_lost: self.next(),
+            stall: Span::from_micros(self.next()),
+            write_errors: self.next(),
+            room: self.maybe(Self::f32),
+        }
+    }
+}
+
+/// What must hold whatever was said.
+fn check(monitor: &mut Monitor, now: Instant) {
+    let sane = |counter: u8, value: f64| {
+        let sign = counter >= BASELINE_FIRST || value >= 0.0;
+        assert!(value.is_finite() && sign, "counter {counter} is {value}");
+    };
+    monitor.for_each_counter(sane);
+    monitor.for_each_counter_of_life(sane);
+    let health = monitor.health();
+    let overall = health.overall();
+    for (check, instance, level) in health.levels() {
+        assert!(not_better(overall, level), "{overall:?}, but {} {instance} is {level:?}", check.name);
+        let subsystem = health.subsystem(check.subsystem);
+        assert!(not_better(subsystem, level), "{subsystem:?}, but {} {instance} is {level:?}", check.name);
+    }
+    for subsystem in Subsystem::ALL {
+        let known = health.levels().any(|(check, ..)| check.subsystem == subsystem);
+        assert!(known || health.subsystem(subsystem) == Level::Stale, "{subsystem:?}: unknown is not OK");
+    }
+    if EXPECTED.into_iter().any(|subsystem| health.subsystem(subsystem) == Level::Stale) {
+        assert!(matches!(overall, Level::Stale | Level::Critical), "{overall:?}");
+    }
+    while monitor.take_happening().is_some() {}
+    while let Some(snapshot) = monitor.take_snapshot(now) {
+        let _ = snapshot.values().count();
+    }
+    let _ = monitor.take_request();
+    while let Some(key) = monitor.save_due(now, Room::Enough) {
+        let mut item = [0; ITEM_BYTES_MAX];
+        let length = monitor.encode_item(key, &mut item);
+        assert_eq!(Monitor::new(Params::defaults()).restore(key, &item[..length]), Ok(()), "{key:?}");
+        monitor.saved(key);
+    }
+}
+
+/// A roll-up is as bad as its part; stale hides a warning, and a danger hides all.
+fn not_better(whole: Level, part: Level) -> bool {
+    let rank = |level| match level {
+        Level::Ok => 0,
+        Level::Advisory => 1,
+        Level::Warning => 2,
+        Level::Stale => 3,
+        Level::Critical => 4,
+    };
+    rank(whole) >= rank(part)
+}
+
+/// Runs a thousand random things past a monitor; gives it as it is then, and when that is.
+fn run(random: &mut Random) -> (Monitor, Instant) {
+    let mut monitor = Monitor::new(random.params());
+    monitor.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(random.heartbeat()));
+    let mut now = Instant::ZERO;
+    for _ in 0..1_000 {
+        let step_us = match random.below(20) {
+            0 => random.below(4_000_000_000),
+            1 => random.below(10_000_000),
+            2 => 0,
+            _ => 50_000,
+        };
+        now = now + Span::from_micros(step_us);
+        for _ in 0..random.below(4) {
+            // A frame may wait for a while, and the clock may have gone on since it was read.
+            let late = Span::from_micros(random.below(3) * random.below(2_000_000));
+            let at = if random.below(8) == 0 { now + late } else { now };
+            let observation = random.observation();
+            for _ in 0..=random.below(2) {
+                monitor.observe(at, random.source(), &observation);
+            }
+        }
+        let (link, recorder) = (random.link(), random.recorder());
+        monitor.tick(now, &link, &recorder, &mut |finding| {
+            assert_ne!(finding.level, finding.previous, "{finding:?}");
+            assert!(finding.value.is_nan() || finding.value.is_finite(), "{finding:?}");
+        });
+        check(&mut monitor, now);
+    }
+    (monitor, now)
+}
+
+#[test]
+fn no_order_time_or_value_of_anything_said_panics_spoils_a_figure_or_betters_the_whole() {
+    for seed in 0..40 {
+        run(&mut Random { state: seed, values: Values::Any });
+    }
+}
+
+#[test]
+fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_that_it_said_is_ok() {
+    for seed in 40..60 {
+        let (mut monitor, end) = run(&mut Random { state: seed, values: Values::Any });
+        let mut now = end;
+        // Longer than any check waits, and than anything of the future that was said.
+        for _ in 0..600 {
+            now = now + Span::from_millis(200);
+            monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
+        }
+        for (check, instance, level) in monitor.health().levels() {
+            let said = check.stale_after.is_some();
+            assert!(!(said && level == Level::Ok), "seed {seed}: {} {instance} is OK", check.name);
+        }
+        let overall = monitor.health().overall();
+        assert!(matches!(overall, Level::Critical | Level::Stale), "seed {seed}: {overall:?}");
+    }
+}
+
+/// Checks of whole numbers that have no way of saying that they are unknown, of ages, and of ourselves.
+const KNOWN_ANYWAY: [&str; 9] = [
+    "batt_fault",
+    "esc_silent",
+    "clipping",
+    "heartbeat",
+    "frames_lost",
+    "autopilot_reboot",
+    "autopilot_state",
+    "sensors",
+    "gps_fix",
+];
+
+#[test]
+fn what_is_said_to_be_unknown_is_never_ok() {
+    for seed in 0..15 {
+        let mut random = Random { state: seed, values: Values::Unknown };
+        let mut monitor = Monitor::new(Params::defaults());
+        for now_ms in (0..120_000).step_by(50) {
+            let now = Instant::from_millis(now_ms);
+            let heartbeat = Heartbeat { armed: now_ms > 1_000, state: 4, ..random.heartbeat() };
+            monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
+            let landed = if now_ms > 2_000 { LandedState::InAir } else { LandedState::OnGround };
+            monitor.observe(now, AUTOPILOT, &Observation::Landed(landed));
+            for _ in 0..3 {
+                let observation = random.observation();
+                let known = matches!(observation, Observation::Heartbeat(_) | Observation::Landed(_));
+                if !known {
+                    monitor.observe(now, AUTOPILOT, &observation);
+                }
+            }
+            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            monitor.tick(now, &link, &RecorderStatus::default(), &mut |_| {});
+            for (check, instance, level) in monitor.health().levels() {
+                let ours = check.subsystem == Subsystem::Recorder || check.alarm_only;
+                let known = ours || KNOWN_ANYWAY.contains(&check.name);
+                assert!(
+                    known || level != Level::Ok,
+                    "{now_ms} ms, seed {seed}: {} {instance} is OK",
+                    check.name
+                );
+            }
+            assert_ne!(monitor.health().overall(), Level::Ok, "{now_ms} ms, seed {seed}");
+            check(&mut monitor, now);
+        }
+        assert!(monitor.flight().airborne(), "what counts in flight only is not looked at");
+    }
+}

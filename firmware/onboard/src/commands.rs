@@ -1,0 +1,219 @@
+//! What a command of a ground station does, and the answers in line as messages.
+//!
+//! | `MAV_CMD` | does |
+//! |---|---|
+//! | 401 `RUN_PREARM_CHECKS` | tells what stands against a flight; accepted when nothing does |
+//! | 512 `REQUEST_MESSAGE` | `HEARTBEAT`, `AUTOPILOT_VERSION`, `PROTOCOL_VERSION` |
+//! | 519, 520 | the same by their older commands |
+//! | 2510, 2511 `LOGGING_START`, `_STOP` | records again; stops recording, while disarmed |
+//! | 31010 `USER_1` | another part is in a component's place, from 1: while disarmed |
+//! | 31011 `USER_2` | cancels the protective action that is announced |
+
+use core::fmt::Write as _;
+
+use hums_blackbox::record::{Event, Record};
+use hums_core::Monitor;
+use hums_core::health::{self, Level};
+use hums_core::params::TABLE;
+use hums_core::time::Instant;
+use hums_link::encode::{Severity, Text};
+use hums_link::messages;
+use hums_link::packet::Packet;
+use hums_link::request::{Port, Reply};
+use hums_link::summary;
+
+use crate::monitoring::{Identity, Monitoring};
+use crate::queues::SectorsIn;
+use crate::secure::Trust;
+
+const PROTOCOL: u16 = 519;
+const CAPABILITIES: u16 = 520;
+/// `MAV_CMD_REQUEST_MESSAGE`
+pub(crate) const MESSAGE: u16 = 512;
+const PREFLIGHT: u16 = 401;
+const RECORD: u16 = 2510;
+const STOP: u16 = 2511;
+const REPLACED: u16 = 31_010;
+const CANCEL: u16 = 31_011;
+/// `MAV_RESULT`
+pub(crate) const ACCEPTED: u8 = 0;
+const TEMPORARILY_REJECTED: u8 = 1;
+/// Of `MAV_RESULT` as well.
+pub(crate) const DENIED: u8 = 2;
+const UNSUPPORTED: u8 = 3;
+const FAILED: u8 = 4;
+
+/// Number of the event that records what somebody did over a link.
+pub(crate) const EVENT: u8 = 12;
+
+impl Monitoring<'_> {
+    /// Does what a command says; its `MAV_RESULT`.
+    pub(crate) fn command(
+        &mut self,
+        now: Instant,
+        port: Port,
+        command: u16,
+        params: [f32; 2],
+        by: (u8, u8),
+        sectors: &mut SectorsIn,
+    ) -> u8 {
+        let mut reply = |reply| {
+            self.companion.replies.push(port, reply);
+            ACCEPTED
+        };
+        match (command, params[0] as u32) {
+            (CAPABILITIES, _) | (MESSAGE, 148) => reply(Reply::Version),
+            (PROTOCOL, _) | (MESSAGE, 300) => reply(Reply::Protocol),
+            (MESSAGE, 0) => reply(Reply::Heartbeat),
+            (PREFLIGHT, _) => {
+                reply(Reply::Preflight);
+                if preflight(self.monitor).is_none() { ACCEPTED } else { FAILED }
+            }
+            (RECORD | STOP | REPLACED | CANCEL, number) => {
+                if !self.companion.limits[port as usize].allows(now) {
+                    return TEMPORARILY_REJECTED;
+                }
+                self.act(now, port, command, number, by, sectors)
+            }
+            _ => UNSUPPORTED,
+        }
+    }
+
+    fn act(
+        &mut self,
+        now: Instant,
+        port: Port,
+        command: u16,
+        number: u32,
+        by: (u8, u8),
+        sectors: &mut SectorsIn,
+    ) -> u8 {
+        let armed = self.monitor.vehicle().armed();
+        match command {
+            CANCEL => {
+                let cancelled = self.monitor.cancel_protection();
+                self.tell_event(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
+                if cancelled { ACCEPTED } else { FAILED }
+            }
+            STOP | REPLACED if armed => TEMPORARILY_REJECTED,
+            REPLACED => {
+                let place = (number as usize).wrapping_sub(1);
+                // Its serial number can be given later; who did it is in the component's record.
+                if self.replace_component(now, place, "", by, sectors) { ACCEPTED } else { DENIED }
+            }
+            _ => {
+                self.stop_or_record(now, command == STOP, port, by, sectors);
+                ACCEPTED
+            }
+        }
+    }
+
+    /// Records that somebody did something; what does not fit into 50 characters is cut.
+    pub(crate) fn tell_event(
+        &mut self,
+        now: Instant,
+        what: core::fmt::Arguments<'_>,
+        sectors: &mut SectorsIn,
+    ) {
+        let mut text = Text::default();
+        let _ = text.write_fmt(what);
+        self.record(now, &Record::Event(Event { number: EVENT, text: text.as_str() }), sectors);
+    }
+
+    /// Never unnoticed: it is an event in the record, a text on the ground station, and a finding for as long as it
+    /// lasts; and it ends when the vehicle is armed.
+    pub(crate) fn stop_or_record(
+        &mut self,
+        now: Instant,
+        stop: bool,
+        port: Port,
+        by: (u8, u8),
+        sectors: &mut SectorsIn,
+    ) {
+        if self.companion.stopped == stop {
+            return;
+        }
+        self.companion.stopped = stop;
+        let what = if stop { "stopped" } else { "started" };
+        self.tell_event(now, format_args!("recording {what} by {}/{}", by.0, by.1), sectors);
+        if stop {
+            self.companion.replies.push(port, Reply::Stopped);
+        }
+    }
+
+    /// Earlier logs are no longer offered and are the first to make room; not in flight.
+    pub(crate) fn erase(
+        &mut self,
+        now: Instant,
+        port: Port,
+        trust: Trust,
+        by: (u8, u8),
+        sectors: &mut SectorsIn,
+    ) {
+        if !self.companion.limits[port as usize].allows(now) {
+            return;
+        }
+        let may = !self.monitor.vehicle().armed();
+        let what = if may { "logs erased" } else { "erasing refused in flight, asked" };
+        self.tell_event(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
+        if may {
+            self.companion.library.erases = true;
+            self.companion.replies.push(port, Reply::Erased);
+            self.changed(trust);
+        }
+    }
+}
+
+/// The first thing that stands against a flight.
+fn preflight(monitor: &Monitor) -> Option<&'static str> {
+    let bad = |level| matches!(level, Level::Warning | Level::Critical);
+    monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, ..)| check.name)
+}
+
+/// An answer as a message.
+pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Identity<'_>) -> Packet {
+    match reply {
+        Reply::Param(index) => match monitor.params().iter().nth(usize::from(index)) {
+            Some((spec, value)) => messages::param_value(spec.name, value, index, TABLE.len() as u16),
+            // Only indices of the table are put in line.
+            None => messages::heartbeat(0),
+        },
+        Reply::Ack(command, result, (system, component)) => {
+            messages::command_ack(command, result, system, component)
+        }
+        Reply::Version => messages::autopilot_version(version(identity.version), identity.git, &identity.uid),
+        Reply::Protocol => messages::protocol_version(),
+        Reply::Heartbeat => summary::heartbeat(monitor),
+        Reply::Preflight => match preflight(monitor) {
+            Some(check) => {
+                let words = health::words(check);
+                messages::status_text(
+                    Severity::Warning,
+                    Text::new(format_args!("HUMS: not ready: {words}")).as_str(),
+                )
+            }
+            None => messages::status_text(Severity::Info, "HUMS: ready"),
+        },
+        Reply::Keyed(true) => messages::status_text(Severity::Notice, "HUMS: signing key set"),
+        Reply::Keyed(false) => messages::status_text(Severity::Notice, "HUMS: signing key removed"),
+        Reply::Erased => messages::status_text(Severity::Notice, "HUMS: earlier logs are erased"),
+        Reply::Stopped => messages::status_text(Severity::Warning, "HUMS: recording stopped by command"),
+    }
+}
+
+/// `1.2.3` as three numbers.
+fn version(text: &str) -> [u8; 3] {
+    let mut numbers = text.split(['.', '-', '+']).map(|part| part.parse().unwrap_or(0));
+    [(); 3].map(|()| numbers.next().unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_version_is_three_numbers_whatever_it_says() {
+        assert_eq!(version("1.22.3"), [1, 22, 3]);
+        assert_eq!((version("0.1.0-rc1"), version("")), ([0, 1, 0], [0, 0, 0]));
+    }
+}

@@ -1,0 +1,111 @@
+//! A power-on with somebody at the ground station's port, step by step: for those who ask how the two sides go together.
+
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use anyhow::{Result, anyhow};
+use hums_core::params::Params;
+use hums_store::{Key, Store};
+
+use super::pipeline::{Memory, Outside, Pipeline};
+use super::{PowerOn, identity};
+use crate::card::SimCard;
+use crate::run::Machine as _;
+use crate::run::report::Finding;
+use crate::run::store;
+use crate::source::Chunk;
+
+/// The number under which the store keeps the signing key.
+const ITEM_KEY: u8 = 32;
+
+/// Where bytes come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The autopilot.
+    Autopilot,
+    /// The ground station.
+    Ground,
+}
+
+/// What the board is before its first byte.
+#[derive(Clone, Copy, Debug)]
+pub struct Board<'a> {
+    /// Its card.
+    pub card: &'a SimCard,
+    /// Its parameters.
+    pub params: &'a Params,
+    /// Its signing key.
+    pub key: Option<[u8; 32]>,
+}
+
+/// What a power-on came to, and each change of level with its time.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The figures.
+    pub done: PowerOn,
+    /// Changes of level.
+    pub findings: Vec<Finding>,
+    /// Parameters at the end.
+    pub params: Params,
+}
+
+/// Gives both ports their bytes in time until there are none, and `told` each frame that begins to leave the ground
+/// station's port, with the time of the chunk before which that was. To know it to a millisecond, give a chunk, which
+/// may be empty, each millisecond.
+pub fn run(
+    board: &Board<'_>,
+    chunks: impl IntoIterator<Item = (Side, Chunk)>,
+    mut told: impl FnMut(u64, &[u8]),
+) -> Result<Outcome> {
+    let mut memory = Memory::new(board.params);
+    let flash = store::open(None, &[])?;
+    if let Some(key) = board.key {
+        let (mut store, _) = Store::mount(flash.clone()).map_err(|error| anyhow!("the store: {error:?}"))?;
+        store.save(Key::item(ITEM_KEY), &key).map_err(|error| anyhow!("the store: {error:?}"))?;
+    }
+    let port = Frames::default();
+    let (mut findings, mut gs, mut autopilot) = (Vec::new(), port.clone(), io::sink());
+    let outside = Outside {
+        card: board.card,
+        flash: &flash,
+        gs: &mut gs,
+        autopilot: &mut autopilot,
+        findings: &mut findings,
+        power_on_us: 0,
+        reboot_at_us: None,
+    };
+    let mut pipeline = Pipeline::new(outside, &mut memory, identity(1), 1);
+    pipeline.start()?;
+    for (side, chunk) in chunks {
+        match side {
+            Side::Autopilot => pipeline.arrive(&chunk)?,
+            Side::Ground => pipeline.hear(&chunk)?,
+        };
+        port.take().iter().for_each(|frame| told(chunk.at_us, frame));
+    }
+    let frames_left = pipeline.finish()?;
+    let (stats, params) = (pipeline.stats(), pipeline.params());
+    drop(pipeline);
+    Ok(Outcome { done: PowerOn { stats, frames_left, card: memory.card_reading() }, findings, params })
+}
+
+/// Keeps each frame: the port writes them one by one.
+#[derive(Clone, Default)]
+struct Frames(Arc<Mutex<Vec<Vec<u8>>>>);
+
+impl Frames {
+    fn take(&self) -> Vec<Vec<u8>> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Write for Frames {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(bytes.to_vec());
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,37 @@
+"""Decodes a log by docs/log-format.md alone: a second decoder that shares no line with the monitor's own.
+
+usage: hums_log [--format tlog|jsonl] LOG
+
+`tlog` writes what `hums decode --format tlog` does: for each frame its time (8 bytes, big endian, microseconds since
+1970) and the frame. `jsonl` writes an object a line: each frame in hexadecimal, and the fields of the records. Gaps are
+told on stderr; the exit code is 3 if there are any. The modules follow the document's sections, which they name; the
+tables of layouts and links are read from where the document has them.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+from log import read
+from records import rows_of
+
+
+def main(arguments):
+    form, path = ("tlog", arguments[0]) if len(arguments) == 1 else (arguments[1], arguments[2])
+    gaps = []
+    for ms, epoch, what, content, verified in read(Path(path).read_bytes(), gaps.append):
+        utc = epoch + ms * 1000
+        if form == "tlog" and what == "frame":
+            sys.stdout.buffer.write(utc.to_bytes(8, "big") + content)
+        elif form == "jsonl" and what == "frame":
+            print(json.dumps({"time_boot": ms / 1000, "frame": content.hex(), "verified": verified}))
+        elif form == "jsonl":
+            for name, fields in rows_of(content):
+                print(json.dumps({"time_boot": ms / 1000, "record": name, "fields": fields}))
+    for gap in gaps:
+        print(gap, file=sys.stderr)
+    return 3 if gaps else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,182 @@
+//! The ground station's port is never overrun: bytes in every window of a second, on every recording; nothing starves;
+//! a critical finding is soon out, however busy the port is.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use hums::card::{Faults, SimCard, image};
+use hums::endpoint::Endpoint;
+use hums::run::sim::both_ports::{Board, Outcome, Side, run};
+use hums::source::{self, Chunk, Timing};
+use hums_core::params::Params;
+use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+use hums_link::packet::{Fields, Packet};
+use hums_link::{Check, Frame};
+use hums_tests::flights::{self, OWN, own};
+
+const BUDGETS: [u32; 3] = [100, 1_000, 5_000];
+/// What the port has by default.
+const BAUD: u64 = 57_600;
+const SECOND: u64 = 1_000_000;
+
+/// A frame at the port: when its first byte leaves, in microseconds, to a millisecond.
+struct Sent {
+    at_us: u64,
+    bytes: Vec<u8>,
+}
+
+impl Sent {
+    fn frame(&self) -> Frame<'_> {
+        Frame::again(&self.bytes, Check::Verified).expect("a frame")
+    }
+
+    /// When its last byte has left.
+    fn end_us(&self) -> u64 {
+        self.at_us + self.bytes.len() as u64 * 10 * SECOND / BAUD
+    }
+}
+
+/// What arrives, and a moment to look each millisecond; `ask` says what the ground station sends every 100 ms.
+fn chunks(recording: &Path, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, Chunk)> {
+    let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
+    let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
+    let (mut chunks, mut now_us) = (Vec::new(), 0);
+    while let Some(chunk) = source.next().unwrap() {
+        while now_us < chunk.at_us {
+            let (side, bytes) = if now_us % 100_000 == 0 {
+                (Side::Ground, ask(now_us))
+            } else {
+                (Side::Autopilot, Vec::new())
+            };
+            chunks.push((side, Chunk { at_us: now_us, bytes }));
+            now_us += 1_000;
+        }
+        chunks.push((Side::Autopilot, chunk));
+    }
+    chunks
+}
+
+fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (Outcome, Vec<Sent>) {
+    let dir = tempfile::tempdir().unwrap();
+    let (file, _) = image::open_or_make(&dir.path().join("card.img"), Some(256)).unwrap();
+    let card = SimCard::new(file, Faults::default()).unwrap();
+    hums_recorder::format::format(&card, 7).unwrap();
+    let mut params = Params::defaults();
+    params.set("GS_BUDGET", budget as f32).unwrap();
+    let board = Board { card: &card, params: &params, key: None };
+    let mut sent = Vec::new();
+    let outcome = run(&board, chunks(recording, ask), |at_us, bytes| {
+        sent.push(Sent { at_us, bytes: bytes.to_vec() });
+    });
+    (outcome.unwrap(), sent)
+}
+
+/// The most bytes of any second.
+fn fullest_second(sent: &[Sent]) -> usize {
+    let (mut first, mut bytes, mut most) = (0, 0, 0);
+    for (index, frame) in sent.iter().enumerate() {
+        bytes += frame.bytes.len();
+        while sent[index].at_us - sent[first].at_us >= SECOND {
+            bytes -= sent[first].bytes.len();
+            first += 1;
+        }
+        most = most.max(bytes);
+    }
+    most
+}
+
+fn recordings() -> Vec<std::path::PathBuf> {
+    OWN.into_iter().map(own).chain(flights::more()).collect()
+}
+
+#[test]
+fn on_every_recording_no_second_holds_more_than_the_budget_and_nothing_starves() {
+    for recording in recordings() {
+        for budget in BUDGETS {
+            let (outcome, sent) = power_on(&recording, budget, |_| Vec::new());
+            let most = fullest_second(&sent);
+            let name = recording.display();
+            println!("{name}: {most} of {budget} B/s at most, {} frames", sent.len());
+            assert!(most <= budget as usize, "{name}: {most} bytes in a second of {budget}");
+            assert_eq!(outcome.done.stats.frames_lost, 0, "{name}");
+            assert_nothing_starves(&name.to_string(), budget, &sent);
+        }
+    }
+}
+
+/// What is told again and again is told to the end: between two of each message there is at most so long. The last
+/// minute is not judged: who stops may stop.
+fn assert_nothing_starves(name: &str, budget: u32, sent: &[Sent]) {
+    let longest_s = match budget {
+        100 => 150,
+        1_000 => 30,
+        _ => 15,
+    };
+    let mut ours: BTreeMap<u32, Vec<u64>> = BTreeMap::new();
+    for frame in sent.iter().filter(|sent| sent.frame().component() == 191) {
+        ours.entry(frame.frame().id()).or_default().push(frame.at_us);
+    }
+    let end = sent.last().map_or(0, |frame| frame.at_us);
+    for id in [0, 251, 252] {
+        let mut times = ours.get(&id).cloned().unwrap_or_default();
+        times.insert(0, 0);
+        times.push(end);
+        let gap = times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0) / SECOND;
+        assert!(gap <= longest_s, "{name}, {budget} B/s: {gap} s without message {id} of ours");
+    }
+}
+
+/// Somebody who asks for everything, all the time: the list of parameters, logs, files, commands.
+fn greedy(now_us: u64) -> Vec<u8> {
+    let mut encoder = Encoder::of(255, 190);
+    encoder.set_sequence((now_us / 100_000) as u8);
+    let mut bytes = Vec::new();
+    let mut say = |packet: &Packet| {
+        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        bytes.extend_from_slice(encoder.frame(&mut buffer, packet));
+    };
+    say(&Packet::new(21).u8(0, 1).u8(1, 191));
+    say(&Packet::new(76).f32(0, 148.0).u16(28, 512).u8(30, 1).u8(31, 191));
+    if now_us.is_multiple_of(2_000_000) {
+        say(&Packet::new(119).u32(0, 0).u32(4, 1_000_000).u16(8, 1).u8(10, 1).u8(11, 191));
+    }
+    bytes
+}
+
+#[test]
+fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is() {
+    for recording in recordings() {
+        let (outcome, sent) = power_on(&recording, 5_000, greedy);
+        let most = fullest_second(&sent);
+        assert!(most <= 5_000, "{}: {most} bytes in a second", recording.display());
+        assert_eq!(outcome.done.stats.frames_lost, 0, "{}", recording.display());
+        let texts: Vec<(u64, u64, &Sent)> = sent
+            .iter()
+            .filter(|sent| sent.frame().id() == 253 && sent.frame().component() == 191)
+            // MAV_SEVERITY_CRITICAL
+            .filter(|sent| Fields(sent.frame().payload()).u8(0) == 2)
+            .map(|sent| (sent.at_us, sent.end_us(), sent))
+            .collect();
+        let critical: Vec<u64> = outcome
+            .findings
+            .iter()
+            .filter(|finding| finding.level == "critical")
+            .map(|finding| (finding.time_s * 1e6) as u64)
+            .collect();
+        // In order: each finding has its text.
+        assert_eq!(texts.len(), critical.len(), "{}", recording.display());
+        let (mut worst_begin, mut worst_end) = (0, 0);
+        for (found_us, (at_us, end_us, _)) in critical.iter().zip(&texts) {
+            worst_begin = worst_begin.max(at_us.saturating_sub(*found_us));
+            worst_end = worst_end.max(end_us.saturating_sub(*found_us));
+        }
+        println!(
+            "{}: {} critical findings, begun after {} ms at most, out after {} ms; {most} B/s at most",
+            recording.display(),
+            critical.len(),
+            worst_begin / 1_000,
+            worst_end / 1_000
+        );
+        assert!(worst_begin <= 50_000, "{}: {worst_begin} us", recording.display());
+    }
+}

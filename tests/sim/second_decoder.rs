@@ -1,0 +1,105 @@
+//! The format document is enough to write a decoder from: `tests/oracle/hums_log` is one, in Python, that shares no line
+//! with `hums`. Both give the same frames with the same times, and the same records.
+#![cfg(feature = "oracle")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hums_tests::child;
+use hums_tests::flights::{OWN, own, root};
+use hums_tests::program::{Decoded, LIMIT, Machine, Recording, command};
+use hums_tests::{fat, oracle};
+use serde_json::{Value, json};
+
+/// Bytes of each recording: some thousands of frames over several groups, in seconds of Python.
+const RECORDING_BYTES: usize = 500_000;
+
+/// Tables of which the second decoder reads every field.
+const TABLES: [&str; 11] = [
+    "HUMS_BOOT",
+    "HUMS_VEHICLE",
+    "HUMS_PARAM",
+    "HUMS_CLOCK",
+    "HUMS_FINDING",
+    "HUMS_LOSS",
+    "HUMS_STATS",
+    "HUMS_FAULT",
+    "HUMS_EVENT",
+    "HUMS_NOTE",
+    "HUMS_KEEP",
+];
+
+/// Both decoders say the same of a log; gives how many frames and records that was.
+#[track_caller]
+fn compare(log: &Path) -> (usize, usize) {
+    let ours = Decoded::of(log, &[0]);
+    let [ours] = ours.tlogs() else { panic!("{} logs", ours.tlogs().len()) };
+    let theirs = oracle::second_decoder(log, "tlog");
+    assert!(*ours == theirs, "{} and {} bytes of tlog", ours.len(), theirs.len());
+
+    let theirs = rows(&oracle::second_decoder(log, "jsonl"));
+    let frames = theirs.iter().filter(|row| row["frame"].is_string()).count();
+    let mut decode = command(["decode".as_ref(), log.as_os_str()]);
+    let text = child::run(decode.args(["--format", "jsonl", "-o", "-"]), LIMIT).expect_code(&[0]).stdout;
+    let (theirs, ours) = (records(&theirs), records(&rows(&text)));
+    for (theirs, ours) in theirs.iter().zip(&ours) {
+        assert_eq!(theirs, ours);
+    }
+    assert_eq!(theirs.len(), ours.len());
+    (frames, ours.len())
+}
+
+fn rows(text: &[u8]) -> Vec<Value> {
+    let text = std::str::from_utf8(text).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Time, table and fields of the records, numbers in single precision: that is what most are stored in.
+fn records(rows: &[Value]) -> Vec<Value> {
+    let mut found = Vec::new();
+    for row in rows {
+        let table = row["record"].as_str().unwrap_or_default();
+        let fields = row["fields"].as_object();
+        let Some(mut fields) = fields.filter(|_| TABLES.contains(&table) || table == "HUMS_USAGE").cloned()
+        else {
+            continue;
+        };
+        // Counters are stored by number; their names are another document's.
+        fields.remove("counter");
+        for value in fields.values_mut() {
+            if let Some(number) = value.as_f64().filter(|_| value.is_f64()) {
+                *value = json!(number as f32);
+            }
+        }
+        found.push(json!([row["time_boot"].as_f64(), table, fields]));
+    }
+    found
+}
+
+#[test]
+fn the_golden_file_reads_the_same() {
+    let golden = root().join("firmware/blackbox/tests/golden/mixed-1.log");
+    assert_eq!(compare(&golden), (6012, 14));
+}
+
+#[test]
+fn recordings_of_each_kind_read_the_same() {
+    for flight in OWN {
+        let dir = tempfile::tempdir().unwrap();
+        let short = dir.path().join(flight);
+        let data = fs::read(own(flight)).unwrap();
+        fs::write(&short, &data[..RECORDING_BYTES]).unwrap();
+        // A parameter that is not at its default, so that there is one in the record.
+        let params = dir.path().join("params.txt");
+        fs::write(&params, "REC_BEFORE 20\n").unwrap();
+        let recording = Recording::make(Machine::Sim, &short, &["--params", params.to_str().unwrap()]);
+        let files = dir.path().join("card");
+        fs::create_dir(&files).unwrap();
+        fat::copy_files(&recording.image(), &files);
+        let logs: Vec<PathBuf> = fs::read_dir(&files).unwrap().map(|entry| entry.unwrap().path()).collect();
+        let [log] = &logs[..] else { panic!("files on the card: {logs:?}") };
+        let (frames, records) = compare(log);
+        assert_eq!(frames as u64, recording.number("frames_logged"), "{flight}");
+        assert!(frames > 5_000 && records > 20, "{flight}: {frames} frames, {records} records");
+    }
+}

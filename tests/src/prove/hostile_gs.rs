@@ -1,0 +1,330 @@
+//! A ground station that means no good, for a day.
+
+use std::collections::VecDeque;
+
+use anyhow::{Context as _, Result, ensure};
+use hums::card::Faults;
+use hums::logs::on_card;
+use hums::rng::Rng;
+use hums::run::sim::both_ports::{Board, Outcome, Side, run as power_on};
+use hums::source::Chunk;
+use hums_core::params::{Params, TABLE};
+use hums_core::time::Instant;
+use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+use hums_link::signing::{Clock, Key, Seal};
+
+use super::card::Card;
+use super::record::Record;
+use super::stream::Stream;
+use super::{Figures, Options};
+use crate::flights::{OWN, own};
+
+/// 10 kB/s of the vehicle; the flights in turn.
+const BAUD: u64 = 100_000;
+/// The ground station's line, always full.
+const GS_BAUD: u64 = 57_600;
+/// How finely the port is watched, in microseconds.
+const STEP_US: u64 = 5_000;
+const SECOND_US: u64 = 1_000_000;
+const KEY: [u8; 32] = [0x5a; 32];
+/// The budget of the board that has a key, in bytes a second.
+const BUDGET: u32 = 1_000;
+/// The most that anybody may set.
+const BUDGET_MAX: u32 = 5_000;
+
+pub(super) fn run(options: &Options) -> Result<Figures> {
+    let seconds = options.runs(24 * 3600, 300);
+    let mut figures = Figures::default();
+    figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
+    // Half of the time it may set what it likes, half of the time it would need the key.
+    for (name, key) in [("without a key", None), ("with a key", Some(KEY))] {
+        let half = attack(options, seconds / 2, key).with_context(|| name.to_owned())?;
+        figures.fact(format!("{name}: hostile bytes, MB"), format!("{:.1}", half.hostile_bytes as f64 / 1e6));
+        figures.fact(
+            format!("{name}: frames of the vehicle, lost"),
+            format!("{}, {}", half.outcome.done.stats.frames_in, half.outcome.done.stats.frames_lost),
+        );
+        figures.fact(
+            format!("{name}: bytes to the ground station in any second at most, of"),
+            format!("{}, {}", half.fullest, half.budget),
+        );
+        figures.fact(format!("{name}: parameters changed"), half.changed);
+        figures.fact(
+            format!("{name}: sector queue at most, of"),
+            format!(
+                "{}, {}",
+                half.outcome.done.stats.queue_bytes_max, half.outcome.done.stats.queue_bytes_capacity
+            ),
+        );
+    }
+    Ok(figures)
+}
+
+struct Half {
+    outcome: Outcome,
+    hostile_bytes: u64,
+    fullest: usize,
+    budget: u32,
+    changed: usize,
+}
+
+fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half> {
+    let open = |flight: &&str| Stream::of_flight(&own(flight), BAUD);
+    let streams = OWN.iter().map(open).collect::<Result<Vec<_>>>()?;
+    let mut card = Card::new(256)?;
+    let device = card.device(Faults::default())?;
+    let mut params = Params::defaults();
+    let set = |params: &mut Params, name: &str, value: f32| {
+        params.set(name, value).map_err(|_| anyhow::anyhow!("{name}"))
+    };
+    set(&mut params, "GS_BUDGET", BUDGET as f32)?;
+    if key.is_some() {
+        set(&mut params, "GS_SIGN", 2.0)?;
+        set(&mut params, "AP_SIGN", 2.0)?;
+    }
+    let budget = if key.is_some() { BUDGET } else { BUDGET_MAX };
+    let mut hostile = Hostile::new(options.seed ^ u64::from(key.is_some()));
+    let mut window = Window::default();
+    let board = Board { card: &device, params: &params, key };
+    let outcome = power_on(&board, both_sides(&streams, seconds, &mut hostile), |at_us, frame| {
+        window.add(at_us, frame.len());
+    })?;
+    card.check()?;
+
+    let stats = outcome.done.stats;
+    ensure!(window.fullest <= budget as usize, "{} bytes in a second of {budget}", window.fullest);
+    ensure!(stats.frames_lost + outcome.done.frames_left == 0, "{} frames lost", stats.frames_lost);
+    let changed =
+        params.iter().zip(outcome.params.iter()).filter(|(a, b)| a.1.to_bits() != b.1.to_bits()).count();
+    if key.is_some() {
+        ensure!(changed == 0, "{changed} parameters were changed without the key");
+        // Nobody stopped it for a moment, and none of it is a frame that the vehicle did not send.
+        ensure!(stats.frames_logged == stats.frames_in, "{} of {}", stats.frames_logged, stats.frames_in);
+        let path = card.path();
+        let logs = on_card(&path);
+        let record = Record::of(logs.last().context("no log")?)?;
+        let holes = record.gaps.iter().filter(|(_, gap)| gap.from.is_some()).count();
+        ensure!(holes == 0, "{holes} holes in the log");
+    } else {
+        ensure!(changed > 0, "the attack never got through: it shows nothing");
+    }
+    Ok(Half { outcome, hostile_bytes: hostile.bytes, fullest: window.fullest, budget, changed })
+}
+
+/// The fullest second at a port.
+#[derive(Default)]
+struct Window {
+    frames: VecDeque<(u64, usize)>,
+    bytes: usize,
+    fullest: usize,
+}
+
+impl Window {
+    fn add(&mut self, at_us: u64, bytes: usize) {
+        // What is seen at a step has begun since the step before.
+        while self.frames.front().is_some_and(|(first, _)| at_us - first >= SECOND_US - STEP_US) {
+            self.bytes -= self.frames.pop_front().map_or(0, |(_, bytes)| bytes);
+        }
+        self.frames.push_back((at_us, bytes));
+        self.bytes += bytes;
+        self.fullest = self.fullest.max(self.bytes);
+    }
+}
+
+/// The vehicle's bytes and the ground station's, step by step.
+fn both_sides<'a>(
+    streams: &'a [Stream],
+    seconds: u64,
+    hostile: &'a mut Hostile,
+) -> impl Iterator<Item = (Side, Chunk)> + 'a {
+    let mut flights = streams.iter().cycle().flat_map(|stream| stream.bytes.iter().copied());
+    (1..=seconds * SECOND_US / STEP_US).flat_map(move |step| {
+        let at_us = step * STEP_US;
+        let count = (BAUD / 10 * STEP_US / SECOND_US) as usize;
+        let vehicle = flights.by_ref().take(count).collect();
+        let ground = hostile.take((GS_BAUD / 10 * STEP_US / SECOND_US) as usize + 1);
+        [(Side::Ground, Chunk { at_us, bytes: ground }), (Side::Autopilot, Chunk { at_us, bytes: vehicle })]
+    })
+}
+
+/// What it sends.
+struct Hostile {
+    rng: Rng,
+    encoder: Encoder,
+    waiting: VecDeque<u8>,
+    /// The same again, for so many frames.
+    flood: (u64, u64),
+    bytes: u64,
+    /// Something that was sent before.
+    old: Vec<u8>,
+    frames: u64,
+}
+
+impl Hostile {
+    fn new(seed: u64) -> Self {
+        Self {
+            rng: Rng::new(seed, 0x905),
+            encoder: Encoder::of(255, 190),
+            waiting: VecDeque::new(),
+            flood: (0, 0),
+            bytes: 0,
+            old: Vec::new(),
+            frames: 0,
+        }
+    }
+
+    fn take(&mut self, count: usize) -> Vec<u8> {
+        while self.waiting.len() < count {
+            self.attack();
+        }
+        self.bytes += count as u64;
+        self.waiting.drain(..count).collect()
+    }
+
+    fn below(&mut self, limit: u64) -> u64 {
+        self.rng.next_u64() % limit
+    }
+
+    fn random_bytes(&mut self, count: usize) -> Vec<u8> {
+        (0..count).map(|_| self.rng.next_u64() as u8).collect()
+    }
+
+    fn attack(&mut self) {
+        if self.flood.1 == 0 {
+            self.flood = (self.below(16), 1 + self.below(400));
+        }
+        self.flood.1 -= 1;
+        self.frames += 1;
+        let kind = self.flood.0;
+        let target = (if self.rng.chance(0.8) { 1 } else { self.rng.next_u64() as u8 }, self.component());
+        let at_target = |packet: Packet, at: usize| packet.u8(at, target.0).u8(at + 1, target.1);
+        let packet = match kind {
+            0 => {
+                let count = 1 + self.below(300) as usize;
+                let noise = self.random_bytes(count);
+                self.waiting.extend(noise);
+                return;
+            }
+            1 => at_target(Packet::new(21), 0),
+            2 => at_target(Packet::new(20).u16(0, self.rng.next_u64() as u16), 2),
+            3 | 4 => {
+                let (value, name) = (self.value(), self.name());
+                at_target(Packet::new(23).f32(0, value).bytes(6, &name).u8(22, 9), 4)
+            }
+            5 => {
+                let commands = [400, 401, 511, 512, 519, 520, 2510, 2511, 31_010, 31_011, 246];
+                let known = commands[self.below(11) as usize];
+                let command = if self.rng.chance(0.7) { known } else { self.rng.next_u64() as u16 };
+                let first = if self.rng.chance(0.5) { self.below(400) as f32 } else { self.value() };
+                at_target(Packet::new(75 + self.below(2) as u32).f32(0, first).u16(28, command), 30)
+            }
+            6 => at_target(Packet::new(117).u16(0, self.rng.next_u64() as u16).u16(2, u16::MAX), 4),
+            7 => {
+                let (offset, count) = (self.rng.next_u64() as u32, self.rng.next_u64() as u32);
+                let id = self.below(4) as u16;
+                at_target(Packet::new(119).u32(0, offset % 100_000).u32(4, count).u16(8, id), 10)
+            }
+            8 => at_target(Packet::new(121), 0),
+            9 | 10 => {
+                let size = 12 + self.below(240) as usize;
+                let mut payload = self.random_bytes(size);
+                payload[3] = self.below(18) as u8;
+                if self.rng.chance(0.5) {
+                    payload.splice(12..12, *b"/00001_00.HUM");
+                }
+                at_target(Packet::new(110).bytes(3, payload.get(..251).unwrap_or(&payload)), 1)
+            }
+            11 => {
+                let key = self.random_bytes(32);
+                at_target(Packet::new(256).u64(0, self.rng.next_u64()).bytes(10, &key), 8)
+            }
+            // Any message, with anything in it; also as somebody else.
+            12 | 13 => {
+                let id = self.below(512) as u32;
+                let size = self.below(255) as usize;
+                Packet::new(id).bytes(0, &self.random_bytes(size))
+            }
+            14 => {
+                let old = self.old.clone();
+                self.waiting.extend(old);
+                return;
+            }
+            // As much as there can be.
+            _ if self.rng.chance(0.5) => {
+                Packet::new(23).f32(0, 5_000.0).u8(4, 1).u8(5, 191).text(6, 16, "GS_BUDGET")
+            }
+            _ => Packet::new(23).f32(0, 57_600.0).u8(4, 1).u8(5, 191).text(6, 16, "GS_BAUD"),
+        };
+        self.say(&packet);
+    }
+
+    fn component(&mut self) -> u8 {
+        match self.below(4) {
+            0 => 0,
+            1 => self.rng.next_u64() as u8,
+            _ => 191,
+        }
+    }
+
+    fn name(&mut self) -> Vec<u8> {
+        if self.rng.chance(0.2) {
+            return self.random_bytes(16);
+        }
+        // Who turns his own port off is not heard any longer, and that would be the end of the attack.
+        let name =
+            Some(TABLE[self.below(TABLE.len() as u64) as usize].name).filter(|name| *name != "GS_PATH");
+        let mut name = name.unwrap_or("GS_BUDGET").as_bytes().to_vec();
+        name.resize(16, 0);
+        name
+    }
+
+    fn value(&mut self) -> f32 {
+        match self.below(5) {
+            0 => f32::from_bits(self.rng.next_u64() as u32),
+            1 => [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, f32::MAX][self.below(5) as usize],
+            2 => self.below(100_000) as f32,
+            _ => self.below(4) as f32,
+        }
+    }
+
+    /// As itself, as the vehicle, as the board, or as anybody; sometimes damaged, sometimes signed with another key.
+    fn say(&mut self, packet: &Packet) {
+        let who = match self.below(8) {
+            0 => (1, 1),
+            1 => (1, 191),
+            2 => (self.rng.next_u64() as u8, self.rng.next_u64() as u8),
+            _ => (255, 190),
+        };
+        let mut encoder = if who == (255, 190) { self.encoder } else { Encoder::of(who.0, who.1) };
+        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let now = Instant::from_millis(self.frames);
+        let mut frame = if self.rng.chance(0.2) {
+            let mut key = [0; 32];
+            key[..].copy_from_slice(&self.random_bytes(32));
+            let mut seal =
+                Seal::new(Key(key), self.rng.next_u64() as u8, Clock::default(), self.rng.next_u64() >> 17);
+            encoder.frame_signed(&mut buffer, packet, now, &mut seal).to_vec()
+        } else {
+            encoder.frame(&mut buffer, packet).to_vec()
+        };
+        if who == (255, 190) {
+            self.encoder = encoder;
+        }
+        if self.rng.chance(0.05) && !frame.is_empty() {
+            let at = self.below(frame.len() as u64) as usize;
+            frame[at] ^= 1 << self.below(8);
+        }
+        if self.rng.chance(0.02) {
+            frame.truncate(self.below(frame.len() as u64 + 1) as usize);
+        }
+        if self.rng.chance(0.1) {
+            self.old.clone_from(&frame);
+        }
+        // A message that nobody knows is no frame.
+        if frame.is_empty() {
+            frame = self.random_bytes(8);
+        }
+        self.waiting.extend(frame);
+    }
+}
