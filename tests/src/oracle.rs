@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::child;
 use crate::flights::{Manifest, root};
@@ -36,7 +36,7 @@ fn outcome(script: &str, arguments: &[PathBuf]) -> child::Outcome {
     child::run(&mut command, LIMIT).expect_code(&[0])
 }
 
-fn parse(text: &str) -> Value {
+fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("the script prints JSON")
 }
 
@@ -48,7 +48,7 @@ fn program(variable: &str, path: &str) -> PathBuf {
 /// Compares what a log was decoded to with its recording, field by field: see `tests/oracle/readback.py`.
 pub fn readback(recording: &Path, out: &Path) -> Value {
     let influxd = program("HUMS_INFLUXD", "/usr/bin/influxd");
-    parse(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
+    json(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
 }
 
 /// Decodes a log to `tlog` or `jsonl` by the format document alone: see `tests/oracle/hums_log`.
@@ -58,14 +58,14 @@ pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
 
 /// Runs a document's queries in a folder: see `tests/oracle/fleet.py`.
 pub fn fleet(document: &Path, folder: &Path) -> Value {
-    parse(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
+    json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
 }
 
 /// Looks at a page in a browser: see `tests/oracle/browser.py`.
 pub fn browser(page: &Path) -> Value {
     let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
     let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
-    parse(&run("browser.py", &[chromium, driver, page.to_owned()]))
+    json(&run("browser.py", &[chromium, driver, page.to_owned()]))
 }
 
 /// A page of `hums live` in a browser: see `tests/oracle/live.py`. Ends with the browser.
@@ -95,58 +95,58 @@ impl LivePage {
     fn ask(&mut self, what: &Value) -> Value {
         writeln!(self.asked, "{what}").expect("the browser's script has ended");
         let answer = self.answers.next().and_then(Result::ok);
-        parse(&answer.unwrap_or_else(|| panic!("the browser's script has ended at {what}")))
+        json(&answer.unwrap_or_else(|| panic!("the browser's script has ended at {what}")))
     }
 
     /// Opens an address, in a window of this size.
     #[track_caller]
     pub fn open(&mut self, url: &str, scheme: &str, width: u32, height: u32) {
         // Another fragment alone would not load the page anew.
-        self.ask(&json!({ "do": "open", "url": "about:blank", "scheme": scheme, "width": width, "height": height }));
-        self.ask(&json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
+        self.ask(&serde_json::json!({ "do": "open", "url": "about:blank", "scheme": scheme, "width": width, "height": height }));
+        self.ask(&serde_json::json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
     }
 
     /// What the page shows at one moment.
     #[track_caller]
     pub fn read(&mut self) -> Value {
-        self.ask(&json!({ "do": "read" }))
+        self.ask(&serde_json::json!({ "do": "read" }))
     }
 
     /// Waits until a script returns something true.
     #[track_caller]
     pub fn wait(&mut self, script: &str, limit_s: u32) -> Value {
-        self.ask(&json!({ "do": "wait", "script": script, "limit_s": limit_s }))
+        self.ask(&serde_json::json!({ "do": "wait", "script": script, "limit_s": limit_s }))
     }
 
     /// What a script returns.
     #[track_caller]
     pub fn run(&mut self, script: &str) -> Value {
-        self.ask(&json!({ "do": "run", "script": script }))
+        self.ask(&serde_json::json!({ "do": "run", "script": script }))
     }
 
     /// Presses keys, one after the other.
     #[track_caller]
     pub fn press(&mut self, keys: &[&str]) {
-        self.ask(&json!({ "do": "press", "keys": keys }));
+        self.ask(&serde_json::json!({ "do": "press", "keys": keys }));
     }
 
     /// Milliseconds between the frames that the browser draws, for so long.
     #[track_caller]
     pub fn frames_ms(&mut self, seconds: u32) -> Vec<f64> {
-        let frames = self.ask(&json!({ "do": "frames", "seconds": seconds }));
+        let frames = self.ask(&serde_json::json!({ "do": "frames", "seconds": seconds }));
         frames.as_array().expect("a list").iter().filter_map(Value::as_f64).collect()
     }
 
     /// A screenshot of the window, or of the whole page.
     #[track_caller]
     pub fn shot(&mut self, path: &Path, whole: bool) {
-        self.ask(&json!({ "do": "shot", "path": path, "whole": whole }));
+        self.ask(&serde_json::json!({ "do": "shot", "path": path, "whole": whole }));
     }
 
     /// What the browser has complained about.
     #[track_caller]
     pub fn console(&mut self) -> Value {
-        self.ask(&json!({ "do": "console" }))
+        self.ask(&serde_json::json!({ "do": "console" }))
     }
 }
 
