@@ -7,7 +7,7 @@ usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard inp
   {"do": "wait", "script": JS, "limit_s": S}  until the script returns something true; answers what it returned
   {"do": "run", "script": JS}               answers what it returned
   {"do": "press", "keys": [...]}            key presses, by name or as the character
-  {"do": "frames", "seconds": S}            milliseconds between frames, each
+  {"do": "frames", "seconds": S}            milliseconds that each frame takes, from its beginning until it is painted
   {"do": "shot", "path": P, "whole": BOOL}  a screenshot, of the window or of the whole page
   {"do": "console"}                         what the browser complained about since the last time
   {"do": "quit"}                            the end
@@ -53,8 +53,14 @@ return {
 
 FRAMES = """
 const [seconds, done] = arguments;
-const times = [], end = performance.now() + seconds * 1000;
-const step = (time) => { times.push(time); if (time < end) requestAnimationFrame(step); else done(times.slice(1).map((t, i) => t - times[i])); };
+const times = [], end = performance.now() + seconds * 1000, channel = new MessageChannel();
+let began = 0;
+// A message comes after the frame's own work: all programs, style, layout and paint.
+channel.port1.onmessage = () => {
+  times.push(performance.now() - began);
+  if (began < end) requestAnimationFrame(step); else done(times);
+};
+const step = (time) => { began = time; channel.port2.postMessage(null); };
 requestAnimationFrame(step);
 """
 

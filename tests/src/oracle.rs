@@ -130,7 +130,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "press", "keys": keys }));
     }
 
-    /// Milliseconds between the frames that the browser draws, for so long.
+    /// Milliseconds that each frame of the browser takes until it is painted, for so long.
     #[track_caller]
     pub fn frames_ms(&mut self, seconds: u32) -> Vec<f64> {
         let frames = self.ask(&serde_json::json!({ "do": "frames", "seconds": seconds }));

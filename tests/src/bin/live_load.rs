@@ -4,8 +4,8 @@
 //! live_load HUMS SECONDS MESSAGES_PER_SECOND RECORDING.tlog
 //! ```
 //! For instance: `cargo run --release -p hums-tests --bin live_load -- target/release/hums 600 2000
-//! tests/flights/ap_quad_faults.tlog`. Prints the server's share of one core, its memory, and the time between frames
-//! of the page in Chromium, of the first and of the last seconds.
+//! tests/flights/ap_quad_faults.tlog`. Prints the server's share of one core, its memory, and what a frame of the
+//! page takes in Chromium until it is painted, in the first and in the last seconds.
 
 use std::net::UdpSocket;
 use std::path::Path;
@@ -78,7 +78,7 @@ fn measure(hums: &Path, seconds: u32, rate: f64, recording: &Path) -> Result<()>
         frames.sort_by(f64::total_cmp);
         let at = |part: f64| frames.get((frames.len() as f64 * part) as usize).copied().unwrap_or(f64::NAN);
         println!(
-            "page, {name:<5} {LOOK_S} s    {:.1} ms between frames at the median, {:.1} ms at 95 %, {} frames",
+            "page, {name:<5} {LOOK_S} s    {:.1} ms a frame at the median, {:.1} ms at 95 %, {} frames",
             at(0.5),
             at(0.95),
             frames.len()
