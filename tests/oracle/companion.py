@@ -136,6 +136,8 @@ def main():
     # 31010: another part is in this component's place; 31011: cancel the protective action.
     out["no_component"] = result(peer.command(31010, 1))
     put("CMP1_KIND", 4.0)
+    # In force at the next tick, 50 ms later.
+    time.sleep(0.5)
     out["replaced"] = result(peer.command(31010, 1))
     out["nothing_to_cancel"] = result(peer.command(31011))
     out["for_the_autopilot"] = result(

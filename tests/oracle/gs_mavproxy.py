@@ -75,7 +75,7 @@ def main():
     out = {"detected": prompt.expect(r"Detected vehicle 1:191", 20)}
 
     def show(name):
-        return prompt.ask(f"param show {name}", rf"{name}\s+(\S+)", 4, 2)
+        return prompt.ask(f"param show {name}", rf"{name} {{2,}}(\S+)", 4, 2)
 
     out["received"] = prompt.ask("param fetch", r"Received (\d+) parameters", 15, 2)
     out["shown"] = show("GS_BUDGET")
@@ -90,7 +90,7 @@ def main():
     out["logs"] = prompt.ask("log list", r"Log 1 +numLogs (\d+)", 6, 3)
     log = os.path.join(folder, "log.bin")
     out["downloaded"] = prompt.ask(f"log download 1 {log}", r"Finished downloading .*\((\d+) bytes", 60)
-    prompt.type("signing setup a passphrase of this flight")
+    prompt.type("signing setup passphrase-of-this-flight")
     out["key"] = prompt.expect(r"HUMS: signing key set", 6)
     prompt.type("param set BAT_REM_WARN 34")
     time.sleep(2)

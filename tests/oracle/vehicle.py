@@ -55,6 +55,7 @@ class Vehicle:
         self.beat_at = 0
         self.intervals, self.last = {}, {}
         self.asked, self.groups, self.version = [], [], 0
+        self.flies, self.returns = False, []
 
     def frame(self, message, system=1, component=1, key=None):
         """A frame as somebody else would send it, signed where there is a key."""
@@ -72,7 +73,14 @@ class Vehicle:
             mav = self.autopilot.mav
             if now - self.beat_at >= 0.5:
                 self.beat_at = now
-                mav.heartbeat_send(2, 12 if self.kind == "px4" else 3, 0, 0, 3)
+                # MAV_MODE_FLAG_SAFETY_ARMED
+                mav.heartbeat_send(2, 12 if self.kind == "px4" else 3, 128 if self.flies else 0, 0, 4 if self.flies else 3)
+                if self.flies:
+                    # MAV_LANDED_STATE_IN_AIR, and a battery that is as good as empty.
+                    mav.extended_sys_state_send(0, 2)
+                    mav.global_position_int_send(boot_ms, 0, 0, 90000, 30000, 0, 0, 0, 0)
+                    mav.vfr_hud_send(5, 5, 0, 50, 30, 0)
+                    mav.battery_status_send(0, 0, 3, 2500, [3700] * 3 + [65535] * 7, 1000, 100, -1, 2)
                 mav.system_time_send(0, boot_ms)
                 self.ground.mav.heartbeat_send(6, 8, 0, 0, 4)
             for number, interval in self.intervals.items():
@@ -118,6 +126,9 @@ class Vehicle:
             self.version += 1
             mav.command_ack_send(512, 0, 0, 0, 1, OURS)
             mav.autopilot_version_send(0, 0x01020304, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 7)
+        elif name == "COMMAND_LONG" and message.command == 20:
+            self.returns.append([message.target_system, message.target_component, message.confirmation])
+            mav.command_ack_send(20, 0, 0, 0, 1, OURS)
         elif name == "REQUEST_DATA_STREAM":
             self.groups.append([message.req_stream_id, message.req_message_rate, message.start_stop])
 
@@ -209,6 +220,34 @@ def erasing(vehicle, out):
     out["logs_after"] = logs()
 
 
+def protecting(vehicle, out):
+    """In flight with an empty battery it asks to return, unless somebody cancels that."""
+    ground = vehicle.ground
+
+    def told(text, seconds):
+        def seen():
+            return any(frame[7] == 253 and text.encode() in frame for frame in ground.heard)
+
+        vehicle.run(seconds, seen)
+        return seen()
+
+    for name, value in ((b"PROT_ACTION", 1.0), (b"PROT_DELAY", 6.0)):
+        ground.mav.param_set_send(1, OURS, name, value, 9)
+    for flight in ("cancelled", "asked_for"):
+        ground.heard.clear()
+        vehicle.flies = True
+        announced = told("return in 6 s", 20)
+        if flight == "cancelled":
+            ground.mav.command_long_send(1, OURS, 31011, 0, 0, 0, 0, 0, 0, 0, 0)
+            told("cancelled by command", 2)
+        accepted = told("return accepted", 9)
+        out[flight] = [announced, told("cancelled by command", 0.1), accepted, vehicle.returns[:]]
+        # On the ground again, disarmed: the next flight is another one.
+        vehicle.flies = False
+        vehicle.autopilot.mav.extended_sys_state_send(0, 1)
+        vehicle.run(8)
+
+
 def main():
     if len(sys.argv) != 5:
         sys.exit(__doc__)
@@ -217,6 +256,8 @@ def main():
     asking(vehicle, out)
     passing(vehicle, out)
     erasing(vehicle, out)
+    if sys.argv[4] == "px4":
+        protecting(vehicle, out)
     print(json.dumps(out))
 
 

@@ -193,6 +193,9 @@ fn a_px4_is_asked_for_what_is_missing_and_its_radio_is_shared() {
     assert!(said["version_asked"].as_u64() >= Some(1), "{said}");
     assert!(said["asked_again"].as_u64() >= Some(10), "after a reboot: {said}");
     assert_what_passes(&said, &dir);
+    // Announced, cancelled, accepted, and what the autopilot was asked until then: system, component, confirmation.
+    assert_eq!(said["cancelled"], serde_json::json!([true, true, false, []]), "{said}");
+    assert_eq!(said["asked_for"], serde_json::json!([true, false, true, [[1, 1, 0]]]), "{said}");
 }
 
 #[test]
@@ -226,7 +229,7 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let unsigned = hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[1]);
     assert!(unsigned.stderr.contains("no answer"), "{}", unsigned.stderr);
     let key = folder.join("key.txt");
-    fs::write(&key, "a passphrase of this flight\n").unwrap();
+    fs::write(&key, "passphrase-of-this-flight\n").unwrap();
     let key = key.to_str().unwrap();
     let got =
         hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]).text();
@@ -234,6 +237,9 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let gone = hums(["params", "sign", "--remove", "--key", key, "--link", &address]).expect_code(&[0]);
     assert_eq!(gone.text(), "key removed\n");
     hums(["params", "get", "BAT_REM_WARN", "--link", &address]).expect_code(&[0]);
+    let set = hums(["params", "sign", "--key", key, "--link", &address]).expect_code(&[0]);
+    assert_eq!(set.text(), "key set\n");
+    hums(["params", "get", "BAT_REM_WARN", "--key", key, "--link", &address]).expect_code(&[0]);
 }
 
 #[test]

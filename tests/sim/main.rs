@@ -13,6 +13,7 @@ mod hostile_input;
 mod noise;
 mod persistence;
 mod power_cut;
+mod protection;
 mod round_trip;
 mod salvage;
 mod second_decoder;

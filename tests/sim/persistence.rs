@@ -6,7 +6,8 @@ use std::path::Path;
 
 use hums_core::usage::UsageCounter;
 use hums_tests::damage::Random;
-use hums_tests::flights::own;
+use hums_tests::flights::{Manifest, own};
+use hums_tests::frames::build_v2;
 use hums_tests::program::{Machine, Recording, hums};
 use hums_tests::store::Stored;
 
@@ -138,6 +139,61 @@ fn components_wear_from_flight_to_flight_until_they_are_due_and_info_says_so() {
     }
     let expected = [("green", "green", false), ("yellow", "green", true), ("red", "green", true)];
     assert_eq!(seen, expected.map(|(first, second, due)| (first.to_owned(), second.to_owned(), due)));
+}
+
+#[test]
+fn a_component_that_a_command_says_is_replaced_begins_anew_and_that_is_recorded() {
+    const COMMAND_LONG: u32 = 76;
+    const HEARTBEAT: u32 = 0;
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    fs::write(path("hums.param"), "CMP1_KIND 1\nCMP1_FLIGHTS 10\n").unwrap();
+    let params = ["--params".to_owned(), path("hums.param").display().to_string()];
+    let flags = |more: [String; 2]| -> Vec<String> { params.iter().cloned().chain(more).collect() };
+    // USER_1, component 1, to the box of vehicle 1: once in flight, and once after the disarming at 248.7 s.
+    let mut command = [1.0_f32.to_le_bytes(), [0; 4]].concat();
+    command.resize(28, 0);
+    command.extend([0x22, 0x79, 1, 191, 0]);
+    let seeds = &Manifest::own().seeds;
+    let entry = |second: u64, id: u32, payload: &[u8]| {
+        let time_us = 1_700_000_000_000_000 + second * 1_000_000;
+        [&time_us.to_be_bytes()[..], &build_v2(second as u8, id, payload, seeds[&id])].concat()
+    };
+    let said = [
+        entry(0, HEARTBEAT, &[0, 0, 0, 0, 6, 8, 0, 4, 3]),
+        entry(100, COMMAND_LONG, &command),
+        entry(250, COMMAND_LONG, &command),
+    ];
+    fs::write(path("gs.tlog"), said.concat()).unwrap();
+    let store = path("store.bin");
+    let run = |more: [String; 2]| {
+        let flags = flags(more);
+        let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
+        fly(&store, &flags).expect_code(&[0])
+    };
+    let recording = run(["--gs-input".into(), path("gs.tlog").display().to_string()]);
+    let text = records(&recording.image(), dir.path());
+    let replaced: Vec<&str> = text
+        .lines()
+        .filter(|line| {
+            line.contains("\"replaced\"")
+                && line.contains("HUMS_COMPONENT")
+                && line.contains("\"why\":\"replaced\"")
+        })
+        .collect();
+    assert_eq!(replaced.len(), 1, "once, and not in flight: {replaced:?}");
+    assert!(time_s(replaced[0]) > 249.0, "{}", replaced[0]);
+    let fields = serde_json::from_str::<serde_json::Value>(replaced[0]).unwrap()["fields"].clone();
+    assert_eq!(fields["flights"].as_f64(), Some(1.0), "what the old one had run: {fields}");
+    let recording = run(["--seed".into(), "1".into()]);
+    let info = hums(["info".as_ref(), recording.image().as_os_str(), "--json".as_ref()]).expect_code(&[0]);
+    let info: serde_json::Value = serde_json::from_str(&info.text()).unwrap();
+    let component = &info["logs"][0]["components"][0];
+    assert_eq!(
+        (component["flights"].as_f64(), component["replaced"].as_u64()),
+        (Some(1.0), Some(1)),
+        "{component}"
+    );
 }
 
 /// What `hums info --json` says of a component.

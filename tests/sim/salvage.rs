@@ -199,3 +199,18 @@ fn a_file_that_held_something_else_before_is_no_damage() {
         manifest.frames_of(&path, &input).len()
     );
 }
+
+#[test]
+fn a_damaged_sector_is_told_as_such_on_a_card_without_a_file_system_too() {
+    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
+    let image = recording.image();
+    let blocks = fs::read(&image).unwrap();
+    let is_sector = |block: &[u8]| block.starts_with(&[0x48, 0xB1]);
+    let sectors: Vec<_> = (0_u64..).zip(blocks.chunks(512)).filter(|(_, block)| is_sector(block)).collect();
+    let (at, block) = sectors[100];
+    let file = File::options().write(true).open(&image).unwrap();
+    file.write_all_at(&[!block[100]], at * BLOCK + 100).unwrap();
+    zero(&image, 0, BLOCK);
+    let text = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[3]).text();
+    assert!(text.contains("1 damaged sectors") && text.contains("sectors are damaged"), "{text}");
+}

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use hums_tests::child;
-use hums_tests::flights::{OWN, own, root};
+use hums_tests::flights::{OWN, more, own, root};
 use hums_tests::program::{Decoded, LIMIT, Machine, Recording, command};
 use hums_tests::{fat, oracle};
 use serde_json::{Value, json};
@@ -84,11 +84,12 @@ fn the_golden_file_reads_the_same() {
 
 #[test]
 fn recordings_of_each_kind_read_the_same() {
-    for flight in OWN {
+    for path in OWN.into_iter().map(own).chain(more()) {
+        let flight = path.file_name().unwrap().to_string_lossy();
         let dir = tempfile::tempdir().unwrap();
-        let short = dir.path().join(flight);
-        let data = fs::read(own(flight)).unwrap();
-        fs::write(&short, &data[..RECORDING_BYTES]).unwrap();
+        let short = dir.path().join(&*flight);
+        let data = fs::read(&path).unwrap();
+        fs::write(&short, &data[..RECORDING_BYTES.min(data.len())]).unwrap();
         // A parameter that is not at its default, so that there is one in the record.
         let params = dir.path().join("params.txt");
         fs::write(&params, "REC_BEFORE 20\n").unwrap();
@@ -100,6 +101,6 @@ fn recordings_of_each_kind_read_the_same() {
         let [log] = &logs[..] else { panic!("files on the card: {logs:?}") };
         let (frames, records) = compare(log);
         assert_eq!(frames as u64, recording.number("frames_logged"), "{flight}");
-        assert!(frames > 5_000 && records > 20, "{flight}: {frames} frames, {records} records");
+        assert!(frames > 2_000 && records > 20, "{flight}: {frames} frames, {records} records");
     }
 }

@@ -195,6 +195,12 @@ pub fn signing(port: u16, state: &Path) -> Value {
     json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
 }
 
+/// An autopilot in flight whose battery runs empty, and its pilot, at these UDP ports: see `tests/oracle/autopilot.py`.
+pub fn autopilot(autopilot: u16, gs: u16, pilot: &str) -> Value {
+    let arguments = [autopilot.to_string(), gs.to_string(), pilot.to_owned()];
+    json(&ask("autopilot.py", &arguments.map(PathBuf::from)))
+}
+
 /// Plays the autopilot (`px4` or `ardupilot`) at one UDP port of the box and the ground station at the other: see
 /// `tests/oracle/vehicle.py`.
 pub fn vehicle(autopilot: u16, ground: u16, kind: &str) -> Value {

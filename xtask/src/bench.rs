@@ -27,10 +27,14 @@ const CYCLES_PER_INSTRUCTION: f64 = 1.5;
 const LOAD_MAX: f64 = 0.10;
 /// How fast decoding is to be, as a part of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;
+/// Steps of all checks, usage and trends, a second.
+const TICKS_PER_S: f64 = 20.0;
 /// The line on which costs are counted: at a slower one what is done by the clock is a larger part of each byte.
 const BAUD: &str = "921600";
 /// What is counted at least, in seconds of that line, so that a short recording shows more than its start.
 const SECONDS_MIN: f64 = 10.0;
+/// What is decoded at least, in bytes of tlog, so that neither program's start counts for much.
+const DECODED_MIN: f64 = 8e6;
 /// Pairs of runs that are compared.
 const ROUNDS: usize = 9;
 
@@ -121,7 +125,31 @@ fn sizes(flights: &[PathBuf]) -> Result<()> {
         .args(["run", "--quiet", "--release", "-p", "hums-blackbox", "--example", "sizes", "--"])
         .args(flights)
         .run()
-        .context("a size misses its target, or xz is missing")
+        .context("a size misses its target, or xz is missing")?;
+    sizes_of_sessions(flights)
+}
+
+/// What whole sessions take: with every finding, snapshot, counter and statistic that the monitor makes of a recording.
+fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
+    println!("\nSizes of whole sessions, with all that the monitor records of them\n");
+    build_hums()?;
+    let card = work_folder()?.join("card.img");
+    let (mut logs, mut count) = (0.0, 0.0);
+    for flight in unsigned(flights) {
+        let _ = fs::remove_file(&card);
+        let sim = ["sim", "--json", "--speed", "max", "--input"];
+        let (json, _) =
+            Shell::new(repo::hums()).args(sim).arg(flight).arg("--sd").arg(&card).output_and_code()?;
+        let report: Value = serde_json::from_str(&json).context("the report of hums sim")?;
+        let bytes =
+            report["bytes_logged"].as_f64().filter(|&bytes| bytes > 0.0).context("nothing was logged")?;
+        let ratio = fs::metadata(flight)?.len() as f64 / bytes;
+        println!("{:22} {bytes:9} bytes, {ratio:6.3} times smaller than the tlog", name(flight));
+        logs += ratio.ln();
+        count += 1.0;
+    }
+    println!("geometric mean: {:.3}", (logs / count).exp());
+    Ok(())
 }
 
 /// Decodes logs and unpacks the same tlogs, one after the other on one core, several times.
@@ -136,13 +164,15 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
     let (mut all_ratios, mut all_gains) = (Vec::new(), Vec::new());
     for flight in unsigned(flights) {
         let (log, zipped) = (folder.join("flight.hum"), folder.join("flight.tlog.gz"));
-        let done = Command::new(repo::hums()).arg("pack").arg(flight).arg("-o").arg(&log).output()?;
+        let tlog = folder.join("long.tlog");
+        repeat(flight, DECODED_MIN, &tlog)?;
+        let done = Command::new(repo::hums()).arg("pack").arg(&tlog).arg("-o").arg(&log).output()?;
         if !log.is_file() || !done.status.success() {
             bail!("hums pack {}: {}", flight.display(), String::from_utf8_lossy(&done.stderr));
         }
-        let gzip = Command::new("gzip").arg("-c").arg(flight).stdout(File::create(&zipped)?).status();
+        let gzip = Command::new("gzip").arg("-c").arg(&tlog).stdout(File::create(&zipped)?).status();
         gzip.context("gzip cannot be started")?;
-        let bytes = fs::metadata(flight)?.len() as f64;
+        let bytes = fs::metadata(&tlog)?.len() as f64;
         let decode = |threads: Option<&str>| {
             let mut command = on_one_core(repo::hums().as_os_str(), threads.is_some());
             command.arg("decode").arg(&log).args(["--format", "tlog", "-o", "-"]);
@@ -185,6 +215,13 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
+/// A recording as often as it takes to have so many bytes.
+fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
+    let tlog = fs::read(flight)?;
+    let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;
+    fs::write(to, tlog.repeat(times)).with_context(|| to.display().to_string())
+}
+
 /// A program on the first core only, where `taskset` is there to see to it.
 fn on_one_core(program: &std::ffi::OsStr, one: bool) -> Command {
     let pinned = one && Command::new("taskset").arg("--version").output().is_ok();
@@ -221,9 +258,7 @@ fn cost(flights: &[PathBuf]) -> Result<()> {
     let (mut dearest, mut all) = (("none".to_owned(), 0.0), (0.0, 0.0));
     for flight in unsigned(flights) {
         let _ = fs::remove_file(&card);
-        let tlog = fs::read(flight)?;
-        let times = (SECONDS_MIN * BYTES_PER_S / tlog.len().max(1) as f64).ceil().max(1.0) as usize;
-        fs::write(&input, tlog.repeat(times))?;
+        repeat(flight, SECONDS_MIN * BYTES_PER_S, &input)?;
         let (json, _) = Shell::new(repo::hums())
             .args(["emulate", "--json", "--costs", "--firmware"])
             .arg(&image)
@@ -274,6 +309,17 @@ fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
             count / bytes,
             count / frames,
             load(count / bytes) * 100.0
+        );
+    }
+    if let (Some(powered_s), Some(steps)) =
+        (report["usage"]["powered_time_s"].as_f64(), stages.get("tick").and_then(Value::as_f64))
+    {
+        let step = steps / (powered_s * TICKS_PER_S);
+        let load = step * TICKS_PER_S * CYCLES_PER_INSTRUCTION / CLOCK_HZ;
+        println!(
+            "  {:10} {step:8.0} instructions every 50 ms {:11.2} % of the processor",
+            "a step",
+            load * 100.0
         );
     }
     Ok((report["instructions"]["encode"].as_f64().context("no stage encode")?, bytes))

@@ -30,7 +30,8 @@ cargo xtask COMMAND
                                  without an emulator, or with --pc, through the same pipeline on this PC
   test [--only STEP]... [--list] everything that CI checks, or the steps named
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
-                                 the campaigns: power cuts, damage, stalls, endurance, noise; hours, and docs/proof.md
+                                 the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
+                                 and docs/proof.md
   firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
   bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz

@@ -73,7 +73,7 @@ fn main() -> ! {
         keeper.turn_ahead();
     }
     keeper.load(monitor);
-    let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor.params()));
+    let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor));
     let monitoring = MONITORING.init_with(|| {
         Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
     });

@@ -34,14 +34,18 @@ macro_rules! params {
             },)*
         ];
 
-        /// The values of all parameters.
+        /// The values of all parameters, and which of them are still to be saved.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Params([f32; TABLE.len()]);
+        pub struct Params {
+            values: [f32; TABLE.len()],
+            /// A bit each.
+            unsaved: [u32; TABLE.len().div_ceil(32)],
+        }
 
         impl Params {
-            /// All defaults.
+            /// All defaults, which need not be saved.
             pub const fn defaults() -> Self {
-                Self([$($default,)*])
+                Self { values: [$($default,)*], unsaved: [0; TABLE.len().div_ceil(32)] }
             }
         }
     };
@@ -210,7 +214,7 @@ impl Default for Params {
 impl Params {
     /// A parameter's value.
     pub const fn get(&self, param: Param) -> f32 {
-        self.0[param as usize]
+        self.values[param as usize]
     }
 
     /// Sets a parameter by name; `Err` says what is wrong with name or value, and nothing changed.
@@ -220,13 +224,45 @@ impl Params {
         if !(spec.min..=spec.max).contains(&value) {
             return Err(ParamError::OutOfRange { min: spec.min, max: spec.max });
         }
-        self.0[index] = value;
+        // Bit for bit: what is the same need not be saved.
+        if self.values[index].to_bits() != value.to_bits() {
+            self.values[index] = value;
+            self.unsaved[index / 32] |= 1 << (index % 32);
+        }
         Ok(())
+    }
+
+    /// A parameter that was set and not saved since: its index in [`TABLE`], and its value.
+    pub fn unsaved(&self) -> Option<(usize, &'static ParamSpec, f32)> {
+        let word = self.unsaved.iter().position(|word| *word != 0)?;
+        let index = word * 32 + self.unsaved[word].trailing_zeros() as usize;
+        Some((index, TABLE.get(index)?, self.values[index]))
+    }
+
+    /// It is with the store.
+    pub fn saved(&mut self, index: usize) {
+        if let Some(word) = self.unsaved.get_mut(index / 32) {
+            *word &= !(1 << (index % 32));
+        }
+    }
+
+    /// All of them are as they are stored, which is what they begin with.
+    pub const fn all_saved(&mut self) {
+        self.unsaved = [0; TABLE.len().div_ceil(32)];
+    }
+
+    /// Nothing is stored any more: whatever is not at its default is to be saved.
+    pub fn all_unsaved(&mut self) {
+        for (index, (spec, value)) in TABLE.iter().zip(self.values).enumerate() {
+            if value.to_bits() != spec.default.to_bits() {
+                self.unsaved[index / 32] |= 1 << (index % 32);
+            }
+        }
     }
 
     /// All parameters with their values, in table order.
     pub fn iter(&self) -> impl Iterator<Item = (&'static ParamSpec, f32)> {
-        TABLE.iter().zip(self.0)
+        TABLE.iter().zip(self.values)
     }
 }
 

@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::cell::Cell;
+
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::baseline::Quantity;
@@ -12,7 +14,7 @@ use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey};
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::Rpm;
+use hums_core::units::{Amperes, Rpm, Volts};
 
 /// Flies for 80 s and lands; gives the findings, and the baselines as they are saved.
 fn fly(
@@ -92,6 +94,25 @@ fn each_quantity_that_leaves_what_was_normal_is_found_and_not_learned() {
         let (again, ..) = fly(&Params::defaults(), Some(&item), change);
         assert!(again.iter().any(|finding| finding.check == check), "{check} was learned");
     }
+}
+
+#[test]
+fn a_battery_whose_resistance_rises_is_found() {
+    // 20 milliohms for the first 50 s, then 45; the current goes up and down once in two seconds.
+    let steps = Cell::new(0);
+    let (findings, ..) = fly(&Params::defaults(), None, |quad| {
+        let step = steps.replace(steps.get() + 1);
+        let ohm = if step < 1_000 { 0.020 } else { 0.045 };
+        let amperes = if step / 20 % 2 == 0 { 10.0 } else { 30.0 };
+        quad.battery.current = Some(Amperes(amperes));
+        quad.battery.voltage = Some(Volts(16.4 - ohm * amperes));
+    });
+    let found = findings.iter().find(|finding| finding.level == Level::Critical).expect("it is found");
+    assert_eq!(found.check, "batt_resistance", "{findings:?}");
+    // The mean looks back six seconds, and the debounce is ten.
+    assert!((60_000..=75_000).contains(&found.at.as_millis()), "{found:?}");
+    assert!((100.0..=130.0).contains(&found.value), "{found:?}");
+    assert!(findings.iter().all(|finding| finding.check == "batt_resistance"), "{findings:?}");
 }
 
 #[test]

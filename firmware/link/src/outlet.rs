@@ -28,6 +28,8 @@ pub const BACKLOG: Span = Span::from_millis(50);
 const BACKLOG_FINDINGS: Span = Span::from_millis(300);
 /// The same for what is forwarded, so that longer frames find the line free enough.
 const BACKLOG_FORWARD: Span = Span::from_millis(25);
+/// Bytes of findings that may wait beside everything else: eleven texts, signed.
+pub const FINDINGS: u32 = 11 * 92;
 /// A finding's text with its header, and a signature: what stays free for a critical one.
 const RESERVE: u32 = 80;
 /// The least budget that has such a reserve: below, it would leave nothing for anything else.
@@ -133,6 +135,8 @@ pub struct Outlet {
     forward: Bucket,
     budget: u32,
     baud: u32,
+    /// Bytes that may wait, findings apart.
+    room: u32,
     /// The line is to get another rate, and nothing is added until it is empty: what waits would leave at another time
     /// than it is booked for.
     changing: bool,
@@ -146,8 +150,9 @@ pub struct Outlet {
 const BULK_WAITS: Span = Span::from_secs(1);
 
 impl Outlet {
-    /// A port that may send `budget` bytes a second on a line of `baud`.
-    pub const fn new(budget: u32, baud: u32) -> Self {
+    /// A port that may send `budget` bytes a second on a line of `baud`, with a queue before it that has room for so many
+    /// bytes, and for [`FINDINGS`] of findings.
+    pub const fn new(budget: u32, baud: u32, room: u32) -> Self {
         Self {
             encoder: Encoder::new(),
             seal: None,
@@ -157,6 +162,7 @@ impl Outlet {
             forward: Bucket::FULL,
             budget,
             baud,
+            room,
             changing: false,
             free_at: Instant::ZERO,
             bulk_at: None,
@@ -204,11 +210,18 @@ impl Outlet {
     pub fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
         let start = self.free_at.max(now);
         let busy = start.since(now);
-        let waits = match class {
-            Class::Critical | Class::Finding => busy <= BACKLOG_FINDINGS,
-            Class::Forward => busy == Span::ZERO || busy + self.duration(bytes) <= BACKLOG_FORWARD,
-            _ => busy == Span::ZERO || busy + self.duration(bytes) <= BACKLOG,
+        // A fast line would let more wait than the queue holds.
+        let waiting = busy.as_micros() * u64::from(self.baud) / 10_200_000;
+        let room = match class {
+            Class::Critical | Class::Finding => self.room + FINDINGS,
+            _ => self.room,
         };
+        let waits = waiting + bytes as u64 <= u64::from(room)
+            && match class {
+                Class::Critical | Class::Finding => busy <= BACKLOG_FINDINGS,
+                Class::Forward => busy == Span::ZERO || busy + self.duration(bytes) <= BACKLOG_FORWARD,
+                _ => busy == Span::ZERO || busy + self.duration(bytes) <= BACKLOG,
+            };
         if class == Class::Bulk {
             self.bulk_at = Some(now);
         }
@@ -309,7 +322,7 @@ mod tests {
             baud in proptest::sample::select(vec![9_600_u32, 57_600, 921_600]),
             steps in proptest::collection::vec((0_u64..90_000, 12_usize..280, 0_usize..6), 1..400),
         ) {
-            let mut outlet = Outlet::new(budget, baud);
+            let mut outlet = Outlet::new(budget, baud, 288);
             let mut now_us = 0;
             let mut sent = Vec::new();
             for (step_us, bytes, class) in steps {
@@ -323,8 +336,27 @@ mod tests {
     }
 
     #[test]
+    fn no_more_waits_than_the_queue_holds_however_fast_the_line() {
+        for baud in [9_600, 57_600, 921_600] {
+            let mut outlet = Outlet::new(5_000, baud, 288);
+            for tick in 0..200 {
+                let now = Instant::from_millis(50 * tick);
+                let mut waiting = outlet.free_at.since(now).as_micros() as usize * baud as usize / 10_200_000;
+                let before = waiting;
+                for class in [Class::Bulk, Class::Forward, Class::Event, Class::Own] {
+                    while outlet.pass(now, class, &[0; 60], &mut |frame| waiting += frame.len()) {}
+                }
+                // Findings of the tick before may still be there.
+                assert!(waiting <= before.max(300), "{waiting} bytes at {baud} baud");
+                while outlet.pass(now, Class::Finding, &[0; 92], &mut |frame| waiting += frame.len()) {}
+                assert!(waiting <= 300 + FINDINGS as usize, "{waiting} bytes at {baud} baud");
+            }
+        }
+    }
+
+    #[test]
     fn another_line_rate_waits_until_the_line_is_empty() {
-        let mut outlet = Outlet::new(5_000, 9_600);
+        let mut outlet = Outlet::new(5_000, 9_600, 288);
         assert!(outlet.pass(Instant::ZERO, Class::Own, &[0; 96], &mut |_| {}));
         outlet.set(Instant::from_millis(50), 5_000, 57_600);
         assert!(!outlet.pass(Instant::from_millis(50), Class::Critical, &[0; 12], &mut |_| {}));
@@ -336,7 +368,7 @@ mod tests {
 
     #[test]
     fn a_saturated_outlet_uses_its_budget() {
-        let mut outlet = Outlet::new(2_000, 57_600);
+        let mut outlet = Outlet::new(2_000, 57_600, 288);
         let mut bytes = 0;
         for now_ms in 0..60_000 {
             outlet.pass(Instant::from_millis(now_ms), Class::Forward, &[0; 40], &mut |frame| {
@@ -350,7 +382,7 @@ mod tests {
     #[test]
     fn what_is_forwarded_leaves_room_for_bulk_and_bulk_for_it() {
         for budget in [500, 2_000, 5_000] {
-            let mut outlet = Outlet::new(budget, 57_600);
+            let mut outlet = Outlet::new(budget, 57_600, 288);
             let (mut forwarded, mut bulk) = (0, 0);
             let piece = vec![0; outlet.bulk_frame_max()];
             for now_ms in 0..20_000 {
@@ -371,7 +403,7 @@ mod tests {
     #[test]
     fn a_critical_finding_finds_room_and_waits_less_than_the_backlog() {
         for budget in [400, 1_000, 5_000] {
-            let mut outlet = Outlet::new(budget, 57_600);
+            let mut outlet = Outlet::new(budget, 57_600, 288);
             for now_ms in 0..10_000 {
                 let now = Instant::from_millis(now_ms);
                 for class in [Class::Bulk, Class::Forward, Class::Event, Class::Own] {

@@ -62,6 +62,8 @@ const STATE_MS: u16 = 2_000;
 /// `NAMED_VALUE_FLOAT` and `_INT` with their header.
 const VALUE_BYTES: usize = 30;
 
+/// Bytes that may wait at the port, findings apart: 50 ms at 57,600 baud.
+pub const WAITING_BYTES: u32 = 288;
 /// Findings that wait for their turn.
 const WAITING_MAX: usize = 16;
 const HEARTBEAT: Span = Span::from_secs(1);
@@ -131,7 +133,11 @@ impl Summary {
     /// Before the first frame.
     pub fn new(params: &Params) -> Self {
         Self {
-            outlet: Outlet::new(params.get(Param::GsBudget) as u32, params.get(Param::GsBaud) as u32),
+            outlet: Outlet::new(
+                params.get(Param::GsBudget) as u32,
+                params.get(Param::GsBaud) as u32,
+                WAITING_BYTES,
+            ),
             forwards: true,
             vehicle: None,
             turns: [Turn { due_ms: 0, seen_ms: 0, bytes: 0, known: false }; TURNS],

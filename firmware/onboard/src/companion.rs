@@ -26,6 +26,9 @@ use crate::queues::{GsIn, Path, SectorsIn, UplinkOut};
 use crate::secure::{Secure, Trust};
 use crate::settings::Settings;
 
+/// Bytes that may wait at the autopilot's port. Its queue has room for them, for as many of the summary where the
+/// autopilot carries it, and for the longest frame.
+const WAITING_BYTES: u32 = 400;
 /// How often the autopilot hears of us: it routes only to those it has heard.
 const HEARTBEAT: Span = Span::from_secs(1);
 /// Settings and commands that a port may send at once, and how many more each second.
@@ -85,7 +88,11 @@ pub(crate) struct Companion {
 impl Companion {
     pub(crate) const fn new(params: &Params) -> Self {
         Self {
-            outlet: Outlet::new(params.get(Param::ApBudget) as u32, params.get(Param::ApBaud) as u32),
+            outlet: Outlet::new(
+                params.get(Param::ApBudget) as u32,
+                params.get(Param::ApBaud) as u32,
+                WAITING_BYTES,
+            ),
             asking: Asking::new(),
             replies: Replies::new(),
             limits: [Limiter::new(); 2],

@@ -126,7 +126,7 @@ fn file(asked: &ftp::Asked<'_>, open: &mut Option<LogName>) -> Kind {
             *open = None;
             say(None)
         }
-        Operation::List("" | "/" | "." | "/." | "@SYS" | "/logs", offset) => {
+        Operation::List("" | "/" | "." | "/." | "/logs" | "@MAV_LOG" | "@MAV_LOG/", offset) => {
             Kind::FtpList { reply, entry: offset.min(u32::from(u16::MAX)) as u16 }
         }
         Operation::List(..) => say(Some(Error::FileNotFound)),
@@ -335,7 +335,7 @@ mod tests {
     #[test]
     fn a_path_is_a_logs_name_with_or_without_its_directory() {
         let expected = Some(LogName { session: 42, segment: 7 });
-        for path in ["00042_07.HUM", "/00042_07.HUM", "/logs/00042_07.HUM"] {
+        for path in ["00042_07.HUM", "/00042_07.HUM", "@MAV_LOG/00042_07.HUM"] {
             assert_eq!(name(path), expected, "{path}");
         }
         for path in ["", "/", "42.HUM", "../etc/passwd", "00042_07.TXT"] {

@@ -12,15 +12,15 @@ use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use heapless::spsc;
 use hums_blackbox::{ENTRY_SECTORS_MAX, Header, SECTOR_BYTES, Sector, SectorSink};
+use hums_link::{outlet, summary};
 
 use crate::shelf::{Reader, Server, Shelf};
 
 /// 40 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes one or two.
 pub const FRAME_QUEUE_BYTES: usize = 4 * 1024;
 
-/// The outlet lets 50 ms of the port wait (288 bytes at 57,600 baud), and behind them every finding that it holds back
-/// at once: 16 texts of 79 bytes, signed and with the queue's two bytes each.
-pub const GS_QUEUE_BYTES: usize = 288 + 16 * 81;
+/// What the port's outlet lets wait, findings and all, and the end of the queue that the longest frame does not fit into.
+pub const GS_QUEUE_BYTES: usize = (summary::WAITING_BYTES + outlet::FINDINGS) as usize + GS_FRAME_BYTES_MAX;
 
 /// 0.17 s of a radio at 57,600 baud: the monitor looks at least every 50 ms. Three of the longest frames.
 pub const UPLINK_QUEUE_BYTES: usize = 1024;

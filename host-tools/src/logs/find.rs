@@ -295,12 +295,23 @@ fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     sessions.into_iter().map(log).collect()
 }
 
-/// Sectors that follow each other, in place and in number.
+/// Sectors that follow each other, in place and in number; damaged ones between them are theirs.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     number: u32,
     start: u64,
     blocks: u64,
+}
+
+impl Run {
+    /// Whether a sector of this number at this place continues it, with at most a group between that is none.
+    fn goes_on(&self, number: u32, at: u64) -> bool {
+        let blocks = at.checked_sub(self.start).map(|bytes| bytes / BLOCK_BYTES as u64);
+        let numbers = number.checked_sub(self.number).map(u64::from);
+        let group = hums_blackbox::GROUP_SECTORS as u64;
+        blocks == numbers
+            && blocks.is_some_and(|blocks| (self.blocks..=self.blocks + group).contains(&blocks))
+    }
 }
 
 /// Looks at every block of a card for sectors, and puts those of each session in order.
@@ -314,11 +325,8 @@ fn scan(path: &Path, length: u64) -> Result<Vec<Log>> {
         if let Ok(header) = Header::read(&block) {
             let session = sessions.entry(header.session).or_default();
             match session.last_mut() {
-                Some(run)
-                    if run.start + run.blocks * BLOCK_BYTES as u64 == at
-                        && u64::from(run.number) + run.blocks == u64::from(header.number) =>
-                {
-                    run.blocks += 1;
+                Some(run) if run.goes_on(header.number, at) => {
+                    run.blocks = u64::from(header.number - run.number) + 1;
                 }
                 _ if runs < RUNS_MAX => {
                     session.push(Run { number: header.number, start: at, blocks: 1 });

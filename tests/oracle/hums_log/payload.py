@@ -119,6 +119,9 @@ class Payload:
         clock, neighbour = self.clock, None
         limit = slot.fixed if slot.version == 1 else length
         elements = [one for one in slot.elements if one.offset + one.size <= limit]
+        ends = [one.offset + one.size for one in elements]
+        if slot.instance and slot.layout and sum(slot.layout.instance) <= limit:
+            ends.append(sum(slot.layout.instance))
         for one in elements:
             if not (still and one.quiet):
                 before = one.value
@@ -133,7 +136,7 @@ class Payload:
         if slot.trimmed:
             return bytes(image).rstrip(b"\0") or b"\0"
         before = 0
-        for at in range(min(limit, length), slot.fixed):
+        for at in range(max(ends, default=0), slot.fixed):
             image[at] = self.group.model.byte(before, at & 255, 3)
             before = before << 8 | image[at]
         return bytes(image[:slot.fixed])

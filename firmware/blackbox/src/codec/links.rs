@@ -111,6 +111,20 @@ mod tests {
     }
 
     #[test]
+    fn the_table_is_that_of_the_format_document() {
+        let document = include_str!("../../../../docs/log-format.md");
+        let table = document.split("\n## 10. Links").nth(1).expect("the section");
+        let rows: std::vec::Vec<_> = table.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
+        let row = |link: &Link| {
+            let what = if link.publishes { "publishes" } else { "consults" };
+            let Link { id, offset, register, scale, .. } = link;
+            std::format!("| {id} | {offset} | {what} | {register} | {scale:?} |")
+        };
+        let links: std::vec::Vec<_> = LINKS.iter().filter(|link| link.id != u32::MAX).map(row).collect();
+        assert_eq!(rows, links);
+    }
+
+    #[test]
     fn every_link_names_a_field_of_the_dialect() {
         for link in LINKS.iter().filter(|link| link.id != u32::MAX) {
             let message = hums_dialect::message(link.id).expect("known");

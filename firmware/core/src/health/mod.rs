@@ -89,7 +89,8 @@ const fn due(subsystem: Subsystem) -> Check {
 
 fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     let mine = inputs.wear.iter().flatten().filter(|(of, _)| *of == subsystem);
-    Reading::new(Some(inputs.now), mine.map(|(_, percent)| *percent).reduce(f32::max))
+    // What has reached its limit is due, while a check's value must be beyond it.
+    Reading::new(Some(inputs.now), mine.map(|(_, percent)| percent.next_up()).reduce(f32::max))
 }
 
 /// How far a quantity is from what is normal for this airframe.

@@ -18,9 +18,8 @@ pub const QUIET: Span = Span::from_secs(5);
 pub struct Handover<'a> {
     items: MailboxIn<'a>,
     status: &'a StoreStatus,
-    /// Parameters as they are stored, or as they are by default.
-    stored: Params,
     told: StoreReading,
+    remade: u32,
     frames: u32,
     frames_at: Instant,
 }
@@ -35,10 +34,11 @@ pub struct News {
 }
 
 impl<'a> Handover<'a> {
-    /// After [`Keeper::load`], with the parameters as they are then.
-    pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, params: &Params) -> Self {
+    /// After [`Keeper::load`](super::Keeper::load): the parameters are as they are stored.
+    pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, monitor: &mut Monitor) -> Self {
+        monitor.params_mut().all_saved();
         let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };
-        Self { items, status, stored: *params, told, frames: 0, frames_at: Instant::ZERO }
+        Self { items, status, told, remade: 0, frames: 0, frames_at: Instant::ZERO }
     }
 
     /// At every tick: hands over what is due. `frames` is what reception has counted.
@@ -49,7 +49,12 @@ impl<'a> Handover<'a> {
         let disarmed = monitor.vehicle().heartbeat.get().is_some_and(|heartbeat| !heartbeat.armed);
         let quiet = disarmed && now.since(self.frames_at) >= QUIET;
         self.status.quiet.store(quiet, Ordering::Relaxed);
-        self.put_params(monitor.params());
+        if newer(&mut self.remade, self.status.read().remade) {
+            // Nothing of it is there any more.
+            monitor.params_mut().all_unsaved();
+            monitor.save_anew();
+        }
+        self.put_params(monitor.params_mut());
         self.put_items(now, monitor);
     }
 
@@ -57,7 +62,7 @@ impl<'a> Handover<'a> {
     /// keeper took something.
     pub fn finish(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         monitor.save_all();
-        self.put_params(monitor.params()) && self.put_items(now, monitor)
+        self.put_params(monitor.params_mut()) && self.put_items(now, monitor)
     }
 
     /// What is new about the store, one thing at a time.
@@ -79,8 +84,6 @@ impl<'a> Handover<'a> {
             return news(4, "HUMS: a stored item was unreadable");
         }
         if newer(&mut told.remade, now.remade) {
-            // All that is set goes there again; the items follow when they change.
-            self.stored = Params::defaults();
             return news(3, "HUMS: store unreadable, made anew");
         }
         if told.room != now.room {
@@ -108,20 +111,15 @@ impl<'a> Handover<'a> {
         self.status.read().remade
     }
 
-    /// Each parameter that is not as it is stored; `false` when one found no room.
-    fn put_params(&mut self, params: &Params) -> bool {
-        let Self { items, stored, .. } = self;
-        let before = *stored;
-        for ((spec, value), (_, stored_value)) in params.iter().zip(before.iter()) {
-            if value.to_bits() == stored_value.to_bits() {
-                continue;
-            }
-            let Some((bytes, length)) = param_value(spec.name, value) else { continue };
-            if !items.put(Key::param(spec.name), bytes.get(..length).unwrap_or_default()) {
+    /// Each parameter that was set; `false` when one found no room.
+    fn put_params(&mut self, params: &mut Params) -> bool {
+        while let Some((index, spec, value)) = params.unsaved() {
+            if let Some((bytes, length)) = param_value(spec.name, value)
+                && !self.items.put(Key::param(spec.name), bytes.get(..length).unwrap_or_default())
+            {
                 return false;
             }
-            // Cannot be refused: it comes out of the same table.
-            let _ = stored.set(spec.name, value);
+            params.saved(index);
         }
         true
     }

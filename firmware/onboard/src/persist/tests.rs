@@ -30,7 +30,7 @@ fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut
     keeper.turn_ahead();
     keeper.load(&mut monitor);
     monitor.tick(Instant::ZERO, &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
-    let mut handover = Handover::new(items_in, &status, monitor.params());
+    let mut handover = Handover::new(items_in, &status, &mut monitor);
     act(&mut monitor, &mut handover, &mut keeper);
 }
 
@@ -228,6 +228,27 @@ fn flash_with_something_else_in_it_is_told_and_the_counters_begin() {
 }
 
 #[test]
+fn a_store_that_is_made_anew_in_the_middle_gets_everything_again() {
+    let mut flash = Flash::blank();
+    fly(&mut flash, 600);
+    session(&mut flash, |monitor, handover, keeper| {
+        monitor.params_mut().set("CELL_VOLT_WARN", 3.3).expect("in range");
+        for second in 0..60 {
+            live(second, true, monitor, handover, second as u32);
+            while keeper.service(false) == Kept::Took {}
+        }
+        keeper.status.remade.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let saved = keeper.status.read().saved;
+        live(60, true, monitor, handover, 60);
+        while keeper.service(false) == Kept::Took {
+            handover.step(Instant::from_millis(60_000), monitor, 60);
+        }
+        // Lifetime, baselines, exceedances, exposure, the session, one parameter.
+        assert_eq!(keeper.status.read().saved - saved, 6);
+    });
+}
+
+#[test]
 fn an_item_that_makes_no_sense_is_told_and_the_others_are_read() {
     let mut flash = Flash::blank();
     let (mut store, _) = Store::mount(&mut flash).expect("it works");
@@ -254,7 +275,7 @@ fn without_a_store_all_goes_on_and_it_is_told() {
     let mut monitor = Box::new(Monitor::new(Params::defaults()));
     let mut keeper = Keeper::<Flash>::mount(None, items_out, &status);
     keeper.load(&mut monitor);
-    let mut handover = Handover::new(items_in, &status, monitor.params());
+    let mut handover = Handover::new(items_in, &status, &mut monitor);
     assert!(handover.news().is_some_and(|news| news.text.contains("no store")));
     for second in 0..100 {
         handover.step(Instant::from_millis(second * 1_000), &mut monitor, 0);

@@ -186,7 +186,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let mut keeper = Keeper::mount(Some(outside.flash.clone()), items_out, store_status);
         keeper.turn_ahead();
         keeper.load(monitor);
-        let handover = Handover::new(items_in, store_status, monitor.params());
+        let handover = Handover::new(items_in, store_status, monitor);
         let mut monitoring = Monitoring::new(monitor, writer, identity, card_status, port_status);
         monitoring.restore_signing(&mut keeper);
         Self {

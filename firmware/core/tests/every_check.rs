@@ -1,0 +1,234 @@
+//! Every check there is finds what it is there for, within its own debounce plus 100 ms: on either autopilot's scales,
+//! with an engine, with a second battery and with a twelfth motor.
+#![allow(clippy::panic, clippy::unwrap_used)]
+
+mod common;
+
+use common::{AUTOPILOT, Quad};
+use hums_core::Monitor;
+use hums_core::health::{Finding, Level, checks};
+use hums_core::observation::{
+    Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Heartbeat, Observation, Processor,
+    RadioControl, Rails, TelemetryRadio, VehicleKind,
+};
+use hums_core::params::Params;
+use hums_core::status::{LinkReading, Recording};
+use hums_core::time::{Instant, Span};
+use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Metres, Radians, Rpm, Volts};
+
+const FAULT_MS: u64 = 20_000;
+const END_MS: u64 = 95_000;
+
+/// What goes wrong: it changes the quad, and says what a quad does not say.
+type Fault = fn(&mut Quad, &mut Vec<Observation>);
+
+/// Off by default, since they depend on the engine and on the devices.
+const LIMITS: [(&str, f32); 5] = [
+    ("ENG_CHT_CRIT", 200.0),
+    ("ENG_EGT_CRIT", 800.0),
+    ("ENG_FUEL_CRIT", 100.0),
+    ("RC_RSSI_CRIT", 50.0),
+    ("RADIO_RSSI_WARN", 60.0),
+];
+
+fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
+    let mut params = Params::defaults();
+    for (name, value) in settings {
+        params.set(name, *value).unwrap();
+    }
+    let mut monitor = Monitor::new(params);
+    let mut findings = Vec::new();
+    for now_ms in (0..END_MS).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        let (mut quad, mut more) = (Quad::healthy(), Vec::new());
+        if now_ms >= FAULT_MS {
+            fault(&mut quad, &mut more);
+        }
+        if now_ms.is_multiple_of(100) {
+            for observation in quad.says(now_ms).iter().chain(&more) {
+                monitor.observe(now, AUTOPILOT, observation);
+            }
+        }
+        let link = LinkReading { frames_lost: Some(quad.lost), at: now };
+        monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
+    }
+    findings
+}
+
+const FAULTS: [(&str, u8, Level, Fault); 48] = [
+    ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
+    ("batt_remaining", 1, Level::Critical, |_, more| {
+        let remaining = Some(Fraction(0.05));
+        more.push(Observation::Battery(Battery { id: 1, remaining, ..Battery::default() }));
+    }),
+    ("cell_voltage", 0, Level::Critical, |quad, _| quad.battery.voltage = Some(Volts(13.2))),
+    ("cell_deviation", 0, Level::Critical, |quad, _| cells(quad, 3.7)),
+    ("cell_dev_lasting", 0, Level::Critical, |quad, _| cells(quad, 3.8)),
+    ("batt_fault", 0, Level::Warning, |quad, _| quad.battery.faults = 4),
+    ("batt_temperature", 0, Level::Critical, |quad, _| quad.battery.temperature = Some(Celsius(80.0))),
+    ("rail_5v_low", 0, Level::Critical, |_, more| rail(more, 4.4)),
+    ("rail_5v_high", 0, Level::Warning, |_, more| rail(more, 5.6)),
+    ("esc_temperature", 3, Level::Critical, |quad, _| esc(quad, 3).temperature = Some(Celsius(120.0))),
+    ("esc_temperature", 11, Level::Critical, |_, more| {
+        let esc = Esc { rpm: Some(Rpm(5_000.0)), temperature: Some(Celsius(120.0)), ..Esc::default() };
+        more.push(Observation::Escs(EscGroup { first: 8, escs: [None, None, None, Some(esc)] }));
+    }),
+    ("esc_failure", 2, Level::Critical, |quad, _| esc(quad, 2).failures = Some(32)),
+    ("esc_failure", 1, Level::Warning, |quad, _| esc(quad, 1).failures = Some(4)),
+    ("motor_loss", 1, Level::Critical, |quad, _| esc(quad, 1).current = Some(Amperes(0.0))),
+    ("motor_imbalance", 0, Level::Critical, |quad, _| esc(quad, 0).rpm = Some(Rpm(7_500.0))),
+    ("cylinder_head", 0, Level::Critical, |_, more| {
+        more.push(Observation::Engine(Engine { cylinder_head: Some(Celsius(250.0)), ..Engine::default() }));
+    }),
+    ("exhaust_gas", 0, Level::Critical, |_, more| {
+        more.push(Observation::Engine(Engine { exhaust: Some(Celsius(900.0)), ..Engine::default() }));
+    }),
+    ("fuel_pressure", 0, Level::Critical, |_, more| {
+        more.push(Observation::Engine(Engine {
+            fuel_pressure: Some(Hectopascals(50.0)),
+            ..Engine::default()
+        }));
+    }),
+    ("vibration", 0, Level::Critical, |quad, _| quad.vibration.levels[0] = Some(70.0)),
+    ("vibration_px4", 0, Level::Critical, |quad, more| {
+        // Which scale it is, the heartbeat tells.
+        let kind = VehicleKind::Rotorcraft;
+        let px4 =
+            Heartbeat { autopilot: Autopilot::Px4, kind, armed: true, state: 4, ..Heartbeat::default() };
+        more.push(Observation::Heartbeat(px4));
+        quad.vibration.levels = [Some(0.0), Some(0.0), Some(12.0)];
+    }),
+    ("clipping", 0, Level::Critical, |quad, _| quad.vibration.clips = [200; 3]),
+    ("load_factor", 0, Level::Critical, |quad, _| quad.acceleration_down = -45.0),
+    ("ekf_variance", 0, Level::Warning, |quad, _| quad.estimator.compass = Some(0.7)),
+    ("ekf_failsafe", 0, Level::Critical, |quad, _| {
+        (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(0.9));
+    }),
+    ("ekf_test_ratio", 0, Level::Critical, |quad, _| {
+        quad.estimator.scale = EstimatorScale::TestRatio;
+        quad.estimator.velocity = Some(1.5);
+    }),
+    ("gps_satellites", 0, Level::Warning, |quad, _| quad.gnss.satellites = Some(6)),
+    ("gps_hdop", 0, Level::Warning, |quad, _| quad.gnss.hdop = Some(2.5)),
+    ("gps_accuracy", 0, Level::Warning, |quad, _| quad.gnss.accuracy = Some(Metres(3.0))),
+    ("gps_fix", 0, Level::Critical, |quad, _| quad.gnss.fix = 1),
+    ("gps_jamming", 0, Level::Critical, |quad, _| quad.integrity.jamming = 3),
+    ("gps_spoofing", 0, Level::Critical, |quad, _| quad.integrity.spoofing = 3),
+    ("frames_lost", 0, Level::Critical, |quad, _| quad.lost = 0.08),
+    ("rc_rssi", 0, Level::Critical, |_, more| {
+        more.push(Observation::RadioControl(RadioControl { rssi: Some(20) }));
+    }),
+    ("radio_rssi", 0, Level::Warning, |_, more| radio(more, 30, 5)),
+    ("radio_margin", 0, Level::Warning, |_, more| radio(more, 90, 85)),
+    ("load", 0, Level::Critical, |quad, _| quad.system.load = Some(Fraction(0.97))),
+    ("mcu_temperature", 0, Level::Critical, |_, more| {
+        more.push(Observation::Processor(Processor { temperature: Some(Celsius(105.0)), voltage: None }));
+    }),
+    ("autopilot_state", 0, Level::Critical, |_, more| {
+        let kind = VehicleKind::Rotorcraft;
+        more.push(Observation::Heartbeat(Heartbeat { armed: true, kind, state: 5, ..Heartbeat::default() }));
+    }),
+    ("sensors", 0, Level::Warning, |quad, _| quad.system.unhealthy = 0x20),
+    ("roll", 0, Level::Critical, |quad, _| quad.roll = -1.2),
+    ("pitch", 0, Level::Critical, |_, more| {
+        more.push(Observation::Attitude(Attitude { pitch: Radians(1.2), ..Attitude::default() }));
+    }),
+    ("recording", 0, Level::Critical, |quad, _| quad.recorder.recording = Recording::Stopped),
+    ("record_queue", 0, Level::Critical, |quad, _| quad.recorder.queue = 0.95),
+    ("record_lost", 0, Level::Warning, |quad, _| quad.recorder.frames_lost = 5),
+    ("card_stall", 0, Level::Critical, |quad, _| quad.recorder.stall = Span::from_millis(3_000)),
+    ("card_errors", 0, Level::Warning, |quad, _| quad.recorder.write_errors = 3),
+    ("card_room", 0, Level::Critical, |quad, _| quad.recorder.room = Some(0.005)),
+    ("card_room", 0, Level::Warning, |quad, _| quad.recorder.room = Some(0.05)),
+];
+
+/// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
+/// `trends.rs`.
+const ELSEWHERE: [&str; 8] = [
+    "esc_silent",
+    "esc_errors",
+    "heartbeat",
+    "autopilot_reboot",
+    "batt_resistance",
+    "motor_trend",
+    "throttle_trend",
+    "vibration_trend",
+];
+
+/// What is due, and the kind of component (`CMP1_KIND`) that is.
+const DUE: [(&str, f32); 8] = [
+    ("airframe_due", 1.0),
+    ("battery_due", 2.0),
+    ("drive_due", 3.0),
+    ("drive_due", 4.0),
+    ("drive_due", 5.0),
+    ("card_due", 6.0),
+    ("engine_due", 7.0),
+    ("airframe_due", 8.0),
+];
+
+fn cells(quad: &mut Quad, lowest_v: f32) {
+    for cell in &mut quad.battery.cells[..4] {
+        *cell = Some(Volts(3.9));
+    }
+    quad.battery.cells[1] = Some(Volts(lowest_v));
+}
+
+fn rail(more: &mut Vec<Observation>, volts: f32) {
+    more.push(Observation::Rails(Rails { vcc: Some(Volts(volts)), servo: None }));
+}
+
+fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
+    quad.escs[motor].as_mut().unwrap()
+}
+
+fn radio(more: &mut Vec<Observation>, rssi: u8, noise: u8) {
+    let radio = TelemetryRadio {
+        rssi: Some(rssi),
+        remote_rssi: Some(rssi),
+        noise: Some(noise),
+        remote_noise: Some(noise),
+        errors: 0,
+    };
+    more.push(Observation::TelemetryRadio(radio));
+}
+
+#[test]
+fn every_check_finds_what_it_is_there_for_in_time() {
+    for (name, instance, level, fault) in FAULTS {
+        let check = checks().find(|check| check.name == name).expect(name);
+        let findings = fly(&LIMITS, fault);
+        let mut mine =
+            findings.iter().filter(|finding| (finding.check, finding.instance) == (name, instance));
+        let found = mine.find(|finding| finding.level == level);
+        let found = found.unwrap_or_else(|| panic!("{name} {instance} never {level:?}: {findings:?}"));
+        let debounce = if level == Level::Critical { check.debounce_critical } else { check.debounce_warn };
+        let after_ms = found.at.as_millis().saturating_sub(FAULT_MS);
+        // Speeds that are compared are smoothed: half again above the others is 30 % above after 0.9 s.
+        let smoothing_ms = if name == "motor_imbalance" { 900 } else { 0 };
+        let in_time = debounce.as_millis()..=debounce.as_millis() + smoothing_ms + 100;
+        assert!(found.at.as_millis() >= FAULT_MS, "{name} {instance} before anything was wrong: {found:?}");
+        assert!(in_time.contains(&after_ms), "{name} {instance} {level:?} after {after_ms} ms: {in_time:?}");
+    }
+}
+
+#[test]
+fn each_kind_of_component_is_due_in_its_own_subsystem() {
+    for (name, kind) in DUE {
+        let limits = [("CMP1_KIND", kind), ("CMP1_FLIGHTS", 1.0)];
+        let findings = fly(&limits, |_, _| {});
+        let found: Vec<_> = findings.iter().map(|finding| (finding.check, finding.level)).collect();
+        assert_eq!(found, [(name, Level::Critical)], "kind {kind}: {findings:?}");
+        // In the air after 2.5 s; one component is looked at a tick, and the debounce is a second.
+        assert!((3_500..=4_000).contains(&findings[0].at.as_millis()), "{findings:?}");
+    }
+}
+
+#[test]
+fn there_is_no_check_that_nothing_shows_to_work() {
+    for check in checks() {
+        let here = FAULTS.iter().any(|(name, ..)| *name == check.name);
+        let due = DUE.iter().any(|(name, _)| *name == check.name);
+        assert!(here || due || ELSEWHERE.contains(&check.name), "{}", check.name);
+    }
+}
