@@ -8,6 +8,7 @@ pub mod duplex;
 pub mod endpoint;
 pub mod info;
 pub mod interrupt;
+pub mod live;
 pub mod logs;
 pub mod mavlink;
 pub mod outcome;
@@ -51,6 +52,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Report(args) => report::run(args),
+        Command::Live(args) => live::run(args),
         Command::Pack(args) => pack::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Params(args) => talk::params::run(args),

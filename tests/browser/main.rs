@@ -1,5 +1,7 @@
-//! The report in a browser: what it shows is what the flight was.
+//! The report and the live page in a browser: what they show is what the flight was.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+#[cfg(feature = "browser")]
+mod live;
 #[cfg(feature = "browser")]
 mod report;

@@ -5,6 +5,7 @@
 //! * [`program`] runs `hums` and reads what it left behind.
 //! * [`frames`] reads MAVLink frames with a few lines of its own and the checksum seeds of pymavlink.
 //! * [`flights`] knows the recordings and what pymavlink found in them; [`oracle`] asks it about others.
+//! * [`live`] starts `hums live`, and sends it frames.
 //! * [`prove`] are the campaigns, thousands of cases each.
 //! * [`store`] reads what outlives power.
 //! * [`damage`] makes noise; [`fat`] checks a card's file system with the system's own tools.
@@ -20,6 +21,7 @@ pub mod damage;
 pub mod fat;
 pub mod flights;
 pub mod frames;
+pub mod live;
 pub mod oracle;
 pub mod program;
 pub mod prove;

@@ -1,7 +1,8 @@
 //! Asks pymavlink, in the environment that `cargo xtask setup` makes.
 
+use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
@@ -65,6 +66,103 @@ pub fn browser(page: &Path) -> Value {
     let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
     let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
     json(&run("browser.py", &[chromium, driver, page.to_owned()]))
+}
+
+/// A page of `hums live` in a browser: see `tests/oracle/live.py`. Ends with the browser.
+pub struct LivePage {
+    browser: Child,
+    asked: ChildStdin,
+    answers: Lines<BufReader<ChildStdout>>,
+}
+
+impl LivePage {
+    /// Starts the browser.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn start() -> Self {
+        let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
+        command.arg(root().join("tests/oracle/live.py")).env("PYTHONDONTWRITEBYTECODE", "1");
+        command.arg(program("HUMS_CHROMIUM", "/usr/bin/chromium"));
+        command.arg(program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver"));
+        let mut browser = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");
+        let asked = browser.stdin.take().expect("it is piped");
+        let answers = BufReader::new(browser.stdout.take().expect("it is piped")).lines();
+        Self { browser, asked, answers }
+    }
+
+    #[track_caller]
+    fn ask(&mut self, what: &Value) -> Value {
+        writeln!(self.asked, "{what}").expect("the browser's script has ended");
+        let answer = self.answers.next().and_then(Result::ok);
+        json(&answer.unwrap_or_else(|| panic!("the browser's script has ended at {what}")))
+    }
+
+    /// Opens an address, in a window of this size.
+    #[track_caller]
+    pub fn open(&mut self, url: &str, scheme: &str, width: u32, height: u32) {
+        // Another fragment alone would not load the page anew.
+        self.ask(&serde_json::json!({ "do": "open", "url": "about:blank", "scheme": scheme, "width": width, "height": height }));
+        self.ask(&serde_json::json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
+    }
+
+    /// What the page shows at one moment.
+    #[track_caller]
+    pub fn read(&mut self) -> Value {
+        self.ask(&serde_json::json!({ "do": "read" }))
+    }
+
+    /// Waits until a script returns something true.
+    #[track_caller]
+    pub fn wait(&mut self, script: &str, limit_s: u32) -> Value {
+        self.ask(&serde_json::json!({ "do": "wait", "script": script, "limit_s": limit_s }))
+    }
+
+    /// What a script returns.
+    #[track_caller]
+    pub fn run(&mut self, script: &str) -> Value {
+        self.ask(&serde_json::json!({ "do": "run", "script": script }))
+    }
+
+    /// Presses keys, one after the other.
+    #[track_caller]
+    pub fn press(&mut self, keys: &[&str]) {
+        self.ask(&serde_json::json!({ "do": "press", "keys": keys }));
+    }
+
+    /// Milliseconds that each frame of the browser takes until it is painted, for so long.
+    #[track_caller]
+    pub fn frames_ms(&mut self, seconds: u32) -> Vec<f64> {
+        let frames = self.ask(&serde_json::json!({ "do": "frames", "seconds": seconds }));
+        frames.as_array().expect("a list").iter().filter_map(Value::as_f64).collect()
+    }
+
+    /// A screenshot of the window, or of the whole page.
+    #[track_caller]
+    pub fn shot(&mut self, path: &Path, whole: bool) {
+        self.ask(&serde_json::json!({ "do": "shot", "path": path, "whole": whole }));
+    }
+
+    /// What the browser has complained about.
+    #[track_caller]
+    pub fn console(&mut self) -> Value {
+        self.ask(&serde_json::json!({ "do": "console" }))
+    }
+}
+
+impl Drop for LivePage {
+    fn drop(&mut self) {
+        // The script ends its browser when nothing more is asked; one that hangs is ended.
+        let _ = self.asked.write_all(b"{\"do\": \"quit\"}\n");
+        for _ in 0..100 {
+            if !matches!(self.browser.try_wait(), Ok(None)) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let _ = self.browser.kill();
+        let _ = self.browser.wait();
+    }
 }
 
 /// What pymavlink finds in these recordings.

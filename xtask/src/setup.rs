@@ -31,11 +31,12 @@ pub(crate) enum Need {
     Dosfstools,
     PythonVenv,
     Influx,
+    Victoria,
     Chromium,
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Linker,
         Self::FirmwareTarget,
         Self::Rustfmt,
@@ -45,6 +46,7 @@ impl Need {
         Self::Dosfstools,
         Self::PythonVenv,
         Self::Influx,
+        Self::Victoria,
         Self::Chromium,
     ];
 
@@ -60,7 +62,8 @@ impl Need {
             Self::Dosfstools => "dosfstools (fsck.vfat), which checks the card's file system",
             Self::PythonVenv => "python3 with venv, for pymavlink, the independent reader of MAVLink",
             Self::Influx => "influxdb, which takes the line protocol",
-            Self::Chromium => "chromium and its driver, which look at the report",
+            Self::Victoria => "victoria-metrics, another database that takes the line protocol",
+            Self::Chromium => "chromium and its driver, which look at the pages",
         }
     }
 
@@ -76,6 +79,7 @@ impl Need {
             Self::Dosfstools => find_program("fsck.vfat").is_some(),
             Self::PythonVenv => Shell::new("python3").args(["-c", "import venv, ensurepip"]).ask().is_some(),
             Self::Influx => find_program("influxd").is_some(),
+            Self::Victoria => find_program("victoria-metrics").is_some(),
             Self::Chromium => find_program("chromium").is_some() && find_program("chromedriver").is_some(),
         }
     }
@@ -99,6 +103,7 @@ impl Need {
             Self::Dosfstools => &["dosfstools"],
             Self::PythonVenv => &["python3-venv"],
             Self::Influx => &["influxdb"],
+            Self::Victoria => &["victoria-metrics"],
             Self::Chromium => &["chromium", "chromium-driver", "fonts-dejavu-core"],
             Self::FirmwareTarget | Self::Rustfmt | Self::Clippy => &[],
         }

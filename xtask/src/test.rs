@@ -22,7 +22,7 @@ struct Step {
 }
 
 /// In the order in which they fail soonest.
-const STEPS: [Step; 13] = [
+const STEPS: [Step; 14] = [
     Step { name: "fmt", about: "the formatting", needs: &[Need::Rustfmt], run: fmt },
     Step {
         name: "clippy",
@@ -69,9 +69,15 @@ const STEPS: [Step; 13] = [
     },
     Step {
         name: "browser",
-        about: "the report in Chromium",
+        about: "the report and the live page in Chromium",
         needs: &[Need::PythonVenv, Need::Chromium],
         run: browser,
+    },
+    Step {
+        name: "live",
+        about: "live writing to InfluxDB and VictoriaMetrics, and the Grafana dashboards",
+        needs: &[Need::PythonVenv, Need::Influx, Need::Victoria],
+        run: live,
     },
     Step {
         name: "emulator",
@@ -167,7 +173,12 @@ fn fmt() -> Result<()> {
 fn clippy() -> Result<()> {
     Shell::cargo()
         .args(["clippy", "--workspace", "--exclude=hums-app", "--all-targets"])
-        .args(["--features=hums-tests/emulator,hums-tests/browser", "--", "-D", "warnings"])
+        .args([
+            "--features=hums-tests/emulator,hums-tests/browser,hums-tests/databases",
+            "--",
+            "-D",
+            "warnings",
+        ])
         .run()
 }
 
@@ -219,6 +230,10 @@ fn answer() -> Result<()> {
 
 fn browser() -> Result<()> {
     end_to_end("browser", "browser")
+}
+
+fn live() -> Result<()> {
+    end_to_end("databases", "live")
 }
 
 fn emulator() -> Result<()> {

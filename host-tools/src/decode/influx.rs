@@ -69,6 +69,11 @@ impl Lines {
         self.ends.is_empty()
     }
 
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
     fn begin(&mut self) -> usize {
         self.text.len()
     }

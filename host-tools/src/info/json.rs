@@ -330,7 +330,7 @@ pub(super) fn vehicle(log: &Overview) -> Option<VehicleJson> {
 }
 
 /// The names of `MAV_AUTOPILOT` that are met in the field.
-fn autopilot_name(number: u8) -> String {
+pub(crate) fn autopilot_name(number: u8) -> String {
     match number {
         0 => "generic".into(),
         3 => "ArduPilot".into(),
@@ -340,7 +340,7 @@ fn autopilot_name(number: u8) -> String {
 }
 
 /// The names of `MAV_TYPE` that are met in the field.
-fn type_name(number: u8) -> String {
+pub(crate) fn type_name(number: u8) -> String {
     let name = match number {
         0 => "generic",
         1 => "fixed wing",

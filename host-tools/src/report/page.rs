@@ -19,9 +19,9 @@ use crate::summary::Overview;
 const TEMPLATE: &str = include_str!("assets/page.html");
 const STYLE: &str = include_str!("assets/page.css");
 const PROGRAM: &str = include_str!("assets/page.js");
-/// uPlot 1.6.32, MIT (`assets/uPlot.LICENSE`).
-const UPLOT: &str = include_str!("assets/uPlot.iife.min.js");
-const UPLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
+/// uPlot 1.6.32, MIT (`src/assets/uPlot.LICENSE`).
+const UPLOT: &str = include_str!("../assets/uPlot.iife.min.js");
+const UPLOT_STYLE: &str = include_str!("../assets/uPlot.min.css");
 
 /// What the page's program draws.
 #[derive(Serialize)]

@@ -3,6 +3,7 @@
 //! joined and the intervals become twice as long: memory and page are bounded, however long the flight is.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use hums_core::time::Instant;
 use serde::Serialize;
@@ -65,14 +66,17 @@ pub struct Key {
     pub line: u8,
 }
 
-/// All series of a page.
+/// All series of a page, or of a live vehicle, by what names them there.
 #[derive(Clone, Debug)]
-pub struct Store {
+pub struct Store<K = Key> {
     grid: Grid,
-    series: BTreeMap<Key, Series>,
+    series: BTreeMap<K, Series>,
 }
 
-impl Default for Store {
+/// What a series has in some of the intervals: their numbers, and the values of each in their order, a pair each.
+pub type Part = (Vec<u16>, Vec<f32>);
+
+impl<K> Default for Store<K> {
     fn default() -> Self {
         Self { grid: Grid { start_ms: None, interval_ms: INTERVAL_MS }, series: BTreeMap::new() }
     }
@@ -99,9 +103,9 @@ pub struct GridJson {
     intervals: usize,
 }
 
-impl Store {
+impl<K: Copy + Ord> Store<K> {
     /// Takes a value; what is not finite is none.
-    pub fn push(&mut self, at: Instant, key: Key, value: f32) {
+    pub fn push(&mut self, at: Instant, key: K, value: f32) {
         let known = self.series.contains_key(&key);
         if !value.is_finite() || (!known && self.series.len() >= SERIES_MAX) {
             return;
@@ -130,6 +134,26 @@ impl Store {
         (since_ms / self.grid.interval_ms) as u16
     }
 
+    /// The first interval's time and the intervals' length, milliseconds; `None` before the first value.
+    pub fn spacing_ms(&self) -> Option<(u64, u64)> {
+        Some((self.grid.start_ms?, self.grid.interval_ms))
+    }
+
+    /// What all series have in these intervals, for those that have anything.
+    pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (K, Part)> {
+        // An empty range is one that ends before it begins, which a map refuses.
+        let some = intervals.start() <= intervals.end();
+        self.series.iter().filter(move |_| some).filter_map(move |(key, series)| {
+            let (mut numbers, mut values) = (Vec::new(), Vec::new());
+            for (&number, extremes) in series.values.range(intervals.clone()) {
+                numbers.push(number);
+                let (low, high) = (extremes.low, extremes.high);
+                values.extend(if extremes.rises { [low, high] } else { [high, low] });
+            }
+            (!numbers.is_empty()).then_some((*key, (numbers, values)))
+        })
+    }
+
     /// The row of intervals.
     pub fn grid(&self) -> GridJson {
         let last = self.series.values().filter_map(|series| series.values.keys().next_back()).max();
@@ -139,7 +163,9 @@ impl Store {
             intervals: last.map_or(0, |last| usize::from(*last) + 1),
         }
     }
+}
 
+impl Store {
     /// The series of a plot, with this many decimals.
     pub fn plot(
         &self,

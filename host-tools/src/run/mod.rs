@@ -6,7 +6,7 @@
 pub mod arrivals;
 pub mod emulate;
 pub mod ground;
-mod params;
+pub(crate) mod params;
 pub mod qemu;
 pub mod report;
 pub mod sim;

@@ -9,7 +9,7 @@ use hums_link::param_line::{self, Line};
 use crate::outcome::usage;
 
 /// The parameters that a file sets, in its order; none where there is no file.
-pub(super) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
+pub(crate) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("--params {}: cannot be read", path.display()))?;

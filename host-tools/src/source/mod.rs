@@ -37,7 +37,7 @@ pub struct Chunk {
 }
 
 /// A stream of chunks.
-pub trait Source {
+pub trait Source: Send {
     /// The next chunk; `None` at the end.
     fn next(&mut self) -> io::Result<Option<Chunk>>;
 

@@ -18,7 +18,7 @@ impl<R: Read> Raw<R> {
     }
 }
 
-impl<R: Read> Source for Raw<R> {
+impl<R: Read + Send> Source for Raw<R> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         let mut bytes = vec![0; CHUNK_BYTES];
         let got = super::read_some(&mut self.input, &mut bytes)?;

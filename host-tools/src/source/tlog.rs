@@ -164,7 +164,7 @@ impl<R: Read> Tlog<R> {
     }
 }
 
-impl<R: Read> Source for Tlog<R> {
+impl<R: Read + Send> Source for Tlog<R> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         Ok(match self.records.next_record()? {
             None => None,

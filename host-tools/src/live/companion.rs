@@ -1,0 +1,171 @@
+//! What a HUMS on board of the vehicle tells of itself over the link: the authority on what happened on board, because
+//! it hears every frame and this PC only what the radio carries. See `hums_link::summary` for what it sends.
+
+use hums_core::health::{Level, Subsystem};
+use hums_core::time::{Instant, Span};
+use hums_link::encode::COMPONENT;
+use hums_link::packet::Fields;
+use hums_link::{Check, Frame};
+use serde::Serialize;
+
+/// `HEARTBEAT`, `NAMED_VALUE_FLOAT`, `NAMED_VALUE_INT`.
+const HEARTBEAT: u32 = 0;
+const NAMED_FLOAT: u32 = 251;
+const NAMED_INT: u32 = 252;
+/// Five heartbeats missed: it is gone.
+const GONE: Span = Span::from_secs(5);
+/// The levels come every two seconds where the budget allows; over the slowest radio every half minute.
+const LEVELS_AGE_MAX: Span = Span::from_secs(60);
+
+/// What was heard.
+#[derive(Clone, Debug, Default)]
+pub struct Companion {
+    heard: Option<Instant>,
+    /// It named itself a HUMS by a value that only HUMS sends.
+    named: bool,
+    levels: Option<(Instant, [Level; Subsystem::ALL.len()])>,
+    overall: Option<Level>,
+    flight_s: Option<f32>,
+    flights: Option<f32>,
+    distance_m: Option<f32>,
+}
+
+/// As the page takes it.
+#[derive(Debug, Serialize)]
+pub struct CompanionJson {
+    heard_ms: u64,
+    gone: bool,
+    overall: Option<&'static str>,
+    /// By subsystem, in the order of the board.
+    levels: Option<Vec<&'static str>>,
+    levels_ms: Option<u64>,
+    recorder: Option<&'static str>,
+    flight_s: Option<f32>,
+    flights: Option<f32>,
+    distance_m: Option<f32>,
+}
+
+impl Companion {
+    /// Takes a frame of the vehicle's system.
+    pub fn frame(&mut self, at: Instant, frame: &Frame<'_>) {
+        if frame.component() != COMPONENT || frame.check() != Check::Verified {
+            return;
+        }
+        let mut payload = [0; 18];
+        for (to, from) in payload.iter_mut().zip(frame.payload()) {
+            *to = *from;
+        }
+        let fields = Fields(&payload);
+        match frame.id() {
+            HEARTBEAT => self.heard = Some(at),
+            NAMED_FLOAT => self.float(at, fields.text(8, 10).unwrap_or_default(), fields.f32(4)),
+            NAMED_INT if fields.text(8, 10) == Some("HUMS_STATE") => {
+                self.named = true;
+                self.heard = Some(at);
+                let packed = fields.u32(4);
+                let level = |index: usize| Level::from_number((packed >> (3 * index) & 7) as u8);
+                let levels = std::array::from_fn(|index| level(index).unwrap_or(Level::Stale));
+                self.levels = Some((at, levels));
+            }
+            _ => {}
+        }
+    }
+
+    fn float(&mut self, at: Instant, name: &str, value: f32) {
+        let value = Some(value).filter(|value| value.is_finite());
+        match name {
+            "HUMS_LEVEL" => {
+                self.named = true;
+                self.overall = value.and_then(|value| Level::from_number(value as u8));
+            }
+            "FLT_TIME_S" => self.flight_s = value,
+            "FLIGHTS" => self.flights = value,
+            "DIST_M" => self.distance_m = value,
+            _ => return,
+        }
+        self.heard = Some(at);
+    }
+
+    /// Whether there is one, and it is heard.
+    pub fn present(&self, now: Instant) -> bool {
+        self.named && self.heard.is_some_and(|at| now.since(at) <= GONE)
+    }
+
+    /// Whether there ever was one on this link.
+    pub fn known(&self) -> bool {
+        self.named
+    }
+
+    /// Its word on the whole vehicle, while it is heard.
+    pub fn overall(&self, now: Instant) -> Option<Level> {
+        self.overall.filter(|_| self.present(now))
+    }
+
+    /// Its word on a subsystem, unless it is too old to count.
+    pub fn level(&self, now: Instant, subsystem: Subsystem) -> Option<Level> {
+        let (at, levels) = self.levels.filter(|(at, _)| now.since(*at) <= LEVELS_AGE_MAX)?;
+        // Levels of one that is silent are nobody's.
+        if !self.present(now) || now.since(at) > LEVELS_AGE_MAX {
+            return None;
+        }
+        levels.get(subsystem as usize).copied()
+    }
+
+    /// As the page takes it; `None` where there never was one.
+    pub fn json(&self, now: Instant) -> Option<CompanionJson> {
+        let heard = self.heard.filter(|_| self.named)?;
+        let names = |levels: [Level; 9]| levels.into_iter().map(Level::name).collect();
+        Some(CompanionJson {
+            heard_ms: now.since(heard).as_millis(),
+            gone: !self.present(now),
+            overall: self.overall.map(Level::name),
+            levels: self.levels.map(|(_, levels)| names(levels)),
+            levels_ms: self.levels.map(|(at, _)| now.since(at).as_millis()),
+            recorder: self.level(now, Subsystem::Recorder).map(Level::name),
+            flight_s: self.flight_s,
+            flights: self.flights,
+            distance_m: self.distance_m,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::Monitor;
+    use hums_core::params::Params;
+    use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::{messages, packet, summary};
+
+    use super::*;
+
+    fn hear(companion: &mut Companion, at: Instant, packet: &packet::Packet) {
+        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut encoder = Encoder::new();
+        companion.frame(at, &Frame::parse(encoder.frame(&mut buffer, packet)).expect("a frame"));
+    }
+
+    #[test]
+    fn the_state_that_the_box_packs_is_unpacked_here() {
+        let (mut companion, at) = (Companion::default(), Instant::from_millis(1));
+        let monitor = Monitor::new(Params::defaults());
+        hear(&mut companion, at, &messages::heartbeat(4));
+        assert!(!companion.present(at), "any companion has heartbeats");
+        hear(&mut companion, at, &messages::named_int(at, "HUMS_STATE", summary::state(&monitor)));
+        for subsystem in Subsystem::ALL {
+            assert_eq!(companion.level(at, subsystem), Some(monitor.health().subsystem(subsystem)));
+        }
+        hear(&mut companion, at, &messages::named_int(at, "HUMS_STATE", 3 << 24 | 1));
+        assert_eq!(companion.level(at, Subsystem::Power), Some(Level::Advisory));
+        assert_eq!(companion.level(at, Subsystem::Recorder), Some(Level::Critical));
+    }
+
+    #[test]
+    fn one_that_falls_silent_is_no_authority_any_longer() {
+        let (mut companion, at) = (Companion::default(), Instant::from_millis(1));
+        hear(&mut companion, at, &messages::named_float(at, "HUMS_LEVEL", 2.0));
+        hear(&mut companion, at, &messages::named_int(at, "HUMS_STATE", 0));
+        assert!(companion.present(Instant::from_millis(5_000)));
+        assert_eq!(companion.level(Instant::from_millis(5_002), Subsystem::Power), None);
+        assert!(companion.json(Instant::from_millis(9_000)).expect("there was one").gone);
+    }
+}

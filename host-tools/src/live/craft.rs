@@ -1,0 +1,252 @@
+//! One vehicle: the same monitor that flies on board, on the frames that reach this PC, and what else is told of it.
+//!
+//! Small, and all of it can be copied: playback keeps copies to go back to. What grows is in [`super::history`].
+
+use std::collections::BTreeMap;
+
+use hums_core::Monitor;
+use hums_core::flight::Phase;
+use hums_core::happening::Happening;
+use hums_core::health::{Finding, Level, Subsystem};
+use hums_core::observation::{Observation, Source};
+use hums_core::params::Params;
+use hums_core::status::{RecorderStatus, Recording};
+use hums_core::time::{Instant, Span};
+use hums_link::sequence::Sequences;
+use hums_link::{Frame, observe, summary};
+
+use super::companion::Companion;
+use super::history::{History, Note, Plot};
+use super::texts::Texts;
+use super::values::Told;
+use crate::decode::reference::Reference;
+
+/// `STATUSTEXT`
+const STATUSTEXT: u32 = 253;
+/// By then a HUMS on board has told of itself.
+const SETTLE: Span = Span::from_secs(5);
+/// When the whole vehicle is silent for so long, that its ESCs are says nothing of them.
+const SILENT: Span = Span::from_secs(1);
+/// The check of that.
+const ESC_SILENT: &str = "esc_silent";
+/// How often the link's figures are kept for their plot.
+const LINK_EVERY: Span = Span::from_secs(1);
+
+/// What is known of a vehicle.
+#[derive(Clone, Debug)]
+pub struct Craft {
+    /// Vehicle, flight, health, usage.
+    pub monitor: Monitor,
+    /// The reference system's view of it.
+    pub reference: Reference,
+    /// When each of the reference system's quantities was told last.
+    pub told: Told,
+    /// A HUMS on board.
+    pub companion: Companion,
+    /// `RPM`, `RAW_RPM`: the first two sensors.
+    pub speed_sensors: [Option<(Instant, f32)>; 2],
+    /// The last finding of each check that is not well.
+    pub worries: BTreeMap<(&'static str, u8), Finding>,
+    /// When its autopilot was heard last.
+    pub heard: Instant,
+    /// Frames of its system, and how many of them are missing by their own count.
+    pub frames: u64,
+    /// See [`Self::frames`].
+    pub missing: u64,
+    /// The part of its frames that was lost in the last ten seconds.
+    pub loss: Option<f32>,
+    /// What its components say in words.
+    texts: Texts,
+    sequences: Sequences,
+    began: Instant,
+    link_at: Instant,
+}
+
+impl Craft {
+    /// A vehicle whose autopilot has just been heard.
+    pub fn new(at: Instant, params: &Params) -> Self {
+        Self {
+            monitor: Monitor::new(*params),
+            reference: Reference::new(),
+            told: Told::default(),
+            companion: Companion::default(),
+            speed_sensors: [None; 2],
+            worries: BTreeMap::new(),
+            heard: at,
+            frames: 0,
+            missing: 0,
+            loss: None,
+            texts: Texts::default(),
+            sequences: Sequences::new(),
+            began: at,
+            link_at: at,
+        }
+    }
+
+    /// Takes a frame of its system.
+    pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
+        self.frames += 1;
+        let lost = self.sequences.frame(at, frame);
+        if Some(Source { system: frame.system(), component: frame.component() }) == self.counted(at) {
+            self.missing += u64::from(lost);
+        }
+        let before = self.companion.known();
+        self.companion.frame(at, frame);
+        if !before && self.companion.known() {
+            // What was missing until now was left out by it.
+            self.missing = 0;
+        }
+        if frame.id() == STATUSTEXT {
+            self.texts.frame(at, frame, &mut |at, note| keep(history, at, note));
+        }
+        if let Some((source, observation)) = observe(frame) {
+            self.observe(at, source, &observation, history);
+        }
+    }
+
+    /// Takes what somebody said of it.
+    pub fn observe(
+        &mut self,
+        at: Instant,
+        source: Source,
+        observation: &Observation,
+        history: &mut Option<&mut History>,
+    ) {
+        if !self.monitor.observe(at, source, observation) || !self.reference.observe(at, source, observation)
+        {
+            return;
+        }
+        self.heard = at;
+        for (_, quantities) in self.reference.told_by(observation) {
+            for quantity in quantities {
+                if let Some(value) = self.reference.value(at, quantity) {
+                    self.told.set(at, quantity, value);
+                }
+            }
+        }
+        if let Observation::SpeedSensors(sensors) = observation {
+            for sensor in sensors.iter().flatten() {
+                if let Some(slot) = self.speed_sensors.get_mut(usize::from(sensor.index)) {
+                    *slot = Some((at, sensor.rpm.0));
+                }
+            }
+        }
+        if let Some(history) = history {
+            history.sample(at, &self.reference, observation);
+        }
+    }
+
+    /// Whether an observation of another component than the autopilot is one of the vehicle: a battery's, an ESC's.
+    pub fn told_by_part(&self, source: Source, observation: &Observation) -> bool {
+        let part =
+            matches!(observation, Observation::Battery(_) | Observation::Escs(_) | Observation::Engine(_));
+        part && self.monitor.vehicle().source.is_some_and(|vehicle| vehicle.system == source.system)
+    }
+
+    /// Whose sequence numbers tell what the link loses: a HUMS on board thins out what it forwards, which is no loss, so
+    /// its own count where there is one. Whether there is one shows within some seconds.
+    fn counted(&self, now: Instant) -> Option<Source> {
+        let autopilot = self.monitor.vehicle().source?;
+        if self.companion.known() {
+            return Some(Source { component: hums_link::encode::COMPONENT, ..autopilot });
+        }
+        (now.since(self.began) >= SETTLE).then_some(autopilot)
+    }
+
+    /// What time alone asks for, every [`hums_core::monitor::TICK`].
+    pub fn tick(
+        &mut self,
+        now: Instant,
+        history: &mut Option<&mut History>,
+        findings: &mut impl FnMut(&Finding),
+    ) {
+        let link = self.sequences.reading(now, self.counted(now));
+        self.loss = link.frames_lost;
+        // There is no card here: that the recording is well is the box's to say.
+        let recorder = RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() };
+        // A HUMS on board passes on what the radio can carry: that a stream is thin here says nothing of the vehicle.
+        let thin = self.companion.present(now);
+        let cut_off = now.since(self.heard) >= SILENT;
+        let Self { monitor, worries, .. } = self;
+        monitor.tick(now, &link, &recorder, &mut |finding| {
+            let silence = finding.level == Level::Stale
+                || (finding.level == Level::Ok && finding.previous == Level::Stale);
+            if finding.subsystem == Subsystem::Recorder || (thin && silence) {
+                return;
+            }
+            if cut_off && finding.check == ESC_SILENT {
+                return;
+            }
+            let key = (finding.check, finding.instance);
+            if finding.level == Level::Ok {
+                worries.remove(&key)
+            } else {
+                worries.insert(key, *finding)
+            };
+            keep(history, now, found(finding));
+            findings(finding);
+        });
+        while let Some(happening) = self.monitor.take_happening() {
+            if let Some(words) = told(happening) {
+                let note = Note {
+                    at_s: now.as_secs_f64(),
+                    kind: "event",
+                    level: "ok",
+                    from: "here".to_owned(),
+                    subsystem: "",
+                    words: words.to_owned(),
+                };
+                keep(history, now, note);
+            }
+        }
+        // Nobody takes these here, and they are made anew.
+        while self.monitor.take_snapshot(now).is_some() {}
+        self.texts.tick(now, &mut |at, note| keep(history, at, note));
+        if now.since(self.link_at) >= LINK_EVERY {
+            self.link_at = now;
+            if let (Some(history), Some(loss)) = (history, self.loss) {
+                history.push(now, (Plot::Loss, 0), loss * 100.0);
+            }
+        }
+    }
+
+    /// What it is doing.
+    pub fn phase(&self, now: Instant) -> Phase {
+        self.monitor.flight().phase(now, self.monitor.vehicle())
+    }
+}
+
+fn keep(history: &mut Option<&mut History>, at: Instant, note: Note) {
+    if let Some(history) = history {
+        history.note(at, note);
+    }
+}
+
+/// A finding of the checks here.
+fn found(finding: &Finding) -> Note {
+    Note {
+        at_s: finding.at.as_secs_f64(),
+        kind: "finding",
+        level: finding.level.name(),
+        from: "here".to_owned(),
+        subsystem: finding.subsystem.name(),
+        words: words(finding),
+    }
+}
+
+/// A finding in words.
+pub fn words(finding: &Finding) -> String {
+    summary::text(finding).as_str().trim_start_matches("HUMS: ").to_owned()
+}
+
+/// What a pilot wants to see on the time line.
+fn told(happening: Happening) -> Option<&'static str> {
+    match happening {
+        Happening::Armed => Some("armed"),
+        Happening::Disarmed => Some("disarmed"),
+        Happening::TakeOff => Some("take-off"),
+        Happening::Landing => Some("landing"),
+        Happening::AutopilotReboot => Some("the autopilot has rebooted"),
+        _ => None,
+    }
+}

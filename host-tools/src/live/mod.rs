@@ -1,0 +1,169 @@
+//! `hums live`: a page that shows the vehicle as it flies, from a link or from a recording.
+//!
+//! ```text
+//! link or recording -> frames -> world (a monitor a vehicle) -> hub -> server -> pages
+//!                                       \-> points -> InfluxDB
+//! ```
+//!
+//! Three threads: one follows the vehicle (`feed` on this PC's clock, `playback` on a recording's), one serves the pages,
+//! one writes to a database where that is wanted. The first waits for neither of the others: pages take the newest state
+//! and what they lack of the history (`hub`), points wait in memory and on disk (`influx`).
+
+pub mod assets;
+pub mod board;
+pub mod companion;
+pub mod craft;
+pub mod feed;
+pub mod guard;
+pub mod history;
+pub mod hub;
+pub mod influx;
+pub mod playback;
+pub mod recording;
+pub mod server;
+pub mod show;
+pub mod spool;
+pub mod texts;
+pub mod values;
+pub mod world;
+
+use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+use std::thread::JoinHandle;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use anyhow::{Context as _, Result, anyhow};
+use hums_core::params::Params;
+
+use self::feed::Feed;
+use self::guard::Guard;
+use self::hub::Hub;
+use self::influx::Influx;
+use self::influx::target::Target;
+use self::playback::Player;
+use crate::cli;
+use crate::interrupt;
+use crate::outcome::{Outcome, usage};
+
+/// Twenty times a second.
+const PUBLISH: Duration = Duration::from_millis(50);
+
+/// Runs `hums live`.
+pub fn run(args: &cli::Live) -> Result<Outcome> {
+    let mut params = Params::defaults();
+    for (spec, value) in crate::run::params::read(args.params.as_deref())? {
+        params.set(spec.name, value).map_err(|error| anyhow!("--params: {}: {error:?}", spec.name))?;
+    }
+    let influx = database(args)?;
+    let (listener, address) = listen(&args.listen)?;
+    let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);
+    let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
+    let (hub, commands) = Hub::new();
+    interrupt::watch();
+    let follower = follow(args, &params, &hub, commands, influx)?;
+    let page = page_address(address, token.as_deref());
+    println!("{page}");
+    if args.open {
+        open(&page);
+    }
+    let server = std::thread::Builder::new().name("pages".to_owned());
+    let server = server.spawn(move || server::serve(listener, hub, guard)).context("no thread")?;
+    // Whichever fails ends the program; both end with Ctrl-C.
+    while !server.is_finished() && !follower.is_finished() {
+        std::thread::sleep(PUBLISH);
+    }
+    if follower.is_finished() || interrupt::requested() {
+        let influx =
+            follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
+        return Ok(influx.map_or(Outcome::Done, finish));
+    }
+    server.join().map_err(|_| anyhow!("the server has failed"))??;
+    Ok(Outcome::Done)
+}
+
+type Follower = JoinHandle<Result<Option<Influx>>>;
+
+/// Starts the thread that follows the vehicle; what is wrong with the source is told at once.
+fn follow(
+    args: &cli::Live,
+    params: &Params,
+    hub: &Arc<Hub>,
+    commands: Receiver<hub::Command>,
+    influx: Option<Influx>,
+) -> Result<Follower> {
+    let thread = std::thread::Builder::new().name("vehicle".to_owned());
+    let hub = Arc::clone(hub);
+    let started = if args.input.is_live() {
+        let feed = Feed::open(&args.input, *params, hub, influx)?;
+        thread.spawn(move || Ok(feed.run()))
+    } else {
+        let opened = recording::open(&args.input)?;
+        let player = Player::new(&args.input.to_string(), *params, hub, commands, influx);
+        thread.spawn(move || player.run(opened))
+    };
+    started.context("no thread")
+}
+
+fn database(args: &cli::Live) -> Result<Option<Influx>> {
+    let Some(url) = &args.influx else {
+        if args.token.is_some() || args.org.is_some() {
+            return Err(usage("--token and --org are for --influx; the page's own token is --listen-token"));
+        }
+        return Ok(None);
+    };
+    let token = args.token.clone().or_else(|| std::env::var("HUMS_INFLUX_TOKEN").ok());
+    let target = Target::new(url, token.as_deref(), args.org.as_deref(), &args.bucket)?;
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    // As good as unique among the sessions of one vehicle, and in their order.
+    let session = format!("s{:08x}", now.as_secs() as u32);
+    Ok(Some(Influx::start(target, session)?))
+}
+
+fn finish(influx: Influx) -> Outcome {
+    let figures = influx.finish();
+    let missing = figures.waiting + figures.lost + figures.rejected;
+    eprintln!("{} points written", figures.written);
+    if missing > 0 {
+        eprintln!("{missing} points are not in the database: {}", figures.trouble);
+    }
+    Outcome::lossy(missing > 0)
+}
+
+fn listen(text: &str) -> Result<(TcpListener, SocketAddr)> {
+    let wrong = || usage(format!("--listen `{text}` is not ADDR:PORT, for instance 127.0.0.1:8080"));
+    let addresses = text.to_socket_addrs().map_err(|_| wrong())?;
+    let address = addresses.into_iter().next().ok_or_else(wrong)?;
+    let listener = TcpListener::bind(address).with_context(|| {
+        format!("--listen {address}: cannot listen there; 127.0.0.1:0 takes any free port")
+    })?;
+    let address = listener.local_addr()?;
+    Ok((listener, address))
+}
+
+/// What to type into a browser. The token stands behind the `#`, which a browser sends to nobody.
+fn page_address(address: SocketAddr, token: Option<&str>) -> String {
+    let token = token.map_or_else(String::new, |token| format!("#token={token}"));
+    if address.ip().is_unspecified() {
+        // Every address of this PC; the one that others reach it by is not ours to guess.
+        return format!("http://localhost:{}/{token}", address.port());
+    }
+    format!("http://{address}/{token}")
+}
+
+/// Shows the page in the user's browser; without one the address stands there anyway.
+fn open(page: &str) {
+    let (program, first): (&str, &[&str]) = if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else if cfg!(windows) {
+        ("cmd", &["/C", "start", ""])
+    } else {
+        ("xdg-open", &[])
+    };
+    let mut command = Command::new(program);
+    command.args(first).arg(page).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    if command.spawn().is_err() {
+        eprintln!("no browser was found: open the address above");
+    }
+}

@@ -1,0 +1,277 @@
+//! A recording or a HUMS log, played: read through once at the start, which makes the whole history, the time line and
+//! copies of the vehicles' state to go back to; then played at any speed, from any place.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant as Wall};
+
+use anyhow::{Context as _, Result};
+use hums_core::params::Params;
+use hums_core::time::{Instant, Span};
+use hums_link::Frame;
+
+use super::PUBLISH;
+use super::feed::Rate;
+use super::hub::{Command, Hub, Published};
+use super::influx::{Figures, Influx};
+use super::recording::{self, Opened};
+use super::show::{self, Around, SourceJson};
+use super::spool::{Spool, SpoolWriter, Spooled};
+use super::world::World;
+use crate::interrupt;
+
+/// Copies of the state at most; when they are this many, every second one goes.
+const COPIES_MAX: usize = 128;
+/// The first distance between two.
+const COPY_EVERY: Span = Span::from_secs(5);
+/// Speeds that make sense.
+const SPEEDS: (f64, f64) = (0.1, 64.0);
+/// Frames between two looks at the clock while reading.
+const LOOK_EVERY: u64 = 4_096;
+
+/// The state at a moment, and where the recording goes on from there.
+#[derive(Debug)]
+struct Copy {
+    at: Instant,
+    offset: u64,
+    world: World,
+}
+
+/// A recording that was read.
+#[derive(Debug)]
+struct Loaded {
+    spool: Spool,
+    copies: Vec<Copy>,
+    start: Instant,
+    end: Instant,
+    frames: u64,
+}
+
+/// Plays a recording until Ctrl-C.
+pub struct Player {
+    hub: Arc<Hub>,
+    commands: Receiver<Command>,
+    params: Params,
+    source: SourceJson,
+    epoch_us: Option<u64>,
+    influx: Option<Influx>,
+    rate: Rate,
+    /// Counts how often the time went back.
+    epoch: u64,
+    timeline: Arc<str>,
+}
+
+impl Player {
+    /// What the pages see, and where they ask.
+    pub fn new(
+        name: &str,
+        params: Params,
+        hub: Arc<Hub>,
+        commands: Receiver<Command>,
+        influx: Option<Influx>,
+    ) -> Self {
+        let source = SourceJson {
+            name: name.to_owned(),
+            recording: true,
+            phase: "reading",
+            speed: 1.0,
+            ..SourceJson::default()
+        };
+        let (rate, timeline) = (Rate::default(), Arc::default());
+        Self { hub, commands, params, source, epoch_us: None, influx, rate, epoch: 0, timeline }
+    }
+
+    /// Runs until Ctrl-C; gives what is still to be written. A recording that cannot be read is told on the page too.
+    pub fn run(mut self, mut opened: Opened) -> Result<Option<Influx>> {
+        let mut loaded =
+            self.load(&mut opened).with_context(|| format!("{}: cannot be read", self.source.name))?;
+        drop(opened);
+        self.play(&mut loaded)?;
+        Ok(self.influx)
+    }
+
+    /// Reads it through.
+    fn load(&mut self, opened: &mut Opened) -> Result<Loaded> {
+        let mut world = World::new(self.params);
+        let mut writer = SpoolWriter::new()?;
+        let (mut copies, mut copy_every) = (Vec::new(), COPY_EVERY);
+        let (mut start, mut end, mut frames) = (None, Instant::ZERO, 0_u64);
+        let mut shown = Wall::now();
+        let Self { hub, influx, source, epoch_us, .. } = self;
+        // `Ctrl-C` ends a long reading too.
+        recording::each(opened, &mut |at, epoch, progress, frame| -> io::Result<bool> {
+            *epoch_us = epoch.or(*epoch_us);
+            if start.is_none() {
+                start = Some(at);
+                world.begin(at);
+            }
+            let due = copies.last().is_none_or(|copy: &Copy| at.since(copy.at) >= copy_every);
+            if due {
+                if copies.len() >= COPIES_MAX {
+                    let mut odd = false;
+                    copies.retain(|_| {
+                        odd = !odd;
+                        odd
+                    });
+                    copy_every = copy_every + copy_every;
+                }
+                copies.push(Copy { at, offset: writer.offset(), world: world.clone() });
+            }
+            writer.push(Spooled { at, check: frame.check(), bytes: frame.bytes() })?;
+            world.frame(at, frame, Some(&mut hub.histories()));
+            if let Some(influx) = influx {
+                influx.frame(at, epoch_us.unwrap_or(0), frame, &world);
+                influx.found(epoch_us.unwrap_or(0), &world);
+                influx.usage(at, epoch_us.unwrap_or(0), &world);
+            }
+            world.found.clear();
+            frames += 1;
+            end = end.max(at);
+            if frames.is_multiple_of(LOOK_EVERY) && shown.elapsed() >= PUBLISH {
+                shown = Wall::now();
+                source.progress = progress;
+                let around = Around { source, epoch_us: None, frames_s: 0.0, influx: None };
+                hub.publish(Published {
+                    head: show::head(&World::new(Params::defaults()), Instant::ZERO, &around),
+                    ..Published::default()
+                });
+            }
+            Ok(!interrupt::requested())
+        })?;
+        let start = start.unwrap_or_default();
+        (self.source.start_s, self.source.end_s) = (start.as_secs_f64(), end.as_secs_f64());
+        self.timeline = timeline(hub);
+        self.rate = Rate::default();
+        Ok(Loaded { spool: writer.finish()?, copies, start, end, frames })
+    }
+
+    /// Plays it, as the pages ask.
+    fn play(&mut self, loaded: &mut Loaded) -> Result<()> {
+        let mut world = World::new(self.params);
+        world.begin(loaded.start);
+        let mut now = loaded.start;
+        self.source.phase = if loaded.frames == 0 { "ended" } else { "playing" };
+        if loaded.frames == 0 {
+            "there is no frame in it".clone_into(&mut self.source.words);
+        }
+        let (mut before, mut turn) = (Wall::now(), Wall::now());
+        while !interrupt::requested() {
+            let wait = turn.saturating_duration_since(Wall::now());
+            match self.commands.recv_timeout(wait) {
+                Ok(command) => {
+                    self.obey(command, loaded, &mut world, &mut now)?;
+                    before = Wall::now();
+                    // Seen at once.
+                    self.publish(&world, now);
+                    continue;
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                // The hub lives as long as we do.
+                Err(RecvTimeoutError::Disconnected) => std::thread::sleep(PUBLISH),
+            }
+            let passed = before.elapsed();
+            before = Wall::now();
+            turn = (turn + PUBLISH).max(before);
+            if self.source.phase == "playing" {
+                // A PC that was asleep, or too slow for this speed, goes on from where it was.
+                let passed_us = passed.min(Duration::from_millis(250)).as_micros() as f64 * self.source.speed;
+                now = (now + Span::from_micros(passed_us as u64)).min(loaded.end);
+                follow(&mut loaded.spool, &mut world, now)?;
+                if now >= loaded.end {
+                    self.source.phase = "ended";
+                }
+            }
+            self.publish(&world, now);
+        }
+        Ok(())
+    }
+
+    fn obey(
+        &mut self,
+        command: Command,
+        loaded: &mut Loaded,
+        world: &mut World,
+        now: &mut Instant,
+    ) -> Result<()> {
+        match command {
+            Command::Pause if self.source.phase == "playing" => self.source.phase = "paused",
+            Command::Play => {
+                if self.source.phase == "ended" {
+                    self.seek(loaded.start, loaded, world, now)?;
+                }
+                self.source.phase = "playing";
+            }
+            Command::Speed(speed) if speed.is_finite() => self.source.speed = speed.clamp(SPEEDS.0, SPEEDS.1),
+            Command::Seek(to_s) if to_s.is_finite() => {
+                let to = Instant::from_micros((to_s.max(0.0) * 1e6) as u64).clamp(loaded.start, loaded.end);
+                self.seek(to, loaded, world, now)?;
+                if self.source.phase == "ended" && to < loaded.end {
+                    self.source.phase = "paused";
+                }
+            }
+            // Nothing to be paused, and times that are no numbers.
+            Command::Pause | Command::Speed(_) | Command::Seek(_) => {}
+        }
+        Ok(())
+    }
+
+    /// Goes to a time: from the last copy before it, or on from here where that is nearer.
+    fn seek(&mut self, to: Instant, loaded: &mut Loaded, world: &mut World, now: &mut Instant) -> Result<()> {
+        let copy = loaded.copies.iter().rev().find(|copy| copy.at <= to);
+        if to < *now {
+            self.epoch += 1;
+        }
+        match copy {
+            Some(copy) if to < *now || copy.at > *now => {
+                *world = copy.world.clone();
+                loaded.spool.seek(copy.offset)?;
+            }
+            None => {
+                *world = World::new(self.params);
+                world.begin(loaded.start);
+                loaded.spool.seek(0)?;
+            }
+            Some(_) => {}
+        }
+        *now = to;
+        follow(&mut loaded.spool, world, to)?;
+        Ok(())
+    }
+
+    fn publish(&mut self, world: &World, now: Instant) {
+        self.rate.count(world.frames);
+        let around = Around {
+            source: &self.source,
+            epoch_us: self.epoch_us,
+            frames_s: self.rate.frames_s,
+            influx: self.influx.as_mut().map(Influx::figures) as Option<Figures>,
+        };
+        self.hub.publish(Published {
+            epoch: self.epoch,
+            now,
+            head: show::head(world, now, &around),
+            timeline: Arc::clone(&self.timeline),
+            crafts: show::crafts(world, now),
+        });
+    }
+}
+
+/// Takes what came by `now`.
+fn follow(spool: &mut Spool, world: &mut World, now: Instant) -> io::Result<()> {
+    while let Some(Spooled { at, check, bytes }) = spool.next_until(now)? {
+        if let Some(frame) = Frame::again(bytes, check) {
+            world.frame(at, &frame, None);
+        }
+    }
+    world.advance(now, None);
+    world.found.clear();
+    Ok(())
+}
+
+/// Findings and events of each vehicle, for the time line.
+fn timeline(hub: &Hub) -> Arc<str> {
+    let marks: std::collections::BTreeMap<u8, _> =
+        hub.histories().iter().map(|(system, history)| (*system, history.marks())).collect();
+    serde_json::json!({ "t": "timeline", "marks": marks }).to_string().into()
+}

@@ -1,0 +1,234 @@
+//! The page, and the one connection that carries its data: a WebSocket.
+//!
+//! Each page has a task that looks at the newest state when it can send, so a slow one skips states; a page that takes
+//! nothing for [`PATIENCE`] is dropped.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use anyhow::{Context as _, Result};
+use axum::Router;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Path, RawQuery, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::Deserialize;
+use tokio::net::TcpListener;
+
+use super::assets;
+use super::guard::Guard;
+use super::history::Cursor;
+use super::hub::{Command, Hub, Published};
+use crate::interrupt;
+
+/// Pages at once.
+const PAGES_MAX: usize = 16;
+/// What a page may send at once: its commands are short.
+const COMMAND_BYTES_MAX: usize = 1_024;
+/// A page that takes nothing for so long is gone.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// How soon Ctrl-C is noticed.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Only what is our own, nothing written into the page, no foreign frame around it.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; \
+                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+#[derive(Clone)]
+struct Shared {
+    hub: Arc<Hub>,
+    guard: Guard,
+    pages: Arc<AtomicUsize>,
+}
+
+/// Serves pages until Ctrl-C.
+pub fn serve(listener: std::net::TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("no runtime")?;
+    runtime.block_on(async move {
+        listener.set_nonblocking(true)?;
+        let listener = TcpListener::from_std(listener)?;
+        let shared = Shared { hub, guard, pages: Arc::default() };
+        let router = Router::new()
+            .route("/", get(index))
+            .route("/ws", get(connect))
+            .route("/{name}", get(asset))
+            .layer(middleware::from_fn_with_state(shared.clone(), check))
+            .with_state(shared);
+        tokio::select! {
+            served = async { axum::serve(listener, router).await } => served.context("the server has ended"),
+            () = interrupted() => Ok(()),
+        }
+    })
+}
+
+async fn interrupted() {
+    while !interrupt::requested() {
+        tokio::time::sleep(LOOK).await;
+    }
+}
+
+/// What holds for every request and every answer.
+async fn check(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    let headers = request.headers();
+    let mut response = if !shared.guard.knows_host(headers) {
+        (StatusCode::FORBIDDEN, "This server is asked by its address only.\n").into_response()
+    } else if !shared.guard.knows_origin(headers) {
+        (StatusCode::FORBIDDEN, "Other pages may not ask this server.\n").into_response()
+    } else {
+        next.run(request).await
+    };
+    let fixed = [
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::CACHE_CONTROL, "no-store"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+        (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
+    ];
+    for (name, value) in fixed {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+async fn index() -> Response {
+    found("index.html")
+}
+
+async fn asset(Path(name): Path<String>) -> Response {
+    found(&name)
+}
+
+fn found(name: &str) -> Response {
+    match assets::find(name) {
+        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
+        None => (StatusCode::NOT_FOUND, "There is no such thing here.\n").into_response(),
+    }
+}
+
+async fn connect(
+    State(shared): State<Shared>,
+    RawQuery(query): RawQuery,
+    _: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    if !shared.guard.knows_token(query.as_deref()) {
+        return (StatusCode::UNAUTHORIZED, "The token is missing or wrong.\n").into_response();
+    }
+    if shared.pages.fetch_add(1, Ordering::SeqCst) >= PAGES_MAX {
+        shared.pages.fetch_sub(1, Ordering::SeqCst);
+        return (StatusCode::SERVICE_UNAVAILABLE, "Too many pages are open.\n").into_response();
+    }
+    upgrade.max_message_size(COMMAND_BYTES_MAX).max_frame_size(COMMAND_BYTES_MAX).on_upgrade(
+        async move |socket| {
+            Page::new(&shared.hub).run(socket, &shared.hub).await;
+            shared.pages.fetch_sub(1, Ordering::SeqCst);
+        },
+    )
+}
+
+/// What a page sends.
+#[derive(Debug, Deserialize)]
+#[serde(tag = "cmd", rename_all = "lowercase")]
+enum Asked {
+    Vehicle { system: u8 },
+    Pause,
+    Play,
+    Seek { to: f64 },
+    Speed { to: f64 },
+}
+
+/// One page, and what it has.
+struct Page {
+    follow: tokio::sync::watch::Receiver<Arc<Published>>,
+    vehicle: Option<u8>,
+    cursor: Cursor,
+    epoch: u64,
+    timeline: Arc<str>,
+}
+
+impl Page {
+    fn new(hub: &Hub) -> Self {
+        Self {
+            follow: hub.follow(),
+            vehicle: None,
+            cursor: Cursor::default(),
+            epoch: 0,
+            timeline: Arc::default(),
+        }
+    }
+
+    async fn run(mut self, mut socket: WebSocket, hub: &Hub) {
+        self.follow.mark_changed();
+        loop {
+            let messages = tokio::select! {
+                received = socket.recv() => match received {
+                    Some(Ok(Message::Text(text))) => {
+                        self.obey(text.as_str(), hub);
+                        Vec::new()
+                    }
+                    Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_))) => Vec::new(),
+                    Some(Ok(Message::Close(_)) | Err(_)) | None => return,
+                },
+                changed = self.follow.changed() => match changed {
+                    Ok(()) => self.news(hub),
+                    Err(_) => return,
+                },
+            };
+            for text in messages {
+                let sent = tokio::time::timeout(PATIENCE, socket.send(Message::Text(text.into()))).await;
+                if !matches!(sent, Ok(Ok(()))) {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// What cannot be read asks for nothing.
+    fn obey(&mut self, text: &str, hub: &Hub) {
+        let command = match serde_json::from_str(text) {
+            Ok(Asked::Vehicle { system }) => {
+                self.vehicle = Some(system);
+                self.cursor = Cursor::default();
+                self.follow.mark_changed();
+                return;
+            }
+            Ok(Asked::Pause) => Command::Pause,
+            Ok(Asked::Play) => Command::Play,
+            Ok(Asked::Seek { to }) => Command::Seek(to),
+            Ok(Asked::Speed { to }) => Command::Speed(to),
+            Err(_) => return,
+        };
+        hub.command(command);
+    }
+
+    /// The newest state, and what this page lacks of the history.
+    fn news(&mut self, hub: &Hub) -> Vec<String> {
+        let published = Arc::clone(&self.follow.borrow_and_update());
+        if published.epoch != self.epoch {
+            self.epoch = published.epoch;
+            self.cursor = Cursor::default();
+        }
+        let mut messages = vec![published.head.clone()];
+        if !Arc::ptr_eq(&self.timeline, &published.timeline) && !published.timeline.is_empty() {
+            self.timeline = Arc::clone(&published.timeline);
+            messages.push(self.timeline.to_string());
+        }
+        let wanted =
+            self.vehicle.and_then(|wanted| published.crafts.iter().find(|(system, _)| *system == wanted));
+        if let Some((system, state)) = wanted.or_else(|| published.crafts.first()) {
+            if self.vehicle != Some(*system) {
+                self.vehicle = Some(*system);
+                self.cursor = Cursor::default();
+            }
+            let part = hub.since(*system, &mut self.cursor, published.now);
+            messages.extend(part.and_then(|part| serde_json::to_string(&part).ok()));
+            messages.push(state.clone());
+        }
+        messages.retain(|message| !message.is_empty());
+        messages
+    }
+}

@@ -1,0 +1,228 @@
+//! What is known now as the text that pages take.
+
+use std::collections::BTreeMap;
+
+use hums_core::component::COMPONENTS_MAX;
+use hums_core::params::Param;
+use hums_core::time::Instant;
+use hums_core::usage::UsageCounter;
+use serde::Serialize;
+
+use super::board;
+use super::companion::CompanionJson;
+use super::craft::Craft;
+use super::values::{Motors, Values};
+use super::world::World;
+use crate::info::json::{autopilot_name, type_name};
+
+/// Where the bytes come from, and what they are doing.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct SourceJson {
+    /// As the command line names it.
+    pub name: String,
+    /// A recording can be paused, sought and played at other speeds.
+    pub recording: bool,
+    /// `waiting`, `live`, `silent`, `lost`, `reading`, `playing`, `paused`, `ended` or `failed`.
+    pub phase: &'static str,
+    /// More about it, in words.
+    pub words: String,
+    /// Of reading, 0 to 1.
+    pub progress: f64,
+    /// A recording's beginning and end, seconds.
+    pub start_s: f64,
+    /// See `start_s`.
+    pub end_s: f64,
+    /// Seconds a second.
+    pub speed: f64,
+}
+
+#[derive(Serialize)]
+struct Head<'a> {
+    t: &'static str,
+    source: &'a SourceJson,
+    now_s: f64,
+    /// UTC now, milliseconds since 1970, where it is known.
+    utc_ms: Option<u64>,
+    frames: u64,
+    frames_s: f64,
+    unverified: u64,
+    refused: u64,
+    vehicles: Vec<VehicleJson>,
+    influx: Option<&'a super::influx::Figures>,
+}
+
+#[derive(Serialize)]
+struct VehicleJson {
+    system: u8,
+    name: String,
+    overall: &'static str,
+    heard_ms: u64,
+}
+
+/// What the head tells besides the world.
+#[derive(Clone, Debug)]
+pub struct Around<'a> {
+    /// The source.
+    pub source: &'a SourceJson,
+    /// UTC of time zero, microseconds since 1970.
+    pub epoch_us: Option<u64>,
+    /// Frames a second, lately.
+    pub frames_s: f64,
+    /// What goes to a database.
+    pub influx: Option<super::influx::Figures>,
+}
+
+/// Source, time and vehicles.
+pub fn head(world: &World, now: Instant, around: &Around<'_>) -> String {
+    let vehicles = world.crafts.iter().map(|(system, craft)| VehicleJson {
+        system: *system,
+        name: name(craft),
+        overall: board::overall(craft, now),
+        heard_ms: now.since(craft.heard).as_millis(),
+    });
+    text(&Head {
+        t: "head",
+        source: around.source,
+        now_s: now.as_secs_f64(),
+        utc_ms: around.epoch_us.map(|epoch| epoch.saturating_add(now.as_micros()) / 1000),
+        frames: world.frames,
+        frames_s: around.frames_s,
+        unverified: world.unverified,
+        refused: world.refused,
+        vehicles: vehicles.collect(),
+        influx: around.influx.as_ref(),
+    })
+}
+
+/// Each vehicle by system id.
+pub fn crafts(world: &World, now: Instant) -> Vec<(u8, String)> {
+    world.crafts.iter().map(|(system, craft)| (*system, state(*system, craft, now))).collect()
+}
+
+#[derive(Serialize)]
+struct State<'a> {
+    t: &'static str,
+    vehicle: u8,
+    now_s: f64,
+    name: String,
+    firmware: Option<String>,
+    armed: bool,
+    airborne: bool,
+    phase: &'static str,
+    overall: &'static str,
+    heard_ms: u64,
+    px4: bool,
+    values: Values<'a>,
+    motors: Motors<'a>,
+    cells: Vec<f32>,
+    board: Vec<board::Part>,
+    usage: BTreeMap<&'static str, f64>,
+    components: Vec<ComponentJson>,
+    link: LinkJson,
+    companion: Option<CompanionJson>,
+    limits: BTreeMap<&'static str, [f32; 2]>,
+}
+
+#[derive(Serialize)]
+struct LinkJson {
+    frames: u64,
+    missing: u64,
+    loss_percent: Option<f32>,
+    reboots: u32,
+}
+
+#[derive(Serialize)]
+struct ComponentJson {
+    kind: &'static str,
+    number: u8,
+    name: String,
+    status: &'static str,
+    used_percent: Option<f32>,
+    flight_h: f64,
+    motor_h: f64,
+    flights: f64,
+}
+
+fn state(system: u8, craft: &Craft, now: Instant) -> String {
+    let vehicle = craft.monitor.vehicle();
+    let heartbeat = vehicle.heartbeat.get().copied().unwrap_or_default();
+    let px4 = heartbeat.autopilot == hums_core::observation::Autopilot::Px4;
+    let identity = vehicle.identity.get().filter(|identity| identity.firmware != 0);
+    let [major, minor, patch, _] = identity.map_or(0, |identity| identity.firmware).to_be_bytes();
+    text(&State {
+        t: "state",
+        vehicle: system,
+        now_s: now.as_secs_f64(),
+        name: name(craft),
+        firmware: identity.map(|_| format!("{major}.{minor}.{patch}")),
+        armed: heartbeat.armed,
+        airborne: craft.monitor.flight().airborne(),
+        phase: craft.phase(now).name(),
+        overall: board::overall(craft, now),
+        heard_ms: now.since(craft.heard).as_millis(),
+        px4,
+        values: Values::of(craft, now),
+        motors: Motors(Values::of(craft, now)),
+        cells: vehicle.batteries[0]
+            .get()
+            .map(|battery| battery.cells.iter().flatten().map(|volts| volts.0).collect())
+            .unwrap_or_default(),
+        board: board::of(craft, now),
+        usage: usage(craft),
+        components: components(craft),
+        link: LinkJson {
+            frames: craft.frames,
+            missing: craft.missing,
+            loss_percent: craft.loss.map(|loss| loss * 100.0),
+            reboots: vehicle.reboots,
+        },
+        companion: craft.companion.json(now),
+        limits: limits(craft, px4),
+    })
+}
+
+fn name(craft: &Craft) -> String {
+    let heartbeat = craft.monitor.vehicle().heartbeat.get().copied().unwrap_or_default();
+    format!("{} {}", autopilot_name(heartbeat.autopilot_number), type_name(heartbeat.type_number))
+}
+
+/// The counters of this session that have something to say.
+fn usage(craft: &Craft) -> BTreeMap<&'static str, f64> {
+    let value = |counter: &UsageCounter| Some((counter.name(), craft.monitor.usage().value(*counter)?));
+    UsageCounter::ALL.iter().filter_map(value).collect()
+}
+
+fn components(craft: &Craft) -> Vec<ComponentJson> {
+    let json = |place: usize| {
+        let component = craft.monitor.components().get(place)?;
+        let (figures, status) = craft.monitor.component_figures(place)?;
+        Some(ComponentJson {
+            kind: component.kind.name(),
+            number: component.number,
+            name: component.name.as_str().to_owned(),
+            status: status.name(),
+            used_percent: craft.monitor.component_used_percent(place).filter(|percent| percent.is_finite()),
+            flight_h: figures.flight_s / 3_600.0,
+            motor_h: figures.motor_s / 3_600.0,
+            flights: figures.flights,
+        })
+    };
+    (0..COMPONENTS_MAX).filter_map(json).collect()
+}
+
+/// Where the gauges change their colour: the limits of warning and of critical.
+fn limits(craft: &Craft, px4: bool) -> BTreeMap<&'static str, [f32; 2]> {
+    let of = |warning, critical| [craft.monitor.params().get(warning), craft.monitor.params().get(critical)];
+    let vibration =
+        if px4 { of(Param::VibePx4Warn, Param::VibePx4Crit) } else { of(Param::VibeWarn, Param::VibeCrit) };
+    BTreeMap::from([
+        ("battery_percent", of(Param::BatRemWarn, Param::BatRemCrit)),
+        ("cell_volts", of(Param::CellVoltWarn, Param::CellVoltCrit)),
+        ("vibration", vibration),
+    ])
+}
+
+/// Structures of strings and numbers always become JSON.
+fn text(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
+}

@@ -1,0 +1,428 @@
+//! `hums live` in Chromium: on a recorded flight, and on a link.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{TcpStream, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use hums_tests::flights::{Manifest, own};
+use hums_tests::frames::build_v2;
+use hums_tests::live::{Live, Running, free_port};
+use hums_tests::oracle::LivePage;
+use hums_tests::program::{command, hums};
+use serde_json::{Value, json};
+
+/// A number as the page prints it.
+fn number(text: &str) -> f64 {
+    let plain: String =
+        text.chars().filter(|c| *c != '\u{202f}').map(|c| if c == '\u{2212}' { '-' } else { c }).collect();
+    plain.parse().unwrap_or_else(|_| panic!("no number: {text:?}"))
+}
+
+fn shown(page: &Value, name: &str) -> f64 {
+    number(page["values"][name].as_str().unwrap_or_else(|| panic!("the page has no {name}")))
+}
+
+/// Every frame of a recording as an independent reader's fields, by the way of a packed log.
+fn frames(recording: &Path) -> Vec<Value> {
+    let dir = tempfile::tempdir().unwrap();
+    let (log, out) = (dir.path().join("flight.hum"), dir.path().join("flight.jsonl"));
+    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0]);
+    let format = ["--format".as_ref(), "jsonl".as_ref()];
+    hums([&["decode".as_ref(), log.as_os_str(), "-o".as_ref(), out.as_os_str()][..], &format].concat())
+        .expect_code(&[0]);
+    let text = std::fs::read_to_string(out).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// What of a recording comes after its first so many seconds.
+fn cut(recording: &Path, from_s: f64, to: &Path) -> PathBuf {
+    let data = std::fs::read(recording).unwrap();
+    let frames = hums_tests::frames::of_tlog(&data, &Manifest::own().seeds, false);
+    let start_us = frames[0].time_us.unwrap() + (from_s * 1e6) as u64;
+    let late = frames.iter().filter(|frame| frame.time_us.unwrap() >= start_us);
+    let bytes = late.flat_map(|frame| [&frame.time_us.unwrap().to_be_bytes()[..], frame.bytes].concat());
+    std::fs::write(to, bytes.collect::<Vec<u8>>()).unwrap();
+    to.to_owned()
+}
+
+/// The vehicle's last message of a name by a time.
+fn last<'a>(frames: &'a [Value], message: &str, by_s: f64) -> &'a Value {
+    let of_vehicle = |frame: &&Value| frame["message"] == message && frame["component"] == 1;
+    let by = |frame: &&Value| frame["time_boot"].as_f64().unwrap() <= by_s;
+    let found = frames.iter().filter(of_vehicle).rfind(by);
+    &found.unwrap_or_else(|| panic!("no {message} by {by_s} s"))["fields"]
+}
+
+/// What a panel shows, of which message and how finely, and the value by the message's fields.
+type Panel = (&'static str, &'static str, f64, fn(&Value) -> f64);
+
+fn of(fields: &Value, name: &str) -> f64 {
+    fields[name].as_f64().unwrap_or_else(|| panic!("no {name} in {fields}"))
+}
+
+const PANELS: [Panel; 24] = [
+    ("battery_volts", "BATTERY_STATUS", 0.01, |f| f["voltages"][0].as_f64().unwrap() / 1e3),
+    ("battery_percent", "BATTERY_STATUS", 1.0, |f| of(f, "battery_remaining")),
+    ("battery_amperes", "BATTERY_STATUS", 0.01, |f| of(f, "current_battery") / 100.0),
+    ("pressure", "SCALED_PRESSURE", 1.0, |f| of(f, "press_abs")),
+    ("temperature", "SCALED_PRESSURE", 0.1, |f| of(f, "temperature") / 100.0),
+    ("esc_rpm:2", "ESC_TELEMETRY_1_TO_4", 1.0, |f| f["rpm"][2].as_f64().unwrap()),
+    ("esc_amperes:1", "ESC_TELEMETRY_1_TO_4", 0.1, |f| f["current"][1].as_f64().unwrap() / 100.0),
+    ("esc_volts:0", "ESC_TELEMETRY_1_TO_4", 0.01, |f| f["voltage"][0].as_f64().unwrap() / 100.0),
+    ("airspeed", "VFR_HUD", 0.1, |f| of(f, "airspeed")),
+    ("groundspeed", "VFR_HUD", 0.1, |f| of(f, "groundspeed")),
+    ("heading", "VFR_HUD", 1.0, |f| of(f, "heading")),
+    ("throttle", "VFR_HUD", 1.0, |f| of(f, "throttle")),
+    ("climb", "VFR_HUD", 0.1, |f| of(f, "climb")),
+    ("velocity_module", "LOCAL_POSITION_NED", 0.1, |f| of(f, "vx").hypot(of(f, "vy")).hypot(of(f, "vz"))),
+    ("velocity:0", "LOCAL_POSITION_NED", 0.01, |f| of(f, "vx")),
+    ("velocity:2", "LOCAL_POSITION_NED", 0.01, |f| of(f, "vz")),
+    ("altitude", "GPS_RAW_INT", 0.1, |f| of(f, "alt") / 1e3),
+    ("latitude", "GPS_RAW_INT", 1e-7, |f| of(f, "lat") / 1e7),
+    ("longitude", "GPS_RAW_INT", 1e-7, |f| of(f, "lon") / 1e7),
+    ("satellites", "GPS_RAW_INT", 1.0, |f| of(f, "satellites_visible")),
+    ("roll", "ATTITUDE", 0.1, |f| of(f, "roll").to_degrees()),
+    ("pitch", "ATTITUDE", 0.1, |f| of(f, "pitch").to_degrees()),
+    ("height", "GLOBAL_POSITION_INT", 0.1, |f| of(f, "relative_alt") / 1e3),
+    ("vibration_2", "VIBRATION", 0.1, |f| of(f, "vibration_z")),
+];
+
+#[track_caller]
+fn assert_shows(page: &Value, frames: &[Value]) {
+    // A packed log keeps whole milliseconds.
+    let now_s = page["now"].as_f64().unwrap() + 0.0005;
+    for (name, message, resolution, value) in PANELS {
+        let (says, wanted) = (shown(page, name), value(last(frames, message, now_s)));
+        assert!(
+            (says - wanted).abs() <= resolution * 0.51,
+            "{name} says {says} at {now_s} s, {message} says {wanted}"
+        );
+    }
+}
+
+/// Goes to a time of a recording, as a hand on the slider would.
+fn seek(page: &mut LivePage, to_s: f64) -> Value {
+    page.run(&format!(
+        "const s = document.querySelector('input[type=range]'); s.value = {to_s}; \
+         s.dispatchEvent(new Event('input')); s.dispatchEvent(new Event('change'));"
+    ));
+    page.wait(&format!("return Math.abs(document.documentElement.dataset.now - {to_s}) < 0.06"), 20);
+    page.read()
+}
+
+#[track_caller]
+fn assert_sound(page: &mut LivePage) {
+    assert_eq!(page.console(), json!([]), "the browser complains");
+    let width = &page.read()["width"];
+    // Where something sticks out, a phone makes the page smaller and the window wider than itself.
+    let window = page.run("return outerWidth || innerWidth").as_f64();
+    assert!(width[0].as_f64() <= width[1].as_f64(), "it is wider than the window: {width}");
+    assert!(width[1].as_f64() <= window, "something sticks out: {width} in a window of {window:?}");
+}
+
+/// Where screenshots go, for those who want to look at them.
+fn shots() -> Option<PathBuf> {
+    let folder = PathBuf::from(std::env::var_os("HUMS_SHOTS")?);
+    std::fs::create_dir_all(&folder).unwrap();
+    Some(folder)
+}
+
+fn shoot(page: &mut LivePage, name: &str) {
+    if let Some(folder) = shots() {
+        page.shot(&folder.join(format!("{name}.png")), true);
+    }
+}
+
+#[test]
+fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there() {
+    let recording = own("ap_quad_faults.tlog");
+    let frames = frames(&recording);
+    let live = Live::start(&["--input", recording.to_str().unwrap()]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "light", 1440, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 60);
+    let start = page.read()["now"].as_f64().unwrap();
+    page.wait(&format!("return document.documentElement.dataset.now > {start} + 1"), 20);
+    page.press(&[" "]);
+    page.wait("return document.getElementById('source').textContent === 'paused'", 10);
+
+    // On, back, and on again; each time all of it is of that moment.
+    for to_s in [60.0, 90.0, 45.0, 75.0] {
+        assert_shows(&seek(&mut page, to_s), &frames);
+    }
+    let there = page.read()["now"].as_f64().unwrap();
+    page.press(&["ARROW_LEFT"]);
+    page.wait(&format!("return document.documentElement.dataset.now < {there} - 4"), 10);
+
+    // A finding is there once its time has come, and not before.
+    let found = |page: &Value| {
+        let notes = page["notes"].as_array().unwrap();
+        notes.iter().filter(|note| ["warning", "critical"].contains(&note[1].as_str().unwrap())).count()
+    };
+    let (early, late) = (found(&seek(&mut page, 5.0)), found(&seek(&mut page, 1e9_f64.min(last_s(&frames)))));
+    assert!(late > early, "{early} findings at the beginning, {late} at the end");
+    assert_sound(&mut page);
+
+    for (name, scheme, width, height) in [
+        ("desktop-light", "light", 1440, 900),
+        ("desktop-dark", "dark", 1440, 900),
+        ("phone-light", "light", 390, 844),
+        ("phone-dark", "dark", 390, 844),
+    ] {
+        page.open(&live.address, scheme, width, height);
+        page.wait("return document.documentElement.dataset.ready === 'true'", 60);
+        assert_shows(&seek(&mut page, 75.0), &frames);
+        assert_sound(&mut page);
+        shoot(&mut page, name);
+    }
+}
+
+fn last_s(frames: &[Value]) -> f64 {
+    frames.iter().filter_map(|frame| frame["time_boot"].as_f64()).fold(0.0, f64::max) - 1.0
+}
+
+#[test]
+fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
+    let dir = tempfile::tempdir().unwrap();
+    // Ten seconds before the accelerometers begin to shake.
+    let recording = cut(&own("ap_quad_faults.tlog"), 75.0, &dir.path().join("late.tlog"));
+    let frames = frames(&recording);
+    let port = free_port();
+    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "dark", 1440, 900);
+    page.wait("return document.getElementById('source').textContent === 'waiting'", 20);
+    let mut sim = command(["sim", "--speed", "real", "--input"]);
+    sim.arg(&recording).arg("--sd").arg(dir.path().join("card.img"));
+    sim.arg("--gs").arg(format!("udpout:127.0.0.1:{port}")).stdout(Stdio::null()).stderr(Stdio::null());
+    let began = Instant::now();
+    let sim = Running(sim.spawn().unwrap());
+    page.wait("return document.getElementById('source').textContent === 'live'", 20);
+    // Once the receiver is heard, positions are its own.
+    page.wait("return document.querySelector('[data-value=satellites]').textContent.length > 1", 30);
+
+    // What stands there was sent in the last seconds.
+    let until = Instant::now() + Duration::from_secs(20);
+    let mut agreed = 0;
+    while Instant::now() < until {
+        let seen = page.read();
+        let now_s = began.elapsed().as_secs_f64();
+        let lately = |message: &str, field: &str, scale: f64, wanted: f64, close: f64| {
+            frames.iter().any(|frame| {
+                let at_s = frame["time_boot"].as_f64().unwrap();
+                frame["message"] == message
+                    && (now_s - 6.0..now_s + 1.0).contains(&at_s)
+                    && (of(&frame["fields"], field) * scale - wanted).abs() <= close
+            })
+        };
+        if seen["values"]["latitude"] == "\u{2013}" {
+            continue;
+        }
+        assert!(lately("GPS_RAW_INT", "lat", 1e-7, shown(&seen, "latitude"), 0.6e-7), "{}", seen["values"]);
+        assert!(lately("ATTITUDE", "roll", 57.295_779_5, shown(&seen, "roll"), 0.06), "{}", seen["values"]);
+        agreed += 1;
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    assert!(agreed > 10, "only {agreed} looks");
+    // The box on the same link is heard, and its word on itself counts.
+    page.wait("return document.querySelector('[data-subsystem=recorder] .badge').textContent === 'ok'", 20);
+    let seen = page.read();
+    assert_eq!(seen["board"]["recorder"]["by"], "on board", "{}", seen["board"]);
+    let loss = seen["values"]["link:loss"].as_str().unwrap();
+    assert!(loss == "0.0 %" || loss == "not known yet", "what the box leaves out is no loss: {loss}");
+    // A finding comes while somebody looks.
+    page.wait("return [...document.querySelectorAll('.notes li .badge')].some((b) => ['warning', 'critical'].includes(b.textContent))", 60);
+    assert_sound(&mut page);
+    shoot(&mut page, "live-dark");
+
+    drop(sim);
+    page.wait("return document.querySelector('[data-panel=horizon]').classList.contains('stale')", 10);
+    page.wait(
+        "return document.querySelector('[data-panel=horizon] .corner').textContent === 'stale 6 s'",
+        20,
+    );
+    let seen = page.read();
+    assert_eq!(seen["source"], "silent");
+    for panel in ["horizon", "map", "groundspeed", "velocity_module"] {
+        assert_eq!(seen["panels"][panel]["stale"], true, "{panel}: {}", seen["panels"]);
+    }
+    shoot(&mut page, "stale-dark");
+}
+
+#[test]
+fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
+    const HOSTILE: [&str; 3] = [
+        "<img src=x onerror=\"document.title='owned'\">",
+        "</script><script>document.title='owned'</script>",
+        "{{now}} & \"quotes\" 'n' \\u003c <b>",
+    ];
+    let seeds = &Manifest::own().seeds;
+    let port = free_port();
+    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "light", 390, 844);
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    for sequence in 0..60_u8 {
+        let heartbeat = build_v2(sequence.wrapping_mul(2), 0, &[4, 0, 0, 0, 2, 3, 0x51, 4, 3], seeds[&0]);
+        let mut payload = vec![4];
+        payload.extend(HOSTILE[usize::from(sequence) % 3].bytes());
+        payload.resize(51, 0);
+        let text = build_v2(sequence.wrapping_mul(2).wrapping_add(1), 253, &payload, seeds[&253]);
+        for frame in [heartbeat, text] {
+            socket.send_to(&frame, ("127.0.0.1", port)).unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    page.wait("return document.querySelectorAll('.notes li').length >= 3", 20);
+    let seen = page.read();
+    assert!(!seen["title"].as_str().unwrap().contains("owned"), "{}", seen["title"]);
+    let words: Vec<&str> =
+        seen["notes"].as_array().unwrap().iter().map(|note| note[2].as_str().unwrap()).collect();
+    for hostile in HOSTILE {
+        let said = &hostile[..hostile.len().min(50)];
+        assert!(words.contains(&said), "{said:?} is not among {words:?}");
+    }
+    assert_eq!(page.run("return document.querySelectorAll('main img, main script').length"), 0);
+    assert_sound(&mut page);
+}
+
+/// The first line of the answer to a request with these headers.
+fn ask(address: &str, path: &str, headers: &[(&str, &str)]) -> String {
+    let host = address.trim_start_matches("http://").trim_end_matches('/');
+    let mut stream = TcpStream::connect(host).unwrap();
+    let own = [("Host", host)].into_iter().filter(|_| headers.iter().all(|(name, _)| *name != "Host"));
+    let lines: Vec<String> =
+        own.chain(headers.iter().copied()).map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+    let request = format!("GET {path} HTTP/1.1\r\n{}", lines.concat());
+    stream.write_all(format!("{request}\r\n").as_bytes()).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    let mut line = String::new();
+    BufReader::new(stream.take(4_096)).read_line(&mut line).unwrap();
+    line.trim().to_owned()
+}
+
+const UPGRADE: [(&str, &str); 4] = [
+    ("Connection", "Upgrade"),
+    ("Upgrade", "websocket"),
+    ("Sec-WebSocket-Version", "13"),
+    ("Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ=="),
+];
+
+#[test]
+fn a_foreign_page_a_foreign_name_and_a_stranger_are_refused() {
+    let recording = own("ap_quad_guided.tlog");
+    let input = ["--input", recording.to_str().unwrap()];
+    let open = Live::start(&input);
+    assert!(ask(&open.address, "/", &[]).ends_with("200 OK"));
+    let with = |more: &[(&'static str, &'static str)]| [&UPGRADE[..], more].concat();
+    assert!(ask(&open.address, "/ws", &with(&[])).contains("101"), "a program that is no browser");
+    let evil = with(&[("Origin", "http://evil.example")]);
+    assert!(ask(&open.address, "/ws", &evil).contains("403"), "a foreign page");
+    assert!(
+        ask(&open.address, "/", &[("Host", "evil.example")]).contains("403"),
+        "a name that was bent to here"
+    );
+    assert!(ask(&open.address, "/ws", &with(&[("Host", "evil.example:80")])).contains("403"));
+
+    let closed = Live::start(&[&input[..], &["--listen-token", "correct-horse"]].concat());
+    let (address, token) = closed.address.split_once("#token=").expect("the address has the token");
+    assert_eq!(token, "correct-horse");
+    for (path, code) in [("/ws", "401"), ("/ws?token=wrong-horse", "401"), ("/ws?token=correct-horse", "101")]
+    {
+        assert!(ask(address, path, &with(&[])).contains(code), "{path}");
+    }
+}
+
+/// Notes when the roll's number changes, and to what, in milliseconds since 1970.
+const WATCH: &str = "
+const roll = document.querySelector('[data-value=roll]');
+window.seen = [];
+const note = () => window.seen.push([performance.timeOrigin + performance.now(), roll.textContent]);
+new MutationObserver(note).observe(roll, { childList: true, characterData: true, subtree: true });
+";
+
+#[test]
+fn a_packet_changes_the_page_within_a_tenth_of_a_second() {
+    let port = free_port();
+    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "light", 1440, 900);
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let seeds = &Manifest::own().seeds;
+    let mut sequence = 0_u8;
+    let mut send = |id: u32, payload: &[u8]| {
+        sequence = sequence.wrapping_add(1);
+        socket.send_to(&build_v2(sequence, id, payload, seeds[&id]), ("127.0.0.1", port)).unwrap();
+        SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs_f64() * 1e3
+    };
+    send(0, &[4, 0, 0, 0, 2, 3, 0x51, 4, 3]);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    page.run(WATCH);
+    let mut sent = Vec::new();
+    for number in 1..=60_u16 {
+        let roll_deg = f32::from(number) / 2.0;
+        let mut attitude = vec![0; 28];
+        attitude[4..8].copy_from_slice(&roll_deg.to_radians().to_le_bytes());
+        sent.push((format!("{roll_deg:.1}"), send(30, &attitude)));
+        // No multiple of the page's own step.
+        std::thread::sleep(Duration::from_millis(137));
+    }
+    let seen = page.run("return window.seen");
+    let changed = |text: &str| {
+        let seen = seen.as_array().unwrap().iter().find(|one| one[1] == text);
+        seen.and_then(|one| one[0].as_f64())
+    };
+    let mut latencies: Vec<f64> = sent.iter().filter_map(|(text, at)| Some(changed(text)? - at)).collect();
+    assert!(latencies.len() > 50, "only {} of 60 were seen", latencies.len());
+    latencies.sort_by(f64::total_cmp);
+    let median_ms = latencies[latencies.len() / 2];
+    println!(
+        "from packet to page: {median_ms:.0} ms at the median, {:.0} ms at most",
+        latencies[latencies.len() - 1]
+    );
+    assert!(median_ms < 100.0, "{latencies:?}");
+}
+
+#[test]
+fn two_vehicles_on_one_link_are_told_apart() {
+    let port = free_port();
+    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "light", 1024, 768);
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let seeds = &Manifest::own().seeds;
+    for sequence in 0..20_u8 {
+        for (system, roll) in [(7_u8, 0.25_f32), (9, -0.5)] {
+            let mut attitude = vec![0; 28];
+            attitude[4..8].copy_from_slice(&roll.to_le_bytes());
+            let frames = [
+                build_v2(sequence.wrapping_mul(2), 0, &[4, 0, 0, 0, 2, 3, 0x51, 4, 3], seeds[&0]),
+                build_v2(sequence.wrapping_mul(2).wrapping_add(1), 30, &attitude, seeds[&30]),
+            ];
+            for frame in frames {
+                socket.send_to(&sent_by(system, frame, seeds), ("127.0.0.1", port)).unwrap();
+            }
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    page.wait("return document.querySelectorAll('.vehicles button').length === 2", 20);
+    for (key, system, roll) in [("1", "7", 14.3), ("2", "9", -28.6), ("1", "7", 14.3)] {
+        page.press(&[key]);
+        let pressed = "document.querySelector('.vehicles [aria-pressed=true]')?.textContent";
+        page.wait(&format!("return ({pressed} ?? '').startsWith('{system} ')"), 10);
+        assert!((shown(&page.read(), "roll") - roll).abs() < 0.06, "vehicle {system}");
+    }
+    assert_sound(&mut page);
+}
+
+/// The same frame from another system.
+fn sent_by(system: u8, mut frame: Vec<u8>, seeds: &hums_tests::frames::Seeds) -> Vec<u8> {
+    frame[5] = system;
+    let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
+    let end = frame.len() - 2;
+    let sum = hums_tests::frames::checksum(&frame[1..end], seeds[&id]);
+    frame[end..].copy_from_slice(&sum.to_le_bytes());
+    frame
+}

@@ -1,0 +1,140 @@
+//! `InfluxDB` and `VictoriaMetrics` with an empty database in a folder of their own.
+
+use std::fs;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use hums_tests::live::{Running, free_port};
+use serde_json::Value;
+
+/// A database may read its own files for a while before it answers.
+const START: Duration = Duration::from_mins(1);
+
+/// Which one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Influx,
+    Victoria,
+}
+
+/// A database that can be ended and started again with what it has.
+pub(crate) struct Database {
+    kind: Kind,
+    folder: tempfile::TempDir,
+    pub(crate) port: u16,
+    running: Option<Running>,
+}
+
+impl Database {
+    /// Starts one.
+    pub(crate) fn start(kind: Kind) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut database = Self { kind, folder, port: free_port(), running: None };
+        if kind == Kind::Influx {
+            fs::write(database.config(), database.configuration()).unwrap();
+        }
+        database.again();
+        database
+    }
+
+    fn config(&self) -> PathBuf {
+        self.folder.path().join("influxdb.conf")
+    }
+
+    fn configuration(&self) -> String {
+        let (folder, port, other) = (self.folder.path().display(), self.port, free_port());
+        format!(
+            "reporting-disabled = true\nbind-address = \"127.0.0.1:{other}\"\n[meta]\ndir = \"{folder}/meta\"\n\
+             [data]\ndir = \"{folder}/data\"\nwal-dir = \"{folder}/wal\"\nquery-log-enabled = false\n\
+             [http]\nbind-address = \"127.0.0.1:{port}\"\nlog-enabled = false\nmax-row-limit = 0\n\
+             [monitor]\nstore-enabled = false\n"
+        )
+    }
+
+    /// Starts it with what it has.
+    pub(crate) fn again(&mut self) {
+        let mut command = match self.kind {
+            Kind::Influx => Command::new(program("HUMS_INFLUXD", "/usr/bin/influxd")),
+            Kind::Victoria => Command::new(program("HUMS_VICTORIA", "/usr/bin/victoria-metrics")),
+        };
+        match self.kind {
+            Kind::Influx => command.arg("run").arg("-config").arg(self.config()),
+            Kind::Victoria => command
+                .arg(format!("-httpListenAddr=127.0.0.1:{}", self.port))
+                .arg(format!("-storageDataPath={}", self.folder.path().display()))
+                .arg("-retentionPeriod=100y"),
+        };
+        let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        self.running = Some(Running(child));
+        let start = Instant::now();
+        let path = if self.kind == Kind::Influx { "/ping" } else { "/health" };
+        while !self.get(path).is_ok_and(|(code, _)| code / 100 == 2) {
+            assert!(start.elapsed() < START, "{:?} does not start", self.kind);
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Ends it: `InfluxDB` at once, as power would; `VictoriaMetrics` in order, because it holds what it has accepted
+    /// in memory for some seconds by design.
+    pub(crate) fn end(&mut self) {
+        let mut running = self.running.take().unwrap();
+        running.signal(if self.kind == Kind::Influx { "KILL" } else { "TERM" });
+        running.end(Duration::from_mins(1));
+    }
+
+    fn get(&self, path: &str) -> std::io::Result<(u16, String)> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
+        stream.set_read_timeout(Some(Duration::from_mins(1)))?;
+        // HTTP 1.0: the answer ends with the connection.
+        write!(stream, "GET {path} HTTP/1.0\r\nHost: 127.0.0.1\r\n\r\n")?;
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer)?;
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap_or((&answer, ""));
+        let code = head.split_whitespace().nth(1).and_then(|code| code.parse().ok()).unwrap_or(0);
+        Ok((code, body.to_owned()))
+    }
+
+    /// `InfluxDB`: the answer to a question.
+    pub(crate) fn ask(&self, question: &str) -> Vec<Value> {
+        let bytes: Vec<String> = question.bytes().map(|byte| format!("%{byte:02X}")).collect();
+        let question = bytes.concat();
+        let (code, body) = self.get(&format!("/query?db=hums&epoch=ns&q={question}")).unwrap();
+        assert_eq!(code, 200, "{body}");
+        let answer: Value = serde_json::from_str(&body).unwrap();
+        answer["results"][0]["series"].as_array().cloned().unwrap_or_default()
+    }
+
+    /// `InfluxDB`: how many points a measurement has.
+    pub(crate) fn points(&self, measurement: &str) -> u64 {
+        let series = self.ask(&format!("SELECT * FROM \"{measurement}\""));
+        series.iter().map(|one| one["values"].as_array().map_or(0, Vec::len) as u64).sum()
+    }
+
+    /// `InfluxDB`: the measurements.
+    pub(crate) fn measurements(&self) -> Vec<String> {
+        let series = self.ask("SHOW MEASUREMENTS");
+        let values = series.iter().flat_map(|one| one["values"].as_array().cloned().unwrap_or_default());
+        values.map(|value| value[0].as_str().unwrap().to_owned()).collect()
+    }
+
+    /// `VictoriaMetrics`: how many samples a metric has.
+    pub(crate) fn samples(&self, metric: &str) -> u64 {
+        self.get("/internal/force_flush").unwrap();
+        let (code, body) = self.get(&format!("/api/v1/export?match[]={metric}")).unwrap();
+        assert_eq!(code, 200, "{body}");
+        let lines = body.lines().filter(|line| !line.is_empty());
+        let count = |line: &str| {
+            serde_json::from_str::<Value>(line).unwrap()["values"].as_array().map_or(0, Vec::len)
+        };
+        lines.map(|line| count(line) as u64).sum()
+    }
+}
+
+fn program(variable: &str, path: &str) -> PathBuf {
+    let path = std::env::var_os(variable).map_or_else(|| PathBuf::from(path), PathBuf::from);
+    assert!(Path::new(&path).exists(), "{} is missing: `cargo xtask setup` installs it", path.display());
+    path
+}

@@ -1,0 +1,105 @@
+//! A flight is written while it is flown; the database goes away in the middle and comes back.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write as _;
+use std::net::TcpListener;
+use std::time::Duration;
+
+use hums_tests::flights::{Manifest, own};
+use hums_tests::frames::of_tlog;
+use hums_tests::live::{Live, send};
+
+use crate::database::{Database, Kind};
+
+/// As many messages a second as a fast link has.
+const RATE: f64 = 2_000.0;
+/// Twelve seconds of them.
+const FRAMES: usize = 24_000;
+/// The database goes after so many, and is back after so many more.
+const GOES_AT: u64 = 8_000;
+const BACK_AT: u64 = 16_000;
+
+/// The first frames of a flight, and how many there are of each message.
+fn flight() -> (Vec<Vec<u8>>, BTreeMap<u32, u64>) {
+    let data = fs::read(own("ap_quad_faults.tlog")).unwrap();
+    let frames = of_tlog(&data, &Manifest::own().seeds, false);
+    // From the middle of the flight on, where everything is sent.
+    let frames: Vec<_> = frames.into_iter().skip(20_000).take(FRAMES).collect();
+    let mut counts = BTreeMap::new();
+    for frame in frames.iter().filter(|frame| frame.verified) {
+        *counts.entry(frame.id).or_insert(0) += 1;
+    }
+    (frames.into_iter().map(|frame| frame.bytes.to_vec()).collect(), counts)
+}
+
+/// Flies it past the database; gives what hums says it has written.
+#[track_caller]
+fn fly(database: &mut Database, flags: &[&str]) -> (u64, BTreeMap<u32, u64>) {
+    let (frames, counts) = flight();
+    // By TCP, so that nothing is lost before it is there.
+    let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
+    let (input, url) =
+        (format!("tcp:{}", vehicle.local_addr().unwrap()), format!("http://127.0.0.1:{}", database.port));
+    let live = Live::start(&[&["--input", &input, "--influx", &url][..], flags].concat());
+    let (mut stream, _) = vehicle.accept().unwrap();
+    let put = |frame: &[u8]| stream.write_all(frame).unwrap();
+    send(frames.iter().map(Vec::as_slice), RATE, put, |gone| match gone {
+        GOES_AT => database.end(),
+        BACK_AT => database.again(),
+        _ => {}
+    });
+    std::thread::sleep(Duration::from_secs(1));
+    let (code, words) = live.interrupt(Duration::from_mins(1));
+    assert_eq!(code, Some(0), "{words}");
+    let written = words.split_whitespace().next().and_then(|word| word.parse().ok());
+    (written.unwrap_or_else(|| panic!("no count: {words}")), counts)
+}
+
+#[test]
+fn influxdb_is_killed_in_flight_and_has_every_point_in_the_end() {
+    let mut database = Database::start(Kind::Influx);
+    let (written, counts) = fly(&mut database, &[]);
+    let mut in_all = 0;
+    for measurement in database.measurements() {
+        in_all += database.points(&measurement);
+    }
+    assert_eq!(in_all, written, "points that hums says it wrote");
+    let names = hums_names();
+    for (id, count) in counts {
+        assert_eq!(database.points(&names[&id]), count, "{}", names[&id]);
+    }
+    // As `hums decode` names and tags them.
+    let tags: Vec<_> = database.ask("SHOW TAG KEYS FROM \"HUMS\"");
+    let keys = tags[0]["values"].as_array().unwrap().iter().map(|key| key[0].as_str().unwrap().to_owned());
+    assert_eq!(keys.collect::<Vec<_>>(), ["motor", "session", "vehicle"]);
+    let volts = database.ask("SELECT last(\"Battery (V)\") FROM \"HUMS\"");
+    assert!(volts[0]["values"][0][1].as_f64().is_some_and(|volts| (9.0..13.0).contains(&volts)), "{volts:?}");
+}
+
+#[test]
+fn victoriametrics_is_restarted_in_flight_and_has_every_sample_in_the_end() {
+    let mut database = Database::start(Kind::Victoria);
+    let (written, counts) = fly(&mut database, &["--org", "anything", "--bucket", "hums"]);
+    assert!(written > FRAMES as u64);
+    for (id, field) in [
+        (30, "ATTITUDE_roll"),
+        (74, "VFR_HUD_throttle"),
+        (24, "GPS_RAW_INT_lat"),
+        (241, "VIBRATION_vibration_x"),
+    ] {
+        let samples = database.samples(field);
+        // A batch whose answer the end cut off is written twice.
+        assert!(
+            (counts[&id]..counts[&id] + 200).contains(&samples),
+            "{field}: {samples}, sent {}",
+            counts[&id]
+        );
+    }
+}
+
+/// The names of messages by id, from `hums decode`'s own tables.
+fn hums_names() -> BTreeMap<u32, String> {
+    let definitions = hums_dialect::messages().iter();
+    definitions.map(|message| (message.id, message.name.to_owned())).collect()
+}

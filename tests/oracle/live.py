@@ -1,0 +1,122 @@
+"""Looks at `hums live` in Chromium, step by step.
+
+usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard input is answered by one on standard output
+
+  {"do": "open", "url": U, "scheme": "light" | "dark", "width": W, "height": H}
+  {"do": "read"}                            what the page shows at one moment: see READ
+  {"do": "wait", "script": JS, "limit_s": S}  until the script returns something true; answers what it returned
+  {"do": "run", "script": JS}               answers what it returned
+  {"do": "press", "keys": [...]}            key presses, by name or as the character
+  {"do": "frames", "seconds": S}            milliseconds that each frame takes, from its beginning until it is painted
+  {"do": "shot", "path": P, "whole": BOOL}  a screenshot, of the window or of the whole page
+  {"do": "console"}                         what the browser complained about since the last time
+  {"do": "quit"}                            the end
+"""
+
+import base64
+import json
+import sys
+import tempfile
+
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
+
+FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
+         "--disable-component-update", "--disable-sync", "--no-first-run", "--disable-default-apps",
+         "--force-device-scale-factor=1", "--window-size=1440,900"]
+
+READ = """
+const text = (node) => node.textContent;
+const all = (selector) => [...document.querySelectorAll(selector)];
+const shown = (node) => node.checkVisibility();
+return {
+  now: Number(document.documentElement.dataset.now),
+  title: document.title,
+  overall: text(document.getElementById("overall")),
+  source: text(document.getElementById("source")),
+  notice: document.getElementById("notice").hidden ? "" : text(document.getElementById("notice")),
+  values: Object.fromEntries(all("[data-value]").map((node) => [node.dataset.value, text(node)])),
+  panels: Object.fromEntries(all("[data-panel]").filter(shown).map((node) => [node.dataset.panel, {
+    stale: node.classList.contains("stale"), none: node.classList.contains("none"), corner: text(node.querySelector(".corner")),
+  }])),
+  board: Object.fromEntries(all(".board li").map((node) => [node.dataset.subsystem, {
+    level: text(node.querySelector(".badge")), reason: text(node.querySelector(".reason")), by: text(node.querySelector("small")),
+  }])),
+  notes: all(".notes li").map((node) => [text(node.querySelector("time")), text(node.querySelector(".badge")), text(node.querySelector(".words"))]),
+  vehicles: all(".vehicles button").map(text),
+  width: [document.documentElement.scrollWidth, innerWidth],
+};
+"""
+
+FRAMES = """
+const [seconds, done] = arguments;
+const times = [], end = performance.now() + seconds * 1000, channel = new MessageChannel();
+let began = 0;
+// A message comes after the frame's own work: all programs, style, layout and paint.
+channel.port1.onmessage = () => {
+  times.push(performance.now() - began);
+  if (began < end) requestAnimationFrame(step); else done(times);
+};
+const step = (time) => { began = time; channel.port2.postMessage(null); };
+requestAnimationFrame(step);
+"""
+
+
+def main():
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    options = webdriver.ChromeOptions()
+    options.binary_location = sys.argv[1]
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    with tempfile.TemporaryDirectory() as profile:
+        for flag in [*FLAGS, f"--user-data-dir={profile}"]:
+            options.add_argument(flag)
+        driver = webdriver.Chrome(options=options, service=Service(sys.argv[2]))
+        driver.set_script_timeout(120)
+        try:
+            for line in sys.stdin:
+                if json.loads(line)["do"] == "quit":
+                    break
+                print(json.dumps(step(driver, json.loads(line))), flush=True)
+        finally:
+            driver.quit()
+
+
+def step(driver, asked):
+    do = asked["do"]
+    if do == "open":
+        size = {"width": asked["width"], "height": asked["height"]}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                               {**size, "deviceScaleFactor": 1, "mobile": asked["width"] < 720})
+        scheme = {"name": "prefers-color-scheme", "value": asked["scheme"]}
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
+        driver.get(asked["url"])
+        return None
+    if do == "read":
+        return driver.execute_script(READ)
+    if do == "wait":
+        return WebDriverWait(driver, asked["limit_s"], poll_frequency=0.05).until(
+            lambda driver: driver.execute_script(asked["script"]))
+    if do == "run":
+        return driver.execute_script(asked["script"])
+    if do == "press":
+        for key in asked["keys"]:
+            ActionChains(driver).send_keys(getattr(Keys, key, key)).perform()
+        return None
+    if do == "frames":
+        return driver.execute_async_script(FRAMES, asked["seconds"])
+    if do == "shot":
+        taken = driver.execute_cdp_cmd("Page.captureScreenshot", {"format": "png", "captureBeyondViewport": asked["whole"]})
+        with open(asked["path"], "wb") as file:
+            file.write(base64.b64decode(taken["data"]))
+        return None
+    if do == "console":
+        return [entry["message"] for entry in driver.get_log("browser")]
+    raise ValueError(do)
+
+
+if __name__ == "__main__":
+    main()

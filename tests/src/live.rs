@@ -1,0 +1,127 @@
+//! `hums live` as a program that goes on, and a vehicle for it.
+
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::net::UdpSocket;
+use std::path::Path;
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A program that ends with what holds it.
+#[derive(Debug)]
+pub struct Running(pub Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Running {
+    /// Sends it a signal by name, for instance `INT`.
+    pub fn signal(&self, name: &str) {
+        let status = Command::new("kill").arg(format!("-{name}")).arg(self.0.id().to_string()).status();
+        assert!(status.unwrap().success(), "no such process");
+    }
+
+    /// Its exit code, which it is to have within `limit`.
+    #[track_caller]
+    pub fn end(&mut self, limit: Duration) -> Option<i32> {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.0.try_wait().unwrap() {
+                return status.code();
+            }
+            assert!(start.elapsed() < limit, "it does not end within {limit:?}");
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Processor time that it has taken, seconds, and its memory, now and at most, KiB.
+    pub fn cost(&self) -> Option<(f64, u64, u64)> {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.0.id())).ok()?;
+        // After the name, which may have spaces in it.
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        let ticks: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.0.id())).ok()?;
+        let kib = |name: &str| -> Option<u64> {
+            status.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
+        };
+        // Linux counts in hundredths on every machine that this runs on.
+        Some((ticks as f64 / 100.0, kib("VmRSS:")?, kib("VmHWM:")?))
+    }
+}
+
+/// `hums live`, and the address that it printed.
+#[derive(Debug)]
+pub struct Live {
+    /// The program.
+    pub program: Running,
+    /// The page's address.
+    pub address: String,
+    stderr: ChildStderr,
+}
+
+impl Live {
+    /// Starts it with these arguments, at a free port.
+    #[track_caller]
+    pub fn start(arguments: &[&str]) -> Self {
+        Self::start_at(crate::program::path(), arguments)
+    }
+
+    /// As [`Self::start`], with the program at this path.
+    #[track_caller]
+    pub fn start_at(program: &Path, arguments: &[&str]) -> Self {
+        let mut command = Command::new(program);
+        command
+            .args(["live", "--listen", "127.0.0.1:0"])
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut address = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
+        let mut stderr = child.stderr.take().unwrap();
+        if !address.starts_with("http://127.0.0.1:") {
+            let mut words = String::new();
+            let _ = stderr.read_to_string(&mut words);
+            panic!("no address: {address:?} {words}");
+        }
+        Self { program: Running(child), address: address.trim().to_owned(), stderr }
+    }
+
+    /// Ends it as Ctrl-C does: its exit code, and what it said.
+    #[track_caller]
+    pub fn interrupt(mut self, limit: Duration) -> (Option<i32>, String) {
+        self.program.signal("INT");
+        let code = self.program.end(limit);
+        let mut words = String::new();
+        self.stderr.read_to_string(&mut words).unwrap();
+        assert!(!words.contains("panicked"), "{words}");
+        (code, words)
+    }
+}
+
+/// A UDP or TCP port that is free now.
+pub fn free_port() -> u16 {
+    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+/// Gives frames to `put`, evenly, so many a second; `each` is told how many are gone.
+pub fn send<'a>(
+    frames: impl Iterator<Item = &'a [u8]>,
+    rate: f64,
+    mut put: impl FnMut(&[u8]),
+    mut each: impl FnMut(u64),
+) {
+    let start = Instant::now();
+    for (number, frame) in (0_u64..).zip(frames) {
+        let due = Duration::from_secs_f64(number as f64 / rate);
+        if let Some(wait) = due.checked_sub(start.elapsed()).filter(|wait| *wait > Duration::from_millis(1)) {
+            thread::sleep(wait);
+        }
+        put(frame);
+        each(number + 1);
+    }
+}
