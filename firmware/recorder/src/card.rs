@@ -162,6 +162,11 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         self.manager.map(|manager| manager.free().0.into_device())
     }
 
+    /// The device, for what is no matter of files.
+    pub fn device<T>(&self, act: impl FnOnce(&D) -> T) -> Option<T> {
+        self.manager.as_ref().map(|manager| manager.device(|gate| act(gate.device())))
+    }
+
     /// The card's layout.
     pub const fn layout(&self) -> &Layout {
         &self.layout
