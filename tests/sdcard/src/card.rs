@@ -34,7 +34,12 @@ enum State {
 enum Transfer {
     None,
     /// Waits for a token, or takes a block.
-    Write { many: bool, at: u32, block: Option<Vec<u8>>, failed: bool },
+    Write {
+        many: bool,
+        at: u32,
+        block: Option<Vec<u8>>,
+        failed: bool,
+    },
 }
 
 pub(crate) struct SdCard {
@@ -313,8 +318,7 @@ impl SdCard {
         let model = &mut self.model;
         let is_damaged = model.has(now_ns, |fault| fault == Fault::DamagedWrite).is_some();
         let is_locked = model.locked.0 || model.locked.1;
-        let (mut response, mut busy_ns) =
-            (0xE5, if *many { model.write_ns.1 } else { model.write_ns.0 });
+        let (mut response, mut busy_ns) = (0xE5, if *many { model.write_ns.1 } else { model.write_ns.0 });
         if *failed || !is_whole || is_damaged {
             (response, busy_ns, *failed) = (0xEB, 0, true);
         } else if is_locked || *at >= model.medium.size() {

@@ -1,8 +1,8 @@
 //! Which card it is: what does not change while it has power.
 
+use crate::MS;
 use crate::fault::{Fault, Plan};
 use crate::medium::Medium;
-use crate::MS;
 
 /// The kinds of cards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,10 +87,20 @@ impl Model {
         let mut csd = if self.kind.by_bytes() {
             // Blocks of 512 bytes, in units of 512: what a card of this structure can say of its size.
             let units = (size >> 9) - 1;
-            [0x00, 0x26, 0x00, 0x32, 0x5F, 0x59, 0x80 | (units >> 10) as u8, (units >> 2) as u8, (units << 6) as u8]
-                .into_iter()
-                .chain([0x03, 0x80, 0, 0, 0x40, 0, 0])
-                .collect::<Vec<_>>()
+            [
+                0x00,
+                0x26,
+                0x00,
+                0x32,
+                0x5F,
+                0x59,
+                0x80 | (units >> 10) as u8,
+                (units >> 2) as u8,
+                (units << 6) as u8,
+            ]
+            .into_iter()
+            .chain([0x03, 0x80, 0, 0, 0x40, 0, 0])
+            .collect::<Vec<_>>()
         } else {
             let units = (size >> 10) - 1;
             [0x40, 0x0E, 0x00, 0x32, 0x5B, 0x59, 0, (units >> 16) as u8, (units >> 8) as u8, units as u8]

@@ -3,7 +3,7 @@
 
 use embedded_sdmmc::{Block, BlockDevice as _, BlockIdx};
 use hums_core::time::Span;
-use hums_recorder::spi::{BUSY_MAX, SERVICE_MAX, SpiError, SpiCard};
+use hums_recorder::spi::{BUSY_MAX, SERVICE_MAX, SpiCard, SpiError};
 use hums_recorder::{CardDevice as _, Trouble};
 use hums_sdcard::{Event, Fault, Kind, MS, Medium, Model, Plan, SimPort, Slot};
 
@@ -140,9 +140,8 @@ fn a_card_that_never_becomes_ready_is_given_up() {
 fn one_service_has_an_end_however_many_waits_are_in_it() {
     let bench = Bench::new(card(Kind::Sdhc).with(Plan::always(Fault::Busy(2_900 * MS))));
     bench.driver.begin_service();
-    let (errors, took) = bench.timed(|bench| {
-        (0..10).filter_map(|at| bench.write(at, &[block(at)]).err()).collect::<Vec<_>>()
-    });
+    let (errors, took) =
+        bench.timed(|bench| (0..10).filter_map(|at| bench.write(at, &[block(at)]).err()).collect::<Vec<_>>());
     assert_eq!(errors.first(), Some(&SpiError::OutOfTime));
     assert!(took >= SERVICE_MAX && took < SERVICE_MAX + Span::from_secs(2), "{took:?}");
     bench.driver.begin_service();
@@ -152,7 +151,9 @@ fn one_service_has_an_end_however_many_waits_are_in_it() {
 
 #[test]
 fn what_is_damaged_on_its_way_is_sent_again() {
-    for fault in [Fault::DamagedRead, Fault::DamagedWrite, Fault::DamagedCommand, Fault::Silent, Fault::NoBlock] {
+    for fault in
+        [Fault::DamagedRead, Fault::DamagedWrite, Fault::DamagedCommand, Fault::Silent, Fault::NoBlock]
+    {
         for skip in 0..12 {
             let bench = Bench::new(card(Kind::Sdhc));
             assert!(bench.driver.num_blocks().is_ok());
