@@ -88,6 +88,11 @@ impl Slot {
         self.0.borrow_mut().happen(event);
     }
 
+    /// Whether a card is in it.
+    pub fn has_card(&self) -> bool {
+        self.0.borrow().card.is_some()
+    }
+
     /// Nanoseconds since 0 s.
     pub fn now_ns(&self) -> u64 {
         self.0.borrow().now_ns
@@ -118,6 +123,15 @@ impl Slot {
     /// The slot as the driver's port.
     pub fn port(&self) -> SimPort {
         SimPort { slot: self.clone(), transfer_hz: 21_000_000 }
+    }
+
+    /// Eighty clocks at this rate with no card selected, as a card needs before its first command.
+    pub fn wake(&self, hz: u32) {
+        let mut inner = self.0.borrow_mut();
+        inner.hz = hz;
+        for _ in 0..10 {
+            inner.exchange(0xFF);
+        }
     }
 
     /// The slot as embedded-hal has it, at this clock.

@@ -137,6 +137,18 @@ fn a_card_that_never_becomes_ready_is_given_up() {
 }
 
 #[test]
+fn a_card_that_is_busy_for_a_minute_is_interrupted_only_after_it_was_waited_for_again_and_again() {
+    let bench = Bench::new(card(Kind::Sdhc).with(Plan::always(Fault::Busy(60_000 * MS)).times(1)));
+    assert_eq!(bench.write(100, &[block(0)]), Err(SpiError::Busy));
+    for time in 0..4 {
+        assert_eq!(bench.read(0).map(|_| ()), Err(SpiError::Busy), "time {time}");
+        bench.assert_in_order();
+    }
+    assert!(bench.read(0).is_ok(), "a reset helps this one");
+    assert!(bench.slot.now() < hums_core::time::Instant::from_millis(20_000));
+}
+
+#[test]
 fn one_service_has_an_end_however_many_waits_are_in_it() {
     let bench = Bench::new(card(Kind::Sdhc).with(Plan::always(Fault::Busy(2_900 * MS))));
     bench.driver.begin_service();

@@ -28,6 +28,8 @@ const HIGH_CAPACITY: u32 = 1 << 30;
 const RESET_MAX: Span = Span::from_millis(200);
 /// How long a card may take to end a row that it was in the middle of: what the specification allows.
 const STOP_MAX: Span = Span::from_millis(500);
+/// How often a busy card is waited for in vain before it is reset.
+const BUSY_TIMES: u8 = 4;
 /// How long a card may take to start. The specification allows 1 s.
 const START_MAX: Span = Span::from_secs(2);
 /// Bytes with the card not selected that wake it up: at least 74 clocks (6.4.1).
@@ -50,12 +52,18 @@ impl<P: Port> Line<P> {
         self.checks = false;
         self.port.select(false);
         self.port.send(&WAKE)?;
-        // A card that is still at work, when the processor restarted alone, is not interrupted: that may cost more than
-        // the block (4.3.4). One that does not come to an end is.
+        // A card that is at work is not interrupted, because that may cost more than the block in work (7.2.4). One that
+        // does not come to an end, however often it is waited for, has nothing to lose.
         match self.selected(|line| line.ready(BUSY_MAX)) {
-            Ok(()) | Err(SpiError::Busy) => {}
+            Ok(()) => {}
+            Err(SpiError::Busy) if self.busy_times >= BUSY_TIMES => {}
+            Err(SpiError::Busy) => {
+                self.busy_times += 1;
+                return Err(SpiError::Busy);
+            }
             Err(error) => return Err(error),
         }
+        self.busy_times = 0;
         self.reset()?;
         let identity = self.selected(Self::start)?;
         self.port.set_clock(Clock::Transfer);

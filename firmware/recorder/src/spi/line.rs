@@ -31,6 +31,8 @@ pub(super) struct Line<P> {
     pub(super) deadline: Option<Instant>,
     /// Blocks carry checksums that count.
     pub(super) checks: bool,
+    /// How often it was waited for in vain to become ready, in a row.
+    pub(super) busy_times: u8,
 }
 
 impl From<PortFailed> for SpiError {

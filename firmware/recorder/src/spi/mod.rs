@@ -63,7 +63,7 @@ struct Inner<P> {
 impl<P: Port> SpiCard<P> {
     /// The card at this port; it is looked for at the first access.
     pub const fn new(port: P) -> Self {
-        let line = Line { port, deadline: None, checks: false };
+        let line = Line { port, deadline: None, checks: false, busy_times: 0 };
         Self { inner: RefCell::new(Inner { line, card: None, cid: None, retries: 0 }) }
     }
 }
