@@ -66,23 +66,39 @@ pub struct Formatting {
 /// What goes where.
 #[derive(Clone, Copy, Debug)]
 struct Plan {
+    volume_id: u32,
     total: u32,
     cluster_blocks: u32,
     fat_blocks: u32,
     /// The next block to be cleared, of those before `end`.
     next: u32,
     end: u32,
+    /// How many of [`STRUCTURES`] are written.
+    structures: usize,
 }
 
+/// Where the FAT begins.
+const FAT_START: u32 = PARTITION_START + RESERVED_BLOCKS;
+type Make = fn(&Plan) -> Block;
+/// What is written once the FAT and the root directory are cleared, in this order.
+const STRUCTURES: [(Make, u32); 6] = [
+    (fat_begin, FAT_START),
+    (boot_sector, PARTITION_START),
+    (info_sector, PARTITION_START + INFO_BLOCK),
+    (boot_sector, PARTITION_START + BACKUP_BLOCK),
+    (info_sector, PARTITION_START + BACKUP_BLOCK + INFO_BLOCK),
+    (partition_table, 0),
+];
+
 impl Plan {
-    const fn new(card_blocks: u32) -> Self {
+    const fn new(card_blocks: u32, volume_id: u32) -> Self {
         let total = card_blocks - PARTITION_START;
         let cluster_blocks = cluster_blocks(total);
         // The FAT for all that is left is a little more than needed: it also covers the blocks that it takes itself.
         let fat_blocks = ((total - RESERVED_BLOCKS) / cluster_blocks + 2).div_ceil(ENTRIES);
-        let start = PARTITION_START + RESERVED_BLOCKS;
         // The FAT, and behind it the root directory's cluster.
-        Self { total, cluster_blocks, fat_blocks, next: start, end: start + fat_blocks + cluster_blocks }
+        let end = FAT_START + fat_blocks + cluster_blocks;
+        Self { volume_id, total, cluster_blocks, fat_blocks, next: FAT_START, end, structures: 0 }
     }
 }
 
@@ -102,7 +118,7 @@ impl Formatting {
                 return Err(FormatError::TooSmall);
             }
             write(&ZEROS[..1], 0)?;
-            self.plan = Some(Plan::new(card_blocks));
+            self.plan = Some(Plan::new(card_blocks, self.volume_id));
             return Ok(false);
         };
         let left = plan.end - plan.next;
@@ -112,15 +128,11 @@ impl Formatting {
             plan.next += count;
             return Ok(false);
         }
-        let boot = boot_sector(plan.total, plan.cluster_blocks, plan.fat_blocks, self.volume_id);
-        let info = info_sector();
-        write(&[fat_begin()], PARTITION_START + RESERVED_BLOCKS)?;
-        for base in [0, BACKUP_BLOCK] {
-            write(core::slice::from_ref(&boot), PARTITION_START + base)?;
-            write(core::slice::from_ref(&info), PARTITION_START + base + INFO_BLOCK)?;
+        if let Some((make, at)) = STRUCTURES.get(plan.structures) {
+            write(&[make(plan)], *at)?;
+            plan.structures += 1;
         }
-        write(&[partition_table(plan.total)], 0)?;
-        Ok(true)
+        Ok(plan.structures >= STRUCTURES.len())
     }
 }
 
@@ -128,17 +140,18 @@ fn put(block: &mut Block, at: usize, bytes: &[u8]) {
     block[at..at + bytes.len()].copy_from_slice(bytes);
 }
 
-fn partition_table(total: u32) -> Block {
+fn partition_table(plan: &Plan) -> Block {
     let mut block = Block::new();
     // Status, CHS of the first block ("too far"), type FAT32 LBA, CHS of the last block.
     put(&mut block, 446, &[0x00, 0xFE, 0xFF, 0xFF, 0x0C, 0xFE, 0xFF, 0xFF]);
     put(&mut block, 454, &PARTITION_START.to_le_bytes());
-    put(&mut block, 458, &total.to_le_bytes());
+    put(&mut block, 458, &plan.total.to_le_bytes());
     put(&mut block, 510, &[0x55, 0xAA]);
     block
 }
 
-fn boot_sector(total: u32, cluster_blocks: u32, fat_blocks: u32, volume_id: u32) -> Block {
+fn boot_sector(plan: &Plan) -> Block {
+    let Plan { total, cluster_blocks, fat_blocks, volume_id, .. } = *plan;
     let mut block = Block::new();
     put(&mut block, 0, &[0xEB, 0x58, 0x90]);
     put(&mut block, 3, b"HUMS    ");
@@ -164,7 +177,7 @@ fn boot_sector(total: u32, cluster_blocks: u32, fat_blocks: u32, volume_id: u32)
 }
 
 /// The free count stays unknown for ever (see [`crate::gate`]), so it can never be wrong.
-fn info_sector() -> Block {
+fn info_sector(_: &Plan) -> Block {
     let mut block = Block::new();
     put(&mut block, 0, &0x4161_5252_u32.to_le_bytes());
     put(&mut block, 484, &0x6141_7272_u32.to_le_bytes());
@@ -175,7 +188,7 @@ fn info_sector() -> Block {
 }
 
 /// The FAT's first block: media, "clean" flags, and the root directory of one cluster.
-fn fat_begin() -> Block {
+fn fat_begin(_: &Plan) -> Block {
     let mut block = Block::new();
     for (entry, value) in [0x0FFF_FFF8_u32, 0x0FFF_FFFF, 0x0FFF_FFFF].iter().enumerate() {
         put(&mut block, entry * 4, &value.to_le_bytes());

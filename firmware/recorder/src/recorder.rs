@@ -187,7 +187,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
                         self.status.count_write_errors(1);
                     }
                     if !may_work_elsewhere::<D>(&error) {
-                        self.give_up(now, &error);
+                        self.lose(now, &error);
                         return Written::Later;
                     }
                 }
@@ -202,7 +202,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         match moved {
             Ok(()) => Written::Done,
             Err(error) => {
-                self.give_up(now, &error);
+                self.lose(now, &error);
                 Written::Later
             }
         }
@@ -452,6 +452,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     fn mounted(&mut self) -> Result<&mut Card<'a, D>, CardError<D::Error>> {
         self.card().ok_or(CardError::NotOpen)
+    }
+
+    /// The card in work is given up. The next one may be another one, for which only what comes from a group's start on
+    /// can be read: the sooner there is one, the less is lost.
+    fn lose(&mut self, now: Instant, error: &CardError<D::Error>) {
+        self.status.want_group();
+        self.give_up(now, error);
     }
 
     fn give_up(&mut self, now: Instant, error: &CardError<D::Error>) {

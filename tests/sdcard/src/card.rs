@@ -42,6 +42,8 @@ enum Transfer {
     },
 }
 
+// Each is a flag of the specification's own.
+#[allow(clippy::struct_excessive_bools)]
 pub(crate) struct SdCard {
     pub(crate) model: Model,
     state: State,
@@ -269,11 +271,11 @@ impl SdCard {
         let at = if by_bytes { argument / 512 } else { argument };
         match number {
             16 => self.answer_with(if argument == 512 { 0 } else { PARAMETER }, &[]),
-            17 | 24 | 25 if by_bytes && argument % 512 != 0 => self.answer_with(ADDRESS, &[]),
+            17 | 24 | 25 if by_bytes && !argument.is_multiple_of(512) => self.answer_with(ADDRESS, &[]),
             17 | 24 | 25 if at >= self.model.medium.size() => self.answer_with(PARAMETER, &[]),
-            9 => self.send(now_ns, self.model.csd().to_vec(), 0),
-            10 => self.send(now_ns, self.model.cid().to_vec(), 0),
-            17 => self.send(now_ns, self.model.medium.get(at).to_vec(), self.model.read_ns),
+            9 => self.send(now_ns, &self.model.csd(), 0),
+            10 => self.send(now_ns, &self.model.cid(), 0),
+            17 => self.send(now_ns, &self.model.medium.get(at), self.model.read_ns),
             24 | 25 => {
                 self.answer_with(0, &[]);
                 self.transfer = Transfer::Write { many: number == 25, at, block: None, failed: false };
@@ -291,7 +293,7 @@ impl SdCard {
         }
     }
 
-    fn send(&mut self, now_ns: u64, data: Vec<u8>, after_ns: u64) {
+    fn send(&mut self, now_ns: u64, data: &[u8], after_ns: u64) {
         self.answer_with(0, &[]);
         if self.model.has(now_ns, |fault| fault == Fault::NoBlock).is_some() {
             return;
@@ -301,8 +303,8 @@ impl SdCard {
             return;
         }
         let mut bytes = vec![0xFE];
-        bytes.extend(&data);
-        bytes.extend(crc16(&data).to_be_bytes());
+        bytes.extend(data);
+        bytes.extend(crc16(data).to_be_bytes());
         if self.model.has(now_ns, |fault| fault == Fault::DamagedRead).is_some() {
             bytes[7] ^= 0x10;
         }

@@ -71,8 +71,8 @@ impl Model {
     }
 
     pub(crate) fn has(&mut self, now_ns: u64, wanted: impl Fn(Fault) -> bool) -> Option<Fault> {
-        let plans = self.plans.iter_mut().filter(|plan| wanted(plan.fault));
-        plans.filter_map(|plan| plan.strikes(now_ns).then_some(plan.fault)).next()
+        let mut plans = self.plans.iter_mut().filter(|plan| wanted(plan.fault));
+        plans.find_map(|plan| plan.strikes(now_ns).then_some(plan.fault))
     }
 
     pub(crate) fn cid(&self) -> [u8; 16] {

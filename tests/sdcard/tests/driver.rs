@@ -312,7 +312,7 @@ fn noise_is_an_error_in_bounded_time_and_never_a_panic() {
         bench.slot.advance_to(from_ms * MS / 2);
         for at in 0..40 {
             bench.driver.begin_service();
-            let (_, took) = bench.timed(|bench| {
+            let ((), took) = bench.timed(|bench| {
                 let _ = bench.write(at, &blocks(1 + at % 8));
                 let _ = bench.read(at);
             });

@@ -34,7 +34,7 @@ const fn size_v1(raw: &[u8; 16]) -> u64 {
 mod tests {
     use super::*;
 
-    /// Registers as cards have them: SdFat's and embedded-sdmmc's test data describe the same two cards.
+    /// Registers as cards have them, of which `embedded-sdmmc`'s tests say the same.
     #[test]
     fn sizes_are_those_of_known_cards() {
         let v1 =

@@ -178,7 +178,7 @@ impl Rig {
             match frame.id() {
                 253 => {
                     let text = payload[1..51].iter().take_while(|byte| **byte != 0).copied().collect();
-                    self.texts.push((self.tick_at, String::from_utf8(text).unwrap()));
+                    self.texts.push((self.tick_at, String::from_utf8(text).expect("our texts are ASCII")));
                 }
                 77 => self.acks.push((u16::from_le_bytes([payload[0], payload[1]]), payload[2])),
                 _ => {}
