@@ -6,7 +6,7 @@ use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, UsageValue, Vehicle, Why};
 use hums_blackbox::{Cause, Entry, Gap, Record};
 use hums_core::component::Figures;
-use hums_core::exceedance::Crossings;
+use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
 
 use crate::decode::collect::lost;
