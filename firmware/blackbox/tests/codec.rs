@@ -1,28 +1,16 @@
 //! The codec, from outside: whatever a link carries comes back bit for bit, with its times.
 #![allow(clippy::panic, reason = "that is how a test fails")]
 
+#[path = "common/card.rs"]
+mod card;
 mod common;
 
+use card::Card;
 use common::Random;
 use hums_blackbox::record::{Clock, Note};
-use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, SectorSink, Writer};
+use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, Writer};
 use hums_core::time::Instant;
 use proptest::prelude::*;
-
-#[derive(Default)]
-struct Card(Vec<Sector>);
-
-impl SectorSink for Card {
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-
-    fn put(&mut self, sector: &Sector) {
-        let mut sector = *sector;
-        sector.seal(42);
-        self.0.push(sector);
-    }
-}
 
 type Frame = (u64, Vec<u8>, bool);
 

@@ -153,6 +153,8 @@ impl<'a> Monitoring<'a> {
         keeping.tick(now, monitor.params(), armed, card, writer, sectors);
         if self.keeping.takes_new_file(self.card) {
             self.heading(now, sectors);
+            // All of it, also what was recorded before.
+            self.usage_at = Instant::ZERO;
             self.record_usage(now, Moment::Periodic, sectors);
         }
     }
