@@ -18,6 +18,7 @@ pub mod collect;
 pub mod columns;
 pub mod identity;
 pub mod influx;
+mod names;
 pub mod parquet;
 pub mod record;
 pub mod reference;
