@@ -27,8 +27,10 @@ use crate::setup::Need;
 const HELP: &str = "\
 cargo xtask COMMAND
 
-  demo [--flight FILE] [--pc]    a recorded flight through the firmware in the emulator, and what came of it;
-                                 without an emulator, or with --pc, through the same pipeline on this PC
+  demo [--flight FILE] [--pc] [--no-dashboard]
+                                 a recorded flight through the firmware in the emulator, and what came of it;
+                                 without an emulator, or with --pc, through the same pipeline on this PC;
+                                 on a terminal the dashboard plays it at the end, until Ctrl-C
   test [--only STEP]... [--list] everything that CI checks, or the steps named
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
