@@ -7,6 +7,7 @@ mod apt;
 mod bench;
 mod budgets;
 mod demo;
+mod dist;
 mod firmware;
 mod fuzz;
 mod oracle;
@@ -26,8 +27,10 @@ use crate::setup::Need;
 const HELP: &str = "\
 cargo xtask COMMAND
 
-  demo [--flight FILE] [--pc]    a recorded flight through the firmware in the emulator, and what came of it;
-                                 without an emulator, or with --pc, through the same pipeline on this PC
+  demo [--flight FILE] [--pc] [--no-dashboard]
+                                 a recorded flight through the firmware in the emulator, and what came of it;
+                                 without an emulator, or with --pc, through the same pipeline on this PC;
+                                 on a terminal the dashboard plays it at the end, until Ctrl-C
   test [--only STEP]... [--list] everything that CI checks, or the steps named
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
@@ -35,6 +38,7 @@ cargo xtask COMMAND
   firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
   bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
+  dist [--check]                 the files of a release, in target/dist; --check builds them twice and compares
   size                           flash and RAM of both boards against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
   manifest                       make tests/flights/manifest.json anew with pymavlink
@@ -69,6 +73,7 @@ enum Command {
     Firmware(Board),
     Bench(Vec<bench::Bench>),
     Fuzz { seconds: u32 },
+    Dist { check: bool },
     Size,
     Setup { dry_run: bool },
     Manifest,
@@ -94,6 +99,11 @@ impl Command {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
                 _ => bail!("firmware takes --board f405 or --board emulated"),
+            },
+            "dist" => match rest.as_slice() {
+                [] => Ok(Self::Dist { check: false }),
+                ["--check"] => Ok(Self::Dist { check: true }),
+                _ => bail!("dist takes nothing or --check"),
             },
             "setup" => match rest.as_slice() {
                 [] => Ok(Self::Setup { dry_run: false }),
@@ -126,6 +136,7 @@ impl Command {
             }
             Self::Bench(what) => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
+            Self::Dist { check } => dist::run(check),
             Self::Size => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
                 budgets::check_all()

@@ -23,7 +23,7 @@ pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
 
 /// Two rows: of the session and of the airframe's life.
 pub(super) fn exceedance(exceedance: &Exceedance<'_>) -> Vec<Row> {
-    let row = |(of, crossings): (&str, hums_core::exceedance::Crossings)| {
+    let row = |(of, crossings): (&str, hums_core::health::exceedance::Crossings)| {
         let cells = vec![
             ("moment", Cell::Text(exceedance.moment.name().to_owned())),
             ("of", Cell::Text(of.to_owned())),

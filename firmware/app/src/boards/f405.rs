@@ -12,9 +12,9 @@
 //! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
 //! is for the checksum to find), so that not one good byte is thrown away with a bad one.
 
+#[path = "stm32f4/card.rs"]
+mod card;
 mod flash;
-
-use core::cell::Cell;
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::dma::{self, ReadableRingBuffer, Request, TransferOptions};
@@ -23,21 +23,20 @@ use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH2, DMA2_CH7, IWDG, RNG};
 use embassy_stm32::rng::{self, Rng};
-use embassy_stm32::spi::{self, Spi, mode::Master};
+use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, Uart, UartRx, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, pac, rcc};
-use embassy_time::{Delay, Duration, Timer};
-use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx, SdCard, SdCardError};
-use hums_recorder::CardDevice;
+use embassy_time::{Duration, Timer};
 use static_cell::ConstStaticCell;
 
 use super::{Boot, Overrun, Receive, ResetCause, Transmit};
 use crate::costs::Stage;
 use crate::report::Report;
 
+pub(crate) use card::Card;
+use card::CardPort;
 pub(crate) use flash::StoreFlash;
 
 use defmt_rtt as _;
@@ -59,10 +58,6 @@ const FETCH_EVERY: Duration = Duration::from_millis(1);
 const GS_RING_BYTES: usize = 512;
 /// How often the uplink looks into its ring: nobody there is in a hurry.
 const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
-/// What a card must be able to take before it is identified (SD specification, 4.2.1).
-const CARD_IDENTIFICATION: Hertz = Hertz(400_000);
-/// What every card takes afterwards: default speed is 25 MHz at most, the next slower clock of this chip is 21.
-const CARD_TRANSFER: Hertz = Hertz(21_000_000);
 /// The watchdog's time. The monitor feeds it every 50 ms.
 const WATCHDOG_US: u32 = 1_000_000;
 
@@ -130,16 +125,15 @@ pub(crate) fn take() -> Parts {
     );
 
     let mut bus = spi::Config::default();
-    bus.frequency = CARD_IDENTIFICATION;
+    bus.frequency = CardPort::IDENTIFICATION;
     bus.miso_pull = Pull::Up;
     let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
     let select = Output::new(p.PA4, Level::High, Speed::VeryHigh);
-    let Ok(spi) = ExclusiveDevice::new_no_delay(bus, select);
 
     Parts {
         autopilot,
         gs,
-        card: Card { driver: SdCard::new(spi, Delay), identified: Cell::new(false) },
+        card: Card::new(CardPort::new(bus, select)),
         store: Some(StoreFlash::new(Flash::new_blocking(p.FLASH))),
         led: Led(Output::new(p.PC12, Level::High, Speed::Low)),
         watchdog: Watchdog { timer: IndependentWatchdog::new(p.IWDG, WATCHDOG_US), running: false },
@@ -272,68 +266,6 @@ impl Transmit for PortTx {
             defmt::warn!("a port cannot run at {=u32} baud", baud);
         }
         self.baud = baud;
-    }
-}
-
-type CardSpi = ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, NoDelay>;
-
-/// The microSD card. Its driver waits for the card with the processor: only the least urgent task may use it.
-pub(crate) struct Card {
-    driver: SdCard<CardSpi, Delay>,
-    /// Whether the card is identified, so that the fast clock may be used.
-    identified: Cell<bool>,
-}
-
-impl Card {
-    fn set_clock(&self, frequency: Hertz) {
-        self.driver.spi(|device| {
-            let mut config = device.bus().get_current_config();
-            config.frequency = frequency;
-            // Cannot fail: both clocks are within what the bus can divide down to.
-            let _ = device.bus_mut().set_config(&config);
-        });
-    }
-
-    /// Identifies the card at the slow clock if that is still to be done.
-    fn ready(&self) -> Result<(), SdCardError> {
-        if self.identified.get() {
-            return Ok(());
-        }
-        self.set_clock(CARD_IDENTIFICATION);
-        // At least 74 clocks with the card not selected wake it up (SD specification, 6.4.1).
-        self.driver
-            .spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10]))
-            .map_err(|_| SdCardError::Transport)?;
-        self.driver.num_bytes()?;
-        self.set_clock(CARD_TRANSFER);
-        self.identified.set(true);
-        Ok(())
-    }
-}
-
-impl BlockDevice for Card {
-    type Error = SdCardError;
-
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), SdCardError> {
-        self.ready()?;
-        self.driver.read(blocks, start)
-    }
-
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), SdCardError> {
-        self.ready()?;
-        self.driver.write(blocks, start)
-    }
-
-    fn num_blocks(&self) -> Result<BlockCount, SdCardError> {
-        self.ready()?;
-        self.driver.num_blocks()
-    }
-}
-
-impl CardDevice for Card {
-    fn reset(&self) {
-        self.driver.mark_card_uninit();
-        self.identified.set(false);
     }
 }
 

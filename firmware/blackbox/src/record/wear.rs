@@ -1,7 +1,7 @@
 //! What was exceeded, and what wears: limits that were crossed, and components.
 
 use hums_core::component::{Figures, Kind, Status};
-use hums_core::exceedance::{self, Crossings};
+use hums_core::health::exceedance::{self, Crossings};
 
 use super::Moment;
 use super::stored::{Fields, Sink};

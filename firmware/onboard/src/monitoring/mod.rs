@@ -8,6 +8,7 @@ mod figures;
 mod happenings;
 mod notices;
 mod records;
+mod slot;
 
 use hums_blackbox::record::{
     Boot, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Vehicle as VehicleRecord,
@@ -31,6 +32,7 @@ pub use happenings::By;
 use figures::Sums;
 use happenings::CRITICAL;
 use notices::Notices;
+use slot::Told;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = monitor::TICK;
@@ -72,6 +74,7 @@ pub struct Monitoring<'a> {
     epoch_micros: Option<u64>,
     losses: Losses,
     notices: Notices,
+    slot: Told,
     keeping: Keeping,
     port_before: PortReading,
     card_before: CardReading,
@@ -106,6 +109,7 @@ impl<'a> Monitoring<'a> {
             epoch_micros: None,
             losses: Losses::new(),
             notices: Notices::new(),
+            slot: Told::new(),
             keeping: Keeping::new(),
             port_before: PortReading::default(),
             card_before: card.read(),
@@ -225,6 +229,7 @@ impl<'a> Monitoring<'a> {
         }
         self.keep(now, sectors);
         self.count_losses(now, sectors);
+        self.tell_slot(now, sectors);
         self.check(now, sectors, gs, findings);
         self.record_happenings(now, sectors);
         self.record_vehicle(now, sectors);

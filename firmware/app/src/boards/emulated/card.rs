@@ -4,7 +4,7 @@ use core::cell::RefCell;
 use core::fmt;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_recorder::CardDevice;
+use hums_recorder::{CardDevice, Trouble};
 use semihosting::fs::File;
 use semihosting::io::{Read, Seek, SeekFrom, Write};
 
@@ -83,7 +83,14 @@ impl BlockDevice for ImageCard {
     }
 }
 
-impl CardDevice for ImageCard {}
+impl CardDevice for ImageCard {
+    fn trouble(error: &CardError) -> Trouble {
+        match error {
+            CardError::NoCard => Trouble::Gone,
+            CardError::Io => Trouble::Refusing,
+        }
+    }
+}
 
 fn read_block(file: &mut File, mut rest: &mut [u8]) -> Result<(), CardError> {
     while !rest.is_empty() {

@@ -4,8 +4,10 @@
 //! Bounded: [`EXCEEDANCES_MAX`] checks and instances. One more is counted as left out, unless it is critical and another
 //! never was: that one makes room.
 
-use crate::health::{Check, Finding, Level, Side, checks};
-use crate::lifetime::{Put, Take, Unreadable};
+use super::check::{Check, Side};
+use super::finding::{Finding, Level};
+use super::tables::checks;
+use crate::bytes::{Put, Take, Unreadable};
 use crate::time::Instant;
 
 /// Checks and instances that are kept.
