@@ -32,7 +32,7 @@ cargo xtask COMMAND
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
                                  and docs/proof.md
-  firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
+  firmware [--board BOARD]       build the firmware: f405 (the default) or f429, which are real, or emulated
   bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   size                           flash and RAM of both boards against budgets.toml
@@ -93,7 +93,7 @@ impl Command {
             "firmware" => match rest.as_slice() {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
-                _ => bail!("firmware takes --board f405 or --board emulated"),
+                _ => bail!("firmware takes --board f405, f429 or emulated"),
             },
             "setup" => match rest.as_slice() {
                 [] => Ok(Self::Setup { dry_run: false }),
