@@ -177,6 +177,22 @@ const EMULATE_EXAMPLES: &str = "Examples:
 
 Needs qemu-system-arm 8.0 or later. Inside the source tree a missing firmware image is built first.";
 
+/// What the firmware understands of `--provoke`.
+fn provoked(text: &str) -> Result<String, String> {
+    let (what, at_s) = text.split_once('@').unwrap_or((text, "0"));
+    let (what, task) = what.split_once(':').unwrap_or((what, "downlink"));
+    let one_of = |word: &str, known: &[&str]| {
+        known.contains(&word).then_some(()).ok_or(format!("{word} is none of {}", known.join(", ")))
+    };
+    one_of(what, &["panic", "bus-fault", "overflow", "spin", "silence", "supply"])?;
+    one_of(task, &["reception", "monitor", "downlink", "storage"])?;
+    if what == "silence" && matches!(task, "monitor" | "storage") {
+        return Err(format!("{task} has no place where it could wait for ever: spin"));
+    }
+    at_s.parse::<u32>().map_err(|_| format!("{at_s} is no whole number of seconds"))?;
+    Ok(text.to_owned())
+}
+
 /// `hums emulate`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = EMULATE_EXAMPLES)]
@@ -187,8 +203,9 @@ pub struct Emulate {
     /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
     #[arg(long, value_name = "ELF")]
     pub firmware: Option<PathBuf>,
-    /// What is to go wrong in the firmware itself, when it first sends to the ground station
-    #[arg(long, value_name = "WHAT", value_parser = ["panic", "bus-fault", "silence"])]
+    /// What is to go wrong, once, in the firmware itself: panic, bus-fault, overflow (of the stack), spin, silence or
+    /// supply; in reception, monitor, downlink (the default) or storage; from some second on (0)
+    #[arg(long, value_name = "WHAT[:TASK][@SECONDS]", value_parser = provoked)]
     pub provoke: Option<String>,
     /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
     #[arg(long)]
