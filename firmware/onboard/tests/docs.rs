@@ -33,7 +33,7 @@ fn every_text_that_a_pilot_may_read_is_in_the_runbook() {
         // What stands between the placeholders.
         let pieces = text.split('{').map(|piece| piece.rsplit('}').next().unwrap_or_default().trim());
         for piece in pieces.filter(|piece| piece.chars().filter(char::is_ascii_alphabetic).count() > 3) {
-            let piece = piece.trim_matches([':', '(', ',']);
+            let piece = piece.trim_matches([':', '(', ',', ' ']);
             assert!(known.contains(piece), "docs/runbook.md does not tell of {piece:?} in {text:?}");
         }
     }

@@ -17,10 +17,10 @@ const FORMAT: u16 = 526;
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
 /// A card of 512 GB takes two minutes.
-const PATIENCE: Duration = Duration::from_secs(600);
+const PATIENCE: Duration = Duration::from_mins(10);
 
 /// Runs `hums format`.
-pub fn run(args: &cli::Format) -> Result<Outcome> {
+pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     if !args.yes {
         return Err(usage("everything on the board's card will be lost; say --yes if that is meant"));
     }
