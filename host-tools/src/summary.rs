@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use hums_blackbox::record::{Loss, Moment, Stats, UsageValue, Vehicle, Why};
+use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Entry, Gap, Record};
 use hums_core::component::Figures;
-use hums_core::exceedance::Crossings;
+use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
 
 use crate::decode::collect::lost;
@@ -275,11 +275,8 @@ impl Contents {
     }
 }
 
-fn named(counters: impl Iterator<Item = (u8, UsageValue)>) -> impl Iterator<Item = (String, f64)> {
-    counters.map(|(number, value)| match value {
-        UsageValue::Real(value) => (usage::name(number), value),
-        UsageValue::Count(value) => (usage::name(number), value as f64),
-    })
+fn named(counters: impl Iterator<Item = (u8, f32)>) -> impl Iterator<Item = (String, f64)> {
+    counters.map(|(number, value)| (usage::name(number), f64::from(value)))
 }
 
 fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {

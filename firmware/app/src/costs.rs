@@ -12,8 +12,10 @@ use crate::boards::{CYCLE_BITS, board};
 /// The parts that are measured apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
-    /// Nothing else; also the executors and interrupts themselves.
+    /// Nothing else; also the interrupts of ports and clock.
     Idle,
+    /// Everything in a task that is none of the below: the executors, waiting and waking.
+    Tasks,
     /// Bytes to frames.
     Framer,
     /// Frames out of their queue.
@@ -31,12 +33,13 @@ pub(crate) enum Stage {
 }
 
 /// Number of stages.
-pub(crate) const STAGES: usize = 8;
+pub(crate) const STAGES: usize = 9;
 
 impl Stage {
     /// All of them, in the order of [`totals`], with their names.
     pub(crate) const NAMES: [(Self, &str); STAGES] = [
         (Self::Idle, "idle"),
+        (Self::Tasks, "tasks"),
         (Self::Framer, "framer"),
         (Self::Monitor, "monitor"),
         (Self::Encode, "encode"),

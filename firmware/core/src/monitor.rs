@@ -1,14 +1,15 @@
 //! The monitor: vehicle, flight, health and usage, kept together in step.
 
 use crate::baseline::{Baselines, Quantity};
+use crate::bytes::Unreadable;
 use crate::component::{COMPONENTS_MAX, Component, Figures, Kind, Label, Status};
 use crate::derived::Derived;
-use crate::exceedance::Exceedances;
 use crate::exposure::Exposure;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
+use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
-use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Saving, Session, Unreadable};
+use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Saving, Session};
 use crate::observation::{MOTORS_MAX, Observation, Source};
 use crate::params::Params;
 use crate::protect::{Protect, Request};
@@ -141,7 +142,7 @@ impl Monitor {
         if crossed || self.exceedances.lasting() {
             self.saving.change(ItemKey::Exceedances);
         }
-        self.exposure.step(now, &self.vehicle, &self.usage);
+        self.exposure.step(now, &self.vehicle, self.usage.current_a());
         self.step_protect(now, event);
         self.step_life(event);
         self.step_happenings(now, event);
@@ -295,8 +296,10 @@ impl Monitor {
             ItemKey::Session => {
                 let session = Session::decode(stored)?;
                 self.before.add(&session);
-                self.exposure.add(&session);
-                self.components.iter_mut().for_each(|component| component.add(&session));
+                self.exposure.add(session.boots, session.exposure());
+                self.components
+                    .iter_mut()
+                    .for_each(|component| component.add(session.boots, &session.wear()));
             }
         }
         Ok(())

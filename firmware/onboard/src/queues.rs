@@ -16,8 +16,9 @@ use hums_link::{outlet, summary};
 
 use crate::shelf::{Reader, Server, Shelf};
 
-/// 40 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes one or two.
-pub const FRAME_QUEUE_BYTES: usize = 4 * 1024;
+/// 16 ms of a line at 921,600 baud, stamps included: the monitor's longest step, a tick that records everything there
+/// is, takes 4 (`ARCHITECTURE.md` has the figures).
+pub const FRAME_QUEUE_BYTES: usize = 2 * 1024;
 
 /// What the port's outlet lets wait, findings and all, and the end of the queue that the longest frame does not fit into.
 pub const GS_QUEUE_BYTES: usize = (summary::WAITING_BYTES + outlet::FINDINGS) as usize + GS_FRAME_BYTES_MAX;
@@ -29,10 +30,11 @@ pub const UPLINK_QUEUE_BYTES: usize = 1024;
 pub const AUTOPILOT_QUEUE_BYTES: usize = 1100;
 
 /// 2.5 s of a standing card at 921,600 baud: 92 kB/s at 3.5 times smaller is 66 KB; storage holds eight sectors more.
-pub const SECTOR_QUEUE_SECTORS: usize = 134;
+pub const SECTOR_QUEUE_SECTORS: usize = 132;
 
-/// Sectors kept free for findings and losses when frames are refused already.
-pub const SECTOR_RESERVE: usize = 2 * ENTRY_SECTORS_MAX;
+/// Sectors kept free for findings and losses when frames are refused already: two sectors of them, as the last has to
+/// leave room for the longest entry there is.
+pub const SECTOR_RESERVE: usize = ENTRY_SECTORS_MAX + 1;
 
 /// Bytes of log that the sector queue holds.
 pub const SECTOR_QUEUE_BYTES: usize = SECTOR_QUEUE_SECTORS * SECTOR_BYTES;

@@ -12,12 +12,13 @@ use hums_recorder::CardState;
 
 use super::downlink::{BAUD_AUTOPILOT, BAUD_GS};
 use super::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
-use crate::boards::board;
+use crate::boards::{ResetCause, board};
 use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};
 use crate::memory;
 use crate::report::Report;
+use crate::watch;
 
 /// Ticks of one half of the LED's blinking while the card records: 0.5 s.
 const BLINK_RECORDING: u32 = 10;
@@ -37,14 +38,12 @@ pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
     mut ends: Ends,
     handover: &'static mut Handover<'static>,
-    fault: Option<Fault>,
+    cause: ResetCause,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
 ) -> ! {
     body.start(now(), &mut ends.sectors);
-    if let Some(fault) = fault {
-        body.fault(now(), &fault.record(), &mut ends.sectors);
-    }
+    tell_fault(body, &mut ends, cause);
     wake_others();
     let mut ticker = Ticker::every(links::wait(TICK));
     let mut ticks: u32 = 0;
@@ -59,10 +58,13 @@ pub(crate) async fn run(
                 tick(body, &mut ends, handover);
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
-                match SUPERVISOR.silent(now()) {
-                    None => watchdog.feed(),
-                    // Not fed: the watchdog does what is to be done.
-                    Some(task) => fault::silent(task),
+                fault::tick(now());
+                let silent = SUPERVISOR.silent(now());
+                fault::silent(silent);
+                // Else the watchdog does what is to be done.
+                if silent.is_none() {
+                    watchdog.feed();
+                    watch::fed();
                 }
             }
             Either4::Fourth(()) => break,
@@ -84,11 +86,26 @@ pub(crate) async fn run(
     }
 }
 
+/// Records how the start before this one ended, and tells the ground station. The note is read here, so that it takes no
+/// memory of the task's.
+fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
+    let noted = fault::take();
+    fault::begin();
+    let unnoted = noted.is_none() && cause == ResetCause::Watchdog;
+    if let Some(fault) = noted.or_else(|| unnoted.then(Fault::without_note)) {
+        defmt::error!("before this start: {}", defmt::Display2Format(&fault));
+        body.fault(now(), &fault.record(), fault.last_messages(), &mut ends.sectors);
+    }
+}
+
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
     let Ends { frames, sectors, gs, .. } = ends;
     let mut begin = |step| {
         costs::enter(match step {
-            Step::Encode => Stage::Encode,
+            Step::Encode { at, id } => {
+                fault::seen(at, id);
+                Stage::Encode
+            }
             Step::Observe => Stage::Observe,
             Step::Summary => Stage::Summary,
         });

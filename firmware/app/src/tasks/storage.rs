@@ -9,6 +9,7 @@ use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Keeper, Service, Storage, Task};
 use hums_recorder::HeldBlocks;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use super::{CARD_STATUS, SUPERVISOR};
 
@@ -21,6 +22,19 @@ const REPORT: Duration = Duration::from_secs(1);
 /// How long the end waits for a card that is out, before what waits for it is lost.
 const CARD_PATIENCE: Span = Span::from_secs(5);
 
+/// What the task calls.
+type Body = Storage<'static, board::Card>;
+
+// Statics of their own: made within the task both would come to their place over the stack, 8 and 1.5 KiB of it.
+static HELD: ConstStaticCell<HeldBlocks> = ConstStaticCell::new(HeldBlocks::new());
+static BODY: StaticCell<Body> = StaticCell::new();
+
+/// Makes the task's body, once.
+#[inline(never)]
+fn prepare(card: board::Card, entropy: u32) -> &'static mut Body {
+    BODY.init_with(|| Storage::new(card, &CARD_STATUS, HELD.take(), entropy))
+}
+
 #[embassy_executor::task]
 pub(crate) async fn run(
     card: board::Card,
@@ -29,8 +43,7 @@ pub(crate) async fn run(
     mut shelf: Server<'static>,
     keeper: &'static mut Keeper<'static, board::StoreFlash>,
 ) -> ! {
-    let held = HeldBlocks::new();
-    let mut body = Storage::new(card, &CARD_STATUS, &held, entropy);
+    let body = prepare(card, entropy);
     let mut ended_at = None;
     loop {
         SUPERVISOR.report(Task::Storage, now());

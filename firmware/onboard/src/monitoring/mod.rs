@@ -8,9 +8,10 @@ mod figures;
 mod happenings;
 mod notices;
 mod records;
+mod slot;
 
 use hums_blackbox::record::{
-    Boot, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Vehicle as VehicleRecord,
+    Boot, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
@@ -26,11 +27,13 @@ use crate::keeping::Keeping;
 use crate::loss::Losses;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::{FramesOut, GsIn, SectorsIn};
+use crate::supervisor::Task;
 pub use happenings::By;
 
 use figures::Sums;
 use happenings::CRITICAL;
-use notices::Notices;
+use notices::{Notice, Notices};
+use slot::Told;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = monitor::TICK;
@@ -41,6 +44,9 @@ const STATS: Span = Span::from_secs(10);
 /// How often usage is recorded.
 const USAGE: Span = Span::from_secs(60);
 
+/// The `MAV_SEVERITY` of a restart after a fault.
+const FAULT_SEVERITY: u8 = 4;
+
 /// What the board knows of itself: what the first record of a log says.
 pub type Identity<'a> = Boot<'a>;
 
@@ -48,7 +54,12 @@ pub type Identity<'a> = Boot<'a>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Into the record.
-    Encode,
+    Encode {
+        /// When it came.
+        at: Instant,
+        /// Which message it is.
+        id: u32,
+    },
     /// Into what the monitor knows.
     Observe,
     /// On to the ground station, where it is its turn.
@@ -72,6 +83,7 @@ pub struct Monitoring<'a> {
     epoch_micros: Option<u64>,
     losses: Losses,
     notices: Notices,
+    slot: Told,
     keeping: Keeping,
     port_before: PortReading,
     card_before: CardReading,
@@ -106,6 +118,7 @@ impl<'a> Monitoring<'a> {
             epoch_micros: None,
             losses: Losses::new(),
             notices: Notices::new(),
+            slot: Told::new(),
             keeping: Keeping::new(),
             port_before: PortReading::default(),
             card_before: card.read(),
@@ -149,13 +162,20 @@ impl<'a> Monitoring<'a> {
         keeping.tick(now, monitor.params(), armed, card, writer, sectors);
         if self.keeping.takes_new_file(self.card) {
             self.heading(now, sectors);
+            // All of it, also what was recorded before.
+            self.usage_at = Instant::ZERO;
             self.record_usage(now, Moment::Periodic, sectors);
         }
     }
 
-    /// Records how the boot before this one ended. To be called after [`Self::start`].
-    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, sectors: &mut SectorsIn) {
+    /// Records how the boot before this one ended, with a word on what came before, and tells the ground station as soon
+    /// as the vehicle is known. To be called after [`Self::start`].
+    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, before: &str, sectors: &mut SectorsIn) {
         self.record(now, &Record::Fault(*fault), sectors);
+        self.record(now, &Record::Note(Note { severity: FAULT_SEVERITY, text: before }), sectors);
+        let task = Task::ALL.into_iter().map(Task::name).find(|name| *name == fault.task);
+        // There is room: nothing was told yet.
+        let _ = self.notices.push(Notice::Restarted(restart_words(fault), task));
     }
 
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
@@ -185,8 +205,9 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
         begin: &mut impl FnMut(Step),
     ) {
-        begin(Step::Encode);
-        let key = Frame::again(bytes, Check::Unverified).filter(|frame| frame.id() == crate::secure::SETUP);
+        let whole = Frame::again(bytes, Check::Unverified);
+        begin(Step::Encode { at, id: whole.as_ref().map_or(0, Frame::id) });
+        let key = whole.filter(|frame| frame.id() == crate::secure::SETUP);
         if let Some(frame) = key {
             self.withhold(at, &frame, sectors);
         } else if !self.companion.stopped && self.writer.frame(at, bytes, verified, sectors).is_err() {
@@ -223,6 +244,7 @@ impl<'a> Monitoring<'a> {
         }
         self.keep(now, sectors);
         self.count_losses(now, sectors);
+        self.tell_slot(now, sectors);
         self.check(now, sectors, gs, findings);
         self.record_happenings(now, sectors);
         self.record_vehicle(now, sectors);
@@ -323,4 +345,15 @@ fn write(
         losses.count(now, Lost::Records, 1);
     }
     written
+}
+
+/// How a start ended, in words for a pilot.
+fn restart_words(fault: &Fault<'_>) -> &'static str {
+    match fault.kind {
+        1 => "panic",
+        2 if fault.message == "stack overflow" => "stack overflow",
+        2 => "processor fault",
+        3 => "watchdog",
+        _ => "supply low",
+    }
 }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant as Wall};
 
 use anyhow::Result;
 use hums_blackbox::Record;
-use hums_blackbox::record::{FindingRecord, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
+use hums_blackbox::record::{FindingRecord, Moment, USAGE_ENTRIES_MAX, Usage};
 use hums_core::time::{Instant, Span};
 use hums_link::{Frame, observe};
 use serde::Serialize;
@@ -136,7 +136,7 @@ impl Influx {
         for (system, craft) in &world.crafts {
             let tags = self.names.tags(*system, world);
             let mut counters = Vec::new();
-            craft.monitor.for_each_counter(|number, value| counters.push((number, UsageValue::Real(value))));
+            craft.monitor.for_each_counter(|number, value| counters.push((number, value as f32)));
             let mut lines = Lines::default();
             for part in counters.chunks(USAGE_ENTRIES_MAX) {
                 for row in rows(&Record::Usage(Usage::new(Moment::Periodic, part))) {

@@ -4,7 +4,8 @@ use core::cell::RefCell;
 use core::fmt;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_recorder::CardDevice;
+use hums_onboard::Task;
+use hums_recorder::{CardDevice, Trouble};
 use semihosting::fs::File;
 use semihosting::io::{Read, Seek, SeekFrom, Write};
 
@@ -70,6 +71,7 @@ impl BlockDevice for ImageCard {
     }
 
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
+        let _ = super::provoke::here(Task::Storage);
         self.at(start, |file| {
             blocks.iter().try_for_each(|block| file.write_all(&block.contents).map_err(|_| CardError::Io))
         })
@@ -83,7 +85,14 @@ impl BlockDevice for ImageCard {
     }
 }
 
-impl CardDevice for ImageCard {}
+impl CardDevice for ImageCard {
+    fn trouble(error: &CardError) -> Trouble {
+        match error {
+            CardError::NoCard => Trouble::Gone,
+            CardError::Io => Trouble::Refusing,
+        }
+    }
+}
 
 fn read_block(file: &mut File, mut rest: &mut [u8]) -> Result<(), CardError> {
     while !rest.is_empty() {

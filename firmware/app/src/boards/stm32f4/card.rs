@@ -1,0 +1,58 @@
+//! The microSD card on an SPI bus: its port; the driver is `hums_recorder::spi`.
+
+use embassy_stm32::gpio::{Level, Output};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::spi::{Spi, mode::Master};
+use embassy_stm32::time::Hertz;
+use hums_core::time::Instant;
+use hums_recorder::SpiCard;
+use hums_recorder::spi::{Clock, Port, PortFailed};
+
+/// The microSD card. Its driver waits for the card with the processor: only the least urgent task may use it.
+pub(crate) type Card = SpiCard<CardPort>;
+
+/// The card's port.
+pub(crate) struct CardPort {
+    bus: Spi<'static, Blocking, Master>,
+    select: Output<'static>,
+}
+
+impl CardPort {
+    /// No more before a card is identified; the bus's slowest is 328 kHz, 84 MHz by 256.
+    pub(crate) const IDENTIFICATION: Hertz = Hertz(400_000);
+    /// Cards take 25 MHz; the next slower clock of these chips is 21, 84 MHz by 4.
+    const TRANSFER: Hertz = Hertz(21_000_000);
+
+    /// The port on this bus, mode 0, with its select pin high.
+    pub(crate) const fn new(bus: Spi<'static, Blocking, Master>, select: Output<'static>) -> Self {
+        Self { bus, select }
+    }
+}
+
+impl Port for CardPort {
+    fn select(&mut self, selected: bool) {
+        self.select.set_level(if selected { Level::Low } else { Level::High });
+    }
+
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
+        self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
+        self.bus.blocking_write(bytes).map_err(|_| PortFailed)
+    }
+
+    fn set_clock(&mut self, clock: Clock) {
+        let mut config = self.bus.get_current_config();
+        config.frequency = match clock {
+            Clock::Identification => Self::IDENTIFICATION,
+            Clock::Transfer => Self::TRANSFER,
+        };
+        // Cannot fail: both clocks are within what the bus can divide down to.
+        let _ = self.bus.set_config(&config);
+    }
+
+    fn now(&self) -> Instant {
+        crate::links::now()
+    }
+}
