@@ -63,7 +63,7 @@ pub enum Command {
     Params(Params),
     /// Download the board's logs over MAVLink
     Pull(Pull),
-    /// Show it: a recorded flight is recorded, decoded and summed up
+    /// Show it: a recorded flight is recorded, decoded and summed up, and played on the dashboard
     Demo(Demo),
 }
 
@@ -338,7 +338,7 @@ const LIVE_EXAMPLES: &str = "Examples:
   hums live --input udpin:0.0.0.0:14550 --open
   hums live --input serial:/dev/ttyUSB0:57600
   hums live --input flight.tlog --open
-  hums live --input card.img
+  hums live --input card.img --session 00042
   hums live --input udpin:0.0.0.0:14550 --influx http://127.0.0.1:8086 --org drones --bucket hums --token T
   hums live --input udpin:0.0.0.0:14550 --listen 192.168.1.5:8080
 
@@ -353,6 +353,9 @@ pub struct Live {
     /// A link (udpin:, udpout:, tcp:, serial:), a recording (tlog or raw MAVLink, `-`), or a log (file, image, folder)
     #[arg(long, value_name = "SRC")]
     pub input: Endpoint,
+    /// Of several sessions this one, by the name that `hums info` gives; otherwise the newest
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
     /// Where the page is served; port 0 is any free one
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8080")]
     pub listen: String,
@@ -494,7 +497,10 @@ pub struct Pull {
 
 const DEMO_EXAMPLES: &str = "Examples:
   hums demo
-  hums demo --input flight.tlog --dir demo";
+  hums demo --input flight.tlog --dir demo
+  hums demo --dashboard never
+
+On a terminal it ends with the dashboard, which plays the card and runs until Ctrl-C.";
 
 /// `hums demo`
 #[derive(Args, Clone, Debug)]
@@ -506,6 +512,20 @@ pub struct Demo {
     /// Where to put the card image and what is decoded from it
     #[arg(long, value_name = "DIR", default_value = "hums-demo")]
     pub dir: PathBuf,
+    /// Whether it ends with the dashboard
+    #[arg(long, value_enum, value_name = "WHEN", default_value_t = Dashboard::Auto)]
+    pub dashboard: Dashboard,
+}
+
+/// Whether the demo ends with the dashboard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Dashboard {
+    /// Where standard output is a terminal
+    Auto,
+    /// Wherever it goes
+    Always,
+    /// Not at all
+    Never,
 }
 
 #[cfg(test)]

@@ -57,6 +57,16 @@ impl Board {
         ]
     }
 
+    /// The same for `cargo cyclonedx`, which works on one package.
+    pub(crate) fn sbom_arguments(self) -> [String; 4] {
+        [
+            format!("--target={FIRMWARE_TARGET}"),
+            "--no-default-features".into(),
+            "--features".into(),
+            format!("board-{}", self.name()),
+        ]
+    }
+
     /// Where [`build`] leaves the image: one file a board, so that building one does not replace the other.
     pub(crate) fn image(self) -> PathBuf {
         repo::target().join("firmware").join(format!("hums-{}.elf", self.name()))

@@ -52,6 +52,18 @@ fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
     Ok(joined)
 }
 
+/// All of the pieces as one, from the first address on. What lies between them is as erased flash is: whoever programs
+/// this, and not the pieces, gives the board an empty store.
+pub(crate) fn flat(pieces: &[Piece]) -> Vec<u8> {
+    let mut flat = Vec::new();
+    let Some(first) = pieces.first() else { return flat };
+    for piece in pieces {
+        flat.resize((piece.address - first.address) as usize, 0xFF);
+        flat.extend(&piece.bytes);
+    }
+    flat
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,6 +89,12 @@ mod tests {
     #[test]
     fn segments_that_overlap_are_refused() {
         assert!(joined(vec![piece(0x0801_0000, 4), piece(0x0801_0002, 4)]).is_err());
+    }
+
+    #[test]
+    fn a_flat_image_has_an_erased_store() {
+        let flat = flat(&[piece(0x0800_0000, 2), piece(0x0800_0004, 1)]);
+        assert_eq!(flat, [7, 7, 0xFF, 0xFF, 7]);
     }
 
     #[test]

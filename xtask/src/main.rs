@@ -9,6 +9,7 @@ mod budgets;
 mod costs;
 mod demo;
 mod dfu;
+mod dist;
 mod firmware;
 mod flash;
 mod fuzz;
@@ -30,8 +31,10 @@ use crate::setup::Need;
 const HELP: &str = "\
 cargo xtask COMMAND
 
-  demo [--flight FILE] [--pc]    a recorded flight through the firmware in the emulator, and what came of it;
-                                 without an emulator, or with --pc, through the same pipeline on this PC
+  demo [--flight FILE] [--pc] [--no-dashboard]
+                                 a recorded flight through the firmware in the emulator, and what came of it;
+                                 without an emulator, or with --pc, through the same pipeline on this PC;
+                                 on a terminal the dashboard plays it at the end, until Ctrl-C
   test [--only STEP]... [--list] everything that CI checks, or the steps named
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
@@ -39,6 +42,7 @@ cargo xtask COMMAND
   firmware [--board BOARD]       build the firmware: f405 (the default) or f429, which are real, or emulated
   bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
+  dist [--check]                 the files of a release, in target/dist; --check builds them twice and compares
   flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
                                  boot loader (dfu-util); what the board has stored stays
   attach [--board BOARD]         show the log of a board that runs (probe-rs)
@@ -79,6 +83,7 @@ enum Command {
     Attach(flash::Options),
     Bench(Vec<bench::Bench>),
     Fuzz { seconds: u32 },
+    Dist { check: bool },
     Size,
     Costs,
     Setup { dry_run: bool },
@@ -105,6 +110,11 @@ impl Command {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
                 _ => bail!("firmware takes --board f405, f429 or emulated"),
+            },
+            "dist" => match rest.as_slice() {
+                [] => Ok(Self::Dist { check: false }),
+                ["--check"] => Ok(Self::Dist { check: true }),
+                _ => bail!("dist takes nothing or --check"),
             },
             "flash" => Ok(Self::Flash(flash::Options::parse(&rest, true)?)),
             "attach" => Ok(Self::Attach(flash::Options::parse(&rest, false)?)),
@@ -143,6 +153,7 @@ impl Command {
             Self::Costs => costs::check(),
             Self::Bench(what) => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
+            Self::Dist { check } => dist::run(check),
             Self::Size => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
                 budgets::check_all()

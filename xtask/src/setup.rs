@@ -18,12 +18,17 @@ use crate::shell::Shell;
 /// The emulator's first version that has the STM32F405's 128 KiB of SRAM and its 64 KiB of CCM.
 const QEMU_MAJOR_MIN: u32 = 8;
 
+/// The target of a `hums` that needs no library of the machine it runs on.
+pub(crate) const STATIC_TARGET: &str =
+    if cfg!(target_arch = "aarch64") { "aarch64-unknown-linux-musl" } else { "x86_64-unknown-linux-musl" };
+
 /// Something that a command needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Need {
     /// `cc`: rustc links with it. (`.cargo/linker` sees to it before this program can run at all.)
     Linker,
     FirmwareTarget,
+    StaticTarget,
     Rustfmt,
     Clippy,
     Qemu,
@@ -36,9 +41,10 @@ pub(crate) enum Need {
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Linker,
         Self::FirmwareTarget,
+        Self::StaticTarget,
         Self::Rustfmt,
         Self::Clippy,
         Self::Qemu,
@@ -55,6 +61,7 @@ impl Need {
         match self {
             Self::Linker => "a C linker (cc), for everything that rustc builds",
             Self::FirmwareTarget => "the Rust target thumbv7em-none-eabihf, for the firmware",
+            Self::StaticTarget => "Rust's musl target, for the static hums of a release",
             Self::Rustfmt => "rustfmt, for the check of the formatting",
             Self::Clippy => "clippy, for the lints",
             Self::Qemu => "qemu-system-arm 8.0 or later, which runs the firmware",
@@ -71,7 +78,8 @@ impl Need {
         let cargo_has = |tool: &str| Shell::cargo().args([tool, "--version"]).ask().is_some();
         match self {
             Self::Linker => find_program("cc").is_some(),
-            Self::FirmwareTarget => firmware_target_installed(),
+            Self::FirmwareTarget => target_installed(FIRMWARE_TARGET),
+            Self::StaticTarget => target_installed(STATIC_TARGET),
             Self::Rustfmt => cargo_has("fmt"),
             Self::Clippy => cargo_has("clippy"),
             Self::Qemu => qemu_major().is_some_and(|major| major >= QEMU_MAJOR_MIN),
@@ -88,6 +96,7 @@ impl Need {
     fn rustup(self) -> Option<[&'static str; 3]> {
         match self {
             Self::FirmwareTarget => Some(["target", "add", FIRMWARE_TARGET]),
+            Self::StaticTarget => Some(["target", "add", STATIC_TARGET]),
             Self::Rustfmt => Some(["component", "add", "rustfmt"]),
             Self::Clippy => Some(["component", "add", "clippy"]),
             _ => None,
@@ -105,7 +114,7 @@ impl Need {
             Self::Influx => &["influxdb"],
             Self::Victoria => &["victoria-metrics"],
             Self::Chromium => &["chromium", "chromium-driver", "fonts-dejavu-core"],
-            Self::FirmwareTarget | Self::Rustfmt | Self::Clippy => &[],
+            Self::FirmwareTarget | Self::StaticTarget | Self::Rustfmt | Self::Clippy => &[],
         }
     }
 }
@@ -283,9 +292,9 @@ fn advise(line: &str) {
     eprintln!("  type: {line}");
 }
 
-fn firmware_target_installed() -> bool {
+fn target_installed(target: &str) -> bool {
     let library = Shell::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()))
-        .args(["--print", "target-libdir", "--target", FIRMWARE_TARGET])
+        .args(["--print", "target-libdir", "--target", target])
         .ask();
     library.is_some_and(|dir| Path::new(dir.trim()).is_dir())
 }

@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::io::Write as _;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, bail};
@@ -30,6 +31,13 @@ impl Shell {
     /// As root: as it is for root, through `sudo -n` for anyone else.
     pub(crate) fn as_root(program: &str) -> Self {
         if crate::setup::is_root() { Self::new(program) } else { Self::new("sudo").args(["-n", program]) }
+    }
+
+    /// In `folder`; elsewhere it is the root.
+    pub(crate) fn within(mut self, folder: &Path) -> Self {
+        self.command.current_dir(folder);
+        self.shown = format!("cd {} && {}", quoted(&folder.to_string_lossy()), self.shown);
+        self
     }
 
     pub(crate) fn arg(mut self, argument: impl AsRef<OsStr>) -> Self {

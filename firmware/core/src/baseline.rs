@@ -5,7 +5,7 @@
 //! [`FLIGHTS_MIN`] flights make it, each later one moves it by a tenth of the difference at most, and one that is
 //! beyond the limit of a warning does not move it at all, so that a fault never becomes normal.
 
-use crate::lifetime::{Put, Take, Unreadable};
+use crate::bytes::{Put, Take, Unreadable};
 use crate::observation::MOTORS_MAX;
 use crate::vehicle::BATTERIES_MAX;
 

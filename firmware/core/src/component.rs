@@ -4,11 +4,11 @@
 //! has run, are an item that outlives power. It is green, from [`Param::CompYellow`] percent of whichever limit trips
 //! first yellow, and from [`Param::CompRed`] percent red. Replacing one is recorded with the old part's figures.
 
-use crate::health::Subsystem;
-use crate::lifetime::{Put, Session, Take, Unreadable};
+use crate::bytes::{Put, Take, Unreadable};
+use crate::health::finding::Subsystem;
 use crate::observation::MOTORS_MAX;
 use crate::params::{Param, Params};
-use crate::usage::{Totals, UsageCounter};
+use crate::usage::{UsageCounter, Wear};
 
 /// Components at most.
 pub const COMPONENTS_MAX: usize = 8;
@@ -183,15 +183,6 @@ impl Figures {
     }
 }
 
-/// What a session has counted, as far as components wear by it: its sums, not yet the cycles of the load factor.
-#[derive(Clone, Copy, Debug)]
-pub struct Wear<'a> {
-    /// The session's counters.
-    pub totals: &'a Totals,
-    /// Full discharges of each battery.
-    pub battery_cycles: &'a [f64],
-}
-
 /// Which parameters describe a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ComponentParams {
@@ -361,6 +352,17 @@ impl Component {
         self.base
     }
 
+    /// The same, having run so much.
+    pub const fn having_run(self, ran: Figures) -> Self {
+        Self { base: ran, ..self }
+    }
+
+    /// The same in a session that has counted so much of what it ran already.
+    pub(crate) fn in_session(self, wear: &Wear<'_>) -> Self {
+        let counted = Figures::after(wear, self.kind, self.number);
+        self.having_run(self.base.zip(counted, |ran, counted| ran - counted))
+    }
+
     /// Whether it is to be saved anew, because it was stored as of an earlier power-on.
     pub(crate) const fn begin(&mut self, boots: u32) -> bool {
         let begins = self.as_of != boots;
@@ -368,10 +370,10 @@ impl Component {
         begins
     }
 
-    /// Adds the session that was saved last, if it is not in it already.
-    pub(crate) fn add(&mut self, session: &Session) {
-        if session.boots == self.as_of {
-            self.base = self.figures(&session.wear());
+    /// Adds what the session of power-on `boots` counted, if it is not in it already.
+    pub(crate) fn add(&mut self, boots: u32, wear: &Wear<'_>) {
+        if boots == self.as_of {
+            self.base = self.figures(wear);
         }
     }
 
@@ -419,7 +421,7 @@ impl Component {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exposure::Exposure;
+    use crate::usage::Totals;
 
     fn params(set: &[(&str, f32)]) -> Params {
         let mut params = Params::defaults();
@@ -477,7 +479,6 @@ mod tests {
         let params = params(&[("CMP1_KIND", 2.0), ("CMP1_NUMBER", 1.0)]);
         let totals = flown(1.0, 2.0);
         let wear = Wear { totals: &totals, battery_cycles: &[0.75] };
-        let session = Session::now(5, true, &totals, &wear, &Exposure::new());
         let none = Totals::nothing();
         let mut component = Component { name: Label::new("pack A"), ..Component::NONE };
         component.describe(0, &Wear { totals: &none, battery_cycles: &[] }, &params);
@@ -491,7 +492,7 @@ mod tests {
             component.encode(boots, &mut stored);
             let mut read = Component::decode(&stored).expect("readable");
             assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", Kind::Battery, 1));
-            read.add(&session);
+            read.add(5, &wear);
             assert_eq!(read.ran(), expected, "as of power-on {boots}");
             for cut in 0..Component::BYTES {
                 assert_eq!(Component::decode(&stored[..cut]), Err(Unreadable));

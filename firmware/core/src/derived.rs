@@ -2,8 +2,7 @@
 //! imbalance of motors in steady flight, clips since take-off, load factor.
 
 use crate::flight::{Flight, FlightEvent};
-use crate::health::{Inputs, Reading};
-use crate::latest::Latest;
+use crate::latest::{Latest, Reading};
 use crate::observation::{Battery, CELLS_MAX, EscGroup, MOTORS_MAX, Observation};
 use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
@@ -230,37 +229,43 @@ impl Derived {
     }
 
     /// The lowest cell's voltage where cells are measured, the pack's share of it otherwise.
-    pub(crate) fn cell_voltage(&self, inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
+    pub(crate) fn cell_voltage(&self, vehicle: &Vehicle, params: &Params, battery: u8) -> Option<Reading> {
         let index = usize::from(battery);
-        let slot = inputs.vehicle.batteries.get(index)?;
+        let slot = vehicle.batteries.get(index)?;
         if slot.get().is_some_and(|known| !known.lithium) {
             return None;
         }
-        let at = if slot.get().is_some() { slot.at() } else { inputs.vehicle.system.at() };
+        let at = if slot.get().is_some() { slot.at() } else { vehicle.system.at() };
         let lowest = slot
             .get()
             .filter(|known| known.cells_reported() > 1)
             .and_then(|known| known.cells.iter().flatten().map(|cell| cell.0).reduce(f32::min));
         let share = || {
-            let cells = self.cell_count(inputs.vehicle, index, inputs.params);
-            pack_v(inputs.vehicle, index).filter(|_| cells > 0).map(|pack_v| pack_v / f32::from(cells))
+            let cells = self.cell_count(vehicle, index, params);
+            pack_v(vehicle, index).filter(|_| cells > 0).map(|pack_v| pack_v / f32::from(cells))
         };
         Reading::new(at, lowest.or_else(share))
     }
 
     /// Seconds since an ESC last told speed or current, once it has missed some of its own intervals; 0 before.
-    pub(crate) fn esc_silence(&self, inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
+    pub(crate) fn esc_silence(&self, now: Instant, motor: u8) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor))?;
-        let silence_s = inputs.now.since(track.last?).as_secs_f32();
+        let silence_s = now.since(track.last?).as_secs_f32();
         let missed = track.interval_s > 0.0 && silence_s > INTERVALS_MISSED * track.interval_s;
-        Some(Reading { at: inputs.now, value: if missed { silence_s } else { 0.0 } })
+        Some(Reading { at: now, value: if missed { silence_s } else { 0.0 } })
     }
 
     /// How far a motor's speed is from the mean of the others, in percent of it, in steady flight.
-    pub(crate) fn motor_imbalance(&self, inputs: &Inputs<'_>, motor: u8) -> Option<Reading> {
+    pub(crate) fn motor_imbalance(
+        &self,
+        now: Instant,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        motor: u8,
+    ) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
         let mean = self.mean_of_others(motor)?;
-        if !Self::is_steady(inputs.now, inputs.vehicle, inputs.flight) {
+        if !Self::is_steady(now, vehicle, flight) {
             return None;
         }
         Reading::new(track.last, Some((track.smooth_rpm - mean).abs() / mean * 100.0))
@@ -293,13 +298,13 @@ impl Derived {
     }
 
     /// Clipped samples since take-off, the worst accelerometer.
-    pub(crate) fn clips(&self, inputs: &Inputs<'_>) -> Option<Reading> {
-        let since = clips(inputs.vehicle)?.saturating_sub(self.clips_at_takeoff?);
-        Reading::new(inputs.vehicle.vibration.at(), Some(since as f32))
+    pub(crate) fn clips(&self, vehicle: &Vehicle) -> Option<Reading> {
+        let since = clips(vehicle)?.saturating_sub(self.clips_at_takeoff?);
+        Reading::new(vehicle.vibration.at(), Some(since as f32))
     }
 
     /// Magnitude of the specific force in units of gravity: 1 at rest and in steady flight.
-    pub(crate) fn load_factor(&self, _: &Inputs<'_>) -> Option<Reading> {
+    pub(crate) fn load_factor(&self) -> Option<Reading> {
         Reading::new(self.load_factor.at(), self.load_factor.get().copied())
     }
 
@@ -314,7 +319,7 @@ impl Derived {
     }
 
     /// Frames that our own recording lost in the last ten seconds.
-    pub(crate) fn frames_lost_lately(&self, _: &Inputs<'_>) -> f32 {
+    pub(crate) fn frames_lost_lately(&self) -> f32 {
         self.frames_lost.lately()
     }
 

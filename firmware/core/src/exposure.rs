@@ -1,9 +1,8 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
-use crate::lifetime::{Put, Session, Take, Unreadable};
+use crate::bytes::{Put, Take, Unreadable};
 use crate::time::{Instant, Span};
 use crate::units::Celsius;
-use crate::usage::Usage;
 use crate::vehicle::Vehicle;
 
 /// Ranges of a quantity.
@@ -70,7 +69,7 @@ impl Quantity {
         }
     }
 
-    fn value(self, now: Instant, vehicle: &Vehicle, usage: &Usage) -> Option<f32> {
+    fn value(self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) -> Option<f32> {
         let hottest = |temperature: Option<Celsius>, other: Option<f32>| match (temperature, other) {
             (Some(Celsius(one)), Some(other)) if one.abs() <= CELSIUS_MAX => Some(other.max(one)),
             (Some(Celsius(one)), None) if one.abs() <= CELSIUS_MAX => Some(one),
@@ -93,7 +92,7 @@ impl Quantity {
                 let vibration = vehicle.vibration.within(now, FRESH).filter(|_| vehicle.armed())?;
                 vibration.levels.into_iter().flatten().reduce(f32::max)
             }
-            Self::Current => usage.current_a().filter(|_| vehicle.armed()),
+            Self::Current => current_a.filter(|_| vehicle.armed()),
         }
         .filter(|value| value.is_finite())
     }
@@ -135,8 +134,8 @@ impl Exposure {
         Self { last: None, session: none, before: none, as_of: 0 }
     }
 
-    /// One step, after usage.
-    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, usage: &Usage) {
+    /// One step; `current_a` is what all batteries together give, where that is known.
+    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) {
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
         if self.last.is_some() && step < EVERY {
             return;
@@ -149,7 +148,7 @@ impl Exposure {
             return;
         }
         for (quantity, bins) in Quantity::ALL.into_iter().zip(&mut self.session) {
-            if let Some(value) = quantity.value(now, vehicle, usage) {
+            if let Some(value) = quantity.value(now, vehicle, current_a) {
                 let bin = quantity.edges().iter().take_while(|edge| value >= **edge).count();
                 bins[bin] = bins[bin].saturating_add(tenths);
             }
@@ -184,10 +183,10 @@ impl Exposure {
         &self.session
     }
 
-    /// Adds the session that was saved last, if it is not in it already.
-    pub(crate) fn add(&mut self, session: &Session) {
-        if session.boots == self.as_of {
-            for (sum, tenths) in self.before.iter_mut().flatten().zip(session.exposure().iter().flatten()) {
+    /// Adds the session of power-on `boots`, if it is not in it already.
+    pub(crate) fn add(&mut self, boots: u32, session: &Tenths) {
+        if boots == self.as_of {
+            for (sum, tenths) in self.before.iter_mut().flatten().zip(session.iter().flatten()) {
                 *sum = sum.saturating_add(*tenths);
             }
         }
@@ -232,9 +231,7 @@ fn visit(tenths: &Tenths, mut each: impl FnMut(Quantity, usize, f64)) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::component::Wear;
     use crate::observation::{Heartbeat, Observation, Processor, Source};
-    use crate::usage::Totals;
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -245,7 +242,7 @@ mod tests {
             let now = Instant::from_millis(now_ms);
             let processor = Processor { temperature: Some(Celsius(celsius)), voltage: None };
             vehicle.observe(now, AUTOPILOT, &Observation::Processor(processor));
-            exposure.step(now, &vehicle, &Usage::new());
+            exposure.step(now, &vehicle, None);
         }
     }
 
@@ -267,15 +264,14 @@ mod tests {
         heat(&mut exposure, 21_050, 22_050, 1e9);
         heat(&mut exposure, 90_000, 90_500, 200.0);
         assert_eq!(seen(&exposure), [(0, 10.0), (3, 10.0), (7, 0.4)]);
-        let wear = Wear { totals: &Totals::nothing(), battery_cycles: &[] };
-        let session = Session::now(7, true, &Totals::nothing(), &wear, &exposure);
+        let session = *exposure.session();
         let mut stored = [0; Exposure::BYTES];
         exposure.encode(8, &mut stored);
         let mut exposure = Exposure::decode(&stored).expect("readable");
-        exposure.add(&session);
+        exposure.add(7, &session);
         assert_eq!(seen(&exposure), [], "it is in it");
         exposure.as_of = 7;
-        exposure.add(&session);
+        exposure.add(7, &session);
         heat(&mut exposure, 0, 1_050, 45.0);
         assert_eq!(seen(&exposure), [(0, 10.0), (3, 11.0), (7, 0.4)]);
         let mut session = 0.0;

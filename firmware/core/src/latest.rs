@@ -47,6 +47,22 @@ impl<T> Latest<T> {
     }
 }
 
+/// A value and when it was measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// When it was measured.
+    pub at: Instant,
+    /// In the unit of whoever asks. A value that is no number counts as not measured.
+    pub value: f32,
+}
+
+impl Reading {
+    /// A value that was measured at `at`; `None` where either is missing.
+    pub fn new(at: Option<Instant>, value: Option<f32>) -> Option<Self> {
+        Some(Self { at: at?, value: value? })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

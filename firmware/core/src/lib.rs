@@ -3,9 +3,9 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod baseline;
+pub mod bytes;
 pub mod component;
 pub mod derived;
-pub mod exceedance;
 pub mod exposure;
 pub mod flight;
 pub mod half;

@@ -1,14 +1,15 @@
 //! The monitor: vehicle, flight, health and usage, kept together in step.
 
 use crate::baseline::{Baselines, Quantity};
+use crate::bytes::Unreadable;
 use crate::component::{COMPONENTS_MAX, Component, Figures, Kind, Label, Status};
 use crate::derived::Derived;
-use crate::exceedance::Exceedances;
 use crate::exposure::Exposure;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
+use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
-use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Saving, Session, Unreadable};
+use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Saving, Session};
 use crate::observation::{MOTORS_MAX, Observation, Source};
 use crate::params::Params;
 use crate::protect::{Protect, Request};
@@ -141,7 +142,7 @@ impl Monitor {
         if crossed || self.exceedances.lasting() {
             self.saving.change(ItemKey::Exceedances);
         }
-        self.exposure.step(now, &self.vehicle, &self.usage);
+        self.exposure.step(now, &self.vehicle, self.usage.current_a());
         self.step_protect(now, event);
         self.step_life(event);
         self.step_happenings(now, event);
@@ -295,8 +296,10 @@ impl Monitor {
             ItemKey::Session => {
                 let session = Session::decode(stored)?;
                 self.before.add(&session);
-                self.exposure.add(&session);
-                self.components.iter_mut().for_each(|component| component.add(&session));
+                self.exposure.add(session.boots, session.exposure());
+                self.components
+                    .iter_mut()
+                    .for_each(|component| component.add(session.boots, &session.wear()));
             }
         }
         Ok(())
@@ -420,6 +423,15 @@ impl Monitor {
     /// The part of a component's life that is used, percent; `None` where it has no limit.
     pub fn component_used_percent(&self, place: usize) -> Option<f32> {
         self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
+    }
+
+    /// Takes a component as another monitor of this vehicle has it in this very session: what is counted from here on
+    /// adds to it.
+    pub fn learn_component(&mut self, place: usize, known: Component) {
+        let known = known.in_session(&self.usage.wear());
+        if let Some(component) = self.components.get_mut(place) {
+            *component = known;
+        }
     }
 
     /// Another part is in a component's place. Gives the old one with what it had run, to be recorded; `None` where

@@ -40,7 +40,9 @@ const COLUMNS: [&[usize]; Subsystem::ALL.len()] = [
 const KEPT: [Quantity; 24] = [
     Quantity("voltage_v", voltage_v),
     Quantity("current_a", current_a),
-    Quantity("cell_lowest_v", |inputs| inputs.derived.cell_voltage(inputs, 0).map(|reading| reading.value)),
+    Quantity("cell_lowest_v", |inputs| {
+        inputs.derived.cell_voltage(inputs.vehicle, inputs.params, 0).map(|reading| reading.value)
+    }),
     Quantity("remaining_percent", remaining_percent),
     Quantity("throttle_percent", |inputs| {
         Some(inputs.vehicle.hud.within(inputs.now, FRESH)?.throttle?.0 * 100.0)

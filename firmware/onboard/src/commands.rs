@@ -5,6 +5,7 @@
 //! | 401 `RUN_PREARM_CHECKS` | tells what stands against a flight; accepted when nothing does |
 //! | 512 `REQUEST_MESSAGE` | `HEARTBEAT`, `AUTOPILOT_VERSION`, `PROTOCOL_VERSION` |
 //! | 519, 520 | the same by their older commands |
+//! | 526 `STORAGE_FORMAT` | formats a card that cannot be recorded on as it is: while disarmed |
 //! | 2510, 2511 `LOGGING_START`, `_STOP` | records again; stops recording, while disarmed |
 //! | 31010 `USER_1` | another part is in a component's place, from 1: while disarmed |
 //! | 31011 `USER_2` | cancels the protective action that is announced |
@@ -21,6 +22,7 @@ use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::request::{Port, Reply};
 use hums_link::summary;
+use hums_recorder::CardState;
 
 use crate::monitoring::{Identity, Monitoring};
 use crate::queues::SectorsIn;
@@ -33,6 +35,7 @@ pub(crate) const MESSAGE: u16 = 512;
 const PREFLIGHT: u16 = 401;
 const RECORD: u16 = 2510;
 const STOP: u16 = 2511;
+const FORMAT: u16 = 526;
 const REPLACED: u16 = 31_010;
 const CANCEL: u16 = 31_011;
 /// `MAV_RESULT`
@@ -69,7 +72,9 @@ impl Monitoring<'_> {
                 reply(Reply::Preflight);
                 if preflight(self.monitor).is_none() { ACCEPTED } else { FAILED }
             }
-            (RECORD | STOP | REPLACED | CANCEL, number) => {
+            // Which storage is it, and is it meant: a command that is sent by mistake has neither.
+            (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
+            (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
                 if !self.companion.limits[port as usize].allows(now) {
                     return TEMPORARILY_REJECTED;
                 }
@@ -95,7 +100,8 @@ impl Monitoring<'_> {
                 self.tell_event(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
                 if cancelled { ACCEPTED } else { FAILED }
             }
-            STOP | REPLACED if armed => TEMPORARILY_REJECTED,
+            STOP | FORMAT | REPLACED if armed => TEMPORARILY_REJECTED,
+            FORMAT => self.format(now, by, sectors),
             REPLACED => {
                 let place = (number as usize).wrapping_sub(1);
                 // Its serial number can be given later; who did it is in the component's record.
@@ -105,6 +111,22 @@ impl Monitoring<'_> {
                 self.stop_or_record(now, command == STOP, port, by, sectors);
                 ACCEPTED
             }
+        }
+    }
+
+    /// Only a card that holds nothing for us is formatted over a link: nobody at a radio destroys logs.
+    fn format(&mut self, now: Instant, by: (u8, u8), sectors: &mut SectorsIn) -> u8 {
+        let state = self.card.read().state;
+        let may = state.wants_format();
+        let what = if may { "card is formatted" } else { "formatting refused, asked" };
+        self.tell_event(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
+        match state {
+            _ if may => {
+                self.card.want_format();
+                ACCEPTED
+            }
+            CardState::Recording | CardState::Finished | CardState::Full | CardState::Formatting => DENIED,
+            _ => FAILED,
         }
     }
 

@@ -16,7 +16,7 @@ pub const NO_CARD_RETRY: Span = Span::from_millis(100);
 /// What one call did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Service {
-    /// Something was written: call again at once.
+    /// Something was written, or formatted: call again at once.
     Wrote,
     /// Nothing waits: call again when something does.
     Idle,
@@ -40,6 +40,9 @@ impl<'a, D: CardDevice> Storage<'a, D> {
     /// took.
     pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
         self.status.begin_service(now);
+        if self.recorder.format(now) {
+            return Service::Wrote;
+        }
         while sectors.oldest().is_some_and(|sector| self.recorder.take(sector)) {
             sectors.drop_oldest();
         }

@@ -162,6 +162,11 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         self.manager.map(|manager| manager.free().0.into_device())
     }
 
+    /// The device, for what is no matter of files.
+    pub fn device<T>(&self, act: impl FnOnce(&D) -> T) -> Option<T> {
+        self.manager.as_ref().map(|manager| manager.device(|gate| act(gate.device())))
+    }
+
     /// The card's layout.
     pub const fn layout(&self) -> &Layout {
         &self.layout
@@ -211,14 +216,16 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         self.open = None;
-        let made = self.allocate(name, bytes);
+        let mut made = self.allocate(name, bytes);
         let committed = self.manager()?.device(|gate| {
             if made.is_ok() {
-                gate.commit()
-            } else {
-                gate.abort();
-                Ok(())
+                return gate.commit();
             }
+            if let Some(failure) = gate.take_failure() {
+                made = Err(CardError::Device(failure));
+            }
+            gate.abort();
+            Ok(())
         });
         self.reopen()?;
         made?;

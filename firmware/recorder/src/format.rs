@@ -1,4 +1,5 @@
-//! Formats a card: one partition, FAT32. Used for the PC's card images, and by command on the board, never unasked.
+//! Formats a card: one partition, FAT32. Used for the PC's card images, and on the board by command
+//! ([`crate::CardStatus::want_format`]), never unasked.
 //!
 //! One FAT instead of two, deliberately: with two, every update has a moment in which the copies differ, and a cut
 //! there is what a file system check complains about. The second copy is never read by any system in use.
@@ -39,55 +40,118 @@ const fn cluster_blocks(volume_blocks: u32) -> u32 {
     blocks
 }
 
+/// Blocks that are cleared with one command.
+const CLEAR_BLOCKS: u32 = 8;
+/// In flash: they take no RAM.
+static ZEROS: [Block; CLEAR_BLOCKS as usize] =
+    [const { Block { contents: [0; Block::LEN] } }; CLEAR_BLOCKS as usize];
+
 /// Makes a partition table and an empty FAT32 volume; everything on the card is lost.
 pub fn format<D: BlockDevice>(device: &D, volume_id: u32) -> Result<(), FormatError<D::Error>> {
-    let card_blocks = device.num_blocks().map_err(FormatError::Device)?.0;
-    if card_blocks < BLOCKS_MIN {
-        return Err(FormatError::TooSmall);
-    }
-    let total = card_blocks - PARTITION_START;
-    let cluster_blocks = cluster_blocks(total);
-    // The FAT for all that is left is a little more than needed: it also covers the blocks that it takes itself.
-    let fat_blocks = ((total - RESERVED_BLOCKS) / cluster_blocks + 2).div_ceil(ENTRIES);
-    let clusters = (total - RESERVED_BLOCKS - fat_blocks) / cluster_blocks;
-    let write = |block: &Block, at: u32| {
-        device.write(core::slice::from_ref(block), BlockIdx(at)).map_err(FormatError::Device)
-    };
+    let mut formatting = Formatting::new(volume_id);
+    while !formatting.step(device)? {}
+    Ok(())
+}
 
-    // The partition table comes last, so that a cut before it leaves an unformatted card, not a damaged volume.
-    let boot = boot_sector(total, cluster_blocks, fat_blocks, volume_id);
-    let info = info_sector();
-    for base in [0, BACKUP_BLOCK] {
-        write(&boot, PARTITION_START + base)?;
-        write(&info, PARTITION_START + base + INFO_BLOCK)?;
+/// A card on its way to be formatted, one command at a step: the FAT of a large card is tens of megabytes.
+///
+/// The partition table is cleared first and written last, so that a cut in between leaves an unformatted card, and not a
+/// damaged volume.
+#[derive(Clone, Copy, Debug)]
+pub struct Formatting {
+    volume_id: u32,
+    plan: Option<Plan>,
+}
+
+/// What goes where.
+#[derive(Clone, Copy, Debug)]
+struct Plan {
+    volume_id: u32,
+    total: u32,
+    cluster_blocks: u32,
+    fat_blocks: u32,
+    /// The next block to be cleared, of those before `end`.
+    next: u32,
+    end: u32,
+    /// How many of [`STRUCTURES`] are written.
+    structures: usize,
+}
+
+/// Where the FAT begins.
+const FAT_START: u32 = PARTITION_START + RESERVED_BLOCKS;
+type Make = fn(&Plan) -> Block;
+/// What is written once the FAT and the root directory are cleared, in this order.
+const STRUCTURES: [(Make, u32); 6] = [
+    (fat_begin, FAT_START),
+    (boot_sector, PARTITION_START),
+    (info_sector, PARTITION_START + INFO_BLOCK),
+    (boot_sector, PARTITION_START + BACKUP_BLOCK),
+    (info_sector, PARTITION_START + BACKUP_BLOCK + INFO_BLOCK),
+    (partition_table, 0),
+];
+
+impl Plan {
+    const fn new(card_blocks: u32, volume_id: u32) -> Self {
+        let total = card_blocks - PARTITION_START;
+        let cluster_blocks = cluster_blocks(total);
+        // The FAT for all that is left is a little more than needed: it also covers the blocks that it takes itself.
+        let fat_blocks = ((total - RESERVED_BLOCKS) / cluster_blocks + 2).div_ceil(ENTRIES);
+        // The FAT, and behind it the root directory's cluster.
+        let end = FAT_START + fat_blocks + cluster_blocks;
+        Self { volume_id, total, cluster_blocks, fat_blocks, next: FAT_START, end, structures: 0 }
     }
-    let fat_start = PARTITION_START + RESERVED_BLOCKS;
-    for index in 0..fat_blocks {
-        write(&fat_block(index), fat_start + index)?;
+}
+
+impl Formatting {
+    /// Nothing is done yet.
+    pub const fn new(volume_id: u32) -> Self {
+        Self { volume_id, plan: None }
     }
-    let data_start = fat_start + fat_blocks;
-    debug_assert!(clusters > ROOT_CLUSTER);
-    for index in 0..cluster_blocks {
-        write(&Block::new(), data_start + index)?;
+
+    /// Does one step; whether it was the last one.
+    pub fn step<D: BlockDevice>(&mut self, device: &D) -> Result<bool, FormatError<D::Error>> {
+        let write =
+            |blocks: &[Block], at: u32| device.write(blocks, BlockIdx(at)).map_err(FormatError::Device);
+        let Some(plan) = &mut self.plan else {
+            let card_blocks = device.num_blocks().map_err(FormatError::Device)?.0;
+            if card_blocks < BLOCKS_MIN {
+                return Err(FormatError::TooSmall);
+            }
+            write(&ZEROS[..1], 0)?;
+            self.plan = Some(Plan::new(card_blocks, self.volume_id));
+            return Ok(false);
+        };
+        let left = plan.end - plan.next;
+        if left > 0 {
+            let count = left.min(CLEAR_BLOCKS);
+            write(ZEROS.get(..count as usize).unwrap_or_default(), plan.next)?;
+            plan.next += count;
+            return Ok(false);
+        }
+        if let Some((make, at)) = STRUCTURES.get(plan.structures) {
+            write(&[make(plan)], *at)?;
+            plan.structures += 1;
+        }
+        Ok(plan.structures >= STRUCTURES.len())
     }
-    write(&partition_table(total), 0)
 }
 
 fn put(block: &mut Block, at: usize, bytes: &[u8]) {
     block[at..at + bytes.len()].copy_from_slice(bytes);
 }
 
-fn partition_table(total: u32) -> Block {
+fn partition_table(plan: &Plan) -> Block {
     let mut block = Block::new();
     // Status, CHS of the first block ("too far"), type FAT32 LBA, CHS of the last block.
     put(&mut block, 446, &[0x00, 0xFE, 0xFF, 0xFF, 0x0C, 0xFE, 0xFF, 0xFF]);
     put(&mut block, 454, &PARTITION_START.to_le_bytes());
-    put(&mut block, 458, &total.to_le_bytes());
+    put(&mut block, 458, &plan.total.to_le_bytes());
     put(&mut block, 510, &[0x55, 0xAA]);
     block
 }
 
-fn boot_sector(total: u32, cluster_blocks: u32, fat_blocks: u32, volume_id: u32) -> Block {
+fn boot_sector(plan: &Plan) -> Block {
+    let Plan { total, cluster_blocks, fat_blocks, volume_id, .. } = *plan;
     let mut block = Block::new();
     put(&mut block, 0, &[0xEB, 0x58, 0x90]);
     put(&mut block, 3, b"HUMS    ");
@@ -113,7 +177,7 @@ fn boot_sector(total: u32, cluster_blocks: u32, fat_blocks: u32, volume_id: u32)
 }
 
 /// The free count stays unknown for ever (see [`crate::gate`]), so it can never be wrong.
-fn info_sector() -> Block {
+fn info_sector(_: &Plan) -> Block {
     let mut block = Block::new();
     put(&mut block, 0, &0x4161_5252_u32.to_le_bytes());
     put(&mut block, 484, &0x6141_7272_u32.to_le_bytes());
@@ -123,13 +187,11 @@ fn info_sector() -> Block {
     block
 }
 
-fn fat_block(index: u32) -> Block {
+/// The FAT's first block: media, "clean" flags, and the root directory of one cluster.
+fn fat_begin(_: &Plan) -> Block {
     let mut block = Block::new();
-    if index == 0 {
-        // Media, "clean" flags, and the root directory of one cluster.
-        for (entry, value) in [0x0FFF_FFF8_u32, 0x0FFF_FFFF, 0x0FFF_FFFF].iter().enumerate() {
-            put(&mut block, entry * 4, &value.to_le_bytes());
-        }
+    for (entry, value) in [0x0FFF_FFF8_u32, 0x0FFF_FFFF, 0x0FFF_FFFF].iter().enumerate() {
+        put(&mut block, entry * 4, &value.to_le_bytes());
     }
     block
 }

@@ -86,13 +86,15 @@ impl HeldBlocks {
 }
 
 /// The gate. Its methods take `&self` because the library owns it and hands out only shared references.
-pub struct Gate<'a, D> {
+pub struct Gate<'a, D: BlockDevice> {
     device: D,
     layout: Layout,
     transaction: Cell<bool>,
     discard: Cell<bool>,
     reads_left: Cell<u32>,
     held: &'a RefCell<Vec<Held, HELD_BLOCKS>>,
+    /// What failed first in a transaction.
+    failure: Cell<Option<D::Error>>,
 }
 
 impl<'a, D: BlockDevice> Gate<'a, D> {
@@ -107,6 +109,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             discard: Cell::new(false),
             reads_left: Cell::new(0),
             held: &held.metadata,
+            failure: Cell::new(None),
         }
     }
 
@@ -132,6 +135,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
 
     /// Holds metadata back from now on.
     pub fn begin(&self) {
+        self.failure.set(None);
         self.held.borrow_mut().clear();
         self.transaction.set(true);
     }
@@ -155,6 +159,20 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         Ok(())
     }
 
+    /// What of the card failed in the transaction, if it did. The library calls any failure of an allocation a full
+    /// card, so it has to be asked for here.
+    pub fn take_failure(&self) -> Option<D::Error> {
+        self.failure.take()
+    }
+
+    fn fail(&self, error: D::Error) -> GateError<D::Error> {
+        if self.transaction.get() {
+            self.failure.set(Some(error));
+            return GateError::Refused;
+        }
+        GateError::Device(error)
+    }
+
     /// Forgets what was held back. The library may still remember some of it: open the volume anew.
     pub fn abort(&self) {
         self.transaction.set(false);
@@ -172,7 +190,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     }
 
     fn write_device(&self, block: &Block, at: u32) -> Result<(), GateError<D::Error>> {
-        self.device.write(core::slice::from_ref(block), BlockIdx(at)).map_err(GateError::Device)
+        self.device.write(core::slice::from_ref(block), BlockIdx(at)).map_err(|error| self.fail(error))
     }
 
     fn read_block(&self, block: &mut Block, at: u32) -> Result<(), GateError<D::Error>> {
@@ -182,7 +200,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             *block = held.block.clone();
             return Ok(());
         }
-        self.device.read(core::slice::from_mut(block), BlockIdx(at)).map_err(GateError::Device)?;
+        self.device.read(core::slice::from_mut(block), BlockIdx(at)).map_err(|error| self.fail(error))?;
         if self.layout.is_fat(at) {
             self.for_bad_entries(block, at, |entry| entry.copy_from_slice(&0x0FFF_FFF7_u32.to_le_bytes()));
         } else if at == self.layout.info {
@@ -255,7 +273,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             return Ok(());
         }
         let mut block = [Block::new()];
-        self.device.read(&mut block, BlockIdx(at)).map_err(GateError::Device)?;
+        self.device.read(&mut block, BlockIdx(at)).map_err(|error| self.fail(error))?;
         let mut damaged = false;
         self.for_bad_entries(&mut block[0], at, |_| damaged = true);
         if damaged { Err(GateError::Refused) } else { Ok(()) }

@@ -15,6 +15,9 @@ pub const FAT32_CLUSTERS_MAX: u32 = 0x0FFF_FFF5;
 /// MBR partition types of FAT32: CHS and LBA.
 const FAT32_TYPES: [u8; 2] = [0x0B, 0x0C];
 
+/// MBR partition type of exFAT, and of NTFS.
+pub(crate) const EXFAT_TYPE: u8 = 0x07;
+
 /// A FAT32 volume in the first partition of a card. Block numbers are absolute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {

@@ -13,6 +13,8 @@
 //! * Of a vehicle that is recorded by arming, while it is disarmed, only the last while is kept: small segments that are
 //!   renamed and overwritten in turn.
 //!
+//! [`spi`] is the driver of a real card; the PC's and the emulator's cards are files.
+//!
 //! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before `embedded-sdmmc` sees the card, and
 //! [`gate::Gate`] checks what it reads of the FAT and bounds how much it may read.
 #![cfg_attr(not(test), no_std)]
@@ -25,16 +27,44 @@ pub mod layout;
 pub mod name;
 pub mod recorder;
 mod ring;
+pub mod spi;
 pub mod status;
 
 pub use card::{Card, CardError};
 pub use gate::HeldBlocks;
 pub use name::LogName;
 pub use recorder::{Recorder, Written};
+pub use spi::SpiCard;
 pub use status::{CardState, CardStatus};
+
+/// What an error of a card means for whoever records on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// No card answers, or another one does.
+    Gone,
+    /// It does not become ready: nothing more is to be had of it before it is identified anew.
+    Stuck,
+    /// It answers, and refused this access: the same again, or another place, may work.
+    Refusing,
+    /// It must not be written.
+    Locked,
+}
 
 /// A block device that can be told to start over, as a card must be after it was pulled and put back.
 pub trait CardDevice: embedded_sdmmc::BlockDevice {
-    /// Forgets what is known of the card, so that the next access identifies it anew.
+    /// Forgets what is known of the card, so that the next access identifies it anew, and whichever it is.
     fn reset(&self) {}
+
+    /// A service begins: all waits until the next call are together to have an end.
+    fn begin_service(&self) {}
+
+    /// Accesses that the device itself tried again since the last call.
+    fn take_retries(&self) -> u32 {
+        0
+    }
+
+    /// What an error means.
+    fn trouble(_error: &Self::Error) -> Trouble {
+        Trouble::Refusing
+    }
 }

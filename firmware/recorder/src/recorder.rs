@@ -11,16 +11,21 @@
 //! What fails is tried again, then given a new segment, then the card is given up and looked for once a second. A
 //! sector is only counted lost when it can never be written: the caller keeps it until then.
 
+mod formatting;
+mod trouble;
+
 use embedded_sdmmc::Block;
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES, Sector};
 use hums_core::time::{Instant, Span};
 
 use crate::CardDevice;
 use crate::card::{Card, CardError, LogEntry};
+use crate::format::Formatting;
 use crate::gate::HeldBlocks;
 use crate::name::LogName;
 use crate::ring::{self, Ring};
 use crate::status::{CardState, CardStatus};
+use trouble::may_work_elsewhere;
 
 /// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
 pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
@@ -65,6 +70,8 @@ enum Slot<'a, D: CardDevice> {
     /// The device, while no usable card is in it.
     Waiting(D),
     Mounted(Card<'a, D>),
+    /// A card that is being formatted.
+    Formatting(D, Formatting),
     /// Only while the value is being replaced.
     Moving,
 }
@@ -103,6 +110,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Looks for a card if there is none, at most once a second. Whether a session is open now.
     pub fn ready(&mut self, now: Instant) -> bool {
+        self.begin_service();
         if matches!(self.slot, Slot::Mounted(_)) {
             return true;
         }
@@ -180,12 +188,20 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
         for _ in 0..WRITE_TRIES {
             match self.try_write(now, &first) {
-                Ok(()) => return Written::Done,
-                Err(CardError::Full) => {
-                    self.give_up(now, &CardError::Full);
-                    return Written::Later;
+                Ok(()) => {
+                    self.count_retries();
+                    return Written::Done;
                 }
-                Err(_) => self.status.count_write_error(),
+                Err(error) => {
+                    self.count_retries();
+                    if !matches!(error, CardError::Full) {
+                        self.status.count_write_errors(1);
+                    }
+                    if !may_work_elsewhere::<D>(&error) {
+                        self.lose(now, &error);
+                        return Written::Later;
+                    }
+                }
             }
         }
         // A new segment may lie where the card still works.
@@ -193,12 +209,27 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             self.status.want_group();
             self.try_write(now, &first)
         });
+        self.count_retries();
         match moved {
             Ok(()) => Written::Done,
             Err(error) => {
-                self.give_up(now, &error);
+                self.lose(now, &error);
                 Written::Later
             }
+        }
+    }
+
+    fn begin_service(&self) {
+        match &self.slot {
+            Slot::Waiting(device) | Slot::Formatting(device, _) => device.begin_service(),
+            Slot::Mounted(card) => card.device(D::begin_service).unwrap_or_default(),
+            Slot::Moving => {}
+        }
+    }
+
+    fn count_retries(&self) {
+        if let Slot::Mounted(card) = &self.slot {
+            self.status.count_write_errors(card.device(D::take_retries).unwrap_or_default());
         }
     }
 
@@ -434,6 +465,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.card().ok_or(CardError::NotOpen)
     }
 
+    /// The card in work is given up. The next one may be another one, for which only what comes from a group's start on
+    /// can be read: the sooner there is one, the less is lost.
+    fn lose(&mut self, now: Instant, error: &CardError<D::Error>) {
+        self.status.want_group();
+        self.give_up(now, error);
+    }
+
     fn give_up(&mut self, now: Instant, error: &CardError<D::Error>) {
         self.tell(error);
         self.retry_at = now + RETRY;
@@ -445,15 +483,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             Slot::Mounted(card) => card.unmount().map_or(Slot::Moving, Slot::Waiting),
             other => other,
         };
-    }
-
-    fn tell(&self, error: &CardError<D::Error>) {
-        self.status.set_state(match error {
-            CardError::Device(_) => CardState::Absent,
-            CardError::Foreign(_) | CardError::Damaged => CardState::Foreign,
-            CardError::Full => CardState::Full,
-            CardError::NotFound | CardError::NotOpen => CardState::Failing,
-        });
     }
 }
 

@@ -22,7 +22,7 @@ pub enum CardState {
     Recording = 1,
     /// No card, or it does not answer.
     Absent = 2,
-    /// A card that cannot be used as it is: no FAT32, or a damaged one. Never formatted unasked.
+    /// A card whose first partition is neither FAT32 nor exFAT. Like the next three: never formatted unasked.
     Foreign = 3,
     /// No free clusters, and no log of ours to overwrite.
     Full = 4,
@@ -30,9 +30,24 @@ pub enum CardState {
     Failing = 5,
     /// The session was finished.
     Finished = 6,
+    /// The card is write protected, or locked with a password.
+    Locked = 7,
+    /// The card is exFAT (or NTFS), as cards of more than 32 GB are when they are new.
+    ExFat = 8,
+    /// The card has no partition table: what is on it, if anything, is not for us to tell.
+    Unpartitioned = 9,
+    /// A FAT32 volume whose structures are damaged.
+    Damaged = 10,
+    /// The card is being formatted, because somebody asked for it.
+    Formatting = 11,
 }
 
 impl CardState {
+    /// Whether the card can be used once it is formatted, and what is on it is nothing that we can use.
+    pub const fn wants_format(self) -> bool {
+        matches!(self, Self::Foreign | Self::ExFat | Self::Unpartitioned | Self::Damaged)
+    }
+
     /// The state of a stored number.
     pub const fn from_number(number: u8) -> Self {
         match number {
@@ -42,6 +57,11 @@ impl CardState {
             4 => Self::Full,
             5 => Self::Failing,
             6 => Self::Finished,
+            7 => Self::Locked,
+            8 => Self::ExFat,
+            9 => Self::Unpartitioned,
+            10 => Self::Damaged,
+            11 => Self::Formatting,
             _ => Self::Unknown,
         }
     }
@@ -68,6 +88,7 @@ pub struct CardStatus {
     room: AtomicU32,
     queue_sectors_max: AtomicU32,
     group_wanted: AtomicBool,
+    format_wanted: AtomicBool,
     /// From this sector on only the latest are kept; [`KEEP_ALL`]: all are.
     waiting_from: AtomicU32,
     /// How much of them, in milliseconds.
@@ -132,6 +153,7 @@ impl CardStatus {
             room: AtomicU32::new(UNCOUNTED),
             queue_sectors_max: AtomicU32::new(0),
             group_wanted: AtomicBool::new(false),
+            format_wanted: AtomicBool::new(false),
             waiting_from: AtomicU32::new(KEEP_ALL),
             waiting_ms: AtomicU32::new(0),
             fat_time: AtomicU32::new(0),
@@ -176,8 +198,8 @@ impl CardStatus {
         self.writes.fetch_add(1, Ordering::Relaxed);
     }
 
-    pub(crate) fn count_write_error(&self) {
-        self.write_errors.fetch_add(1, Ordering::Relaxed);
+    pub(crate) fn count_write_errors(&self, errors: u32) {
+        self.write_errors.fetch_add(errors, Ordering::Relaxed);
     }
 
     pub(crate) fn count_lost_sector(&self, frames: u32) {
@@ -223,6 +245,16 @@ impl CardStatus {
     /// Whether storage asked for a new group since the last call.
     pub fn take_group_wanted(&self) -> bool {
         self.group_wanted.swap(false, Ordering::Acquire)
+    }
+
+    /// Somebody asks for the card that is in to be formatted.
+    pub fn want_format(&self) {
+        self.format_wanted.store(true, Ordering::Release);
+    }
+
+    /// Whether somebody asked since the last call.
+    pub(crate) fn take_format_wanted(&self) -> bool {
+        self.format_wanted.swap(false, Ordering::Acquire)
     }
 
     /// From sector `number` on, at the next group, only the last `keep` are kept: the vehicle is disarmed, and is

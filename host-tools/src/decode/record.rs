@@ -1,6 +1,6 @@
 //! The monitor's own records as rows of tables: `HUMS_FINDING`, `HUMS_USAGE`, `HUMS_LOSS` and so on.
 
-use hums_blackbox::record::{Record, UsageValue};
+use hums_blackbox::record::Record;
 use hums_core::time::Instant;
 
 use super::text::{push_csv_number, push_csv_text, push_hex, push_integer, push_json_number, push_json_text};
@@ -138,12 +138,8 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
     match record {
         Record::Usage(usage) => {
             let moment = format!("{:?}", usage.moment).to_ascii_lowercase();
-            let row = |(number, value): (u8, UsageValue)| {
-                let value = match value {
-                    UsageValue::Real(value) => Cell::Double(value),
-                    UsageValue::Count(value) => Cell::Count(value),
-                };
-                let name = Cell::Text(super::usage::name(number));
+            let row = |(number, value)| {
+                let (name, value) = (Cell::Text(super::usage::name(number)), Cell::Single(value));
                 Row::new("HUMS_USAGE", vec![("moment", text(&moment)), ("counter", name), ("value", value)])
             };
             usage.iter().map(row).collect()

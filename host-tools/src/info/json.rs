@@ -172,7 +172,7 @@ struct ComponentJson {
 }
 
 fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
-    let crossings = |of: &hums_core::exceedance::Crossings| CrossingsJson {
+    let crossings = |of: &hums_core::health::exceedance::Crossings| CrossingsJson {
         warnings: of.warnings,
         criticals: of.criticals,
         warning_s: f64::from(of.warning_tenths) / 10.0,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use hums_core::exceedance::Crossings;
+use hums_core::health::exceedance::Crossings;
 
 use super::json::finite;
 use crate::summary::Overview;

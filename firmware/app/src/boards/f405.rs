@@ -26,7 +26,7 @@ pub(crate) use super::stm32f4::{
     AutopilotRx, AutopilotTx, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, Parts, StoreFlash,
     TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, cycles, done, ended, remember, restart,
 };
-use super::stm32f4::{PortRx, PortTx, clocks, reset_cause, start_counters, watch_supply};
+use super::stm32f4::{CardPort, PortRx, PortTx, clocks, reset_cause, start_counters, watch_supply};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f405";
@@ -75,14 +75,14 @@ pub(crate) fn take() -> Parts {
     );
 
     let mut bus = spi::Config::default();
-    bus.frequency = Card::IDENTIFICATION;
+    bus.frequency = CardPort::IDENTIFICATION;
     bus.miso_pull = Pull::Up;
     let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
     let entropy = Rng::new(p.RNG, Irqs).next_u32();
     Parts {
         autopilot,
         gs,
-        card: Card::new(bus, Output::new(p.PA4, Level::High, Speed::VeryHigh)),
+        card: Card::new(CardPort::new(bus, Output::new(p.PA4, Level::High, Speed::VeryHigh))),
         store: Some(StoreFlash::new(Flash::new_blocking(p.FLASH))),
         led: Led::new(Output::new(p.PC12, Level::High, Speed::Low), Level::Low),
         watchdog: Watchdog::new(p.IWDG),

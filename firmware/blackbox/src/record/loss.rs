@@ -2,7 +2,7 @@
 
 use hums_core::time::Instant;
 
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// What was lost. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -67,16 +67,15 @@ pub struct Loss {
 
 impl Loss {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(7).u8(self.what as u8).u64(self.count);
-        sink.u64(self.from.as_micros()).u64(self.to.as_micros());
+        sink.head(7).time(self.from).time(self.to).u64(self.count).u8(self.what as u8);
     }
 
     pub(super) fn read(fields: &mut Fields<'_>) -> Self {
         Self {
             what: Lost::from_number(fields.u8()),
-            count: fields.u64(),
             from: fields.instant(),
             to: fields.instant(),
+            count: fields.u64(),
         }
     }
 }

@@ -1,7 +1,10 @@
 //! Roll and pitch.
 
-use super::check::{Check, Reading, Side, When};
-use super::{Inputs, STALE, Subsystem};
+use super::check::{Check, Side, When};
+use super::common::STALE;
+use super::finding::Subsystem;
+use super::inputs::Inputs;
+use crate::latest::Reading;
 use crate::observation::Attitude;
 use crate::params::Param;
 use crate::time::Span;

@@ -13,7 +13,9 @@
 
 use core::num::NonZeroU32;
 
-use crate::health::{Inputs, Level, Subsystem};
+use super::finding::{Level, Subsystem};
+use super::inputs::Inputs;
+use crate::latest::Reading;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 
@@ -35,22 +37,6 @@ pub enum When {
     Armed,
     /// From take-off to landing.
     InFlight,
-}
-
-/// A value and when it was measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
-    /// When it was measured.
-    pub at: Instant,
-    /// In the check's unit. A value that is no number counts as not measured.
-    pub value: f32,
-}
-
-impl Reading {
-    /// A value that was measured at `at`; `None` where either is missing.
-    pub fn new(at: Option<Instant>, value: Option<f32>) -> Option<Self> {
-        Some(Self { at: at?, value: value? })
-    }
 }
 
 /// One check.

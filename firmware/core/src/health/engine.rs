@@ -1,8 +1,11 @@
 //! The combustion engine (EFI). What is normal depends on the engine, so the limits are off (at their maximum) until
 //! they are set.
 
-use super::check::{Check, Reading, Side, When};
-use super::{Inputs, STALE, Subsystem};
+use super::check::{Check, Side, When};
+use super::common::{STALE, due};
+use super::finding::Subsystem;
+use super::inputs::Inputs;
+use crate::latest::Reading;
 use crate::observation::Engine;
 use crate::params::Param;
 use crate::time::Span;
@@ -46,7 +49,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| read(inputs, |engine| engine.fuel_pressure.map(|pressure| pressure.0)),
         ..ENGINE
     },
-    Check { name: "engine_due", words: "engine due", ..super::due(Subsystem::Engine) },
+    Check { name: "engine_due", words: "engine due", ..due(Subsystem::Engine) },
 ];
 
 fn read(inputs: &Inputs<'_>, value: impl FnOnce(&Engine) -> Option<f32>) -> Option<Reading> {

@@ -5,142 +5,31 @@
 
 mod attitude;
 pub mod check;
+mod common;
 mod computer;
 mod engine;
+pub mod exceedance;
 pub mod finding;
+mod inputs;
 mod link;
 mod navigation;
 mod power;
 mod propulsion;
 mod recorder;
 mod structure;
+mod tables;
 
-pub use check::{CLEAR, Check, Reading, Side, State, When};
+pub use check::{CLEAR, Check, Side, State, When};
 pub use finding::{Finding, Level, Subsystem};
+pub use inputs::Inputs;
+pub use tables::{checks, instances, words};
 
-use crate::baseline::{Baselines, Quantity};
-use crate::component::COMPONENTS_MAX;
-use crate::exceedance::Exceedances;
-use crate::flight::Flight;
-use crate::params::{Param, Params};
-use crate::status::{LinkReading, RecorderStatus};
-use crate::time::{Instant, Span};
-use crate::trends::Trends;
-use crate::vehicle::Vehicle;
-
-/// What checks read. Nothing here changes while they do.
-#[derive(Clone, Copy, Debug)]
-pub struct Inputs<'a> {
-    /// Now.
-    pub now: Instant,
-    /// The vehicle as it is known.
-    pub vehicle: &'a Vehicle,
-    /// On the ground or in the air.
-    pub flight: &'a Flight,
-    /// What the raw messages do not say by themselves.
-    pub derived: &'a crate::derived::Derived,
-    /// The autopilot's port.
-    pub link: &'a LinkReading,
-    /// Our own recording.
-    pub recorder: &'a RecorderStatus,
-    /// Quantities of steady flight.
-    pub trends: &'a Trends,
-    /// What is normal for this airframe.
-    pub baselines: &'a Baselines,
-    /// Of each component, whose health it is and the part of its life that is used, percent.
-    pub wear: &'a [Option<(Subsystem, f32)>; COMPONENTS_MAX],
-    /// Limits and settings.
-    pub params: &'a Params,
-}
-
-/// Most streams come at 1 Hz or more even over a radio; some batteries at 0.5 Hz.
-pub(crate) const STALE: Option<Span> = Some(Span::from_secs(5));
-/// For streams that come at 0.5 Hz.
-pub(crate) const STALE_SLOW: Option<Span> = Some(Span::from_secs(12));
-
-/// Of a subsystem's components, the one that is nearest to its limit.
-const fn due(subsystem: Subsystem) -> Check {
-    Check {
-        name: "",
-        words: "",
-        subsystem,
-        unit: "%",
-        side: Side::Above,
-        warn: Some(Param::CompYellow),
-        critical: Some(Param::CompRed),
-        hysteresis: 0.0,
-        debounce_warn: Span::from_secs(1),
-        debounce_critical: Span::from_secs(1),
-        when: When::Always,
-        stale_after: None,
-        instances: 1,
-        // That a part is not due does not make its subsystem healthy.
-        alarm_only: true,
-        read: match subsystem {
-            Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
-            Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),
-            Subsystem::Engine => |inputs, _| used(inputs, Subsystem::Engine),
-            Subsystem::Structure => |inputs, _| used(inputs, Subsystem::Structure),
-            Subsystem::Recorder => |inputs, _| used(inputs, Subsystem::Recorder),
-            _ => |_, _| None,
-        },
-    }
-}
-
-fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
-    let mine = inputs.wear.iter().flatten().filter(|(of, _)| *of == subsystem);
-    // What has reached its limit is due, while a check's value must be beyond it.
-    Reading::new(Some(inputs.now), mine.map(|(_, percent)| percent.next_up()).reduce(f32::max))
-}
-
-/// How far a quantity is from what is normal for this airframe.
-fn departure(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
-    Reading::new(Some(inputs.now), inputs.trends.departure(quantity, inputs.baselines))
-}
-
-const TABLES: [&[Check]; 9] = [
-    power::CHECKS,
-    propulsion::CHECKS,
-    engine::CHECKS,
-    structure::CHECKS,
-    navigation::CHECKS,
-    link::CHECKS,
-    computer::CHECKS,
-    attitude::CHECKS,
-    recorder::CHECKS,
-];
+use crate::params::Param;
+use exceedance::Exceedances;
+use tables::STATES;
 
 /// Subsystems that every vehicle has, in the air and on the ground.
 pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsystem::Computer];
-
-const STATES: usize = {
-    let mut states = 0;
-    let mut table = 0;
-    while table < TABLES.len() {
-        let mut check = 0;
-        while check < TABLES[table].len() {
-            states += TABLES[table][check].instances as usize;
-            check += 1;
-        }
-        table += 1;
-    }
-    states
-};
-
-/// All checks, by subsystem.
-pub fn checks() -> impl Iterator<Item = &'static Check> {
-    TABLES.into_iter().flatten()
-}
-
-/// What a check means, in a few words that a pilot understands; its name where there is no such check.
-pub fn words(name: &'static str) -> &'static str {
-    checks().find(|check| check.name == name).map_or(name, |check| check.words)
-}
-
-/// How many instances a check has; 0 where there is no such check.
-pub fn instances(name: &str) -> u8 {
-    checks().find(|check| check.name == name).map_or(0, |check| check.instances)
-}
 
 /// The memory of all checks.
 #[derive(Clone, Copy, Debug)]
@@ -270,7 +159,7 @@ mod tests {
 
     #[test]
     fn every_subsystem_has_checks_under_its_own_name() {
-        for (table, subsystem) in TABLES.iter().zip(Subsystem::ALL) {
+        for (table, subsystem) in tables::TABLES.iter().zip(Subsystem::ALL) {
             assert!(
                 !table.is_empty() && table.iter().all(|check| check.subsystem == subsystem),
                 "{subsystem:?}"

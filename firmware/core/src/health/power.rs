@@ -1,7 +1,10 @@
 //! Batteries and rails.
 
-use super::check::{Check, Reading, Side, When};
-use super::{Inputs, STALE, STALE_SLOW, Subsystem};
+use super::check::{Check, Side, When};
+use super::common::{STALE, STALE_SLOW, due};
+use super::finding::Subsystem;
+use super::inputs::Inputs;
+use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::Span;
 use crate::vehicle::BATTERIES_MAX;
@@ -38,7 +41,7 @@ pub(super) const CHECKS: &[Check] = &[
         // ArduPilot's low voltage timer is 10 s: a sag under full throttle is not an empty battery.
         debounce_warn: Span::from_secs(10),
         debounce_critical: Span::from_secs(5),
-        read: |inputs, battery| inputs.derived.cell_voltage(inputs, battery),
+        read: |inputs, battery| inputs.derived.cell_voltage(inputs.vehicle, inputs.params, battery),
         when: When::Armed,
         ..BATTERY
     },
@@ -139,7 +142,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: rail_v,
         ..BATTERY
     },
-    Check { name: "battery_due", words: "battery due", ..super::due(Subsystem::Power) },
+    Check { name: "battery_due", words: "battery due", ..due(Subsystem::Power) },
 ];
 
 /// A battery's own figure; the autopilot's only where no battery reports itself (it is ambiguous with several).

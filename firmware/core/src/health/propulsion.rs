@@ -1,8 +1,11 @@
 //! Motors, ESCs and propellers.
 
-use super::check::{Check, Reading, Side, When};
-use super::{Inputs, STALE_SLOW, Subsystem};
+use super::check::{Check, Side, When};
+use super::common::{STALE_SLOW, departure, due};
+use super::finding::Subsystem;
+use super::inputs::Inputs;
 use crate::baseline::Quantity;
+use crate::latest::Reading;
 use crate::observation::MOTORS_MAX;
 use crate::params::Param;
 use crate::time::Span;
@@ -23,7 +26,7 @@ const ESC: Check = Check {
     stale_after: None,
     instances: MOTORS_MAX as u8,
     alarm_only: false,
-    read: |inputs, motor| inputs.derived.esc_silence(inputs, motor),
+    read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -92,7 +95,10 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // Only steady flight says something; ESCs that stop talking are `esc_silent`.
         stale_after: None,
-        read: |inputs, motor| inputs.derived.motor_imbalance(inputs, motor),
+        read: |inputs, motor| {
+            let Inputs { now, vehicle, flight, derived, .. } = *inputs;
+            derived.motor_imbalance(now, vehicle, flight, motor)
+        },
         ..ESC
     },
     Check {
@@ -105,7 +111,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(10),
         debounce_critical: Span::from_secs(10),
         when: When::InFlight,
-        read: |inputs, motor| super::departure(inputs, Quantity::MotorSpeed(motor)),
+        read: |inputs, motor| departure(inputs, Quantity::MotorSpeed(motor)),
         ..ESC
     },
     Check {
@@ -119,10 +125,10 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_secs(10),
         when: When::InFlight,
         instances: 1,
-        read: |inputs, _| super::departure(inputs, Quantity::HoverThrottle),
+        read: |inputs, _| departure(inputs, Quantity::HoverThrottle),
         ..ESC
     },
-    Check { name: "drive_due", words: "motor/prop/ESC due", ..super::due(Subsystem::Propulsion) },
+    Check { name: "drive_due", words: "motor/prop/ESC due", ..due(Subsystem::Propulsion) },
 ];
 
 fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {

@@ -1,7 +1,10 @@
 //! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
 
-use super::check::{Check, Reading, Side, When};
-use super::{Inputs, Subsystem};
+use super::check::{Check, Side, When};
+use super::common::due;
+use super::finding::Subsystem;
+use super::inputs::Inputs;
+use crate::latest::Reading;
 use crate::params::Param;
 use crate::status::Recording;
 use crate::time::Span;
@@ -45,7 +48,7 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::RecLostWarn),
         critical: None,
         debounce_warn: Span::ZERO,
-        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.frames_lost_lately(inputs) }),
+        read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.derived.frames_lost_lately() }),
         ..STATE
     },
     Check {
@@ -79,7 +82,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.room? * 100.0 }),
         ..STATE
     },
-    Check { name: "card_due", words: "card due", ..super::due(Subsystem::Recorder) },
+    Check { name: "card_due", words: "card due", ..due(Subsystem::Recorder) },
 ];
 
 /// 0 recording, 1 not recording, 2 not recording while armed.

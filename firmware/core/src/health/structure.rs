@@ -1,8 +1,11 @@
 //! Vibration, clipping and load factor.
 
-use super::check::{Check, Reading, Side, When};
-use super::{Inputs, STALE, Subsystem};
+use super::check::{Check, Side, When};
+use super::common::{STALE, departure, due};
+use super::finding::Subsystem;
+use super::inputs::Inputs;
 use crate::baseline::Quantity;
+use crate::latest::Reading;
 use crate::observation::VibrationScale;
 use crate::params::Param;
 use crate::time::Span;
@@ -46,7 +49,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::ZERO,
         debounce_critical: Span::ZERO,
         when: When::InFlight,
-        read: |inputs, _| inputs.derived.clips(inputs),
+        read: |inputs, _| inputs.derived.clips(inputs.vehicle),
         ..VIBRATION
     },
     Check {
@@ -59,7 +62,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_millis(100),
         debounce_critical: Span::from_millis(100),
         when: When::InFlight,
-        read: |inputs, _| inputs.derived.load_factor(inputs),
+        read: |inputs, _| inputs.derived.load_factor(),
         ..VIBRATION
     },
     Check {
@@ -74,10 +77,10 @@ pub(super) const CHECKS: &[Check] = &[
         when: When::InFlight,
         // A trend holds until the next figure.
         stale_after: None,
-        read: |inputs, _| super::departure(inputs, Quantity::Vibration),
+        read: |inputs, _| departure(inputs, Quantity::Vibration),
         ..VIBRATION
     },
-    Check { name: "airframe_due", words: "airframe due", ..super::due(Subsystem::Structure) },
+    Check { name: "airframe_due", words: "airframe due", ..due(Subsystem::Structure) },
 ];
 
 fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -13,18 +13,17 @@
 //! (distance, charge, energy, revolutions) in double precision, which at 10,000 hours of 10,000 rpm, 6e9 revolutions,
 //! still resolves a millionth of one.
 
-mod bytes;
 mod saving;
 mod session;
 
-pub(crate) use bytes::{Put, Take};
 pub use saving::{EVERY, EVERY_ARMED, Room, Saving};
 pub use session::Session;
 
 use crate::baseline::Baselines;
+use crate::bytes::{Put, Take, Unreadable, amount, tenths};
 use crate::component::{COMPONENTS_MAX, Component};
-use crate::exceedance::Exceedances;
 use crate::exposure::Exposure;
+use crate::health::exceedance::Exceedances;
 use crate::usage::{Form, Totals, UsageCounter};
 
 /// The longest item. Each has its own length.
@@ -113,10 +112,6 @@ impl ItemKey {
         }
     }
 }
-
-/// An item that cannot be read: too short, or of no version.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unreadable;
 
 /// Which airframe it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -214,16 +209,6 @@ impl Lifetime {
         }
         Ok(lifetime)
     }
-}
-
-/// To the nearest tenth of a second; a cast saturates.
-pub(crate) fn tenths(seconds: f64) -> u32 {
-    libm::round(seconds * 10.0) as u32
-}
-
-/// Sums are never negative, and never without end.
-pub(crate) fn amount(value: f64) -> f64 {
-    if value.is_finite() && value >= 0.0 { value } else { 0.0 }
 }
 
 fn put_counter(put: &mut Put<'_>, form: Form, value: f64) {

@@ -14,11 +14,11 @@
 //!
 //! Of a quad with four ESCs after half an hour that is some 155 bytes; at most [`Session::BYTES_MAX`].
 
-use super::{COUNTERS_V1, Lifetime, Put, Take, Unreadable, amount, tenths};
-use crate::component::Wear;
+use super::{COUNTERS_V1, Lifetime};
+use crate::bytes::{Put, Take, Unreadable, amount, tenths};
 use crate::exposure::{BINS, Exposure, Quantity, Tenths};
 use crate::observation::MOTORS_MAX;
-use crate::usage::{Form, Totals, UsageCounter};
+use crate::usage::{Form, Totals, UsageCounter, Wear};
 use crate::vehicle::BATTERIES_MAX;
 
 const VERSION: u8 = 1;

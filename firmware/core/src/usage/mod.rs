@@ -9,9 +9,8 @@ pub use counters::{
     BASELINE_FIRST, CounterName, EXPOSURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST,
     UsageCounter, baseline_number, counter_name, exposure_number,
 };
-pub use totals::{MotorTotals, Totals};
+pub use totals::{MotorTotals, Totals, Wear};
 
-use crate::component::Wear;
 use crate::derived::Derived;
 use crate::flight::{Flight, FlightEvent, Phase, climb_mps, ground_speed_mps};
 use crate::observation::Observation;

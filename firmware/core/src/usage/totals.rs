@@ -103,6 +103,15 @@ impl Totals {
     }
 }
 
+/// What a session has counted, as far as components wear by it: its sums, not yet the cycles of the load factor.
+#[derive(Clone, Copy, Debug)]
+pub struct Wear<'a> {
+    /// The session's counters.
+    pub totals: &'a Totals,
+    /// Full discharges of each battery.
+    pub battery_cycles: &'a [f64],
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

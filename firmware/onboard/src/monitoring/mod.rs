@@ -8,6 +8,7 @@ mod figures;
 mod happenings;
 mod notices;
 mod records;
+mod slot;
 
 use hums_blackbox::record::{
     Boot, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Vehicle as VehicleRecord,
@@ -33,6 +34,7 @@ pub use figures::Machine;
 use figures::Sums;
 use happenings::CRITICAL;
 use notices::{Notice, Notices};
+use slot::Told;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = monitor::TICK;
@@ -82,6 +84,7 @@ pub struct Monitoring<'a> {
     epoch_micros: Option<u64>,
     losses: Losses,
     notices: Notices,
+    slot: Told,
     keeping: Keeping,
     port_before: PortReading,
     card_before: CardReading,
@@ -117,6 +120,7 @@ impl<'a> Monitoring<'a> {
             epoch_micros: None,
             losses: Losses::new(),
             notices: Notices::new(),
+            slot: Told::new(),
             keeping: Keeping::new(),
             port_before: PortReading::default(),
             card_before: card.read(),
@@ -161,6 +165,8 @@ impl<'a> Monitoring<'a> {
         keeping.tick(now, monitor.params(), armed, card, writer, sectors);
         if self.keeping.takes_new_file(self.card) {
             self.heading(now, sectors);
+            // All of it, also what was recorded before.
+            self.usage_at = Instant::ZERO;
             self.record_usage(now, Moment::Periodic, sectors);
         }
     }
@@ -247,6 +253,7 @@ impl<'a> Monitoring<'a> {
         }
         self.keep(now, sectors);
         self.count_losses(now, sectors);
+        self.tell_slot(now, sectors);
         self.check(now, sectors, gs, findings);
         self.record_happenings(now, sectors);
         self.record_vehicle(now, sectors);

@@ -18,7 +18,7 @@ use hums_onboard::{
     Handover, Keeper, Mailbox, Monitoring, PortStatus, Reception, Service, Storage, StoreStatus,
 };
 use hums_recorder::status::CardReading;
-use hums_recorder::{CardDevice, CardStatus, HeldBlocks};
+use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Trouble};
 
 use crate::card::SimCard;
 use crate::card::sim::CardError;
@@ -100,7 +100,14 @@ impl BlockDevice for Slot<'_> {
     }
 }
 
-impl CardDevice for Slot<'_> {}
+impl CardDevice for Slot<'_> {
+    fn trouble(error: &CardError) -> Trouble {
+        match error {
+            CardError::PowerGone | CardError::Absent => Trouble::Gone,
+            CardError::WriteRefused | CardError::OutOfRange | CardError::Image(_) => Trouble::Refusing,
+        }
+    }
+}
 
 /// The tasks of one power-on.
 pub(super) struct Pipeline<'a, 'w> {

@@ -5,7 +5,7 @@ use core::fmt;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_onboard::Task;
-use hums_recorder::CardDevice;
+use hums_recorder::{CardDevice, Trouble};
 use semihosting::fs::File;
 use semihosting::io::{Read, Seek, SeekFrom, Write};
 
@@ -85,7 +85,14 @@ impl BlockDevice for ImageCard {
     }
 }
 
-impl CardDevice for ImageCard {}
+impl CardDevice for ImageCard {
+    fn trouble(error: &CardError) -> Trouble {
+        match error {
+            CardError::NoCard => Trouble::Gone,
+            CardError::Io => Trouble::Refusing,
+        }
+    }
+}
 
 fn read_block(file: &mut File, mut rest: &mut [u8]) -> Result<(), CardError> {
     while !rest.is_empty() {

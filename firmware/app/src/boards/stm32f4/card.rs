@@ -1,85 +1,58 @@
-//! The microSD card on an SPI bus.
+//! The microSD card on an SPI bus: its port; the driver is `hums_recorder::spi`.
 
-use core::cell::Cell;
-
-use embassy_stm32::gpio::Output;
+use embassy_stm32::gpio::{Level, Output};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::spi::{Spi, mode::Master};
 use embassy_stm32::time::Hertz;
-use embassy_time::Delay;
-use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx, SdCard, SdCardError};
-use hums_recorder::CardDevice;
-
-type CardSpi = ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, NoDelay>;
+use hums_core::time::Instant;
+use hums_recorder::SpiCard;
+use hums_recorder::spi::{Clock, Port, PortFailed};
 
 /// The microSD card. Its driver waits for the card with the processor: only the least urgent task may use it.
-pub(crate) struct Card {
-    driver: SdCard<CardSpi, Delay>,
-    /// Whether the card is identified, so that the fast clock may be used.
-    identified: Cell<bool>,
+pub(crate) type Card = SpiCard<CardPort>;
+
+/// The card's port.
+pub(crate) struct CardPort {
+    bus: Spi<'static, Blocking, Master>,
+    select: Output<'static>,
 }
 
-impl Card {
-    /// What a card must be able to take before it is identified (SD specification, 4.2.1).
+impl CardPort {
+    /// No more before a card is identified; the bus's slowest is 328 kHz, 84 MHz by 256.
     pub(crate) const IDENTIFICATION: Hertz = Hertz(400_000);
-    /// What every card takes afterwards: default speed is 25 MHz at most, the next slower clock of these chips is 21.
+    /// Cards take 25 MHz; the next slower clock of these chips is 21, 84 MHz by 4.
     const TRANSFER: Hertz = Hertz(21_000_000);
 
-    /// On this bus, at [`Self::IDENTIFICATION`], selected by this pin.
-    pub(crate) fn new(bus: Spi<'static, Blocking, Master>, select: Output<'static>) -> Self {
-        let Ok(spi) = ExclusiveDevice::new_no_delay(bus, select);
-        Self { driver: SdCard::new(spi, Delay), identified: Cell::new(false) }
-    }
-
-    fn set_clock(&self, frequency: Hertz) {
-        self.driver.spi(|device| {
-            let mut config = device.bus().get_current_config();
-            config.frequency = frequency;
-            // Cannot fail: both clocks are within what the bus can divide down to.
-            let _ = device.bus_mut().set_config(&config);
-        });
-    }
-
-    /// Identifies the card at the slow clock if that is still to be done.
-    fn ready(&self) -> Result<(), SdCardError> {
-        if self.identified.get() {
-            return Ok(());
-        }
-        self.set_clock(Self::IDENTIFICATION);
-        // At least 74 clocks with the card not selected wake it up (SD specification, 6.4.1).
-        self.driver
-            .spi(|device| device.bus_mut().blocking_write(&[0xFF_u8; 10]))
-            .map_err(|_| SdCardError::Transport)?;
-        self.driver.num_bytes()?;
-        self.set_clock(Self::TRANSFER);
-        self.identified.set(true);
-        Ok(())
+    /// The port on this bus, mode 0, with its select pin high.
+    pub(crate) const fn new(bus: Spi<'static, Blocking, Master>, select: Output<'static>) -> Self {
+        Self { bus, select }
     }
 }
 
-impl BlockDevice for Card {
-    type Error = SdCardError;
-
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), SdCardError> {
-        self.ready()?;
-        self.driver.read(blocks, start)
+impl Port for CardPort {
+    fn select(&mut self, selected: bool) {
+        self.select.set_level(if selected { Level::Low } else { Level::High });
     }
 
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), SdCardError> {
-        self.ready()?;
-        self.driver.write(blocks, start)
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
+        self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)
     }
 
-    fn num_blocks(&self) -> Result<BlockCount, SdCardError> {
-        self.ready()?;
-        self.driver.num_blocks()
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
+        self.bus.blocking_write(bytes).map_err(|_| PortFailed)
     }
-}
 
-impl CardDevice for Card {
-    fn reset(&self) {
-        self.driver.mark_card_uninit();
-        self.identified.set(false);
+    fn set_clock(&mut self, clock: Clock) {
+        let mut config = self.bus.get_current_config();
+        config.frequency = match clock {
+            Clock::Identification => Self::IDENTIFICATION,
+            Clock::Transfer => Self::TRANSFER,
+        };
+        // Cannot fail: both clocks are within what the bus can divide down to.
+        let _ = self.bus.set_config(&config);
+    }
+
+    fn now(&self) -> Instant {
+        crate::links::now()
     }
 }

@@ -13,7 +13,7 @@ use embassy_stm32::gpio::{Level, Output};
 use embassy_stm32::rcc;
 use embassy_time::Duration;
 
-pub(crate) use card::Card;
+pub(crate) use card::{Card, CardPort};
 pub(crate) use flash::StoreFlash;
 pub(crate) use port::{PortRx, PortTx};
 pub(crate) use reset::reset_cause;

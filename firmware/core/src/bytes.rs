@@ -1,6 +1,18 @@
-//! Little-endian fields, written one after the other and read likewise.
+//! Stored items: little-endian fields, written one after the other and read likewise.
 
-use super::Unreadable;
+/// An item that cannot be read: too short, or of no version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unreadable;
+
+/// To the nearest tenth of a second; a cast saturates.
+pub(crate) fn tenths(seconds: f64) -> u32 {
+    libm::round(seconds * 10.0) as u32
+}
+
+/// Sums are never negative, and never without end.
+pub(crate) fn amount(value: f64) -> f64 {
+    if value.is_finite() && value >= 0.0 { value } else { 0.0 }
+}
 
 /// Writes fields; what no longer fits is left out, which the callers' const-asserted lengths rule out.
 pub(crate) struct Put<'a> {

@@ -1,0 +1,54 @@
+//! What several subsystems' tables share.
+
+use super::check::{Check, Side, When};
+use super::finding::Subsystem;
+use super::inputs::Inputs;
+use crate::baseline::Quantity;
+use crate::latest::Reading;
+use crate::params::Param;
+use crate::time::Span;
+
+/// Most streams come at 1 Hz or more even over a radio; some batteries at 0.5 Hz.
+pub(super) const STALE: Option<Span> = Some(Span::from_secs(5));
+/// For streams that come at 0.5 Hz.
+pub(super) const STALE_SLOW: Option<Span> = Some(Span::from_secs(12));
+
+/// Of a subsystem's components, the one that is nearest to its limit.
+pub(super) const fn due(subsystem: Subsystem) -> Check {
+    Check {
+        name: "",
+        words: "",
+        subsystem,
+        unit: "%",
+        side: Side::Above,
+        warn: Some(Param::CompYellow),
+        critical: Some(Param::CompRed),
+        hysteresis: 0.0,
+        debounce_warn: Span::from_secs(1),
+        debounce_critical: Span::from_secs(1),
+        when: When::Always,
+        stale_after: None,
+        instances: 1,
+        // That a part is not due does not make its subsystem healthy.
+        alarm_only: true,
+        read: match subsystem {
+            Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
+            Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),
+            Subsystem::Engine => |inputs, _| used(inputs, Subsystem::Engine),
+            Subsystem::Structure => |inputs, _| used(inputs, Subsystem::Structure),
+            Subsystem::Recorder => |inputs, _| used(inputs, Subsystem::Recorder),
+            _ => |_, _| None,
+        },
+    }
+}
+
+fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
+    let mine = inputs.wear.iter().flatten().filter(|(of, _)| *of == subsystem);
+    // What has reached its limit is due, while a check's value must be beyond it.
+    Reading::new(Some(inputs.now), mine.map(|(_, percent)| percent.next_up()).reduce(f32::max))
+}
+
+/// How far a quantity is from what is normal for this airframe.
+pub(super) fn departure(inputs: &Inputs<'_>, quantity: Quantity) -> Option<Reading> {
+    Reading::new(Some(inputs.now), inputs.trends.departure(quantity, inputs.baselines))
+}

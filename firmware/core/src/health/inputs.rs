@@ -1,0 +1,36 @@
+//! What checks read.
+
+use super::finding::Subsystem;
+use crate::baseline::Baselines;
+use crate::derived::Derived;
+use crate::flight::Flight;
+use crate::params::Params;
+use crate::status::{LinkReading, RecorderStatus};
+use crate::time::Instant;
+use crate::trends::Trends;
+use crate::vehicle::Vehicle;
+
+/// What checks read. Nothing here changes while they do.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    /// Now.
+    pub now: Instant,
+    /// The vehicle as it is known.
+    pub vehicle: &'a Vehicle,
+    /// On the ground or in the air.
+    pub flight: &'a Flight,
+    /// What the raw messages do not say by themselves.
+    pub derived: &'a Derived,
+    /// The autopilot's port.
+    pub link: &'a LinkReading,
+    /// Our own recording.
+    pub recorder: &'a RecorderStatus,
+    /// Quantities of steady flight.
+    pub trends: &'a Trends,
+    /// What is normal for this airframe.
+    pub baselines: &'a Baselines,
+    /// Of each component, whose health it is and the part of its life that is used, percent.
+    pub wear: &'a [Option<(Subsystem, f32)>],
+    /// Limits and settings.
+    pub params: &'a Params,
+}

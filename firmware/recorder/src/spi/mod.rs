@@ -1,0 +1,203 @@
+//! An SD card on an SPI bus, as a block device that never waits without a limit.
+//!
+//! `embedded-sdmmc` brings a driver of its own. Against a simulated card (`tests/sdcard`, `docs/cards.md` has the
+//! figures) it gave a busy card up after half a second, where good cards take 2.5; it did not ask whether what it wrote
+//! arrived ([`SpiError::NotWritten`]), left a failed write of many blocks open, and let go of the select pin after every
+//! byte, which the specification forbids within a command. So this one is over its `BlockDevice`:
+//!
+//! * Each wait has a limit, and all waits of one service together have one: [`SERVICE_MAX`]. Whoever records gives such a
+//!   card up, says so, and tries again.
+//! * Checksums both ways, on every card that can: what was damaged on its way is sent again, [`TRIES`] times in all.
+//! * Many blocks go with one command, and the card is asked afterwards whether it could write them.
+//! * A card that lost its power for a moment is identified again at the next try, and used only if it is the same one
+//!   (its CID): everything above knows where its files lie.
+//!
+//! The driver waits with the processor: it belongs to the least urgent task.
+//! Source: SD Specifications Part 1, Physical Layer Simplified Specification 9.10, chapter 7.
+
+mod crc;
+mod error;
+mod identify;
+mod line;
+pub mod port;
+mod registers;
+
+use core::cell::RefCell;
+
+use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_core::time::Span;
+
+pub use error::SpiError;
+pub use line::BUSY_MAX;
+pub use port::{Clock, Port, PortFailed};
+
+use crate::{CardDevice, Trouble};
+use identify::Identity;
+use line::{Line, TOKEN_MANY, TOKEN_ONE};
+
+/// How long all waits of one service together may take. Storage must report in every 10 s.
+pub const SERVICE_MAX: Span = Span::from_secs(8);
+/// How often an access is tried whose failure may be a passing one.
+pub const TRIES: u32 = 3;
+
+const READ: u8 = 17;
+const ERASE_BEFORE: u8 = 23;
+const WRITE: u8 = 24;
+const WRITE_MANY: u8 = 25;
+
+/// A card.
+pub struct SpiCard<P> {
+    inner: RefCell<Inner<P>>,
+}
+
+struct Inner<P> {
+    line: Line<P>,
+    /// `None`: the card must be identified before it is used.
+    card: Option<Identity>,
+    /// Which card it was before that.
+    cid: Option<[u8; 16]>,
+    /// Accesses that were tried again, since they were asked for last.
+    retries: u32,
+}
+
+impl<P: Port> SpiCard<P> {
+    /// The card at this port; it is looked for at the first access.
+    pub const fn new(port: P) -> Self {
+        let line = Line { port, deadline: None, checks: false, busy_times: 0 };
+        Self { inner: RefCell::new(Inner { line, card: None, cid: None, retries: 0 }) }
+    }
+}
+
+impl<P: Port> Inner<P> {
+    /// The card, identified if it is not.
+    fn card(&mut self) -> Result<Identity, SpiError> {
+        if let Some(card) = self.card {
+            return Ok(card);
+        }
+        let card = self.line.identify()?;
+        if self.cid.is_some_and(|cid| cid != card.cid) {
+            return Err(SpiError::Changed);
+        }
+        self.cid = Some(card.cid);
+        self.card = Some(card);
+        Ok(card)
+    }
+
+    /// Accesses the card, again where that may help.
+    fn access<T>(
+        &mut self,
+        mut act: impl FnMut(&mut Line<P>, &Identity) -> Result<T, SpiError>,
+    ) -> Result<T, SpiError> {
+        let mut tries = 1;
+        loop {
+            // What cannot be identified is not waited for: whoever records looks again in a while.
+            let card = self.card()?;
+            let done = self.line.selected(|line| act(line, &card));
+            let Err(error) = done else { return done };
+            if error.has_lost_card() {
+                self.card = None;
+            }
+            if !error.is_passing() || tries >= TRIES {
+                return Err(error);
+            }
+            tries += 1;
+            self.retries = self.retries.saturating_add(1);
+        }
+    }
+}
+
+/// What commands call a block of this card, if it and `count - 1` more are there.
+fn address(card: &Identity, block: u32, count: usize) -> Result<u32, SpiError> {
+    let end = u64::from(block) + count as u64;
+    if end > u64::from(card.csd.blocks) {
+        return Err(SpiError::OutOfRange);
+    }
+    let address = if card.by_bytes { block.checked_mul(Block::LEN_U32) } else { Some(block) };
+    address.ok_or(SpiError::OutOfRange)
+}
+
+fn read_one<P: Port>(line: &mut Line<P>, address: u32, block: &mut Block) -> Result<(), SpiError> {
+    line.must(READ, address)?;
+    line.receive(&mut block.contents)
+}
+
+fn write<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Result<(), SpiError> {
+    let given = match blocks {
+        [block] => {
+            line.must(WRITE, address)?;
+            line.give(TOKEN_ONE, &block.contents)
+        }
+        _ => give_many(line, address, blocks),
+    };
+    // A card that can still be asked knows better what went wrong.
+    match given {
+        Ok(()) => line.check_written(),
+        Err(SpiError::NotWritten(response)) => {
+            Err(line.check_written().err().unwrap_or(SpiError::NotWritten(response)))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn give_many<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Result<(), SpiError> {
+    // Some cards are faster when they know how many come (4.3.4); one that does not know the command writes as well.
+    line.app_command(ERASE_BEFORE, blocks.len() as u32)?;
+    line.must(WRITE_MANY, address)?;
+    match blocks.iter().try_for_each(|block| line.give(TOKEN_MANY, &block.contents)) {
+        Ok(()) => line.stop(),
+        Err(error) => {
+            // What went wrong first is what counts.
+            let _ = line.abort();
+            Err(error)
+        }
+    }
+}
+
+impl<P: Port> BlockDevice for SpiCard<P> {
+    type Error = SpiError;
+
+    /// One command a block: nothing here reads many in a row.
+    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), SpiError> {
+        let mut inner = self.inner.borrow_mut();
+        for (index, block) in (start.0..).zip(blocks) {
+            inner.access(|line, card| read_one(line, address(card, index, 1)?, block))?;
+        }
+        Ok(())
+    }
+
+    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), SpiError> {
+        if blocks.is_empty() {
+            return Ok(());
+        }
+        self.inner.borrow_mut().access(|line, card| {
+            if card.csd.is_locked {
+                return Err(SpiError::Locked);
+            }
+            write(line, address(card, start.0, blocks.len())?, blocks)
+        })
+    }
+
+    fn num_blocks(&self) -> Result<BlockCount, SpiError> {
+        self.inner.borrow_mut().access(|_, card| Ok(BlockCount(card.csd.blocks)))
+    }
+}
+
+impl<P: Port> CardDevice for SpiCard<P> {
+    fn reset(&self) {
+        let mut inner = self.inner.borrow_mut();
+        (inner.card, inner.cid) = (None, None);
+    }
+
+    fn begin_service(&self) {
+        let mut inner = self.inner.borrow_mut();
+        inner.line.deadline = Some(inner.line.port.now() + SERVICE_MAX);
+    }
+
+    fn take_retries(&self) -> u32 {
+        core::mem::take(&mut self.inner.borrow_mut().retries)
+    }
+
+    fn trouble(error: &SpiError) -> Trouble {
+        error.trouble()
+    }
+}

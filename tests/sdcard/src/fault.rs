@@ -1,0 +1,80 @@
+//! What can be wrong with a card, and when it is.
+
+/// What is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A command gets no answer.
+    Silent,
+    /// A command arrives damaged: the card says so by its checksum.
+    DamagedCommand,
+    /// A block that is read is damaged on its way.
+    DamagedRead,
+    /// A block that is written is damaged on its way.
+    DamagedWrite,
+    /// A block that is written is refused with a write error.
+    WriteError,
+    /// A block that is written is taken, and not programmed; only the status says so.
+    NotProgrammed,
+    /// This comes in place of a block's token.
+    Token(u8),
+    /// A block that is asked for never comes.
+    NoBlock,
+    /// A block that is written keeps the card busy for so many nanoseconds.
+    Busy(u64),
+    /// The line carries noise.
+    Noise,
+}
+
+/// A fault, and when it strikes.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    pub(crate) fault: Fault,
+    from_ns: u64,
+    until_ns: u64,
+    skip: u32,
+    times: u32,
+}
+
+impl Plan {
+    /// Always.
+    pub const fn always(fault: Fault) -> Self {
+        Self { fault, from_ns: 0, until_ns: u64::MAX, skip: 0, times: u32::MAX }
+    }
+
+    /// Only from this moment on, nanoseconds since the slot got its power.
+    pub const fn from(mut self, ns: u64) -> Self {
+        self.from_ns = ns;
+        self
+    }
+
+    /// Only until this moment.
+    pub const fn until(mut self, ns: u64) -> Self {
+        self.until_ns = ns;
+        self
+    }
+
+    /// Not the first so many times that it could strike.
+    pub const fn skip(mut self, skip: u32) -> Self {
+        self.skip = skip;
+        self
+    }
+
+    /// No more than so many times.
+    pub const fn times(mut self, times: u32) -> Self {
+        self.times = times;
+        self
+    }
+
+    /// Whether it strikes now, at this occasion.
+    pub(crate) fn strikes(&mut self, now_ns: u64) -> bool {
+        if !(self.from_ns..self.until_ns).contains(&now_ns) || self.times == 0 {
+            return false;
+        }
+        if self.skip > 0 {
+            self.skip -= 1;
+            return false;
+        }
+        self.times -= 1;
+        true
+    }
+}

@@ -1,0 +1,23 @@
+//! A simulated SD card at the level of SPI bytes and SD commands.
+//!
+//! ```text
+//! Recorder -> SpiCard -> SimPort -> Slot (bus, time, events) -> SdCard (state machine, faults) -> Medium (blocks)
+//! ```
+//! Time is virtual: each byte on the bus takes as long as its clock says, and nothing else takes any. What a card
+//! or a driver may not do is not corrected here but noted ([`Slot::violations`]): a test can ask that there be none.
+//!
+//! Source: SD Specifications Part 1, Physical Layer Simplified Specification 9.10, chapter 7 (SPI mode).
+
+mod card;
+mod fault;
+mod medium;
+mod model;
+mod slot;
+
+pub use fault::{Fault, Plan};
+pub use medium::Medium;
+pub use model::{Kind, Model};
+pub use slot::{Counts, Event, SimPort, SimSpi, Slot};
+
+/// Nanoseconds of a millisecond.
+pub const MS: u64 = 1_000_000;

@@ -1,0 +1,145 @@
+//! Which card it is: what does not change while it has power.
+
+use crate::MS;
+use crate::fault::{Fault, Plan};
+use crate::medium::Medium;
+
+/// The kinds of cards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Up to 2 GB, of before version 2 of the specification.
+    Old,
+    /// Up to 2 GB.
+    Sdsc,
+    /// 2 to 32 GB.
+    Sdhc,
+    /// 32 GB to 2 TB.
+    Sdxc,
+}
+
+impl Kind {
+    pub(crate) const fn by_bytes(self) -> bool {
+        matches!(self, Self::Old | Self::Sdsc)
+    }
+}
+
+/// A card without power.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Its kind.
+    pub kind: Kind,
+    /// What it holds.
+    pub medium: Medium,
+    /// Its serial number.
+    pub serial: u32,
+    /// How long it takes to start.
+    pub start_ns: u64,
+    /// How long it takes to find a block.
+    pub read_ns: u64,
+    /// How long it takes to take one block alone, and one of many.
+    pub write_ns: (u64, u64),
+    /// Write protected, in its CSD: for now, for ever.
+    pub locked: (bool, bool),
+    /// What is wrong with it.
+    pub plans: Vec<Plan>,
+}
+
+impl Model {
+    /// A card of this kind in good order, with times as measured on usual ones.
+    pub fn new(kind: Kind, medium: Medium) -> Self {
+        Self {
+            kind,
+            medium,
+            serial: 0x1234_5678,
+            start_ns: 20 * MS,
+            read_ns: MS / 2,
+            write_ns: (2 * MS, MS / 4),
+            locked: (false, false),
+            plans: Vec::new(),
+        }
+    }
+
+    /// The same with something wrong.
+    pub fn with(mut self, plan: Plan) -> Self {
+        self.plans.push(plan);
+        self
+    }
+
+    /// The same with nothing wrong.
+    pub fn healed(&self) -> Self {
+        Self { plans: Vec::new(), ..self.clone() }
+    }
+
+    pub(crate) fn has(&mut self, now_ns: u64, wanted: impl Fn(Fault) -> bool) -> Option<Fault> {
+        let mut plans = self.plans.iter_mut().filter(|plan| wanted(plan.fault));
+        plans.find_map(|plan| plan.strikes(now_ns).then_some(plan.fault))
+    }
+
+    pub(crate) fn cid(&self) -> [u8; 16] {
+        let mut cid = *b"\x03SDHUMS0\x10\0\0\0\0\x01\x6A\0";
+        cid[9..13].copy_from_slice(&self.serial.to_be_bytes());
+        cid[15] = crc7(&cid[..15]);
+        cid
+    }
+
+    pub(crate) fn csd(&self) -> [u8; 16] {
+        let size = self.medium.size();
+        let mut csd = if self.kind.by_bytes() {
+            // Blocks of 512 bytes, in units of 512: what a card of this structure can say of its size.
+            let units = (size >> 9) - 1;
+            [
+                0x00,
+                0x26,
+                0x00,
+                0x32,
+                0x5F,
+                0x59,
+                0x80 | (units >> 10) as u8,
+                (units >> 2) as u8,
+                (units << 6) as u8,
+            ]
+            .into_iter()
+            .chain([0x03, 0x80, 0, 0, 0x40, 0, 0])
+            .collect::<Vec<_>>()
+        } else {
+            let units = (size >> 10) - 1;
+            [0x40, 0x0E, 0x00, 0x32, 0x5B, 0x59, 0, (units >> 16) as u8, (units >> 8) as u8, units as u8]
+                .into_iter()
+                .chain([0x7F, 0x80, 0x0A, 0x40, 0, 0])
+                .collect()
+        };
+        csd[14] = u8::from(self.locked.0) << 4 | u8::from(self.locked.1) << 5;
+        csd[15] = crc7(&csd[..15]);
+        csd.try_into().unwrap_or_default()
+    }
+}
+
+/// Written from the specification, bit by bit, and not the driver's.
+pub(crate) fn crc7(bytes: &[u8]) -> u8 {
+    let mut crc = 0_u8;
+    for byte in bytes {
+        for bit in (0..8).rev() {
+            let carry = (crc >> 6) ^ (byte >> bit) & 1;
+            crc = (crc << 1) & 0x7F;
+            if carry & 1 == 1 {
+                crc ^= 0x09;
+            }
+        }
+    }
+    crc << 1 | 1
+}
+
+/// As [`crc7`].
+pub(crate) fn crc16(bytes: &[u8]) -> u16 {
+    let mut crc = 0_u16;
+    for byte in bytes {
+        for bit in (0..8).rev() {
+            let carry = (crc >> 15) as u8 ^ (byte >> bit) & 1;
+            crc <<= 1;
+            if carry & 1 == 1 {
+                crc ^= 0x1021;
+            }
+        }
+    }
+    crc
+}

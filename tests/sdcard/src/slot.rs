@@ -1,0 +1,276 @@
+//! The slot: the bus, its clock and time, and what happens to the card in it.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::rc::Rc;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use hums_core::time::Instant;
+use hums_recorder::spi::{Clock, Port, PortFailed};
+
+use crate::card::SdCard;
+use crate::model::Model;
+
+/// What happens to the card in the slot.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// It is pulled.
+    Pull,
+    /// A card is put in.
+    Insert(Model),
+    /// It loses contact for a moment, and with it its power.
+    Bounce,
+}
+
+/// What went over the bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Bytes.
+    pub bytes: u64,
+    /// Of them, those with no card selected.
+    pub unselected: u64,
+    /// Times that the select pin went down.
+    pub selects: u64,
+}
+
+struct Inner {
+    card: Option<SdCard>,
+    now_ns: u64,
+    hz: u32,
+    selected: bool,
+    counts: Counts,
+    at_time: Vec<(u64, Event)>,
+    at_byte: Vec<(u64, Event)>,
+    violations: BTreeMap<String, u32>,
+    /// The processor has stopped once so many bytes went over the bus: no more of them do.
+    stop_at: Option<u64>,
+}
+
+/// A slot; a clone is the same one.
+#[derive(Clone)]
+pub struct Slot(Rc<RefCell<Inner>>);
+
+impl Slot {
+    /// A slot with this card in it, at 0 s.
+    pub fn new(card: Option<Model>) -> Self {
+        Self(Rc::new(RefCell::new(Inner {
+            card: card.map(SdCard::new),
+            now_ns: SdCard::POWER_UP_NS,
+            hz: 0,
+            selected: false,
+            counts: Counts::default(),
+            at_time: Vec::new(),
+            at_byte: Vec::new(),
+            violations: BTreeMap::new(),
+            stop_at: None,
+        })))
+    }
+
+    /// At this moment this happens.
+    pub fn at(&self, ns: u64, event: Event) {
+        self.0.borrow_mut().at_time.push((ns, event));
+    }
+
+    /// When so many bytes went over the bus this happens.
+    pub fn at_byte(&self, bytes: u64, event: Event) {
+        self.0.borrow_mut().at_byte.push((bytes, event));
+    }
+
+    /// From so many bytes on nothing goes over the bus any more, as when the processor restarts; `None`: it does again.
+    pub fn stop_at(&self, bytes: Option<u64>) {
+        self.0.borrow_mut().stop_at = bytes;
+    }
+
+    /// Now.
+    pub fn event(&self, event: Event) {
+        self.0.borrow_mut().happen(event);
+    }
+
+    /// Whether a card is in it.
+    pub fn has_card(&self) -> bool {
+        self.0.borrow().card.is_some()
+    }
+
+    /// Nanoseconds since 0 s.
+    pub fn now_ns(&self) -> u64 {
+        self.0.borrow().now_ns
+    }
+
+    /// As the driver sees it.
+    pub fn now(&self) -> Instant {
+        Instant::from_micros(self.now_ns() / 1_000)
+    }
+
+    /// Time goes on to this moment with the bus at rest.
+    pub fn advance_to(&self, ns: u64) {
+        let mut inner = self.0.borrow_mut();
+        inner.now_ns = inner.now_ns.max(ns);
+        inner.happen_what_is_due();
+    }
+
+    /// What went over the bus so far.
+    pub fn counts(&self) -> Counts {
+        self.0.borrow().counts
+    }
+
+    /// What was not allowed so far, and how often.
+    pub fn violations(&self) -> BTreeMap<String, u32> {
+        self.0.borrow().violations.clone()
+    }
+
+    /// The slot as the driver's port.
+    pub fn port(&self) -> SimPort {
+        SimPort { slot: self.clone(), transfer_hz: 21_000_000 }
+    }
+
+    /// Eighty clocks at this rate with no card selected, as a card needs before its first command.
+    pub fn wake(&self, hz: u32) {
+        let mut inner = self.0.borrow_mut();
+        inner.hz = hz;
+        for _ in 0..10 {
+            inner.exchange(0xFF);
+        }
+    }
+
+    /// The slot as embedded-hal has it, at this clock.
+    pub fn spi(&self, hz: u32) -> SimSpi {
+        self.0.borrow_mut().hz = hz;
+        SimSpi(self.clone())
+    }
+}
+
+impl Inner {
+    fn happen(&mut self, event: Event) {
+        match event {
+            Event::Pull => self.card = None,
+            Event::Insert(model) => self.card = Some(SdCard::new(model)),
+            Event::Bounce => self.card = self.card.take().map(|card| SdCard::new(card.model)),
+        }
+    }
+
+    fn happen_what_is_due(&mut self) {
+        let (now_ns, bytes) = (self.now_ns, self.counts.bytes);
+        if self.at_time.is_empty() && self.at_byte.is_empty() {
+            return;
+        }
+        let (mut due, later): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.at_time).into_iter().partition(|(at, _)| *at <= now_ns);
+        self.at_time = later;
+        let (now, later): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.at_byte).into_iter().partition(|(at, _)| *at <= bytes);
+        self.at_byte = later;
+        due.sort_by_key(|(at, _)| *at);
+        for (_, event) in due.into_iter().chain(now) {
+            self.happen(event);
+        }
+    }
+
+    fn exchange(&mut self, sent: u8) -> u8 {
+        self.happen_what_is_due();
+        self.now_ns += 8_000_000_000 / u64::from(self.hz.max(1));
+        if self.stop_at.is_some_and(|at| self.counts.bytes >= at) {
+            return 0xFF;
+        }
+        self.counts.bytes += 1;
+        self.counts.unselected += u64::from(!self.selected);
+        let Self { card, now_ns, hz, selected, violations, .. } = self;
+        let mut wrong = |what: String| *violations.entry(what).or_default() += 1;
+        // The line is pulled up.
+        card.as_mut().map_or(0xFF, |card| card.exchange(*now_ns, *hz, *selected, sent, &mut wrong))
+    }
+
+    fn select(&mut self, selected: bool) {
+        self.counts.selects += u64::from(selected && !self.selected);
+        if self.selected
+            && !selected
+            && let Some(card) = &mut self.card
+        {
+            let violations = &mut self.violations;
+            card.deselected(&mut |what| *violations.entry(what).or_default() += 1);
+        }
+        self.selected = selected;
+    }
+}
+
+/// The slot as [`hums_recorder::spi::SpiCard`] sees it: the F405 board's clocks.
+pub struct SimPort {
+    slot: Slot,
+    transfer_hz: u32,
+}
+
+impl Port for SimPort {
+    fn select(&mut self, selected: bool) {
+        self.slot.0.borrow_mut().select(selected);
+    }
+
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
+        let mut inner = self.slot.0.borrow_mut();
+        for byte in bytes {
+            *byte = inner.exchange(*byte);
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
+        let mut inner = self.slot.0.borrow_mut();
+        for byte in bytes {
+            inner.exchange(*byte);
+        }
+        Ok(())
+    }
+
+    fn set_clock(&mut self, clock: Clock) {
+        self.slot.0.borrow_mut().hz = match clock {
+            Clock::Identification => 328_125,
+            Clock::Transfer => self.transfer_hz,
+        };
+    }
+
+    fn now(&self) -> Instant {
+        self.slot.now()
+    }
+}
+
+/// The slot as `embedded-sdmmc`'s own driver sees it, to compare with.
+pub struct SimSpi(Slot);
+
+impl ErrorType for SimSpi {
+    type Error = Infallible;
+}
+
+impl SpiDevice for SimSpi {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        let mut inner = self.0.0.borrow_mut();
+        inner.select(true);
+        for operation in operations {
+            match operation {
+                Operation::Read(bytes) => bytes.iter_mut().for_each(|byte| *byte = inner.exchange(0xFF)),
+                Operation::Write(bytes) => bytes.iter().for_each(|byte| {
+                    inner.exchange(*byte);
+                }),
+                Operation::Transfer(read, write) => {
+                    for index in 0..read.len().max(write.len()) {
+                        let answer = inner.exchange(write.get(index).copied().unwrap_or(0xFF));
+                        if let Some(byte) = read.get_mut(index) {
+                            *byte = answer;
+                        }
+                    }
+                }
+                Operation::TransferInPlace(bytes) => {
+                    bytes.iter_mut().for_each(|byte| *byte = inner.exchange(*byte));
+                }
+                Operation::DelayNs(ns) => inner.now_ns += u64::from(*ns),
+            }
+        }
+        inner.select(false);
+        Ok(())
+    }
+}
+
+impl DelayNs for SimSpi {
+    fn delay_ns(&mut self, ns: u32) {
+        self.0.0.borrow_mut().now_ns += u64::from(ns);
+    }
+}

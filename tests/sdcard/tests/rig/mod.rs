@@ -1,0 +1,338 @@
+//! The firmware's own monitor and storage over the simulated card, in virtual time, and what a pilot sees of it.
+//!
+//! Storage waits for the card with the processor, and whatever is more urgent goes on meanwhile: so, when a service of
+//! the card has taken its time, frames and ticks of that time come first and then the next service.
+// Each test file uses its own part of this.
+#![allow(dead_code, missing_docs, unreachable_pub)]
+
+use std::collections::BTreeMap;
+
+use embedded_sdmmc::Block;
+use hums_blackbox::record::Boot;
+use hums_blackbox::{Gap, Item, LogReader, Writer};
+use hums_core::Monitor;
+use hums_core::health::Level;
+use hums_core::params::Params;
+use hums_core::time::{Instant, Span};
+use hums_link::frame::{Check, Frame};
+use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
+use hums_onboard::storage::NO_CARD_RETRY;
+use hums_onboard::{Monitoring, PortStatus, Service, Storage, Supervisor, Task};
+use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName, SpiCard};
+use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
+
+/// One frame of noise each so often: 2.5 kB/s of log.
+const FRAME_EVERY: Span = Span::from_millis(40);
+const TICK: Span = Span::from_millis(50);
+const NOISE_ID: u32 = 0xC0DE;
+
+pub struct Rig {
+    pub slot: Slot,
+    pub status: &'static CardStatus,
+    pub texts: Vec<(Instant, String)>,
+    pub acks: Vec<(u16, u8)>,
+    pub findings: Vec<(Instant, &'static str, Level)>,
+    pub armed: bool,
+    /// The longest that one service of the card took.
+    pub longest: Span,
+    supervisor: Supervisor,
+    port: &'static PortStatus,
+    ends: Ends<'static>,
+    monitoring: Monitoring<'static>,
+    storage: Storage<'static, SpiCard<SimPort>>,
+    frame_at: Instant,
+    tick_at: Instant,
+    frames: u32,
+    heartbeats: u32,
+}
+
+/// What a card holds in the end.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// Numbers of the frames of noise, in the order of sessions.
+    pub frames: Vec<u32>,
+    pub all_frames: u64,
+    pub gaps: Vec<Gap>,
+    pub sessions: usize,
+    pub segments: usize,
+}
+
+impl Rig {
+    pub fn new(card: impl Into<Option<Model>>) -> Self {
+        let slot = Slot::new(card.into());
+        let status: &CardStatus = Box::leak(Box::default());
+        let port: &PortStatus = Box::leak(Box::new(PortStatus::new()));
+        let monitor = Box::leak(Box::new(Monitor::new(Params::defaults())));
+        let writer = Box::leak(Box::new(Writer::new()));
+        let identity = Boot { version: "1.2.3", board: "rig", ..Boot::default() };
+        let held: &HeldBlocks = Box::leak(Box::default());
+        let queues = Box::leak(Box::new(Queues::new()));
+        let mut rig = Self {
+            status,
+            port,
+            texts: Vec::new(),
+            acks: Vec::new(),
+            findings: Vec::new(),
+            armed: false,
+            longest: Span::ZERO,
+            supervisor: Supervisor::new(),
+            ends: queues.split(),
+            monitoring: Monitoring::new(monitor, writer, identity, status, port),
+            storage: Storage::new(SpiCard::new(slot.port()), status, held, 77),
+            frame_at: Instant::ZERO,
+            tick_at: Instant::ZERO + TICK,
+            frames: 0,
+            heartbeats: 0,
+            slot,
+        };
+        rig.monitoring.start(Instant::ZERO, &mut rig.ends.sectors_in);
+        rig
+    }
+
+    /// Goes on until so many milliseconds after the start.
+    pub fn run_to(&mut self, ms: u64) {
+        while self.slot.now_ns() < ms * MS {
+            self.service();
+        }
+    }
+
+    /// One round of the storage task, and what else happens meanwhile.
+    fn service(&mut self) -> Service {
+        let begun = self.slot.now();
+        self.supervisor.report(Task::Storage, begun);
+        let service = self.storage.service(begun, &mut self.ends.sectors_out);
+        if service == Service::Idle {
+            self.storage.serve(&mut self.ends.shelf);
+        }
+        let took = self.slot.now().since(begun);
+        self.longest = self.longest.max(took);
+        self.meanwhile();
+        self.status.end_service(took.as_millis() as u32);
+        let now_ns = self.slot.now_ns();
+        match service {
+            Service::Wrote => self.slot.advance_to(now_ns + 1_000),
+            Service::Idle => self.slot.advance_to(now_ns + 5 * MS),
+            Service::NoCard => self.slot.advance_to(now_ns + NO_CARD_RETRY.as_micros() * 1_000),
+        }
+        self.meanwhile();
+        service
+    }
+
+    /// Frames and ticks by now.
+    fn meanwhile(&mut self) {
+        let now = self.slot.now();
+        while self.frame_at.min(self.tick_at) <= now {
+            if self.frame_at <= self.tick_at {
+                self.frame();
+                self.frame_at = self.frame_at + FRAME_EVERY;
+            } else {
+                self.tick();
+                self.tick_at = self.tick_at + TICK;
+            }
+            self.listen();
+        }
+    }
+
+    fn frame(&mut self) {
+        let index = self.frames;
+        self.frames += 1;
+        let mut state = index.wrapping_mul(0x9E37_79B9) | 1;
+        let mut payload: Vec<u8> = index.to_le_bytes().into();
+        payload.extend((0..96).map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        }));
+        self.give(NOISE_ID, &payload, false);
+        if index.is_multiple_of(25) {
+            self.heartbeats += 1;
+            let mode = if self.armed { 0x81 } else { 0x01 };
+            self.give(0, &[0, 0, 0, 0, 2, 3, mode, 4, 3], true);
+        }
+    }
+
+    fn give(&mut self, id: u32, payload: &[u8], verified: bool) {
+        let bytes = frame(1, 1, id, payload);
+        assert!(self.ends.frames_in.put(self.frame_at.as_micros(), verified, &bytes));
+        let Ends { frames_out, sectors_in, gs_in, .. } = &mut self.ends;
+        while self.monitoring.drain(frames_out, sectors_in, gs_in) {}
+    }
+
+    fn tick(&mut self) {
+        let Self { monitoring, ends, findings, tick_at, supervisor, .. } = self;
+        for task in [Task::Reception, Task::Monitor, Task::Downlink] {
+            supervisor.report(task, *tick_at);
+        }
+        assert_eq!(supervisor.silent(*tick_at), None, "the watchdog would bite");
+        monitoring.tick(*tick_at, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
+            findings.push((finding.at, finding.check, finding.level));
+        });
+    }
+
+    /// What reaches the ground station.
+    fn listen(&mut self) {
+        let mut bytes = [0; GS_FRAME_BYTES_MAX];
+        while let Some(length) = self.ends.gs_out.take(&mut bytes) {
+            let Some(frame) = Frame::again(&bytes[..length], Check::Verified) else { continue };
+            let mut payload = frame.payload().to_vec();
+            payload.resize(60, 0);
+            match frame.id() {
+                253 => {
+                    let text = payload[1..51].iter().take_while(|byte| **byte != 0).copied().collect();
+                    self.texts.push((self.tick_at, String::from_utf8(text).expect("our texts are ASCII")));
+                }
+                77 => self.acks.push((u16::from_le_bytes([payload[0], payload[1]]), payload[2])),
+                _ => {}
+            }
+        }
+        while self.ends.autopilot_out.take(&mut bytes).is_some() {}
+    }
+
+    /// A ground station sends a command; its answer.
+    pub fn command(&mut self, command: u16, params: [f32; 2]) -> Option<u8> {
+        let mut payload: Vec<u8> = params.iter().flat_map(|param| param.to_le_bytes()).collect();
+        payload.resize(28, 0);
+        payload.extend(command.to_le_bytes());
+        payload.extend([1, 191, 0]);
+        let bytes = frame(255, 190, 76, &payload);
+        let now = self.slot.now();
+        assert!(self.ends.uplink_in.put(now.as_micros(), true, &bytes));
+        let Ends { uplink_out, sectors_in, gs_in, .. } = &mut self.ends;
+        while self.monitoring.uplink(now, uplink_out, sectors_in, gs_in) {}
+        let before = self.acks.len();
+        self.run_to(self.slot.now_ns() / MS + 1_000);
+        self.acks[before..].iter().find(|(number, _)| *number == command).map(|(_, result)| *result)
+    }
+
+    pub fn state(&self) -> CardState {
+        self.status.read().state
+    }
+
+    /// Whether the pilot was told this since then.
+    pub fn was_told(&self, text: &str, since_ms: u64) -> bool {
+        self.texts.iter().any(|(at, told)| at.as_millis() >= since_ms && told.contains(text))
+    }
+
+    #[track_caller]
+    pub fn assert_told(&self, text: &str, since_ms: u64) {
+        assert!(self.was_told(text, since_ms), "not told {text:?} since {since_ms} ms: {:?}", self.texts);
+    }
+
+    #[track_caller]
+    pub fn assert_state(&self, state: CardState) {
+        assert_eq!(self.state(), state, "{:?}", self.texts);
+    }
+
+    /// Ends the power-on in order. Every frame is on one of these cards, once and in order, or counted as lost; how many
+    /// are lost.
+    #[track_caller]
+    pub fn finish(mut self, cards: &[&Medium]) -> (Vec<Found>, u64) {
+        let Ends { sectors_in, gs_in, .. } = &mut self.ends;
+        self.monitoring.finish(self.slot.now(), sectors_in, gs_in);
+        let end = self.slot.now() + Span::from_secs(10);
+        while !self.storage.is_done(&self.ends.sectors_out) && self.slot.now() < end {
+            let begun = self.slot.now();
+            self.storage.service(begun, &mut self.ends.sectors_out);
+            self.slot.advance_to(self.slot.now_ns() + 10 * MS);
+        }
+        self.storage.finish();
+        let left = self.storage.abandon(&mut self.ends.sectors_out);
+        let card_lost = u64::from(self.status.read().frames_lost);
+        let refused = self.monitoring.stats(&self.ends.gs_in).frames_lost;
+        let lost = refused.max(card_lost) + left;
+        let found: Vec<Found> = cards.iter().map(|medium| read(medium)).collect();
+        let on_cards: u64 = found.iter().map(|found| found.all_frames).sum();
+        let sent = u64::from(self.frames + self.heartbeats);
+        // On the first of two cards a copy of a sector in progress may hold what is counted as lost for the second.
+        let twice = 10 * (cards.len() as u64 - 1);
+        let accounted = on_cards + lost;
+        assert!(
+            (sent..=sent + twice).contains(&accounted),
+            "{sent} sent, {on_cards} on cards, {lost} lost ({left} left)"
+        );
+        for found in &found {
+            assert!(found.frames.windows(2).all(|pair| pair[0] < pair[1]), "out of order");
+        }
+        (found, lost)
+    }
+
+    /// As [`Self::finish`], with nothing lost, and nothing on the bus that the specification forbids.
+    #[track_caller]
+    pub fn finish_whole(self, medium: &Medium) -> Found {
+        let slot = self.slot.clone();
+        let (mut found, lost) = self.finish(&[medium]);
+        assert_eq!(lost, 0);
+        let found = found.remove(0);
+        assert!(found.gaps.is_empty(), "{:?}", found.gaps);
+        assert!(slot.violations().is_empty(), "{:?}", slot.violations());
+        found
+    }
+}
+
+fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
+    let [a, b, c, _] = id.to_le_bytes();
+    let mut bytes = vec![0xFD, payload.len() as u8, 0, 0, 0, system, component, a, b, c];
+    bytes.extend(payload);
+    // CRC-16/MCRF4XX over all but the first byte, and a byte that stands for the definition.
+    let seed = match id {
+        0 => 50,
+        76 => 152,
+        _ => 0,
+    };
+    let crc = bytes[1..].iter().chain([&seed]).fold(0xFFFF_u16, |crc, byte| {
+        let low = byte ^ crc as u8;
+        let low = u16::from(low ^ low << 4);
+        crc >> 8 ^ low << 8 ^ low << 3 ^ low >> 4
+    });
+    bytes.extend(crc.to_le_bytes());
+    bytes
+}
+
+/// Reads a card as `hums` does: its segments in order, one session after the other.
+#[track_caller]
+pub fn read(medium: &Medium) -> Found {
+    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let mounted = Card::mount(medium.clone(), &status, &held);
+    let card = mounted.map_err(|(_, error)| error.to_string()).expect("the card is in order");
+    let mut sessions: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();
+    card.logs(|log| sessions.entry(log.name.session).or_default().push(log.name)).expect("it lists");
+    let mut found = Found { sessions: sessions.len(), ..Found::default() };
+    for mut names in sessions.into_values() {
+        names.sort_unstable();
+        found.segments += names.len();
+        let mut reader = Box::new(LogReader::new());
+        for name in names {
+            let mut segment = card.segment(name).expect("it is there");
+            for index in 0..segment.blocks() {
+                let mut block = Block::new();
+                card.read(&mut segment, index, &mut block).expect("it reads");
+                // Nothing was written from here on.
+                if block.contents == [0; 512] {
+                    break;
+                }
+                reader.feed(&block.contents);
+                take(&mut reader, &mut found);
+            }
+        }
+        reader.end();
+        take(&mut reader, &mut found);
+    }
+    found
+}
+
+fn take(reader: &mut LogReader, found: &mut Found) {
+    while let Some(item) = reader.next() {
+        match item {
+            Item::Frame { bytes, .. } => {
+                found.all_frames += 1;
+                if let Some(frame) =
+                    Frame::again(bytes, Check::Unverified).filter(|frame| frame.id() == NOISE_ID)
+                {
+                    let payload = frame.payload();
+                    found.frames.push(u32::from_le_bytes([payload[0], payload[1], payload[2], payload[3]]));
+                }
+            }
+            Item::Gap(gap) => found.gaps.push(gap),
+            Item::Record { .. } | Item::End(_) => {}
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! `cargo xtask dist`: what a release is made of, and proof that whoever builds it gets the same.
+//!
+//! A release is built from a commit, in a clone of its own, so that nothing that lies about in the working copy gets
+//! into it. Paths of the machine are replaced by `/hums` and `/cargo`: two builds in two places are equal byte by byte,
+//! which `--check` shows by doing so.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+use anyhow::{Context as _, Result, bail};
+use sha2::{Digest as _, Sha256};
+
+use crate::dfu;
+use crate::firmware::Board;
+use crate::image;
+use crate::repo::{self, FIRMWARE_TARGET};
+use crate::setup::{self, Need, STATIC_TARGET};
+use crate::shell::Shell;
+
+/// Boards whose firmware a user may flash.
+fn boards() -> impl Iterator<Item = Board> {
+    Board::ALL.into_iter().filter(|board| *board != Board::Emulated)
+}
+
+/// Makes a release of the commit that is checked out, in `target/dist`; with `check` a second one elsewhere, and compares.
+pub(crate) fn run(check: bool) -> Result<()> {
+    setup::ensure(&[Need::Linker, Need::FirmwareTarget, Need::StaticTarget], false).require_all()?;
+    ensure_cyclonedx()?;
+    let commit = git(&["rev-parse", "HEAD"])?;
+    if !git(&["status", "--porcelain"])?.is_empty() {
+        eprintln!("note: what is not committed is not in the release, which is of {commit}");
+    }
+    let folder = repo::target().join("dist");
+    let files = Release::new(&commit, &repo::target().join("dist-build"))?.make()?;
+    write_all(&folder, &files)?;
+    print!("{}", sums(&files));
+    println!("{}", repo::shown(&folder));
+    if !check {
+        return Ok(());
+    }
+    let elsewhere = env::temp_dir().join(format!("hums-built-again-{}", std::process::id()));
+    let again = Release::new(&commit, &elsewhere).and_then(|release| release.make());
+    // Gigabytes, and of no use to anybody, whatever came of it.
+    fs::remove_dir_all(&elsewhere).with_context(|| format!("cannot remove {}", elsewhere.display()))?;
+    let again = again?;
+    let different = differences(&files, &again);
+    if !different.is_empty() {
+        write_all(&repo::target().join("dist-again"), &again)?;
+        bail!("built again elsewhere these differ: {}; they are in target/dist-again", different.join(", "));
+    }
+    println!("built again in {}: all {} files are the same", elsewhere.display(), files.len());
+    Ok(())
+}
+
+/// A file of the release: its name and what is in it.
+type File = (String, Vec<u8>);
+
+/// A clone in which one release is built.
+struct Release {
+    tree: PathBuf,
+    commit: String,
+    flags: String,
+}
+
+impl Release {
+    fn new(commit: &str, tree: &Path) -> Result<Self> {
+        if tree.exists() {
+            fs::remove_dir_all(tree)?;
+        }
+        Shell::new("git").args(["clone", "--quiet", "--no-checkout", "."]).arg(tree).run()?;
+        Shell::new("git").within(tree).args(["checkout", "--quiet", "--detach", commit]).run()?;
+        let cargo_home = env::var_os("CARGO_HOME").map(PathBuf::from);
+        let cargo_home = cargo_home.or_else(|| Some(env::home_dir()?.join(".cargo")));
+        let cargo_home = cargo_home.context("neither CARGO_HOME nor a home folder is known")?;
+        let tree = tree.canonicalize()?;
+        let flags = [(&tree, "/hums"), (&cargo_home, "/cargo")]
+            .map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()))
+            // Not separated by spaces: a folder may have one in its name.
+            .join("\u{1f}");
+        Ok(Self { tree, commit: commit.to_owned(), flags })
+    }
+
+    fn make(&self) -> Result<Vec<File>> {
+        let mut files = Vec::new();
+        for board in boards() {
+            self.build(&board.cargo_arguments())?;
+            let elf = self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware");
+            let elf = read(&format!("hums-{}.elf", board.name()), &elf)?;
+            let pieces = image::pieces(&elf.1)?;
+            files.push((format!("hums-{}.dfu", board.name()), dfu::file(board.name(), &pieces)));
+            files.push((format!("hums-{}.bin", board.name()), image::flat(&pieces)));
+            files.push(elf);
+            files.push(self.sbom(
+                &format!("hums-{}", board.name()),
+                "firmware/app",
+                &board.sbom_arguments(),
+            )?);
+        }
+        self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
+        files.push(read("hums", &self.target().join(STATIC_TARGET).join("release/hums"))?);
+        files.push(self.sbom("hums", "host-tools", &["--target", STATIC_TARGET])?);
+        for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
+            files.push(read(licence, &self.tree.join(licence))?);
+        }
+        files.push(("BUILD".to_owned(), self.provenance()?.into_bytes()));
+        files.push(("SHA256SUMS".to_owned(), sums(&files).into_bytes()));
+        Ok(files)
+    }
+
+    fn target(&self) -> PathBuf {
+        self.tree.join("target")
+    }
+
+    fn build<A: AsRef<std::ffi::OsStr>>(&self, arguments: &[A]) -> Result<()> {
+        Shell::cargo()
+            .within(&self.tree)
+            .env("CARGO_TARGET_DIR", self.target())
+            .env("CARGO_ENCODED_RUSTFLAGS", &self.flags)
+            .args(["build", "--locked"])
+            .args(arguments)
+            .run()
+    }
+
+    /// The bill of materials of the one program in the package at `folder`, as `CycloneDX` has it: every crate that is built for it.
+    fn sbom<A: AsRef<std::ffi::OsStr>>(&self, name: &str, folder: &str, arguments: &[A]) -> Result<File> {
+        let folder = self.tree.join(folder);
+        let stamp = Shell::new("git").within(&self.tree).args(["log", "-1", "--format=%ct"]).output()?;
+        Shell::cargo()
+            .within(&folder)
+            .env("SOURCE_DATE_EPOCH", stamp.trim())
+            .args(["cyclonedx", "--quiet", "--format=json", "--spec-version=1.5", "--describe=binaries"])
+            .arg("--manifest-path")
+            .arg(folder.join("Cargo.toml"))
+            .args(arguments)
+            .run()?;
+        let suffix = "_bin.cdx.json";
+        let made = fs::read_dir(&folder)?.filter_map(|entry| Some(entry.ok()?.path()));
+        let made = made.filter(|path| path.to_string_lossy().ends_with(suffix));
+        let [made] = <[PathBuf; 1]>::try_from(made.collect::<Vec<_>>())
+            .map_err(|all| anyhow::anyhow!("cargo cyclonedx made {} files, not one", all.len()))?;
+        let text = fs::read_to_string(&made)?;
+        fs::remove_file(&made)?;
+        let text = text.replace(&*self.tree.to_string_lossy(), "/hums");
+        Ok((format!("{name}.cdx.json"), text.into_bytes()))
+    }
+
+    /// What somebody needs to know who wants to build the same.
+    fn provenance(&self) -> Result<String> {
+        let rustc = Shell::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()));
+        let rustc = rustc.args(["--version", "--verbose"]).output()?;
+        Ok(format!("commit {}\n{rustc}command cargo xtask dist\n", self.commit))
+    }
+}
+
+/// `cargo cyclonedx`, installed if it is missing.
+fn ensure_cyclonedx() -> Result<()> {
+    if Shell::cargo().args(["cyclonedx", "--version"]).ask().is_some() {
+        return Ok(());
+    }
+    eprintln!("cargo-cyclonedx is not installed: building it, once (some minutes)");
+    Shell::cargo().args(["install", "--quiet", "--locked", "cargo-cyclonedx"]).run()
+}
+
+fn git(arguments: &[&str]) -> Result<String> {
+    Ok(Shell::new("git").args(arguments).output()?.trim().to_owned())
+}
+
+fn read(name: &str, path: &Path) -> Result<File> {
+    let data = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    Ok((name.to_owned(), data))
+}
+
+fn write_all(folder: &Path, files: &[File]) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder)?;
+    }
+    fs::create_dir_all(folder)?;
+    for (name, data) in files {
+        fs::write(folder.join(name), data)?;
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        fs::set_permissions(folder.join("hums"), fs::Permissions::from_mode(0o755))?;
+    }
+    Ok(())
+}
+
+/// As `sha256sum` writes it and `sha256sum --check` reads it.
+fn sums(files: &[File]) -> String {
+    files.iter().fold(String::new(), |mut text, (name, data)| {
+        for byte in Sha256::digest(data) {
+            let _ = write!(text, "{byte:02x}");
+        }
+        let _ = writeln!(text, "  {name}");
+        text
+    })
+}
+
+/// The names of what is not the same in both.
+fn differences(one: &[File], other: &[File]) -> Vec<String> {
+    let missing = |from: &[File], file: &File| !from.contains(file);
+    let mut names: Vec<String> =
+        one.iter().filter(|file| missing(other, file)).map(|(name, _)| name.clone()).collect();
+    names.extend(other.iter().filter(|file| missing(one, file)).map(|(name, _)| name.clone()));
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(name: &str, data: &[u8]) -> File {
+        (name.to_owned(), data.to_vec())
+    }
+
+    #[test]
+    fn sums_are_those_of_sha256sum() {
+        // FIPS 180-4's example.
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad  a\n";
+        assert_eq!(sums(&[file("a", b"abc")]), expected);
+    }
+
+    #[test]
+    fn one_byte_or_one_file_more_is_a_difference() {
+        let one = [file("a", b"1"), file("b", b"2")];
+        assert!(differences(&one, &one).is_empty());
+        assert_eq!(differences(&one, &[file("a", b"1"), file("b", b"3")]), ["b"]);
+        assert_eq!(differences(&one, &one[..1]), ["b"]);
+        assert_eq!(differences(&one[..1], &one), ["b"]);
+    }
+
+    #[test]
+    fn nobody_is_given_the_emulator_s_firmware() {
+        assert!(boards().count() > 0 && boards().all(|board| board != Board::Emulated));
+    }
+}
