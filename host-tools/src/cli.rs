@@ -188,8 +188,8 @@ fn provoked(text: &str) -> Result<String, String> {
     };
     one_of(what, &["panic", "bus-fault", "overflow", "spin", "silence", "supply"])?;
     one_of(task, &["reception", "monitor", "downlink", "storage"])?;
-    if what == "silence" && matches!(task, "monitor" | "storage") {
-        return Err(format!("{task} has no place where it could wait for ever: spin"));
+    if what == "silence" && task != "downlink" {
+        return Err(format!("{task} has no place where it could wait for ever: only downlink has; or spin"));
     }
     at_s.parse::<u32>().map_err(|_| format!("{at_s} is no whole number of seconds"))?;
     Ok(text.to_owned())

@@ -6,6 +6,7 @@
 use core::cell::RefCell;
 
 use critical_section::Mutex;
+use hums_core::time::Instant;
 
 use crate::boards::{CYCLE_BITS, board};
 
@@ -50,6 +51,9 @@ impl Stage {
     ];
 }
 
+/// The processor's clock, 168 MHz on every board.
+const CYCLES_A_MICROSECOND: u64 = 168;
+
 struct Meter {
     current: Stage,
     since: u32,
@@ -90,4 +94,35 @@ fn switch_to(stage: Stage) -> Stage {
         }
         before
     })
+}
+
+/// What the processor was busy, second by second.
+pub(crate) struct Load {
+    since: Instant,
+    busy: u64,
+    worst: u16,
+}
+
+impl Load {
+    /// Nothing is known yet.
+    pub(crate) const fn new() -> Self {
+        Self { since: Instant::ZERO, busy: 0, worst: 0 }
+    }
+
+    /// The last second's and the worst second's, in thousandths, once a second has passed since the last answer.
+    pub(crate) fn step(&mut self, now: Instant) -> Option<(u16, u16)> {
+        let micros = now.since(self.since).as_micros();
+        if micros < 1_000_000 {
+            return None;
+        }
+        let idle = Stage::Idle as usize;
+        let counted =
+            totals().iter().enumerate().filter(|(stage, _)| *stage != idle).map(|(_, cycles)| cycles).sum();
+        let busy = board::busy_cycles(counted);
+        let permille = 1_000 * busy.wrapping_sub(self.busy) / (micros * CYCLES_A_MICROSECOND);
+        (self.since, self.busy) = (now, busy);
+        let permille = permille.min(1_000) as u16;
+        self.worst = self.worst.max(permille);
+        Some((permille, self.worst))
+    }
 }

@@ -277,6 +277,16 @@ pub(crate) fn cycles() -> u32 {
     SYSTICK_RELOAD - cortex_m::peripheral::SYST::get_current()
 }
 
+/// Instructions are counted only where that was asked for; then each takes 1.5 cycles.
+pub(crate) fn busy_cycles(counted: u64) -> u64 {
+    if TELL_COSTS.load(Ordering::Relaxed) { instructions(counted) * 3 / 2 } else { 0 }
+}
+
+/// With `-icount shift=3` an instruction takes 8 ns, and `SysTick` counts 168 MHz: 168 / 125 ticks.
+const fn instructions(ticks: u64) -> u64 {
+    ticks * 125 / 168
+}
+
 /// Prints the figures of the run as one line of JSON, and ends the emulator.
 pub(crate) fn done(report: &Report) {
     let Report { stats, frames_left, costs, stack: (stack_used, stack_all) } = report;
@@ -308,8 +318,6 @@ struct Costs<'a>(&'a [u64]);
 
 impl core::fmt::Display for Costs<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        /// With `-icount shift=3` an instruction takes 8 ns, and `SysTick` counts 168 MHz: 168 / 125 ticks.
-        const TICKS: (u64, u64) = (168, 125);
         if !TELL_COSTS.load(Ordering::Relaxed) {
             return Ok(());
         }
@@ -318,7 +326,7 @@ impl core::fmt::Display for Costs<'_> {
         let busy = Stage::NAMES.iter().zip(self.0).filter(|((stage, _), _)| *stage != Stage::Idle);
         for (index, ((_, name), ticks)) in busy.enumerate() {
             let comma = if index == 0 { "" } else { "," };
-            write!(f, "{comma}\"{name}\":{}", ticks * TICKS.1 / TICKS.0)?;
+            write!(f, "{comma}\"{name}\":{}", instructions(*ticks))?;
         }
         f.write_str("},\"stack_by_urgency\":{")?;
         for (index, (name, bytes)) in depth::all().enumerate() {

@@ -14,6 +14,7 @@
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |
 //! | `ended()` | waits for the end of the input; for ever on a board that flies |
 //! | `cycles()` | a free running counter of [`CYCLE_BITS`] bits, for measuring |
+//! | `busy_cycles()` | what `cycles()` counted while tasks ran, in the processor's cycles; 0 where it counts something else |
 //! | `done(&Report)` | the log is closed after `ended()` |
 //! | `LATE_TURNS`, `TIME_STOPS_WITH_TASKS` | when the watchdog counts as late (`watch`) |
 //! | `bites_soon()` | the watchdog was not fed, and is about to bite: where it is not a device of its own, it does so now |

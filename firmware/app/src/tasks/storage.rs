@@ -2,7 +2,7 @@
 //! nobody but idle.
 
 use embassy_time::{Duration, Timer, with_timeout};
-use hums_core::time::Span;
+use hums_core::time::{Instant, Span};
 use hums_onboard::persist::Kept;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
@@ -48,7 +48,7 @@ pub(crate) async fn run(
     loop {
         SUPERVISOR.report(Task::Storage, now());
         let begun = now();
-        let service = measure(Stage::Storage, || body.service(begun, &mut sectors));
+        let service = service(body, begun, &mut sectors);
         CARD_STATUS.end_service(now().since(begun).as_millis() as u32);
         keep(keeper);
         if ended_at.is_none() && links::RECORD_ENDED.signaled() {
@@ -58,15 +58,14 @@ pub(crate) async fn run(
             Service::Wrote => {}
             Service::Idle if !sectors.is_empty() => {}
             Service::Idle if ended_at.is_some() => break,
-            Service::Idle if measure(Stage::Storage, || body.serve(&mut shelf)) => {}
+            Service::Idle if serve(body, &mut shelf) => {}
             Service::Idle => wait_for_work(&sectors, &shelf, keeper).await,
             Service::NoCard if ended_at.is_some_and(|at| now().since(at) > CARD_PATIENCE) => break,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
     }
     while keep(keeper) == Kept::Took {}
-    body.finish();
-    links::LOG_CLOSED.signal(body.abandon(&mut sectors));
+    links::LOG_CLOSED.signal(finish(body, &mut sectors));
     loop {
         core::future::pending::<()>().await;
     }
@@ -88,7 +87,27 @@ async fn wait_for_work(
     }
 }
 
+// None of these within the task: what one of them takes of the stack is not to lie below what another takes.
+
+#[inline(never)]
+fn service(body: &mut Body, begun: Instant, sectors: &mut SectorsOut<'static>) -> Service {
+    measure(Stage::Storage, || body.service(begun, sectors))
+}
+
+#[inline(never)]
+fn serve(body: &mut Body, shelf: &mut Server<'static>) -> bool {
+    measure(Stage::Storage, || body.serve(shelf))
+}
+
+/// Closes the log; how many frames found no card.
+#[inline(never)]
+fn finish(body: &mut Body, sectors: &mut SectorsOut<'static>) -> u64 {
+    body.finish();
+    body.abandon(sectors)
+}
+
 /// Saves one item, if there is one.
+#[inline(never)]
 fn keep(keeper: &mut Keeper<'static, board::StoreFlash>) -> Kept {
     let kept = measure(Stage::Storage, || keeper.service(links::ENDING.signaled()));
     if kept == Kept::Took {

@@ -1,6 +1,6 @@
 //! The monitor task's body: frames from the queue into the record, the checks and the summary stream.
 //!
-//! Less urgent than reception, whose frames wait up to 40 ms for it; more urgent than anything that waits for a device.
+//! Less urgent than reception, whose frames wait up to 16 ms for it; more urgent than anything that waits for a device.
 //! One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] every 50 ms does
 //! what time alone asks for.
 
@@ -30,6 +30,7 @@ use crate::queues::{FramesOut, GsIn, SectorsIn};
 use crate::supervisor::Task;
 pub use happenings::By;
 
+pub use figures::Machine;
 use figures::Sums;
 use happenings::CRITICAL;
 use notices::{Notice, Notices};
@@ -88,6 +89,7 @@ pub struct Monitoring<'a> {
     port_before: PortReading,
     card_before: CardReading,
     sums: Sums,
+    machine: Machine,
     /// Frames that found no room in the sector queue.
     refused: u64,
     queue_sectors_max: usize,
@@ -123,6 +125,7 @@ impl<'a> Monitoring<'a> {
             port_before: PortReading::default(),
             card_before: card.read(),
             sums: Sums::default(),
+            machine: Machine::default(),
             refused: 0,
             queue_sectors_max: 0,
             partial_at: Instant::ZERO,
@@ -222,13 +225,19 @@ impl<'a> Monitoring<'a> {
             self.pass_down(at, &frame, gs);
             return;
         }
-        self.sequences.frame(at, &frame);
-        if let Some((source, observation)) = hums_link::observe(&frame) {
-            self.monitor.observe(at, source, &observation);
-        }
+        self.observe(at, &frame);
         self.heard(at, &frame, sectors, gs);
         begin(Step::Summary);
         self.summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
+    }
+
+    /// Not within its caller: an observation is not to lie on the stack below a conversation.
+    #[inline(never)]
+    fn observe(&mut self, at: Instant, frame: &Frame<'_>) {
+        self.sequences.frame(at, frame);
+        if let Some((source, observation)) = hums_link::observe(frame) {
+            self.monitor.observe(at, source, &observation);
+        }
     }
 
     /// What time alone asks for, every [`TICK`]. Each finding is recorded, told to the GS, and given to `findings`.
@@ -252,14 +261,14 @@ impl<'a> Monitoring<'a> {
         self.losses_to_record(now, false, sectors);
         if now.since(self.stats_at) >= STATS {
             self.stats_at = now;
-            let stats = Record::Stats(self.stats(gs));
-            self.record(now, &stats, sectors);
+            self.record_stats(now, sectors, gs);
         }
         if now.since(self.usage_at) >= USAGE {
             self.record_usage(now, Moment::Periodic, sectors);
         }
         self.partial(now, sectors);
         self.tell_notices(now, gs);
+        self.summary.own = self.own_figures();
         self.summary.tick(now, self.monitor, &mut |bytes| gs.tell(bytes));
         self.converse(now, sectors, gs);
     }
@@ -270,8 +279,7 @@ impl<'a> Monitoring<'a> {
         self.count_losses(now, sectors);
         self.losses_to_record(now, true, sectors);
         self.record_usage(now, Moment::End, sectors);
-        let stats = Record::Stats(self.stats(gs));
-        self.record(now, &stats, sectors);
+        self.record_stats(now, sectors, gs);
         sectors.with_reserve(|sink| self.writer.finish(sink));
     }
 
@@ -285,6 +293,9 @@ impl<'a> Monitoring<'a> {
         self.monitor
     }
 
+    // Not within the tick: what one of these takes of the stack is not to lie below what another takes.
+
+    #[inline(never)]
     fn check(
         &mut self,
         now: Instant,
@@ -307,6 +318,7 @@ impl<'a> Monitoring<'a> {
         });
     }
 
+    #[inline(never)]
     fn losses_to_record(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
         let Self { losses, writer, .. } = self;
         losses.flush(now, all, |loss| {
@@ -319,7 +331,14 @@ impl<'a> Monitoring<'a> {
         write(now, record, self.writer, &mut self.losses, sectors)
     }
 
+    #[inline(never)]
+    fn record_stats(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &GsIn) {
+        let stats = Record::Stats(self.stats(gs));
+        self.record(now, &stats, sectors);
+    }
+
     /// Gives storage a copy of the sector in progress, unless full sectors keep it busy anyway.
+    #[inline(never)]
     fn partial(&mut self, now: Instant, sectors: &mut SectorsIn) {
         if now.since(self.partial_at) < PARTIAL || !sectors.is_empty() {
             return;

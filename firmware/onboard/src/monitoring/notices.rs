@@ -56,6 +56,7 @@ impl Monitoring<'_> {
     }
 
     /// Tells what waits, as far as the budget allows.
+    #[inline(never)]
     pub(super) fn tell_notices(&mut self, now: Instant, gs: &mut GsIn) {
         let Self { notices, summary, monitor, .. } = self;
         while let Some(notice) = notices.first() {

@@ -7,7 +7,7 @@
 //! | `bus-fault` | reads where there is no memory |
 //! | `overflow` | calls itself until the stack is full |
 //! | `spin` | never comes back |
-//! | `silence` | waits for ever; `monitor` and `storage`, which cannot, go on |
+//! | `silence` | waits for ever; only the downlink waits for something that nothing ends |
 //! | `supply` | is interrupted by a supply that is too low |
 //!
 //! `TASK` is `reception`, `monitor`, `downlink` or `storage`.
