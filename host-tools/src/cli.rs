@@ -63,6 +63,8 @@ pub enum Command {
     Params(Params),
     /// Download the board's logs over MAVLink
     Pull(Pull),
+    /// Have the board format a card that it cannot record on
+    Format(FormatCard),
     /// Show it: a recorded flight is recorded, decoded and summed up, and played on the dashboard
     Demo(Demo),
 }
@@ -177,6 +179,22 @@ const EMULATE_EXAMPLES: &str = "Examples:
 
 Needs qemu-system-arm 8.0 or later. Inside the source tree a missing firmware image is built first.";
 
+/// What the firmware understands of `--provoke`.
+fn provoked(text: &str) -> Result<String, String> {
+    let (what, at_s) = text.split_once('@').unwrap_or((text, "0"));
+    let (what, task) = what.split_once(':').unwrap_or((what, "downlink"));
+    let one_of = |word: &str, known: &[&str]| {
+        known.contains(&word).then_some(()).ok_or(format!("{word} is none of {}", known.join(", ")))
+    };
+    one_of(what, &["panic", "bus-fault", "overflow", "spin", "silence", "supply"])?;
+    one_of(task, &["reception", "monitor", "downlink", "storage"])?;
+    if what == "silence" && task != "downlink" {
+        return Err(format!("{task} has no place where it could wait for ever: only downlink has; or spin"));
+    }
+    at_s.parse::<u32>().map_err(|_| format!("{at_s} is no whole number of seconds"))?;
+    Ok(text.to_owned())
+}
+
 /// `hums emulate`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = EMULATE_EXAMPLES)]
@@ -187,8 +205,9 @@ pub struct Emulate {
     /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
     #[arg(long, value_name = "ELF")]
     pub firmware: Option<PathBuf>,
-    /// What is to go wrong in the firmware itself, when it first sends to the ground station
-    #[arg(long, value_name = "WHAT", value_parser = ["panic", "bus-fault", "silence"])]
+    /// What is to go wrong, once, in the firmware itself: panic, bus-fault, overflow (of the stack), spin, silence or
+    /// supply; in reception, monitor, downlink (the default) or storage; from some second on (0)
+    #[arg(long, value_name = "WHAT[:TASK][@SECONDS]", value_parser = provoked)]
     pub provoke: Option<String>,
     /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
     #[arg(long)]
@@ -476,6 +495,24 @@ pub struct Pull {
     /// Only the newest so many
     #[arg(long, value_name = "N")]
     pub last: Option<usize>,
+}
+
+const FORMAT_EXAMPLES: &str = "Examples:
+  hums format --yes --link serial:/dev/ttyUSB0:57600
+
+Only a card that the board cannot use as it is (exFAT, no partition table, another file system, a damaged one), and
+only while the vehicle is disarmed.";
+
+/// `hums format`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = FORMAT_EXAMPLES)]
+pub struct FormatCard {
+    /// Where the board is.
+    #[command(flatten)]
+    pub at: Link,
+    /// Everything on the card may be lost
+    #[arg(long)]
+    pub yes: bool,
 }
 
 const DEMO_EXAMPLES: &str = "Examples:

@@ -24,7 +24,7 @@ const SMALLER_THAN_XZ_MIN: f64 = 2.3;
 /// The processor's clock, Hz.
 const CLOCK_HZ: f64 = 168e6;
 /// Bytes of MAVLink a second at 921,600 baud.
-const BYTES_PER_S: f64 = 92_160.0;
+pub(crate) const BYTES_PER_S: f64 = 92_160.0;
 /// Cycles that an instruction takes: the emulator counts instructions only.
 const CYCLES_PER_INSTRUCTION: f64 = 1.5;
 /// What the encoder may take of the processor.
@@ -266,22 +266,9 @@ fn median(values: &mut [f64]) -> f64 {
 fn cost(flights: &[PathBuf]) -> Result<()> {
     println!("\nInstructions on a Cortex-M4 at {BAUD} baud, by stage\n");
     setup::ensure(&[Need::FirmwareTarget, Need::Qemu], false).require_all()?;
-    let image = firmware::build(Board::Emulated)?;
-    build_hums()?;
-    let (card, input) = (work_folder()?.join("card.img"), work_folder()?.join("long.tlog"));
     let (mut dearest, mut all) = (("none".to_owned(), 0.0), (0.0, 0.0));
     for flight in unsigned(flights) {
-        let _ = fs::remove_file(&card);
-        repeat(flight, SECONDS_MIN * BYTES_PER_S, &input)?;
-        let (json, _) = Shell::new(repo::hums())
-            .args(["emulate", "--json", "--costs", "--firmware"])
-            .arg(&image)
-            .arg("--input")
-            .arg(&input)
-            .args(["--line-rate", BAUD, "--sd"])
-            .arg(&card)
-            .output_and_code()?;
-        let report: Value = serde_json::from_str(&json).context("the report of hums emulate")?;
+        let report = record_at_full_rate(flight)?;
         let (encoding, bytes) = print_costs(&name(flight), &report)?;
         all = (all.0 + encoding, all.1 + bytes);
         if encoding / bytes > dearest.1 {
@@ -307,6 +294,24 @@ fn cost(flights: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
+/// Runs a recording through the firmware in the emulator, which counts, back to back at the fastest line: its report.
+pub(crate) fn record_at_full_rate(flight: &Path) -> Result<Value> {
+    let image = firmware::build(Board::Emulated)?;
+    build_hums()?;
+    let (card, input) = (work_folder()?.join("card.img"), work_folder()?.join("long.tlog"));
+    let _ = fs::remove_file(&card);
+    repeat(flight, SECONDS_MIN * BYTES_PER_S, &input)?;
+    let (json, _) = Shell::new(repo::hums())
+        .args(["emulate", "--json", "--costs", "--firmware"])
+        .arg(&image)
+        .arg("--input")
+        .arg(&input)
+        .args(["--line-rate", BAUD, "--sd"])
+        .arg(&card)
+        .output_and_code()?;
+    serde_json::from_str(&json).context("the report of hums emulate")
+}
+
 /// One recording's stages; gives the instructions that encoding took, and the bytes.
 fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
     let number = |key: &str| report[key].as_f64().filter(|&number| number > 0.0);
@@ -324,6 +329,14 @@ fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
             load(count / bytes) * 100.0
         );
     }
+    let all: f64 = stages.values().filter_map(Value::as_f64).sum();
+    println!(
+        "  {:10} {:8.1} a byte {:9.0} a frame {:7.2} % of the processor",
+        "all",
+        all / bytes,
+        all / frames,
+        load(all / bytes) * 100.0
+    );
     if let (Some(powered_s), Some(steps)) =
         (report["usage"]["powered_time_s"].as_f64(), stages.get("tick").and_then(Value::as_f64))
     {
@@ -339,7 +352,7 @@ fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
 }
 
 /// The part of the processor that so many instructions a byte take on the fastest line.
-fn load(instructions_per_byte: f64) -> f64 {
+pub(crate) fn load(instructions_per_byte: f64) -> f64 {
     instructions_per_byte * BYTES_PER_S * CYCLES_PER_INSTRUCTION / CLOCK_HZ
 }
 

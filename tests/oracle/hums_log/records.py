@@ -17,7 +17,9 @@ SOURCES = ["unknown", "SYSTEM_TIME", "recording", "GNSS"]
 FAULTS = ["unknown", "panic", "hard_fault", "watchdog"]
 STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_not_frames", "bytes_logged",
               "blocks_written", "queue_bytes_max", "queue_bytes_capacity", "sd_stall_ms_max", "gs_frames",
-              "gs_bytes"]
+              "gs_bytes", "frame_queue_bytes_max", "frame_queue_bytes_capacity", "gs_queue_bytes_max",
+              "gs_queue_bytes_capacity", "cpu_permille", "cpu_permille_max", "stack_bytes_max",
+              "stack_bytes_capacity"]
 # Fields with their types: those of the module struct, `text`, `time` (in seconds), so many bytes (negative: of words),
 # or a list of names.
 RECORDS = {

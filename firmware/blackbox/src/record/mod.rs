@@ -222,6 +222,7 @@ mod tests {
         reads_back(Record::Usage(Usage::new(Moment::End, &entries)));
         reads_back(Record::Loss(Loss { what: Lost::QueueFull, count: 3, from: Instant::ZERO, to: at }));
         reads_back(Record::Stats(Stats { frames_in: 1, gs_bytes: 12, ..Stats::default() }));
+        reads_back(Record::Stats(Stats { frames_in: 1, cpu_permille: 20, ..Stats::default() }));
         let registers = core::array::from_fn(|index| index as u32);
         reads_back(Record::Fault(Fault {
             kind: 1,

@@ -16,6 +16,7 @@ pub(super) const CRITICAL: u8 = 8;
 pub type By = (u8, u8);
 
 impl Monitoring<'_> {
+    #[inline(never)]
     pub(super) fn record_happenings(&mut self, now: Instant, sectors: &mut SectorsIn) {
         while let Some(happening) = self.monitor.take_happening() {
             let (number, text) = match happening {

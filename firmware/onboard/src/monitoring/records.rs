@@ -13,10 +13,14 @@ use crate::queues::SectorsIn;
 /// A UTC that differs more than this from the one that is recorded is recorded anew.
 const CLOCK_STEP_MICROS: u64 = 1_000_000;
 
-/// Counters on their way into records: whenever a record's worth is together it is written.
-struct Counters<const N: usize>(heapless::Vec<(u8, f32), N>);
+/// Counters of a record: fewer than there may be, as they gather on the stack, at 24 bytes each.
+const GATHERED: usize = 16;
+const _: () = assert!(GATHERED <= USAGE_ENTRIES_MAX && GATHERED <= LIFETIME_ENTRIES_MAX);
 
-impl<const N: usize> Counters<N> {
+/// Counters on their way into records: whenever a record's worth is together it is written.
+struct Counters(heapless::Vec<(u8, f32), GATHERED>);
+
+impl Counters {
     const fn new() -> Self {
         Self(heapless::Vec::new())
     }
@@ -38,6 +42,7 @@ impl<const N: usize> Counters<N> {
 }
 
 impl Monitoring<'_> {
+    #[inline(never)]
     pub(super) fn record_vehicle(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let vehicle = self.monitor.vehicle();
         let (Some(source), Some(heartbeat)) = (vehicle.source, vehicle.heartbeat.get()) else { return };
@@ -87,9 +92,11 @@ impl Monitoring<'_> {
         self.record_exceedances(now, moment, since, sectors);
     }
 
+    // Never within its caller: what each takes of the stack is not taken by all.
+    #[inline(never)]
     fn record_session(&mut self, now: Instant, moment: Moment, sectors: &mut SectorsIn) {
         let Self { monitor, writer, losses, .. } = self;
-        let mut counters = Counters::<USAGE_ENTRIES_MAX>::new();
+        let mut counters = Counters::new();
         let mut put = |part: &[_]| {
             super::write(now, &Record::Usage(Usage::new(moment, part)), writer, losses, sectors);
         };
@@ -97,10 +104,11 @@ impl Monitoring<'_> {
         counters.flush(put);
     }
 
+    #[inline(never)]
     fn record_life(&mut self, now: Instant, moment: Moment, sectors: &mut SectorsIn) {
         let Self { monitor, writer, losses, .. } = self;
         let life = monitor.lifetime();
-        let mut counters = Counters::<LIFETIME_ENTRIES_MAX>::new();
+        let mut counters = Counters::new();
         let mut put = |part: &[_]| {
             let record = Record::Lifetime(Lifetime::new(moment, &life, part));
             super::write(now, &record, writer, losses, sectors);
@@ -110,6 +118,7 @@ impl Monitoring<'_> {
     }
 
     /// At the start what was exceeded in the airframe's life; later what was in this session, and has changed.
+    #[inline(never)]
     fn record_exceedances(&mut self, now: Instant, moment: Moment, since: Instant, sectors: &mut SectorsIn) {
         let Self { monitor, writer, losses, .. } = self;
         for exceedance in monitor.exceedances().changed(now, since) {
@@ -120,6 +129,7 @@ impl Monitoring<'_> {
         }
     }
 
+    #[inline(never)]
     pub(super) fn record_component(&mut self, now: Instant, place: usize, why: Why, sectors: &mut SectorsIn) {
         let Some((figures, status)) = self.monitor.component_figures(place) else { return };
         let used_percent = self.monitor.component_used_percent(place);
