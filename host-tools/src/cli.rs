@@ -63,6 +63,8 @@ pub enum Command {
     Params(Params),
     /// Download the board's logs over MAVLink
     Pull(Pull),
+    /// Have the board format a card that it cannot record on
+    Format(FormatCard),
     /// Show it: a recorded flight is recorded, decoded and summed up, and played on the dashboard
     Demo(Demo),
 }
@@ -493,6 +495,24 @@ pub struct Pull {
     /// Only the newest so many
     #[arg(long, value_name = "N")]
     pub last: Option<usize>,
+}
+
+const FORMAT_EXAMPLES: &str = "Examples:
+  hums format --yes --link serial:/dev/ttyUSB0:57600
+
+Only a card that the board cannot use as it is (exFAT, no partition table, another file system, a damaged one), and
+only while the vehicle is disarmed.";
+
+/// `hums format`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = FORMAT_EXAMPLES)]
+pub struct FormatCard {
+    /// Where the board is.
+    #[command(flatten)]
+    pub at: Link,
+    /// Everything on the card may be lost
+    #[arg(long)]
+    pub yes: bool,
 }
 
 const DEMO_EXAMPLES: &str = "Examples:

@@ -57,5 +57,6 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Demo(args) => demo::run(args),
         Command::Params(args) => talk::params::run(args),
         Command::Pull(args) => talk::pull::run(args),
+        Command::Format(args) => talk::format::run(args),
     }
 }

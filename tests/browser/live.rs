@@ -214,6 +214,8 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
         let live = Live::start(&[&["--input", input][..], flags].concat());
         page.open(&live.address, "light", 1440, 900);
         page.wait("return document.documentElement.dataset.ready === 'true'", 60);
+        page.press(&[" "]);
+        page.wait("return document.getElementById('source').textContent === 'paused'", 20);
         let early = {
             seek(&mut page, 10.0);
             part(&mut page)

@@ -416,3 +416,26 @@ fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
     let refused = hums(["params", "set", "BAT_REM_WARN", "1000", "--link", &address]).expect_code(&[1]);
     assert!(refused.stderr.contains("keeps 21.5"), "{}", refused.stderr);
 }
+
+#[test]
+fn a_card_from_the_shop_is_formatted_by_command_and_one_with_logs_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let image = dir.path().join("card.img");
+    // One partition of the type of exFAT, on a card of an odd size.
+    let mut card = vec![0; 70_001 * 512];
+    card[446..462].copy_from_slice(&[0, 0, 2, 0, 7, 0xFE, 0xFF, 0xFF, 0, 8, 0, 0, 0x71, 9, 1, 0]);
+    card[510..512].copy_from_slice(&[0x55, 0xAA]);
+    fs::write(&image, &card).unwrap();
+    let board = Board::start_in(dir, &[]);
+    let address = format!("udpout:127.0.0.1:{}", board.port);
+    let format =
+        |flags: &[&str]| hums(["format", "--link", &address].into_iter().chain(flags.iter().copied()));
+    assert!(format(&[]).expect_code(&[2]).stderr.contains("will be lost"));
+    assert_eq!(fs::read(&image).unwrap(), card, "nobody said --yes");
+    let done = format(&["--yes"]).expect_code(&[0]).text();
+    assert_eq!(done, "formatted, and recorded on\n");
+    let again = format(&["--yes"]).expect_code(&[1]);
+    assert!(again.stderr.contains("is not formatted over a link"), "{}", again.stderr);
+    let log = board.end();
+    assert!(log.contains("card is formatted by 255/190"), "the record says who did it");
+}

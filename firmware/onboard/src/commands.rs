@@ -125,7 +125,9 @@ impl Monitoring<'_> {
                 self.card.want_format();
                 ACCEPTED
             }
-            CardState::Recording | CardState::Finished | CardState::Full | CardState::Formatting => DENIED,
+            // It was asked for already, and the answer was lost.
+            CardState::Formatting => ACCEPTED,
+            CardState::Recording | CardState::Finished | CardState::Full => DENIED,
             _ => FAILED,
         }
     }

@@ -6,6 +6,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use hums_core::time::{Instant, Span};
+use hums_recorder::spi::SERVICE_MAX;
 
 /// The tasks that must report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +35,8 @@ impl Task {
         }
     }
 
-    /// How long it may be silent. The short ones have nothing to wait for; a card may take 500 ms for a block and is
-    /// tried three times, twice over, and the ground station's port 70 ms for its longest frame at 38,400 baud.
+    /// How long it may be silent. The short ones have nothing to wait for but the ground station's port, 70 ms for its
+    /// longest frame at 38,400 baud; storage waits for its card, and that has an end ([`SERVICE_MAX`]).
     pub const fn silence_max(self) -> Span {
         match self {
             Self::Reception | Self::Monitor | Self::Downlink => Span::from_secs(1),
@@ -43,6 +44,9 @@ impl Task {
         }
     }
 }
+
+// A second for what is no waiting.
+const _: () = assert!(Task::Storage.silence_max().as_millis() > SERVICE_MAX.as_millis() + 1_000);
 
 /// When each task last reported in. One static, shared by all tasks.
 #[derive(Debug, Default)]

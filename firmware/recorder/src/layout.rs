@@ -81,7 +81,7 @@ impl Layout {
         let mut block = [Block::new()];
         device.read(&mut block, BlockIdx(0)).map_err(LayoutError::Device)?;
         let (start, blocks) = partition(&block[0])?;
-        if start == 0 || start >= card_blocks {
+        if start >= card_blocks {
             return Err(LayoutError::BadVolume("the partition begins outside the card"));
         }
         device.read(&mut block, BlockIdx(start)).map_err(LayoutError::Device)?;
@@ -155,8 +155,10 @@ impl Layout {
 fn partition<E>(mbr: &Block) -> Result<(u32, u32), LayoutError<E>> {
     let entry = &mbr[446..462];
     let word = |at: usize| u32::from_le_bytes([entry[at], entry[at + 1], entry[at + 2], entry[at + 3]]);
-    // A volume without a partition table begins with a jump instruction and carries the same signature.
-    if mbr[510..512] != [0x55, 0xAA] || entry[0] & 0x7F != 0 || entry[4] == 0 {
+    // A volume without a partition table begins with a jump instruction and carries the same signature; `mkfs.vfat`
+    // gives it a table as well, whose partition begins with the table itself.
+    let is_table = mbr[510..512] == [0x55, 0xAA] && entry[0] & 0x7F == 0 && entry[4] != 0 && word(8) != 0;
+    if !is_table {
         return Err(LayoutError::NoPartitionTable);
     }
     if !FAT32_TYPES.contains(&entry[4]) {

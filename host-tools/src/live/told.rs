@@ -62,6 +62,8 @@ pub enum Told {
         name: String,
         /// Its value.
         value: f32,
+        /// It is part of the table as it stood at the session's start.
+        start: bool,
     },
     /// A part that wears, with all that it has run.
     Part {
@@ -77,7 +79,8 @@ impl Told {
     pub fn of(record: &Record<'_>) -> Option<Self> {
         match record {
             Record::Parameter(parameter) => {
-                Some(Self::Parameter { name: parameter.name.to_owned(), value: parameter.value as f32 })
+                let (value, start) = (parameter.value as f32, !parameter.changed);
+                Some(Self::Parameter { name: parameter.name.to_owned(), value, start })
             }
             // Of a part that was replaced the figures are those of the old one.
             Record::Component(recorded) => {
@@ -97,6 +100,11 @@ impl Told {
             _ => None,
         }
     }
+}
+
+/// The place of the part that this parameter describes, from 0: of `CMP1_KIND` 0.
+pub fn place_of(name: &str) -> Option<usize> {
+    name.strip_prefix("CMP")?.strip_suffix("_KIND")?.parse::<usize>().ok()?.checked_sub(1)
 }
 
 /// A parameter that the box on board tells a ground station, and its value.

@@ -11,7 +11,7 @@ use hums_link::{Check, Frame, observe};
 
 use super::craft::Craft;
 use super::history::History;
-use super::told::{Limits, Told, parameter};
+use super::told::{Limits, Told, parameter, place_of};
 
 /// Vehicles that are told apart; later ones are counted.
 pub const VEHICLES_MAX: usize = 8;
@@ -19,6 +19,9 @@ pub const VEHICLES_MAX: usize = 8;
 const SILENCE_MAX: Span = Span::from_secs(600);
 /// What a check's debounce and age need at its beginning.
 const SILENCE_HEAD: Span = Span::from_secs(60);
+
+/// A session's start, which is recorded at once.
+const BEGINNING: Instant = Instant::from_millis(10_000);
 
 /// Histories by system id.
 pub type Histories = BTreeMap<u8, History>;
@@ -115,20 +118,28 @@ impl World {
     pub fn told(&mut self, at: Instant, told: &Told, histories: Option<&mut Histories>) {
         self.advance(at, histories);
         match told {
-            Told::Parameter { name, value } => {
+            Told::Parameter { name, value, start } => {
                 self.limits.learn(name, *value);
+                // Each file of a log repeats the table. At the session's start it stands before the parts, each with
+                // what it ran before: one that is not told has run nothing.
+                let new = |place: &usize| matches!(self.parts.get(*place), Some(None));
+                if let Some(place) = place_of(name).filter(|_| *start && at < BEGINNING).filter(new) {
+                    self.part(place, Component::NONE);
+                }
                 for craft in self.crafts.values_mut() {
                     self.limits.take(craft.monitor.params_mut(), name, *value);
                 }
             }
-            Told::Part { place, component } => {
-                if let Some(part) = self.parts.get_mut(*place) {
-                    *part = Some(*component);
-                }
-                if let Some(craft) = self.owner.and_then(|owner| self.crafts.get_mut(&owner)) {
-                    craft.learn_part(*place, *component);
-                }
-            }
+            Told::Part { place, component } => self.part(*place, *component),
+        }
+    }
+
+    fn part(&mut self, place: usize, component: Component) {
+        if let Some(part) = self.parts.get_mut(place) {
+            *part = Some(component);
+        }
+        if let Some(craft) = self.owner.and_then(|owner| self.crafts.get_mut(&owner)) {
+            craft.learn_part(place, component);
         }
     }
 
@@ -209,7 +220,7 @@ mod tests {
     /// A motor's limit of ten hours, as a log's parameters have it.
     fn tell_limits(world: &mut World) {
         for (name, value) in [("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 10.0)] {
-            let told = Told::Parameter { name: name.to_owned(), value };
+            let told = Told::Parameter { name: name.to_owned(), value, start: true };
             world.told(Instant::from_millis(1), &told, None);
         }
     }
@@ -239,8 +250,24 @@ mod tests {
             let (figures, status) = craft.monitor.component_figures(0).expect("a part");
             assert_eq!((figures.motor_s, status), (9.5 * 3_600.0, Status::Yellow), "before: {before}");
             assert_eq!(craft.monitor.component_used_percent(0), Some(95.0));
-            assert!(craft.knows_life(0) && !craft.knows_life(1));
+            assert!(craft.knows_life(0) && !craft.knows_life(1), "before: {before}");
         }
+    }
+
+    #[test]
+    fn a_part_that_a_logs_start_describes_and_that_ran_nothing_begins_with_the_session() {
+        let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
+        tell_limits(&mut world);
+        hear(&mut world, &mut histories, Instant::from_millis(10), &heartbeat(1));
+        world.advance(Instant::from_millis(3_000), Some(&mut histories));
+        assert!(world.crafts[&1].knows_life(0));
+        assert_eq!(world.crafts[&1].monitor.component_used_percent(0), Some(0.0));
+
+        // A later file of the log repeats the table; the part stays as it is.
+        world.told(Instant::from_millis(3_500), &motor(), None);
+        tell_limits(&mut world);
+        world.advance(Instant::from_millis(4_000), Some(&mut histories));
+        assert_eq!(world.crafts[&1].monitor.component_used_percent(0), Some(95.0));
     }
 
     #[test]

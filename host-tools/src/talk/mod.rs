@@ -1,5 +1,6 @@
-//! Talking with a board as a ground station does: `hums params` and `hums pull`.
+//! Talking with a board as a ground station does: `hums params`, `hums pull` and `hums format`.
 
+pub mod format;
 pub mod params;
 pub mod pull;
 

@@ -42,6 +42,13 @@ fn without_partitions() -> Medium {
     medium
 }
 
+/// As `mkfs.vfat` makes it of a whole disk.
+fn partition_of_everything() -> Medium {
+    let medium = without_partitions();
+    medium.patch(0, 446, &[0x80, 0, 1, 0, 0x0C, 0xFE, 0xFF, 0xFF, 0, 0, 0, 0, 0, 0, 4, 0]);
+    medium
+}
+
 fn linux() -> Medium {
     let medium = Medium::new(128 * MIB);
     // The superblock's magic.
@@ -84,6 +91,12 @@ fn all() -> Vec<(&'static str, Medium, CardState, &'static str)> {
         ("GPT", partitioned(0xEE), CardState::Foreign, "not FAT32, format it"),
         ("Linux", partitioned(0x83), CardState::Foreign, "not FAT32, format it"),
         ("FAT32 without partitions", without_partitions(), CardState::Unpartitioned, "no partition table"),
+        (
+            "FAT32 in a partition of everything",
+            partition_of_everything(),
+            CardState::Unpartitioned,
+            "no partition table",
+        ),
         ("ext4 without partitions", linux(), CardState::Unpartitioned, "no partition table"),
         ("empty", Medium::new(128 * MIB), CardState::Unpartitioned, "no partition table"),
         ("garbage", garbage(), CardState::Unpartitioned, "no partition table"),

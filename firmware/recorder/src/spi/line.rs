@@ -174,7 +174,7 @@ impl<P: Port> Line<P> {
 
     /// Ends a write of many blocks that did not (7.2.4).
     pub(super) fn abort(&mut self) -> Result<(), SpiError> {
-        self.command_now(STOP_TRANSMISSION, 0)?;
+        self.command(STOP_TRANSMISSION, 0)?;
         self.ready(BUSY_MAX)
     }
 

@@ -41,7 +41,7 @@ export const usage = () => {
     return { name, format, number, node: el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, number, unit ? ` ${unit}` : "")) };
   });
   const due = el("ul", { class: "due" });
-  const none = el("p", { class: "dim small" }, "No part is described: a log tells its own, a box on the link when it is asked for its parameters, or --params with CMP1_KIND and so on.");
+  const none = el("p", { class: "dim small" }, "No part is described. A log tells its own, a box on the link does when it is asked for its parameters, or a file does: ", el("span", { class: "word" }, "--params"), ".");
   const box = panel("usage", "Usage of this session", [el("dl", { class: "facts two" }, rows.map((row) => row.node)), el("h4", {}, "Due"), due, none]);
   let parts = [];
   return {
