@@ -64,7 +64,7 @@ pub enum Command {
     /// Download the board's logs over MAVLink
     Pull(Pull),
     /// Have the board format a card that it cannot record on
-    Format(Format),
+    Format(FormatCard),
     /// Show it: a recorded flight is recorded, decoded and summed up
     Demo(Demo),
 }
@@ -486,7 +486,7 @@ only while the vehicle is disarmed.";
 /// `hums format`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = FORMAT_EXAMPLES)]
-pub struct Format {
+pub struct FormatCard {
     /// Where the board is.
     #[command(flatten)]
     pub at: Link,

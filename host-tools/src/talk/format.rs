@@ -20,7 +20,7 @@ const TRIES: usize = 8;
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Runs `hums format`.
-pub fn run(args: &cli::Format) -> Result<Outcome> {
+pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     if !args.yes {
         return Err(usage("everything on the board's card will be lost; say --yes if that is meant"));
     }
