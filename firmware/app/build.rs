@@ -1,12 +1,11 @@
 //! Gives the linker the memory map and its scripts, and the program its commit. Only for the bare-metal target: a host
 //! build of the workspace must not see them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
 fn main() {
-    println!("cargo::rerun-if-changed=../../memory.x");
     println!("cargo::rustc-env=HUMS_GIT={}", commit());
     println!("cargo::rerun-if-env-changed=DEFMT_LOG");
     if env::var_os("DEFMT_LOG").is_none() {
@@ -17,11 +16,19 @@ fn main() {
         return;
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    fs::copy("../../memory.x", out.join("memory.x")).expect("memory.x is at the root of the workspace");
+    copy("../../memory.x", &out.join("memory.x"));
+    // QEMU has the real board's memories.
+    let board = if env::var_os("CARGO_FEATURE_BOARD_F429").is_some() { "f429" } else { "f405" };
+    copy(&format!("src/boards/{board}.x"), &out.join("board.x"));
     println!("cargo::rustc-link-search={}", out.display());
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
+}
+
+fn copy(from: &str, to: &Path) {
+    println!("cargo::rerun-if-changed={from}");
+    fs::copy(from, to).expect("the linker script is in the source tree");
 }
 
 /// The commit that is built; empty where there is no git.

@@ -1,22 +1,11 @@
 //! Any pieces of bytes, most of them no frames, through writer and reader: they come back as they were.
 
-use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Sector, SectorSink, Writer};
+#[path = "../../firmware/blackbox/tests/common/card.rs"]
+mod card;
+
+use card::Card;
+use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Writer};
 use hums_core::time::Instant;
-
-#[derive(Default)]
-struct Card(Vec<Sector>);
-
-impl SectorSink for Card {
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-
-    fn put(&mut self, sector: &Sector) {
-        let mut sector = *sector;
-        sector.seal(1);
-        self.0.push(sector);
-    }
-}
 
 /// Pieces of the input: each begins with how long it is, when it comes and how it is made a frame.
 fn pieces(mut data: &[u8]) -> Vec<(u64, Vec<u8>)> {

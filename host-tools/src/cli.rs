@@ -65,7 +65,7 @@ pub enum Command {
     Pull(Pull),
     /// Have the board format a card that it cannot record on
     Format(FormatCard),
-    /// Show it: a recorded flight is recorded, decoded and summed up
+    /// Show it: a recorded flight is recorded, decoded and summed up, and played on the dashboard
     Demo(Demo),
 }
 
@@ -179,6 +179,22 @@ const EMULATE_EXAMPLES: &str = "Examples:
 
 Needs qemu-system-arm 8.0 or later. Inside the source tree a missing firmware image is built first.";
 
+/// What the firmware understands of `--provoke`.
+fn provoked(text: &str) -> Result<String, String> {
+    let (what, at_s) = text.split_once('@').unwrap_or((text, "0"));
+    let (what, task) = what.split_once(':').unwrap_or((what, "downlink"));
+    let one_of = |word: &str, known: &[&str]| {
+        known.contains(&word).then_some(()).ok_or(format!("{word} is none of {}", known.join(", ")))
+    };
+    one_of(what, &["panic", "bus-fault", "overflow", "spin", "silence", "supply"])?;
+    one_of(task, &["reception", "monitor", "downlink", "storage"])?;
+    if what == "silence" && task != "downlink" {
+        return Err(format!("{task} has no place where it could wait for ever: only downlink has; or spin"));
+    }
+    at_s.parse::<u32>().map_err(|_| format!("{at_s} is no whole number of seconds"))?;
+    Ok(text.to_owned())
+}
+
 /// `hums emulate`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = EMULATE_EXAMPLES)]
@@ -189,8 +205,9 @@ pub struct Emulate {
     /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
     #[arg(long, value_name = "ELF")]
     pub firmware: Option<PathBuf>,
-    /// What is to go wrong in the firmware itself, when it first sends to the ground station
-    #[arg(long, value_name = "WHAT", value_parser = ["panic", "bus-fault", "silence"])]
+    /// What is to go wrong, once, in the firmware itself: panic, bus-fault, overflow (of the stack), spin, silence or
+    /// supply; in reception, monitor, downlink (the default) or storage; from some second on (0)
+    #[arg(long, value_name = "WHAT[:TASK][@SECONDS]", value_parser = provoked)]
     pub provoke: Option<String>,
     /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
     #[arg(long)]
@@ -323,7 +340,7 @@ const LIVE_EXAMPLES: &str = "Examples:
   hums live --input udpin:0.0.0.0:14550 --open
   hums live --input serial:/dev/ttyUSB0:57600
   hums live --input flight.tlog --open
-  hums live --input card.img
+  hums live --input card.img --session 00042
   hums live --input udpin:0.0.0.0:14550 --influx http://127.0.0.1:8086 --org drones --bucket hums --token T
   hums live --input udpin:0.0.0.0:14550 --listen 192.168.1.5:8080
 
@@ -338,6 +355,9 @@ pub struct Live {
     /// A link (udpin:, udpout:, tcp:, serial:), a recording (tlog or raw MAVLink, `-`), or a log (file, image, folder)
     #[arg(long, value_name = "SRC")]
     pub input: Endpoint,
+    /// Of several sessions this one, by the name that `hums info` gives; otherwise the newest
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
     /// Where the page is served; port 0 is any free one
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8080")]
     pub listen: String,
@@ -497,7 +517,10 @@ pub struct FormatCard {
 
 const DEMO_EXAMPLES: &str = "Examples:
   hums demo
-  hums demo --input flight.tlog --dir demo";
+  hums demo --input flight.tlog --dir demo
+  hums demo --dashboard never
+
+On a terminal it ends with the dashboard, which plays the card and runs until Ctrl-C.";
 
 /// `hums demo`
 #[derive(Args, Clone, Debug)]
@@ -509,6 +532,20 @@ pub struct Demo {
     /// Where to put the card image and what is decoded from it
     #[arg(long, value_name = "DIR", default_value = "hums-demo")]
     pub dir: PathBuf,
+    /// Whether it ends with the dashboard
+    #[arg(long, value_enum, value_name = "WHEN", default_value_t = Dashboard::Auto)]
+    pub dashboard: Dashboard,
+}
+
+/// Whether the demo ends with the dashboard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Dashboard {
+    /// Where standard output is a terminal
+    Auto,
+    /// Wherever it goes
+    Always,
+    /// Not at all
+    Never,
 }
 
 #[cfg(test)]

@@ -1,22 +1,27 @@
 //! `hums demo`: a recorded flight is recorded by the firmware (in the emulator, where there is one), the card is
-//! decoded, and what came of it is summed up.
+//! decoded, what came of it is summed up, and the dashboard plays the card.
 
 use std::fs;
+use std::io::IsTerminal as _;
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use crate::cli::{self, FaultFlags, Format};
+use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output::line;
 use crate::run::{emulate, qemu, sim};
 use crate::summary::Overview;
-use crate::{decode, info, report};
+use crate::{decode, info, live, report};
 
 /// The flight that is shown, inside the source tree: a whole flight of a PX4 quadcopter.
 const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
+
+/// Where `hums live` serves its page as well.
+const PORT: u16 = 8080;
 
 /// Runs `hums demo`.
 pub fn run(args: &cli::Demo) -> Result<Outcome> {
@@ -61,7 +66,42 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         line(&format!("   {what:<28} {}", shown(path)))?;
     }
     line("   try: hums info CARD, hums verify CARD, hums decode CARD -o OUT --format jsonl")?;
-    Ok(recorded.and(read))
+    line("")?;
+    let outcome = recorded.and(read);
+    if !is_wanted(args.dashboard) {
+        line(&format!("5. the dashboard: hums live --input {} --open", shown(&card)))?;
+        return Ok(outcome);
+    }
+    line("5. the dashboard plays it, until Ctrl-C, at")?;
+    dashboard(&card)?;
+    Ok(outcome)
+}
+
+/// Whoever calls this from a script waits for its end.
+fn is_wanted(dashboard: Dashboard) -> bool {
+    match dashboard {
+        Dashboard::Auto => std::io::stdout().is_terminal(),
+        Dashboard::Always => true,
+        Dashboard::Never => false,
+    }
+}
+
+/// Plays the card, until Ctrl-C.
+fn dashboard(card: &Path) -> Result<Outcome> {
+    // Where that port is taken, any other will do.
+    let port = TcpListener::bind(("127.0.0.1", PORT)).map_or(0, |_| PORT);
+    live::run(&cli::Live {
+        input: Endpoint::File(card.to_owned()),
+        session: None,
+        listen: format!("127.0.0.1:{port}"),
+        listen_token: None,
+        params: None,
+        open: false,
+        influx: None,
+        token: None,
+        org: None,
+        bucket: "hums".to_owned(),
+    })
 }
 
 fn shown(path: &Path) -> String {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use hums_blackbox::record::{Loss, Moment, Stats, UsageValue, Vehicle, Why};
+use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Entry, Gap, Record};
 use hums_core::component::Figures;
 use hums_core::health::exceedance::Crossings;
@@ -11,8 +11,8 @@ use hums_core::time::Instant;
 
 use crate::decode::collect::lost;
 use crate::decode::{progress_bar, usage};
+use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, Summary, read};
-use crate::logs::{Log, reader};
 use crate::mavlink::frame::{Check, Peek, peek};
 
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
@@ -191,7 +191,6 @@ impl Contents {
                 });
             }
             Record::Vehicle(vehicle) => self.vehicle = Some(*vehicle),
-            Record::Clock(clock) => self.epoch_us = Some(clock.epoch_micros()),
             Record::Finding(finding) => {
                 self.findings_count += 1;
                 if self.findings.len() < LISTED_MAX {
@@ -258,7 +257,6 @@ impl Contents {
         self.records += next.records;
         self.boot = self.boot.take().or(next.boot);
         self.vehicle = next.vehicle.or(self.vehicle);
-        self.epoch_us = next.epoch_us.or(self.epoch_us);
         self.findings_count += next.findings_count;
         let room = LISTED_MAX.saturating_sub(self.findings.len());
         self.findings.extend(next.findings.into_iter().take(room));
@@ -277,11 +275,8 @@ impl Contents {
     }
 }
 
-fn named(counters: impl Iterator<Item = (u8, UsageValue)>) -> impl Iterator<Item = (String, f64)> {
-    counters.map(|(number, value)| match value {
-        UsageValue::Real(value) => (usage::name(number), value),
-        UsageValue::Count(value) => (usage::name(number), value as f64),
-    })
+fn named(counters: impl Iterator<Item = (u8, f32)>) -> impl Iterator<Item = (String, f64)> {
+    counters.map(|(number, value)| (usage::name(number), f64::from(value)))
 }
 
 fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {
@@ -350,10 +345,7 @@ impl Overview {
         let mut contents = new();
         let summary = read(log, new, &mut contents, |blocks| bar.set_position(blocks * 512))?;
         bar.finish_and_clear();
-        if contents.epoch_us.is_none() {
-            // The clock record itself may be in a part that cannot be read; group starts repeat it.
-            contents.epoch_us = reader::epoch(log)?;
-        }
+        contents.epoch_us = summary.epoch_us;
         let files = log.files.clone();
         Ok(Self { name: log.name.clone(), files, bytes_on_card: log.bytes(), summary, contents })
     }

@@ -179,6 +179,86 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     }
 }
 
+/// What the page says of a part that wears: its level, and the part of its life that is used, percent.
+fn part(page: &mut LivePage) -> (String, f64) {
+    page.wait("return document.querySelector('.due li') !== null", 20);
+    let level = page.run("return document.querySelector('.due .badge').textContent");
+    let words = page.run("return document.querySelector('.due .reason').textContent");
+    let words = words.as_str().unwrap();
+    assert!(words.contains("% used") && !words.contains("in this session"), "all of its life: {words}");
+    (level.as_str().unwrap().to_owned(), number(words.split(' ').next().unwrap()))
+}
+
+#[test]
+fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
+    let dir = tempfile::tempdir().unwrap();
+    let (card, store, params) =
+        (dir.path().join("card.img"), dir.path().join("store.bin"), dir.path().join("box.param"));
+    // A motor that may turn six minutes: two of these flights are more.
+    std::fs::write(&params, "CMP1_KIND 3\nCMP1_NUMBER 2\nCMP1_MOT_HOURS 0.1\n").unwrap();
+    for _ in 0..2 {
+        let mut sim = command(["sim", "--speed", "max", "--input"]);
+        sim.arg(own("px4_hil_quad_low.tlog")).arg("--sd").arg(&card);
+        sim.arg("--store").arg(&store).arg("--params").arg(&params);
+        hums_tests::child::run(&mut sim, hums_tests::program::LIMIT).expect_code(&[0]);
+    }
+    let info = hums(["info".as_ref(), "--json".as_ref(), card.as_os_str()]).expect_code(&[0]).text();
+    let info: Value = serde_json::from_str(&info).unwrap();
+    let names: Vec<&str> =
+        info["logs"].as_array().unwrap().iter().map(|log| log["name"].as_str().unwrap()).collect();
+    assert_eq!(names.len(), 2);
+    let input = card.to_str().unwrap();
+    let mut page = LivePage::start();
+    let mut used = Vec::new();
+    for flags in [&["--session", names[0]][..], &["--session", names[1]], &[]] {
+        let live = Live::start(&[&["--input", input][..], flags].concat());
+        page.open(&live.address, "light", 1440, 900);
+        page.wait("return document.documentElement.dataset.ready === 'true'", 60);
+        page.press(&[" "]);
+        page.wait("return document.getElementById('source').textContent === 'paused'", 20);
+        let early = {
+            seek(&mut page, 10.0);
+            part(&mut page)
+        };
+        let late = {
+            seek(&mut page, 240.0);
+            part(&mut page)
+        };
+        let name = flags.last().unwrap_or(&names[1]);
+        let facts = page.run("return document.querySelector('.facts-line').textContent");
+        assert!(facts.as_str().unwrap().contains(&format!("session {name}")), "{facts}");
+        assert_sound(&mut page);
+        used.push((early, late));
+    }
+    assert_eq!(used[1], used[2], "without a name it is the newest");
+    let [first, second] = [&used[0], &used[1]];
+    assert!(first.0.1 < 5.0 && first.1.1 > 30.0, "a new motor turns: {used:?}");
+    assert!((second.0.1 - first.1.1).abs() < 15.0, "it goes on where it was: {used:?}");
+    assert_eq!((first.0.0.as_str(), second.1.0.as_str()), ("good", "due"), "{used:?}");
+
+    let wrong = hums(["live", "--input", input, "--session", "99999"]).expect_code(&[2]);
+    assert!(wrong.stderr.contains(names[0]), "it says which there are");
+}
+
+#[test]
+fn the_demo_ends_with_the_dashboard_on_the_card_that_it_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut demo = command(["demo", "--dashboard", "always", "--dir"]);
+    // Without a path there is no emulator, and the flight is recorded on this PC.
+    demo.arg(dir.path()).arg("--input").arg(own("px4_hil_quad_low.tlog")).env("PATH", "");
+    let mut child = demo.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let address = lines.into_iter().find(|line| line.starts_with("http://127.0.0.1:"));
+    let mut demo = Running(child);
+    let mut page = LivePage::start();
+    page.open(&address.expect("an address"), "light", 1440, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 60);
+    assert!(page.read()["values"]["battery_volts"].as_str().is_some());
+    assert_sound(&mut page);
+    demo.signal("INT");
+    assert_eq!(demo.end(Duration::from_secs(10)), Some(0));
+}
+
 fn last_s(frames: &[Value]) -> f64 {
     frames.iter().filter_map(|frame| frame["time_boot"].as_f64()).fold(0.0, f64::max) - 1.0
 }

@@ -1,27 +1,13 @@
 //! What outlives power and resets, with the firmware itself.
 
 use std::fs;
-use std::path::Path;
 
 use hums_core::usage::UsageCounter;
-use hums_tests::flights::{Manifest, own};
-use hums_tests::program::{Decoded, Machine, Recording, hums};
+use hums_tests::flights::own;
+use hums_tests::program::{Machine, Recording};
 use hums_tests::store::Stored;
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
-/// Half a minute of it.
-const BEGINNING: usize = 150_000;
-
-/// All records of a card, as text.
-fn records(image: &Path) -> String {
-    let dir = tempfile::tempdir().unwrap();
-    let out = dir.path().join("out");
-    let arguments = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
-    hums(arguments.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0, 3]);
-    let mut files: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
-    files.iter().map(|file| fs::read_to_string(file).unwrap()).collect()
-}
 
 #[test]
 fn both_machines_go_on_with_the_same_store() {
@@ -43,39 +29,6 @@ fn both_machines_go_on_with_the_same_store() {
         counters.push((lifetime.boots, lifetime.totals.raw(UsageCounter::Flights) as u32));
     }
     assert_eq!(counters, [(1, 1), (2, 2), (3, 3)]);
-}
-
-#[test]
-fn each_fault_is_survived_recorded_and_the_record_goes_on() {
-    let dir = tempfile::tempdir().unwrap();
-    let short = dir.path().join("short.tlog");
-    let data = fs::read(own(FLIGHT)).unwrap();
-    fs::write(&short, &data[..BEGINNING]).unwrap();
-    let manifest = Manifest::own();
-    let input = manifest.frames_of(&own(FLIGHT), &data);
-    for (what, kind, message, cause) in [
-        ("panic", "panic", "provoked", "software"),
-        ("bus-fault", "hard_fault", "processor fault", "software"),
-        ("silence", "watchdog", "silent", "watchdog"),
-    ] {
-        let recording =
-            Recording::attempt(Machine::Emulated, &short, &["--provoke", what]).expect_code(&[0, 3]);
-        let records = records(&recording.image());
-        let fault =
-            records.lines().find(|line| line.contains("HUMS_FAULT")).unwrap_or_else(|| panic!("{what}"));
-        for part in [message, "downlink"] {
-            assert!(fault.contains(part), "{what}: {fault}");
-        }
-        assert!(fault.contains(&format!("\"kind\":\"{kind}\"")), "{what}: {fault}");
-        assert!(records.contains(&format!("\"{cause}\"")), "{what}: the second start does not say {cause}");
-        // What the reset took is what was in memory: a quarter of a second, and what the watchdog waits for.
-        let decoded = Decoded::of(&recording.image(), &[0, 3]);
-        let frames = decoded.frames(&manifest.seeds).len() as u64;
-        assert_eq!(recording.number("frames_logged"), frames, "{what}");
-        let lost = recording.number("frames_lost");
-        assert!(lost <= 40, "{what}: {lost} frames lost");
-        assert!(frames > 2_000 && frames < input.len() as u64, "{what}: {frames}");
-    }
 }
 
 #[test]

@@ -1,12 +1,14 @@
-//! The dashboards in `host-tools/grafana`: whole by Grafana's own rules, and asking for what the points have.
+//! The dashboards in `host-tools/grafana`: whole by Grafana's own schema and by what it leaves open, and asking for what
+//! the points have.
 #![cfg(feature = "oracle")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use hums_tests::flights::{own, root};
+use hums_tests::oracle;
 use hums_tests::program::hums;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// Units of Grafana that the dashboards use; a slip in one shows as plain text on the panel.
 const UNITS: [&str; 14] = [
@@ -68,6 +70,41 @@ fn panels(dashboard: &Value) -> &Vec<Value> {
 
 fn queries(panel: &Value) -> impl Iterator<Item = &str> {
     panel["targets"].as_array().into_iter().flatten().map(|target| target["query"].as_str().unwrap())
+}
+
+#[test]
+fn grafanas_own_model_takes_every_member_of_the_dashboards() {
+    let folder = root().join("host-tools/grafana");
+    let paths = ["flight.json", "health.json"].map(|name| folder.join("dashboards").join(name));
+    let said = oracle::grafana(&paths);
+    assert_eq!(said["told"], json!([]), "Grafana has other members or types");
+    let count: usize = dashboards().iter().map(|(_, dashboard)| panels(dashboard).len()).sum();
+    assert_eq!(said["panels"], count);
+
+    // That silence means something: each slip is told.
+    let dir = tempfile::tempdir().unwrap();
+    let (_, whole) = dashboards().into_iter().find(|(name, _)| name == "flight.json").unwrap();
+    let place = panels(&whole).iter().position(|panel| panel["type"] == "stat").unwrap();
+    let slips: [(&str, Value); 5] = [
+        ("/options/graphMode", json!("sparkle")),
+        ("/options/reduceOptions/calcs", json!("last")),
+        ("/fieldConfig/defaults/thresholds/mode", json!("relative")),
+        ("/gridPos/h", json!("6")),
+        ("/type", json!("speedometer")),
+    ];
+    for (member, value) in slips {
+        let mut slip = whole.clone();
+        *slip["panels"][place].pointer_mut(member).unwrap_or_else(|| panic!("no {member}")) = value;
+        let path = dir.path().join("slip.json");
+        fs::write(&path, slip.to_string()).unwrap();
+        assert_ne!(oracle::grafana(&[path])["told"], json!([]), "{member}");
+    }
+    // The model is that of the release that the compose file starts.
+    let model = fs::read_to_string(root().join("tests/oracle/requirements.txt")).unwrap();
+    let release = model.lines().find_map(|line| line.strip_prefix("grafana-foundation-sdk==")).unwrap();
+    let release = release.split('!').next_back().unwrap();
+    let compose = fs::read_to_string(folder.join("compose.yaml")).unwrap();
+    assert!(compose.contains(&format!("grafana/grafana:{release}")), "the model is of {release}");
 }
 
 #[test]

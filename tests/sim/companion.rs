@@ -108,7 +108,20 @@ fn a_ground_station_lists_reads_sets_and_commands() {
     assert_eq!(said["protocol"], 200);
     assert_eq!(said["for_the_autopilot"], Value::Null, "that is not ours to answer");
 
-    for recorded in ["BAT_REM_WARN", "recording stopped by 255/190", "recording started by 255/190"] {
+    // Each change, with who made it; not what was refused.
+    let changes: Vec<Value> = log
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap())
+        .filter(|row| row["record"] == "HUMS_PARAM" && row["fields"]["changed"] == true)
+        .map(|row| row["fields"].clone())
+        .collect();
+    let change = |name: &str, value: f64| {
+        serde_json::json!({
+            "name": name, "value": value, "changed": true, "by_system": 255, "by_component": 190
+        })
+    };
+    assert_eq!(changes, [change("BAT_REM_WARN", 22.0), change("BAT_REM_CRIT", 9.0)]);
+    for recorded in ["recording stopped by 255/190", "recording started by 255/190"] {
         assert!(log.contains(recorded), "the record does not tell: {recorded}");
     }
 }

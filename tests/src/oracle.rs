@@ -61,6 +61,11 @@ pub fn fleet(document: &Path, folder: &Path) -> Value {
     json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
 }
 
+/// What Grafana's own model of dashboards says to these: see `tests/oracle/grafana.py`.
+pub fn grafana(dashboards: &[PathBuf]) -> Value {
+    json(&run("grafana.py", dashboards))
+}
+
 /// Looks at a page in a browser: see `tests/oracle/browser.py`.
 pub fn browser(page: &Path) -> Value {
     let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");

@@ -15,62 +15,135 @@ use serde::Deserialize;
 use crate::firmware::{self, Board};
 use crate::repo;
 
-/// The STM32F405's memories: name, first address, one past the last.
+/// The memories: name, first address, one past the last of the board that has most of it.
 const MEMORIES: [(&str, u64, u64); 3] = [
-    ("flash", 0x0800_0000, 0x0810_0000),
-    ("ram", 0x2000_0000, 0x2002_0000),
+    ("flash", 0x0800_0000, 0x0820_0000),
+    ("ram", 0x2000_0000, 0x2003_0000),
     ("ccm", 0x1000_0000, 0x1001_0000),
 ];
 
-/// One limit of `budgets.toml`.
+/// One limit of `budgets.toml`, in bytes.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Budget {
-    bytes_max: u64,
-    reason: String,
+pub(crate) struct Bytes {
+    pub(crate) bytes_max: u64,
+    pub(crate) reason: String,
 }
 
-/// Per board, per memory.
-type Budgets = BTreeMap<String, BTreeMap<String, Budget>>;
+/// One limit of `budgets.toml`, in instructions.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Instructions {
+    /// For each frame.
+    pub(crate) per_frame_max: f64,
+    pub(crate) reason: String,
+}
 
-/// Builds both boards, prints what they take and fails if any takes more than its budget.
+/// What the processor may be busy at the fastest line.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Load {
+    /// In percent, of all of it.
+    pub(crate) percent_max: f64,
+    pub(crate) reason: String,
+}
+
+/// A board's limits.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfBoard {
+    spare_min: u64,
+    memory: BTreeMap<String, Bytes>,
+}
+
+/// All of `budgets.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Budgets {
+    f405: OfBoard,
+    f429: OfBoard,
+    emulated: OfBoard,
+    /// By urgency.
+    pub(crate) stack: BTreeMap<String, Bytes>,
+    /// By stage.
+    pub(crate) instructions: BTreeMap<String, Instructions>,
+    pub(crate) load: Load,
+}
+
+impl Budgets {
+    pub(crate) fn read() -> Result<Self> {
+        let path = repo::root().join("budgets.toml");
+        let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        toml::from_str(&text).with_context(|| format!("{}", path.display()))
+    }
+
+    /// What the stack takes when every urgency interrupts the one below it at its deepest.
+    pub(crate) fn stack_bytes(&self) -> u64 {
+        self.stack.values().map(|budget| budget.bytes_max).sum()
+    }
+
+    fn of(&self, board: Board) -> &OfBoard {
+        match board {
+            Board::F405 => &self.f405,
+            Board::F429 => &self.f429,
+            Board::Emulated => &self.emulated,
+        }
+    }
+}
+
+/// Builds all boards, prints what they take and fails if any takes more than its budget.
 pub(crate) fn check_all() -> Result<()> {
-    let path = repo::root().join("budgets.toml");
-    let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let budgets: Budgets = toml::from_str(&text).with_context(|| format!("{}", path.display()))?;
-    let mut rows = Vec::new();
+    let budgets = Budgets::read()?;
+    let stack_bytes = budgets.stack_bytes();
+    let (mut rows, mut spares) = (Vec::new(), Vec::new());
     for board in Board::ALL {
         let image = firmware::build(board)?;
         let data = fs::read(&image)?;
         let used = sizes(&data).with_context(|| format!("{}", image.display()))?;
-        let limits =
-            budgets.get(board.name()).with_context(|| format!("budgets.toml has no [{}]", board.name()))?;
-        rows.extend(compare(board.name(), &used, limits)?);
+        let of_board = budgets.of(board);
+        rows.extend(compare(board.name(), &used, &of_board.memory)?);
+        spares.push(spare(board, &used, stack_bytes, of_board.spare_min));
     }
     println!(
         "{:<10} {:<6} {:>9} {:>9} {:>6}  reason of the limit",
         "board", "memory", "bytes", "limit", "used"
     );
-    for row in &rows {
+    for row in rows.iter().chain(&spares) {
         println!("{}", row.text);
     }
-    if rows.iter().any(|row| row.over) {
+    if rows.iter().chain(&spares).any(|row| row.over) {
         bail!("the firmware is over its budget: see the table");
     }
     Ok(())
 }
 
-struct Row {
-    text: String,
-    over: bool,
+/// What is free of all that can be written to.
+fn spare(board: Board, used: &BTreeMap<&str, u64>, stack_bytes: u64, spare_min: u64) -> Row {
+    let all = board.ram_bytes();
+    let taken = ["ram", "ccm"].iter().filter_map(|memory| used.get(memory)).sum::<u64>() + stack_bytes;
+    let spare = 100.0 - taken as f64 * 100.0 / all as f64;
+    let over = spare < spare_min as f64;
+    let text = format!(
+        "{:<10} of {all} bytes of RAM and CCM {taken} are taken, {stack_bytes} of stack with them: {spare:.1} % to \
+         spare{}",
+        board.name(),
+        if over { format!(", OVER: {spare_min} % are asked") } else { String::new() }
+    );
+    Row { text, over }
 }
 
-fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Budget>) -> Result<Vec<Row>> {
+pub(crate) struct Row {
+    pub(crate) text: String,
+    pub(crate) over: bool,
+}
+
+fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Bytes>) -> Result<Vec<Row>> {
     MEMORIES
         .iter()
         .map(|(memory, ..)| {
-            let budget =
-                limits.get(*memory).with_context(|| format!("budgets.toml has no [{board}.{memory}]"))?;
+            let budget = limits
+                .get(*memory)
+                .with_context(|| format!("budgets.toml has no [{board}.memory.{memory}]"))?;
             let bytes = used.get(memory).copied().unwrap_or(0);
             let over = bytes > budget.bytes_max;
             let percent = bytes * 100 / budget.bytes_max.max(1);
@@ -117,10 +190,10 @@ fn sizes(elf: &[u8]) -> Result<BTreeMap<&'static str, u64>> {
 mod tests {
     use super::*;
 
-    fn limits(bytes_max: u64) -> BTreeMap<String, Budget> {
+    fn limits(bytes_max: u64) -> BTreeMap<String, Bytes> {
         MEMORIES
             .iter()
-            .map(|(name, ..)| ((*name).to_owned(), Budget { bytes_max, reason: "because".into() }))
+            .map(|(name, ..)| ((*name).to_owned(), Bytes { bytes_max, reason: "because".into() }))
             .collect()
     }
 
@@ -137,6 +210,28 @@ mod tests {
         let mut limits = limits(100);
         limits.remove("ccm");
         assert!(compare("f405", &BTreeMap::new(), &limits).is_err());
+    }
+
+    #[test]
+    fn the_stack_counts_for_what_is_to_spare() {
+        let used = BTreeMap::from([("flash", 300_000), ("ram", 100_000), ("ccm", 40_000)]);
+        let (all, taken) = (Board::F405.ram_bytes() as f64, 146_000.0);
+        let row = spare(Board::F405, &used, 6_000, 25);
+        assert!(
+            !row.over && row.text.contains(&format!("{:.1} %", 100.0 - taken * 100.0 / all)),
+            "{}",
+            row.text
+        );
+        assert!(spare(Board::F405, &used, 16_000, 25).over);
+    }
+
+    #[test]
+    fn the_file_of_budgets_is_whole() {
+        let budgets = Budgets::read().unwrap();
+        for board in Board::ALL {
+            assert!(MEMORIES.iter().all(|(memory, ..)| budgets.of(board).memory.contains_key(*memory)));
+        }
+        assert!(budgets.stack_bytes() > 0 && !budgets.instructions.is_empty());
     }
 
     #[test]

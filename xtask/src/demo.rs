@@ -1,6 +1,7 @@
 //! A recorded flight through all of it, and what came of it.
 
 use std::fs;
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -23,15 +24,19 @@ pub(crate) struct Options {
     flight: PathBuf,
     /// On this PC even if there is an emulator.
     pc: bool,
+    /// At the end, until Ctrl-C.
+    dashboard: bool,
 }
 
 impl Options {
     pub(crate) fn parse(words: &[&str]) -> Result<Self> {
-        let mut options = Self { flight: repo::root().join(FLIGHT), pc: false };
+        let dashboard = std::io::stdout().is_terminal();
+        let mut options = Self { flight: repo::root().join(FLIGHT), pc: false, dashboard };
         let mut words = words.iter();
         while let Some(word) = words.next() {
             match *word {
                 "--pc" => options.pc = true,
+                "--no-dashboard" => options.dashboard = false,
                 "--flight" => {
                     let Some(flight) = words.next() else {
                         bail!("--flight wants a tlog or a raw recording")
@@ -39,16 +44,16 @@ impl Options {
                     // As typed where it was typed: the commands themselves run at the root.
                     options.flight = std::path::absolute(flight)?;
                 }
-                other => bail!("demo takes --flight FILE and --pc, not {other}"),
+                other => bail!("demo takes --flight FILE, --pc and --no-dashboard, not {other}"),
             }
         }
         Ok(options)
     }
 }
 
-/// In CI the demo must run in the emulator.
+/// In CI the demo must run in the emulator, and end.
 pub(crate) fn as_test() -> Result<()> {
-    run(&Options::parse(&[])?)
+    run(&Options::parse(&["--no-dashboard"])?)
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
@@ -117,6 +122,11 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     if run.get("frames_lost").and_then(serde_json::Value::as_u64) != Some(0) {
         bail!("frames were lost");
     }
+    if options.dashboard {
+        println!("{:<30} until Ctrl-C, at", "the dashboard plays it");
+        return Shell::new(repo::hums()).args(["live", "--listen", "127.0.0.1:0", "--input"]).arg(card).run();
+    }
+    println!("{:<30} target/release/hums live --open --input {}", "the dashboard", repo::shown(&card));
     Ok(())
 }
 

@@ -11,7 +11,9 @@ use std::{env, fs};
 use anyhow::{Context as _, Result, bail};
 use sha2::{Digest as _, Sha256};
 
+use crate::dfu;
 use crate::firmware::Board;
+use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, Need, STATIC_TARGET};
 use crate::shell::Shell;
@@ -84,7 +86,11 @@ impl Release {
         for board in boards() {
             self.build(&board.cargo_arguments())?;
             let elf = self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware");
-            files.push(read(&format!("hums-{}.elf", board.name()), &elf)?);
+            let elf = read(&format!("hums-{}.elf", board.name()), &elf)?;
+            let pieces = image::pieces(&elf.1)?;
+            files.push((format!("hums-{}.dfu", board.name()), dfu::file(board.name(), &pieces)));
+            files.push((format!("hums-{}.bin", board.name()), image::flat(&pieces)));
+            files.push(elf);
             files.push(self.sbom(
                 &format!("hums-{}", board.name()),
                 "firmware/app",

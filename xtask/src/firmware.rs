@@ -13,24 +13,35 @@ use crate::shell::Shell;
 pub(crate) enum Board {
     /// A real board with an STM32F405.
     F405,
-    /// The same chip in QEMU.
+    /// A NUCLEO-F429ZI.
+    F429,
+    /// The first one's chip in QEMU.
     Emulated,
 }
 
 impl Board {
-    pub(crate) const ALL: [Self; 2] = [Self::F405, Self::Emulated];
+    pub(crate) const ALL: [Self; 3] = [Self::F405, Self::F429, Self::Emulated];
 
     pub(crate) fn parse(name: &str) -> Result<Self> {
         match Self::ALL.into_iter().find(|board| board.name() == name) {
             Some(board) => Ok(board),
-            None => bail!("there is no board {name}: f405 or emulated"),
+            None => bail!("there is no board {name}: f405, f429 or emulated"),
         }
     }
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::F405 => "f405",
+            Self::F429 => "f429",
             Self::Emulated => "emulated",
+        }
+    }
+
+    /// Bytes of memory that can be written to: RAM and CCM (`firmware/app/src/boards/*.x`).
+    pub(crate) fn ram_bytes(self) -> u64 {
+        match self {
+            Self::F405 | Self::Emulated => (128 + 64) * 1024,
+            Self::F429 => (192 + 64) * 1024,
         }
     }
 
@@ -91,7 +102,7 @@ mod tests {
         for board in Board::ALL {
             assert_eq!(Board::parse(board.name()).unwrap(), board);
         }
-        assert!(Board::parse("f407").unwrap_err().to_string().contains("f405 or emulated"));
+        assert!(Board::parse("f407").unwrap_err().to_string().contains("f405, f429 or emulated"));
     }
 
     #[test]

@@ -6,10 +6,14 @@
 mod apt;
 mod bench;
 mod budgets;
+mod costs;
 mod demo;
+mod dfu;
 mod dist;
 mod firmware;
+mod flash;
 mod fuzz;
+mod image;
 mod oracle;
 mod prove;
 mod repo;
@@ -27,17 +31,23 @@ use crate::setup::Need;
 const HELP: &str = "\
 cargo xtask COMMAND
 
-  demo [--flight FILE] [--pc]    a recorded flight through the firmware in the emulator, and what came of it;
-                                 without an emulator, or with --pc, through the same pipeline on this PC
+  demo [--flight FILE] [--pc] [--no-dashboard]
+                                 a recorded flight through the firmware in the emulator, and what came of it;
+                                 without an emulator, or with --pc, through the same pipeline on this PC;
+                                 on a terminal the dashboard plays it at the end, until Ctrl-C
   test [--only STEP]... [--list] everything that CI checks, or the steps named
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
                                  and docs/proof.md
-  firmware [--board BOARD]       build the firmware: f405 (a real board, the default) or emulated
+  firmware [--board BOARD]       build the firmware: f405 (the default) or f429, which are real, or emulated
   bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   dist [--check]                 the files of a release, in target/dist; --check builds them twice and compares
-  size                           flash and RAM of both boards against budgets.toml
+  flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
+                                 boot loader (dfu-util); what the board has stored stays
+  attach [--board BOARD]         show the log of a board that runs (probe-rs)
+  size                           flash and RAM of all boards against budgets.toml
+  costs                          instructions and stack, in the emulator, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
   manifest                       make tests/flights/manifest.json anew with pymavlink
   help                           this text
@@ -69,10 +79,13 @@ enum Command {
     Test { only: Vec<String>, list: bool },
     Prove(Vec<String>),
     Firmware(Board),
+    Flash(flash::Options),
+    Attach(flash::Options),
     Bench(Vec<bench::Bench>),
     Fuzz { seconds: u32 },
     Dist { check: bool },
     Size,
+    Costs,
     Setup { dry_run: bool },
     Manifest,
     Help,
@@ -96,22 +109,25 @@ impl Command {
             "firmware" => match rest.as_slice() {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
-                _ => bail!("firmware takes --board f405 or --board emulated"),
+                _ => bail!("firmware takes --board f405, f429 or emulated"),
             },
             "dist" => match rest.as_slice() {
                 [] => Ok(Self::Dist { check: false }),
                 ["--check"] => Ok(Self::Dist { check: true }),
                 _ => bail!("dist takes nothing or --check"),
             },
+            "flash" => Ok(Self::Flash(flash::Options::parse(&rest, true)?)),
+            "attach" => Ok(Self::Attach(flash::Options::parse(&rest, false)?)),
             "setup" => match rest.as_slice() {
                 [] => Ok(Self::Setup { dry_run: false }),
                 ["--dry-run"] => Ok(Self::Setup { dry_run: true }),
                 _ => bail!("setup takes nothing or --dry-run"),
             },
-            "size" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
+            "size" | "costs" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
                 bail!("{name} takes nothing")
             }
             "size" => Ok(Self::Size),
+            "costs" => Ok(Self::Costs),
             "manifest" => Ok(Self::Manifest),
             "help" | "--help" | "-h" => Ok(Self::Help),
             other => bail!("there is no command {other}"),
@@ -132,6 +148,9 @@ impl Command {
                 println!("{}", firmware::build(board)?.display());
                 Ok(())
             }
+            Self::Flash(options) => flash::flash(options),
+            Self::Attach(options) => flash::attach(options),
+            Self::Costs => costs::check(),
             Self::Bench(what) => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
             Self::Dist { check } => dist::run(check),

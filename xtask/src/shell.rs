@@ -58,6 +58,12 @@ impl Shell {
         self
     }
 
+    /// As it can be typed.
+    #[cfg(test)]
+    pub(crate) fn shown(&self) -> &str {
+        &self.shown
+    }
+
     /// Without what it writes to stdout, for programs that say much and mean little.
     pub(crate) fn quiet(mut self) -> Self {
         self.command.stdout(Stdio::null());

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result, bail};
 
 use crate::budgets;
+use crate::costs;
 use crate::demo;
 use crate::firmware::{self, Board};
 use crate::oracle;
@@ -22,7 +23,7 @@ struct Step {
 }
 
 /// In the order in which they fail soonest.
-const STEPS: [Step; 14] = [
+const STEPS: [Step; 15] = [
     Step { name: "fmt", about: "the formatting", needs: &[Need::Rustfmt], run: fmt },
     Step {
         name: "clippy",
@@ -78,6 +79,12 @@ const STEPS: [Step; 14] = [
         about: "live writing to InfluxDB and VictoriaMetrics, and the Grafana dashboards",
         needs: &[Need::PythonVenv, Need::Influx, Need::Victoria],
         run: live,
+    },
+    Step {
+        name: "costs",
+        about: "instructions and stack of the firmware against budgets.toml",
+        needs: &[Need::Qemu, Need::FirmwareTarget],
+        run: costs::check,
     },
     Step {
         name: "emulator",

@@ -6,14 +6,17 @@
 use core::cell::RefCell;
 
 use critical_section::Mutex;
+use hums_core::time::Instant;
 
 use crate::boards::{CYCLE_BITS, board};
 
 /// The parts that are measured apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
-    /// Nothing else; also the executors and interrupts themselves.
+    /// Nothing else; also the interrupts of ports and clock.
     Idle,
+    /// Everything in a task that is none of the below: the executors, waiting and waking.
+    Tasks,
     /// Bytes to frames.
     Framer,
     /// Frames out of their queue.
@@ -31,12 +34,13 @@ pub(crate) enum Stage {
 }
 
 /// Number of stages.
-pub(crate) const STAGES: usize = 8;
+pub(crate) const STAGES: usize = 9;
 
 impl Stage {
     /// All of them, in the order of [`totals`], with their names.
     pub(crate) const NAMES: [(Self, &str); STAGES] = [
         (Self::Idle, "idle"),
+        (Self::Tasks, "tasks"),
         (Self::Framer, "framer"),
         (Self::Monitor, "monitor"),
         (Self::Encode, "encode"),
@@ -46,6 +50,9 @@ impl Stage {
         (Self::Storage, "storage"),
     ];
 }
+
+/// The processor's clock, 168 MHz on every board.
+const CYCLES_A_MICROSECOND: u64 = 168;
 
 struct Meter {
     current: Stage,
@@ -87,4 +94,35 @@ fn switch_to(stage: Stage) -> Stage {
         }
         before
     })
+}
+
+/// What the processor was busy, second by second.
+pub(crate) struct Load {
+    since: Instant,
+    busy: u64,
+    worst: u16,
+}
+
+impl Load {
+    /// Nothing is known yet.
+    pub(crate) const fn new() -> Self {
+        Self { since: Instant::ZERO, busy: 0, worst: 0 }
+    }
+
+    /// The last second's and the worst second's, in thousandths, once a second has passed since the last answer.
+    pub(crate) fn step(&mut self, now: Instant) -> Option<(u16, u16)> {
+        let micros = now.since(self.since).as_micros();
+        if micros < 1_000_000 {
+            return None;
+        }
+        let idle = Stage::Idle as usize;
+        let counted =
+            totals().iter().enumerate().filter(|(stage, _)| *stage != idle).map(|(_, cycles)| cycles).sum();
+        let busy = board::busy_cycles(counted);
+        let permille = 1_000 * busy.wrapping_sub(self.busy) / (micros * CYCLES_A_MICROSECOND);
+        (self.since, self.busy) = (now, busy);
+        let permille = permille.min(1_000) as u16;
+        self.worst = self.worst.max(permille);
+        Some((permille, self.worst))
+    }
 }

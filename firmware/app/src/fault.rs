@@ -1,20 +1,22 @@
-//! What went wrong before the last reset: a panic, a processor fault or a silent task leaves its note in memory that a
-//! reset does not clear, and the next start reads it.
+//! What went wrong before the last reset: a panic, a processor fault, an overflow of the stack, a task that hangs or a
+//! supply that sags leaves its note in memory that a reset does not clear, and the next start reads it.
 //!
 //! That memory is garbage after power-on, so a note counts only with its mark and its check sum. It is made of atomics
-//! because the writer may have interrupted anybody, itself included.
+//! because the writer may have interrupted anybody, itself included. The clock is not asked for the same reason: the
+//! time is that of the last frame or tick ([`seen`], [`tick`]).
 
 use core::fmt::{self, Write as _};
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use cortex_m::peripheral::SCB;
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::ExceptionFrame;
 use heapless::String;
 use hums_blackbox::record;
+use hums_core::time::Instant;
+use hums_onboard::Task;
 
 use crate::boards::board;
-use crate::executors;
+use crate::{executors, trap};
 
 /// Bytes of the place that are kept: a file of ours and its line.
 const PLACE_BYTES: usize = 64;
@@ -22,14 +24,19 @@ const PLACE_BYTES: usize = 64;
 const FILE_BYTES: usize = PLACE_BYTES - 8;
 /// Bytes of the message that are kept.
 const MESSAGE_BYTES: usize = 128;
-/// Registers of a processor fault, in the order of [`record::Fault::registers`].
-const REGISTERS: usize = 12;
+/// In the order of [`record::Fault::registers`]: what the processor stacked, then four registers that say why.
+pub(crate) type Registers = [u32; 12];
+/// Messages that are remembered.
+const SEEN: usize = 8;
+/// Bytes of [`Fault::last_messages`].
+const LAST_BYTES: usize = 200;
 /// Says that a note is there.
 const MARK: u32 = 0x4641_554C;
 
 /// How a start can end, by the numbers that the record uses.
 #[derive(Clone, Copy)]
-enum Kind {
+pub(crate) enum Kind {
+    Supply = 0,
     Panic = 1,
     HardFault = 2,
     Watchdog = 3,
@@ -40,7 +47,8 @@ struct Note {
     sum: AtomicU32,
     kind: AtomicU32,
     task: AtomicU32,
-    registers: [AtomicU32; REGISTERS],
+    at_ms: AtomicU32,
+    registers: [AtomicU32; size_of::<Registers>() / 4],
     place: Text<{ PLACE_BYTES / 4 }>,
     message: Text<{ MESSAGE_BYTES / 4 }>,
 }
@@ -51,10 +59,29 @@ static NOTE: Note = Note {
     sum: AtomicU32::new(0),
     kind: AtomicU32::new(0),
     task: AtomicU32::new(0),
-    registers: [const { AtomicU32::new(0) }; REGISTERS],
+    at_ms: AtomicU32::new(0),
+    registers: [const { AtomicU32::new(0) }; size_of::<Registers>() / 4],
     place: Text::new(),
     message: Text::new(),
 };
+
+/// The last messages of the autopilot: which, and when in milliseconds since the start.
+struct Seen {
+    now_ms: AtomicU32,
+    next: AtomicU32,
+    messages: [(AtomicU32, AtomicU32); SEEN],
+}
+
+#[unsafe(link_section = ".uninit.seen")]
+static LAST_SEEN: Seen = Seen {
+    now_ms: AtomicU32::new(0),
+    next: AtomicU32::new(0),
+    messages: [const { (AtomicU32::new(0), AtomicU32::new(0)) }; SEEN],
+};
+/// An id that no message has: the place is empty.
+const NOTHING: u32 = u32::MAX;
+/// The task that was silent for too long, as a number of an exception; 0: none.
+static SILENT: AtomicU32 = AtomicU32::new(0);
 
 struct Starts {
     mark: AtomicU32,
@@ -68,16 +95,34 @@ static STARTS: Starts = Starts { mark: AtomicU32::new(0), count: AtomicU32::new(
 pub(crate) struct Fault {
     kind: u8,
     task: &'static str,
-    registers: [u32; REGISTERS],
+    registers: Registers,
     place: String<PLACE_BYTES>,
     message: String<MESSAGE_BYTES>,
+    last_messages: String<LAST_BYTES>,
 }
 
 impl Fault {
     /// As the log records it.
     pub(crate) fn record(&self) -> record::Fault<'_> {
-        let Self { kind, task, registers, place, message } = self;
+        let Self { kind, task, registers, place, message, .. } = self;
         record::Fault { kind: *kind, task, place, registers: *registers, message }
+    }
+
+    /// In words: when it was, and which messages came before it, by their numbers, the newest first.
+    pub(crate) fn last_messages(&self) -> &str {
+        &self.last_messages
+    }
+
+    /// The watchdog reset the machine and nobody left a note: interrupts were off, or memory did not survive.
+    pub(crate) fn without_note() -> Self {
+        Self {
+            kind: Kind::Watchdog as u8,
+            task: "?",
+            registers: Registers::default(),
+            place: text("?"),
+            message: text("no note was left"),
+            last_messages: String::new(),
+        }
     }
 }
 
@@ -104,7 +149,52 @@ pub(crate) fn take() -> Option<Fault> {
         registers: NOTE.registers.each_ref().map(|register| register.load(Ordering::Relaxed)),
         place: NOTE.place.read(),
         message: NOTE.message.read(),
+        last_messages: LAST_SEEN.read(),
     })
+}
+
+/// Forgets the messages that came before this start: after [`take`], and before the first [`seen`].
+pub(crate) fn begin() {
+    LAST_SEEN.now_ms.store(0, Ordering::Relaxed);
+    for (_, id) in &LAST_SEEN.messages {
+        id.store(NOTHING, Ordering::Relaxed);
+    }
+}
+
+/// A message is about to be worked on.
+pub(crate) fn seen(at: Instant, id: u32) {
+    let Seen { next, messages, .. } = &LAST_SEEN;
+    let index = next.load(Ordering::Relaxed) as usize % SEEN;
+    next.store(index as u32 + 1, Ordering::Relaxed);
+    let ms = at.as_millis() as u32;
+    if let Some((at_ms, of)) = messages.get(index) {
+        at_ms.store(ms, Ordering::Relaxed);
+        of.store(id, Ordering::Relaxed);
+    }
+    tick(at);
+}
+
+/// Time goes on without messages as well.
+pub(crate) fn tick(now: Instant) {
+    LAST_SEEN.now_ms.store(now.as_millis() as u32, Ordering::Relaxed);
+}
+
+impl Seen {
+    fn read(&self) -> String<LAST_BYTES> {
+        let mut text = String::new();
+        let at_ms = NOTE.at_ms.load(Ordering::Relaxed);
+        let next = self.next.load(Ordering::Relaxed) as usize;
+        // What does not fit is cut off: the newest come first.
+        let _ = write!(text, "restart at {at_ms} ms; last messages:");
+        for back in 1..=SEEN {
+            let Some((at, id)) = self.messages.get((next % SEEN + SEEN - back) % SEEN) else { continue };
+            let (at, id) = (at.load(Ordering::Relaxed), id.load(Ordering::Relaxed));
+            if id != NOTHING {
+                let _ = write!(text, " {id} at {at}{}", if back == SEEN { "" } else { "," });
+            }
+        }
+        text
+    }
 }
 
 /// How many starts there were since power-on, this one included.
@@ -124,15 +214,76 @@ pub(crate) fn count_start() -> u32 {
     starts
 }
 
-/// A task has been silent for too long: says so to whoever starts after the watchdog.
-pub(crate) fn silent(task: hums_onboard::Task) {
-    NOTE.keep(Kind::Watchdog, executors::number_of(task), format_args!("watchdog"), format_args!("silent"));
+/// Which task has been silent for too long, if any has.
+pub(crate) fn silent(task: Option<Task>) {
+    SILENT.store(task.map_or(0, |task| u32::from(executors::number_of(task))), Ordering::Relaxed);
+}
+
+/// The watchdog is about to bite. `interrupted` ran until now; `None`: nothing did, all tasks wait.
+///
+/// To blame is the task that is silent. If none is known to be, the monitor does not look any more: because it waits, or
+/// because what runs does not let it.
+pub(crate) fn late(interrupted: Option<&ExceptionFrame>) {
+    let running = interrupted.map_or(0, |frame| (frame.xpsr() & 0x1FF) as u16);
+    let blamed = match SILENT.load(Ordering::Relaxed) as u16 {
+        0 if running == 0 => executors::number_of(Task::Monitor),
+        0 => running,
+        silent => silent,
+    };
+    match interrupted.filter(|_| running == blamed) {
+        Some(frame) => {
+            NOTE.keep_registers(trap::stacked(frame));
+            let place = format_args!("pc {:08x}", frame.pc());
+            NOTE.keep(Kind::Watchdog, blamed, place, format_args!("hangs"));
+        }
+        // Keeps what an earlier look may have found.
+        None if NOTE.mark.load(Ordering::Relaxed) == MARK => {}
+        None => {
+            NOTE.keep_registers(Registers::default());
+            NOTE.keep(Kind::Watchdog, blamed, format_args!("waits"), format_args!("silent"));
+        }
+    }
+}
+
+/// The watchdog was fed after all.
+pub(crate) fn not_late() {
+    NOTE.mark.store(0, Ordering::Relaxed);
+}
+
+/// The supply is too low to write anything: waits until it is back, or gone.
+pub(crate) fn supply_low(is_low: fn() -> bool) -> ! {
+    cortex_m::interrupt::disable();
+    NOTE.keep_registers(Registers::default());
+    let (place, message) = (format_args!("supply"), format_args!("below 2.7 V"));
+    NOTE.keep(Kind::Supply, executors::begun(), place, message);
+    while is_low() {}
+    board::restart();
+}
+
+/// The processor cannot go on. `overflow`: the stack was full, `place` is all that is known.
+pub(crate) fn processor(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) -> ! {
+    NOTE.keep_registers(registers);
+    let message = if overflow { "stack overflow" } else { "processor fault" };
+    NOTE.keep(Kind::HardFault, running, place, format_args!("{message}"));
+    board::restart();
+}
+
+fn text<const BYTES: usize>(text: &str) -> String<BYTES> {
+    String::try_from(text).unwrap_or_default()
 }
 
 impl Note {
+    /// Before [`Self::keep`].
+    fn keep_registers(&self, registers: Registers) {
+        for (kept, value) in self.registers.iter().zip(registers) {
+            kept.store(value, Ordering::Relaxed);
+        }
+    }
+
     fn keep(&self, kind: Kind, running: u16, place: fmt::Arguments, message: fmt::Arguments) {
         self.kind.store(kind as u32, Ordering::Relaxed);
         self.task.store(u32::from(running), Ordering::Relaxed);
+        self.at_ms.store(LAST_SEEN.now_ms.load(Ordering::Relaxed), Ordering::Relaxed);
         self.place.write(place);
         self.message.write(message);
         self.sum.store(self.sum_now(), Ordering::Relaxed);
@@ -141,7 +292,7 @@ impl Note {
 
     /// Any change of one word changes it; memory that was never written matches by a chance of 2^-32.
     fn sum_now(&self) -> u32 {
-        let words = [&self.kind, &self.task].into_iter().chain(&self.registers);
+        let words = [&self.kind, &self.task, &self.at_ms].into_iter().chain(&self.registers);
         let words = words.chain(&self.place.0).chain(&self.message.0);
         words.fold(MARK, |sum, word| {
             sum.rotate_left(5) ^ word.load(Ordering::Relaxed).wrapping_mul(0x9E37_79B1)
@@ -194,42 +345,17 @@ impl fmt::Write for TextWriter<'_> {
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
     cortex_m::interrupt::disable();
-    for register in &NOTE.registers {
-        register.store(0, Ordering::Relaxed);
-    }
+    NOTE.keep_registers(trap::now());
+    let (running, message) = (executors::running(), info.message());
     match info.location() {
         Some(place) => {
             // The end of a long path says more than its beginning.
             let file = place.file();
             let file = file.get(file.len().saturating_sub(FILE_BYTES)..).unwrap_or(file);
             let place = format_args!("{file}:{}", place.line());
-            NOTE.keep(Kind::Panic, executors::running(), place, format_args!("{}", info.message()));
+            NOTE.keep(Kind::Panic, running, place, format_args!("{message}"));
         }
-        None => NOTE.keep(
-            Kind::Panic,
-            executors::running(),
-            format_args!("?"),
-            format_args!("{}", info.message()),
-        ),
+        None => NOTE.keep(Kind::Panic, running, format_args!("?"), format_args!("{message}")),
     }
-    board::restart();
-}
-
-/// Every fault of the processor ends here, as the milder ones are not switched on.
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    // SAFETY: reading the status registers that every Cortex-M4 has (ARMv7-M, B3.2.2) has no side effect.
-    let [cfsr, hfsr, mmfar, bfar] = unsafe {
-        let scb = &*SCB::PTR;
-        [scb.cfsr.read(), scb.hfsr.read(), scb.mmfar.read(), scb.bfar.read()]
-    };
-    let (f, status) = (frame, [cfsr, hfsr, mmfar, bfar]);
-    let stacked = [f.r0(), f.r1(), f.r2(), f.r3(), f.r12(), f.lr(), f.pc(), f.xpsr()];
-    for (register, value) in NOTE.registers.iter().zip(stacked.into_iter().chain(status)) {
-        register.store(value, Ordering::Relaxed);
-    }
-    // What ran before this exception is in the stacked status.
-    let running = (f.xpsr() & 0x1FF) as u16;
-    NOTE.keep(Kind::HardFault, running, format_args!("pc {:08x}", f.pc()), format_args!("processor fault"));
     board::restart();
 }

@@ -18,16 +18,19 @@ mod links;
 mod memory;
 mod report;
 mod tasks;
+mod trap;
+mod watch;
 
 use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::params::Params;
+use hums_onboard::persist::mailbox::MailboxOut;
 use hums_onboard::queues::{Ends, Queues};
 use hums_onboard::{Handover, Keeper, Monitoring};
 use static_cell::{ConstStaticCell, StaticCell};
 
-use boards::board;
+use boards::{ResetCause, board};
 use tasks::monitor;
 
 static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
@@ -44,16 +47,18 @@ const ONCE: &str = "each task is spawned once";
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    start().run()
+}
+
+/// Puts all together and starts the tasks. Not a part of `main`, whose place on the stack is taken for good.
+#[inline(never)]
+fn start() -> board::Idle {
     // SAFETY: this is the program's first statement: nobody has touched CCM, no interrupt is unmasked.
     unsafe { memory::init() };
     board::remember();
-    let fault = fault::take();
     let boots = fault::count_start();
     let parts = board::take();
     defmt::info!("start {=u32}, {}, id {=[u8]:02x}", boots, parts.boot.cause, parts.boot.id);
-    if let Some(fault) = &fault {
-        defmt::error!("before this start: {}", defmt::Display2Format(fault));
-    }
 
     let queues = QUEUES.take().split();
     let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;
@@ -68,30 +73,50 @@ fn main() -> ! {
     };
     let monitor = MONITOR.take();
     let (items_in, items_out) = tasks::MAILBOX.split();
-    let keeper = KEEPER.init_with(|| Keeper::mount(parts.store, items_out, &tasks::STORE_STATUS));
-    if !parts.boot.cause.may_be_in_flight() {
-        keeper.turn_ahead();
-    }
-    keeper.load(monitor);
+    let keeper = restore(parts.store, items_out, parts.boot.cause, monitor);
     let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor));
-    let monitoring = MONITORING.init_with(|| {
-        Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
-    });
+    let monitoring = monitoring(monitor, identity);
     monitoring.restore_signing(keeper);
 
+    memory::depth::end_start();
     let on = executors::start();
     let (autopilot_rx, autopilot_tx) = parts.autopilot;
     let (gs_rx, gs_tx) = parts.gs;
     on.reception.spawn(tasks::reception::run(autopilot_rx, frames_in).expect(ONCE));
     let ends =
         monitor::Ends { frames: frames_out, uplink: queues.uplink_out, sectors: sectors_in, gs: gs_in };
-    on.monitor.spawn(monitor::run(monitoring, ends, handover, fault, parts.watchdog, parts.led).expect(ONCE));
+    on.monitor.spawn(
+        monitor::run(monitoring, ends, handover, parts.boot.cause, parts.watchdog, parts.led).expect(ONCE),
+    );
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
     on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
     on.storage.spawn(
         tasks::storage::run(parts.card, parts.boot.entropy, sectors_out, queues.shelf, keeper).expect(ONCE),
     );
-    let mut idle = parts.idle;
-    idle.run()
+    parts.idle
+}
+
+// Apart from `start`: what each builds on the stack is gone when the next one begins.
+
+#[inline(never)]
+fn restore(
+    store: Option<board::StoreFlash>,
+    items: MailboxOut<'static>,
+    cause: ResetCause,
+    monitor: &mut Monitor,
+) -> &'static mut Keeper<'static, board::StoreFlash> {
+    let keeper = KEEPER.init_with(|| Keeper::mount(store, items, &tasks::STORE_STATUS));
+    if !cause.may_be_in_flight() {
+        keeper.turn_ahead();
+    }
+    keeper.load(monitor);
+    keeper
+}
+
+#[inline(never)]
+fn monitoring(monitor: &'static mut Monitor, identity: Boot<'static>) -> &'static mut Monitoring<'static> {
+    MONITORING.init_with(|| {
+        Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+    })
 }

@@ -1,8 +1,4 @@
-//! Little-endian fields in and out of byte slices, bounded at both ends.
-
-use hums_core::time::Instant;
-
-use crate::record::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
+//! Little-endian fields out of byte slices, and copies between them, bounded at both ends.
 
 /// Copies `from` to the start of `to`, as far as there is room. Few bytes are copied in pieces of fixed sizes: less work
 /// than a call of `memcpy`, which the compiler makes of anything plainer.
@@ -70,10 +66,6 @@ impl<'a> Fields<'a> {
         u64::from_le_bytes(self.array())
     }
 
-    pub(crate) fn instant(&mut self) -> Instant {
-        Instant::from_micros(self.u64())
-    }
-
     /// A length and that many bytes; what is not UTF-8 ends the text.
     pub(crate) fn text(&mut self) -> &'a str {
         let len = self.u8();
@@ -82,67 +74,6 @@ impl<'a> Fields<'a> {
             Ok(text) => text,
             Err(error) => core::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
         }
-    }
-}
-
-/// Writes fields; remembers when there were too many.
-pub(crate) struct Sink<'a> {
-    out: &'a mut [u8],
-    len: usize,
-}
-
-impl<'a> Sink<'a> {
-    pub(crate) fn new(out: &'a mut [u8]) -> Self {
-        Self { out, len: 0 }
-    }
-
-    /// The bytes written, or `None` where they did not fit.
-    pub(crate) fn len(&self) -> Option<usize> {
-        (self.len <= self.out.len()).then_some(self.len)
-    }
-
-    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
-        let end = self.len.saturating_add(bytes.len());
-        if let Some(place) = self.out.get_mut(self.len..end) {
-            place.copy_from_slice(bytes);
-        }
-        self.len = end;
-        self
-    }
-
-    /// A record's kind, in its version 1.
-    pub(crate) fn head(&mut self, kind: u8) -> &mut Self {
-        self.u8(kind).u8(1)
-    }
-
-    pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
-        self.bytes(&[value])
-    }
-
-    pub(crate) fn u32(&mut self, value: u32) -> &mut Self {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    pub(crate) fn u64(&mut self, value: u64) -> &mut Self {
-        self.bytes(&value.to_le_bytes())
-    }
-
-    /// A name, cut at a character's border where it is too long.
-    pub(crate) fn name(&mut self, text: &str) -> &mut Self {
-        self.cut(text, NAME_BYTES_MAX)
-    }
-
-    /// A text, cut likewise.
-    pub(crate) fn text(&mut self, text: &str) -> &mut Self {
-        self.cut(text, TEXT_BYTES_MAX)
-    }
-
-    fn cut(&mut self, text: &str, bytes_max: usize) -> &mut Self {
-        let mut end = text.len().min(bytes_max);
-        while !text.is_char_boundary(end) {
-            end -= 1;
-        }
-        self.u8(end as u8).bytes(&text.as_bytes()[..end])
     }
 }
 

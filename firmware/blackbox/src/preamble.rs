@@ -7,7 +7,7 @@
 //!  14  u64: UTC at power-on, microseconds since 1970; 0 where it is not known yet
 //! ```
 
-use crate::bytes::{Fields, Sink};
+use crate::bytes::Fields;
 
 pub(crate) const PREAMBLE_BYTES: usize = 22;
 
@@ -27,11 +27,10 @@ pub struct Preamble {
 impl Preamble {
     pub(crate) fn store(&self) -> [u8; PREAMBLE_BYTES] {
         let mut out = [0; PREAMBLE_BYTES];
-        Sink::new(&mut out)
-            .u32(self.layouts)
-            .bytes(&self.start_ms.to_le_bytes()[..6])
-            .u32(self.frames_before)
-            .u64(self.epoch_micros.unwrap_or(0));
+        out[..4].copy_from_slice(&self.layouts.to_le_bytes());
+        out[4..10].copy_from_slice(&self.start_ms.to_le_bytes()[..6]);
+        out[10..14].copy_from_slice(&self.frames_before.to_le_bytes());
+        out[14..].copy_from_slice(&self.epoch_micros.unwrap_or(0).to_le_bytes());
         out
     }
 

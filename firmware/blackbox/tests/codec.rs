@@ -1,28 +1,16 @@
 //! The codec, from outside: whatever a link carries comes back bit for bit, with its times.
 #![allow(clippy::panic, reason = "that is how a test fails")]
 
+#[path = "common/card.rs"]
+mod card;
 mod common;
 
+use card::Card;
 use common::Random;
-use hums_blackbox::record::{Clock, Note};
-use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, SectorSink, Writer};
+use hums_blackbox::record::{Clock, Note, RECORD_BYTES_MAX};
+use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, Writer};
 use hums_core::time::Instant;
 use proptest::prelude::*;
-
-#[derive(Default)]
-struct Card(Vec<Sector>);
-
-impl SectorSink for Card {
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-
-    fn put(&mut self, sector: &Sector) {
-        let mut sector = *sector;
-        sector.seal(42);
-        self.0.push(sector);
-    }
-}
 
 type Frame = (u64, Vec<u8>, bool);
 
@@ -218,6 +206,56 @@ fn records_among_frames_come_back_in_order() {
     assert_eq!(found, frames);
     assert_eq!(notes.len(), 300);
     assert_eq!(notes[299], "note 2990");
+}
+
+#[test]
+fn records_of_any_shape_and_with_any_numbers_come_back() {
+    let mut random = Random(13);
+    let stored: Vec<Vec<u8>> = (0..3_000)
+        .map(|index| {
+            let (words, halves) = (random.below(125), random.below(10));
+            let calm = random.below(2) == 0;
+            // Sometimes with more or less than the head says, and up to the longest; numbers that stay or that jump.
+            let len = match index % 10 {
+                0 => random.below(RECORD_BYTES_MAX + 1),
+                1 => RECORD_BYTES_MAX,
+                _ => (4 + 4 * words + 2 * halves + random.below(20)).min(RECORD_BYTES_MAX),
+            };
+            let mut bytes: Vec<u8> = (0..len).map(|_| if calm { 7 } else { random.next() as u8 }).collect();
+            let head =
+                [100 + (index % 40) as u8, 1 + 0x10 * random.below(4) as u8, words as u8, halves as u8];
+            bytes.iter_mut().zip(head).for_each(|(place, byte)| *place = byte);
+            bytes
+        })
+        .filter(|bytes| bytes.len() >= 2)
+        .collect();
+    let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
+    for (index, bytes) in stored.iter().enumerate() {
+        let at = Instant::from_millis(index as u64 * 7);
+        writer.record(at, &Record::read(bytes), &mut card).expect("room");
+    }
+    writer.finish(&mut card);
+    let mut reader = Box::new(LogReader::new());
+    let mut expected = stored.iter().enumerate();
+    let mut sectors = card.0.iter();
+    let mut ended = false;
+    while !ended {
+        match sectors.next() {
+            Some(sector) => reader.feed(sector.bytes()),
+            None => reader.end(),
+        }
+        while let Some(item) = reader.next() {
+            match item {
+                Item::Record { at, record, .. } => {
+                    let (index, bytes) = expected.next().expect("no more than were written");
+                    assert_eq!((at.as_millis(), record), (index as u64 * 7, Record::read(bytes)));
+                }
+                Item::End(_) => ended = true,
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+    assert_eq!(expected.next(), None);
 }
 
 #[test]

@@ -3,26 +3,15 @@
 //! `mixed-1.log` holds frames and records made by `stream` below, in several groups. When it must be made anew (only
 //! before the version is published): `HUMS_GOLDEN=write cargo test -p hums-blackbox --test golden`.
 
+#[path = "common/card.rs"]
+mod card;
+
 use std::path::PathBuf;
 
-use hums_blackbox::record::{Boot, Clock, Note, Stats};
-use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Sector, SectorSink, Writer};
+use card::Card;
+use hums_blackbox::record::{Boot, Clock, Moment, Note, Stats, Usage};
+use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
 use hums_core::time::Instant;
-
-#[derive(Default)]
-struct Card(Vec<u8>);
-
-impl SectorSink for Card {
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-
-    fn put(&mut self, sector: &Sector) {
-        let mut sector = *sector;
-        sector.seal(0x4855_4d53);
-        self.0.extend_from_slice(sector.bytes());
-    }
-}
 
 /// Frames of the kinds that matter: floats that wander, counters, decimals, times, text, two senders, both versions, a
 /// wrong checksum, an unknown id, a signed one, a repeated one.
@@ -115,13 +104,22 @@ fn write() -> Vec<u8> {
         if index % 1_000 == 999 {
             let stats = Stats { frames_in: index as u64, ..Stats::default() };
             writer.record(at, &Record::Stats(stats), &mut card).expect("room");
+            let note = Note { severity: 6, text: "a thousand more" };
+            writer.record(at, &Record::Note(note), &mut card).expect("room");
+            let counters = [(0, index as f32 / 8.0), (1, 0.0), (7, -1.5), (8, f32::NAN)];
             writer
-                .record(at, &Record::Note(Note { severity: 6, text: "a thousand more" }), &mut card)
+                .record(at, &Record::Usage(Usage::new(Moment::Periodic, &counters)), &mut card)
                 .expect("room");
+            // A kind that there is not, with a time, halves and bytes; and one whose head says more than there is.
+            let [a, b, c, d, ..] = at.as_micros().to_le_bytes();
+            let known =
+                [200, 0x1f, 3, 4, a, b, c, d, 0, 0, 0, 0, 1, 2, 3, 4, 0, 0, 9, 0, 0, 0x80, 255, 255, 1, 2];
+            writer.record(at, &Record::read(&known), &mut card).expect("room");
+            writer.record(at, &Record::read(&[201, 1, 200, 0, 5]), &mut card).expect("room");
         }
     }
     assert!(writer.finish(&mut card));
-    card.0
+    card.0.iter().flat_map(|sector| *sector.bytes()).collect()
 }
 
 fn golden() -> PathBuf {
@@ -164,6 +162,6 @@ fn the_reader_reads_version_1() {
         }
     };
     assert!(frames == stream());
-    assert_eq!(records, 14);
+    assert_eq!(records, 32);
     assert!(end.closed && end.groups >= 2, "{end:?}");
 }

@@ -352,6 +352,17 @@ impl Component {
         self.base
     }
 
+    /// The same, having run so much.
+    pub const fn having_run(self, ran: Figures) -> Self {
+        Self { base: ran, ..self }
+    }
+
+    /// The same in a session that has counted so much of what it ran already.
+    pub(crate) fn in_session(self, wear: &Wear<'_>) -> Self {
+        let counted = Figures::after(wear, self.kind, self.number);
+        self.having_run(self.base.zip(counted, |ran, counted| ran - counted))
+    }
+
     /// Whether it is to be saved anew, because it was stored as of an earlier power-on.
     pub(crate) const fn begin(&mut self, boots: u32) -> bool {
         let begins = self.as_of != boots;

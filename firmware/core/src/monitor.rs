@@ -425,6 +425,15 @@ impl Monitor {
         self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
     }
 
+    /// Takes a component as another monitor of this vehicle has it in this very session: what is counted from here on
+    /// adds to it.
+    pub fn learn_component(&mut self, place: usize, known: Component) {
+        let known = known.in_session(&self.usage.wear());
+        if let Some(component) = self.components.get_mut(place) {
+            *component = known;
+        }
+    }
+
     /// Another part is in a component's place. Gives the old one with what it had run, to be recorded; `None` where
     /// there is no such component.
     pub fn replace_component(&mut self, place: usize, serial: Label) -> Option<Component> {

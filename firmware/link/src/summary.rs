@@ -113,6 +113,19 @@ const fn interval_ms(index: usize) -> u32 {
     }) as u32
 }
 
+/// How the box itself is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OwnFigures {
+    /// What the processor was busy in the last second, percent; 0 where nobody counts.
+    pub cpu_percent: f32,
+    /// The deepest the stack was, percent of it.
+    pub stack_percent: f32,
+    /// The fullest the sector queue was, percent.
+    pub queue_percent: f32,
+    /// The longest the card took for one call, seconds.
+    pub stall_s: f32,
+}
+
 /// The summary stream.
 #[derive(Clone, Debug)]
 pub struct Summary {
@@ -120,6 +133,8 @@ pub struct Summary {
     pub outlet: Outlet,
     /// Whether the vehicle's frames are forwarded: not where the autopilot itself carries the stream.
     pub forwards: bool,
+    /// What the box says of itself.
+    pub own: OwnFigures,
     vehicle: Option<Source>,
     turns: [Turn; TURNS],
     next_value: usize,
@@ -139,6 +154,7 @@ impl Summary {
                 WAITING_BYTES,
             ),
             forwards: true,
+            own: OwnFigures::default(),
             vehicle: None,
             turns: [Turn { due_ms: 0, seen_ms: 0, bytes: 0, known: false }; TURNS],
             next_value: 0,
@@ -261,7 +277,7 @@ impl Summary {
             let packet = if index == STATE {
                 messages::named_int(now, "HUMS_STATE", state(monitor))
             } else {
-                value(now, monitor, self.next_value)
+                value(now, monitor, &self.own, self.next_value)
             };
             if self.outlet.send(now, Class::Forward, &packet, out) {
                 self.turns[index].took(now_ms, interval_ms(index));
@@ -288,8 +304,8 @@ pub fn heartbeat(monitor: &Monitor) -> crate::packet::Packet {
 }
 
 /// The values that are told in turn: the level of all and of each subsystem (0 ok, 1 advisory, 2 warning, 3 critical,
-/// 4 stale), and what usage a pilot asks for. The overall level comes every other time.
-const VALUE_NAMES: [&str; 24] = [
+/// 4 stale), what usage a pilot asks for, and how the box is doing. The overall level comes every other time.
+const VALUE_NAMES: [&str; 32] = [
     "HUMS_LEVEL",
     "L_POWER",
     "HUMS_LEVEL",
@@ -314,14 +330,26 @@ const VALUE_NAMES: [&str; 24] = [
     "FLIGHTS",
     "HUMS_LEVEL",
     "DIST_M",
+    "HUMS_LEVEL",
+    "CPU_PCT",
+    "HUMS_LEVEL",
+    "STACK_PCT",
+    "HUMS_LEVEL",
+    "QUEUE_PCT",
+    "HUMS_LEVEL",
+    "SD_STALL_S",
 ];
 
-fn value(now: Instant, monitor: &Monitor, index: usize) -> crate::packet::Packet {
+fn value(now: Instant, monitor: &Monitor, own: &OwnFigures, index: usize) -> crate::packet::Packet {
     let usage = |counter| monitor.usage().value(counter).unwrap_or(0.0) as f32;
     let value = match index {
         19 => usage(UsageCounter::Flight),
         21 => usage(UsageCounter::Flights),
         23 => usage(UsageCounter::Distance),
+        25 => own.cpu_percent,
+        27 => own.stack_percent,
+        29 => own.queue_percent,
+        31 => own.stall_s,
         _ if index % 2 == 1 => match Subsystem::ALL.get(index / 2) {
             Some(subsystem) => f32::from(monitor.health().subsystem(*subsystem) as u8),
             None => 0.0,

@@ -240,6 +240,7 @@ impl Monitoring<'_> {
     }
 
     /// What time alone asks for, every tick: our heartbeat to the autopilot, what we ask of it, answers that wait.
+    #[inline(never)]
     pub(crate) fn converse(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
         gs.set_path(match self.monitor.params().get(Param::GsPath) as u8 {
             0 => Path::Nobody,

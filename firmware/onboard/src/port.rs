@@ -14,6 +14,7 @@ pub struct PortStatus {
     frames: AtomicU32,
     frames_lost: AtomicU32,
     overrun: AtomicU32,
+    queue_bytes_max: AtomicU32,
 }
 
 /// A reading of [`PortStatus`], or a difference of two.
@@ -57,7 +58,17 @@ impl PortStatus {
             frames: AtomicU32::new(0),
             frames_lost: AtomicU32::new(0),
             overrun: AtomicU32::new(0),
+            queue_bytes_max: AtomicU32::new(0),
         }
+    }
+
+    /// The most bytes that waited in the frame queue at once.
+    pub fn queue_bytes_max(&self) -> u32 {
+        self.queue_bytes_max.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn set_queue_bytes_max(&self, bytes: u32) {
+        self.queue_bytes_max.store(bytes, Ordering::Relaxed);
     }
 
     /// All counters; each is right by itself, they may be a moment apart.

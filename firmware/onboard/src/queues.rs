@@ -8,6 +8,8 @@
 //! | uplink | uplink | monitor | [`UPLINK_QUEUE_BYTES`] | the frame is lost, counted; whoever asks the ground station's port must ask again |
 //! | autopilot | monitor | requests | [`AUTOPILOT_QUEUE_BYTES`] | the frame is lost, counted; requests are repeated |
 
+use core::sync::atomic::{AtomicU32, Ordering};
+
 use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use heapless::spsc;
@@ -16,8 +18,9 @@ use hums_link::{outlet, summary};
 
 use crate::shelf::{Reader, Server, Shelf};
 
-/// 40 ms of a line at 921,600 baud: the monitor's longest step, a tick that finds, logs and tells, takes one or two.
-pub const FRAME_QUEUE_BYTES: usize = 4 * 1024;
+/// 16 ms of a line at 921,600 baud, stamps included: the monitor's longest step, a tick that records everything there
+/// is, takes 4 (`ARCHITECTURE.md` has the figures).
+pub const FRAME_QUEUE_BYTES: usize = 2 * 1024;
 
 /// What the port's outlet lets wait, findings and all, and the end of the queue that the longest frame does not fit into.
 pub const GS_QUEUE_BYTES: usize = (summary::WAITING_BYTES + outlet::FINDINGS) as usize + GS_FRAME_BYTES_MAX;
@@ -29,10 +32,11 @@ pub const UPLINK_QUEUE_BYTES: usize = 1024;
 pub const AUTOPILOT_QUEUE_BYTES: usize = 1100;
 
 /// 2.5 s of a standing card at 921,600 baud: 92 kB/s at 3.5 times smaller is 66 KB; storage holds eight sectors more.
-pub const SECTOR_QUEUE_SECTORS: usize = 134;
+pub const SECTOR_QUEUE_SECTORS: usize = 132;
 
-/// Sectors kept free for findings and losses when frames are refused already.
-pub const SECTOR_RESERVE: usize = 2 * ENTRY_SECTORS_MAX;
+/// Sectors kept free for findings and losses when frames are refused already: two sectors of them, as the last has to
+/// leave room for the longest entry there is.
+pub const SECTOR_RESERVE: usize = ENTRY_SECTORS_MAX + 1;
 
 /// Bytes of log that the sector queue holds.
 pub const SECTOR_QUEUE_BYTES: usize = SECTOR_QUEUE_SECTORS * SECTOR_BYTES;
@@ -55,6 +59,7 @@ pub struct Queues {
     autopilot: AutopilotQueue,
     sectors: SectorQueue,
     shelf: Shelf,
+    levels: [Level; 4],
 }
 
 /// The ends of all queues, each for one task.
@@ -97,6 +102,7 @@ impl Queues {
             autopilot: Churrasco::new(),
             sectors: spsc::Queue::new(),
             shelf: Shelf::new(),
+            levels: [const { Level::new() }; 4],
         }
     }
 
@@ -104,23 +110,50 @@ impl Queues {
     pub fn split(&mut self) -> Ends<'_> {
         let (sectors_in, sectors_out) = self.sectors.split();
         let (reader, shelf) = self.shelf.split();
+        let [frames, gs, uplink, autopilot] = &self.levels;
         Ends {
-            frames_in: FramesIn(self.frames.framed_producer()),
-            frames_out: FramesOut(self.frames.framed_consumer()),
+            frames_in: FramesIn(self.frames.framed_producer(), frames),
+            frames_out: FramesOut(self.frames.framed_consumer(), frames),
             sectors_in: SectorsIn { queue: sectors_in, reserve: SECTOR_RESERVE, deepest: 0 },
             sectors_out: SectorsOut(sectors_out),
             gs_in: GsIn {
-                gs: PortIn::new(self.gs.framed_producer()),
-                autopilot: PortIn::new(self.autopilot.framed_producer()),
+                gs: PortIn::new(self.gs.framed_producer(), gs),
+                autopilot: PortIn::new(self.autopilot.framed_producer(), autopilot),
                 shelf: reader,
                 path: Path::Port,
             },
             shelf,
-            gs_out: PortOut(self.gs.framed_consumer()),
-            uplink_in: FramesIn(self.uplink.framed_producer()),
-            uplink_out: FramesOut(self.uplink.framed_consumer()),
-            autopilot_out: PortOut(self.autopilot.framed_consumer()),
+            gs_out: PortOut(self.gs.framed_consumer(), gs),
+            uplink_in: FramesIn(self.uplink.framed_producer(), uplink),
+            uplink_out: FramesOut(self.uplink.framed_consumer(), uplink),
+            autopilot_out: PortOut(self.autopilot.framed_consumer(), autopilot),
         }
+    }
+}
+
+/// How full a queue is, and was at most.
+#[derive(Debug, Default)]
+struct Level {
+    bytes: AtomicU32,
+    bytes_max: AtomicU32,
+}
+
+impl Level {
+    const fn new() -> Self {
+        Self { bytes: AtomicU32::new(0), bytes_max: AtomicU32::new(0) }
+    }
+
+    fn rise(&self, bytes: usize) {
+        let before = self.bytes.fetch_add(bytes as u32, Ordering::Relaxed);
+        self.bytes_max.fetch_max(before.wrapping_add(bytes as u32), Ordering::Relaxed);
+    }
+
+    fn fall(&self, bytes: usize) {
+        self.bytes.fetch_sub(bytes as u32, Ordering::Relaxed);
+    }
+
+    fn max(&self) -> u32 {
+        self.bytes_max.load(Ordering::Relaxed)
     }
 }
 
@@ -128,7 +161,10 @@ impl Queues {
 const STAMP_BYTES: usize = 9;
 
 /// The frame queue's writing end.
-pub struct FramesIn<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(FramedProducer<&'a Churrasco<BYTES>>);
+pub struct FramesIn<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(
+    FramedProducer<&'a Churrasco<BYTES>>,
+    &'a Level,
+);
 /// The uplink queue's writing end.
 pub type UplinkIn<'a> = FramesIn<'a, UPLINK_QUEUE_BYTES>;
 
@@ -140,13 +176,23 @@ impl<const BYTES: usize> FramesIn<'_, BYTES> {
         grant[..8].copy_from_slice(&at_micros.to_le_bytes());
         grant[8] = u8::from(verified);
         grant[STAMP_BYTES..len].copy_from_slice(frame);
+        // Before anybody can take it out.
+        self.1.rise(len);
         grant.commit(len as u16);
         true
+    }
+
+    /// The most bytes that waited at once.
+    pub fn bytes_max(&self) -> u32 {
+        self.1.max()
     }
 }
 
 /// The frame queue's reading end.
-pub struct FramesOut<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(FramedConsumer<&'a Churrasco<BYTES>>);
+pub struct FramesOut<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(
+    FramedConsumer<&'a Churrasco<BYTES>>,
+    &'a Level,
+);
 /// The uplink queue's reading end.
 pub type UplinkOut<'a> = FramesOut<'a, UPLINK_QUEUE_BYTES>;
 
@@ -159,6 +205,7 @@ impl<const BYTES: usize> FramesOut<'_, BYTES> {
             at.copy_from_slice(&stamp[..8]);
             take(u64::from_le_bytes(at), stamp[8] != 0, frame);
         }
+        self.1.fall(grant.len());
         grant.release();
         true
     }
@@ -307,19 +354,25 @@ impl GsIn<'_> {
     pub const fn lost(&self) -> u64 {
         self.gs.lost
     }
+
+    /// The most bytes that waited for the GS port at once.
+    pub fn bytes_max(&self) -> u32 {
+        self.gs.level.max()
+    }
 }
 
 /// The writing end of a port's queue, with what went in.
 pub struct PortIn<'a, const BYTES: usize> {
     queue: FramedProducer<&'a Churrasco<BYTES>>,
+    level: &'a Level,
     frames: u64,
     bytes: u64,
     lost: u64,
 }
 
 impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
-    const fn new(queue: FramedProducer<&'a Churrasco<BYTES>>) -> Self {
-        Self { queue, frames: 0, bytes: 0, lost: 0 }
+    const fn new(queue: FramedProducer<&'a Churrasco<BYTES>>, level: &'a Level) -> Self {
+        Self { queue, level, frames: 0, bytes: 0, lost: 0 }
     }
 
     /// Queues a frame, or counts it lost.
@@ -330,6 +383,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
             return;
         };
         grant.copy_from_slice(frame);
+        self.level.rise(frame.len());
         grant.commit(len);
         self.frames += 1;
         self.bytes += frame.len() as u64;
@@ -347,7 +401,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
 }
 
 /// The reading end of a port's queue.
-pub struct PortOut<'a, const BYTES: usize>(FramedConsumer<&'a Churrasco<BYTES>>);
+pub struct PortOut<'a, const BYTES: usize>(FramedConsumer<&'a Churrasco<BYTES>>, &'a Level);
 /// The GS queue's reading end.
 pub type GsOut<'a> = PortOut<'a, GS_QUEUE_BYTES>;
 /// The autopilot queue's reading end.
@@ -359,6 +413,7 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         let grant = self.0.read().ok()?;
         let len = grant.len().min(out.len());
         out[..len].copy_from_slice(&grant[..len]);
+        self.1.fall(grant.len());
         grant.release();
         Some(len)
     }
@@ -388,6 +443,22 @@ mod tests {
             assert!(seen, "frame {expected}");
         }
         assert!(!ends.frames_out.take(|_, _, _| panic!("the queue should be empty")));
+    }
+
+    #[test]
+    fn how_full_a_queue_was_is_remembered_when_it_is_empty_again() {
+        let mut queues = Box::new(Queues::new());
+        let mut ends = queues.split();
+        let mut out = [0; GS_FRAME_BYTES_MAX];
+        for frames in [3, 1] {
+            for _ in 0..frames {
+                ends.frames_in.put(0, true, &[1; 50]);
+                ends.gs_in.put(&[7; 100]);
+            }
+            while ends.frames_out.take(|_, _, _| {}) && ends.gs_out.take(&mut out).is_some() {}
+            assert_eq!(ends.frames_in.bytes_max(), 3 * (50 + STAMP_BYTES as u32));
+            assert_eq!(ends.gs_in.bytes_max(), 300);
+        }
     }
 
     #[test]

@@ -25,6 +25,16 @@ impl Task {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Reception, Self::Monitor, Self::Downlink, Self::Storage];
 
+    /// As the log names it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Reception => "reception",
+            Self::Monitor => "monitor",
+            Self::Downlink => "downlink",
+            Self::Storage => "storage",
+        }
+    }
+
     /// How long it may be silent. The short ones have nothing to wait for but the ground station's port, 70 ms for its
     /// longest frame at 38,400 baud; storage waits for its card, and that has an end ([`SERVICE_MAX`]).
     pub const fn silence_max(self) -> Span {

@@ -25,8 +25,9 @@ use heapless::Vec;
 use crate::layout::Layout;
 
 /// Metadata blocks held back in a transaction: the FAT blocks of the segment in work, its directory block, and the
-/// information sector. FAT blocks beyond this are written early, which is harmless: nothing refers to them yet.
-pub const HELD_BLOCKS: usize = 12;
+/// information sector. An 8 MiB segment's chain lies in up to three blocks of each FAT where clusters have 32 KiB, as on
+/// cards of 32 GB; FAT blocks beyond this are written early, which is harmless: nothing refers to them yet.
+pub const HELD_BLOCKS: usize = 8;
 
 /// What went wrong below the file system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

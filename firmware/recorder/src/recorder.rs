@@ -118,15 +118,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             return false;
         }
         self.retry_at = now + RETRY;
-        let Slot::Waiting(device) = core::mem::replace(&mut self.slot, Slot::Moving) else { return false };
-        device.reset();
-        match Card::mount(device, self.status, self.held) {
-            Ok(card) => self.slot = Slot::Mounted(card),
-            Err((device, error)) => {
-                self.slot = Slot::Waiting(device);
-                self.tell(&error);
-                return false;
-            }
+        if !self.mount() {
+            return false;
         }
         self.room_known = false;
         self.status.set_room_permille(None);
@@ -134,6 +127,24 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             Ok(()) => true,
             Err(error) => {
                 self.give_up(now, &error);
+                false
+            }
+        }
+    }
+
+    /// Not within its caller: the volumes that are moved here are not to lie on the stack below what follows.
+    #[inline(never)]
+    fn mount(&mut self) -> bool {
+        let Slot::Waiting(device) = core::mem::replace(&mut self.slot, Slot::Moving) else { return false };
+        device.reset();
+        match Card::mount(device, self.status, self.held) {
+            Ok(card) => {
+                self.slot = Slot::Mounted(card);
+                true
+            }
+            Err((device, error)) => {
+                self.slot = Slot::Waiting(device);
+                self.tell(&error);
                 false
             }
         }

@@ -9,7 +9,7 @@ use hums_core::time::Instant;
 use hums_link::{Check, Frame, observe};
 
 use crate::logs::Log;
-use crate::logs::reader::{Collect, Deliver, epoch, read};
+use crate::logs::reader::{Collect, Deliver, read};
 use crate::utc::iso8601;
 
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
@@ -23,6 +23,8 @@ pub struct Identity {
     pub session: String,
     /// What tells two logs of equal names apart.
     pub extent: Extent,
+    /// UTC at power-on, microseconds since 1970.
+    pub epoch_us: Option<u64>,
 }
 
 /// Frames, and the times of the first and the last entry.
@@ -41,11 +43,12 @@ impl Identity {
             (None, None) => "unknown".to_owned(),
         };
         let utc_us =
-            epoch(log)?.zip(summary.first).map(|(epoch, first)| epoch.saturating_add(first.as_micros()));
+            summary.epoch_us.zip(summary.first).map(|(epoch, first)| epoch.saturating_add(first.as_micros()));
         let session =
             summary.session.map_or_else(|| "unknown".to_owned(), |session| format!("s{session:08x}"));
         let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
-        Ok(Self { vehicle, date, session, extent: (summary.frames, summary.first, summary.last) })
+        let extent = (summary.frames, summary.first, summary.last);
+        Ok(Self { vehicle, date, session, extent, epoch_us: summary.epoch_us })
     }
 }
 

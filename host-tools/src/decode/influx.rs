@@ -13,12 +13,11 @@
 //! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a message may
 //! come twice: the second one's time is a nanosecond later, so that none replaces another.
 
-use std::borrow::Cow;
-
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use hums_dialect::{Field, Kind};
 
+use super::names::free_name;
 use super::record::{Cell, Row};
 use super::reference::{Quantity, Reference};
 use super::text::{push_finite, push_hex, push_integer};
@@ -27,6 +26,8 @@ use crate::mavlink::values::{Payload, Scalar, Value};
 
 /// Columns of records that are tags: few values, and what one groups by.
 const TAGS: [&str; 3] = ["subsystem", "check", "counter"];
+/// Names that the database or our tags have already: a field called `time` would be dropped.
+pub(super) const TAKEN: [&str; 5] = ["time", "vehicle", "session", "system", "component"];
 /// `ACTUATOR_OUTPUT_STATUS`
 const ACTUATORS: u32 = 375;
 
@@ -236,7 +237,7 @@ impl<'a> Fields<'a> {
     }
 
     fn value(&mut self, field: &Field, value: Value<'_>) {
-        let name = free_name(field.name);
+        let name = free_name(field.name, &TAKEN);
         match value {
             Value::Scalar(scalar) => self.scalar(field, &name, scalar),
             Value::Text(text) => self.text(&name, &String::from_utf8_lossy(text)),
@@ -296,15 +297,6 @@ impl<'a> Fields<'a> {
             }
             Cell::Unknown(_) => {}
         }
-    }
-}
-
-/// The name of a message's field, with `_field` behind it where the database or our tags have that name already: a
-/// field called `time` would be dropped.
-fn free_name(name: &str) -> Cow<'_, str> {
-    match name {
-        "time" | "vehicle" | "session" | "system" | "component" => Cow::Owned(format!("{name}_field")),
-        _ => Cow::Borrowed(name),
     }
 }
 

@@ -18,6 +18,7 @@ pub mod collect;
 pub mod columns;
 pub mod identity;
 pub mod influx;
+mod names;
 pub mod parquet;
 pub mod record;
 pub mod reference;
@@ -36,14 +37,15 @@ use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::{self, Format};
-use crate::logs::{self, Log, reader};
+use crate::logs::reader::{self, Summary};
+use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::output;
 use collect::{Collected, Selection};
 use identity::{Extent, Identity};
 use influx::Tags;
 use side_by_side::side_by_side;
-use write::{Destination, Writers};
+use write::{Destination, Writers, Written};
 
 /// Runs `hums decode`.
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
@@ -160,7 +162,15 @@ impl Task<'_> {
         let mut remarks = Vec::new();
         let mut context =
             Context { formats: self.formats, selection: self.selection.clone(), ..Context::default() };
-        context.epoch_us = reader::epoch(log)?;
+        context.epoch_us = if self.formats.influx || self.formats.parquet {
+            context.identity = Identity::of(log)?;
+            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+            context.identity.epoch_us
+        } else if self.standard_output {
+            reader::epoch(log)?
+        } else {
+            reader::likely_epoch(log)?
+        };
         if context.epoch_us.is_none() {
             context.selection.check_without_utc(&log.name)?;
             remarks.push(format!(
@@ -169,10 +179,6 @@ impl Task<'_> {
             ));
         }
         let mut parquet = None;
-        if self.formats.influx || self.formats.parquet {
-            context.identity = Identity::of(log)?;
-            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
-        }
         if self.formats.parquet {
             parquet = sessions.lock().ok().and_then(|mut sessions| {
                 claim(&mut sessions, &partition(self.output, &context.identity), context.identity.extent)
@@ -185,17 +191,12 @@ impl Task<'_> {
                 ));
             }
         }
-        let destination = if self.standard_output {
-            Destination::Standard
-        } else {
-            Destination::new(self.output, log, self.logs, self.formats)
-        };
-        let mut writers = Writers::new(&context, destination, parquet)?;
-        let bar = progress_bar(log);
-        let new = || Collected::new(&context);
-        let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
-        bar.finish_and_clear();
-        let written = writers.finish()?;
+        let (mut summary, mut written) = self.write(log, &context, parquet.as_deref())?;
+        if summary.epoch_us != context.epoch_us && !self.standard_output {
+            // Only its last group knew better: all of it again, with that.
+            context.epoch_us = summary.epoch_us;
+            (summary, written) = self.write(log, &context, parquet.as_deref())?;
+        }
         let lossy = summary.gaps > 0 || summary.blocks.damaged > 0 || written.losses > 0;
         if lossy {
             remarks.push(format!(
@@ -205,6 +206,21 @@ impl Task<'_> {
         }
         let lines = if self.standard_output { Vec::new() } else { written.lines };
         Ok(Done { outcome: Outcome::lossy(lossy), lines, remarks })
+    }
+
+    /// Reads a log and writes its files.
+    fn write(&self, log: &Log, context: &Context, parquet: Option<&Path>) -> Result<(Summary, Written)> {
+        let destination = if self.standard_output {
+            Destination::Standard
+        } else {
+            Destination::new(self.output, log, self.logs, self.formats)
+        };
+        let mut writers = Writers::new(context, destination, parquet.map(Path::to_owned))?;
+        let bar = progress_bar(log);
+        let new = || Collected::new(context);
+        let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
+        bar.finish_and_clear();
+        Ok((summary, writers.finish()?))
     }
 }
 

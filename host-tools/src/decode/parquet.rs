@@ -28,6 +28,7 @@ use rayon::prelude::*;
 
 use super::collect::Table;
 use super::columns::{Column, TextColumn, cell_array, cell_data_type};
+use super::names::free_name;
 use super::record::Row;
 use super::write::make_directory;
 use crate::mavlink::frame::Frame;
@@ -44,8 +45,9 @@ const PAGE_BYTES: usize = 64 * 1024;
 
 /// Names that every table has: its own first columns, and those that its place among the directories adds.
 const TAKEN: [&str; 5] = ["boot_s", "utc", "vehicle", "date", "session"];
-/// Names that tables of frames have besides.
-const TAKEN_FRAMES: [&str; 2] = ["system", "component"];
+/// Names that tables of frames have: those, and who sent the frame.
+pub(super) const TAKEN_FRAMES: [&str; 7] =
+    ["boot_s", "utc", "vehicle", "date", "session", "system", "component"];
 
 /// One group's entries as columns.
 #[derive(Debug, Default)]
@@ -188,7 +190,7 @@ fn frame_schema(table: Table) -> SchemaRef {
     if let Table::Message(id) = table {
         for field in hums_dialect::message(id).map(|message| message.fields).unwrap_or_default() {
             let arrow =
-                Field::new(column_name(field.name, &TAKEN_FRAMES), Column::of(field).data_type(), false);
+                Field::new(free_name(field.name, &TAKEN_FRAMES), Column::of(field).data_type(), false);
             fields.push(with_units(arrow, field.units, field.enumeration));
         }
     } else {
@@ -196,12 +198,6 @@ fn frame_schema(table: Table) -> SchemaRef {
         fields.extend([id, byte("sequence"), Field::new("payload", DataType::Utf8, false)]);
     }
     Arc::new(Schema::new(fields))
-}
-
-/// A column under its own name, unless that is taken.
-fn column_name(name: &str, taken: &[&str]) -> String {
-    let taken = TAKEN.contains(&name) || taken.contains(&name);
-    if taken { format!("{name}_field") } else { name.to_owned() }
 }
 
 fn with_units(field: Field, units: &str, enumeration: &str) -> Field {
@@ -228,7 +224,7 @@ impl RowColumns {
             let plain = plain.replace('%', "percent");
             let cells = self.rows.iter().map(|row| row.cells.get(place).map(|(_, cell)| cell));
             arrays.push(cell_array(&data_type, cells));
-            fields.push(with_units(Field::new(column_name(&plain, &[]), data_type, true), units, ""));
+            fields.push(with_units(Field::new(free_name(&plain, &TAKEN), data_type, true), units, ""));
         }
         Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)?)
     }

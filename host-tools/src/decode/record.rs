@@ -1,6 +1,6 @@
 //! The monitor's own records as rows of tables: `HUMS_FINDING`, `HUMS_USAGE`, `HUMS_LOSS` and so on.
 
-use hums_blackbox::record::{Record, UsageValue};
+use hums_blackbox::record::Record;
 use hums_core::time::Instant;
 
 use super::text::{push_csv_number, push_csv_text, push_hex, push_integer, push_json_number, push_json_text};
@@ -138,12 +138,8 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
     match record {
         Record::Usage(usage) => {
             let moment = format!("{:?}", usage.moment).to_ascii_lowercase();
-            let row = |(number, value): (u8, UsageValue)| {
-                let value = match value {
-                    UsageValue::Real(value) => Cell::Double(value),
-                    UsageValue::Count(value) => Cell::Count(value),
-                };
-                let name = Cell::Text(super::usage::name(number));
+            let row = |(number, value)| {
+                let (name, value) = (Cell::Text(super::usage::name(number)), Cell::Single(value));
                 Row::new("HUMS_USAGE", vec![("moment", text(&moment)), ("counter", name), ("value", value)])
             };
             usage.iter().map(row).collect()
@@ -172,6 +168,14 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("sd_stall_ms_max", count(stats.sd_stall_ms_max)),
                 ("gs_frames", count(stats.gs_frames)),
                 ("gs_bytes", count(stats.gs_bytes)),
+                ("frame_queue_bytes_max", count(stats.frame_queue_bytes_max)),
+                ("frame_queue_bytes_capacity", count(stats.frame_queue_bytes_capacity)),
+                ("gs_queue_bytes_max", count(stats.gs_queue_bytes_max)),
+                ("gs_queue_bytes_capacity", count(stats.gs_queue_bytes_capacity)),
+                ("cpu_permille", count(stats.cpu_permille)),
+                ("cpu_permille_max", count(stats.cpu_permille_max)),
+                ("stack_bytes_max", count(stats.stack_bytes_max)),
+                ("stack_bytes_capacity", count(stats.stack_bytes_capacity)),
             ],
         ),
         Record::Fault(fault) => one(

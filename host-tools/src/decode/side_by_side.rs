@@ -18,10 +18,12 @@ pub fn side_by_side<I: Sync, R: Send>(
     work: impl Fn(&I) -> R + Sync,
     mut tell: impl FnMut(R) -> Result<()>,
 ) -> Result<()> {
-    let threads = items.len().min(AT_ONCE).min(rayon::current_num_threads());
-    if threads <= 1 {
+    let alone = || rayon::current_num_threads() <= 1;
+    // One item asks for no worker: a small log is read before they would be awake.
+    if items.len() <= 1 || alone() {
         return items.iter().try_for_each(|item| tell(work(item)));
     }
+    let threads = items.len().min(AT_ONCE).min(rayon::current_num_threads());
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
     let (sender, results) = mpsc::channel();
     thread::scope(|scope| {

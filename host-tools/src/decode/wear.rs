@@ -1,16 +1,12 @@
 //! The records of what wears, as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`; and `HUMS_SNAPSHOT`.
 
-use hums_blackbox::record::{Component, Exceedance, Lifetime, Snapshot, UsageValue};
+use hums_blackbox::record::{Component, Exceedance, Lifetime, Snapshot};
 
 use super::record::{Cell, Row};
 
 /// One row a counter.
 pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
     let row = |(number, value)| {
-        let value = match value {
-            UsageValue::Real(value) => Cell::Double(value),
-            UsageValue::Count(value) => Cell::Double(value as f64),
-        };
         let cells = vec![
             ("moment", Cell::Text(life.moment.name().to_owned())),
             ("system", Cell::Count(u64::from(life.system))),
@@ -18,7 +14,7 @@ pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
             ("boots", Cell::Count(u64::from(life.boots))),
             ("sessions", Cell::Count(u64::from(life.sessions))),
             ("counter", Cell::Text(super::usage::name(number))),
-            ("value", value),
+            ("value", Cell::Single(value)),
         ];
         Row::new("HUMS_LIFETIME", cells)
     };

@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
+use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level, Subsystem};
@@ -60,6 +61,8 @@ pub struct Craft {
     sequences: Sequences,
     began: Instant,
     link_at: Instant,
+    /// Of which parts it is known what they ran before this session.
+    lives: [bool; COMPONENTS_MAX],
 }
 
 impl Craft {
@@ -80,7 +83,21 @@ impl Craft {
             sequences: Sequences::new(),
             began: at,
             link_at: at,
+            lives: [false; COMPONENTS_MAX],
         }
+    }
+
+    /// A log has told of a part, with all that it has run.
+    pub fn learn_part(&mut self, place: usize, part: Component) {
+        self.monitor.learn_component(place, part);
+        if let Some(known) = self.lives.get_mut(place) {
+            *known = true;
+        }
+    }
+
+    /// Whether what a part has run is all of its life, and not this session alone.
+    pub fn knows_life(&self, place: usize) -> bool {
+        self.lives.get(place).copied().unwrap_or(false)
     }
 
     /// Takes a frame of its system.

@@ -1,13 +1,12 @@
 //! A live source: bytes as they come, on this PC's clock, until Ctrl-C.
 //!
 //! The thread waits for bytes at most [`SILENCE`], takes them through the framer into the world, and publishes twenty
-//! times a second. A connection that breaks is opened again; meanwhile the values grow old, and the page says so.
+//! to thirty times a second. A connection that breaks is opened again; meanwhile the values grow old, and the page says so.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
 
 use anyhow::Result;
-use hums_core::params::Params;
 use hums_core::time::Instant;
 use hums_link::framer::Framer;
 
@@ -15,6 +14,7 @@ use super::PUBLISH;
 use super::hub::{Hub, Published};
 use super::influx::Influx;
 use super::show::{self, Around, SourceJson};
+use super::told::Limits;
 use super::world::World;
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
@@ -24,6 +24,9 @@ use crate::interrupt;
 const SILENCE: Duration = Duration::from_millis(10);
 /// The largest UDP datagram.
 const BUFFER_BYTES: usize = 65_536;
+/// What has come is shown so long after the last turn: at once where nothing came for a while. Pages that draw in 10 ms
+/// have time for it, and a packet waits half as long as for the turn of a silent source.
+const SOON: Duration = Duration::from_millis(30);
 /// How soon a broken connection is tried again.
 const AGAIN: Duration = Duration::from_secs(1);
 /// A source that says nothing for so long is silent.
@@ -74,7 +77,7 @@ impl Rate {
 
 impl Feed {
     /// Opens the source: a slip in its name is told at once.
-    pub fn open(endpoint: &Endpoint, params: Params, hub: Arc<Hub>, influx: Option<Influx>) -> Result<Self> {
+    pub fn open(endpoint: &Endpoint, limits: Limits, hub: Arc<Hub>, influx: Option<Influx>) -> Result<Self> {
         let port = duplex::open(endpoint, SILENCE)?.reader;
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Ok(Self {
@@ -82,7 +85,7 @@ impl Feed {
             port: Some(port),
             again_at: Wall::now(),
             hub,
-            world: World::new(params),
+            world: World::new(limits),
             framer: Framer::new(),
             influx,
             source: SourceJson { name: endpoint.to_string(), phase: "waiting", ..SourceJson::default() },
@@ -96,14 +99,15 @@ impl Feed {
     /// Runs until Ctrl-C; gives what is still to be written.
     pub fn run(mut self) -> Option<Influx> {
         let mut buffer = vec![0; BUFFER_BYTES];
-        let mut publish_at = Wall::now();
+        let (mut published, mut news) = (Wall::now(), false);
         while !interrupt::requested() {
+            let frames = self.world.frames;
             self.read(&mut buffer);
-            let now = Wall::now();
-            if now >= publish_at {
+            news |= self.world.frames != frames;
+            if published.elapsed() >= if news { SOON } else { PUBLISH } {
+                published = Wall::now();
+                news = false;
                 self.publish();
-                // A turn that was missed is not caught up with.
-                publish_at = (publish_at + PUBLISH).max(now);
             }
         }
         self.influx

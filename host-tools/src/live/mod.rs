@@ -24,6 +24,7 @@ pub mod server;
 pub mod show;
 pub mod spool;
 pub mod texts;
+pub mod told;
 pub mod values;
 pub mod world;
 
@@ -35,7 +36,6 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context as _, Result, anyhow};
-use hums_core::params::Params;
 
 use self::feed::Feed;
 use self::guard::Guard;
@@ -43,28 +43,27 @@ use self::hub::Hub;
 use self::influx::Influx;
 use self::influx::target::Target;
 use self::playback::Player;
+use self::told::Limits;
 use crate::cli;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
+use crate::output;
 
 /// Twenty times a second.
 const PUBLISH: Duration = Duration::from_millis(50);
 
 /// Runs `hums live`.
 pub fn run(args: &cli::Live) -> Result<Outcome> {
-    let mut params = Params::defaults();
-    for (spec, value) in crate::run::params::read(args.params.as_deref())? {
-        params.set(spec.name, value).map_err(|error| anyhow!("--params: {}: {error:?}", spec.name))?;
-    }
+    let limits = Limits::new(&crate::run::params::read(args.params.as_deref())?);
     let influx = database(args)?;
     let (listener, address) = listen(&args.listen)?;
     let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);
     let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
     let (hub, commands) = Hub::new();
     interrupt::watch();
-    let follower = follow(args, &params, &hub, commands, influx)?;
+    let follower = follow(args, &limits, &hub, commands, influx)?;
     let page = page_address(address, token.as_deref());
-    println!("{page}");
+    output::line(&page)?;
     if args.open {
         open(&page);
     }
@@ -88,7 +87,7 @@ type Follower = JoinHandle<Result<Option<Influx>>>;
 /// Starts the thread that follows the vehicle; what is wrong with the source is told at once.
 fn follow(
     args: &cli::Live,
-    params: &Params,
+    limits: &Limits,
     hub: &Arc<Hub>,
     commands: Receiver<hub::Command>,
     influx: Option<Influx>,
@@ -96,11 +95,18 @@ fn follow(
     let thread = std::thread::Builder::new().name("vehicle".to_owned());
     let hub = Arc::clone(hub);
     let started = if args.input.is_live() {
-        let feed = Feed::open(&args.input, *params, hub, influx)?;
+        if args.session.is_some() {
+            return Err(usage("--session is for what was recorded: a log, a card or a folder"));
+        }
+        let feed = Feed::open(&args.input, limits.clone(), hub, influx)?;
         thread.spawn(move || Ok(feed.run()))
     } else {
-        let opened = recording::open(&args.input)?;
-        let player = Player::new(&args.input.to_string(), *params, hub, commands, influx);
+        let opened = recording::open(&args.input, args.session.as_deref())?;
+        let name = match &opened {
+            recording::Opened::Log(log) => format!("{}, session {}", args.input, log.name),
+            recording::Opened::Stream(..) => args.input.to_string(),
+        };
+        let player = Player::new(&name, limits.clone(), hub, commands, influx);
         thread.spawn(move || player.run(opened))
     };
     started.context("no thread")

@@ -7,7 +7,6 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant as Wall};
 
 use anyhow::{Context as _, Result};
-use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
 use hums_link::Frame;
 
@@ -15,9 +14,10 @@ use super::PUBLISH;
 use super::feed::Rate;
 use super::hub::{Command, Hub, Published};
 use super::influx::{Figures, Influx};
-use super::recording::{self, Opened};
+use super::recording::{self, Heard, Opened};
 use super::show::{self, Around, SourceJson};
 use super::spool::{Spool, SpoolWriter, Spooled};
+use super::told::{Limits, Told};
 use super::world::World;
 use crate::interrupt;
 
@@ -27,6 +27,8 @@ const COPIES_MAX: usize = 128;
 const COPY_EVERY: Span = Span::from_secs(5);
 /// Speeds that make sense.
 const SPEEDS: (f64, f64) = (0.1, 64.0);
+/// What a log tells besides frames: its parameters and parts, some hundred at its start. More is not kept.
+const TOLD_MAX: usize = 8_192;
 /// Frames between two looks at the clock while reading.
 const LOOK_EVERY: u64 = 4_096;
 
@@ -35,6 +37,8 @@ const LOOK_EVERY: u64 = 4_096;
 struct Copy {
     at: Instant,
     offset: u64,
+    /// What else is told from here on.
+    told: usize,
     world: World,
 }
 
@@ -42,17 +46,61 @@ struct Copy {
 #[derive(Debug)]
 struct Loaded {
     spool: Spool,
+    told: Vec<(Instant, Told)>,
+    /// The next one of these.
+    told_next: usize,
     copies: Vec<Copy>,
     start: Instant,
     end: Instant,
     frames: u64,
 }
 
+/// What gets each frame of a recording that is followed, after the world has; `false` ends it.
+type Each<'a> = dyn FnMut(Instant, &Frame<'_>, &mut World) -> bool + 'a;
+
+impl Loaded {
+    /// Goes to a place in it.
+    fn seek(&mut self, offset: u64, told: usize) -> io::Result<()> {
+        self.told_next = told;
+        self.spool.seek(offset)
+    }
+
+    /// The world takes what came by `now`.
+    fn go(&mut self, world: &mut World, now: Instant) -> io::Result<()> {
+        self.follow(world, now, &mut |_, _, _| true)?;
+        world.advance(now, None);
+        world.found.clear();
+        Ok(())
+    }
+
+    fn follow(&mut self, world: &mut World, now: Instant, each: &mut Each<'_>) -> io::Result<()> {
+        while let Some(Spooled { at, check, bytes }) = self.spool.next_until(now)? {
+            tell(&self.told, &mut self.told_next, at, world);
+            if let Some(frame) = Frame::again(bytes, check) {
+                world.frame(at, &frame, None);
+                if !each(at, &frame, world) {
+                    return Ok(());
+                }
+            }
+        }
+        tell(&self.told, &mut self.told_next, now, world);
+        Ok(())
+    }
+}
+
+/// What else was told by then.
+fn tell(told: &[(Instant, Told)], next: &mut usize, by: Instant, world: &mut World) {
+    while let Some((at, what)) = told.get(*next).filter(|(at, _)| *at <= by) {
+        world.told(*at, what, None);
+        *next += 1;
+    }
+}
+
 /// Plays a recording until Ctrl-C.
 pub struct Player {
     hub: Arc<Hub>,
     commands: Receiver<Command>,
-    params: Params,
+    limits: Limits,
     source: SourceJson,
     epoch_us: Option<u64>,
     influx: Option<Influx>,
@@ -66,7 +114,7 @@ impl Player {
     /// What the pages see, and where they ask.
     pub fn new(
         name: &str,
-        params: Params,
+        limits: Limits,
         hub: Arc<Hub>,
         commands: Receiver<Command>,
         influx: Option<Influx>,
@@ -79,7 +127,7 @@ impl Player {
             ..SourceJson::default()
         };
         let (rate, timeline) = (Rate::default(), Arc::default());
-        Self { hub, commands, params, source, epoch_us: None, influx, rate, epoch: 0, timeline }
+        Self { hub, commands, limits, source, epoch_us: None, influx, rate, epoch: 0, timeline }
     }
 
     /// Runs until Ctrl-C; gives what is still to be written. A recording that cannot be read is told on the page too.
@@ -87,25 +135,36 @@ impl Player {
         let mut loaded =
             self.load(&mut opened).with_context(|| format!("{}: cannot be read", self.source.name))?;
         drop(opened);
+        self.write(&mut loaded)?;
         self.play(&mut loaded)?;
         Ok(self.influx)
     }
 
     /// Reads it through.
     fn load(&mut self, opened: &mut Opened) -> Result<Loaded> {
-        let mut world = World::new(self.params);
+        let mut world = World::new(self.limits.clone());
         let mut writer = SpoolWriter::new()?;
-        let (mut copies, mut copy_every) = (Vec::new(), COPY_EVERY);
+        let (mut copies, mut copy_every, mut told) = (Vec::new(), COPY_EVERY, Vec::new());
         let (mut start, mut end, mut frames) = (None, Instant::ZERO, 0_u64);
         let mut shown = Wall::now();
-        let Self { hub, influx, source, epoch_us, .. } = self;
+        let Self { hub, source, epoch_us, influx, .. } = self;
         // `Ctrl-C` ends a long reading too.
-        recording::each(opened, &mut |at, epoch, progress, frame| -> io::Result<bool> {
+        recording::each(opened, &mut |at, epoch, progress, heard| -> io::Result<bool> {
             *epoch_us = epoch.or(*epoch_us);
             if start.is_none() {
                 start = Some(at);
                 world.begin(at);
             }
+            let frame = match heard {
+                Heard::Frame(frame) => frame,
+                Heard::Told(what) => {
+                    if told.len() < TOLD_MAX {
+                        told.push((at, what.clone()));
+                        world.told(at, what, Some(&mut hub.histories()));
+                    }
+                    return Ok(!interrupt::requested());
+                }
+            };
             let due = copies.last().is_none_or(|copy: &Copy| at.since(copy.at) >= copy_every);
             if due {
                 if copies.len() >= COPIES_MAX {
@@ -116,15 +175,10 @@ impl Player {
                     });
                     copy_every = copy_every + copy_every;
                 }
-                copies.push(Copy { at, offset: writer.offset(), world: world.clone() });
+                copies.push(Copy { at, offset: writer.offset(), told: told.len(), world: world.clone() });
             }
             writer.push(Spooled { at, check: frame.check(), bytes: frame.bytes() })?;
             world.frame(at, frame, Some(&mut hub.histories()));
-            if let Some(influx) = influx {
-                influx.frame(at, epoch_us.unwrap_or(0), frame, &world);
-                influx.found(epoch_us.unwrap_or(0), &world);
-                influx.usage(at, epoch_us.unwrap_or(0), &world);
-            }
             world.found.clear();
             frames += 1;
             end = end.max(at);
@@ -133,22 +187,42 @@ impl Player {
                 source.progress = progress;
                 let around = Around { source, epoch_us: None, frames_s: 0.0, influx: None };
                 hub.publish(Published {
-                    head: show::head(&World::new(Params::defaults()), Instant::ZERO, &around),
+                    head: show::head(&World::new(Limits::default()), Instant::ZERO, &around),
                     ..Published::default()
                 });
             }
             Ok(!interrupt::requested())
         })?;
+        if let Some(influx) = influx {
+            influx.know(&world);
+        }
         let start = start.unwrap_or_default();
         (self.source.start_s, self.source.end_s) = (start.as_secs_f64(), end.as_secs_f64());
         self.timeline = timeline(hub);
         self.rate = Rate::default();
-        Ok(Loaded { spool: writer.finish()?, copies, start, end, frames })
+        Ok(Loaded { spool: writer.finish()?, told, told_next: 0, copies, start, end, frames })
+    }
+
+    /// Gives all of it to the database, now that it is known who flew and when.
+    fn write(&mut self, loaded: &mut Loaded) -> io::Result<()> {
+        let Some(influx) = &mut self.influx else { return Ok(()) };
+        let epoch_us = self.epoch_us.unwrap_or(0);
+        let mut world = World::new(self.limits.clone());
+        world.begin(loaded.start);
+        let end = loaded.end;
+        loaded.follow(&mut world, end, &mut |at, frame, world| {
+            influx.frame(at, epoch_us, frame, world);
+            influx.found(epoch_us, world);
+            influx.usage(at, epoch_us, world);
+            world.found.clear();
+            !interrupt::requested()
+        })?;
+        loaded.seek(0, 0)
     }
 
     /// Plays it, as the pages ask.
     fn play(&mut self, loaded: &mut Loaded) -> Result<()> {
-        let mut world = World::new(self.params);
+        let mut world = World::new(self.limits.clone());
         world.begin(loaded.start);
         let mut now = loaded.start;
         self.source.phase = if loaded.frames == 0 { "ended" } else { "playing" };
@@ -177,7 +251,7 @@ impl Player {
                 // A PC that was asleep, or too slow for this speed, goes on from where it was.
                 let passed_us = passed.min(Duration::from_millis(250)).as_micros() as f64 * self.source.speed;
                 now = (now + Span::from_micros(passed_us as u64)).min(loaded.end);
-                follow(&mut loaded.spool, &mut world, now)?;
+                loaded.go(&mut world, now)?;
                 if now >= loaded.end {
                     self.source.phase = "ended";
                 }
@@ -225,17 +299,18 @@ impl Player {
         match copy {
             Some(copy) if to < *now || copy.at > *now => {
                 *world = copy.world.clone();
-                loaded.spool.seek(copy.offset)?;
+                let (offset, told) = (copy.offset, copy.told);
+                loaded.seek(offset, told)?;
             }
             None => {
-                *world = World::new(self.params);
+                *world = World::new(self.limits.clone());
                 world.begin(loaded.start);
-                loaded.spool.seek(0)?;
+                loaded.seek(0, 0)?;
             }
             Some(_) => {}
         }
         *now = to;
-        follow(&mut loaded.spool, world, to)?;
+        loaded.go(world, to)?;
         Ok(())
     }
 
@@ -255,18 +330,6 @@ impl Player {
             crafts: show::crafts(world, now),
         });
     }
-}
-
-/// Takes what came by `now`.
-fn follow(spool: &mut Spool, world: &mut World, now: Instant) -> io::Result<()> {
-    while let Some(Spooled { at, check, bytes }) = spool.next_until(now)? {
-        if let Some(frame) = Frame::again(bytes, check) {
-            world.frame(at, &frame, None);
-        }
-    }
-    world.advance(now, None);
-    world.found.clear();
-    Ok(())
 }
 
 /// Findings and events of each vehicle, for the time line.

@@ -1,5 +1,5 @@
 //! What can be played: a tlog or raw bytes (a file, or `-`, which is read to its end first), or a log of ours (a log
-//! file, segments, a card's image or folder: its newest session).
+//! file, segments, a card's image or folder: one of its sessions).
 
 use std::fs;
 use std::io;
@@ -11,10 +11,15 @@ use hums_core::time::Instant;
 use hums_link::framer::Framer;
 use hums_link::{Check, Frame};
 
+use super::told::Told;
 use crate::endpoint::Endpoint;
 use crate::logs::reader::{Collect, Deliver, epoch, read};
 use crate::logs::{self, Content, Log};
+use crate::outcome::usage;
 use crate::source::{self, Source, Timing};
+
+/// Sessions that are named where one is to be chosen.
+const LISTED_MAX: usize = 12;
 
 /// An input, found good.
 pub enum Opened {
@@ -24,12 +29,15 @@ pub enum Opened {
     Log(Box<Log>),
 }
 
-/// Opens SRC, which is no live one.
-pub fn open(endpoint: &Endpoint) -> Result<Opened> {
+/// Opens SRC, which is no live one; of several sessions the newest, or the one of this name.
+pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
     if let Endpoint::File(path) = endpoint
-        && let Some(log) = newest(path)?
+        && let Some(log) = chosen(path, session)?
     {
         return Ok(Opened::Log(Box::new(log)));
+    }
+    if session.is_some() {
+        return Err(usage(format!("--session is for a log, a card or a folder, and {endpoint} is none")));
     }
     let bytes = match endpoint {
         Endpoint::File(path) => fs::metadata(path).ok().map(|metadata| metadata.len()),
@@ -38,24 +46,47 @@ pub fn open(endpoint: &Endpoint) -> Result<Opened> {
     Ok(Opened::Stream(source::open(endpoint, Timing { line_rate: None })?, bytes))
 }
 
-/// The newest session, where the path holds any.
-fn newest(path: &PathBuf) -> Result<Option<Log>> {
+/// The session to be played, where the path holds any.
+fn chosen(path: &PathBuf, session: Option<&str>) -> Result<Option<Log>> {
     let metadata = fs::metadata(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
     if metadata.is_file()
         && matches!(logs::find::look(path)?, Content::Mavlink | Content::Empty | Content::Other)
     {
         return Ok(None);
     }
-    let found = logs::find::find(std::slice::from_ref(path), false)?;
-    match found.logs.into_iter().next_back() {
-        Some(log) => Ok(Some(log)),
-        None => bail!("{}: there is no log in it", path.display()),
+    let mut logs = logs::find::find(std::slice::from_ref(path), false)?.logs;
+    let names: Vec<String> = logs.iter().map(|log| log.name.clone()).collect();
+    let Some(newest) = names.last() else { bail!("{}: there is no log in it", path.display()) };
+    let wanted = session.unwrap_or(newest);
+    let Some(index) = names.iter().position(|name| name == wanted) else {
+        return Err(usage(format!("{} has no session {wanted}; it has {}", path.display(), listed(&names))));
+    };
+    if session.is_none() && names.len() > 1 {
+        eprintln!("hums: {newest} is played, the newest; --session NAME plays another: {}", listed(&names));
     }
+    Ok(Some(logs.swap_remove(index)))
 }
 
-/// What gets each frame: its time, UTC of time zero where that is known, how much has been read, 0 to 1, and the frame.
-/// `false` ends the reading.
-pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, &Frame<'_>) -> io::Result<bool> + 'a;
+/// Some names, the newest first.
+fn listed(names: &[String]) -> String {
+    let shown: Vec<&str> = names.iter().rev().take(LISTED_MAX).map(String::as_str).collect();
+    let more = names.len() - shown.len();
+    let more = if more > 0 { format!(" and {more} older ones (hums info)") } else { String::new() };
+    shown.join(", ") + &more
+}
+
+/// What comes out of a recording.
+#[derive(Clone, Copy, Debug)]
+pub enum Heard<'a> {
+    /// A frame.
+    Frame(&'a Frame<'a>),
+    /// What a log tells besides.
+    Told(&'a Told),
+}
+
+/// What gets each of these: its time, UTC of time zero where that is known, how much has been read, 0 to 1, and what it
+/// is. `false` ends the reading.
+pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Heard<'_>) -> io::Result<bool> + 'a;
 
 /// Reads it from its beginning to its end.
 pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
@@ -76,7 +107,7 @@ fn stream(source: &mut dyn Source, bytes: Option<u64>, take: &mut Take<'_>) -> R
         let epoch_us = source.utc_start_us();
         framer.push(&chunk.bytes, &mut |frame| {
             if matches!(result, Ok(true)) {
-                result = take(last, epoch_us, progress, &frame);
+                result = take(last, epoch_us, progress, Heard::Frame(&frame));
             }
         });
         if !matches!(result, Ok(true)) {
@@ -85,16 +116,18 @@ fn stream(source: &mut dyn Source, bytes: Option<u64>, take: &mut Take<'_>) -> R
     }
     framer.idle(&mut |frame| {
         if matches!(result, Ok(true)) {
-            result = take(last, source.utc_start_us(), 1.0, &frame);
+            result = take(last, source.utc_start_us(), 1.0, Heard::Frame(&frame));
         }
     });
     result?;
     Ok(())
 }
 
-/// A group's frames.
+/// A group's frames, and what else is told in it.
 #[derive(Default)]
 struct Frames {
+    /// Time, what is told, and the frame that it comes before.
+    told: Vec<(Instant, Told, usize)>,
     /// Time, check, and where it ends in `bytes`.
     frames: Vec<(Instant, Check, usize)>,
     bytes: Vec<u8>,
@@ -102,10 +135,15 @@ struct Frames {
 
 impl Collect for Frames {
     fn entry(&mut self, entry: &Entry<'_>) {
-        if let Entry::Frame { at, bytes, verified } = *entry {
-            let check = if verified { Check::Verified } else { Check::Unverified };
-            self.bytes.extend_from_slice(bytes);
-            self.frames.push((at, check, self.bytes.len()));
+        match *entry {
+            Entry::Frame { at, bytes, verified } => {
+                let check = if verified { Check::Verified } else { Check::Unverified };
+                self.bytes.extend_from_slice(bytes);
+                self.frames.push((at, check, self.bytes.len()));
+            }
+            Entry::Record { at, record } => {
+                self.told.extend(Told::of(&record).map(|told| (at, told, self.frames.len())));
+            }
         }
     }
 }
@@ -126,13 +164,26 @@ impl Deliver<Frames> for Hand<'_, '_> {
     }
 
     fn group(&mut self, group: Frames) -> Result<()> {
-        let mut start = 0;
-        for (at, check, end) in group.frames {
+        let (mut start, mut told) = (0, group.told.iter().peekable());
+        for (number, (at, check, end)) in group.frames.into_iter().enumerate() {
+            while let Some((at, what, _)) = told.next_if(|(.., before)| *before <= number) {
+                self.hand(*at, Heard::Told(what))?;
+            }
             let bytes = group.bytes.get(start..end).unwrap_or_default();
             start = end;
-            let Some(frame) = Frame::again(bytes, check).filter(|_| !self.ended) else { continue };
+            if let Some(frame) = Frame::again(bytes, check) {
+                self.hand(at, Heard::Frame(&frame))?;
+            }
+        }
+        told.try_for_each(|(at, what, _)| self.hand(*at, Heard::Told(what)))
+    }
+}
+
+impl Hand<'_, '_> {
+    fn hand(&mut self, at: Instant, heard: Heard<'_>) -> Result<()> {
+        if !self.ended {
             let progress = (self.done.get() as f64 / self.blocks).min(1.0);
-            self.ended = !(self.take)(at, self.epoch_us, progress, &frame)?;
+            self.ended = !(self.take)(at, self.epoch_us, progress, heard)?;
         }
         Ok(())
     }

@@ -141,6 +141,8 @@ struct ComponentJson {
     flight_h: f64,
     motor_h: f64,
     flights: f64,
+    /// These are of its whole life, and not of this session alone.
+    life: bool,
 }
 
 fn state(system: u8, craft: &Craft, now: Instant) -> String {
@@ -205,6 +207,7 @@ fn components(craft: &Craft) -> Vec<ComponentJson> {
             flight_h: figures.flight_s / 3_600.0,
             motor_h: figures.motor_s / 3_600.0,
             flights: figures.flights,
+            life: craft.knows_life(place),
         })
     };
     (0..COMPONENTS_MAX).filter_map(json).collect()

@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::health::Finding;
 use hums_core::monitor::TICK;
 use hums_core::observation::Observation;
-use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
 use hums_link::{Check, Frame, observe};
 
 use super::craft::Craft;
 use super::history::History;
+use super::told::{Limits, Told, parameter, place_of};
 
 /// Vehicles that are told apart; later ones are counted.
 pub const VEHICLES_MAX: usize = 8;
@@ -18,6 +19,9 @@ pub const VEHICLES_MAX: usize = 8;
 const SILENCE_MAX: Span = Span::from_secs(600);
 /// What a check's debounce and age need at its beginning.
 const SILENCE_HEAD: Span = Span::from_secs(60);
+
+/// A session's start, which is recorded at once.
+const BEGINNING: Instant = Instant::from_millis(10_000);
 
 /// Histories by system id.
 pub type Histories = BTreeMap<u8, History>;
@@ -35,7 +39,11 @@ pub struct World {
     pub refused: u64,
     /// Findings since this was cleared, with whose they are; what nobody clears stops at [`FOUND_MAX`].
     pub found: Vec<(u8, Finding)>,
-    params: Params,
+    limits: Limits,
+    /// The vehicle that a log is of: the first one heard in it.
+    owner: Option<u8>,
+    /// What the log told of its parts before that.
+    parts: [Option<Component>; COMPONENTS_MAX],
     next_tick: Instant,
 }
 
@@ -43,15 +51,17 @@ pub struct World {
 const FOUND_MAX: usize = 4_096;
 
 impl World {
-    /// Nothing heard yet; `params` are the limits.
-    pub fn new(params: Params) -> Self {
+    /// Nothing heard yet.
+    pub fn new(limits: Limits) -> Self {
         Self {
             crafts: BTreeMap::new(),
             frames: 0,
             unverified: 0,
             refused: 0,
             found: Vec::new(),
-            params,
+            limits,
+            owner: None,
+            parts: [None; COMPONENTS_MAX],
             next_tick: Instant::ZERO,
         }
     }
@@ -75,7 +85,14 @@ impl World {
         let told = if known { None } else { observe(frame) };
         match told {
             Some((_, Observation::Heartbeat(_))) if self.crafts.len() < VEHICLES_MAX => {
-                self.crafts.insert(system, Craft::new(at, &self.params));
+                let mut craft = Craft::new(at, self.limits.params());
+                if self.owner.is_none() {
+                    self.owner = Some(system);
+                    for (place, part) in self.parts.iter().enumerate() {
+                        part.iter().for_each(|part| craft.learn_part(place, *part));
+                    }
+                }
+                self.crafts.insert(system, craft);
             }
             Some((_, Observation::Heartbeat(_))) => self.refused += 1,
             // A radio is a system of its own, and everybody's.
@@ -91,6 +108,38 @@ impl World {
         if let Some(craft) = self.crafts.get_mut(&system) {
             let mut history = histories.map(|histories| histories.entry(system).or_default());
             craft.frame(at, frame, &mut history);
+            if let Some((name, value)) = parameter(frame) {
+                self.limits.take(craft.monitor.params_mut(), &name, value);
+            }
+        }
+    }
+
+    /// Takes what a log tells besides frames.
+    pub fn told(&mut self, at: Instant, told: &Told, histories: Option<&mut Histories>) {
+        self.advance(at, histories);
+        match told {
+            Told::Parameter { name, value, start } => {
+                self.limits.learn(name, *value);
+                // Each file of a log repeats the table. At the session's start it stands before the parts, each with
+                // what it ran before: one that is not told has run nothing.
+                let new = |place: &usize| matches!(self.parts.get(*place), Some(None));
+                if let Some(place) = place_of(name).filter(|_| *start && at < BEGINNING).filter(new) {
+                    self.part(place, Component::NONE);
+                }
+                for craft in self.crafts.values_mut() {
+                    self.limits.take(craft.monitor.params_mut(), name, *value);
+                }
+            }
+            Told::Part { place, component } => self.part(*place, *component),
+        }
+    }
+
+    fn part(&mut self, place: usize, component: Component) {
+        if let Some(part) = self.parts.get_mut(place) {
+            *part = Some(component);
+        }
+        if let Some(craft) = self.owner.and_then(|owner| self.crafts.get_mut(&owner)) {
+            craft.learn_part(place, component);
         }
     }
 
@@ -124,7 +173,9 @@ impl World {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::component::{Figures, Kind, Status};
     use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::messages;
     use hums_link::packet::Packet;
 
     use super::*;
@@ -142,7 +193,7 @@ mod tests {
 
     #[test]
     fn vehicles_on_one_link_are_told_apart_and_bounded() {
-        let (mut world, mut histories) = (World::new(Params::defaults()), Histories::new());
+        let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
         for system in 1..=20 {
             hear(&mut world, &mut histories, Instant::from_millis(u64::from(system)), &heartbeat(system));
         }
@@ -155,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_silence_of_hours_is_stepped_over_and_found() {
-        let (mut world, mut histories) = (World::new(Params::defaults()), Histories::new());
+        let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
         for second in 0..30 {
             hear(&mut world, &mut histories, Instant::from_millis(second * 1000), &heartbeat(1));
         }
@@ -164,5 +215,81 @@ mod tests {
         assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
         let link = world.crafts[&1].monitor.health().subsystem(hums_core::health::Subsystem::Link);
         assert_ne!(link, hums_core::health::Level::Ok, "nobody has been heard for hours");
+    }
+
+    /// A motor's limit of ten hours, as a log's parameters have it.
+    fn tell_limits(world: &mut World) {
+        for (name, value) in [("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 10.0)] {
+            let told = Told::Parameter { name: name.to_owned(), value, start: true };
+            world.told(Instant::from_millis(1), &told, None);
+        }
+    }
+
+    /// The second motor, which has turned nine and a half of them.
+    fn motor() -> Told {
+        let mut component = Component::NONE;
+        (component.kind, component.number) = (Kind::Motor, 2);
+        let ran = Figures { motor_s: 9.5 * 3_600.0, ..Figures::ZERO };
+        Told::Part { place: 0, component: component.having_run(ran) }
+    }
+
+    #[test]
+    fn a_part_of_a_log_is_due_by_all_that_it_has_run_whether_told_before_the_vehicle_or_after() {
+        for before in [true, false] {
+            let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
+            tell_limits(&mut world);
+            if before {
+                world.told(Instant::from_millis(2), &motor(), None);
+            }
+            hear(&mut world, &mut histories, Instant::from_millis(10), &heartbeat(1));
+            if !before {
+                world.told(Instant::from_millis(500), &motor(), None);
+            }
+            world.advance(Instant::from_millis(3_000), Some(&mut histories));
+            let craft = &world.crafts[&1];
+            let (figures, status) = craft.monitor.component_figures(0).expect("a part");
+            assert_eq!((figures.motor_s, status), (9.5 * 3_600.0, Status::Yellow), "before: {before}");
+            assert_eq!(craft.monitor.component_used_percent(0), Some(95.0));
+            assert!(craft.knows_life(0) && !craft.knows_life(1), "before: {before}");
+        }
+    }
+
+    #[test]
+    fn a_part_that_a_logs_start_describes_and_that_ran_nothing_begins_with_the_session() {
+        let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
+        tell_limits(&mut world);
+        hear(&mut world, &mut histories, Instant::from_millis(10), &heartbeat(1));
+        world.advance(Instant::from_millis(3_000), Some(&mut histories));
+        assert!(world.crafts[&1].knows_life(0));
+        assert_eq!(world.crafts[&1].monitor.component_used_percent(0), Some(0.0));
+
+        // A later file of the log repeats the table; the part stays as it is.
+        world.told(Instant::from_millis(3_500), &motor(), None);
+        tell_limits(&mut world);
+        world.advance(Instant::from_millis(4_000), Some(&mut histories));
+        assert_eq!(world.crafts[&1].monitor.component_used_percent(0), Some(95.0));
+    }
+
+    #[test]
+    fn the_boxs_parameters_on_the_link_are_its_vehicles_but_those_that_the_user_gave_stay() {
+        let spec = hums_core::params::TABLE.iter().find(|spec| spec.name == "CMP1_FLIGHTS").expect("it is");
+        let (mut world, mut histories) = (World::new(Limits::new(&[(spec, 7.0)])), Histories::new());
+        for system in [1, 2] {
+            hear(&mut world, &mut histories, Instant::from_millis(1), &heartbeat(system));
+        }
+        let mut encoder = Encoder::new();
+        encoder.set_system(1);
+        for (name, value) in [("CMP1_KIND", 1.0), ("CMP1_FLIGHTS", 50.0), ("CMP1_HOURS", 25.0)] {
+            let mut buffer = [0; GS_FRAME_BYTES_MAX];
+            let frame = encoder.frame(&mut buffer, &messages::param_value(name, value, 0, 100)).to_vec();
+            hear(&mut world, &mut histories, Instant::from_millis(5), &frame);
+        }
+        world.advance(Instant::from_millis(3_000), Some(&mut histories));
+        let params = world.crafts[&1].monitor.params();
+        let value = |name| params.iter().find(|(spec, _)| spec.name == name).map(|(_, value)| value);
+        assert_eq!([value("CMP1_FLIGHTS"), value("CMP1_HOURS")], [Some(7.0), Some(25.0)]);
+        assert!(world.crafts[&1].monitor.component_figures(0).is_some());
+        assert!(!world.crafts[&1].knows_life(0), "no link tells what it ran before");
+        assert!(world.crafts[&2].monitor.component_figures(0).is_none(), "another vehicle");
     }
 }

@@ -117,7 +117,13 @@ pub fn look(path: &Path) -> Result<Content> {
     let context = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(context)?;
     let mut start = Vec::new();
-    file.by_ref().take((LOOK_BLOCKS * BLOCK_BYTES) as u64).read_to_end(&mut start).with_context(context)?;
+    file.by_ref().take(BLOCK_BYTES as u64).read_to_end(&mut start).with_context(context)?;
+    if start.first_chunk().is_some_and(|block| Header::read(block).is_ok()) {
+        // Nearly every log: its first block tells.
+        return Ok(Content::Log);
+    }
+    let rest = ((LOOK_BLOCKS - 1) * BLOCK_BYTES) as u64;
+    file.by_ref().take(rest).read_to_end(&mut start).with_context(context)?;
     if start.is_empty() {
         return Ok(Content::Empty);
     }

@@ -1,16 +1,19 @@
 //! Reads a log: groups are decoded in parallel, a few at a time, and what they hold is handed on in order, with the
-//! gaps between them. Memory is bounded by a batch of groups, whatever the log's size.
+//! gaps between them. Memory is bounded by the groups in work, whatever the log's size.
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::sync::mpsc;
 
 use anyhow::Result;
 use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Record};
 use hums_core::time::Instant;
-use rayon::prelude::*;
 
 use super::groups::{Group, Groups};
 use super::places::Log;
 
-/// Groups of a batch for each thread, and at most: each becomes up to some megabytes of text.
+/// Groups in work for each thread, and at most: each becomes up to some megabytes of text.
 const GROUPS_PER_THREAD: usize = 2;
 const GROUPS_MAX: usize = 16;
 
@@ -53,9 +56,13 @@ pub struct Summary {
     pub first: Option<Instant>,
     /// The last entry's time.
     pub last: Option<Instant>,
+    /// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.
+    pub epoch_us: Option<u64>,
 }
 
 /// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
+///
+/// Workers decode while this thread reads the next groups and hands on what is done; it never waits for a whole batch.
 pub fn read<C: Collect>(
     log: &Log,
     new: impl Fn() -> C + Sync,
@@ -63,33 +70,82 @@ pub fn read<C: Collect>(
     mut progress: impl FnMut(u64),
 ) -> Result<Summary> {
     let mut groups = Groups::new(log);
-    let batch_groups = (rayon::current_num_threads() * GROUPS_PER_THREAD).clamp(1, GROUPS_MAX);
     let mut stitch = Stitch::default();
-    loop {
-        let mut batch = Vec::with_capacity(batch_groups);
-        while batch.len() < batch_groups {
-            match groups.next_group()? {
-                Some(group) => batch.push(group),
-                None => break,
+    let (first, second) = (groups.next_group()?, groups.next_group()?);
+    let is_short = second.is_none();
+    let mut ahead = first.into_iter().chain(second);
+    let mut next = |groups: &mut Groups<'_>| match ahead.next() {
+        Some(group) => Ok(Some(group)),
+        None => groups.next_group(),
+    };
+    if is_short || rayon::current_thread_index().is_some() {
+        // Waking workers for one group takes longer than decoding it here; a worker may not wait for others.
+        while let Some(group) = next(&mut groups)? {
+            stitch.take(decode_here(&group, new()), deliver)?;
+            progress(groups.counts().blocks);
+        }
+    } else {
+        let groups_max = (rayon::current_num_threads() * GROUPS_PER_THREAD).clamp(1, GROUPS_MAX);
+        rayon::in_place_scope(|scope| -> Result<()> {
+            let (sender, results) = mpsc::channel();
+            let mut waiting = BTreeMap::new();
+            let (mut given, mut taken) = (0_usize, 0);
+            loop {
+                while given - taken < groups_max {
+                    let Some(group) = next(&mut groups)? else { break };
+                    let (new, promise) = (&new, Promise { sender: sender.clone(), index: given, kept: None });
+                    scope.spawn(move |_| promise.keep(decode_here(&group, new())));
+                    given += 1;
+                }
+                if taken == given {
+                    break;
+                }
+                // A worker that panicked sends nothing; the scope's end tells.
+                let Ok((index, Some(group))) = results.recv() else { break };
+                waiting.insert(index, group);
+                while let Some(group) = waiting.remove(&taken) {
+                    taken += 1;
+                    stitch.take(group, deliver)?;
+                    progress(groups.counts().blocks);
+                }
             }
-        }
-        if batch.is_empty() {
-            break;
-        }
-        let decoded: Vec<Decoded<C>> = batch
-            .into_par_iter()
-            .map_init(|| Box::new(GroupDecoder::new()), |decoder, group| decode(decoder, &group, new()))
-            .collect();
-        for group in decoded {
-            stitch.take(group, deliver)?;
-        }
-        progress(groups.counts().blocks);
+            Ok(())
+        })?;
     }
     stitch.end(groups.damaged_at_end(), deliver)?;
     let mut summary = stitch.summary;
     summary.session = groups.session();
     summary.blocks = groups.counts();
     Ok(summary)
+}
+
+/// What a worker sends when it is done: nothing, where it panics, so that nobody waits for it.
+struct Promise<C> {
+    sender: mpsc::Sender<(usize, Option<Decoded<C>>)>,
+    index: usize,
+    kept: Option<Decoded<C>>,
+}
+
+impl<C> Promise<C> {
+    fn keep(mut self, decoded: Decoded<C>) {
+        self.kept = Some(decoded);
+    }
+}
+
+impl<C> Drop for Promise<C> {
+    fn drop(&mut self) {
+        // Where nobody listens any more, reading has ended with an error.
+        let _ = self.sender.send((self.index, self.kept.take()));
+    }
+}
+
+/// Decodes with this thread's decoder, which is large and made once.
+fn decode_here<C: Collect>(group: &Group, collected: C) -> Decoded<C> {
+    thread_local!(static DECODER: Cell<Option<Box<GroupDecoder>>> = const { Cell::new(None) });
+    let mut decoder = DECODER.take().unwrap_or_else(|| Box::new(GroupDecoder::new()));
+    let decoded = decode(&mut decoder, group, collected);
+    DECODER.set(Some(decoder));
+    decoded
 }
 
 /// A group, decoded.
@@ -114,11 +170,14 @@ struct Decoded<C> {
     closed: bool,
     /// What its records say of what is kept: the first and the last one.
     keeps: Option<(Keep, Keep)>,
+    /// UTC at power-on by what it learned last, microseconds since 1970.
+    epoch_us: Option<u64>,
 }
 
 fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: C) -> Decoded<C> {
     let (mut error, mut begun, mut frames, mut last) = (None, None, 0, None);
     let mut keeps: Option<(Keep, Keep)> = None;
+    let mut epoch_us = None;
     for step in group {
         if let Err(why) = decoder.push(&step.header, &step.sector) {
             error = error.or(Some(why));
@@ -126,14 +185,21 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
         }
         let preamble = decoder.preamble();
         begun.get_or_insert((Instant::from_millis(preamble.start_ms), preamble.frames_before));
+        epoch_us = epoch_us.or(preamble.epoch_micros);
         while let Some(entry) = decoder.next_entry() {
             match entry {
                 Ok(entry) => {
                     let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
                     last = Some(at);
                     frames += u32::from(matches!(entry, Entry::Frame { .. }));
-                    if let Entry::Record { record: Record::Keep(keep), .. } = entry {
-                        keeps = Some((keeps.map_or(keep, |(first, _)| first), keep));
+                    match entry {
+                        Entry::Record { record: Record::Keep(keep), .. } => {
+                            keeps = Some((keeps.map_or(keep, |(first, _)| first), keep));
+                        }
+                        Entry::Record { record: Record::Clock(clock), .. } => {
+                            epoch_us = Some(clock.epoch_micros());
+                        }
+                        _ => {}
                     }
                     collected.entry(&entry);
                 }
@@ -157,6 +223,7 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
         damaged_partial: group.last().filter(|step| step.header.partial).map_or(0, |step| step.damaged),
         closed: group.last().is_some_and(|step| step.header.closed),
         keeps,
+        epoch_us,
     }
 }
 
@@ -193,6 +260,7 @@ impl Stitch {
         self.summary.closed = group.closed;
         self.next_number = group.number.wrapping_add(group.sectors);
         self.keep = group.keeps.map(|(_, last)| last).or(self.keep);
+        self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         match group.begun {
             None => self.skip(&group),
             Some((start, frames_before)) => {
@@ -278,6 +346,17 @@ fn cause_of(error: GroupError) -> Cause {
 
 /// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.
 pub fn epoch(log: &Log) -> Result<Option<u64>> {
+    last_epoch(log, |_| true)
+}
+
+/// The same without decoding anything where a group's start tells it. Wrong only where the last group learned another
+/// one, or learned it twice; [`Summary::epoch_us`] tells afterwards.
+pub fn likely_epoch(log: &Log) -> Result<Option<u64>> {
+    last_epoch(log, |epoch| epoch.is_none())
+}
+
+/// Looks at the starts of all groups, and at the last one's records for as long as `go_on` says so.
+fn last_epoch(log: &Log, go_on: impl Fn(Option<u64>) -> bool) -> Result<Option<u64>> {
     let mut groups = Groups::new(log);
     let mut decoder = Box::new(GroupDecoder::new());
     let (mut epoch, mut last) = (None, Vec::new());
@@ -291,16 +370,15 @@ pub fn epoch(log: &Log) -> Result<Option<u64>> {
         last = group;
     }
     // A clock record in the last group has no preamble after it.
-    decode(&mut decoder, &last, Epoch(&mut epoch));
-    Ok(epoch)
-}
-
-struct Epoch<'a>(&'a mut Option<u64>);
-
-impl Collect for Epoch<'_> {
-    fn entry(&mut self, entry: &Entry<'_>) {
-        if let Entry::Record { record: Record::Clock(clock), .. } = entry {
-            *self.0 = Some(clock.epoch_micros());
+    for step in &last {
+        if !go_on(epoch) || decoder.push(&step.header, &step.sector).is_err() {
+            break;
+        }
+        while let (true, Some(Ok(entry))) = (go_on(epoch), decoder.next_entry()) {
+            if let Entry::Record { record: Record::Clock(clock), .. } = entry {
+                epoch = Some(clock.epoch_micros());
+            }
         }
     }
+    Ok(epoch)
 }

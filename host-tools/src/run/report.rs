@@ -48,6 +48,15 @@ pub struct Report {
     /// Power went at a block write that the command line chose.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub power_cut: bool,
+    /// The deepest the firmware's stack was, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack_bytes_max: Option<u64>,
+    /// What it holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack_bytes: Option<u64>,
+    /// The deepest that each urgency alone took it, where measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack_by_urgency: Option<serde_json::Value>,
     /// Instructions by stage, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instructions: Option<serde_json::Value>,

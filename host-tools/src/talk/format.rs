@@ -17,7 +17,7 @@ const FORMAT: u16 = 526;
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
 /// A card of 512 GB takes two minutes.
-const PATIENCE: Duration = Duration::from_secs(600);
+const PATIENCE: Duration = Duration::from_mins(10);
 
 /// Runs `hums format`.
 pub fn run(args: &cli::FormatCard) -> Result<Outcome> {

@@ -98,34 +98,27 @@ def scramble(x, salt):
 class TextModel:
     def __init__(self, coder):
         self.coder = coder
-        self.rows = [[Cell() for _ in range(16)] for _ in range(128)]
+        self.rows = [Distribution() for _ in range(64)]
+        self.same = [Cell() for _ in range(8)]
 
-    def byte(self, before, above, matched):
-        seeds = (scramble(before & 0xFFFF, 0x20000003), scramble(above << 2 | min(matched, 3), 0x40000007))
-        upper = self.nibble(seeds)
-        return upper << 4 | self.nibble([seed ^ (16 + upper) for seed in seeds])
+    def byte(self, context):
+        upper = self.coder.symbol(self.row(context))
+        return upper << 4 | self.coder.symbol(self.row(context ^ (16 + upper) << 24))
 
-    def nibble(self, seeds):
-        rows = [self.rows[scramble(seed, 0x9E3779B1) >> 25] for seed in seeds]
-        node = 1
-        for _ in range(4):
-            cells = [row[node] for row in rows]
-            weights = [cell.n * (1 + (abs(cell.p - 2048) >> 6) ** 2) for cell in cells]
-            p = (2048 + sum(c.p * w for c, w in zip(cells, weights))) // (1 + sum(weights))
-            bit = self.coder.bit(min(max(p, 16), 4080))
-            cells[0].adapt(bit)
-            if cells[1] is not cells[0]:
-                cells[1].adapt(bit)
-            node = node << 1 | bit
-        return node & 15
+    def row(self, context):
+        return self.rows[scramble(context, 0x20000003) * 0x9E3779B1 % (1 << 32) >> 26]
 
     def text(self, length, above=None):
-        """So many bytes; without a text above, none of them match."""
+        """So many bytes; with a text above (zeros beyond its end), each may be as there."""
         text, before, matched = bytearray(), 0, 0
         for i in range(length):
-            over = above[i] if above is not None and i < len(above) else 0
-            byte = self.byte(before, over, matched)
-            matched = matched + 1 if above is not None and byte == over else 0
-            before = before << 8 | byte
-            text.append(byte)
+            over = None
+            if above is not None:
+                cell = self.same[min(matched, 7)]
+                same = self.coder.bit(min(max(cell.p, 16), 4080))
+                cell.adapt(same)
+                over = above[i] if i < len(above) else 0
+            before = over if above is not None and same else self.byte(before)
+            matched = matched + 1 if before == over else 0
+            text.append(before)
         return bytes(text)

@@ -3,6 +3,7 @@
 from arithmetic import M32, crc16_mcrf4xx
 from coder import Cell, Coder, Distribution, TextModel
 from payload import Payload
+from records import Records
 
 NONE = 255
 
@@ -45,6 +46,7 @@ class Group:
         self.signed_later = Distribution()
         self.model = TextModel(self.coder)
         self.payload = Payload(self)
+        self.records = Records(self.coder, self.model)
 
     def decode(self, count):
         for _ in range(count):
@@ -53,8 +55,11 @@ class Group:
     def entry(self):
         guesses, context = self.predict()
         symbol = self.coder.symbol(self.kinds[self.odd != 0][context])
-        if symbol in (4, 5):
-            return self.plain(symbol == 4)
+        if symbol == 4:
+            return self.plain()
+        if symbol == 5:
+            self.later(self.time)
+            return self.now, "record", self.records.read(self.now), True
         expected = symbol < 4
         what = symbol if expected else symbol - 6
         if what == 3:
@@ -125,13 +130,12 @@ class Group:
             ms |= self.coder.bits(16) << 32
         self.now += ms
 
-    def plain(self, is_frame):
+    def plain(self):
         self.later(self.time)
-        raw = self.coder.bits(1)
-        verified = bool(self.coder.bits(1)) if is_frame else True
+        raw, verified = self.coder.bits(1), bool(self.coder.bits(1))
         length = self.coder.bits(10)
         data = bytes(self.coder.bits(8) for _ in range(length)) if raw else self.model.text(length)
-        return self.now, "frame" if is_frame else "record", data, verified
+        return self.now, "frame", data, verified
 
     # A frame of a slot.
 

@@ -61,7 +61,7 @@ def read(data, complain):
         next_frame = before + frames & M32
         for entry in Group(stream, start_ms, layouts[digest], links).decode(count):
             if entry[1] == "record" and entry[2][:1] == b"\4":
-                boot_us, utc_us = struct.unpack_from("<QQ", entry[2], 2)
+                boot_us, utc_us = struct.unpack_from("<QQ", entry[2], 4)
                 epoch = utc_us - boot_us
             entries.append(entry)
     return [(ms, epoch, *rest) for ms, *rest in entries]

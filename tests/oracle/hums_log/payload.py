@@ -135,10 +135,8 @@ class Payload:
         slot.has_quiet = any(one.quiet for one in elements)
         if slot.trimmed:
             return bytes(image).rstrip(b"\0") or b"\0"
-        before = 0
         for at in range(max(ends, default=0), slot.fixed):
-            image[at] = self.group.model.byte(before, at & 255, 3)
-            before = before << 8 | image[at]
+            image[at] = self.group.model.byte(256 + at)
         return bytes(image[:slot.fixed])
 
     def publish(self, one):

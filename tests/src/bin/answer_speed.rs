@@ -26,6 +26,8 @@ const LIMIT: Duration = Duration::from_hours(2);
 const START_AT: usize = 15 + 4;
 const FRAMES_AT: usize = 15 + 10;
 const NUMBER_AT: usize = 11;
+/// How much later each round is, ms. What the codec expects depends on the lower 32 bits of the time.
+const ROUND_MS: u64 = 1 << 32;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -150,12 +152,12 @@ fn long(hums: &Path, mib: &str, recording: &Path) -> Result<()> {
     println!("a log of {} MiB with {frames} frames", written >> 20);
     for (what, arguments) in [
         ("info", &["info"][..]),
-        ("decode to jsonl", &["decode", "-o", "-", "--format", "jsonl"]),
         ("decode to csv, one type", &["decode", "-o", "OUT", "--format", "csv", "--message", "HEARTBEAT"]),
         (
             "decode to parquet, one type",
             &["decode", "-o", "OUT", "--format", "parquet", "--message", "ATTITUDE"],
         ),
+        ("decode to jsonl", &["decode", "-o", "-", "--format", "jsonl"]),
     ] {
         let out = dir.path().join("out");
         let mut command = Command::new("sh");
@@ -185,7 +187,6 @@ fn lengthen(short: &Path, long: &Path, bytes: u64) -> Result<(u64, u64)> {
     let last = sectors.iter().rposition(|sector| Header::read(sector).is_ok_and(|h| h.since_first == 0));
     let whole = sectors.get(..last.unwrap_or(0)).filter(|whole| !whole.is_empty()).context("too short")?;
     let session = Header::read(&whole[0]).map_or(0, |header| header.session);
-    let end_ms = Preamble::read(&sectors[whole.len()][15..]).context("a group's start")?.start_ms;
     let frames: u64 = whole.iter().filter_map(|s| Header::read(s).ok()).map(|h| u64::from(h.frames)).sum();
     let mut out = BufWriter::new(File::create(long)?);
     let (mut number, mut round, mut written) = (0_u32, 0_u64, 0_u64);
@@ -196,7 +197,7 @@ fn lengthen(short: &Path, long: &Path, bytes: u64) -> Result<(u64, u64)> {
             block[NUMBER_AT..NUMBER_AT + 4].copy_from_slice(&number.to_le_bytes());
             if starts {
                 let preamble = Preamble::read(&block[15..]).context("a group's start")?;
-                let start_ms = preamble.start_ms + round * end_ms;
+                let start_ms = preamble.start_ms + round * ROUND_MS;
                 block[START_AT..START_AT + 6].copy_from_slice(&start_ms.to_le_bytes()[..6]);
                 let before = preamble.frames_before.wrapping_add((round * frames) as u32);
                 block[FRAMES_AT..FRAMES_AT + 4].copy_from_slice(&before.to_le_bytes());

@@ -13,7 +13,7 @@
 //! | `store` | the store's flash, two sectors of 16 KiB; without it there is no store (see [`store`]) |
 //! | `log` | where defmt's messages go |
 //! | `seed` | a number that stands for the true random number of a real board |
-//! | `provoke` | `panic`, `bus-fault` or `silence`: that fault, when the downlink sends first (see [`provoke`]) |
+//! | `provoke` | `WHAT`, `WHAT:TASK` or either `@SECONDS`: that fault goes wrong, once (see [`provoke`]) |
 //! | `resets` | `1`: the host starts the emulator again after a reset, and the start goes on where the last one was (see [`reset`]) |
 //! | `cost` | `1`: tell the instructions of each stage; QEMU must run with `-icount shift=3` |
 //!
@@ -31,9 +31,11 @@ mod uart;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::syst::SystClkSource;
+use embassy_stm32::interrupt;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use heapless::CString;
+use hums_onboard::Task;
 use semihosting::experimental::env;
 use semihosting::fs::File;
 use semihosting::{println, process};
@@ -46,13 +48,20 @@ pub(crate) use uart::{AutopilotRx, AutopilotTx, GsRx, GsTx};
 use super::{Boot, ResetCause};
 use crate::costs::Stage;
 use crate::fault;
+use crate::memory::depth;
 use crate::report::Report;
+use crate::watch::{self, SYSTICK_RELOAD};
 
 /// The board's name.
 pub(crate) const NAME: &str = "emulated";
 
-/// `SysTick`'s 24 bits.
-const SYSTICK_MAX: u32 = 0x00FF_FFFF;
+/// What moves the ports' bytes.
+pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 2] = [interrupt::USART1, interrupt::USART2];
+/// Turns of `SysTick` that a task may take in one go: ten seconds of the emulated processor's clock, which follows this
+/// PC's, however busy that is. Waiting has its own limit, in virtual time ([`WATCHDOG_MS`]).
+pub(crate) const LATE_TURNS: u32 = 100;
+/// Virtual time stands still while tasks run.
+pub(crate) const TIME_STOPS_WITH_TASKS: bool = true;
 /// Nobody fed the watchdog for this long in virtual time: as on the real board.
 const WATCHDOG_MS: u32 = 1_000;
 /// Bytes of all arguments together.
@@ -98,7 +107,7 @@ struct Arguments {
     seed: u32,
     tell_costs: bool,
     resets: bool,
-    provoked: provoke::Fault,
+    provoked: Option<provoke::Plan>,
 }
 
 /// Memory that survives a reset.
@@ -113,6 +122,9 @@ pub(crate) fn take() -> Parts {
     start_systick();
     let arguments = Arguments::read();
     TELL_COSTS.store(arguments.tell_costs, Ordering::Relaxed);
+    if arguments.tell_costs {
+        depth::measure();
+    }
     // Once: what it came to is what the next start shows.
     if fault::starts() <= 1 {
         provoke::arm(arguments.provoked);
@@ -157,7 +169,7 @@ impl Arguments {
                 "seed" => arguments.seed = value.parse().unwrap_or_default(),
                 "resets" => arguments.resets = value == "1",
                 "cost" => arguments.tell_costs = value == "1",
-                "provoke" => arguments.provoked = provoke::Fault::named(value).unwrap_or_default(),
+                "provoke" => arguments.provoked = provoke::Plan::parse(value),
                 _ => println!("unknown argument: {}", key),
             }
         }
@@ -177,8 +189,9 @@ fn set_path(path: &mut CString<PATH_BYTES>, value: &str) {
 fn start_systick() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.SYST.set_clock_source(SystClkSource::Core);
-        core.SYST.set_reload(SYSTICK_MAX);
+        core.SYST.set_reload(SYSTICK_RELOAD);
         core.SYST.clear_current();
+        core.SYST.enable_interrupt();
         core.SYST.enable_counter();
     }
 }
@@ -188,7 +201,9 @@ pub(crate) struct Led(());
 
 impl Led {
     #[expect(clippy::unused_self, reason = "on a real board there is a pin")]
-    pub(crate) fn set(&mut self, _lit: bool) {}
+    pub(crate) fn set(&mut self, _lit: bool) {
+        let _ = provoke::here(Task::Monitor);
+    }
 }
 
 /// In virtual time: idle looks whether it bites.
@@ -212,7 +227,7 @@ pub(crate) struct Idle {
 
 impl Idle {
     /// All tasks wait whenever this runs: it is thread mode, and they are interrupts.
-    pub(crate) fn run(&mut self) -> ! {
+    pub(crate) fn run(mut self) -> ! {
         let mut ended = false;
         loop {
             let alarm_us = clock::next_alarm();
@@ -229,6 +244,7 @@ impl Idle {
                     ended = true;
                     // What is still to be done is bounded, and the monitor does not feed it any more.
                     BITES_AT_MS.store(u32::MAX, Ordering::Relaxed);
+                    watch::off();
                     ENDED.signal(());
                 }
                 None if alarm_us == u64::MAX => {
@@ -238,11 +254,17 @@ impl Idle {
                 _ => clock::advance(alarm_us),
             }
             if now_ms() > BITES_AT_MS.load(Ordering::Relaxed) {
-                println!("the watchdog bites");
-                reset::reset(ResetCause::Watchdog);
+                fault::late(None);
+                bites_soon();
             }
         }
     }
+}
+
+/// The emulator has no watchdog: this is its bite.
+pub(crate) fn bites_soon() {
+    println!("the watchdog bites");
+    reset::reset(ResetCause::Watchdog)
 }
 
 /// Waits for the end of the feed.
@@ -252,7 +274,17 @@ pub(crate) async fn ended() {
 
 /// Counts up where `SysTick` counts down.
 pub(crate) fn cycles() -> u32 {
-    SYSTICK_MAX - cortex_m::peripheral::SYST::get_current()
+    SYSTICK_RELOAD - cortex_m::peripheral::SYST::get_current()
+}
+
+/// Instructions are counted only where that was asked for; then each takes 1.5 cycles.
+pub(crate) fn busy_cycles(counted: u64) -> u64 {
+    if TELL_COSTS.load(Ordering::Relaxed) { instructions(counted) * 3 / 2 } else { 0 }
+}
+
+/// With `-icount shift=3` an instruction takes 8 ns, and `SysTick` counts 168 MHz: 168 / 125 ticks.
+const fn instructions(ticks: u64) -> u64 {
+    ticks * 125 / 168
 }
 
 /// Prints the figures of the run as one line of JSON, and ends the emulator.
@@ -281,13 +313,11 @@ pub(crate) fn done(report: &Report) {
     process::exit(0);
 }
 
-/// The member `instructions` of the report.
+/// The members `instructions` and `stack_by_urgency` of the report.
 struct Costs<'a>(&'a [u64]);
 
 impl core::fmt::Display for Costs<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        /// With `-icount shift=3` an instruction takes 8 ns, and `SysTick` counts 168 MHz: 168 / 125 ticks.
-        const TICKS: (u64, u64) = (168, 125);
         if !TELL_COSTS.load(Ordering::Relaxed) {
             return Ok(());
         }
@@ -296,7 +326,12 @@ impl core::fmt::Display for Costs<'_> {
         let busy = Stage::NAMES.iter().zip(self.0).filter(|((stage, _), _)| *stage != Stage::Idle);
         for (index, ((_, name), ticks)) in busy.enumerate() {
             let comma = if index == 0 { "" } else { "," };
-            write!(f, "{comma}\"{name}\":{}", ticks * TICKS.1 / TICKS.0)?;
+            write!(f, "{comma}\"{name}\":{}", instructions(*ticks))?;
+        }
+        f.write_str("},\"stack_by_urgency\":{")?;
+        for (index, (name, bytes)) in depth::all().enumerate() {
+            let comma = if index == 0 { "" } else { "," };
+            write!(f, "{comma}\"{name}\":{bytes}")?;
         }
         f.write_str("}")
     }

@@ -5,19 +5,20 @@ use core::sync::atomic::Ordering;
 
 use embassy_futures::select::{Either4, select4};
 use embassy_time::Ticker;
-use hums_onboard::monitoring::{Monitoring, Step, TICK};
+use hums_onboard::monitoring::{Machine, Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
 use hums_onboard::{Handover, Task};
 use hums_recorder::CardState;
 
 use super::downlink::{BAUD_AUTOPILOT, BAUD_GS};
 use super::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
-use crate::boards::board;
+use crate::boards::{ResetCause, board};
 use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};
 use crate::memory;
 use crate::report::Report;
+use crate::watch;
 
 /// Ticks of one half of the LED's blinking while the card records: 0.5 s.
 const BLINK_RECORDING: u32 = 10;
@@ -37,17 +38,16 @@ pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
     mut ends: Ends,
     handover: &'static mut Handover<'static>,
-    fault: Option<Fault>,
+    cause: ResetCause,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
 ) -> ! {
     body.start(now(), &mut ends.sectors);
-    if let Some(fault) = fault {
-        body.fault(now(), &fault.record(), &mut ends.sectors);
-    }
+    tell_fault(body, &mut ends, cause);
     wake_others();
     let mut ticker = Ticker::every(links::wait(TICK));
     let mut ticks: u32 = 0;
+    let mut load = costs::Load::new();
     loop {
         SUPERVISOR.report(Task::Monitor, now());
         // Frames first where both are due: they came before this tick.
@@ -56,13 +56,26 @@ pub(crate) async fn run(
             Either4::First(()) => drain(body, &mut ends),
             Either4::Third(()) => uplink(body, &mut ends),
             Either4::Second(()) => {
+                if let Some((cpu_permille, cpu_permille_max)) = load.step(now()) {
+                    let (stack_bytes_max, stack_bytes) = memory::stack_used();
+                    let (stack_bytes_max, stack_bytes) = (stack_bytes_max as u32, stack_bytes as u32);
+                    body.set_machine(Machine {
+                        cpu_permille,
+                        cpu_permille_max,
+                        stack_bytes_max,
+                        stack_bytes,
+                    });
+                }
                 tick(body, &mut ends, handover);
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
-                match SUPERVISOR.silent(now()) {
-                    None => watchdog.feed(),
-                    // Not fed: the watchdog does what is to be done.
-                    Some(task) => fault::silent(task),
+                fault::tick(now());
+                let silent = SUPERVISOR.silent(now());
+                fault::silent(silent);
+                // Else the watchdog does what is to be done.
+                if silent.is_none() {
+                    watchdog.feed();
+                    watch::fed();
                 }
             }
             Either4::Fourth(()) => break,
@@ -71,24 +84,42 @@ pub(crate) async fn run(
     }
     drain(body, &mut ends);
     save_all(body, &mut ends, handover).await;
-    body.finish(now(), &mut ends.sectors, &ends.gs);
+    finish(body, &mut ends);
     links::RECORD_ENDED.signal(());
     links::GS_EMPTY.reset();
     wake_others();
     let frames_left = links::LOG_CLOSED.wait().await;
     links::GS_EMPTY.wait().await;
-    let stats = body.stats(&ends.gs);
-    board::done(&Report { stats, frames_left, costs: costs::totals(), stack: memory::stack_used() });
+    report(body, &ends, frames_left);
     loop {
         core::future::pending::<()>().await;
     }
 }
 
+/// Records how the start before this one ended, and tells the ground station. The note is read here, so that it takes no
+/// memory of the task's.
+#[inline(never)]
+fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
+    let noted = fault::take();
+    fault::begin();
+    let unnoted = noted.is_none() && cause == ResetCause::Watchdog;
+    if let Some(fault) = noted.or_else(|| unnoted.then(Fault::without_note)) {
+        defmt::error!("before this start: {}", defmt::Display2Format(&fault));
+        body.fault(now(), &fault.record(), fault.last_messages(), &mut ends.sectors);
+    }
+}
+
+// None of these within the task: what one of them takes of the stack is not to lie below what another takes.
+
+#[inline(never)]
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
     let Ends { frames, sectors, gs, .. } = ends;
     let mut begin = |step| {
         costs::enter(match step {
-            Step::Encode => Stage::Encode,
+            Step::Encode { at, id } => {
+                fault::seen(at, id);
+                Stage::Encode
+            }
             Step::Observe => Stage::Observe,
             Step::Summary => Stage::Summary,
         });
@@ -96,6 +127,7 @@ fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) {
     while measure(Stage::Monitor, || body.drain_in_steps(frames, sectors, gs, &mut begin)) {}
 }
 
+#[inline(never)]
 fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
     let Ends { uplink, sectors, gs, .. } = ends;
     while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
@@ -113,6 +145,7 @@ async fn save_all(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mu
 }
 
 /// Records what is new about the store.
+#[inline(never)]
 fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     while let Some(news) = handover.news() {
         defmt::info!("{=str}", news.text);
@@ -120,6 +153,7 @@ fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
     }
 }
 
+#[inline(never)]
 fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     let (gs, autopilot) = body.bauds();
     BAUD_GS.store(gs, Ordering::Relaxed);
@@ -136,10 +170,26 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
                 finding.unit
             );
         });
-        handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
-        body.save_signing(now(), handover);
+        hand_over(body, handover);
     });
     note(body, ends, handover);
+}
+
+#[inline(never)]
+fn hand_over(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) {
+    handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
+    body.save_signing(now(), handover);
+}
+
+#[inline(never)]
+fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
+    body.finish(now(), &mut ends.sectors, &ends.gs);
+}
+
+#[inline(never)]
+fn report(body: &Monitoring<'static>, ends: &Ends, frames_left: u64) {
+    let stats = body.stats(&ends.gs);
+    board::done(&Report { stats, frames_left, costs: costs::totals(), stack: memory::stack_used() });
 }
 
 fn wake_others() {

@@ -2,13 +2,14 @@
 //! nobody but idle.
 
 use embassy_time::{Duration, Timer, with_timeout};
-use hums_core::time::Span;
+use hums_core::time::{Instant, Span};
 use hums_onboard::persist::Kept;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Keeper, Service, Storage, Task};
 use hums_recorder::HeldBlocks;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use super::{CARD_STATUS, SUPERVISOR};
 
@@ -21,6 +22,19 @@ const REPORT: Duration = Duration::from_secs(1);
 /// How long the end waits for a card that is out, before what waits for it is lost.
 const CARD_PATIENCE: Span = Span::from_secs(5);
 
+/// What the task calls.
+type Body = Storage<'static, board::Card>;
+
+// Statics of their own: made within the task both would come to their place over the stack, 8 and 1.5 KiB of it.
+static HELD: ConstStaticCell<HeldBlocks> = ConstStaticCell::new(HeldBlocks::new());
+static BODY: StaticCell<Body> = StaticCell::new();
+
+/// Makes the task's body, once.
+#[inline(never)]
+fn prepare(card: board::Card, entropy: u32) -> &'static mut Body {
+    BODY.init_with(|| Storage::new(card, &CARD_STATUS, HELD.take(), entropy))
+}
+
 #[embassy_executor::task]
 pub(crate) async fn run(
     card: board::Card,
@@ -29,13 +43,12 @@ pub(crate) async fn run(
     mut shelf: Server<'static>,
     keeper: &'static mut Keeper<'static, board::StoreFlash>,
 ) -> ! {
-    let held = HeldBlocks::new();
-    let mut body = Storage::new(card, &CARD_STATUS, &held, entropy);
+    let body = prepare(card, entropy);
     let mut ended_at = None;
     loop {
         SUPERVISOR.report(Task::Storage, now());
         let begun = now();
-        let service = measure(Stage::Storage, || body.service(begun, &mut sectors));
+        let service = service(body, begun, &mut sectors);
         CARD_STATUS.end_service(now().since(begun).as_millis() as u32);
         keep(keeper);
         if ended_at.is_none() && links::RECORD_ENDED.signaled() {
@@ -45,15 +58,14 @@ pub(crate) async fn run(
             Service::Wrote => {}
             Service::Idle if !sectors.is_empty() => {}
             Service::Idle if ended_at.is_some() => break,
-            Service::Idle if measure(Stage::Storage, || body.serve(&mut shelf)) => {}
+            Service::Idle if serve(body, &mut shelf) => {}
             Service::Idle => wait_for_work(&sectors, &shelf, keeper).await,
             Service::NoCard if ended_at.is_some_and(|at| now().since(at) > CARD_PATIENCE) => break,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
     }
     while keep(keeper) == Kept::Took {}
-    body.finish();
-    links::LOG_CLOSED.signal(body.abandon(&mut sectors));
+    links::LOG_CLOSED.signal(finish(body, &mut sectors));
     loop {
         core::future::pending::<()>().await;
     }
@@ -75,7 +87,27 @@ async fn wait_for_work(
     }
 }
 
+// None of these within the task: what one of them takes of the stack is not to lie below what another takes.
+
+#[inline(never)]
+fn service(body: &mut Body, begun: Instant, sectors: &mut SectorsOut<'static>) -> Service {
+    measure(Stage::Storage, || body.service(begun, sectors))
+}
+
+#[inline(never)]
+fn serve(body: &mut Body, shelf: &mut Server<'static>) -> bool {
+    measure(Stage::Storage, || body.serve(shelf))
+}
+
+/// Closes the log; how many frames found no card.
+#[inline(never)]
+fn finish(body: &mut Body, sectors: &mut SectorsOut<'static>) -> u64 {
+    body.finish();
+    body.abandon(sectors)
+}
+
 /// Saves one item, if there is one.
+#[inline(never)]
 fn keep(keeper: &mut Keeper<'static, board::StoreFlash>) -> Kept {
     let kept = measure(Stage::Storage, || keeper.service(links::ENDING.signaled()));
     if kept == Kept::Took {

@@ -9,6 +9,9 @@ use super::slots::{Length, Slot};
 use super::texts::Texts;
 use crate::coder::Coder;
 
+/// Context of bytes by their place.
+const AT: u32 = 0x100;
+
 /// What is known of all payloads.
 pub(super) struct Body {
     pub(super) elements: Elements,
@@ -60,12 +63,10 @@ impl Body {
             end = self.fields(coder, slot, frame, elapsed_ms, calm)?;
         }
         if let Length::Fixed(len) = slot.length {
-            let mut before = 0;
             for at in end..usize::from(len) {
                 let byte = frame.payload.get(at).copied()?;
-                let byte = self.common.texts.model.byte(coder, byte, before, at as u8, 3);
+                let byte = self.common.texts.model.byte(coder, byte, AT | at as u32);
                 frame.payload[at] = byte;
-                before = before << 8 | u32::from(byte);
             }
         }
         Some(())

@@ -9,6 +9,7 @@ mod element;
 mod frame;
 mod header;
 mod links;
+mod records;
 mod slots;
 mod text;
 mod texts;
@@ -16,6 +17,7 @@ mod texts;
 use body::Body;
 pub(crate) use frame::Frame;
 use header::{Headers, REPEATED};
+use records::Records;
 use slots::{INSTANCE_BYTES, Key, Length, Next, Slots};
 
 use crate::coder::{Coder, Decoder, Encoder, Reading, Scratch, Writing};
@@ -73,6 +75,7 @@ pub(crate) struct Model {
     slots: Slots,
     headers: Headers,
     body: Body,
+    records: Records,
     /// The times between entries that have no distribution of their own.
     times: Cdf,
 }
@@ -87,6 +90,7 @@ impl Model {
             slots: Slots::new(),
             headers: Headers::new(),
             body: Body::new(),
+            records: Records::new(),
             times: TIME,
         }
     }
@@ -98,6 +102,7 @@ impl Model {
         self.slots.reset();
         self.headers.reset();
         self.body.reset();
+        self.records.reset();
         self.times = TIME;
     }
 
@@ -177,7 +182,7 @@ impl Model {
         self.slots.has_room().then_some((Next::NewSlot, key))
     }
 
-    /// Bytes as they are (`raw`), or by the text model: entries that are no frames.
+    /// An entry that is no frame of a slot: a record, or bytes as they are (`raw`) or by the text model.
     fn plain<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -186,11 +191,13 @@ impl Model {
         raw: bool,
     ) -> Option<Decoded> {
         let at_ms = self.time(coder, None, entry.at_ms)?;
+        let Kind::Frame { verified } = entry.kind else {
+            let text = &mut self.body.common.texts.model;
+            let len = self.records.code(coder, text, at_ms, (buffer, entry.len), raw)?;
+            return Some(Decoded { kind: Kind::Record, at_ms, len });
+        };
         let raw = coder.bits16(u32::from(raw), 1) != 0;
-        let mut kind = entry.kind;
-        if let Kind::Frame { verified } = kind {
-            kind = Kind::Frame { verified: coder.bits16(u32::from(verified), 1) != 0 };
-        }
+        let kind = Kind::Frame { verified: coder.bits16(u32::from(verified), 1) != 0 };
         let len = coder.bits16(entry.len as u32, 10) as usize;
         let bytes = buffer.get_mut(..len)?;
         let mut before = 0;
@@ -198,9 +205,9 @@ impl Model {
             *place = if raw {
                 coder.bits16(u32::from(*place), 8) as u8
             } else {
-                self.body.common.texts.model.byte(coder, *place, before, 0, 0)
+                self.body.common.texts.model.byte(coder, *place, before)
             };
-            before = before << 8 | u32::from(*place);
+            before = u32::from(*place);
         }
         Some(Decoded { kind, at_ms, len })
     }

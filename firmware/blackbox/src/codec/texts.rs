@@ -96,9 +96,9 @@ impl Texts {
         let len = high << 4 | coder.symbol(&mut self.lengths[1], len & 15);
         let (mut before, mut matched) = (0, 0);
         for (place, &above) in text.get_mut(..len)?.iter_mut().zip(above) {
-            *place = self.model.byte(coder, *place, before, above, matched);
+            *place = self.model.byte_below(coder, *place, before, above, matched);
             matched = if *place == above { matched + 1 } else { 0 };
-            before = before << 8 | u32::from(*place);
+            before = u32::from(*place);
         }
         text.get_mut(len..)?.fill(0);
         Some(())

@@ -1,6 +1,6 @@
 //! Who recorded, and how the boot before ended.
 
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// The monitor started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,8 +23,8 @@ pub struct Boot<'a> {
 
 impl<'a> Boot<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(1).name(self.version).name(self.git).name(self.board);
-        sink.u32(self.reset).name(self.reset_name).bytes(&self.uid).u32(self.boots);
+        sink.head(1).u32(self.reset).u32(self.boots);
+        sink.name(self.version).name(self.git).name(self.board).name(self.reset_name).bytes(&self.uid);
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {
@@ -57,11 +57,11 @@ pub struct Fault<'a> {
 
 impl<'a> Fault<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(9).u8(self.kind).name(self.task).name(self.place);
+        sink.head(9);
         for &register in &self.registers {
             sink.u32(register);
         }
-        sink.text(self.message);
+        sink.u8(self.kind).name(self.task).name(self.place).text(self.message);
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {

@@ -3,7 +3,7 @@
 use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::time::Instant;
 
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// A check changed its level: `hums_core::health::Finding` with texts of any lifetime.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +46,9 @@ impl From<&Finding> for FindingRecord<'static> {
 
 impl<'a> FindingRecord<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(5).u64(self.at.as_micros()).u8(self.subsystem as u8).name(self.check).u8(self.instance);
-        sink.u8(self.level as u8).u8(self.previous as u8);
-        sink.u32(self.value.to_bits()).u32(self.limit.to_bits()).name(self.unit);
+        sink.head(5).time(self.at).f32(self.value).f32(self.limit);
+        sink.u8(self.subsystem as u8).name(self.check).u8(self.instance);
+        sink.u8(self.level as u8).u8(self.previous as u8).name(self.unit);
     }
 
     /// `None` where its subsystem or a level is one that this reader does not know.
@@ -60,8 +60,8 @@ impl<'a> FindingRecord<'a> {
             instance: fields.u8(),
             level: Level::from_number(fields.u8())?,
             previous: Level::from_number(fields.u8())?,
-            value: f32::from_bits(fields.u32()),
-            limit: f32::from_bits(fields.u32()),
+            value: fields.f32(),
+            limit: fields.f32(),
             unit: fields.text(),
         })
     }

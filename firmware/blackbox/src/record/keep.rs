@@ -1,6 +1,6 @@
 //! What of a session is kept, where not all of it is.
 
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// Which sectors are kept. While a vehicle that is recorded by arming is disarmed, only the last while is: every group
 /// of that time says so, and so does the one in which it ends. A reader that misses sectors from `from` up to this
@@ -17,7 +17,7 @@ pub struct Keep {
 
 impl Keep {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(15).u8(u8::from(self.all)).u32(self.from).u32(self.seconds);
+        sink.head(15).u32(self.from).u32(self.seconds).u8(u8::from(self.all));
     }
 
     pub(super) fn read(fields: &mut Fields<'_>) -> Self {

@@ -2,7 +2,7 @@
 
 use hums_core::time::Instant;
 
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// What was lost. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -67,19 +67,21 @@ pub struct Loss {
 
 impl Loss {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(7).u8(self.what as u8).u64(self.count);
-        sink.u64(self.from.as_micros()).u64(self.to.as_micros());
+        sink.head(7).time(self.from).time(self.to).u64(self.count).u8(self.what as u8);
     }
 
     pub(super) fn read(fields: &mut Fields<'_>) -> Self {
         Self {
             what: Lost::from_number(fields.u8()),
-            count: fields.u64(),
             from: fields.instant(),
             to: fields.instant(),
+            count: fields.u64(),
         }
     }
 }
+
+/// The numbers that the first version had: always stored. Those that came later are where there is something to say.
+const STATS_MIN: usize = 12;
 
 /// The struct with its numbers in stored order, each named once. A further number goes to the end.
 macro_rules! statistics {
@@ -92,7 +94,13 @@ macro_rules! statistics {
 
         impl Stats {
             pub(super) fn store(&self, sink: &mut Sink<'_>) {
-                sink.head(8)$(.u64(self.$name))+;
+                let numbers = [$(self.$name),+];
+                sink.head(8);
+                // What is cut short reads as zeros.
+                let stored = numbers.iter().rposition(|&number| number != 0).map_or(0, |last| last + 1);
+                for &number in numbers.iter().take(stored.max(STATS_MIN)) {
+                    sink.u64(number);
+                }
             }
 
             pub(super) fn read(fields: &mut Fields<'_>) -> Self {
@@ -128,4 +136,20 @@ statistics! {
     gs_frames,
     /// Bytes sent to the ground station.
     gs_bytes,
+    /// The fullest the frame queue was, bytes.
+    frame_queue_bytes_max,
+    /// What the frame queue holds, bytes.
+    frame_queue_bytes_capacity,
+    /// The fullest the queue to the ground station was, bytes.
+    gs_queue_bytes_max,
+    /// What the queue to the ground station holds, bytes.
+    gs_queue_bytes_capacity,
+    /// What the processor was busy in the last second, thousandths; 0 where nobody counts.
+    cpu_permille,
+    /// The same in the worst second.
+    cpu_permille_max,
+    /// The deepest the stack was, bytes.
+    stack_bytes_max,
+    /// What the stack holds, bytes.
+    stack_bytes_capacity,
 }

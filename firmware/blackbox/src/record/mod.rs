@@ -1,14 +1,16 @@
 //! The monitor's own records: who recorded what, with which parameters, what it found, counted and lost.
 //!
-//! Stored form: `kind u8, version u8`, then the fields in the order below, little endian; a text is its length (u8)
-//! and its UTF-8 bytes. A later version may only append fields, so a reader of version n reads n + 1; a kind that it
-//! does not know is given out as `Record::Unknown` and stays decodable.
+//! Stored form (`stored`): a head, then the numbers of 4 bytes, those of 2, and bytes, each in the order of the fields
+//! and little endian; a text is its length (u8) and its UTF-8 bytes. A later version may only append to each of the
+//! three, so a reader of version n reads n + 1; a kind that it does not know is given out as `Record::Unknown` and stays
+//! decodable.
 
 mod boot;
 mod finding;
 mod keep;
 mod loss;
 mod snapshot;
+mod stored;
 mod usage;
 mod vehicle;
 mod wear;
@@ -20,11 +22,12 @@ pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
 pub use snapshot::{Protection, Snapshot, SnapshotValues};
-pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
+pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage};
 pub use vehicle::{Clock, Parameter, Vehicle};
 pub use wear::{Component, Exceedance, Why};
 
-use crate::bytes::{Fields, Sink};
+use stored::{Fields, Sink};
+pub(crate) use stored::{HEAD_BYTES, Shape};
 
 /// The longest stored record, kind and version included. A longer one is refused (`TooLong`).
 pub const RECORD_BYTES_MAX: usize = 512;
@@ -36,8 +39,9 @@ pub const TEXT_BYTES_MAX: usize = 200;
 pub const NAME_BYTES_MAX: usize = 96;
 
 // The longest records: a boot and a fault.
-const _: () = assert!(2 + 4 * (1 + NAME_BYTES_MAX) + 4 + 12 + 4 <= RECORD_BYTES_MAX);
-const _: () = assert!(2 + 1 + 2 * (1 + NAME_BYTES_MAX) + 12 * 4 + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
+const _: () = assert!(HEAD_BYTES + 4 + 4 + 4 * (1 + NAME_BYTES_MAX) + 12 <= RECORD_BYTES_MAX);
+const _: () =
+    assert!(HEAD_BYTES + 12 * 4 + 1 + 2 * (1 + NAME_BYTES_MAX) + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
 
 /// One record of the monitor itself. The numbers of the kinds are stored and never change meaning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +87,7 @@ pub enum Record<'a> {
         kind: u8,
         /// The stored version.
         version: u8,
-        /// What follows.
+        /// What follows: the rest of the head, numbers, bytes.
         bytes: &'a [u8],
     },
 }
@@ -123,7 +127,7 @@ impl<'a> Record<'a> {
             Self::Snapshot(snapshot) => snapshot.store(&mut sink),
             Self::Protection(protection) => protection.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
-                sink.u8(*kind).u8(*version).bytes(bytes);
+                sink.bytes(&[*kind, *version]).bytes(bytes);
             }
         }
         sink.len().ok_or(TooLong)
@@ -131,8 +135,7 @@ impl<'a> Record<'a> {
 
     /// Reads the stored form. What is cut short reads as zeros and empty texts; what it does not know, as `Unknown`.
     pub fn read(stored: &'a [u8]) -> Self {
-        let mut fields = Fields::new(stored);
-        let (kind, version) = (fields.u8(), fields.u8());
+        let (Shape { kind, version, .. }, mut fields) = Fields::new(stored);
         let fields = &mut fields;
         let unknown = Self::Unknown { kind, version, bytes: stored.get(2..).unwrap_or_default() };
         match kind {
@@ -215,10 +218,11 @@ mod tests {
             limit: 20.0,
             unit: "%",
         }));
-        let entries = [(1, UsageValue::Real(12.25)), (2, UsageValue::Count(u64::MAX))];
+        let entries = [(1, 12.25), (2, f32::MAX), (3, 0.0), (255, 1.0), (0, -1.0)];
         reads_back(Record::Usage(Usage::new(Moment::End, &entries)));
         reads_back(Record::Loss(Loss { what: Lost::QueueFull, count: 3, from: Instant::ZERO, to: at }));
         reads_back(Record::Stats(Stats { frames_in: 1, gs_bytes: 12, ..Stats::default() }));
+        reads_back(Record::Stats(Stats { frames_in: 1, cpu_permille: 20, ..Stats::default() }));
         let registers = core::array::from_fn(|index| index as u32);
         reads_back(Record::Fault(Fault {
             kind: 1,
@@ -263,7 +267,7 @@ mod tests {
 
     #[test]
     fn a_later_version_with_more_fields_reads_as_far_as_it_is_known() {
-        let stored = [10, 2, 5, 1, b'a', 0xee, 0xee];
+        let stored = [10, 2, 0, 0, 5, 1, b'a', 0xee, 0xee];
         assert_eq!(Record::read(&stored), Record::Event(Event { number: 5, text: "a" }));
     }
 

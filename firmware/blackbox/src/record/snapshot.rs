@@ -7,7 +7,7 @@ use hums_core::snapshot::{COLUMNS_MAX, INTERVAL, SAMPLES, columns};
 use hums_core::time::{Instant, Span};
 
 use super::RECORD_BYTES_MAX;
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// Bytes of the values of a snapshot at most.
 const VALUES_MAX: usize = 2 * COLUMNS_MAX * SAMPLES;
@@ -33,7 +33,8 @@ pub struct Snapshot<'a> {
     pub interval: Span,
     /// Columns of a sample.
     pub width: u8,
-    /// Sample by sample, column by column: half-precision numbers, little endian.
+    /// Sample by sample, column by column: half-precision numbers, each less the one of the sample before in its
+    /// column (modulo 2^16; of the first sample, as it is), little endian.
     values: &'a [u8],
 }
 
@@ -41,9 +42,11 @@ impl<'a> Snapshot<'a> {
     /// To be written; `values` is room for its values.
     pub fn new(of: &hums_core::snapshot::Snapshot<'_>, values: &'a mut SnapshotValues) -> Self {
         let SnapshotValues { bytes, .. } = values;
-        let mut length = 0;
-        for (place, half) in bytes.chunks_exact_mut(2).zip(of.values()) {
-            place.copy_from_slice(&half.to_le_bytes());
+        let (mut length, mut last) = (0, [0; COLUMNS_MAX]);
+        let columns = (0..of.width().clamp(1, COLUMNS_MAX)).cycle();
+        for ((place, half), column) in bytes.as_chunks_mut().0.iter_mut().zip(of.values()).zip(columns) {
+            *place = half.wrapping_sub(last[column]).to_le_bytes();
+            last[column] = half;
             length += 2;
         }
         Self {
@@ -62,22 +65,25 @@ impl<'a> Snapshot<'a> {
     /// Each value with its time and its column's name; `None` for a column that this reader does not know.
     pub fn iter(&self) -> impl Iterator<Item = (Instant, Option<&'static str>, f32)> + 'a {
         let Self { first, interval, width, subsystem, values, .. } = *self;
-        let width = usize::from(width).max(1);
-        (0_u64..).zip(values.chunks_exact(2 * width)).flat_map(move |(sample, values)| {
+        let width = usize::from(width).clamp(1, COLUMNS_MAX);
+        let mut last = [0_u16; COLUMNS_MAX];
+        (0_u64..).zip(values.chunks_exact(2 * width)).flat_map(move |(sample, changes)| {
             let at = first + Span::from_micros(interval.as_micros().saturating_mul(sample));
+            for (last, change) in last.iter_mut().zip(changes.as_chunks().0) {
+                *last = last.wrapping_add(u16::from_le_bytes(*change));
+            }
             let names = columns(subsystem).map(Some).chain(core::iter::repeat(None));
-            names.zip(values.chunks_exact(2)).map(move |(name, value)| {
-                let half = value.first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes));
-                (at, name, half::from_bits(half))
-            })
+            names.zip(last).take(width).map(move |(name, half)| (at, name, half::from_bits(half)))
         })
     }
 
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(16).u64(self.at.as_micros()).name(self.check).u8(self.instance);
-        sink.u8(self.subsystem as u8).u8(u8::from(self.after)).u64(self.first.as_micros());
+        sink.head(16).time(self.at).time(self.first);
+        for change in self.values.as_chunks().0 {
+            sink.half(u16::from_le_bytes(*change));
+        }
+        sink.name(self.check).u8(self.instance).u8(self.subsystem as u8).u8(u8::from(self.after));
         sink.bytes(&(self.interval.as_millis() as u16).to_le_bytes()).u8(self.width);
-        sink.bytes(self.values);
     }
 
     /// `None` where its subsystem is one that this reader does not know.
@@ -91,7 +97,7 @@ impl<'a> Snapshot<'a> {
             first: fields.instant(),
             interval: Span::from_millis(u64::from(u16::from_le_bytes(fields.array()))),
             width: fields.u8(),
-            values: fields.bytes(VALUES_MAX),
+            values: fields.halves(),
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Usage counters at one moment: of the session, and of the airframe's life.
 
 use super::RECORD_BYTES_MAX;
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, HEAD_BYTES, Sink};
 
 /// When a usage snapshot was taken. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,23 +16,16 @@ pub enum Moment {
     End = 2,
 }
 
-/// The value of a usage counter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum UsageValue {
-    /// A quantity, in the counter's unit.
-    Real(f64),
-    /// A count.
-    Count(u64),
-}
+/// Entries of a usage record at most: its head, moment and entries fit `RECORD_BYTES_MAX` whatever their numbers are.
+pub const USAGE_ENTRIES_MAX: usize = 84;
+const _: () = assert!(HEAD_BYTES + 1 + USAGE_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
 
-/// Entries of a usage record at most: its count, kind, version and entries fit `RECORD_BYTES_MAX`.
-pub const USAGE_ENTRIES_MAX: usize = 50;
-
-const ENTRY_BYTES: usize = 10;
-const _: () = assert!(4 + USAGE_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
 /// Entries of a lifetime record at most.
-pub const LIFETIME_ENTRIES_MAX: usize = 48;
-const _: () = assert!(2 + 1 + 1 + 8 + 4 + 4 + 1 + LIFETIME_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
+pub const LIFETIME_ENTRIES_MAX: usize = 80;
+const _: () = assert!(HEAD_BYTES + 4 * 4 + 2 + LIFETIME_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
+
+/// A value, and a run of numbers for it alone.
+const ENTRY_BYTES: usize = 4 + 2;
 
 /// Usage counters at one moment: up to `USAGE_ENTRIES_MAX`, more are cut off. Where there are more, another record
 /// follows; a reader keeps the latest value of each counter.
@@ -61,39 +54,57 @@ pub struct Lifetime<'a> {
 
 #[derive(Clone, Copy, Debug)]
 enum Entries<'a> {
-    List(&'a [(u8, UsageValue)]),
-    /// As stored: number u8, type u8 (0 real, 1 count), value u64.
-    Stored(&'a [u8]),
+    List(&'a [(u8, f32)]),
+    /// As stored: the values as words, and runs of numbers (the first one u8, how many u8).
+    Stored {
+        values: &'a [u8],
+        runs: &'a [u8],
+    },
 }
 
 impl<'a> Entries<'a> {
-    fn iter(self, entries_max: usize) -> impl Iterator<Item = (u8, UsageValue)> + 'a {
-        let (list, stored) = match self {
-            Self::List(list) => (list, &[][..]),
-            Self::Stored(stored) => (&[][..], stored),
+    fn iter(self, entries_max: usize) -> impl Iterator<Item = (u8, f32)> + 'a {
+        let (list, values, runs) = match self {
+            Self::List(list) => (list, &[][..], &[][..]),
+            Self::Stored { values, runs } => (&[][..], values, runs),
         };
-        let stored = stored.chunks_exact(ENTRY_BYTES).map(|entry| {
-            let mut fields = Fields::new(entry);
-            let (number, real, bits) = (fields.u8(), fields.u8() == 0, fields.u64());
-            (number, if real { UsageValue::Real(f64::from_bits(bits)) } else { UsageValue::Count(bits) })
+        let values = values.as_chunks().0.iter().map(|value| f32::from_le_bytes(*value));
+        let numbers = runs.as_chunks().0.iter().flat_map(|&[first, count]| {
+            let first = u16::from(first);
+            (first..first + u16::from(count)).map(|number| number as u8)
         });
-        list.iter().copied().chain(stored).take(entries_max)
+        list.iter().copied().chain(numbers.zip(values)).take(entries_max)
     }
 
-    fn store(self, entries_max: usize, sink: &mut Sink<'_>) {
-        sink.u8(self.iter(entries_max).count() as u8);
-        for (number, value) in self.iter(entries_max) {
-            let (count, bits) = match value {
-                UsageValue::Real(real) => (false, real.to_bits()),
-                UsageValue::Count(count) => (true, count),
-            };
-            sink.u8(number).u8(u8::from(count)).u64(bits);
+    fn store_values(self, entries_max: usize, sink: &mut Sink<'_>) {
+        for (_, value) in self.iter(entries_max) {
+            sink.f32(value);
         }
     }
 
+    /// The numbers as runs of those that follow each other.
+    fn store_numbers(self, entries_max: usize, sink: &mut Sink<'_>) {
+        let mut run: Option<(u8, u8)> = None;
+        for (number, _) in self.iter(entries_max) {
+            run = Some(match run {
+                Some((first, count)) if first.checked_add(count) == Some(number) => (first, count + 1),
+                ended => {
+                    end_run(ended, sink);
+                    (number, 1)
+                }
+            });
+        }
+        end_run(run, sink);
+    }
+
     fn read(fields: &mut Fields<'a>) -> Self {
-        let count = usize::from(fields.u8());
-        Self::Stored(fields.bytes(count * ENTRY_BYTES))
+        Self::Stored { values: fields.words(), runs: fields.bytes() }
+    }
+}
+
+fn end_run(run: Option<(u8, u8)>, sink: &mut Sink<'_>) {
+    if let Some((first, count)) = run {
+        sink.u8(first).u8(count);
     }
 }
 
@@ -118,18 +129,18 @@ impl Moment {
 
 impl<'a> Usage<'a> {
     /// A snapshot to be written: counter numbers with their values.
-    pub const fn new(moment: Moment, entries: &'a [(u8, UsageValue)]) -> Self {
+    pub const fn new(moment: Moment, entries: &'a [(u8, f32)]) -> Self {
         Self { moment, entries: Entries::List(entries) }
     }
 
     /// Counter numbers with their values.
-    pub fn iter(&self) -> impl Iterator<Item = (u8, UsageValue)> + 'a {
+    pub fn iter(&self) -> impl Iterator<Item = (u8, f32)> + 'a {
         self.entries.iter(USAGE_ENTRIES_MAX)
     }
 
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(6).u8(self.moment as u8);
-        self.entries.store(USAGE_ENTRIES_MAX, sink);
+        self.entries.store_values(USAGE_ENTRIES_MAX, sink.head(6));
+        self.entries.store_numbers(USAGE_ENTRIES_MAX, sink.u8(self.moment as u8));
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {
@@ -139,11 +150,7 @@ impl<'a> Usage<'a> {
 
 impl<'a> Lifetime<'a> {
     /// To be written: counter numbers with their values.
-    pub const fn new(
-        moment: Moment,
-        life: &hums_core::lifetime::Lifetime,
-        entries: &'a [(u8, UsageValue)],
-    ) -> Self {
+    pub const fn new(moment: Moment, life: &hums_core::lifetime::Lifetime, entries: &'a [(u8, f32)]) -> Self {
         let hums_core::lifetime::Lifetime { airframe, boots, sessions, .. } = *life;
         Self {
             moment,
@@ -156,14 +163,15 @@ impl<'a> Lifetime<'a> {
     }
 
     /// Counter numbers with their values.
-    pub fn iter(&self) -> impl Iterator<Item = (u8, UsageValue)> + 'a {
+    pub fn iter(&self) -> impl Iterator<Item = (u8, f32)> + 'a {
         self.entries.iter(LIFETIME_ENTRIES_MAX)
     }
 
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(12).u8(self.moment as u8).u8(self.system).u64(self.uid);
-        sink.u32(self.boots).u32(self.sessions);
-        self.entries.store(LIFETIME_ENTRIES_MAX, sink);
+        sink.head(12).u64(self.uid).u32(self.boots).u32(self.sessions);
+        self.entries.store_values(LIFETIME_ENTRIES_MAX, sink);
+        sink.u8(self.moment as u8).u8(self.system);
+        self.entries.store_numbers(LIFETIME_ENTRIES_MAX, sink);
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {

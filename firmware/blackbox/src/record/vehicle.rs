@@ -2,7 +2,7 @@
 
 use hums_core::time::Instant;
 
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// The vehicle that is recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,8 +23,8 @@ pub struct Vehicle {
 
 impl Vehicle {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(2).u8(self.system).u8(self.component).u8(self.autopilot).u8(self.vehicle_type);
-        sink.u32(self.firmware).u64(self.uid);
+        sink.head(2).u32(self.firmware).u64(self.uid);
+        sink.u8(self.system).u8(self.component).u8(self.autopilot).u8(self.vehicle_type);
     }
 
     pub(super) fn read(fields: &mut Fields<'_>) -> Self {
@@ -54,14 +54,14 @@ pub struct Parameter<'a> {
 
 impl<'a> Parameter<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(3).name(self.name).u64(self.value.to_bits()).u8(u8::from(self.changed));
+        sink.head(3).f64(self.value).name(self.name).u8(u8::from(self.changed));
         sink.u8(self.by.0).u8(self.by.1);
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {
         Self {
             name: fields.text(),
-            value: f64::from_bits(fields.u64()),
+            value: fields.f64(),
             changed: fields.u8() != 0,
             by: (fields.u8(), fields.u8()),
         }
@@ -86,7 +86,7 @@ impl Clock {
     }
 
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(4).u64(self.boot.as_micros()).u64(self.utc_micros).u8(self.source);
+        sink.head(4).time(self.boot).u64(self.utc_micros).u8(self.source);
     }
 
     pub(super) fn read(fields: &mut Fields<'_>) -> Self {

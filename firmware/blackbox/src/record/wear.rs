@@ -4,7 +4,7 @@ use hums_core::component::{Figures, Kind, Status};
 use hums_core::health::exceedance::{self, Crossings};
 
 use super::Moment;
-use crate::bytes::{Fields, Sink};
+use super::stored::{Fields, Sink};
 
 /// Limits of one check that were crossed: of the session and of the airframe's life.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,12 +37,13 @@ impl<'a> Exceedance<'a> {
     }
 
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(13).u8(self.moment as u8).name(self.check).u8(self.instance).name(self.unit);
+        sink.head(13);
         for crossings in [self.session, self.lifetime] {
             sink.u32(u32::from(crossings.warnings)).u32(u32::from(crossings.criticals));
             sink.u32(crossings.warning_tenths).u32(crossings.critical_tenths);
-            sink.u32(crossings.peak.to_bits());
+            sink.f32(crossings.peak);
         }
+        sink.u8(self.moment as u8).name(self.check).u8(self.instance).name(self.unit);
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {
@@ -53,7 +54,7 @@ impl<'a> Exceedance<'a> {
             criticals: fields.u32().try_into().unwrap_or(u16::MAX),
             warning_tenths: fields.u32(),
             critical_tenths: fields.u32(),
-            peak: f32::from_bits(fields.u32()),
+            peak: fields.f32(),
         };
         Self { moment, check, instance, unit, session: crossings(), lifetime: crossings() }
     }
@@ -126,13 +127,14 @@ pub struct Component<'a> {
 
 impl<'a> Component<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        sink.head(14).u8(self.why as u8).u8(self.place).u8(self.kind as u8).u8(self.number);
-        sink.u8(self.status as u8).u32(self.replaced).name(self.name).name(self.serial);
+        sink.head(14).u32(self.replaced);
         let Figures { powered_s, flight_s, motor_s, flights, cycles } = self.figures;
         for figure in [powered_s, flight_s, motor_s, flights, cycles] {
-            sink.u64(figure.to_bits());
+            sink.f64(figure);
         }
-        sink.u32(self.used_percent.to_bits()).u8(self.by.0).u8(self.by.1).name(self.new_serial);
+        sink.f32(self.used_percent);
+        sink.u8(self.why as u8).u8(self.place).u8(self.kind as u8).u8(self.number).u8(self.status as u8);
+        sink.name(self.name).name(self.serial).u8(self.by.0).u8(self.by.1).name(self.new_serial);
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {
@@ -146,13 +148,13 @@ impl<'a> Component<'a> {
             name: fields.text(),
             serial: fields.text(),
             figures: Figures {
-                powered_s: f64::from_bits(fields.u64()),
-                flight_s: f64::from_bits(fields.u64()),
-                motor_s: f64::from_bits(fields.u64()),
-                flights: f64::from_bits(fields.u64()),
-                cycles: f64::from_bits(fields.u64()),
+                powered_s: fields.f64(),
+                flight_s: fields.f64(),
+                motor_s: fields.f64(),
+                flights: fields.f64(),
+                cycles: fields.f64(),
             },
-            used_percent: f32::from_bits(fields.u32()),
+            used_percent: fields.f32(),
             by: (fields.u8(), fields.u8()),
             new_serial: fields.text(),
         }

@@ -188,7 +188,13 @@ impl Exceedances {
 
     /// Whatever was exceeded, with what lasts counted up to now.
     pub fn iter(&self, now: Instant) -> impl Iterator<Item = Exceedance> {
-        self.entries.iter().flatten().filter_map(move |entry| {
+        self.changed(now, Instant::ZERO)
+    }
+
+    /// Whatever began, ended or lasted at a time or after it, with what lasts counted up to now.
+    pub fn changed(&self, now: Instant, since: Instant) -> impl Iterator<Item = Exceedance> {
+        let changed = move |entry: &&Entry| rank(entry.level) > 0 || entry.since_tenths >= tenths(since);
+        self.entries.iter().flatten().filter(changed).filter_map(move |entry| {
             let check = checks().nth(usize::from(entry.check))?;
             let mut session = entry.session;
             session.extend(entry.level, tenths(now).saturating_sub(entry.since_tenths));
@@ -326,6 +332,21 @@ mod tests {
         let expected =
             Crossings { warnings: 2, criticals: 1, warning_tenths: 40, critical_tenths: 15, peak: 70.0 };
         assert_eq!(tilt.session, expected);
+    }
+
+    #[test]
+    fn what_neither_began_nor_lasted_nor_ended_since_has_not_changed() {
+        let mut exceedances = Exceedances::new();
+        exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
+        let changed = |exceedances: &Exceedances, since_ms| {
+            let now = Instant::from_millis(60_000);
+            exceedances.changed(now, Instant::from_millis(since_ms)).count()
+        };
+        assert_eq!(changed(&exceedances, 50_000), 1, "it lasts");
+        exceedances.change(TILT, Side::Above, &finding(30_000, Level::Warning, Level::Ok, 20.0));
+        assert_eq!(changed(&exceedances, 30_000), 1, "it ended");
+        assert_eq!(changed(&exceedances, 30_100), 0);
+        assert_eq!(exceedances.iter(Instant::from_millis(60_000)).count(), 1);
     }
 
     #[test]

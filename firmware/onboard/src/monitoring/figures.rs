@@ -3,10 +3,13 @@
 use hums_blackbox::record::{Lost, Stats};
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
+use hums_link::summary::OwnFigures;
 use hums_recorder::status::CardState;
 
 use super::Monitoring;
-use crate::queues::{GsIn, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS, SectorsIn};
+use crate::queues::{
+    FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, GsIn, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS, SectorsIn,
+};
 
 /// How long a card may take to be found before it counts as missing.
 const START: Span = Span::from_secs(3);
@@ -20,7 +23,36 @@ pub(super) struct Sums {
     pub(super) frames_lost: u64,
 }
 
+/// What the machine has to give for all this; zeros where nobody counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Machine {
+    /// What the processor was busy in the last second, thousandths.
+    pub cpu_permille: u16,
+    /// The same in the worst second.
+    pub cpu_permille_max: u16,
+    /// The deepest the stack was, bytes.
+    pub stack_bytes_max: u32,
+    /// What the stack holds, bytes.
+    pub stack_bytes: u32,
+}
+
 impl Monitoring<'_> {
+    /// The machine's figures, as they are now: recorded with the others, and told to the ground station.
+    pub fn set_machine(&mut self, machine: Machine) {
+        self.machine = machine;
+    }
+
+    /// The same in percent, with the worst of the queues and of the card, for the summary stream.
+    pub(super) fn own_figures(&self) -> OwnFigures {
+        let Machine { cpu_permille, stack_bytes_max, stack_bytes, .. } = self.machine;
+        OwnFigures {
+            cpu_percent: f32::from(cpu_permille) / 10.0,
+            stack_percent: 100.0 * stack_bytes_max as f32 / stack_bytes.max(1) as f32,
+            queue_percent: 100.0 * self.queue_sectors_max as f32 / SECTOR_QUEUE_SECTORS as f32,
+            stall_s: self.card.read().stall_ms_max as f32 / 1_000.0,
+        }
+    }
+
     /// The pipeline's figures since power-on.
     pub fn stats(&self, gs: &GsIn) -> Stats {
         let card = self.card.read();
@@ -39,6 +71,14 @@ impl Monitoring<'_> {
             sd_stall_ms_max: u64::from(card.stall_ms_max),
             gs_frames: gs.frames(),
             gs_bytes: gs.bytes(),
+            frame_queue_bytes_max: u64::from(self.port.queue_bytes_max()),
+            frame_queue_bytes_capacity: FRAME_QUEUE_BYTES as u64,
+            gs_queue_bytes_max: u64::from(gs.bytes_max()),
+            gs_queue_bytes_capacity: GS_QUEUE_BYTES as u64,
+            cpu_permille: u64::from(self.machine.cpu_permille),
+            cpu_permille_max: u64::from(self.machine.cpu_permille_max),
+            stack_bytes_max: u64::from(self.machine.stack_bytes_max),
+            stack_bytes_capacity: u64::from(self.machine.stack_bytes),
         }
     }
 

@@ -1,10 +1,9 @@
 //! What happened, into the record: take-off and landing, phases of flight, snapshots around critical findings, the
 //! protective action; and what somebody did by hand: parameters, components.
 
-use hums_blackbox::record::{Event, Moment, Parameter, Protection, Record, Snapshot, SnapshotValues, Why};
+use hums_blackbox::record::{Event, Moment, Protection, Record, Snapshot, SnapshotValues, Why};
 use hums_core::component::Label;
 use hums_core::happening::Happening;
-use hums_core::params::ParamError;
 use hums_core::time::Instant;
 
 use super::Monitoring;
@@ -17,6 +16,7 @@ pub(super) const CRITICAL: u8 = 8;
 pub type By = (u8, u8);
 
 impl Monitoring<'_> {
+    #[inline(never)]
     pub(super) fn record_happenings(&mut self, now: Instant, sectors: &mut SectorsIn) {
         while let Some(happening) = self.monitor.take_happening() {
             let (number, text) = match happening {
@@ -44,21 +44,6 @@ impl Monitoring<'_> {
             let record = Record::Snapshot(Snapshot::new(&snapshot, &mut values));
             super::write(now, &record, writer, losses, sectors);
         }
-    }
-
-    /// Sets a parameter, at once, and records who did.
-    pub fn set_parameter(
-        &mut self,
-        now: Instant,
-        name: &str,
-        value: f32,
-        by: By,
-        sectors: &mut SectorsIn,
-    ) -> Result<(), ParamError> {
-        self.monitor.params_mut().set(name, value)?;
-        let record = Parameter { name, value: f64::from(value), changed: true, by };
-        self.record(now, &Record::Parameter(record), sectors);
-        Ok(())
     }
 
     /// Another part is in a component's place, from 0: recorded with what the old one has run. `false` where there is no

@@ -1,6 +1,6 @@
 //! The monitor task's body: frames from the queue into the record, the checks and the summary stream.
 //!
-//! Less urgent than reception, whose frames wait up to 40 ms for it; more urgent than anything that waits for a device.
+//! Less urgent than reception, whose frames wait up to 16 ms for it; more urgent than anything that waits for a device.
 //! One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] every 50 ms does
 //! what time alone asks for.
 
@@ -11,7 +11,7 @@ mod records;
 mod slot;
 
 use hums_blackbox::record::{
-    Boot, Event, Fault, FindingRecord, Lost, Moment, Parameter, Record, Vehicle as VehicleRecord,
+    Boot, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Vehicle as VehicleRecord,
 };
 use hums_blackbox::{Sector, SectorSink, Writer};
 use hums_core::health::{Finding, Level};
@@ -27,11 +27,13 @@ use crate::keeping::Keeping;
 use crate::loss::Losses;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::{FramesOut, GsIn, SectorsIn};
+use crate::supervisor::Task;
 pub use happenings::By;
 
+pub use figures::Machine;
 use figures::Sums;
 use happenings::CRITICAL;
-use notices::Notices;
+use notices::{Notice, Notices};
 use slot::Told;
 
 /// How often [`Monitoring::tick`] is to be called.
@@ -43,6 +45,9 @@ const STATS: Span = Span::from_secs(10);
 /// How often usage is recorded.
 const USAGE: Span = Span::from_secs(60);
 
+/// The `MAV_SEVERITY` of a restart after a fault.
+const FAULT_SEVERITY: u8 = 4;
+
 /// What the board knows of itself: what the first record of a log says.
 pub type Identity<'a> = Boot<'a>;
 
@@ -50,7 +55,12 @@ pub type Identity<'a> = Boot<'a>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Into the record.
-    Encode,
+    Encode {
+        /// When it came.
+        at: Instant,
+        /// Which message it is.
+        id: u32,
+    },
     /// Into what the monitor knows.
     Observe,
     /// On to the ground station, where it is its turn.
@@ -79,6 +89,7 @@ pub struct Monitoring<'a> {
     port_before: PortReading,
     card_before: CardReading,
     sums: Sums,
+    machine: Machine,
     /// Frames that found no room in the sector queue.
     refused: u64,
     queue_sectors_max: usize,
@@ -114,6 +125,7 @@ impl<'a> Monitoring<'a> {
             port_before: PortReading::default(),
             card_before: card.read(),
             sums: Sums::default(),
+            machine: Machine::default(),
             refused: 0,
             queue_sectors_max: 0,
             partial_at: Instant::ZERO,
@@ -153,13 +165,20 @@ impl<'a> Monitoring<'a> {
         keeping.tick(now, monitor.params(), armed, card, writer, sectors);
         if self.keeping.takes_new_file(self.card) {
             self.heading(now, sectors);
+            // All of it, also what was recorded before.
+            self.usage_at = Instant::ZERO;
             self.record_usage(now, Moment::Periodic, sectors);
         }
     }
 
-    /// Records how the boot before this one ended. To be called after [`Self::start`].
-    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, sectors: &mut SectorsIn) {
+    /// Records how the boot before this one ended, with a word on what came before, and tells the ground station as soon
+    /// as the vehicle is known. To be called after [`Self::start`].
+    pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, before: &str, sectors: &mut SectorsIn) {
         self.record(now, &Record::Fault(*fault), sectors);
+        self.record(now, &Record::Note(Note { severity: FAULT_SEVERITY, text: before }), sectors);
+        let task = Task::ALL.into_iter().map(Task::name).find(|name| *name == fault.task);
+        // There is room: nothing was told yet.
+        let _ = self.notices.push(Notice::Restarted(restart_words(fault), task));
     }
 
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
@@ -189,8 +208,9 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
         begin: &mut impl FnMut(Step),
     ) {
-        begin(Step::Encode);
-        let key = Frame::again(bytes, Check::Unverified).filter(|frame| frame.id() == crate::secure::SETUP);
+        let whole = Frame::again(bytes, Check::Unverified);
+        begin(Step::Encode { at, id: whole.as_ref().map_or(0, Frame::id) });
+        let key = whole.filter(|frame| frame.id() == crate::secure::SETUP);
         if let Some(frame) = key {
             self.withhold(at, &frame, sectors);
         } else if !self.companion.stopped && self.writer.frame(at, bytes, verified, sectors).is_err() {
@@ -205,13 +225,19 @@ impl<'a> Monitoring<'a> {
             self.pass_down(at, &frame, gs);
             return;
         }
-        self.sequences.frame(at, &frame);
-        if let Some((source, observation)) = hums_link::observe(&frame) {
-            self.monitor.observe(at, source, &observation);
-        }
+        self.observe(at, &frame);
         self.heard(at, &frame, sectors, gs);
         begin(Step::Summary);
         self.summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
+    }
+
+    /// Not within its caller: an observation is not to lie on the stack below a conversation.
+    #[inline(never)]
+    fn observe(&mut self, at: Instant, frame: &Frame<'_>) {
+        self.sequences.frame(at, frame);
+        if let Some((source, observation)) = hums_link::observe(frame) {
+            self.monitor.observe(at, source, &observation);
+        }
     }
 
     /// What time alone asks for, every [`TICK`]. Each finding is recorded, told to the GS, and given to `findings`.
@@ -235,14 +261,14 @@ impl<'a> Monitoring<'a> {
         self.losses_to_record(now, false, sectors);
         if now.since(self.stats_at) >= STATS {
             self.stats_at = now;
-            let stats = Record::Stats(self.stats(gs));
-            self.record(now, &stats, sectors);
+            self.record_stats(now, sectors, gs);
         }
         if now.since(self.usage_at) >= USAGE {
             self.record_usage(now, Moment::Periodic, sectors);
         }
         self.partial(now, sectors);
         self.tell_notices(now, gs);
+        self.summary.own = self.own_figures();
         self.summary.tick(now, self.monitor, &mut |bytes| gs.tell(bytes));
         self.converse(now, sectors, gs);
     }
@@ -253,8 +279,7 @@ impl<'a> Monitoring<'a> {
         self.count_losses(now, sectors);
         self.losses_to_record(now, true, sectors);
         self.record_usage(now, Moment::End, sectors);
-        let stats = Record::Stats(self.stats(gs));
-        self.record(now, &stats, sectors);
+        self.record_stats(now, sectors, gs);
         sectors.with_reserve(|sink| self.writer.finish(sink));
     }
 
@@ -268,6 +293,9 @@ impl<'a> Monitoring<'a> {
         self.monitor
     }
 
+    // Not within the tick: what one of these takes of the stack is not to lie below what another takes.
+
+    #[inline(never)]
     fn check(
         &mut self,
         now: Instant,
@@ -290,6 +318,7 @@ impl<'a> Monitoring<'a> {
         });
     }
 
+    #[inline(never)]
     fn losses_to_record(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
         let Self { losses, writer, .. } = self;
         losses.flush(now, all, |loss| {
@@ -302,7 +331,14 @@ impl<'a> Monitoring<'a> {
         write(now, record, self.writer, &mut self.losses, sectors)
     }
 
+    #[inline(never)]
+    fn record_stats(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &GsIn) {
+        let stats = Record::Stats(self.stats(gs));
+        self.record(now, &stats, sectors);
+    }
+
     /// Gives storage a copy of the sector in progress, unless full sectors keep it busy anyway.
+    #[inline(never)]
     fn partial(&mut self, now: Instant, sectors: &mut SectorsIn) {
         if now.since(self.partial_at) < PARTIAL || !sectors.is_empty() {
             return;
@@ -328,4 +364,15 @@ fn write(
         losses.count(now, Lost::Records, 1);
     }
     written
+}
+
+/// How a start ended, in words for a pilot.
+fn restart_words(fault: &Fault<'_>) -> &'static str {
+    match fault.kind {
+        1 => "panic",
+        2 if fault.message == "stack overflow" => "stack overflow",
+        2 => "processor fault",
+        3 => "watchdog",
+        _ => "supply low",
+    }
 }

@@ -3,8 +3,8 @@
 
 use hums_blackbox::record::{Note, Record};
 use hums_core::protect::Step;
-use hums_core::time::Instant;
-use hums_link::encode::Severity;
+use hums_core::time::{Instant, Span};
+use hums_link::encode::{Severity, Text};
 use hums_link::messages;
 use hums_link::outlet::Class;
 
@@ -13,6 +13,8 @@ use crate::queues::{GsIn, SectorsIn};
 
 /// Texts that wait; one more is recorded only.
 const WAITING_MAX: usize = 4;
+/// How long a restart waits for the vehicle to be known.
+const UNKNOWN_MAX: Span = Span::from_secs(5);
 /// `MAV_SEVERITY` of what a pilot need not hear of, and whatever is milder.
 const INFO: u8 = 6;
 
@@ -23,6 +25,8 @@ pub(crate) enum Notice {
     Text(u8, &'static str),
     /// A step of the protective action.
     Protection(Step),
+    /// We were restarted: why, and in which task, if it was one.
+    Restarted(&'static str, Option<&'static str>),
 }
 
 /// Texts that are still to be told.
@@ -41,7 +45,7 @@ impl Monitoring<'_> {
     /// Tells what the protective action does, before whatever else waits.
     pub(super) fn announce(&mut self, step: Step) {
         let notices = &mut self.notices;
-        let is_text = |notice: &Notice| matches!(notice, Notice::Text(..));
+        let is_text = |notice: &Notice| !matches!(notice, Notice::Protection(_));
         if notices.is_full() {
             // One less urgent, or the oldest: the record has them all.
             notices.remove(if notices.last().is_some_and(is_text) { WAITING_MAX - 1 } else { 0 });
@@ -52,13 +56,25 @@ impl Monitoring<'_> {
     }
 
     /// Tells what waits, as far as the budget allows.
+    #[inline(never)]
     pub(super) fn tell_notices(&mut self, now: Instant, gs: &mut GsIn) {
-        let Self { notices, summary, .. } = self;
+        let Self { notices, summary, monitor, .. } = self;
         while let Some(notice) = notices.first() {
             let (class, packet) = match notice {
                 Notice::Text(severity, text) => {
                     let severity = if *severity < 5 { Severity::Warning } else { Severity::Notice };
                     (Class::Finding, messages::status_text(severity, text))
+                }
+                Notice::Restarted(why, task) => {
+                    // Until then nobody knows whose companion we are, and no ground station would show it.
+                    if monitor.vehicle().source.is_none() && now.since(Instant::ZERO) < UNKNOWN_MAX {
+                        return;
+                    }
+                    let text = match task {
+                        Some(task) => Text::new(format_args!("HUMS: restarted after: {why} ({task})")),
+                        None => Text::new(format_args!("HUMS: restarted after: {why}")),
+                    };
+                    (Class::Finding, messages::status_text(Severity::Warning, text.as_str()))
                 }
                 Notice::Protection(step) => {
                     let (severity, text) = step.text();

@@ -2,7 +2,7 @@
 
 use hums_blackbox::record::{
     Clock, Component as ComponentRecord, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime, Moment, Record,
-    USAGE_ENTRIES_MAX, Usage, UsageValue, Vehicle as VehicleRecord, Why,
+    USAGE_ENTRIES_MAX, Usage, Vehicle as VehicleRecord, Why,
 };
 use hums_core::component::{COMPONENTS_MAX, Component, Figures, Status};
 use hums_core::time::Instant;
@@ -13,23 +13,27 @@ use crate::queues::SectorsIn;
 /// A UTC that differs more than this from the one that is recorded is recorded anew.
 const CLOCK_STEP_MICROS: u64 = 1_000_000;
 
-/// Counters on their way into records: whenever a record's worth is together it is written.
-struct Counters<const N: usize>(heapless::Vec<(u8, UsageValue), N>);
+/// Counters of a record: fewer than there may be, as they gather on the stack, at 24 bytes each.
+const GATHERED: usize = 16;
+const _: () = assert!(GATHERED <= USAGE_ENTRIES_MAX && GATHERED <= LIFETIME_ENTRIES_MAX);
 
-impl<const N: usize> Counters<N> {
+/// Counters on their way into records: whenever a record's worth is together it is written.
+struct Counters(heapless::Vec<(u8, f32), GATHERED>);
+
+impl Counters {
     const fn new() -> Self {
         Self(heapless::Vec::new())
     }
 
-    fn push(&mut self, number: u8, value: f64, write: impl FnOnce(&[(u8, UsageValue)])) {
+    fn push(&mut self, number: u8, value: f64, write: impl FnOnce(&[(u8, f32)])) {
         // There is room: a full one was written.
-        let _ = self.0.push((number, UsageValue::Real(value)));
+        let _ = self.0.push((number, value as f32));
         if self.0.is_full() {
             self.flush(write);
         }
     }
 
-    fn flush(&mut self, write: impl FnOnce(&[(u8, UsageValue)])) {
+    fn flush(&mut self, write: impl FnOnce(&[(u8, f32)])) {
         if !self.0.is_empty() {
             write(&self.0);
             self.0.clear();
@@ -38,6 +42,7 @@ impl<const N: usize> Counters<N> {
 }
 
 impl Monitoring<'_> {
+    #[inline(never)]
     pub(super) fn record_vehicle(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let vehicle = self.monitor.vehicle();
         let (Some(source), Some(heartbeat)) = (vehicle.source, vehicle.heartbeat.get()) else { return };
@@ -74,7 +79,7 @@ impl Monitoring<'_> {
 
     /// The session's counters, the airframe's life at the session's start and end, and what was exceeded.
     pub(super) fn record_usage(&mut self, now: Instant, moment: Moment, sectors: &mut SectorsIn) {
-        self.usage_at = now;
+        let before = core::mem::replace(&mut self.usage_at, now);
         self.record_session(now, moment, sectors);
         if moment != Moment::Periodic {
             self.record_life(now, moment, sectors);
@@ -83,12 +88,15 @@ impl Monitoring<'_> {
                 self.record_component(now, place, why, sectors);
             }
         }
-        self.record_exceedances(now, moment, sectors);
+        let since = if moment == Moment::Periodic { before } else { Instant::ZERO };
+        self.record_exceedances(now, moment, since, sectors);
     }
 
+    // Never within its caller: what each takes of the stack is not taken by all.
+    #[inline(never)]
     fn record_session(&mut self, now: Instant, moment: Moment, sectors: &mut SectorsIn) {
         let Self { monitor, writer, losses, .. } = self;
-        let mut counters = Counters::<USAGE_ENTRIES_MAX>::new();
+        let mut counters = Counters::new();
         let mut put = |part: &[_]| {
             super::write(now, &Record::Usage(Usage::new(moment, part)), writer, losses, sectors);
         };
@@ -96,10 +104,11 @@ impl Monitoring<'_> {
         counters.flush(put);
     }
 
+    #[inline(never)]
     fn record_life(&mut self, now: Instant, moment: Moment, sectors: &mut SectorsIn) {
         let Self { monitor, writer, losses, .. } = self;
         let life = monitor.lifetime();
-        let mut counters = Counters::<LIFETIME_ENTRIES_MAX>::new();
+        let mut counters = Counters::new();
         let mut put = |part: &[_]| {
             let record = Record::Lifetime(Lifetime::new(moment, &life, part));
             super::write(now, &record, writer, losses, sectors);
@@ -108,10 +117,11 @@ impl Monitoring<'_> {
         counters.flush(put);
     }
 
-    /// At the start what was exceeded in the airframe's life; later what was in this session.
-    fn record_exceedances(&mut self, now: Instant, moment: Moment, sectors: &mut SectorsIn) {
+    /// At the start what was exceeded in the airframe's life; later what was in this session, and has changed.
+    #[inline(never)]
+    fn record_exceedances(&mut self, now: Instant, moment: Moment, since: Instant, sectors: &mut SectorsIn) {
         let Self { monitor, writer, losses, .. } = self;
-        for exceedance in monitor.exceedances().iter(now) {
+        for exceedance in monitor.exceedances().changed(now, since) {
             if moment == Moment::Start || exceedance.session.happened() {
                 let record = Record::Exceedance(Exceedance::new(moment, &exceedance));
                 super::write(now, &record, writer, losses, sectors);
@@ -119,6 +129,7 @@ impl Monitoring<'_> {
         }
     }
 
+    #[inline(never)]
     pub(super) fn record_component(&mut self, now: Instant, place: usize, why: Why, sectors: &mut SectorsIn) {
         let Some((figures, status)) = self.monitor.component_figures(place) else { return };
         let used_percent = self.monitor.component_used_percent(place);

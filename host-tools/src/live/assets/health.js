@@ -41,7 +41,7 @@ export const usage = () => {
     return { name, format, number, node: el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, number, unit ? ` ${unit}` : "")) };
   });
   const due = el("ul", { class: "due" });
-  const none = el("p", { class: "dim small" }, "No component has a limit here: give --params with COMP_ limits.");
+  const none = el("p", { class: "dim small" }, "No part is described. A log tells its own, a box on the link does when it is asked for its parameters, or a file does: ", el("span", { class: "word" }, "--params"), ".");
   const box = panel("usage", "Usage of this session", [el("dl", { class: "facts two" }, rows.map((row) => row.node)), el("h4", {}, "Due"), due, none]);
   let parts = [];
   return {
@@ -59,8 +59,10 @@ export const usage = () => {
       components.forEach((component, i) => {
         const { level, name, text } = parts[i], used = component.used_percent;
         say(name, `${component.kind}${component.number ? " " + component.number : ""}${component.name ? " " + component.name : ""}`);
-        level.set(LEVELS_DUE[component.status], component.status === "red" ? "due" : component.status === "yellow" ? "soon" : "good");
-        say(text, `${used == null ? "no limit" : fixed(used, 0) + " % used"}, ${fixed(component.flight_h, 2)} h, ${whole(component.flights)} flights`);
+        // What it ran before is not known on every link: then it may be due without our knowing.
+        const partial = !component.life && component.status === "green" && used != null;
+        level.set(partial ? "stale" : LEVELS_DUE[component.status], partial ? "life unknown" : component.status === "red" ? "due" : component.status === "yellow" ? "soon" : "good");
+        say(text, `${used == null ? "no limit" : fixed(used, 0) + " % used"}, ${fixed(component.flight_h, 2)} h, ${whole(component.flights)} flights${component.life ? "" : " in this session"}`);
       });
     },
   };

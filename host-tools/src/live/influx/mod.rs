@@ -4,26 +4,27 @@
 //! ([`writer`]). A database that is away costs nothing: batches wait in memory, beyond a limit in a file
 //! ([`queue`]), and are written when it is back.
 
+pub mod names;
 pub mod queue;
 pub mod target;
 pub mod writer;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant as Wall};
 
 use anyhow::Result;
 use hums_blackbox::Record;
-use hums_blackbox::record::{FindingRecord, Moment, USAGE_ENTRIES_MAX, Usage, UsageValue};
+use hums_blackbox::record::{FindingRecord, Moment, USAGE_ENTRIES_MAX, Usage};
 use hums_core::time::{Instant, Span};
 use hums_link::{Frame, observe};
 use serde::Serialize;
 
+use self::names::Names;
 use self::queue::{Batch, Queue};
 use self::target::Target;
 use super::world::World;
-use crate::decode::influx::{Clock, Lines, Tags};
+use crate::decode::influx::{Clock, Lines};
 use crate::decode::record::rows;
 use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
@@ -56,8 +57,7 @@ pub struct Figures {
 
 /// The side that makes points.
 pub struct Influx {
-    session: String,
-    tags: BTreeMap<u8, Tags>,
+    names: Names,
     messages: Clock,
     quantities: Clock,
     batch: Batch,
@@ -72,37 +72,30 @@ impl Influx {
     pub fn start(target: Target, session: String) -> Result<Self> {
         let queue = Arc::new(Queue::new()?);
         let writer = writer::start(target, Arc::clone(&queue))?;
+        Self::new(queue, Some(writer), session)
+    }
+
+    fn new(queue: Arc<Queue>, writer: Option<JoinHandle<()>>, session: String) -> Result<Self> {
         Ok(Self {
-            session,
-            tags: BTreeMap::new(),
+            names: Names::new(session)?,
             messages: Clock::default(),
             quantities: Clock::default(),
             batch: Batch::default(),
             begun: None,
             usage_at: Instant::ZERO,
             queue,
-            writer: Some(writer),
+            writer,
         })
     }
 
-    /// The tags of a system's points: of a vehicle its own; whoever else speaks is tagged with the first vehicle, as a
-    /// log's points are with the one whose log it is.
-    fn tags(&mut self, system: u8, world: &World) -> Tags {
-        let owner = world.crafts.get_key_value(&system).or_else(|| world.crafts.first_key_value());
-        let Some((&owner, craft)) = owner else { return Tags::new(&self.session, "unknown") };
-        let session = &self.session;
-        let tags = self.tags.entry(owner).or_insert_with(|| {
-            let uid =
-                craft.monitor.vehicle().identity.get().map(|identity| identity.uid).filter(|uid| *uid != 0);
-            let vehicle = uid.map_or_else(|| format!("system-{owner}"), |uid| format!("uid-{uid:016x}"));
-            Tags::new(session, &vehicle)
-        });
-        tags.clone()
+    /// All vehicles of a recording are known before its first point is made.
+    pub fn know(&mut self, world: &World) {
+        self.names.know(world);
     }
 
     /// Points for a frame that the world has taken.
     pub fn frame(&mut self, at: Instant, epoch_us: u64, frame: &Frame<'_>, world: &World) {
-        let tags = self.tags(frame.system(), world);
+        let tags = self.names.tags(frame.system(), world);
         if let Peek::Frame(raw) = peek(frame.bytes()) {
             let verified = frame.check() == hums_link::Check::Verified;
             let message = raw.message().filter(|_| verified);
@@ -123,7 +116,7 @@ impl Influx {
     /// Points for the findings that the world has made.
     pub fn found(&mut self, epoch_us: u64, world: &World) {
         for (system, finding) in &world.found {
-            let tags = self.tags(*system, world);
+            let tags = self.names.tags(*system, world);
             let mut lines = Lines::default();
             for row in rows(&Record::Finding(FindingRecord::from(finding))) {
                 lines.row(&tags, finding.at, &row);
@@ -131,6 +124,7 @@ impl Influx {
             self.put(&lines, epoch_us, false);
         }
         self.give_away_when_old();
+        self.settle(world);
     }
 
     /// Points for the usage counters, when it is their turn.
@@ -140,9 +134,9 @@ impl Influx {
         }
         self.usage_at = at;
         for (system, craft) in &world.crafts {
-            let tags = self.tags(*system, world);
+            let tags = self.names.tags(*system, world);
             let mut counters = Vec::new();
-            craft.monitor.for_each_counter(|number, value| counters.push((number, UsageValue::Real(value))));
+            craft.monitor.for_each_counter(|number, value| counters.push((number, value as f32)));
             let mut lines = Lines::default();
             for part in counters.chunks(USAGE_ENTRIES_MAX) {
                 for row in rows(&Record::Usage(Usage::new(Moment::Periodic, part))) {
@@ -174,8 +168,34 @@ impl Influx {
 
     fn give_away(&mut self) {
         self.begun = None;
-        if self.batch.points > 0 {
-            self.queue.put(std::mem::take(&mut self.batch));
+        if self.batch.points > 0
+            && let Some(batch) = self.names.pass(std::mem::take(&mut self.batch))
+        {
+            self.queue.put(batch);
+        }
+    }
+
+    /// Gives away what waited for its vehicles' names, when it is time.
+    fn settle(&mut self, world: &World) {
+        if self.names.is_waiting() {
+            self.give_away();
+            let settled = self.names.settle(world);
+            self.give_settled(settled);
+        }
+    }
+
+    /// In parts that a database takes.
+    fn give_settled(&self, settled: Option<Batch>) {
+        let mut part = Batch::default();
+        for line in settled.iter().flat_map(|all| all.text.split_inclusive(|byte| *byte == b'\n')) {
+            part.text.extend_from_slice(line);
+            part.points += 1;
+            if part.text.len() >= BATCH_BYTES {
+                self.queue.put(std::mem::take(&mut part));
+            }
+        }
+        if part.points > 0 {
+            self.queue.put(part);
         }
     }
 
@@ -183,18 +203,90 @@ impl Influx {
     pub fn figures(&mut self) -> Figures {
         self.give_away_when_old();
         let mut figures = self.queue.figures();
-        figures.waiting += self.batch.points;
+        figures.waiting += self.batch.points + self.names.points_waiting();
         figures
     }
 
     /// Gives away what is left and waits for the database, for a while; what became of all points.
     pub fn finish(mut self) -> Figures {
         self.give_away();
+        let settled = self.names.end();
+        self.give_settled(settled);
         self.queue.close(Wall::now() + LAST_WAIT);
         if let Some(writer) = self.writer.take() {
             // A panic of the writer shows in the figures: its points still wait.
             let _ = writer.join();
         }
         self.queue.figures()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::packet::Packet;
+
+    use super::*;
+    use crate::live::told::Limits;
+
+    /// What was told of the autopilot's id.
+    const UID: u64 = 0x0031_002a_3035_510a;
+
+    fn heartbeat() -> Packet {
+        Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3)
+    }
+
+    /// `AUTOPILOT_VERSION`
+    fn version() -> Packet {
+        Packet::new(148).u32(8, UID as u32).u32(12, (UID >> 32) as u32)
+    }
+
+    /// Flies these packets past; gives the lines that the database would get, the last ones by the end.
+    fn fly(packets: &[Packet], know: bool) -> Vec<String> {
+        let queue = Arc::new(Queue::new().expect("a file"));
+        let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");
+        let mut encoder = Encoder::of(1, 1);
+        let frames: Vec<Vec<u8>> = packets
+            .iter()
+            .map(|packet| encoder.frame(&mut [0; GS_FRAME_BYTES_MAX], packet).to_vec())
+            .collect();
+        let mut world = World::new(Limits::default());
+        if know {
+            let mut whole = World::new(Limits::default());
+            for bytes in &frames {
+                whole.frame(Instant::from_millis(1), &Frame::parse(bytes).expect("a frame"), None);
+            }
+            influx.know(&whole);
+        }
+        for (number, bytes) in (1..).zip(&frames) {
+            let (at, frame) = (Instant::from_millis(number * 100), Frame::parse(bytes).expect("a frame"));
+            world.frame(at, &frame, None);
+            influx.frame(at, 0, &frame, &world);
+            influx.found(0, &world);
+        }
+        influx.finish();
+        let mut lines = Vec::new();
+        while let Some(batch) = queue.take() {
+            let text = String::from_utf8(batch.text).expect("text");
+            assert_eq!(text.lines().count() as u64, batch.points);
+            lines.extend(text.lines().map(str::to_owned));
+        }
+        lines
+    }
+
+    #[test]
+    fn points_before_the_unique_id_have_it_too_as_those_of_decode() {
+        for know in [false, true] {
+            let lines = fly(&[heartbeat(), heartbeat(), version(), heartbeat()], know);
+            assert!(lines.len() >= 4, "{lines:?}");
+            let tag = format!("vehicle=uid-{UID:016x}");
+            assert!(lines.iter().all(|line| line.contains(&tag)), "{lines:#?}");
+        }
+    }
+
+    #[test]
+    fn a_vehicle_that_never_tells_is_named_by_its_system() {
+        let lines = fly(&[heartbeat(), heartbeat()], false);
+        assert!(lines.len() >= 2 && lines.iter().all(|line| line.contains("vehicle=system-1")), "{lines:#?}");
     }
 }

@@ -184,6 +184,9 @@ struct Counters {
     sd_stall_ms_max: u64,
     gs_frames: u64,
     gs_bytes: u64,
+    stack_bytes_max: Option<u64>,
+    stack_bytes: Option<u64>,
+    stack_by_urgency: Option<serde_json::Value>,
     instructions: Option<serde_json::Value>,
 }
 
@@ -202,6 +205,9 @@ impl Counters {
             sd_stall_ms_max: self.sd_stall_ms_max,
             gs_frames: self.gs_frames,
             gs_bytes: self.gs_bytes,
+            stack_bytes_max: self.stack_bytes_max,
+            stack_bytes: self.stack_bytes,
+            stack_by_urgency: self.stack_by_urgency,
             instructions: self.instructions,
             ..Report::default()
         }

@@ -4,6 +4,7 @@ use core::cell::RefCell;
 use core::fmt;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_onboard::Task;
 use hums_recorder::{CardDevice, Trouble};
 use semihosting::fs::File;
 use semihosting::io::{Read, Seek, SeekFrom, Write};
@@ -70,6 +71,7 @@ impl BlockDevice for ImageCard {
     }
 
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
+        let _ = super::provoke::here(Task::Storage);
         self.at(start, |file| {
             blocks.iter().try_for_each(|block| file.write_all(&block.contents).map_err(|_| CardError::Io))
         })

@@ -5,7 +5,7 @@
 //! is switched on only while bytes are due by the feed, and everything else waits on the host's side without loss.
 
 use core::cell::RefCell;
-use core::future::poll_fn;
+use core::future::{pending, poll_fn};
 use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Poll;
 
@@ -16,6 +16,7 @@ use embassy_stm32::pac;
 use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::Timer;
 use heapless::Vec;
+use hums_onboard::Task;
 
 use super::provoke;
 use crate::boards::{Overrun, Receive, Transmit};
@@ -24,7 +25,7 @@ use crate::tasks::reception::FETCH_BYTES;
 /// Bytes that are received as one piece; a feed record of more is several pieces at the same time.
 const PIECE_BYTES: usize = FETCH_BYTES;
 /// The same from the ground station.
-const GS_PIECE_BYTES: usize = 512;
+const GS_PIECE_BYTES: usize = 256;
 /// The ground station's port, in baud: as on the real board.
 const GS_BAUD: u64 = 57_600;
 /// The autopilot's.
@@ -155,6 +156,10 @@ fn USART2() {
 impl<const BYTES: usize> Receive for PortRx<BYTES> {
     async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
         let Self(inbox) = self;
+        // The ground station's port has no task that anybody misses.
+        if BYTES == PIECE_BYTES {
+            let _ = provoke::here(Task::Reception);
+        }
         poll_fn(|context| {
             inbox.waker.register(context.waker());
             if inbox.due.load(Ordering::Acquire) > 0 {
@@ -180,7 +185,9 @@ impl<const BYTES: usize> Receive for PortRx<BYTES> {
 
 impl Transmit for GsTx {
     async fn transmit(&mut self, bytes: &[u8]) {
-        provoke::here().await;
+        if provoke::here(Task::Downlink) {
+            pending::<()>().await;
+        }
         send(pac::USART2, bytes, self.baud).await;
     }
 

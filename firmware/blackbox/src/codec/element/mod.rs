@@ -13,6 +13,7 @@ mod times;
 
 pub(crate) use classes::Distributions;
 use costs::Costs;
+pub(super) use rest::{integer_class, integer_rest};
 
 /// Elements at most: a copter with all streams has 430, a PX4 510.
 pub(crate) const ELEMENTS: usize = 544;

@@ -7,13 +7,13 @@ pub(super) const ESCAPE: usize = 15;
 
 /// Integers: 0 for none, 1 for +-1, then the length in bits; 15 for 15 bits and more.
 #[inline]
-pub(super) fn integer_class(magnitude: u32) -> usize {
+pub(crate) fn integer_class(magnitude: u32) -> usize {
     ((32 - magnitude.leading_zeros()) as usize).min(ESCAPE)
 }
 
 /// Sign and lower bits of an integer difference.
 #[inline]
-pub(super) fn integer_rest<C: Coder>(coder: &mut C, class: usize, difference: i32) -> i32 {
+pub(crate) fn integer_rest<C: Coder>(coder: &mut C, class: usize, difference: i32) -> i32 {
     match class {
         0 => 0,
         // Only the sign, and then at most 15 bits: nearly all of them.

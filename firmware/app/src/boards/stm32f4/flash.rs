@@ -18,7 +18,7 @@ const BYTES: usize = 2 * SECTOR_BYTES;
 pub(crate) struct StoreFlash(Flash<'static, Blocking>);
 
 impl StoreFlash {
-    pub(super) const fn new(flash: Flash<'static, Blocking>) -> Self {
+    pub(crate) const fn new(flash: Flash<'static, Blocking>) -> Self {
         Self(flash)
     }
 

@@ -1,0 +1,94 @@
+//! NUCLEO-F429ZI: an STM32F429ZI, which has 64 KiB more of RAM; its clock comes from the debugger's part of the board.
+//! The card's pins are those of an Arduino shield with a microSD slot at SPI.
+//!
+//! | pin | what | remark |
+//! |---|---|---|
+//! | PG9 (D0) | USART6 RX, from the autopilot's TELEM TX | DMA2 stream 1, ring of [`RING_BYTES`] |
+//! | PG14 (D1) | USART6 TX, to the autopilot's TELEM RX | DMA2 stream 6 |
+//! | PD5 (CN9, 6) | USART2 TX, to the ground station's radio | DMA1 stream 6 |
+//! | PD6 (CN9, 4) | USART2 RX, from the radio | DMA1 stream 5, ring of [`GS_RING_BYTES`] |
+//! | PD14, PA5, PA6, PA7 (D10, D13, D12, D11) | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz; MISO pulled up; JP6 off, which gives PA7 to the Ethernet |
+//! | PB0 | LED LD1, lit when high | |
+
+use embassy_stm32::dma::{self, Request};
+use embassy_stm32::flash::Flash;
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
+use embassy_stm32::interrupt;
+use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH1, DMA2_CH6, RNG};
+use embassy_stm32::rng::{self, Rng};
+use embassy_stm32::spi::{self, Spi};
+use embassy_stm32::usart::{self, Uart};
+use embassy_stm32::{bind_interrupts, pac, rcc};
+use static_cell::ConstStaticCell;
+
+use super::Boot;
+use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
+pub(crate) use super::stm32f4::{
+    AutopilotRx, AutopilotTx, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, Parts, StoreFlash,
+    TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, cycles, done, ended, remember, restart,
+};
+use super::stm32f4::{CardPort, PortRx, PortTx, clocks, reset_cause, start_counters, watch_supply};
+
+/// The board's name.
+pub(crate) const NAME: &str = "f429";
+
+/// What moves the ports' bytes: more urgent than every task.
+pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 4] =
+    [interrupt::DMA2_STREAM1, interrupt::DMA2_STREAM6, interrupt::DMA1_STREAM5, interrupt::DMA1_STREAM6];
+
+/// What USART6's channel is called on its streams, and USART2's on its own (RM0090, tables 42 and 43).
+const USART6_REQUEST: Request = 5;
+const USART2_REQUEST: Request = 4;
+
+bind_interrupts!(struct Irqs {
+    DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
+    DMA2_STREAM6 => dma::InterruptHandler<DMA2_CH6>;
+    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
+    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    HASH_RNG => rng::InterruptHandler<RNG>;
+});
+
+static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
+static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
+
+/// Starts clocks, ports and card. The watchdog runs from its first feeding on.
+pub(crate) fn take() -> Parts {
+    let (cause, cause_register) = reset_cause();
+    let p = embassy_stm32::init(clocks(rcc::HseMode::Bypass));
+    watch_supply();
+    start_counters();
+
+    let mut line = usart::Config::default();
+    line.baudrate = AUTOPILOT_BAUD;
+    let (tx, rx) =
+        Uart::new_blocking(p.USART6, p.PG9, p.PG14, line).expect("the clocks allow this baud rate").split();
+    let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA2_CH1, Irqs), dma::Channel::new(p.DMA2_CH6, Irqs));
+    let autopilot = (
+        PortRx::new(rx, pac::USART6, rx_dma, RING.take(), FETCH_EVERY, USART6_REQUEST),
+        PortTx::new(tx, pac::USART6, tx_dma, USART6_REQUEST),
+    );
+    line.baudrate = GS_BAUD;
+    let (tx, rx) =
+        Uart::new_blocking(p.USART2, p.PD6, p.PD5, line).expect("the clocks allow this baud rate").split();
+    let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA1_CH5, Irqs), dma::Channel::new(p.DMA1_CH6, Irqs));
+    let gs = (
+        PortRx::new(rx, pac::USART2, rx_dma, GS_RING.take(), GS_FETCH_EVERY, USART2_REQUEST),
+        PortTx::new(tx, pac::USART2, tx_dma, USART2_REQUEST),
+    );
+
+    let mut bus = spi::Config::default();
+    bus.frequency = CardPort::IDENTIFICATION;
+    bus.miso_pull = Pull::Up;
+    let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
+    let entropy = Rng::new(p.RNG, Irqs).next_u32();
+    Parts {
+        autopilot,
+        gs,
+        card: Card::new(CardPort::new(bus, Output::new(p.PD14, Level::High, Speed::VeryHigh))),
+        store: Some(StoreFlash::new(Flash::new_blocking(p.FLASH))),
+        led: Led::new(Output::new(p.PB0, Level::Low, Speed::Low), Level::High),
+        watchdog: Watchdog::new(p.IWDG),
+        idle: Idle(()),
+        boot: Boot { id: embassy_stm32::uid::uid(), cause, cause_register, entropy },
+    }
+}

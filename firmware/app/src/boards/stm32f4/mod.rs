@@ -1,0 +1,163 @@
+//! What the boards with an STM32F4 have in common: everything but clocks, pins and channels.
+
+mod card;
+mod flash;
+mod port;
+mod reset;
+mod supply;
+mod watchdog;
+
+use cortex_m::peripheral::DWT;
+use cortex_m::peripheral::syst::SystClkSource;
+use embassy_stm32::gpio::{Level, Output};
+use embassy_stm32::rcc;
+use embassy_time::Duration;
+
+pub(crate) use card::{Card, CardPort};
+pub(crate) use flash::StoreFlash;
+pub(crate) use port::{PortRx, PortTx};
+pub(crate) use reset::reset_cause;
+pub(crate) use supply::watch_supply;
+pub(crate) use watchdog::Watchdog;
+
+use super::Boot;
+use crate::costs::Stage;
+use crate::report::Report;
+
+use defmt_rtt as _;
+
+/// Baud rate of the autopilot's port until a parameter sets it.
+pub(crate) const AUTOPILOT_BAUD: u32 = 921_600;
+/// Baud rate of the ground station's port: the radios' usual one.
+pub(crate) const GS_BAUD: u32 = 57_600;
+/// 22 ms at 921,600 baud, where reception comes every millisecond: it may be kept away 20 times as long.
+pub(crate) const RING_BYTES: usize = 2_048;
+/// How often reception looks into the ring: the resolution of arrival times in the log.
+pub(crate) const FETCH_EVERY: Duration = Duration::from_millis(1);
+/// Turns of `SysTick` without the watchdog being fed after which it counts as late: 0.6 s, as the watchdog's own clock may
+/// be fast by half (datasheet, table 36), so that its second is 0.68 s.
+pub(crate) const LATE_TURNS: u32 = 6;
+/// Time goes on while tasks run.
+pub(crate) const TIME_STOPS_WITH_TASKS: bool = false;
+/// 88 ms at 57,600 baud.
+pub(crate) const GS_RING_BYTES: usize = 512;
+/// How often the uplink looks into its ring: nobody there is in a hurry.
+pub(crate) const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
+
+/// Reception from the autopilot.
+pub(crate) type AutopilotRx = PortRx;
+/// Transmission to the autopilot.
+pub(crate) type AutopilotTx = PortTx;
+/// Reception from the ground station.
+pub(crate) type GsRx = PortRx;
+/// Transmission to the ground station.
+pub(crate) type GsTx = PortTx;
+
+/// What the app gets.
+pub(crate) struct Parts {
+    pub(crate) autopilot: (AutopilotRx, AutopilotTx),
+    pub(crate) gs: (GsRx, GsTx),
+    pub(crate) card: Card,
+    pub(crate) store: Option<StoreFlash>,
+    pub(crate) led: Led,
+    pub(crate) watchdog: Watchdog,
+    pub(crate) idle: Idle,
+    pub(crate) boot: Boot,
+}
+
+/// RAM survives a reset by itself.
+pub(crate) const fn remember() {}
+
+/// 168 MHz from 8 MHz at the clock's pin: 8 / 4 * 168 / 2; the peripheral buses at 42 and 84 MHz.
+pub(crate) fn clocks(mode: rcc::HseMode) -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
+    config.rcc.hse = Some(rcc::Hse { freq: embassy_stm32::time::Hertz(8_000_000), mode });
+    config.rcc.pll_src = rcc::PllSource::HSE;
+    config.rcc.pll = Some(rcc::Pll {
+        prediv: rcc::PllPreDiv::DIV4,
+        mul: rcc::PllMul::MUL168,
+        divp: Some(rcc::PllPDiv::DIV2),
+        divq: Some(rcc::PllQDiv::DIV7),
+        divr: None,
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_P;
+    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = rcc::APBPrescaler::DIV4;
+    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
+    config
+}
+
+/// Starts the cycle counter, and `SysTick` for whoever watches the watchdog (`crate::watch`).
+pub(crate) fn start_counters() {
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+        core.SYST.set_clock_source(SystClkSource::Core);
+        core.SYST.set_reload(crate::watch::SYSTICK_RELOAD);
+        core.SYST.clear_current();
+        core.SYST.enable_interrupt();
+        core.SYST.enable_counter();
+    }
+}
+
+/// The LED.
+pub(crate) struct Led {
+    pin: Output<'static>,
+    lit: Level,
+}
+
+impl Led {
+    /// On this pin, lit at this level.
+    pub(crate) const fn new(pin: Output<'static>, lit: Level) -> Self {
+        Self { pin, lit }
+    }
+
+    pub(crate) fn set(&mut self, lit: bool) {
+        self.pin.set_level(if lit == bool::from(self.lit) { Level::High } else { Level::Low });
+    }
+}
+
+/// Sleeps between interrupts.
+pub(crate) struct Idle(pub(crate) ());
+
+impl Idle {
+    #[expect(clippy::unused_self, reason = "on the emulated board idle reads the feed")]
+    pub(crate) fn run(self) -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+}
+
+/// A vehicle's input has no end: the power goes.
+pub(crate) async fn ended() {
+    core::future::pending::<()>().await;
+}
+
+/// Processor cycles.
+pub(crate) fn cycles() -> u32 {
+    DWT::cycle_count()
+}
+
+/// What was counted while tasks ran, in cycles.
+pub(crate) const fn busy_cycles(counted: u64) -> u64 {
+    counted
+}
+
+/// The watchdog is about to bite, and needs no help.
+pub(crate) const fn bites_soon() {}
+
+/// The log is closed: the card can be pulled.
+pub(crate) fn done(report: &Report) {
+    let Report { stats, frames_left, costs, stack } = report;
+    defmt::info!("log closed: {=u64} frames in, {=u64} without a card", stats.frames_in, frames_left);
+    for ((_, name), cycles) in Stage::NAMES.iter().zip(costs) {
+        defmt::info!("{=str}: {=u64} cycles", name, cycles);
+    }
+    defmt::info!("stack: {=usize} of {=usize} bytes", stack.0, stack.1);
+}
+
+/// Starts anew.
+pub(crate) fn restart() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}

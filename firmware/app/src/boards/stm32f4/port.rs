@@ -1,0 +1,99 @@
+//! A port: reception into a DMA ring, transmission by DMA.
+//!
+//! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
+//! is for the checksum to find), so that not one good byte is thrown away with a bad one.
+
+use embassy_stm32::dma::{self, ReadableRingBuffer, Request, TransferOptions};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::pac;
+use embassy_stm32::usart::{UartRx, UartTx};
+use embassy_time::{Duration, Timer};
+
+use crate::boards::{Overrun, Receive, Transmit};
+
+/// A port's reception: a DMA ring.
+pub(crate) struct PortRx {
+    /// Keeps the pin and the port's clock.
+    _port: UartRx<'static, Blocking>,
+    ring: ReadableRingBuffer<'static, u8>,
+    fetch_every: Duration,
+}
+
+impl PortRx {
+    /// `channel` must be the one that serves the reception of `registers`, which must be `port`'s own, by this `request`.
+    pub(crate) fn new(
+        port: UartRx<'static, Blocking>,
+        registers: pac::usart::Usart,
+        channel: dma::Channel<'static>,
+        buffer: &'static mut [u8],
+        fetch_every: Duration,
+        request: Request,
+    ) -> Self {
+        let from = registers.dr().as_ptr().cast::<u8>();
+        // SAFETY: `from` is the port's data register, `buffer` is a static in RAM that DMA reaches and that nobody else
+        // has, and the channel is owned by the ring from here on.
+        let mut ring =
+            unsafe { ReadableRingBuffer::new(channel, request, from, buffer, TransferOptions::default()) };
+        ring.start();
+        registers.cr3().modify(|w| w.set_dmar(true));
+        Self { _port: port, ring, fetch_every }
+    }
+}
+
+impl Receive for PortRx {
+    async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
+        loop {
+            match self.ring.read(buffer) {
+                Ok((0, _)) => Timer::after(self.fetch_every).await,
+                Ok((count, _)) => return Ok(count),
+                Err(_) => {
+                    self.ring.clear();
+                    return Err(Overrun);
+                }
+            }
+        }
+    }
+}
+
+/// A port's transmission, by DMA.
+pub(crate) struct PortTx {
+    port: UartTx<'static, Blocking>,
+    registers: pac::usart::Usart,
+    channel: dma::Channel<'static>,
+    request: Request,
+    baud: u32,
+}
+
+impl PortTx {
+    /// `channel` must be the one that serves the transmission of `registers`, which must be `port`'s own, by this
+    /// `request`.
+    pub(crate) fn new(
+        port: UartTx<'static, Blocking>,
+        registers: pac::usart::Usart,
+        channel: dma::Channel<'static>,
+        request: Request,
+    ) -> Self {
+        registers.cr3().modify(|w| w.set_dmat(true));
+        Self { port, registers, channel, request, baud: 0 }
+    }
+}
+
+impl Transmit for PortTx {
+    async fn transmit(&mut self, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        let to = self.registers.dr().as_ptr().cast::<u8>();
+        // SAFETY: `to` is the port's data register. The transfer borrows `bytes`, which lie in a task's memory, in RAM
+        // that DMA reaches, and stops when it is dropped.
+        unsafe { self.channel.write(self.request, bytes, to, TransferOptions::default()) }.await;
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        // Both halves share the divider. A rate that the clock cannot give changes nothing.
+        if baud != self.baud && self.port.set_baudrate(baud).is_err() {
+            defmt::warn!("a port cannot run at {=u32} baud", baud);
+        }
+        self.baud = baud;
+    }
+}

@@ -1,0 +1,24 @@
+//! Why the machine started.
+
+use embassy_stm32::pac;
+
+use crate::boards::ResetCause;
+
+/// Reads why the machine started, and clears it for the next time.
+pub(crate) fn reset_cause() -> (ResetCause, u32) {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    // Several flags are set together; the most telling one first.
+    let cause = if flags.wdgrstf() || flags.wwdgrstf() {
+        ResetCause::Watchdog
+    } else if flags.sftrstf() {
+        ResetCause::Software
+    } else if flags.porrstf() {
+        ResetCause::PowerOn
+    } else if flags.borrstf() || flags.lpwrrstf() {
+        ResetCause::BrownOut
+    } else {
+        ResetCause::Pin
+    };
+    (cause, flags.0)
+}

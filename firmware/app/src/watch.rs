@@ -1,0 +1,64 @@
+//! The watch over the watchdog: who is to blame when it bites.
+//!
+//! The watchdog resets without a word. So `SysTick`, more urgent than all else, counts how long it was not fed, and
+//! leaves a note of what it interrupted before the time is over: a task that never comes back is caught with its
+//! registers, be it as urgent as it likes. Only what masks all interrupts for ever leaves no note; the next start says
+//! that too.
+
+use core::arch::naked_asm;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m_rt::ExceptionFrame;
+
+use crate::boards::board;
+use crate::fault;
+use crate::memory::depth;
+
+/// All of `SysTick`'s 24 bits: 0.1 s at 168 MHz.
+pub(crate) const SYSTICK_RELOAD: u32 = 0x00FF_FFFF;
+/// The watchdog does not run yet.
+const NEVER: u32 = u32::MAX;
+
+/// Turns of `SysTick` since the watchdog was fed.
+static SINCE_FED: AtomicU32 = AtomicU32::new(NEVER);
+
+/// The watchdog was fed.
+pub(crate) fn fed() {
+    let since = SINCE_FED.swap(0, Ordering::Relaxed);
+    if since != NEVER && since >= board::LATE_TURNS {
+        fault::not_late();
+    }
+}
+
+/// Nobody is to feed it any more: it does not run where time does not.
+#[cfg(feature = "board-emulated")]
+pub(crate) fn off() {
+    SINCE_FED.store(NEVER, Ordering::Relaxed);
+}
+
+/// The exception itself: [`turn`] with what it interrupted.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+unsafe extern "C" fn SysTick() {
+    naked_asm!("mrs r0, msp", "b {turn}", turn = sym turn)
+}
+
+extern "C" fn turn(interrupted: *const ExceptionFrame) {
+    depth::of(0, || look(interrupted));
+}
+
+fn look(interrupted: *const ExceptionFrame) {
+    // SAFETY: the processor stacked its registers there as this exception began.
+    let frame = unsafe { &*interrupted };
+    let since = SINCE_FED.load(Ordering::Relaxed);
+    if since == NEVER {
+        return;
+    }
+    let idle = frame.xpsr() & 0x1FF == 0;
+    let since = if idle && board::TIME_STOPS_WITH_TASKS { 0 } else { since.saturating_add(1).min(NEVER - 1) };
+    SINCE_FED.store(since, Ordering::Relaxed);
+    if since >= board::LATE_TURNS {
+        fault::late(Some(frame));
+        board::bites_soon();
+    }
+}

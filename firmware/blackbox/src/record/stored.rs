@@ -1,0 +1,246 @@
+//! The stored form of a record: a head that says how many numbers there are, then the numbers, then bytes. So the coder
+//! knows the numbers of a record of any kind, also of one that comes later.
+
+use hums_core::time::Instant;
+
+use super::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
+use crate::bytes::Fields as Bytes;
+
+/// Bytes of the head: kind; version, and in the upper four bits times; words; halves.
+pub(crate) const HEAD_BYTES: usize = 4;
+
+/// The version of each record.
+const VERSION: u8 = 1;
+
+/// What the head says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Shape {
+    pub(crate) kind: u8,
+    /// Version in bits 0-3; in bits 4-7 how many of the first pairs of words are times.
+    pub(crate) version: u8,
+    /// Numbers of 4 bytes.
+    pub(crate) words: u8,
+    /// Numbers of 2 bytes.
+    pub(crate) halves: u8,
+}
+
+impl Shape {
+    /// The shape and the length of the bytes after the numbers; `None` where not all of the numbers are there.
+    pub(crate) fn read(stored: &[u8]) -> Option<(Self, usize)> {
+        let [kind, version, words, halves] = *stored.first_chunk()?;
+        let shape = Self { kind, version, words, halves };
+        Some((shape, stored.len().checked_sub(shape.bytes_at())?))
+    }
+
+    /// Words that are times, a pair each: first the lower half.
+    pub(crate) const fn times(self) -> usize {
+        2 * (self.version >> 4) as usize
+    }
+
+    /// Where the numbers of 2 bytes begin.
+    pub(crate) const fn halves_at(self) -> usize {
+        HEAD_BYTES + 4 * self.words as usize
+    }
+
+    /// Where the bytes begin.
+    pub(crate) const fn bytes_at(self) -> usize {
+        self.halves_at() + 2 * self.halves as usize
+    }
+}
+
+/// Reads the numbers and the bytes of a record, each in their order; beyond the end there are zeros and empty texts.
+pub(crate) struct Fields<'a> {
+    words: Bytes<'a>,
+    halves: &'a [u8],
+    bytes: Bytes<'a>,
+}
+
+impl<'a> Fields<'a> {
+    pub(crate) fn new(stored: &'a [u8]) -> (Shape, Self) {
+        let mut head = [0; HEAD_BYTES];
+        for (place, byte) in head.iter_mut().zip(stored) {
+            *place = *byte;
+        }
+        let [kind, version, words, halves] = head;
+        let shape = Shape { kind, version, words, halves };
+        let part = |from: usize, to: usize| {
+            let to = to.min(stored.len());
+            stored.get(from.min(to)..to).unwrap_or_default()
+        };
+        let fields = Self {
+            words: Bytes::new(part(HEAD_BYTES, shape.halves_at())),
+            halves: part(shape.halves_at(), shape.bytes_at()),
+            bytes: Bytes::new(part(shape.bytes_at(), usize::MAX)),
+        };
+        (shape, fields)
+    }
+
+    pub(crate) fn u32(&mut self) -> u32 {
+        self.words.u32()
+    }
+
+    pub(crate) fn u64(&mut self) -> u64 {
+        self.words.u64()
+    }
+
+    pub(crate) fn f32(&mut self) -> f32 {
+        f32::from_bits(self.u32())
+    }
+
+    pub(crate) fn f64(&mut self) -> f64 {
+        f64::from_bits(self.u64())
+    }
+
+    pub(crate) fn instant(&mut self) -> Instant {
+        Instant::from_micros(self.u64())
+    }
+
+    /// All words that were not read yet.
+    pub(crate) fn words(&mut self) -> &'a [u8] {
+        self.words.bytes(usize::MAX)
+    }
+
+    /// All numbers of 2 bytes.
+    pub(crate) const fn halves(&self) -> &'a [u8] {
+        self.halves
+    }
+
+    pub(crate) fn u8(&mut self) -> u8 {
+        self.bytes.u8()
+    }
+
+    pub(crate) fn array<const N: usize>(&mut self) -> [u8; N] {
+        self.bytes.array()
+    }
+
+    /// All bytes that were not read yet.
+    pub(crate) fn bytes(&mut self) -> &'a [u8] {
+        self.bytes.bytes(usize::MAX)
+    }
+
+    pub(crate) fn text(&mut self) -> &'a str {
+        self.bytes.text()
+    }
+}
+
+/// Writes a record: first the words, times before others, then the halves, then the bytes. Remembers when there was
+/// too much.
+pub(crate) struct Sink<'a> {
+    out: &'a mut [u8],
+    len: usize,
+}
+
+impl<'a> Sink<'a> {
+    pub(crate) fn new(out: &'a mut [u8]) -> Self {
+        Self { out, len: 0 }
+    }
+
+    /// The bytes written, or `None` where they did not fit.
+    pub(crate) fn len(&self) -> Option<usize> {
+        (self.len <= self.out.len()).then_some(self.len)
+    }
+
+    /// A record's kind, in its version 1.
+    pub(crate) fn head(&mut self, kind: u8) -> &mut Self {
+        self.bytes(&[kind, VERSION, 0, 0])
+    }
+
+    /// A time, before all other numbers.
+    pub(crate) fn time(&mut self, at: Instant) -> &mut Self {
+        debug_assert_eq!(2 * self.out.get(1).map_or(0, |version| version >> 4), self.counted(2));
+        if let Some(version) = self.out.get_mut(1) {
+            *version += 0x10;
+        }
+        self.u64(at.as_micros())
+    }
+
+    pub(crate) fn u32(&mut self, value: u32) -> &mut Self {
+        debug_assert_eq!(self.len, HEAD_BYTES + 4 * usize::from(self.counted(2)), "words come first");
+        self.count(2);
+        self.bytes(&value.to_le_bytes())
+    }
+
+    pub(crate) fn u64(&mut self, value: u64) -> &mut Self {
+        self.u32(value as u32).u32((value >> 32) as u32)
+    }
+
+    pub(crate) fn f32(&mut self, value: f32) -> &mut Self {
+        self.u32(value.to_bits())
+    }
+
+    pub(crate) fn f64(&mut self, value: f64) -> &mut Self {
+        self.u64(value.to_bits())
+    }
+
+    pub(crate) fn half(&mut self, value: u16) -> &mut Self {
+        self.count(3);
+        self.bytes(&value.to_le_bytes())
+    }
+
+    pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
+        self.bytes(&[value])
+    }
+
+    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
+        let end = self.len.saturating_add(bytes.len());
+        if let Some(place) = self.out.get_mut(self.len..end) {
+            place.copy_from_slice(bytes);
+        }
+        self.len = end;
+        self
+    }
+
+    /// A name, cut at a character's border where it is too long.
+    pub(crate) fn name(&mut self, text: &str) -> &mut Self {
+        self.cut(text, NAME_BYTES_MAX)
+    }
+
+    /// A text, cut likewise.
+    pub(crate) fn text(&mut self, text: &str) -> &mut Self {
+        self.cut(text, TEXT_BYTES_MAX)
+    }
+
+    fn cut(&mut self, text: &str, bytes_max: usize) -> &mut Self {
+        let mut end = text.len().min(bytes_max);
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        self.u8(end as u8).bytes(&text.as_bytes()[..end])
+    }
+
+    /// A count of the head.
+    fn counted(&self, place: usize) -> u8 {
+        self.out.get(place).copied().unwrap_or_default()
+    }
+
+    fn count(&mut self, place: usize) {
+        if let Some(count) = self.out.get_mut(place) {
+            // What is more than a record holds is refused for its length.
+            *count = count.saturating_add(1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_bytes_come_back_each_in_their_order_and_what_is_cut_off_is_zero() {
+        let mut stored = [0; 64];
+        let mut sink = Sink::new(&mut stored);
+        let at = Instant::from_micros(5_000_000_000);
+        sink.head(7).time(at).u32(9).f64(-1.5).half(3).half(4).u8(1).name("abc");
+        let len = sink.len().expect("fits");
+        let (shape, mut fields) = Fields::new(&stored[..len]);
+        assert_eq!((shape.kind, shape.version, shape.times()), (7, 0x11, 2));
+        assert_eq!(Shape::read(&stored[..len]), Some((shape, 5)));
+        // In another order than they were written in.
+        assert_eq!((fields.u8(), fields.text(), fields.text()), (1, "abc", ""));
+        assert_eq!((fields.instant(), fields.u32(), fields.f64(), fields.u32()), (at, 9, -1.5, 0));
+        assert_eq!(fields.halves(), [3, 0, 4, 0]);
+        assert_eq!(Shape::read(&stored[..shape.bytes_at() - 1]), None);
+        let (_, mut fields) = Fields::new(&stored[..6]);
+        assert_eq!((fields.u32(), fields.halves(), fields.u8()), (0xf200, &[][..], 0));
+    }
+}

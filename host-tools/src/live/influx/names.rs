@@ -1,0 +1,138 @@
+//! Whose points they are: the tag `vehicle` is the one that `hums decode` gives the same flight, which is the
+//! autopilot's unique id. An autopilot tells it when somebody asks for it, which may be some seconds after its first
+//! frame; until then points wait ([`WAIT`] and [`WAITING_BYTES_MAX`] at most) with a mark in the tag's place. A vehicle
+//! that has told nothing by then is `system-1`, from the moment it does its id.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant as Wall};
+
+use anyhow::{Result, anyhow};
+
+use super::queue::Batch;
+use crate::decode::influx::Tags;
+use crate::live::world::World;
+
+/// Whoever asks an autopilot for its id does so at once, and again after some seconds.
+pub const WAIT: Duration = Duration::from_secs(10);
+/// What a fast link brings in that time.
+pub const WAITING_BYTES_MAX: usize = 8 * 1024 * 1024;
+
+/// Who is who, as far as it is known.
+#[derive(Debug)]
+pub struct Names {
+    session: String,
+    /// Vehicles by system, with their unique ids; 0 where none was told.
+    vehicles: BTreeMap<u8, u64>,
+    tags: BTreeMap<u8, (String, Tags)>,
+    /// What stands for a name that is still waited for; no vehicle can guess it.
+    mark: String,
+    waiting: Option<Waiting>,
+}
+
+/// Points that wait for a name.
+#[derive(Debug, Default)]
+struct Waiting {
+    batch: Batch,
+    since: Option<Wall>,
+    systems: BTreeSet<u8>,
+}
+
+impl Names {
+    /// Nobody is known; `session` tags every point.
+    pub fn new(session: String) -> Result<Self> {
+        let mut random = [0; 8];
+        getrandom::fill(&mut random).map_err(|error| anyhow!("this PC has no random numbers: {error}"))?;
+        let mark = format!("mark-{:016x}-", u64::from_le_bytes(random));
+        let (vehicles, tags) = (BTreeMap::new(), BTreeMap::new());
+        Ok(Self { session, vehicles, tags, mark, waiting: Some(Waiting::default()) })
+    }
+
+    /// All of a recording is known before its first point is made.
+    pub fn know(&mut self, world: &World) {
+        self.learn(world);
+        self.waiting = None;
+    }
+
+    fn learn(&mut self, world: &World) {
+        for (system, craft) in &world.crafts {
+            let told = craft.monitor.vehicle().identity.get().map_or(0, |identity| identity.uid);
+            let uid = self.vehicles.entry(*system).or_default();
+            *uid = if told == 0 { *uid } else { told };
+        }
+    }
+
+    /// Whether points wait for a name.
+    pub fn is_waiting(&self) -> bool {
+        self.waiting.is_some()
+    }
+
+    /// How many points wait for a name.
+    pub fn points_waiting(&self) -> u64 {
+        self.waiting.as_ref().map_or(0, |waiting| waiting.batch.points)
+    }
+
+    /// The tags of a system's points: of a vehicle its own; whoever else speaks is tagged with the first vehicle, as a
+    /// log's points are with the one whose log it is.
+    pub fn tags(&mut self, system: u8, world: &World) -> Tags {
+        let name = if let Some(waiting) = &mut self.waiting {
+            waiting.systems.insert(system);
+            self.place(system)
+        } else {
+            self.learn(world);
+            self.name(system)
+        };
+        match self.tags.get(&system) {
+            Some((known, tags)) if *known == name => tags.clone(),
+            _ => {
+                let tags = Tags::new(&self.session, &name);
+                self.tags.insert(system, (name, tags.clone()));
+                tags
+            }
+        }
+    }
+
+    /// What stands in the place of a system's name.
+    fn place(&self, system: u8) -> String {
+        format!("{}{system:03}", self.mark)
+    }
+
+    fn name(&self, system: u8) -> String {
+        let own = self.vehicles.get_key_value(&system);
+        match own.or_else(|| self.vehicles.first_key_value()) {
+            None => "unknown".to_owned(),
+            Some((owner, 0)) => format!("system-{owner}"),
+            Some((_, uid)) => format!("uid-{uid:016x}"),
+        }
+    }
+
+    /// Takes points whose tags may be marks: gives them back where nothing is waited for.
+    pub fn pass(&mut self, batch: Batch) -> Option<Batch> {
+        let Some(waiting) = &mut self.waiting else { return Some(batch) };
+        waiting.since.get_or_insert_with(Wall::now);
+        waiting.batch.text.extend_from_slice(&batch.text);
+        waiting.batch.points += batch.points;
+        None
+    }
+
+    /// The points that waited, with their names, once all vehicles have told theirs or have had their time.
+    pub fn settle(&mut self, world: &World) -> Option<Batch> {
+        let waiting = self.waiting.as_ref()?;
+        let late = waiting.since.is_some_and(|since| since.elapsed() >= WAIT)
+            || waiting.batch.text.len() >= WAITING_BYTES_MAX;
+        self.learn(world);
+        let told = !self.vehicles.is_empty() && self.vehicles.values().all(|uid| *uid != 0);
+        if told || late { self.end() } else { None }
+    }
+
+    /// The points that waited, with what is known of their names.
+    pub fn end(&mut self) -> Option<Batch> {
+        let Waiting { mut batch, systems, .. } = self.waiting.take()?;
+        // What is not UTF-8 was replaced when it became a field.
+        let mut text = String::from_utf8_lossy(&batch.text).into_owned();
+        for system in systems {
+            text = text.replace(&self.place(system), &self.name(system));
+        }
+        batch.text = text.into_bytes();
+        Some(batch)
+    }
+}

@@ -1,0 +1,121 @@
+//! What the box on board has recorded or said of its settings and of the parts that wear: the limits here are then its
+//! own, and what a part had run before this session is known.
+
+use std::sync::Arc;
+
+use hums_blackbox::Record;
+use hums_blackbox::record::Why;
+use hums_core::component::{COMPONENTS_MAX, Component, Label};
+use hums_core::params::{ParamSpec, Params};
+use hums_link::encode::COMPONENT;
+use hums_link::packet::Fields;
+use hums_link::{Check, Frame};
+
+/// `PARAM_VALUE`
+const PARAM_VALUE: u32 = 22;
+
+/// The limits that hold here: those that the user gave, and the box's own for all others.
+#[derive(Clone, Debug, Default)]
+pub struct Limits {
+    params: Params,
+    given: Arc<[&'static str]>,
+}
+
+impl Limits {
+    /// These are given, in this order.
+    pub fn new(given: &[(&'static ParamSpec, f32)]) -> Self {
+        let mut limits = Self::default();
+        for (spec, value) in given {
+            // Whoever read the file has checked name and range.
+            let _ = limits.params.set(spec.name, *value);
+        }
+        limits.given = given.iter().map(|(spec, _)| spec.name).collect();
+        limits
+    }
+
+    /// As they stand.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// Takes what the box says into `params`; what is out of range, or not a parameter of ours, changes nothing.
+    pub fn take(&self, params: &mut Params, name: &str, value: f32) {
+        if !self.given.contains(&name) {
+            let _ = params.set(name, value);
+        }
+    }
+
+    /// The same for all vehicles that come.
+    pub fn learn(&mut self, name: &str, value: f32) {
+        let mut params = self.params;
+        self.take(&mut params, name, value);
+        self.params = params;
+    }
+}
+
+/// What a log tells besides frames.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    /// A parameter's value.
+    Parameter {
+        /// Its name.
+        name: String,
+        /// Its value.
+        value: f32,
+        /// It is part of the table as it stood at the session's start.
+        start: bool,
+    },
+    /// A part that wears, with all that it has run.
+    Part {
+        /// Its place, from 0.
+        place: usize,
+        /// What it is.
+        component: Component,
+    },
+}
+
+impl Told {
+    /// What a record tells, where it is of use here.
+    pub fn of(record: &Record<'_>) -> Option<Self> {
+        match record {
+            Record::Parameter(parameter) => {
+                let (value, start) = (parameter.value as f32, !parameter.changed);
+                Some(Self::Parameter { name: parameter.name.to_owned(), value, start })
+            }
+            // Of a part that was replaced the figures are those of the old one.
+            Record::Component(recorded) => {
+                let place = usize::from(recorded.place);
+                let mut component = Component::NONE;
+                (component.kind, component.number) = (recorded.kind, recorded.number);
+                component.replaced = recorded.replaced.try_into().unwrap_or(u16::MAX);
+                component.name = Label::new(recorded.name);
+                if recorded.why == Why::Replaced {
+                    component.serial = Label::new(recorded.new_serial);
+                } else {
+                    component.serial = Label::new(recorded.serial);
+                    component = component.having_run(recorded.figures);
+                }
+                (place < COMPONENTS_MAX).then_some(Self::Part { place, component })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The place of the part that this parameter describes, from 0: of `CMP1_KIND` 0.
+pub fn place_of(name: &str) -> Option<usize> {
+    name.strip_prefix("CMP")?.strip_suffix("_KIND")?.parse::<usize>().ok()?.checked_sub(1)
+}
+
+/// A parameter that the box on board tells a ground station, and its value.
+pub fn parameter(frame: &Frame<'_>) -> Option<(String, f32)> {
+    if frame.id() != PARAM_VALUE || frame.component() != COMPONENT || frame.check() != Check::Verified {
+        return None;
+    }
+    let mut payload = [0; 25];
+    for (to, from) in payload.iter_mut().zip(frame.payload()) {
+        *to = *from;
+    }
+    let fields = Fields(&payload);
+    Some((fields.text(8, 16)?.to_owned(), fields.f32(0)))
+}

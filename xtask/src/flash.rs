@@ -1,0 +1,145 @@
+//! `cargo xtask flash` and `cargo xtask attach`: a firmware onto a board, and what the board says of itself.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::firmware::{self, Board};
+use crate::setup::{self, Need};
+use crate::shell::Shell;
+use crate::{dfu, image};
+
+const PROBE_RS: (&str, &str) =
+    ("probe-rs", "cargo install probe-rs-tools --locked (or see https://probe.rs)");
+const DFU_UTIL: (&str, &str) = ("dfu-util", "apt-get install dfu-util (macOS: brew install dfu-util)");
+
+/// How the firmware gets onto the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// A debug probe.
+    Probe,
+    /// The chip's own boot loader, over USB.
+    Dfu,
+}
+
+/// What `flash` and `attach` are told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Options {
+    pub(crate) board: Board,
+    pub(crate) way: Way,
+}
+
+impl Options {
+    /// `with_dfu`: whether `--dfu` means anything.
+    pub(crate) fn parse(words: &[&str], with_dfu: bool) -> Result<Self> {
+        let mut options = Self { board: Board::F405, way: Way::Probe };
+        let mut words = words.iter();
+        while let Some(word) = words.next() {
+            match *word {
+                "--board" => {
+                    options.board = Board::parse(words.next().context("--board wants the name of a board")?)?;
+                }
+                "--dfu" if with_dfu => options.way = Way::Dfu,
+                other => bail!(
+                    "{other} is not understood here: --board BOARD{}",
+                    if with_dfu { ", --dfu" } else { "" }
+                ),
+            }
+        }
+        chip(options.board)?;
+        Ok(options)
+    }
+}
+
+/// Builds the firmware and programs it. What is stored on the board stays as it is.
+pub(crate) fn flash(options: Options) -> Result<()> {
+    setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
+    let elf = firmware::build(options.board)?;
+    let pieces = image::pieces(&fs::read(&elf)?).with_context(|| elf.display().to_string())?;
+    match options.way {
+        Way::Probe => {
+            require(PROBE_RS)?;
+            // Without --chip-erase it erases the sectors that the image has bytes in, and no others.
+            probe("download", options.board, &elf)?.run()?;
+            Shell::new(PROBE_RS.0).args(["reset", "--chip", chip(options.board)?]).run()
+        }
+        Way::Dfu => {
+            let path = elf.with_extension("dfu");
+            fs::write(&path, dfu::file(&format!("hums {}", options.board.name()), &pieces))?;
+            println!("{}", path.display());
+            require(DFU_UTIL)?;
+            load(&path).run()
+        }
+    }
+}
+
+/// Shows the log of a board that runs, as it goes on.
+pub(crate) fn attach(options: Options) -> Result<()> {
+    let elf = firmware::build(options.board)?;
+    require(PROBE_RS)?;
+    probe("attach", options.board, &elf)?.run()
+}
+
+fn probe(command: &str, board: Board, elf: &PathBuf) -> Result<Shell> {
+    Ok(Shell::new(PROBE_RS.0).args([command, "--chip", chip(board)?]).arg(elf))
+}
+
+/// The boot loader's alternate setting 0 is the flash; afterwards the firmware starts.
+fn load(file: &Path) -> Shell {
+    Shell::new(DFU_UTIL.0)
+        .args(["--device", "0483:df11", "--alt", "0", "--dfuse-address", ":leave", "--download"])
+        .arg(file)
+}
+
+/// As probe-rs calls it.
+fn chip(board: Board) -> Result<&'static str> {
+    match board {
+        Board::F405 => Ok("STM32F405RGTx"),
+        Board::F429 => Ok("STM32F429ZITx"),
+        Board::Emulated => bail!("the emulated board is no thing to program: cargo xtask demo runs it"),
+    }
+}
+
+fn require((program, how): (&str, &str)) -> Result<()> {
+    if Shell::new(program).arg("--version").ask().is_none() {
+        bail!("{program} is not installed. Type: {how}");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_named_with_what_to_type() {
+        let error = require(("no-such-program", "apt-get install such-program")).unwrap_err().to_string();
+        assert_eq!(error, "no-such-program is not installed. Type: apt-get install such-program");
+        require(("cargo", "")).unwrap();
+    }
+
+    #[test]
+    fn boards_and_ways_are_chosen() {
+        let parse = |line: &str, dfu| Options::parse(&line.split_whitespace().collect::<Vec<_>>(), dfu);
+        assert_eq!(parse("", true).unwrap(), Options { board: Board::F405, way: Way::Probe });
+        let both = Options { board: Board::F429, way: Way::Dfu };
+        assert_eq!(parse("--dfu --board f429", true).unwrap(), both);
+        for line in ["--board", "--board f407", "--board emulated", "--erase"] {
+            assert!(parse(line, true).is_err(), "{line}");
+        }
+        assert!(parse("--dfu", false).is_err(), "there is nothing to attach to");
+    }
+
+    #[test]
+    fn nothing_erases_the_whole_chip() {
+        let elf = PathBuf::from("hums.elf");
+        let probe = probe("download", Board::F429, &elf).unwrap();
+        assert_eq!(probe.shown(), "probe-rs download --chip STM32F429ZITx hums.elf");
+        let load = load(Path::new("hums.dfu"));
+        assert_eq!(
+            load.shown(),
+            "dfu-util --device 0483:df11 --alt 0 --dfuse-address :leave --download hums.dfu"
+        );
+    }
+}

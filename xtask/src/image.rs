@@ -1,0 +1,104 @@
+//! What of a firmware's ELF file goes where into the flash.
+
+use anyhow::{Context as _, Result, bail};
+use object::Endianness;
+use object::elf::{FileHeader32, PT_LOAD};
+use object::read::elf::{FileHeader as _, ProgramHeader as _};
+
+/// The store's two sectors (`firmware/app/src/boards/stm32f4/flash.rs`): nothing that programs the flash may touch them.
+pub(crate) const STORE: std::ops::Range<u32> = 0x0800_4000..0x0800_C000;
+
+/// Bytes that lie one after the other in the flash.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Piece {
+    pub(crate) address: u32,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// The pieces of an ELF file in order; an error where one would overwrite the store.
+pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
+    let header = FileHeader32::<Endianness>::parse(elf).context("no ELF file")?;
+    let endian = header.endian()?;
+    let mut pieces = Vec::new();
+    for segment in header.program_headers(endian, elf)? {
+        if segment.p_type(endian) != PT_LOAD || segment.p_filesz(endian) == 0 {
+            continue;
+        }
+        let bytes = segment.data(endian, elf).ok().context("a segment is longer than the file")?;
+        pieces.push(Piece { address: segment.p_paddr(endian), bytes: bytes.to_vec() });
+    }
+    joined(pieces)
+}
+
+/// In order of address, and what follows directly as one.
+fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
+    pieces.sort_by_key(|piece| piece.address);
+    let mut joined: Vec<Piece> = Vec::new();
+    for piece in pieces {
+        let end = u64::from(piece.address) + piece.bytes.len() as u64;
+        if piece.address < STORE.end && end > u64::from(STORE.start) {
+            bail!("the image has bytes at {:#010x}, where the store is: see memory.x", piece.address);
+        }
+        match joined.last_mut() {
+            Some(before) if before.address + before.bytes.len() as u32 > piece.address => {
+                bail!("two segments lie at {:#010x}", piece.address)
+            }
+            Some(before) if before.address + before.bytes.len() as u32 == piece.address => {
+                before.bytes.extend(piece.bytes);
+            }
+            _ => joined.push(piece),
+        }
+    }
+    Ok(joined)
+}
+
+/// All of the pieces as one, from the first address on. What lies between them is as erased flash is: whoever programs
+/// this, and not the pieces, gives the board an empty store.
+pub(crate) fn flat(pieces: &[Piece]) -> Vec<u8> {
+    let mut flat = Vec::new();
+    let Some(first) = pieces.first() else { return flat };
+    for piece in pieces {
+        flat.resize((piece.address - first.address) as usize, 0xFF);
+        flat.extend(&piece.bytes);
+    }
+    flat
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(address: u32, bytes: usize) -> Piece {
+        Piece { address, bytes: vec![7; bytes] }
+    }
+
+    #[test]
+    fn pieces_are_joined_where_they_touch_and_kept_apart_where_the_store_lies_between() {
+        let pieces = vec![piece(0x0800_C010, 16), piece(0x0800_0000, 392), piece(0x0800_C000, 16)];
+        assert_eq!(joined(pieces).unwrap(), [piece(0x0800_0000, 392), piece(0x0800_C000, 32)]);
+    }
+
+    #[test]
+    fn an_image_that_would_overwrite_the_store_is_refused() {
+        for at in [0x0800_3FFF, 0x0800_4000, 0x0800_BFFF] {
+            assert!(joined(vec![piece(at, 2)]).unwrap_err().to_string().contains("store"), "{at:#x}");
+        }
+        assert!(joined(vec![piece(0x0800_3FFE, 2), piece(0x0800_C000, 2)]).is_ok());
+    }
+
+    #[test]
+    fn segments_that_overlap_are_refused() {
+        assert!(joined(vec![piece(0x0801_0000, 4), piece(0x0801_0002, 4)]).is_err());
+    }
+
+    #[test]
+    fn a_flat_image_has_an_erased_store() {
+        let flat = flat(&[piece(0x0800_0000, 2), piece(0x0800_0004, 1)]);
+        assert_eq!(flat, [7, 7, 0xFF, 0xFF, 7]);
+    }
+
+    #[test]
+    fn what_is_no_elf_file_is_an_error() {
+        assert!(pieces(b"no elf").is_err());
+    }
+}
