@@ -5,22 +5,25 @@
 
 const POLYNOMIAL: u32 = 0x82f6_3b78;
 
-const TABLE: [u32; 256] = table();
+/// What a byte does to the check, and what it does when one, two or three bytes follow it: four bytes are taken in one
+/// step, which more than halves what a sector costs.
+static TABLES: [[u32; 256]; 4] = tables();
 
-const fn table() -> [u32; 256] {
-    let mut table = [0; 256];
+const fn tables() -> [[u32; 256]; 4] {
+    let mut tables = [[0; 256]; 4];
     let mut index = 0;
     while index < 256 {
-        let mut crc = index as u32;
-        let mut bit = 0;
-        while bit < 8 {
+        let (mut crc, mut bit) = (index as u32, 0);
+        while bit < 32 {
             crc = if crc & 1 == 1 { (crc >> 1) ^ POLYNOMIAL } else { crc >> 1 };
             bit += 1;
+            if bit % 8 == 0 {
+                tables[bit / 8 - 1][index] = crc;
+            }
         }
-        table[index] = crc;
         index += 1;
     }
-    table
+    tables
 }
 
 /// A CRC-32C in the making.
@@ -32,8 +35,13 @@ impl Crc32c {
     }
 
     pub(crate) fn add(&mut self, bytes: &[u8]) {
-        let step = |crc: u32, &byte: &u8| (crc >> 8) ^ TABLE[usize::from(crc as u8 ^ byte)];
-        self.0 = bytes.iter().fold(self.0, step);
+        let [last, third, second, first] = &TABLES;
+        let (words, rest) = bytes.as_chunks();
+        let crc = words.iter().fold(self.0, |crc, word| {
+            let [a, b, c, d] = (crc ^ u32::from_le_bytes(*word)).to_le_bytes().map(usize::from);
+            first[a] ^ second[b] ^ third[c] ^ last[d]
+        });
+        self.0 = rest.iter().fold(crc, |crc, byte| (crc >> 8) ^ last[usize::from(crc as u8 ^ byte)]);
     }
 
     pub(crate) const fn value(&self) -> u32 {
@@ -55,5 +63,16 @@ mod tests {
     #[test]
     fn the_check_value_is_the_published_one() {
         assert_eq!(crc32c(b"123456789"), 0xe306_9283);
+    }
+
+    #[test]
+    fn it_does_not_matter_in_which_pieces_the_bytes_come() {
+        let bytes: Vec<u8> = (0..41_u8).map(|index| index.wrapping_mul(37)).collect();
+        for cut in 0..=bytes.len() {
+            let mut crc = Crc32c::new();
+            crc.add(&bytes[..cut]);
+            bytes[cut..].iter().for_each(|byte| crc.add(&[*byte]));
+            assert_eq!(crc.value(), crc32c(&bytes), "cut at {cut}");
+        }
     }
 }

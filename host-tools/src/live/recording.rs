@@ -125,7 +125,7 @@ fn stream(source: &mut dyn Source, bytes: Option<u64>, take: &mut Take<'_>) -> R
 
 /// A group's frames, and what else is told in it.
 #[derive(Default)]
-struct Frames {
+struct Collected {
     /// Time, what is told, and the frame that it comes before.
     told: Vec<(Instant, Told, usize)>,
     /// Time, check, and where it ends in `bytes`.
@@ -133,7 +133,7 @@ struct Frames {
     bytes: Vec<u8>,
 }
 
-impl Collect for Frames {
+impl Collect for Collected {
     fn entry(&mut self, entry: &Entry<'_>) {
         match *entry {
             Entry::Frame { at, bytes, verified } => {
@@ -158,12 +158,12 @@ struct Hand<'a, 'b> {
     ended: bool,
 }
 
-impl Deliver<Frames> for Hand<'_, '_> {
+impl Deliver<Collected> for Hand<'_, '_> {
     fn gap(&mut self, _: &Gap) -> Result<()> {
         Ok(())
     }
 
-    fn group(&mut self, group: Frames) -> Result<()> {
+    fn group(&mut self, group: Collected) -> Result<()> {
         let (mut start, mut told) = (0, group.told.iter().peekable());
         for (number, (at, check, end)) in group.frames.into_iter().enumerate() {
             while let Some((at, what, _)) = told.next_if(|(.., before)| *before <= number) {
@@ -192,6 +192,6 @@ impl Hand<'_, '_> {
 fn session(log: &Log, take: &mut Take<'_>) -> Result<()> {
     let blocks = (log.bytes() / hums_blackbox::SECTOR_BYTES as u64).max(1) as f64;
     let mut hand = Hand { take, epoch_us: epoch(log)?, blocks, done: std::cell::Cell::new(0), ended: false };
-    read(log, Frames::default, &mut hand, |_| ())?;
+    read(log, Collected::default, &mut hand, |_| ())?;
     Ok(())
 }

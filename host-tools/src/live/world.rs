@@ -89,7 +89,9 @@ impl World {
                 if self.owner.is_none() {
                     self.owner = Some(system);
                     for (place, part) in self.parts.iter().enumerate() {
-                        part.iter().for_each(|part| craft.learn_part(place, *part));
+                        if let Some(part) = part {
+                            craft.learn_part(place, *part);
+                        }
                     }
                 }
                 self.crafts.insert(system, craft);

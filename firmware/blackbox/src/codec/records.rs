@@ -40,8 +40,12 @@ impl Records {
         }
     }
 
+    /// In place: a new one would lie on the stack first.
     pub(super) fn reset(&mut self) {
-        *self = Self::new();
+        self.kinds = Cdf::FLAT;
+        self.kept.as_flattened_mut().fill(0);
+        self.words.fill(Cdf::FLAT);
+        self.halves.fill(Cdf::FLAT);
     }
 
     /// Codes a record in its stored form, `len` bytes of the buffer; gives its length. `raw`: as it is.

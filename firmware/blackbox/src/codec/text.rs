@@ -21,8 +21,10 @@ impl TextModel {
         Self { rows: [Cdf::FLAT; ROWS], same: [Cell::EVEN; MATCHES] }
     }
 
+    /// In place: a new one would lie on the stack first.
     pub(crate) fn reset(&mut self) {
-        *self = Self::new();
+        self.rows.fill(Cdf::FLAT);
+        self.same.fill(Cell::EVEN);
     }
 
     /// One byte in a context.

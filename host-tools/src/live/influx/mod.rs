@@ -180,14 +180,14 @@ impl Influx {
         if self.names.is_waiting() {
             self.give_away();
             let settled = self.names.settle(world);
-            self.give_settled(settled);
+            self.give_settled(settled.as_ref());
         }
     }
 
     /// In parts that a database takes.
-    fn give_settled(&self, settled: Option<Batch>) {
+    fn give_settled(&self, settled: Option<&Batch>) {
         let mut part = Batch::default();
-        for line in settled.iter().flat_map(|all| all.text.split_inclusive(|byte| *byte == b'\n')) {
+        for line in settled.into_iter().flat_map(|all| all.text.split_inclusive(|byte| *byte == b'\n')) {
             part.text.extend_from_slice(line);
             part.points += 1;
             if part.text.len() >= BATCH_BYTES {
@@ -211,7 +211,7 @@ impl Influx {
     pub fn finish(mut self) -> Figures {
         self.give_away();
         let settled = self.names.end();
-        self.give_settled(settled);
+        self.give_settled(settled.as_ref());
         self.queue.close(Wall::now() + LAST_WAIT);
         if let Some(writer) = self.writer.take() {
             // A panic of the writer shows in the figures: its points still wait.
