@@ -67,8 +67,10 @@ fn a_card_that_never_starts_is_told_and_tried_again() {
 #[test]
 fn a_card_that_stands_still_for_two_and_a_half_seconds_misses_nothing() {
     let medium = medium();
-    let plan = Plan::always(Fault::Busy(2_500 * MS)).from(10 * S).times(3);
-    let mut rig = recording(sdhc(&medium).with(plan));
+    let model = [10, 15, 20].into_iter().fold(sdhc(&medium), |model, second| {
+        model.with(Plan::always(Fault::Busy(2_500 * MS)).from(second * S).times(1))
+    });
+    let mut rig = recording(model);
     rig.run_to(30_000);
     rig.assert_state(CardState::Recording);
     assert!(rig.longest >= Span::from_millis(2_500) && rig.longest < Span::from_secs(3), "{:?}", rig.longest);

@@ -3,8 +3,6 @@
 //!
 //! `cargo test -p hums-sdcard --test costs -- --nocapture` prints them.
 
-use std::time::{Duration, Instant as Wall};
-
 use embedded_sdmmc::{Block, BlockDevice, BlockIdx, SdCard};
 use hums_recorder::SpiCard;
 use hums_sdcard::{Counts, Fault, Kind, MS, Medium, Model, Plan, Slot};
@@ -38,12 +36,10 @@ fn run(driver: &impl BlockDevice, slot: &Slot, medium: &Medium, per_write: u32) 
     let (before, started_ns): (Counts, u64) = (slot.counts(), slot.now_ns());
     let violations = |slot: &Slot| slot.violations().values().map(|count| u64::from(*count)).sum::<u64>();
     let wrong = violations(slot);
-    let wall = Wall::now();
     let mut failed = 0;
     for (index, blocks) in blocks.chunks(per_write as usize).enumerate() {
         failed += u32::from(driver.write(blocks, BlockIdx(1_000 + index as u32 * per_write)).is_err());
     }
-    assert!(wall.elapsed() < Duration::from_secs(60));
     let after = slot.counts();
     Run {
         is_content: failed == 0,
