@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn four_bytes_a_step_do_what_each_does() {
-        let bytes: Vec<u8> = (0..270_u32).map(|at| (at * 97 >> 2) as u8).collect();
+        let bytes: Vec<u8> = (0..270_u32).map(|at| ((at * 97) >> 2) as u8).collect();
         for len in 0..bytes.len() {
             let each = bytes[..len].iter().fold(0xffff, |crc, byte| crc_add(crc, *byte));
             assert_eq!(crc_add_all(0xffff, &bytes[..len]), each, "{len}");
