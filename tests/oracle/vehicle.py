@@ -15,6 +15,8 @@ import time
 os.environ["MAVLINK20"] = "1"
 from companion import OURS, load_dialect
 
+# GLOBAL_POSITION_INT, VFR_HUD, BATTERY_STATUS, EXTENDED_SYS_STATE: those of a flight.
+TOLD_IN_FLIGHT = {33, 74, 147, 245}
 # What a PX4 of the test can send; anything else is refused for good.
 PX4_HAS = {1, 2, 24, 30, 33, 65, 74, 105, 147, 230, 241, 245, 290, 291, 32}
 
@@ -84,7 +86,9 @@ class Vehicle:
                 mav.system_time_send(0, boot_ms)
                 self.ground.mav.heartbeat_send(6, 8, 0, 0, 4)
             for number, interval in self.intervals.items():
-                if interval > 0 and now - self.last.get(number, 0) >= interval:
+                # Said above: zeros beside it would put it on the ground again, with another battery.
+                told = self.flies and number in TOLD_IN_FLIGHT
+                if interval > 0 and not told and now - self.last.get(number, 0) >= interval:
                     self.last[number] = now
                     self.stream(number, boot_ms)
             for message in self.autopilot.poll():
