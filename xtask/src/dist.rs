@@ -91,11 +91,7 @@ impl Release {
             files.push((format!("hums-{}.dfu", board.name()), dfu::file(board.name(), &pieces)));
             files.push((format!("hums-{}.bin", board.name()), image::flat(&pieces)));
             files.push(elf);
-            files.push(self.sbom(
-                &format!("hums-{}", board.name()),
-                "firmware/app",
-                &board.sbom_arguments(),
-            )?);
+            files.push(self.sbom(&format!("hums-{}", board.name()), "firmware/app", &board.choice())?);
         }
         self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
         files.push(read("hums", &self.target().join(STATIC_TARGET).join("release/hums"))?);

@@ -45,11 +45,9 @@ impl Board {
         }
     }
 
-    /// The arguments that choose this board, for any cargo command.
-    pub(crate) fn cargo_arguments(self) -> [String; 6] {
+    /// The arguments that choose this board, for any cargo command on the firmware's package.
+    pub(crate) fn choice(self) -> [String; 4] {
         [
-            "--package=hums-app".into(),
-            "--profile=firmware".into(),
             format!("--target={FIRMWARE_TARGET}"),
             "--no-default-features".into(),
             "--features".into(),
@@ -57,14 +55,13 @@ impl Board {
         ]
     }
 
-    /// The same for `cargo cyclonedx`, which works on one package.
-    pub(crate) fn sbom_arguments(self) -> [String; 4] {
-        [
-            format!("--target={FIRMWARE_TARGET}"),
-            "--no-default-features".into(),
-            "--features".into(),
-            format!("board-{}", self.name()),
-        ]
+    /// The same with package and profile, for what builds it from the root.
+    pub(crate) fn cargo_arguments(self) -> Vec<String> {
+        ["--package=hums-app", "--profile=firmware"]
+            .map(Into::into)
+            .into_iter()
+            .chain(self.choice())
+            .collect()
     }
 
     /// Where [`build`] leaves the image: one file a board, so that building one does not replace the other.

@@ -45,7 +45,7 @@ use feed::Feed;
 pub(crate) use store::StoreFlash;
 pub(crate) use uart::{AutopilotRx, AutopilotTx, GsRx, GsTx};
 
-use super::{Boot, ResetCause};
+use super::{Boot, Parts, ResetCause};
 use crate::costs::Stage;
 use crate::fault;
 use crate::memory::depth;
@@ -84,18 +84,6 @@ static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static TELL_COSTS: AtomicBool = AtomicBool::new(false);
 /// When the watchdog bites, in virtual milliseconds; before it is fed first, never.
 static BITES_AT_MS: AtomicU32 = AtomicU32::new(u32::MAX);
-
-/// What the app gets.
-pub(crate) struct Parts {
-    pub(crate) autopilot: (AutopilotRx, AutopilotTx),
-    pub(crate) gs: (GsRx, GsTx),
-    pub(crate) card: Card,
-    pub(crate) store: Option<StoreFlash>,
-    pub(crate) led: Led,
-    pub(crate) watchdog: Watchdog,
-    pub(crate) idle: Idle,
-    pub(crate) boot: Boot,
-}
 
 /// What the command line says.
 #[derive(Default)]

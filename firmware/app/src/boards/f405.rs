@@ -20,13 +20,13 @@ use embassy_stm32::usart::{self, Uart};
 use embassy_stm32::{bind_interrupts, pac, rcc};
 use static_cell::ConstStaticCell;
 
-use super::Boot;
 use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
 pub(crate) use super::stm32f4::{
-    AutopilotRx, AutopilotTx, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, Parts, StoreFlash,
-    TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, cycles, done, ended, remember, restart,
+    AutopilotRx, AutopilotTx, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, TIME_STOPS_WITH_TASKS,
+    Watchdog, bites_soon, busy_cycles, cycles, done, ended, remember, restart,
 };
 use super::stm32f4::{CardPort, PortRx, PortTx, clocks, reset_cause, start_counters, watch_supply};
+use super::{Boot, Parts};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f405";

@@ -10,7 +10,7 @@
 //! | `PORT_INTERRUPTS` | what moves the ports' bytes |
 //! | `remember()` | brings back memory that survives a reset, where the machine does not do so itself; first of all |
 //! | `take() -> Parts` | starts the machine; to be called once, first |
-//! | `Parts` | `autopilot` and `gs` (each [`Receive`] and [`Transmit`]), `card` (`CardDevice`), `store` (`NorFlash`, two sectors), `led`, `watchdog`, `idle`, `boot` ([`Boot`]) |
+//! | the types in [`Parts`] | what is in each place there |
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |
 //! | `ended()` | waits for the end of the input; for ever on a board that flies |
 //! | `cycles()` | a free running counter of [`CYCLE_BITS`] bits, for measuring |
@@ -48,6 +48,22 @@ compile_error!("no board: build with `--features board-f405`, `board-f429` or `b
 
 /// Bits of `cycles()` that count: `SysTick` has 24, and the cycle counter is read as if it had no more.
 pub(crate) const CYCLE_BITS: u32 = 24;
+
+/// What the app gets of a board.
+pub(crate) struct Parts {
+    /// [`Receive`] and [`Transmit`].
+    pub(crate) autopilot: (board::AutopilotRx, board::AutopilotTx),
+    /// [`Receive`] and [`Transmit`].
+    pub(crate) gs: (board::GsRx, board::GsTx),
+    /// `CardDevice`.
+    pub(crate) card: board::Card,
+    /// `NorFlash`, two sectors.
+    pub(crate) store: Option<board::StoreFlash>,
+    pub(crate) led: board::Led,
+    pub(crate) watchdog: board::Watchdog,
+    pub(crate) idle: board::Idle,
+    pub(crate) boot: Boot,
+}
 
 /// Bytes were lost before the reception task could fetch them: it came too late and the receive buffer ran over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]

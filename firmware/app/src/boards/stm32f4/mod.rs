@@ -20,7 +20,6 @@ pub(crate) use reset::reset_cause;
 pub(crate) use supply::watch_supply;
 pub(crate) use watchdog::Watchdog;
 
-use super::Boot;
 use crate::costs::Stage;
 use crate::report::Report;
 
@@ -52,18 +51,6 @@ pub(crate) type AutopilotTx = PortTx;
 pub(crate) type GsRx = PortRx;
 /// Transmission to the ground station.
 pub(crate) type GsTx = PortTx;
-
-/// What the app gets.
-pub(crate) struct Parts {
-    pub(crate) autopilot: (AutopilotRx, AutopilotTx),
-    pub(crate) gs: (GsRx, GsTx),
-    pub(crate) card: Card,
-    pub(crate) store: Option<StoreFlash>,
-    pub(crate) led: Led,
-    pub(crate) watchdog: Watchdog,
-    pub(crate) idle: Idle,
-    pub(crate) boot: Boot,
-}
 
 /// RAM survives a reset by itself.
 pub(crate) const fn remember() {}
