@@ -119,6 +119,17 @@ impl Quantity {
     }
 }
 
+/// What a frame told, kept until the frames before it have been taken.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed {
+    /// When it came.
+    pub at: Instant,
+    /// Who said it.
+    pub source: Source,
+    /// What it says.
+    pub observation: Observation,
+}
+
 /// The vehicle as the reference system sees it, replayed from its observations.
 #[derive(Clone, Debug)]
 pub struct Reference {

@@ -13,12 +13,13 @@ pub mod series;
 pub mod trend;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 
 use crate::cli;
-use crate::decode::{inside, side_by_side::side_by_side};
+use crate::decode::side_by_side::side_by_side;
+use crate::files::{appended, inside, make_directory, says_directory};
 use crate::logs::{self, Log};
 use crate::outcome::Outcome;
 use crate::output;
@@ -43,7 +44,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         let html = page::html(overview, &replay::Replay::of(log)?, &trend::of(overview, earlier))?;
         let path = wanted.path(log);
         if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-            fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
+            make_directory(dir)?;
         }
         fs::write(&path, &html).with_context(|| format!("{}: cannot be written", path.display()))?;
         output::line(&format!("{}: session {}, {} bytes", path.display(), log.name, html.len()))?;
@@ -69,8 +70,7 @@ fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
     };
-    let says_directory =
-        args.output.is_dir() || args.output.as_os_str().to_string_lossy().ends_with(['/', '\\']);
+    let directory = says_directory(&args.output);
     let sessions = match &args.session {
         Some(name) => {
             let Some(index) = logs.iter().position(|log| log.name == *name) else {
@@ -79,10 +79,10 @@ fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
             };
             vec![index]
         }
-        None if says_directory => (0..logs.len()).collect(),
+        None if directory => (0..logs.len()).collect(),
         None => vec![last],
     };
-    Ok(Wanted { sessions, output: args.output.clone(), directory: says_directory })
+    Ok(Wanted { sessions, output: args.output.clone(), directory })
 }
 
 impl Wanted {
@@ -90,8 +90,6 @@ impl Wanted {
         if !self.directory {
             return self.output.clone();
         }
-        let mut path = inside(Path::new(&self.output), &log.name).into_os_string();
-        path.push(".html");
-        path.into()
+        appended(&inside(&self.output, &log.name), "html")
     }
 }

@@ -10,8 +10,7 @@ use hums_link::{Check, Frame, observe};
 use serde::Serialize;
 
 use super::series::{Key, Store};
-use crate::decode::influx::Observed;
-use crate::decode::reference::Reference;
+use crate::decode::reference::{Observed, Reference};
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, read};
 use crate::mavlink::values::{Payload, Value};

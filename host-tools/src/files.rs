@@ -1,0 +1,54 @@
+//! Files that results are written to.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+
+use crate::outcome::ReaderGone;
+use crate::output;
+
+/// Room for a group's lines of a busy message; there may be some hundred of these.
+const BUFFER_BYTES: usize = 16 * 1024;
+
+/// Makes a file, and its directory where there is none.
+pub fn create(path: &Path) -> Result<BufWriter<File>> {
+    if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
+        make_directory(dir)?;
+    }
+    let file = File::create(path).with_context(|| format!("{}: cannot be written", path.display()))?;
+    Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
+}
+
+/// Makes a directory, unless it is there.
+pub fn make_directory(dir: &Path) -> Result<()> {
+    fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
+}
+
+/// An error in terms of the file; a reader of standard output that has gone ends it quietly.
+pub fn settle(result: io::Result<()>, path: &Path) -> Result<()> {
+    match result {
+        Err(error) if output::is_reader_gone(&error) => Err(ReaderGone.into()),
+        result => result.with_context(|| format!("{}: cannot be written", path.display())),
+    }
+}
+
+/// Whether an output is named as a directory: it is one, or its name ends like one.
+pub fn says_directory(output: &Path) -> bool {
+    output.is_dir() || output.as_os_str().to_string_lossy().ends_with(['/', '\\'])
+}
+
+/// A path inside `dir` for a log's name, which may have directories of its own.
+pub fn inside(dir: &Path, name: &str) -> PathBuf {
+    name.split('/')
+        .filter(|part| !matches!(*part, "" | "." | ".."))
+        .fold(dir.to_owned(), |path, part| path.join(part))
+}
+
+/// A path with an extension. Appended, not replaced: a log's own name may have a dot in it.
+pub fn appended(name: &Path, extension: &str) -> PathBuf {
+    let mut name = name.to_owned().into_os_string();
+    name.push(format!(".{extension}"));
+    PathBuf::from(name)
+}
