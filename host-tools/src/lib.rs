@@ -21,10 +21,13 @@ pub mod progress;
 pub mod report;
 pub mod rng;
 pub mod run;
+pub mod series;
 pub mod sink;
 pub mod source;
+pub mod statustext;
 pub mod summary;
 pub mod talk;
+pub mod track;
 pub mod utc;
 pub mod verify;
 

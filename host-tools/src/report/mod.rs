@@ -1,15 +1,19 @@
 //! `hums report`: one page for each session, whole in itself: no network, no file beside it.
 //!
-//! [`series`] samples what the vehicle told, so that a page of hours stays below a few megabytes; [`replay`] reads the
-//! log in order and finds flights and phases with the firmware's own rules; [`trend`] compares with the sessions before
-//! on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them (`assets/`).
+//! [`replay`] reads the log in order: [`samples`] keeps what the vehicle told, so that a page of hours stays below a few
+//! megabytes, [`flights`] finds flights and phases with the firmware's own rules, [`frames`] counts; [`trend`] compares
+//! with the sessions before on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them
+//! (`assets/`), which [`plots`] tells what to draw.
 //!
 //! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
 //! own policy lets no other script run and loads nothing.
 
+pub mod flights;
+pub mod frames;
 pub mod page;
+pub mod plots;
 pub mod replay;
-pub mod series;
+pub mod samples;
 pub mod trend;
 
 use std::fs;

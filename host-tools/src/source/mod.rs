@@ -14,7 +14,10 @@ pub mod noise;
 pub mod paced;
 pub mod raw;
 pub mod sniff;
+mod stream;
 pub mod tlog;
+
+pub use stream::{Chunk, Source};
 
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -26,36 +29,6 @@ use crate::outcome::usage;
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
 pub const RAW_BAUD: u32 = 115_200;
-
-/// Bytes that arrive together.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Chunk {
-    /// When the last of them is there, in microseconds since the first byte of the input; never falls.
-    pub at_us: u64,
-    /// The bytes; may be none where only time passed (a live source that is silent).
-    pub bytes: Vec<u8>,
-}
-
-/// A stream of chunks.
-pub trait Source: Send {
-    /// The next chunk; `None` at the end.
-    fn next(&mut self) -> io::Result<Option<Chunk>>;
-
-    /// UTC at the first byte, microseconds since 1970, where the input told it (known once a chunk was read).
-    fn utc_start_us(&self) -> Option<u64> {
-        None
-    }
-
-    /// Whether each chunk is a record of its own (a frame of a tlog), not just some bytes of a stream.
-    fn has_records(&self) -> bool {
-        false
-    }
-
-    /// A sentence about what was strange in the input, once it has been read.
-    fn remark(&self) -> Option<String> {
-        None
-    }
-}
 
 /// The way back to a source that hears.
 pub type Way = Box<dyn Write + Send>;
@@ -103,14 +76,4 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
             Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
         }
     })
-}
-
-/// Reads what there is, going on after an interrupted call; 0 at the end.
-fn read_some(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
-    loop {
-        match input.read(buffer) {
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            result => return result,
-        }
-    }
 }

@@ -40,9 +40,10 @@
 
   const LEVELS = ["ok", "advisory", "stale", "warning", "critical"];
   const PHASES = {
-    "ground": "#8a949e", "take-off": "#d9822b", "hover": "#3f8fd2", "climb": "#4fae62", "cruise": "#7a68c9",
+    "ground": "#8a949e", "take_off": "#d9822b", "hover": "#3f8fd2", "climb": "#4fae62", "cruise": "#7a68c9",
     "descent": "#d0a215", "landing": "#c65b7c",
   };
+  const phaseName = (phase) => phase.replace("_", "-");
   // Paul Tol's bright and muted schemes: told apart by colour-blind eyes, on light and on dark ground.
   const LINES = [
     ["#2f6fb7", "#5aa2f0"], ["#d1495b", "#ff7a8a"], ["#1f8a4c", "#4cc27c"], ["#b8860b", "#e5b93c"],
@@ -361,10 +362,10 @@
       const left = x(phase.from_s), wide = x(phase.to_s) - left;
       ctx.fillStyle = PHASES[phase.phase];
       ctx.fillRect(left, 26, Math.max(wide, 1), 22);
-      const label = ctx.measureText(phase.phase).width;
+      const label = ctx.measureText(phaseName(phase.phase)).width;
       if (wide > label + 10) {
         ctx.fillStyle = "#fff";
-        ctx.fillText(phase.phase, left + (wide - label) / 2, 41);
+        ctx.fillText(phaseName(phase.phase), left + (wide - label) / 2, 41);
       }
     }
     ctx.fillStyle = css("--ink");
@@ -401,7 +402,7 @@
   const shownPhases = [...new Set(data.phases.map((p) => p.phase))];
   const dot = (colour) => { const i = el("i"); i.style.background = colour; return i; };
   time.append(el("div", { class: "panel strip" }, strip, el("div", { class: "legend" },
-    shownPhases.map((phase) => el("span", {}, dot(PHASES[phase]), phase)),
+    shownPhases.map((phase) => el("span", {}, dot(PHASES[phase]), phaseName(phase))),
     gaps.length ? el("span", {}, "framed in red: a gap in the record") : null,
     el("span", { class: "noprint" }, "Drag over a plot to look closer; double click for the whole session."))));
 
@@ -499,7 +500,7 @@
     for (const f of findings) if (f.level !== "ok") spot(near(f.time_s), css("--" + f.level), 5);
     data.flights.slice(0, 9).forEach((f, i) => {
       const number = data.flights.length > 1 ? ` ${i + 1}` : "";
-      spot(near(f.from_s), PHASES["take-off"], 5);
+      spot(near(f.from_s), PHASES.take_off, 5);
       label(near(f.from_s), "take-off" + number, true);
       if (f.landed) { spot(near(f.to_s), PHASES.landing, 5); label(near(f.to_s), "landing" + number, false); }
     });
