@@ -46,7 +46,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     })?
     .0;
     let earlier = logs::on_card(&run.sd).len();
-    let mut reboots = VecDeque::from(run.faults.reboot_at.clone());
+    let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run)?;
     let mut board = Board::start(Fixed {
