@@ -2,7 +2,7 @@
 //! `HUMS_GAP`.
 
 use hums_blackbox::Gap;
-use hums_blackbox::record::Record;
+use hums_blackbox::record::{Record, Stats};
 use hums_core::time::Instant;
 
 use super::row::{Cell, CellType, Row};
@@ -100,31 +100,7 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("to[s]", Cell::Time(loss.to)),
             ],
         ),
-        Record::Stats(stats) => one(
-            "HUMS_STATS",
-            vec![
-                ("frames_in", count(stats.frames_in)),
-                ("frames_logged", count(stats.frames_logged)),
-                ("frames_lost", count(stats.frames_lost)),
-                ("bytes_in", count(stats.bytes_in)),
-                ("bytes_not_frames", count(stats.bytes_not_frames)),
-                ("bytes_logged", count(stats.bytes_logged)),
-                ("blocks_written", count(stats.blocks_written)),
-                ("queue_bytes_max", count(stats.queue_bytes_max)),
-                ("queue_bytes_capacity", count(stats.queue_bytes_capacity)),
-                ("sd_stall_ms_max", count(stats.sd_stall_ms_max)),
-                ("gs_frames", count(stats.gs_frames)),
-                ("gs_bytes", count(stats.gs_bytes)),
-                ("frame_queue_bytes_max", count(stats.frame_queue_bytes_max)),
-                ("frame_queue_bytes_capacity", count(stats.frame_queue_bytes_capacity)),
-                ("gs_queue_bytes_max", count(stats.gs_queue_bytes_max)),
-                ("gs_queue_bytes_capacity", count(stats.gs_queue_bytes_capacity)),
-                ("cpu_permille", count(stats.cpu_permille)),
-                ("cpu_permille_max", count(stats.cpu_permille_max)),
-                ("stack_bytes_max", count(stats.stack_bytes_max)),
-                ("stack_bytes_capacity", count(stats.stack_bytes_capacity)),
-            ],
-        ),
+        Record::Stats(stats) => one("HUMS_STATS", stats_cells(stats)),
         Record::Fault(fault) => one(
             "HUMS_FAULT",
             vec![
@@ -172,6 +148,31 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         // A kind that this version of the host tools has no table for; the record itself stays in the log.
         _ => Vec::new(),
     }
+}
+
+fn stats_cells(stats: &Stats) -> Vec<(&'static str, Cell)> {
+    vec![
+        ("frames_in", count(stats.frames_in)),
+        ("frames_logged", count(stats.frames_logged)),
+        ("frames_lost", count(stats.frames_lost)),
+        ("bytes_in", count(stats.bytes_in)),
+        ("bytes_not_frames", count(stats.bytes_not_frames)),
+        ("bytes_logged", count(stats.bytes_logged)),
+        ("blocks_written", count(stats.blocks_written)),
+        ("queue_bytes_max", count(stats.queue_bytes_max)),
+        ("queue_bytes_capacity", count(stats.queue_bytes_capacity)),
+        ("sd_stall_ms_max", count(stats.sd_stall_ms_max)),
+        ("gs_frames", count(stats.gs_frames)),
+        ("gs_bytes", count(stats.gs_bytes)),
+        ("frame_queue_bytes_max", count(stats.frame_queue_bytes_max)),
+        ("frame_queue_bytes_capacity", count(stats.frame_queue_bytes_capacity)),
+        ("gs_queue_bytes_max", count(stats.gs_queue_bytes_max)),
+        ("gs_queue_bytes_capacity", count(stats.gs_queue_bytes_capacity)),
+        ("cpu_permille", count(stats.cpu_permille)),
+        ("cpu_permille_max", count(stats.cpu_permille_max)),
+        ("stack_bytes_max", count(stats.stack_bytes_max)),
+        ("stack_bytes_capacity", count(stats.stack_bytes_capacity)),
+    ]
 }
 
 /// A gap as a row.

@@ -20,10 +20,17 @@ pub struct Samples {
 impl Samples {
     /// Takes what an observation told.
     pub fn take(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
-        let store = &mut self.store;
+        self.motion(at, reference, observation);
+        self.power(at, reference, observation);
+        self.condition(at, observation);
+        self.radio(at, observation);
+    }
+
+    /// Attitude, height, speed, place.
+    fn motion(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
         let mut push = |plot, line: u8, value: Option<f32>| {
             if let Some(value) = value {
-                store.push(at, (plot, line), value);
+                self.store.push(at, (plot, line), value);
             }
         };
         match observation {
@@ -60,6 +67,18 @@ impl Samples {
                 push(Plot::Attitude, 0, Some(attitude.roll.0.to_degrees()));
                 push(Plot::Attitude, 1, Some(attitude.pitch.0.to_degrees()));
             }
+            _ => {}
+        }
+    }
+
+    /// Batteries, motors, the autopilot's load.
+    fn power(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
+        let mut push = |plot, line: u8, value: Option<f32>| {
+            if let Some(value) = value {
+                self.store.push(at, (plot, line), value);
+            }
+        };
+        match observation {
             Observation::Battery(battery) => {
                 let place = battery.id.min(3);
                 push(Plot::PackVolts, place, battery.voltage.map(|volts| volts.0));
@@ -87,6 +106,18 @@ impl Samples {
                     }
                 }
             }
+            _ => {}
+        }
+    }
+
+    /// Vibration, estimator, temperatures, engine.
+    fn condition(&mut self, at: Instant, observation: &Observation) {
+        let mut push = |plot, line: u8, value: Option<f32>| {
+            if let Some(value) = value {
+                self.store.push(at, (plot, line), value);
+            }
+        };
+        match observation {
             Observation::Vibration(vibration) => {
                 for axis in 0..3_u8 {
                     push(Plot::Vibration, axis, vibration.levels[usize::from(axis)]);
@@ -98,24 +129,6 @@ impl Samples {
                 push(Plot::Estimator, 1, estimator.position_horizontal);
                 push(Plot::Estimator, 2, estimator.position_vertical);
                 push(Plot::Estimator, 3, estimator.compass);
-            }
-            _ => self.take_rest(at, observation),
-        }
-    }
-
-    fn take_rest(&mut self, at: Instant, observation: &Observation) {
-        let mut push = |plot, line: u8, value: Option<f32>| {
-            if let Some(value) = value {
-                self.store.push(at, (plot, line), value);
-            }
-        };
-        match observation {
-            Observation::RadioControl(rc) => push(Plot::Link, 0, rc.rssi.map(f32::from)),
-            Observation::TelemetryRadio(radio) => {
-                push(Plot::Link, 1, radio.rssi.map(f32::from));
-                push(Plot::Link, 2, radio.remote_rssi.map(f32::from));
-                push(Plot::Link, 3, radio.noise.map(f32::from));
-                push(Plot::Link, 4, radio.remote_noise.map(f32::from));
             }
             Observation::Air(air) => push(Plot::Temperature, 0, air.temperature.map(|celsius| celsius.0)),
             Observation::Imu(imu) if imu.instance == 0 => {
@@ -137,6 +150,25 @@ impl Samples {
                 for sensor in sensors.iter().flatten() {
                     push(Plot::SpeedSensors, sensor.index, Some(sensor.rpm.0));
                 }
+            }
+            _ => {}
+        }
+    }
+
+    /// Signals.
+    fn radio(&mut self, at: Instant, observation: &Observation) {
+        let mut push = |plot, line: u8, value: Option<f32>| {
+            if let Some(value) = value {
+                self.store.push(at, (plot, line), value);
+            }
+        };
+        match observation {
+            Observation::RadioControl(rc) => push(Plot::Link, 0, rc.rssi.map(f32::from)),
+            Observation::TelemetryRadio(radio) => {
+                push(Plot::Link, 1, radio.rssi.map(f32::from));
+                push(Plot::Link, 2, radio.remote_rssi.map(f32::from));
+                push(Plot::Link, 3, radio.noise.map(f32::from));
+                push(Plot::Link, 4, radio.remote_noise.map(f32::from));
             }
             _ => {}
         }

@@ -47,7 +47,7 @@ pub(super) struct Arguments<'a> {
     /// The image.
     pub(super) firmware: &'a Path,
     /// Further arguments of the firmware, `key=value`.
-    pub(super) arguments: &'a [String],
+    pub(super) more: &'a [String],
     /// It counts the instructions of each stage.
     pub(super) costs: bool,
 }
@@ -59,7 +59,7 @@ pub(super) fn command(start: &Arguments<'_>, dir: &Path) -> Command {
     for (key, file) in [("sd", "card"), ("store", "store"), ("feed", "feed")] {
         let _ = write!(arguments, " \"{key}={}\"", escaped(&dir.join(file)));
     }
-    for argument in start.arguments.iter().chain(start.costs.then(|| "cost=1".to_owned()).iter()) {
+    for argument in start.more.iter().chain(start.costs.then(|| "cost=1".to_owned()).iter()) {
         let _ = write!(arguments, " \"{argument}\"");
     }
     let mut command = Command::new(PROGRAM);

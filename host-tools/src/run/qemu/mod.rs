@@ -105,7 +105,7 @@ impl Qemu {
         }
         make_fifo(&at("feed"))?;
         let Start { firmware, arguments, costs, .. } = &start;
-        let mut child = command(&Arguments { firmware, arguments, costs: *costs }, dir.path())
+        let mut child = command(&Arguments { firmware, more: arguments, costs: *costs }, dir.path())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
