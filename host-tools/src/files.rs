@@ -4,10 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
-
-use crate::outcome::ReaderGone;
-use crate::output;
+use anyhow::{Context as _, Result, bail};
 
 /// Room for a group's lines of a busy message; there may be some hundred of these.
 const BUFFER_BYTES: usize = 16 * 1024;
@@ -23,15 +20,15 @@ pub fn create(path: &Path) -> Result<BufWriter<File>> {
 
 /// Makes a directory, unless it is there.
 pub fn make_directory(dir: &Path) -> Result<()> {
+    if dir.is_file() {
+        bail!("{}: is a file, and a directory is needed there; name another output", dir.display());
+    }
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
-/// An error in terms of the file; a reader of standard output that has gone ends it quietly.
+/// An error in terms of the file.
 pub fn settle(result: io::Result<()>, path: &Path) -> Result<()> {
-    match result {
-        Err(error) if output::is_reader_gone(&error) => Err(ReaderGone.into()),
-        result => result.with_context(|| format!("{}: cannot be written", path.display())),
-    }
+    result.with_context(|| format!("{}: cannot be written", path.display()))
 }
 
 /// Whether an output is named as a directory: it is one, or its name ends like one.

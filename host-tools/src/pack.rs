@@ -34,9 +34,9 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     let mut last_us = 0;
     while let Some(chunk) = source.next().with_context(|| format!("{}: cannot be read", args.input))? {
         if packer.started.is_none() {
-            packer.start(source.utc_start_us())?;
+            packer.start(source.utc_start_us()).with_context(context)?;
         }
-        packer.chunk(chunk.at_us, &chunk.bytes, source.has_records())?;
+        packer.chunk(chunk.at_us, &chunk.bytes, source.has_records()).with_context(context)?;
         last_us = chunk.at_us;
     }
     let done = packer.finish(last_us).with_context(context)?;

@@ -3,10 +3,8 @@
 use hums_core::observation::Source;
 use hums_core::time::{Instant, Span};
 
+use crate::mavlink::ids::STATUSTEXT;
 use crate::mavlink::values::{Payload, Value};
-
-/// The message's id.
-pub const STATUSTEXT: u32 = 253;
 
 /// A text of several parts that lacks the next one for so long is as long as it is.
 const PATIENCE: Span = Span::from_secs(1);

@@ -47,6 +47,14 @@ pub fn open_or_make(path: &Path, size_mib: Option<u64>) -> Result<(File, Found)>
                     about.len() >> 20
                 )));
             }
+            if about.is_file() && about.len() < u64::from(BLOCKS_MIN) * 512 {
+                bail!(
+                    "{}: is no image of an SD card: it has {} bytes, and a FAT32 card at least {SIZE_MIB_MIN} MiB; name \
+                     another file, or one that is not there yet",
+                    path.display(),
+                    about.len()
+                );
+            }
             let file = OpenOptions::new().read(true).write(true).open(path);
             Ok((
                 file.with_context(|| format!("{}: cannot be opened for writing", path.display()))?,
@@ -55,7 +63,8 @@ pub fn open_or_make(path: &Path, size_mib: Option<u64>) -> Result<(File, Found)>
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let file = OpenOptions::new().read(true).write(true).create_new(true).open(path);
-            let file = file.with_context(|| format!("{}: cannot be made", path.display()))?;
+            let file =
+                file.with_context(|| format!("{}: cannot be made; is its folder there?", path.display()))?;
             let bytes = size_mib.unwrap_or(SIZE_MIB) << 20;
             file.set_len(bytes).with_context(|| format!("{}: cannot have {bytes} bytes", path.display()))?;
             Ok((file, Found::Made))

@@ -10,7 +10,7 @@ const LIVE_EXAMPLES: &str = "Examples:
   hums live --input udpin:0.0.0.0:14550 --open
   hums live --input serial:/dev/ttyUSB0:57600
   hums live --input flight.tlog --open
-  hums live --input card.img --session 00042
+  hums live --input card.img --session 00001
   hums live --input udpin:0.0.0.0:14550 --influx http://127.0.0.1:8086 --org drones --bucket hums --token T
   hums live --input udpin:0.0.0.0:14550 --listen 192.168.1.5:8080
 

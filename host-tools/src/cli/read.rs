@@ -11,7 +11,7 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode card.img -o flight.tlog --format tlog
   hums decode card.img -o out --format tlog,csv,jsonl
   hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
-  hums decode 00042.hum -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
+  hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
   hums decode cards/ -o fleet --format parquet
   hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8086/write?db=hums
 
@@ -67,7 +67,7 @@ pub enum Format {
 
 const INFO_EXAMPLES: &str = "Examples:
   hums info card.img
-  hums info --json 00042_00.HUM";
+  hums info --json 00001_00.HUM";
 
 /// `hums info`
 #[derive(Args, Clone, Debug)]
@@ -109,7 +109,7 @@ pub struct Verify {
 const REPORT_EXAMPLES: &str = "Examples:
   hums report card.img -o report.html
   hums report card.img -o pages/
-  hums report card.img --session 00042 -o report.html
+  hums report card.img --session 00001 -o report.html
 
 With a directory for -o each session gets a page, named after it; otherwise the newest gets one. The page compares with
 the sessions before on the same card.";

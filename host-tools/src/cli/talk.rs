@@ -81,7 +81,7 @@ pub enum ParamsAction {
 const PULL_EXAMPLES: &str = "Examples:
   hums pull --link serial:/dev/ttyUSB0:57600 -o logs
   hums pull --link udpin:0.0.0.0:14550 -o logs --last 1
-  hums pull --link tcp:192.168.1.5:5760 -o logs 00042_00.HUM
+  hums pull --link tcp:192.168.1.5:5760 -o logs 00001_00.HUM
 
 A file that is there already with the same length is left; one that was begun (NAME.part) is gone on with.";
 

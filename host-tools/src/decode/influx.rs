@@ -23,14 +23,13 @@ use super::row::{Cell, Row};
 use super::table::Table;
 use super::text::{push_finite, push_hex, push_integer};
 use crate::mavlink::frame::Frame;
+use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
 use crate::mavlink::values::{Payload, Scalar, Value};
 
 /// Columns of records that are tags: few values, and what one groups by.
 const TAGS: [&str; 3] = ["subsystem", "check", "counter"];
 /// Names that the database or our tags have already: a field called `time` would be dropped.
 pub(super) const TAKEN: [&str; 5] = ["time", "vehicle", "session", "system", "component"];
-/// `ACTUATOR_OUTPUT_STATUS`
-const ACTUATORS: u32 = 375;
 
 /// The tags of every point.
 #[derive(Clone, Debug, Default)]
@@ -112,7 +111,7 @@ impl Lines {
         }
         let count = fields.count;
         self.end(start, at, count);
-        if let Some(payload) = known.filter(|_| frame.id == ACTUATORS) {
+        if let Some(payload) = known.filter(|_| frame.id == ACTUATOR_OUTPUT_STATUS) {
             self.actuators(tags, at, payload);
         }
     }

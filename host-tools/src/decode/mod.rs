@@ -65,9 +65,20 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     }
     let standard_output = args.output == Path::new("-");
     if standard_output && (found.logs.len() != 1 || !formats.is_single_file()) {
+        let why = match found.logs.len() {
+            1 => "these formats are more than that".to_owned(),
+            count => format!("there are {count} logs"),
+        };
         return Err(usage_error(format!(
-            "-o -: standard output takes one log in one format of a single file (tlog, jsonl or influx); there are {} \
-             logs",
+            "-o -: standard output takes one log in one format of a single file (tlog, jsonl or influx), and {why}; \
+             name a file or a directory"
+        )));
+    }
+    let one_file = found.logs.len() == 1 && formats.is_single_file();
+    if args.output.is_file() && !one_file {
+        return Err(usage_error(format!(
+            "-o {}: is a file, and {} logs in these formats need a directory; name one that is there, or none yet",
+            args.output.display(),
             found.logs.len()
         )));
     }

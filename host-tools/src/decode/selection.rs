@@ -82,6 +82,6 @@ fn id_of(name: &str) -> Result<u32> {
         near.retain(|known| known.contains(&upper) || upper.contains(known));
         near.truncate(5);
         let hint = if near.is_empty() { String::new() } else { format!("; there is {}", near.join(", ")) };
-        usage(format!("--message {name}: no message has this name{hint}"))
+        usage(format!("--message {name}: no message has this name{hint}; `hums info LOG` lists a log's"))
     })
 }

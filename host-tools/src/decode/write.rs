@@ -72,7 +72,10 @@ struct Single {
 impl Single {
     fn open(destination: &Destination, extension: &str) -> Result<Self> {
         match destination.path(extension) {
-            None => Ok(Self { out: Box::new(BufWriter::new(Stdout::new())), path: PathBuf::from("-") }),
+            None => Ok(Self {
+                out: Box::new(BufWriter::new(Stdout::new())),
+                path: PathBuf::from("standard output"),
+            }),
             Some(path) => Ok(Self { out: Box::new(create(&path)?), path }),
         }
     }

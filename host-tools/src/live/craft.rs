@@ -21,7 +21,8 @@ use super::latest::Latest;
 use super::note::Note;
 use super::plots::Plot;
 use crate::decode::reference::Reference;
-use crate::statustext::{STATUSTEXT, Text, Texts};
+use crate::mavlink::ids::STATUSTEXT;
+use crate::statustext::{Text, Texts};
 
 /// By then a HUMS on board has told of itself.
 const SETTLE: Span = Span::from_secs(5);

@@ -3,7 +3,7 @@
 //! [`replay`] reads the log in order: [`samples`] keeps what the vehicle told, so that a page of hours stays below a few
 //! megabytes, [`flights`] finds flights and phases with the firmware's own rules, [`frames`] counts; [`trend`] compares
 //! with the sessions before on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them
-//! (`assets/`), which [`plots`] tells what to draw.
+//! ([`program`], from the modules in `assets/`), which [`plots`] tells what to draw.
 //!
 //! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
 //! own policy lets no other script run and loads nothing.
@@ -12,6 +12,7 @@ pub mod flights;
 pub mod frames;
 pub mod page;
 pub mod plots;
+mod program;
 pub mod replay;
 pub mod samples;
 pub mod trend;
@@ -25,7 +26,7 @@ use crate::cli;
 use crate::decode::side_by_side::side_by_side;
 use crate::files::{appended, inside, make_directory, says_directory};
 use crate::logs::{self, Log};
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::summary::Overview;
 
@@ -79,7 +80,10 @@ fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
         Some(name) => {
             let Some(index) = logs.iter().position(|log| log.name == *name) else {
                 let names: Vec<&str> = logs.iter().map(|log| log.name.as_str()).collect();
-                bail!("there is no session {name}; there is {}", names.join(", "));
+                return Err(usage(format!(
+                    "--session {name}: there is no such session; there is {}",
+                    names.join(", ")
+                )));
             };
             vec![index]
         }

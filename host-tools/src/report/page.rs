@@ -11,6 +11,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::flights::{Flight, PhaseSpan};
 use super::plots::{About, Plot, about};
+use super::program::program;
 use super::replay::{Place, Replay, Said};
 use super::trend::Trend;
 use crate::info::json::LogJson;
@@ -19,7 +20,6 @@ use crate::summary::Overview;
 
 const TEMPLATE: &str = include_str!("assets/page.html");
 const STYLE: &str = include_str!("assets/page.css");
-const PROGRAM: &str = include_str!("assets/page.js");
 /// uPlot 1.6.32, MIT (`src/assets/uPlot.LICENSE`).
 const UPLOT: &str = include_str!("../assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("../assets/uPlot.min.css");
@@ -100,7 +100,8 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
         stats: log.contents.stats.as_ref().map(StatsJson::from),
         trend,
     };
-    let programs = [UPLOT, PROGRAM];
+    let program = program();
+    let programs = [UPLOT, program.as_str()];
     // Only these two programs may run, whatever else may ever get onto the page.
     let hashes: Vec<String> = programs
         .iter()
@@ -111,7 +112,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
         ("{{scripts}}", hashes.join(" ").as_str()),
         ("{{style}}", [UPLOT_STYLE, STYLE].concat().as_str()),
         ("{{uplot}}", UPLOT),
-        ("{{program}}", PROGRAM),
+        ("{{program}}", program.as_str()),
         // Last, so that nothing in it is taken for a mark.
         ("{{data}}", harmless(&serde_json::to_string(&data)?).as_str()),
     ] {
@@ -164,11 +165,12 @@ mod tests {
 
     #[test]
     fn each_mark_of_the_template_stands_once() {
+        let program = program();
         for mark in ["{{scripts}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"] {
             assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
-            assert!(!UPLOT.contains(mark) && !PROGRAM.contains(mark) && !STYLE.contains(mark), "{mark}");
+            assert!(!UPLOT.contains(mark) && !program.contains(mark) && !STYLE.contains(mark), "{mark}");
         }
-        for text in [UPLOT, PROGRAM] {
+        for text in [UPLOT, program.as_str()] {
             assert!(!text.contains("</script"), "a program would end early");
         }
     }

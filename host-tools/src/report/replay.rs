@@ -12,7 +12,8 @@ use super::samples::Samples;
 use crate::decode::reference::{Observed, Reference};
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, read};
-use crate::statustext::{STATUSTEXT, Text, Texts};
+use crate::mavlink::ids::STATUSTEXT;
+use crate::statustext::{Text, Texts};
 use crate::track::Point;
 
 /// Texts kept at most; beyond this they are only counted.

@@ -99,7 +99,9 @@ fn hear(ground: &mut Ground, now_us: u64, machine: &mut impl Machine) -> Result<
 fn pace(run: &Run) -> Result<(Speed, bool)> {
     let live = run.input.is_live();
     match run.speed {
-        Some(Speed::Max) if live => Err(usage(format!("--speed max: {} comes in its own time", run.input))),
+        Some(Speed::Max) if live => {
+            Err(usage(format!("--speed max: {} comes in its own time; leave --speed out", run.input)))
+        }
         Some(speed) => Ok((speed, live)),
         None => Ok((if live { Speed::Real } else { Speed::Max }, live)),
     }

@@ -8,6 +8,7 @@ use hums_blackbox::record::Stats;
 use hums_core::health;
 use serde::Serialize;
 
+use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output;
@@ -158,6 +159,16 @@ impl Report {
             output::line(&self.text())?;
         }
         Ok(Outcome::lossy(self.frames_lost > 0))
+    }
+
+    /// What is strange about an input of which nothing came out.
+    pub fn remark(&self, input: &Endpoint) -> Option<String> {
+        (self.bytes_in > 0 && self.frames_in == 0).then(|| {
+            format!(
+                "{input}: not one MAVLink frame was in {} bytes; is it a recording of MAVLink?",
+                self.bytes_in
+            )
+        })
     }
 
     fn text(&self) -> String {

@@ -21,10 +21,12 @@ pub use stream::{Chunk, Source};
 
 use std::fs::File;
 use std::io::{self, Read, Write};
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
 use crate::endpoint::Endpoint;
+use crate::logs::{self, Content};
 use crate::outcome::usage;
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
@@ -63,6 +65,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
             if file.metadata()?.is_dir() {
                 bail!("{}: is a directory; give a recording (tlog or raw MAVLink bytes)", path.display());
             }
+            refuse_our_own(path)?;
             Box::new(file)
         }
         _ => Box::new(io::stdin()),
@@ -76,4 +79,21 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
             Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
         }
     })
+}
+
+/// What HUMS itself has recorded is full of frames, but not as they came.
+fn refuse_our_own(path: &Path) -> Result<()> {
+    // What is no file (a pipe) can be read but once.
+    if !path.is_file() {
+        return Ok(());
+    }
+    let name = path.display();
+    let what = match logs::find::look(path)? {
+        Content::Log => "a log of HUMS",
+        Content::Image if !logs::on_card(path).is_empty() => "an SD card with logs of HUMS",
+        _ => return Ok(()),
+    };
+    bail!(
+        "{name}: is {what}, not a recording; `hums decode {name} -o OUT --format tlog` makes recordings of it"
+    )
 }

@@ -13,6 +13,8 @@ use hums_link::packet::Fields;
 
 use super::Client;
 use crate::cli;
+use crate::files::make_directory;
+use crate::mavlink::ids::FILE_TRANSFER_PROTOCOL;
 use crate::outcome::Outcome;
 use crate::output::Stdout;
 
@@ -48,7 +50,7 @@ impl Answer {
     fn read(frame: &Frame<'_>) -> Option<Self> {
         let fields = Fields(frame.payload().get(3..)?);
         let size = usize::from(fields.u8(4).min(DATA_MAX));
-        (frame.id() == 110).then(|| Self {
+        (frame.id() == FILE_TRANSFER_PROTOCOL).then(|| Self {
             sequence: fields.u16(0),
             opcode: fields.u8(3),
             of: fields.u8(5),
@@ -71,7 +73,7 @@ struct Ftp {
 
 /// Runs `hums pull`.
 pub fn run(args: &cli::Pull) -> Result<Outcome> {
-    fs::create_dir_all(&args.output).with_context(|| format!("{}: cannot be made", args.output.display()))?;
+    make_directory(&args.output)?;
     let mut ftp = Ftp { client: Client::connect(&args.at)?, sequence: 0 };
     ftp.ask(RESET, 0, 0, b"")?;
     let mut logs = ftp.list()?;

@@ -212,17 +212,18 @@ mod tests {
 
     use super::*;
     use crate::live::told::Limits;
+    use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
 
     /// What was told of the autopilot's id.
     const UID: u64 = 0x0031_002a_3035_510a;
 
     fn heartbeat() -> Packet {
-        Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3)
+        Packet::new(HEARTBEAT).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3)
     }
 
     /// `AUTOPILOT_VERSION`
     fn version() -> Packet {
-        Packet::new(148).u32(8, UID as u32).u32(12, (UID >> 32) as u32)
+        Packet::new(AUTOPILOT_VERSION).u32(8, UID as u32).u32(12, (UID >> 32) as u32)
     }
 
     /// Flies these packets past; gives the lines that the database would get, the last ones by the end.

@@ -69,6 +69,9 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let mut report = counters.into_report();
     let frames = report.read_card(&run.sd, earlier)?;
     before.add_to(&mut report, frames);
+    if let Some(remark) = report.remark(&run.input) {
+        eprintln!("hums: {remark}");
+    }
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }
 

@@ -80,6 +80,9 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         eprintln!("hums: {remark}");
     }
     let report = world.settle(&run.sd, earlier)?;
+    if let Some(remark) = report.remark(&run.input) {
+        eprintln!("hums: {remark}");
+    }
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }
 
