@@ -103,6 +103,30 @@ mod tests {
     }
 
     #[test]
+    fn every_command_of_the_documents_is_a_command_line() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let documents = std::fs::read_dir(root.join("docs")).expect("the documents");
+        let mut paths: Vec<_> = documents.map(|entry| entry.expect("a document").path()).collect();
+        paths.push(root.join("README.md"));
+        let mut commands = 0;
+        for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "md")) {
+            let text = std::fs::read_to_string(path).expect("a document");
+            for line in text.lines().map(|line| line.trim_start_matches("target/release/")) {
+                let Some(line) = line.strip_prefix("hums ") else { continue };
+                // Commands stand in a column; what stands in the next one is a remark.
+                let (name, arguments) = line.split_once(' ').unwrap_or((line, ""));
+                let arguments = arguments.trim_start().split("   ").next().unwrap_or_default();
+                let line = format!("{name} {}", arguments.split(" | ").next().unwrap_or_default());
+                let words = std::iter::once("hums").chain(line.split_whitespace());
+                let parsed = Cli::try_parse_from(words);
+                assert!(parsed.is_ok(), "{}: hums {line}: {parsed:?}", path.display());
+                commands += 1;
+            }
+        }
+        assert!(commands >= 20, "{commands} commands");
+    }
+
+    #[test]
     fn the_definition_of_the_command_line_is_sound() {
         Cli::command().debug_assert();
     }
