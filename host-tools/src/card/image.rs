@@ -47,14 +47,6 @@ pub fn open_or_make(path: &Path, size_mib: Option<u64>) -> Result<(File, Found)>
                     about.len() >> 20
                 )));
             }
-            if about.is_file() && about.len() < u64::from(BLOCKS_MIN) * 512 {
-                bail!(
-                    "{}: is no image of an SD card: it has {} bytes, and a FAT32 card at least {SIZE_MIB_MIN} MiB; name \
-                     another file, or one that is not there yet",
-                    path.display(),
-                    about.len()
-                );
-            }
             let file = OpenOptions::new().read(true).write(true).open(path);
             Ok((
                 file.with_context(|| format!("{}: cannot be opened for writing", path.display()))?,

@@ -13,7 +13,7 @@ use hums_link::packet::Fields;
 
 use super::Client;
 use crate::cli;
-use crate::files::make_directory;
+use crate::files::{appended, make_directory};
 use crate::mavlink::ids::FILE_TRANSFER_PROTOCOL;
 use crate::outcome::Outcome;
 use crate::output::Stdout;
@@ -79,7 +79,8 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
     let mut logs = ftp.list()?;
     logs.sort();
     if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
-        bail!("{missing}: the board has no such log");
+        let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
+        bail!("{missing}: the board has no such log; it has {}", names.join(", "));
     }
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
     let newest = args.last.unwrap_or(logs.len()).min(logs.len());
@@ -149,7 +150,7 @@ impl Ftp {
     }
 
     fn pull(&mut self, name: &str, path: &Path) -> Result<()> {
-        let part = path.with_extension("part");
+        let part = appended(path, "part");
         let context = || format!("{}: cannot be written", part.display());
         let mut file = OpenOptions::new().create(true).append(true).open(&part).with_context(context)?;
         let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes())?;
