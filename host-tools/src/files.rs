@@ -14,7 +14,7 @@ pub fn create(path: &Path) -> Result<BufWriter<File>> {
     if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
         make_directory(dir)?;
     }
-    let file = File::create(path).with_context(|| format!("{}: cannot be written", path.display()))?;
+    let file = File::create(path).with_context(|| cannot_write(path))?;
     Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
 }
 
@@ -26,9 +26,16 @@ pub fn make_directory(dir: &Path) -> Result<()> {
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
+/// That a file cannot be written, and where it is that, that its folder is missing.
+pub fn cannot_write(path: &Path) -> String {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+    let why = folder.map_or_else(String::new, |folder| format!("; there is no folder {}", folder.display()));
+    format!("{}: cannot be written{why}", path.display())
+}
+
 /// An error in terms of the file.
 pub fn settle(result: io::Result<()>, path: &Path) -> Result<()> {
-    result.with_context(|| format!("{}: cannot be written", path.display()))
+    result.with_context(|| cannot_write(path))
 }
 
 /// Whether an output is named as a directory: it is one, or its name ends like one.

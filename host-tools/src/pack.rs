@@ -12,6 +12,7 @@ use hums_link::{Check, Framer};
 
 use crate::cli;
 use crate::endpoint::Endpoint;
+use crate::files::cannot_write;
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::source::{self, Timing};
@@ -28,7 +29,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         )));
     }
     let mut source = source::open(&args.input, Timing { line_rate: None })?;
-    let context = || format!("{}: cannot be written", args.output.display());
+    let context = || cannot_write(&args.output);
     let file = BufWriter::new(File::create(&args.output).with_context(context)?);
     let mut packer = Packer::new(file);
     let mut last_us = 0;

@@ -30,7 +30,7 @@ use super::columns::{Column, TextColumn, cell_array, cell_data_type};
 use super::field_names::free_name;
 use super::row::Row;
 use super::table::Table;
-use crate::files::make_directory;
+use crate::files::{cannot_write, make_directory};
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
@@ -325,10 +325,6 @@ impl TableFile {
         }
         Ok(())
     }
-}
-
-fn cannot_write(path: &Path) -> String {
-    format!("{}: cannot be written", path.display())
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use super::reference::Reference;
 use super::table::Table;
 use super::text::columns;
 use super::thesis::Thesis;
-use crate::files::{appended, create, inside, make_directory, says_directory, settle};
+use crate::files::{appended, cannot_write, create, inside, make_directory, says_directory, settle};
 use crate::logs::Log;
 use crate::logs::reader::Deliver;
 use crate::output::Stdout;
@@ -229,7 +229,7 @@ impl<'a> Writers<'a> {
         }
         let mut file = if self.begun.contains(&table) {
             let file = File::options().append(true).open(&path);
-            BufWriter::new(file.with_context(|| format!("{}: cannot be written", path.display()))?)
+            BufWriter::new(file.with_context(|| cannot_write(&path))?)
         } else {
             let mut file = create(&path)?;
             let own = match table {

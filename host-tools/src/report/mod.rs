@@ -24,7 +24,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
-use crate::files::{appended, inside, make_directory, says_directory};
+use crate::files::{appended, cannot_write, inside, make_directory, says_directory};
 use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage};
 use crate::output;
@@ -51,7 +51,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
             make_directory(dir)?;
         }
-        fs::write(&path, &html).with_context(|| format!("{}: cannot be written", path.display()))?;
+        fs::write(&path, &html).with_context(|| cannot_write(&path))?;
         output::line(&format!("{}: session {}, {} bytes", path.display(), log.name, html.len()))?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
     }

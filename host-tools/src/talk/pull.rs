@@ -13,7 +13,7 @@ use hums_link::packet::Fields;
 
 use super::Client;
 use crate::cli;
-use crate::files::{appended, make_directory};
+use crate::files::{appended, cannot_write, make_directory};
 use crate::mavlink::ids::FILE_TRANSFER_PROTOCOL;
 use crate::outcome::Outcome;
 use crate::output::Stdout;
@@ -151,7 +151,7 @@ impl Ftp {
 
     fn pull(&mut self, name: &str, path: &Path) -> Result<()> {
         let part = appended(path, "part");
-        let context = || format!("{}: cannot be written", part.display());
+        let context = || cannot_write(&part);
         let mut file = OpenOptions::new().create(true).append(true).open(&part).with_context(context)?;
         let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes())?;
         if opened.opcode != ACK {
