@@ -8,8 +8,8 @@
 //! arrays text); the fields' metadata has their `units` and `enum`. Each table begins with `boot_s`, seconds since the
 //! monitor's power-on, and `utc`, null where nobody told it; those of frames go on with `system` and `component`.
 //!
-//! Memory is bounded: what waits to be encoded is at most [`PENDING_MAX`], and when the row groups in work are more
-//! than [`WRITERS_MAX`], the largest are written out.
+//! Memory is bounded: what waits to be encoded is at most `PENDING_MAX`, and when the row groups in work are more
+//! than `WRITERS_MAX`, the largest are written out.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;

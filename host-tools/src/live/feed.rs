@@ -1,6 +1,6 @@
 //! A live source: bytes as they come, on this PC's clock, until Ctrl-C.
 //!
-//! The thread waits for bytes at most [`SILENCE`], takes them through the framer into the world, and publishes twenty
+//! The thread waits for bytes at most `SILENCE`, takes them through the framer into the world, and publishes twenty
 //! to thirty times a second. A connection that breaks is opened again; meanwhile the values grow old, and the page says so.
 
 use std::sync::Arc;

@@ -37,7 +37,7 @@ pub struct World {
     pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
-    /// Findings since this was cleared, with whose they are; what nobody clears stops at [`FOUND_MAX`].
+    /// Findings since this was cleared, with whose they are; what nobody clears stops at `FOUND_MAX`.
     pub found: Vec<(u8, Finding)>,
     limits: Limits,
     /// The vehicle that a log is of: the first one heard in it.

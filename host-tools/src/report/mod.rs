@@ -3,7 +3,7 @@
 //! [`replay`] reads the log in order: [`samples`] keeps what the vehicle told, so that a page of hours stays below a few
 //! megabytes, [`flights`] finds flights and phases with the firmware's own rules, [`frames`] counts; [`trend`] compares
 //! with the sessions before on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them
-//! ([`program`], from the modules in `assets/`), which [`plots`] tells what to draw.
+//! (`program`, from the modules in `assets/`), which [`plots`] tells what to draw.
 //!
 //! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
 //! own policy lets no other script run and loads nothing.
