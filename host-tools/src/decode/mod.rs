@@ -77,9 +77,8 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let one_file = found.logs.len() == 1 && formats.is_single_file();
     if args.output.is_file() && !one_file {
         return Err(usage_error(format!(
-            "-o {}: is a file, and {} logs in these formats need a directory; name one that is there, or none yet",
-            args.output.display(),
-            found.logs.len()
+            "-o {}: is a file, but tables, several formats and several logs need a directory; name one, or a new name",
+            args.output.display()
         )));
     }
     if found.logs.is_empty() {
