@@ -21,12 +21,14 @@
 //! step of the checksum; candidates that are not trusted may cost no more than [`CREDIT_PER_BYTE`] such steps for each
 //! byte received, so that no input can starve the other tasks.
 
-use crate::crc;
-use crate::frame::{self, Check, FRAME_MAX, Frame, Header, NoHeader, START_V1, START_V2};
+use hums_dialect::crc;
+use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
+
+use crate::frame::{self, Check, Frame, Header, NoHeader};
 use crate::seen::{Extra, Seen};
 
 /// Bytes held: the longest frame, the byte after it, and as much again so that bytes are seldom moved.
-const BUFFER: usize = 2 * FRAME_MAX;
+const BUFFER: usize = 2 * FRAME_BYTES_MAX;
 
 /// Steps of the checksum that candidates which are not trusted may cost, for each byte received.
 const CREDIT_PER_BYTE: u32 = 4;
@@ -71,7 +73,7 @@ pub struct Framer {
 }
 
 const _: () = assert!(size_of::<Framer>() <= 1_280);
-const _: () = assert!(BUFFER > FRAME_MAX + 1, "a decided candidate must always make room");
+const _: () = assert!(BUFFER > FRAME_BYTES_MAX + 1, "a decided candidate must always make room");
 
 /// What becomes of the first bytes held.
 enum Verdict {
@@ -131,7 +133,7 @@ impl Framer {
         self.after_frame = true;
     }
 
-    /// Bytes received and not yet decided: at most [`FRAME_MAX`].
+    /// Bytes received and not yet decided: at most [`FRAME_BYTES_MAX`].
     pub const fn held(&self) -> usize {
         self.end - self.start
     }
@@ -162,7 +164,7 @@ impl Framer {
                     self.consume(len);
                 }
                 Verdict::Wait(needed) => {
-                    debug_assert!(needed > self.held() && needed <= FRAME_MAX + 1);
+                    debug_assert!(needed > self.held() && needed <= FRAME_BYTES_MAX + 1);
                     self.needed = needed;
                     return;
                 }

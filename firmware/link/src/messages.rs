@@ -2,8 +2,9 @@
 
 use hums_core::time::Instant;
 
-use crate::encode::{COMPONENT, Severity, TEXT_BYTES_MAX};
+use crate::encode::COMPONENT;
 use crate::packet::Packet;
+use crate::text::{Severity, TEXT_BYTES_MAX};
 
 /// `MAV_TYPE_ONBOARD_CONTROLLER`
 const TYPE: u8 = 18;
@@ -95,7 +96,7 @@ pub const fn concerns_us(target: (u8, u8), system: u8) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::frame::{Check, Frame};
 
     /// That the layouts are right is pymavlink's to say, in the end to end tests; here that they fit their messages.
@@ -117,7 +118,7 @@ mod tests {
             log_data(1, 0, &[1; 100]),
             file_transfer(255, 190, &[1; 300]),
         ];
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         for packet in packets {
             let message = hums_dialect::message(packet.id()).expect("a message of the dialect");
             assert!(packet.payload().len() <= usize::from(message.len_max), "{}", packet.id());

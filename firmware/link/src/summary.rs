@@ -16,10 +16,10 @@ use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 
-use crate::encode::{Severity, Text};
 use crate::frame::Frame;
 use crate::messages;
 use crate::outlet::{Class, Outlet};
+use crate::text::{Severity, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
@@ -407,7 +407,7 @@ pub fn text(finding: &Finding) -> Text {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::packet::Packet;
 
     const VEHICLE: Source = Source { system: 1, component: 1 };
@@ -434,7 +434,7 @@ mod tests {
 
     /// A frame of the vehicle, `bytes` long.
     fn frame(id: u32, bytes: usize) -> Vec<u8> {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let packet = Packet::new(id).bytes(0, &vec![1; bytes - 12]);
         let mut frame = Encoder::new().frame(&mut buffer, &packet).to_vec();
         frame[6] = 1;

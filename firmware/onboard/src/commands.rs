@@ -17,11 +17,11 @@ use hums_core::Monitor;
 use hums_core::health::{self, Level};
 use hums_core::params::TABLE;
 use hums_core::time::Instant;
-use hums_link::encode::{Severity, Text};
 use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::request::{Port, Reply};
 use hums_link::summary;
+use hums_link::text::{Severity, Text};
 use hums_recorder::CardState;
 
 use crate::monitoring::{Identity, Monitoring};

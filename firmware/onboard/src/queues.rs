@@ -14,6 +14,7 @@ use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use heapless::spsc;
 use hums_blackbox::{ENTRY_SECTORS_MAX, Header, SECTOR_BYTES, Sector, SectorSink};
+pub use hums_link::encode::FRAME_BYTES_MAX;
 use hums_link::{outlet, summary};
 
 use crate::shelf::{Reader, Server, Shelf};
@@ -23,7 +24,7 @@ use crate::shelf::{Reader, Server, Shelf};
 pub const FRAME_QUEUE_BYTES: usize = 2 * 1024;
 
 /// What the port's outlet lets wait, findings and all, and the end of the queue that the longest frame does not fit into.
-pub const GS_QUEUE_BYTES: usize = (summary::WAITING_BYTES + outlet::FINDINGS) as usize + GS_FRAME_BYTES_MAX;
+pub const GS_QUEUE_BYTES: usize = (summary::WAITING_BYTES + outlet::FINDINGS) as usize + FRAME_BYTES_MAX;
 
 /// 0.17 s of a radio at 57,600 baud: the monitor looks at least every 50 ms. Three of the longest frames.
 pub const UPLINK_QUEUE_BYTES: usize = 1024;
@@ -409,7 +410,7 @@ pub type AutopilotOut<'a> = PortOut<'a, AUTOPILOT_QUEUE_BYTES>;
 
 impl<const BYTES: usize> PortOut<'_, BYTES> {
     /// Copies the oldest frame into `out` and takes it out of the queue; its length, or `None` when there is none.
-    pub fn take(&mut self, out: &mut [u8; GS_FRAME_BYTES_MAX]) -> Option<usize> {
+    pub fn take(&mut self, out: &mut [u8; FRAME_BYTES_MAX]) -> Option<usize> {
         let grant = self.0.read().ok()?;
         let len = grant.len().min(out.len());
         out[..len].copy_from_slice(&grant[..len]);
@@ -418,9 +419,6 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         Some(len)
     }
 }
-
-/// The longest frame: MAVLink 2, signed.
-pub const GS_FRAME_BYTES_MAX: usize = 280;
 
 #[cfg(test)]
 mod tests {
@@ -449,7 +447,7 @@ mod tests {
     fn how_full_a_queue_was_is_remembered_when_it_is_empty_again() {
         let mut queues = Box::new(Queues::new());
         let mut ends = queues.split();
-        let mut out = [0; GS_FRAME_BYTES_MAX];
+        let mut out = [0; FRAME_BYTES_MAX];
         for frames in [3, 1] {
             for _ in 0..frames {
                 ends.frames_in.put(0, true, &[1; 50]);
@@ -483,7 +481,7 @@ mod tests {
         }
         assert_eq!(ends.gs_in.frames() + ends.gs_in.lost(), 100);
         assert!(ends.gs_in.lost() > 0);
-        let mut out = [0; GS_FRAME_BYTES_MAX];
+        let mut out = [0; FRAME_BYTES_MAX];
         assert_eq!(ends.gs_out.take(&mut out), Some(100));
     }
 }

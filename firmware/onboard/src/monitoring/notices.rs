@@ -4,9 +4,9 @@
 use hums_blackbox::record::{Note, Record};
 use hums_core::protect::Step;
 use hums_core::time::{Instant, Span};
-use hums_link::encode::{Severity, Text};
 use hums_link::messages;
 use hums_link::outlet::Class;
+use hums_link::text::{Severity, Text};
 
 use super::Monitoring;
 use crate::queues::{GsIn, SectorsIn};
