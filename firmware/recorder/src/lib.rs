@@ -20,6 +20,7 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod card;
+mod card_error;
 pub mod chain;
 pub mod format;
 pub mod gate;
@@ -27,6 +28,7 @@ pub mod layout;
 pub mod name;
 pub mod recorder;
 mod ring;
+mod room;
 pub mod spi;
 pub mod status;
 
