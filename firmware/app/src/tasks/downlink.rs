@@ -8,7 +8,8 @@ use hums_onboard::Task;
 use hums_onboard::queues::{AutopilotOut, FRAME_BYTES_MAX, GsOut};
 
 use super::SUPERVISOR;
-use crate::boards::{Transmit, board};
+use crate::boards::board;
+use crate::boards::machine::Transmit;
 use crate::links::{self, now};
 
 /// How often it reports in while there is nothing to send.
