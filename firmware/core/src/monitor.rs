@@ -450,9 +450,9 @@ impl Monitor {
         self.happenings.take()
     }
 
-    /// Happenings that nobody took in time.
-    pub const fn happenings_lost(&self) -> u16 {
-        self.happenings.lost()
+    /// How many happenings found no place since this was asked last.
+    pub const fn take_happenings_lost(&mut self) -> u16 {
+        self.happenings.take_lost()
     }
 
     /// Half of a snapshot of what went on around a critical finding, each once.
@@ -473,14 +473,6 @@ impl Monitor {
     /// Quantities of steady flight.
     pub const fn trends(&self) -> &Trends {
         &self.trends
-    }
-
-    /// What the operator calls a component, and its serial number, without replacing it.
-    pub fn name_component(&mut self, place: usize, name: Label, serial: Label) -> bool {
-        let Some(component) = self.components.get_mut(place) else { return false };
-        (component.name, component.serial) = (name, serial);
-        self.saving.hurry(ItemKey::Component(place as u8));
-        true
     }
 
     /// What was normal for the old part is not for the new one.

@@ -10,7 +10,7 @@
 //!
 //! # Frames of definitions that we do not have
 //! They must be recorded and passed on, yet line noise must not. For each checksum that does not fit we compute which
-//! `crc_extra` would make it fit ([`crc::extra_of`]; 1 in 256 of random bytes has one), and let the candidate through
+//! `crc_extra` would make it fit ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one), and let the candidate through
 //! as [`Check::Unverified`] if that extra is the one that this system used for this id before, or, at first sight, if
 //! it stands between frames: a frame (a damaged one, silence) before it, a start byte (or silence) after it, and no whole frame of
 //! a known definition inside. Without a frame before it, its extra is only remembered, and the next one comes through.
@@ -18,7 +18,7 @@
 //!
 //! # Limits
 //! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy, one
-//! step of the checksum; candidates that are not trusted may cost no more than [`CREDIT_PER_BYTE`] such steps for each
+//! step of the checksum; candidates that are not trusted may cost no more than four such steps for each
 //! byte received, so that no input can starve the other tasks.
 
 use hums_dialect::crc;

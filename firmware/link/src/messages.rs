@@ -52,7 +52,7 @@ pub fn command_long(command: u16, params: &[f32], system: u8, component: u8) -> 
 }
 
 /// `REQUEST_DATA_STREAM`: all messages of a group at `rate_hz`.
-pub fn request_data_stream(stream: u8, rate_hz: u16, system: u8, component: u8) -> Packet {
+pub(crate) fn request_data_stream(stream: u8, rate_hz: u16, system: u8, component: u8) -> Packet {
     Packet::new(66).u16(0, rate_hz).u8(2, system).u8(3, component).u8(4, stream).u8(5, 1)
 }
 

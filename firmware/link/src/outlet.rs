@@ -207,7 +207,7 @@ impl Outlet {
     }
 
     /// The same, where `more` bytes shall find room in the same second.
-    pub fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
+    pub(crate) fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
         let start = self.free_at.max(now);
         let busy = start.since(now);
         // A fast line would let more wait than the queue holds.

@@ -5,7 +5,7 @@
 //! All of it goes through an [`Outlet`], which keeps the byte budget and lets findings overtake. What repeats takes
 //! turns: a message may go when its interval is nearly over, and how long it has waited, in intervals, is its score.
 //! Where the budget does not carry them all, a frame goes only if the one with the highest score would still find room
-//! after it; so each becomes the highest in time, and nothing starves. One that has waited [`STARVED`] times its interval
+//! after it; so each becomes the highest in time, and nothing starves. One that has waited four times its interval
 //! goes like a heartbeat.
 
 use hums_core::Monitor;

@@ -221,7 +221,7 @@ pub struct SectorsIn<'a> {
 
 impl SectorsIn<'_> {
     /// Lets what follows use the reserve as well: for records.
-    pub fn with_reserve<R>(&mut self, write: impl FnOnce(&mut Self) -> R) -> R {
+    pub(crate) fn with_reserve<R>(&mut self, write: impl FnOnce(&mut Self) -> R) -> R {
         let reserve = core::mem::replace(&mut self.reserve, 0);
         let result = write(self);
         self.reserve = reserve;
@@ -266,7 +266,7 @@ impl SectorsOut<'_> {
     }
 
     /// Takes the oldest sector out.
-    pub fn drop_oldest(&mut self) {
+    pub(crate) fn drop_oldest(&mut self) {
         let _ = self.0.dequeue();
     }
 

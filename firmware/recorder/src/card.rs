@@ -103,7 +103,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     }
 
     /// Gives the device back.
-    pub fn unmount(self) -> Option<D> {
+    pub(crate) fn unmount(self) -> Option<D> {
         self.manager.map(|manager| manager.free().0.into_device())
     }
 
@@ -153,7 +153,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     }
 
     /// Whether [`CardError::Full`] means that only a part of the card was searched: to try again searches more of it.
-    pub const fn may_have_room(&self) -> bool {
+    pub(crate) const fn may_have_room(&self) -> bool {
         self.room.may_have_more()
     }
 
@@ -338,7 +338,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
 
     /// Counts a little further how much of the card logs can have, one block of the FAT at a call; the share in
     /// thousandths once all of it is counted.
-    pub fn count_room(&mut self) -> Result<Option<u32>, CardError<D::Error>> {
+    pub(crate) fn count_room(&mut self) -> Result<Option<u32>, CardError<D::Error>> {
         let mut room = self.room;
         let counted = self.manager()?.device(|gate| room.count(gate));
         self.room = room;

@@ -1,7 +1,7 @@
 //! The boards: what the app needs of a machine, and one file a board that provides it.
 //!
 //! Nothing above this module knows which board it runs on; what a board is made of is in [`machine`]. A feature of this crate chooses it: `board-f405` and `board-f429`
-//! real ones, which share [`stm32f4`], `board-emulated` QEMU's `netduinoplus2`. A board is a file here and one for the
+//! real ones, which share `stm32f4`, `board-emulated` QEMU's `netduinoplus2`. A board is a file here and one for the
 //! linker beside it, which names its memories (`f405.x`). A board module has
 //!
 //! | name | what |

@@ -1,7 +1,7 @@
 //! What happened, into the record: take-off and landing, phases of flight, snapshots around critical findings, the
 //! protective action.
 
-use hums_blackbox::record::{Event, Moment, Protection, Record, Snapshot, SnapshotValues};
+use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Snapshot, SnapshotValues};
 use hums_core::happening::Happening;
 use hums_core::time::Instant;
 
@@ -42,6 +42,7 @@ pub(super) fn record(
         }
     }
     let Logbook { monitor, journal, .. } = book;
+    journal.lose(now, Lost::Records, u64::from(monitor.take_happenings_lost()));
     while let Some(snapshot) = monitor.take_snapshot(now) {
         let mut values = SnapshotValues::default();
         journal.record(now, &Record::Snapshot(Snapshot::new(&snapshot, &mut values)), sectors);

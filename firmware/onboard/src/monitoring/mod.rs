@@ -44,8 +44,6 @@ const USAGE: Span = Span::from_secs(60);
 
 /// The `MAV_SEVERITY` of a restart after a fault.
 const FAULT_SEVERITY: u8 = 4;
-/// Frames of the ground station that one tick looks at: a flood waits in its queue, and is lost there.
-const UPLINK_FRAMES_A_TICK: u32 = 16;
 
 /// What happens to a frame, one after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -217,21 +215,6 @@ impl<'a> Monitoring<'a> {
             }
             companion.answer(now, book.monitor, identity, summary, gs);
         })
-    }
-
-    /// Takes what the ground station sent since the last tick, as much of it as one tick should.
-    pub fn uplink_some(
-        &mut self,
-        now: Instant,
-        uplink: &mut UplinkOut,
-        sectors: &mut SectorsIn,
-        gs: &mut GsIn,
-    ) {
-        for _ in 0..UPLINK_FRAMES_A_TICK {
-            if !self.uplink(now, uplink, sectors, gs) {
-                break;
-            }
-        }
     }
 
     /// What time alone asks for, every [`TICK`]. Each finding is recorded, told to the GS, and given to `findings`.

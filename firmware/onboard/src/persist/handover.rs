@@ -107,7 +107,7 @@ impl<'a> Handover<'a> {
     }
 
     /// How often the store was found unreadable since power-on, and made anew: what is in it has to be put again.
-    pub fn remade(&self) -> u32 {
+    pub(crate) fn remade(&self) -> u32 {
         self.status.read().remade
     }
 
