@@ -52,8 +52,10 @@ pub fn update(crc: u16, bytes: &[u8]) -> u16 {
     let [last, third, second, first] = &TABLES;
     let (words, rest) = bytes.as_chunks();
     let crc = words.iter().fold(crc, |crc, word| {
-        let [a, b, c, d] = (u32::from(crc) ^ u32::from_le_bytes(*word)).to_le_bytes().map(usize::from);
-        first[a] ^ second[b] ^ third[c] ^ last[d]
+        // By shifts: where the compiler minds the size, an array of the bytes becomes a loop.
+        let four = u32::from(crc) ^ u32::from_le_bytes(*word);
+        let at = |shift: u32| usize::from((four >> shift) as u8);
+        first[at(0)] ^ second[at(8)] ^ third[at(16)] ^ last[at(24)]
     });
     rest.iter().fold(crc, |crc, byte| step(crc, *byte))
 }
