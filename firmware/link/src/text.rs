@@ -3,7 +3,7 @@
 use core::fmt::{self, Write as _};
 
 /// Bytes of text in one message.
-pub const TEXT_BYTES_MAX: usize = 50;
+pub use hums_core::protect::TEXT_BYTES_MAX;
 
 /// How urgent a text is (`MAV_SEVERITY`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

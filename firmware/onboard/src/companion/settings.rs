@@ -88,7 +88,7 @@ impl Settings {
             State::Reading(offset) => {
                 self.read_on(now, offset, library, book, sectors, shelf);
                 if self.state == State::Done && self.refused > 0 {
-                    let text = "HUMS: PARAMS.TXT has lines that are refused";
+                    let text = "HUMS: PARAMS.TXT: lines refused, correct them";
                     notices.note(now, 4, text, &mut book.journal, sectors);
                 }
             }

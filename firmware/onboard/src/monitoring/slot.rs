@@ -54,31 +54,33 @@ impl Slot {
     }
 }
 
-/// At most 50 characters: one STATUSTEXT. `docs/cards.md` says what to do.
+/// One STATUSTEXT each. `docs/cards.md` says what to do.
 const fn words(state: CardState) -> Option<&'static str> {
     Some(match state {
         CardState::Unknown | CardState::Finished => return None,
         CardState::Recording => "HUMS: card: recording",
-        CardState::Absent => "HUMS: card: none found",
+        CardState::Absent => "HUMS: card: none found, push one in",
         CardState::Foreign => "HUMS: card: not FAT32, format it",
         CardState::ExFat => "HUMS: card: exFAT, format it as FAT32",
         CardState::Unpartitioned => "HUMS: card: no partition table, format it",
         CardState::Damaged => "HUMS: card: FAT32 is damaged, copy and format it",
         CardState::Full => "HUMS: card: full of other files, delete some",
         CardState::Failing => "HUMS: card: fails, use another one",
-        CardState::Locked => "HUMS: card: write protected",
+        CardState::Locked => "HUMS: card: write protected, use another one",
         CardState::Formatting => "HUMS: card: is being formatted",
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use hums_link::text::TEXT_BYTES_MAX;
+
     use super::*;
 
     #[test]
     fn every_text_is_one_message() {
         for text in (0..=u8::MAX).filter_map(|number| words(CardState::from_number(number))) {
-            assert!(text.len() <= 50 && text.starts_with("HUMS: card: "), "{text}");
+            assert!(text.len() <= TEXT_BYTES_MAX && text.starts_with("HUMS: card: "), "{text}");
         }
     }
 }
