@@ -12,10 +12,12 @@
 
 mod boards;
 mod costs;
+mod exceptions;
 mod executors;
 mod fault;
 mod links;
 mod memory;
+mod registers;
 mod report;
 mod tasks;
 mod trap;
@@ -30,7 +32,8 @@ use hums_onboard::queues::{Ends, Queues};
 use hums_onboard::{Handover, Keeper, Monitoring};
 use static_cell::{ConstStaticCell, StaticCell};
 
-use boards::{ResetCause, board};
+use boards::board;
+use boards::machine::ResetCause;
 use tasks::monitor;
 
 static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());

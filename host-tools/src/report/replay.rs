@@ -452,7 +452,7 @@ impl Collect for Told {
     fn entry(&mut self, entry: &Entry<'_>) {
         let Entry::Frame { at, bytes, verified: true, .. } = *entry else { return };
         let Some(frame) = Frame::again(bytes, Check::Verified) else { return };
-        let source = Source { system: frame.system(), component: frame.component() };
+        let source = frame.source();
         self.signs.push(Sign { at, source, sequence: frame.sequence() });
         if frame.id() == STATUSTEXT {
             self.texts.extend(text(at, source, frame.payload()));

@@ -14,8 +14,9 @@ use static_cell::{ConstStaticCell, StaticCell};
 use super::{CARD_STATUS, SUPERVISOR};
 
 use crate::boards::board;
-use crate::costs::{Stage, measure};
+use crate::costs::measure;
 use crate::links::{self, now};
+use crate::report::Stage;
 
 /// How often it reports in while there is nothing to write.
 const REPORT: Duration = Duration::from_secs(1);

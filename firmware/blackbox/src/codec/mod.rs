@@ -14,6 +14,8 @@ mod slots;
 mod text;
 mod texts;
 
+use hums_dialect::crc;
+
 use body::Body;
 pub(crate) use frame::Frame;
 use header::{Headers, REPEATED};
@@ -23,14 +25,7 @@ use slots::{INSTANCE_BYTES, Key, Length, Next, Slots};
 use crate::coder::{Coder, Decoder, Encoder, Reading, Scratch, Writing};
 use crate::distribution::Cdf;
 use crate::layouts::Layouts;
-use crate::record::RECORD_BYTES_MAX;
-
-/// The longest frame: a MAVLink 2 header, 255 bytes of payload, checksum and signature.
-pub const FRAME_BYTES_MAX: usize = 10 + 255 + 2 + 13;
-
-/// The longest entry.
-pub(crate) const ENTRY_BYTES_MAX: usize =
-    if FRAME_BYTES_MAX > RECORD_BYTES_MAX { FRAME_BYTES_MAX } else { RECORD_BYTES_MAX };
+use crate::limits::ENTRY_BYTES_MAX;
 
 /// What the coder may make of an entry at most, bytes. An entry that would become longer starts a new group, where
 /// its bytes go out as they are: with length and time that is `ENTRY_BYTES_MAX` and 20 more.
@@ -287,7 +282,7 @@ impl Model {
                 };
             }
             frame.checksum =
-                plan.checksum.unwrap_or_else(|| frame::crc_add(frame.checksum_before_seed(), slot.seed));
+                plan.checksum.unwrap_or_else(|| crc::step(frame.checksum_before_seed(), slot.seed));
         }
         if frame.signed() {
             self.headers.signature(coder, sender, frame)?;
