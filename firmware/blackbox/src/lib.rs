@@ -27,7 +27,7 @@ mod writer;
 
 pub use assemble::{Assembler, BlockCounts, Step};
 pub use codec::FRAME_BYTES_MAX;
-pub use group::{Entry, GroupDecoder, GroupError};
+pub use group::{Entry, GroupDecoder, GroupError, Outline};
 pub use preamble::Preamble;
 pub use reader::{Cause, Gap, Item, LogReader, Summary};
 pub use record::Record;

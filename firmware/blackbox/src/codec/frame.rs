@@ -60,10 +60,9 @@ impl Frame {
         self.v2 && self.incompat & SIGNED != 0
     }
 
-    /// Nothing in it, as a frame to be read begins.
+    /// Nothing in the payload, as a frame to be read begins.
     pub(crate) fn clear(&mut self) {
         self.clear_payload(0);
-        self.len = 0;
     }
 
     /// Keeps `len` bytes of the payload; clears what a frame before left beyond.
@@ -112,8 +111,17 @@ impl Frame {
         Some(())
     }
 
-    /// Puts the frame together; gives its length.
-    pub(crate) fn assemble(&self, out: &mut [u8; ENTRY_BYTES_MAX]) -> usize {
+    /// Its length when put together.
+    pub(crate) fn bytes(&self) -> usize {
+        let head = if self.v2 { 10 } else { 6 };
+        head + self.len.min(PAYLOAD_BYTES_MAX) + 2 + if self.signed() { SIGNATURE_BYTES } else { 0 }
+    }
+
+    /// Puts a frame together that was read, with the checksum that this seed makes, or with its own.
+    pub(crate) fn assemble(&mut self, seed: Option<u8>, out: &mut [u8; ENTRY_BYTES_MAX]) {
+        if let Some(seed) = seed {
+            self.checksum = crc_add(self.checksum_before_seed(), seed);
+        }
         let head = self.head();
         let head = &head[..if self.v2 { 10 } else { 6 }];
         let payload = &self.payload[..self.len.min(PAYLOAD_BYTES_MAX)];
@@ -123,7 +131,15 @@ impl Frame {
             out[at..at + part.len()].copy_from_slice(part);
             at += part.len();
         }
-        at
+    }
+
+    /// The message id as its head has it, if anyone knows what a frame with its flags means.
+    pub(crate) fn known_id(&self) -> Option<u32> {
+        match (self.v2, self.incompat) {
+            (false, _) => Some(self.id & 0xff),
+            (true, 0 | SIGNED) => Some(self.id & 0x00ff_ffff),
+            _ => None,
+        }
     }
 
     fn head(&self) -> [u8; 10] {
@@ -155,10 +171,23 @@ impl Frame {
         }
     }
 
-    /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it.
+    /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it. Of a frame that
+    /// is read: there are only zeros beyond `full`.
     pub(crate) fn trimmed(&self, full: usize) -> usize {
-        let payload = &self.payload[..full.min(PAYLOAD_BYTES_MAX)];
-        payload.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1)
+        let words = self.payload.as_chunks().0;
+        let words = words.get(..full.div_ceil(size_of::<u64>())).unwrap_or_default();
+        for (index, word) in words.iter().enumerate().rev() {
+            let word = u64::from_le_bytes(*word);
+            if word != 0 {
+                return (index + 1) * size_of::<u64>() - word.leading_zeros() as usize / 8;
+            }
+        }
+        1
+    }
+
+    /// Of a frame that was read: bytes of the payload that may not be zero.
+    pub(crate) fn fill_ends(&mut self, at: usize) {
+        self.used = (at + size_of::<u64>()).min(self.payload.len());
     }
 }
 
@@ -235,9 +264,12 @@ mod tests {
         frame.parse(&heartbeat).expect("a frame");
         assert_eq!(crc_add(frame.checksum_before_seed(), 50), frame.checksum);
         assert_eq!(seed_for(frame.checksum_before_seed(), frame.checksum), Some(50));
-        let mut out = [0; ENTRY_BYTES_MAX];
-        let len = frame.assemble(&mut out);
-        assert_eq!(&out[..len], heartbeat);
+        for seed in [None, Some(50)] {
+            let mut out = [0; ENTRY_BYTES_MAX];
+            frame.assemble(seed, &mut out);
+            assert_eq!(&out[..frame.bytes()], heartbeat);
+            frame.checksum = 0;
+        }
         assert!(frame.parse(&heartbeat[..16]).is_none());
         assert!(frame.parse(&[0xfd; 12]).is_none());
     }
