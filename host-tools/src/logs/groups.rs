@@ -43,7 +43,9 @@ impl<'a> Groups<'a> {
             let full = self.group.len() >= GROUP_SECTORS;
             let broken = step.missing > 0 || self.group.last().is_some_and(|last| last.header.partial);
             if !self.group.is_empty() && (step.header.starts_group() || broken || full) {
-                return Ok(Some(std::mem::replace(&mut self.group, vec![step])));
+                let mut next = Vec::with_capacity(GROUP_SECTORS);
+                next.push(step);
+                return Ok(Some(std::mem::replace(&mut self.group, next)));
             }
             self.group.push(step);
         }
