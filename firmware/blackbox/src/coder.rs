@@ -6,7 +6,6 @@
 //! *State:* the interval `[low, low + range)` of 32-bit numbers that begin with what has not been given out yet.
 //! After each step `range >= 2^16`, so a symbol may have a probability down to 2^-16.
 
-use crate::codec::Recall;
 use crate::distribution::{Cdf, PROBABILITY_BITS};
 
 /// A top byte is settled when both ends of the interval share it.
@@ -125,12 +124,6 @@ pub(crate) trait Coder {
     /// A bit that is one with probability `one` of 2^12, 1 to 4095.
     fn bit(&mut self, one: u32, bit: bool) -> bool;
 
-    /// The reading end, where it is that: it may remember more than both ends must.
-    #[inline]
-    fn reading(&mut self) -> Option<Reading<'_>> {
-        None
-    }
-
     /// A number of up to 32 bits, each as likely as any.
     #[inline]
     fn bits(&mut self, value: u32, bits: u32) -> u32 {
@@ -175,14 +168,14 @@ impl<const N: usize> Coder for Writing<'_, N> {
     }
 }
 
-/// The reading end of the coder.
-pub(crate) struct Reading<'a> {
+/// The reading end of the coder, and what its user remembers beyond what both ends must.
+pub(crate) struct Reading<'a, R> {
     pub(crate) decoder: &'a mut Decoder,
     pub(crate) input: &'a [u8],
-    pub(crate) recall: &'a mut Recall,
+    pub(crate) recall: &'a mut R,
 }
 
-impl Coder for Reading<'_> {
+impl<R> Coder for Reading<'_, R> {
     const WRITES: bool = false;
 
     #[expect(clippy::inline_always, reason = "the reader's hottest path: a call more costs a tenth of it")]
@@ -192,11 +185,6 @@ impl Coder for Reading<'_> {
         let (symbol, start, size) = cdf.read(width, offset);
         self.decoder.take(start, size, self.input);
         symbol
-    }
-
-    #[inline]
-    fn reading(&mut self) -> Option<Reading<'_>> {
-        Some(Reading { decoder: self.decoder, input: self.input, recall: self.recall })
     }
 
     #[inline]
@@ -211,7 +199,7 @@ impl Coder for Reading<'_> {
 
     #[inline]
     fn bit(&mut self, one: u32, _: bool) -> bool {
-        let bit = self.decoder.part(12) < one;
+        let bit = self.decoder.is_below(one, 12);
         let (start, size) = if bit { (0, one) } else { (one, 4_096 - one) };
         self.decoder.take(start, size, self.input);
         bit
@@ -238,6 +226,13 @@ impl Decoder {
     pub(crate) fn part(&mut self, bits: u32) -> u32 {
         self.range >>= bits;
         (self.offset / self.range).min((1 << bits) - 1)
+    }
+
+    /// Whether what comes next is one of the first so many of the `1 << bits` parts: `part` without dividing.
+    #[inline]
+    pub(crate) fn is_below(&mut self, parts: u32, bits: u32) -> bool {
+        self.range >>= bits;
+        self.offset < self.range.wrapping_mul(parts)
     }
 
     /// How wide each of the `2^16` parts is, and how far into all of them the next one lies: what `part` divides, for
@@ -331,7 +326,7 @@ mod tests {
             bytes.extend_from_slice(&end[..len]);
             let mut cdf = Cdf::FLAT;
             let mut decoder = Decoder::new(&bytes, 0);
-            let mut reading = Reading { decoder: &mut decoder, input: &bytes, recall: &mut Recall::new() };
+            let mut reading = Reading { decoder: &mut decoder, input: &bytes, recall: &mut () };
             for index in 0..count {
                 assert_eq!(reading.symbol(&mut cdf, 0), (value(index) >> 28) as usize);
                 let bits = index % 33;

@@ -1,6 +1,5 @@
 //! What the coder's probabilities are learned in: distributions over 16 symbols, and cells for single bits.
 
-#[cfg(target_arch = "x86_64")]
 mod at_once;
 
 /// Symbols of a distribution.
@@ -103,28 +102,6 @@ impl Cdf {
         let end = if symbol == SYMBOLS - 1 { 1 << PROBABILITY_BITS } else { u32::from(self.0[symbol]) };
         let start = if symbol == 0 { 0 } else { u32::from(self.0[symbol - 1]) };
         (start, end - start)
-    }
-
-    /// The symbol that holds a place among parts of this width, with where it begins and its size: what the reader
-    /// needs, who learns the symbol only here. Moves towards it as `adapt` does.
-    #[inline]
-    pub(crate) fn read(&mut self, width: u16, offset: u32) -> (usize, u32, u32) {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: SSE2 is part of x86-64.
-        unsafe {
-            at_once::read(&mut self.0, width, offset)
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        {
-            let part = (offset / u32::from(width)).min(u32::from(u16::MAX));
-            let mut symbol = 0;
-            for step in [8, 4, 2, 1] {
-                symbol += if u32::from(self.0[symbol + step - 1]) <= part { step } else { 0 };
-            }
-            let (start, size) = self.part_of(symbol);
-            self.adapt(symbol);
-            (symbol, start, size)
-        }
     }
 
     /// Moves towards a symbol (modulo 16).
@@ -237,36 +214,6 @@ mod tests {
             cdf.adapt(symbol);
             assert_eq!(cdf.0, expected, "round {round}");
             assert!((0..SYMBOLS).all(|symbol| cdf.part_of(symbol).1 >= 1), "round {round}");
-        }
-    }
-
-    #[test]
-    fn what_is_read_is_the_symbol_that_owns_the_place_and_adapts_as_in_writing() {
-        let (mut read, mut written) = (Cdf::FLAT, Cdf::FLAT);
-        let mut state = 7_u32;
-        for round in 0..20_000 {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let symbol = match round % 1_000 {
-                0..500 => 0,
-                500..700 => 15,
-                _ => (state >> 20) as usize % 16,
-            };
-            let (start, size) = written.part_of(symbol);
-            // The narrowest and the widest parts, and their first and last places.
-            let width = [1, 0x100, u16::MAX, (state >> 8) as u16 | 1][round % 4];
-            let (first, last) = (start * u32::from(width), (start + size) * u32::from(width) - 1);
-            let offset = [first, last][round / 4 % 2];
-            assert_eq!(read.read(width, offset), (symbol, start, size), "round {round}");
-            written.adapt(symbol);
-            assert_eq!(read.0, written.0, "round {round}");
-        }
-    }
-
-    #[test]
-    fn what_lies_beyond_all_parts_is_the_last_symbol() {
-        let mut cdf = Cdf::FLAT;
-        for offset in [0xffff_ffff, 0x0001_0000] {
-            assert_eq!(cdf.read(1, offset).0, SYMBOLS - 1);
         }
     }
 }

@@ -88,6 +88,8 @@ pub struct GroupDecoder {
     due: u32,
     frames: u32,
     preamble: Preamble,
+    /// The table of the group before, and its hash.
+    layouts: Option<(u32, Layouts)>,
     entry: [u8; ENTRY_BYTES_MAX],
     decoded: Decoded,
     /// The decoded frame among the last ones, where it is not put together yet.
@@ -115,6 +117,7 @@ impl GroupDecoder {
             due: 0,
             frames: 0,
             preamble: Preamble::default(),
+            layouts: None,
             entry: [0; ENTRY_BYTES_MAX],
             decoded: Decoded { kind: Kind::Record, at_ms: 0, len: 0 },
             apart: None,
@@ -145,7 +148,12 @@ impl GroupDecoder {
         let body = sector.body().get(..header.body_bytes).unwrap_or_default();
         self.preamble = Preamble::read(body).ok_or(GroupError::Corrupt)?;
         let hash = self.preamble.layouts;
-        let layouts = Layouts::by_hash(hash).ok_or(GroupError::UnknownLayouts(hash))?;
+        // Nearly all groups have the table of the one before, and to make its hash takes as long as a sector.
+        let layouts = match self.layouts {
+            Some((known, layouts)) if known == hash => layouts,
+            _ => Layouts::by_hash(hash).ok_or(GroupError::UnknownLayouts(hash))?,
+        };
+        self.layouts = Some((hash, layouts));
         self.model.reset(self.preamble.start_ms, layouts);
         self.recall.reset();
         self.fill(header, sector);

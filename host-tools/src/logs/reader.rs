@@ -7,7 +7,9 @@ use std::sync::mpsc;
 
 use anyhow::Result;
 use hums_blackbox::record::Keep;
-use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
+use hums_blackbox::{
+    BlockCounts, Cause, Entry, GROUP_SECTORS, Gap, GroupDecoder, GroupError, Outline, Record, SECTOR_BYTES,
+};
 use hums_core::time::Instant;
 
 use super::groups::{Group, Groups};
@@ -16,6 +18,9 @@ use super::places::Log;
 /// Groups in work for each thread, and at most: each becomes up to some megabytes of text.
 const GROUPS_PER_THREAD: usize = 2;
 const GROUPS_MAX: usize = 16;
+
+/// A whole group: what is shorter is decoded here.
+const GROUP_BYTES: u64 = (GROUP_SECTORS * SECTOR_BYTES) as u64;
 
 /// What one group's entries become; made in parallel, handed on in order.
 pub trait Collect: Send {
@@ -77,6 +82,10 @@ pub fn read<C: Collect>(
     deliver: &mut impl Deliver<C>,
     mut progress: impl FnMut(u64),
 ) -> Result<Summary> {
+    if log.bytes() > GROUP_BYTES && rayon::current_thread_index().is_none() {
+        // Its workers begin here: they are awake when the first groups are read.
+        rayon::current_num_threads();
+    }
     let mut groups = Groups::new(log);
     let mut stitch = Stitch::default();
     let (first, second) = (groups.next_group()?, groups.next_group()?);

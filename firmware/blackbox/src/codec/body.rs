@@ -5,7 +5,7 @@ use core::ops::Range;
 use super::element::{Context, Distributions, ELEMENTS, Element, Elements, What};
 use super::frame::Frame;
 use super::links::{LINKS, Link, REGISTERS};
-use super::recall::WORDS;
+use super::recall::{End, Recall, WORDS};
 use super::slots::{Length, Slot};
 use super::texts::Texts;
 use crate::coder::{Coder, Reading};
@@ -51,7 +51,7 @@ impl Body {
     }
 
     /// All of the payload.
-    pub(super) fn payload<C: Coder>(
+    pub(super) fn payload<C: End>(
         &mut self,
         coder: &mut C,
         slot: &mut Slot,
@@ -89,7 +89,7 @@ impl Body {
 
     /// The fields that the layout describes; gives where they end. `calm`: the quiet ones stay as they are.
     #[inline(never)]
-    fn fields<C: Coder>(
+    fn fields<C: End>(
         &mut self,
         coder: &mut C,
         slot: &mut Slot,
@@ -167,7 +167,7 @@ impl Body {
     #[inline(never)]
     fn lively(
         &mut self,
-        coder: &mut Reading<'_>,
+        coder: &mut Reading<'_, Recall>,
         slot: &mut Slot,
         frame: &mut Frame,
         elapsed_ms: u32,
@@ -285,7 +285,7 @@ impl Common {
     #[inline]
     fn element(
         &mut self,
-        coder: &mut Reading<'_>,
+        coder: &mut Reading<'_, Recall>,
         (element, rest): (&mut Element, &mut [Element]),
         (slot, frame): (&Slot, &mut Frame),
         offset: usize,

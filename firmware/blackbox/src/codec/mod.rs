@@ -18,6 +18,7 @@ mod texts;
 use body::Body;
 pub(crate) use frame::Frame;
 use header::{Headers, REPEATED};
+use recall::End;
 pub(crate) use recall::Recall;
 use records::Records;
 pub(crate) use slots::SLOTS;
@@ -143,7 +144,7 @@ impl Model {
     /// which of `frames` it is.
     pub(crate) fn decode(
         &mut self,
-        coder: &mut Reading<'_>,
+        coder: &mut Reading<'_, Recall>,
         frames: &mut [Frame; SLOTS],
         buffer: &mut [u8; ENTRY_BYTES_MAX],
     ) -> Result<(Decoded, Option<usize>), Corrupt> {
@@ -251,7 +252,7 @@ impl Model {
     }
 
     /// A frame of a slot. Gives whether it is verified, and its time.
-    fn frame<C: Coder>(
+    fn frame<C: End>(
         &mut self,
         coder: &mut C,
         (next, expected): (Next, bool),

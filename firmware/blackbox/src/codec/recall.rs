@@ -4,6 +4,7 @@
 
 use super::element::{ELEMENTS, Element, What};
 use super::slots::{SLOTS, Slot};
+use crate::coder::{Coder, Reading, Writing};
 
 /// Room for all slots: a power of two.
 const PLACES: usize = SLOTS.next_power_of_two();
@@ -100,5 +101,25 @@ impl Recall {
     #[inline]
     pub(super) fn offset(&self, slot: &Slot, index: usize) -> Option<usize> {
         self.offsets.get(usize::from(slot.elements) + index).map(|offset| usize::from(*offset))
+    }
+}
+
+/// One end of the coder, of which the reading one has its memory with it.
+pub(super) trait End: Coder {
+    /// The reading end, where it is that.
+    fn reading(&mut self) -> Option<Reading<'_, Recall>>;
+}
+
+impl<const N: usize> End for Writing<'_, N> {
+    #[inline]
+    fn reading(&mut self) -> Option<Reading<'_, Recall>> {
+        None
+    }
+}
+
+impl End for Reading<'_, Recall> {
+    #[inline]
+    fn reading(&mut self) -> Option<Reading<'_, Recall>> {
+        Some(Reading { decoder: self.decoder, input: self.input, recall: self.recall })
     }
 }
