@@ -12,10 +12,10 @@ use anyhow::{Context as _, Result, bail};
 use serde_json::Value;
 
 use crate::firmware::{self, Board};
+use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
-use crate::test::build_hums;
 
 /// How much smaller than the tlog a whole session is to be, as a geometric mean.
 const SMALLER_MIN: f64 = 6.5;
@@ -136,7 +136,7 @@ fn sizes(flights: &[PathBuf]) -> Result<()> {
 /// What whole sessions take: with every finding, snapshot, counter and statistic that the monitor makes of a recording.
 fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     println!("\nSizes of whole sessions, with all that the monitor records of them\n");
-    build_hums()?;
+    hums::build()?;
     let (card, packed) = (work_folder()?.join("card.img"), work_folder()?.join("flight.tlog.xz"));
     let (mut logs, mut xz_logs, mut count) = (0.0, 0.0, 0.0);
     println!("{:22} {:>9} {:>9} {:>9} {:>7} {:>7}", "recording", "tlog", "xz -9e", "session", "tlog/", "xz/");
@@ -144,7 +144,7 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
         let _ = fs::remove_file(&card);
         let sim = ["sim", "--json", "--speed", "max", "--input"];
         let (json, _) =
-            Shell::new(repo::hums()).args(sim).arg(flight).arg("--sd").arg(&card).output_and_code()?;
+            Shell::new(hums::program()).args(sim).arg(flight).arg("--sd").arg(&card).output_and_code()?;
         let report: Value = serde_json::from_str(&json).context("the report of hums sim")?;
         let bytes =
             report["bytes_logged"].as_f64().filter(|&bytes| bytes > 0.0).context("nothing was logged")?;
@@ -169,7 +169,7 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
 /// Decodes logs and unpacks the same tlogs, one after the other on one core, several times.
 fn speed(flights: &[PathBuf]) -> Result<()> {
     println!("\nSpeed of decoding to tlog, median of {ROUNDS} rounds\n");
-    build_hums()?;
+    hums::build()?;
     let folder = work_folder()?;
     println!(
         "{:22} {:>10} {:>10} {:>7}  {:>12} {:>6}",
@@ -180,7 +180,7 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         let (log, zipped) = (folder.join("flight.hum"), folder.join("flight.tlog.gz"));
         let tlog = folder.join("long.tlog");
         repeat(flight, DECODED_MIN, &tlog)?;
-        let done = Command::new(repo::hums()).arg("pack").arg(&tlog).arg("-o").arg(&log).output()?;
+        let done = Command::new(hums::program()).arg("pack").arg(&tlog).arg("-o").arg(&log).output()?;
         if !log.is_file() || !done.status.success() {
             bail!("hums pack {}: {}", flight.display(), String::from_utf8_lossy(&done.stderr));
         }
@@ -188,7 +188,7 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         gzip.context("gzip cannot be started")?;
         let bytes = fs::metadata(&tlog)?.len() as f64;
         let decode = |threads: Option<&str>| {
-            let mut command = on_one_core(repo::hums().as_os_str(), threads.is_some());
+            let mut command = on_one_core(hums::program().as_os_str(), threads.is_some());
             command.arg("decode").arg(&log).args(["--format", "tlog", "-o", "-"]);
             if let Some(threads) = threads {
                 command.env("RAYON_NUM_THREADS", threads);
@@ -297,11 +297,11 @@ fn cost(flights: &[PathBuf]) -> Result<()> {
 /// Runs a recording through the firmware in the emulator, which counts, back to back at the fastest line: its report.
 pub(crate) fn record_at_full_rate(flight: &Path) -> Result<Value> {
     let image = firmware::build(Board::Emulated)?;
-    build_hums()?;
+    hums::build()?;
     let (card, input) = (work_folder()?.join("card.img"), work_folder()?.join("long.tlog"));
     let _ = fs::remove_file(&card);
     repeat(flight, SECONDS_MIN * BYTES_PER_S, &input)?;
-    let (json, _) = Shell::new(repo::hums())
+    let (json, _) = Shell::new(hums::program())
         .args(["emulate", "--json", "--costs", "--firmware"])
         .arg(&image)
         .arg("--input")

@@ -8,10 +8,10 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail};
 
 use crate::firmware::{self, Board};
+use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
-use crate::test::build_hums;
 
 /// A quadcopter's flight with faults that the monitor finds: vibration, satellites lost, GPS jammed, a battery that sags.
 const FLIGHT: &str = "tests/flights/ap_quad_faults.tlog";
@@ -63,7 +63,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     if !emulated && !options.pc {
         eprintln!("\nNo emulator here (what to type is above): the same pipeline runs on this PC instead.\n");
     }
-    build_hums()?;
+    hums::build()?;
     let folder = repo::target().join("demo");
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
@@ -72,7 +72,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let built = start.elapsed();
 
     let (card, gs, figures) = (folder.join("card.img"), folder.join("gs.bin"), folder.join("run.json"));
-    let mut hums = Shell::new(repo::hums());
+    let mut hums = Shell::new(hums::program());
     if emulated {
         hums = hums.arg("emulate").arg("--firmware").arg(firmware::build(Board::Emulated)?);
     } else {
@@ -92,7 +92,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     decode(&card, &decoded)?;
 
     println!();
-    Shell::new(repo::hums()).arg("info").arg(&card).run()?;
+    Shell::new(hums::program()).arg("info").arg(&card).run()?;
     let run: serde_json::Value = serde_json::from_str(&json).context("what hums --json printed")?;
     println!();
     for (label, key) in [
@@ -124,14 +124,17 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     }
     if options.dashboard {
         println!("{:<30} until Ctrl-C, at", "the dashboard plays it");
-        return Shell::new(repo::hums()).args(["live", "--listen", "127.0.0.1:0", "--input"]).arg(card).run();
+        return Shell::new(hums::program())
+            .args(["live", "--listen", "127.0.0.1:0", "--input"])
+            .arg(card)
+            .run();
     }
     println!("{:<30} target/release/hums live --open --input {}", "the dashboard", repo::shown(&card));
     Ok(())
 }
 
 fn decode(card: &Path, to: &Path) -> Result<()> {
-    Shell::new(repo::hums()).arg("decode").arg(card).arg("-o").arg(to).args(["--format", "tlog,csv"]).run()
+    Shell::new(hums::program()).arg("decode").arg(card).arg("-o").arg(to).args(["--format", "tlog,csv"]).run()
 }
 
 #[cfg(test)]

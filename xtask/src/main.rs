@@ -13,12 +13,14 @@ mod dist;
 mod firmware;
 mod flash;
 mod fuzz;
+mod hums;
 mod image;
 mod oracle;
 mod prove;
 mod repo;
 mod setup;
 mod shell;
+mod structure;
 mod test;
 
 use std::process::ExitCode;
@@ -49,6 +51,7 @@ cargo xtask COMMAND
   size                           flash and RAM of all boards against budgets.toml
   costs                          instructions and stack, in the emulator, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
+  structure                      draw docs/modules.svg from the code, and count; a circle of imports is an error
   manifest                       make tests/flights/manifest.json anew with pymavlink
   help                           this text
 
@@ -87,6 +90,7 @@ enum Command {
     Size,
     Costs,
     Setup { dry_run: bool },
+    Structure,
     Manifest,
     Help,
 }
@@ -123,11 +127,12 @@ impl Command {
                 ["--dry-run"] => Ok(Self::Setup { dry_run: true }),
                 _ => bail!("setup takes nothing or --dry-run"),
             },
-            "size" | "costs" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
+            "size" | "costs" | "structure" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
                 bail!("{name} takes nothing")
             }
             "size" => Ok(Self::Size),
             "costs" => Ok(Self::Costs),
+            "structure" => Ok(Self::Structure),
             "manifest" => Ok(Self::Manifest),
             "help" | "--help" | "-h" => Ok(Self::Help),
             other => bail!("there is no command {other}"),
@@ -165,6 +170,7 @@ impl Command {
                 }
                 outcome.require_all()
             }
+            Self::Structure => structure::draw(),
             Self::Manifest => {
                 setup::ensure(&[Need::PythonVenv], false).require_all()?;
                 oracle::write_manifest()

@@ -16,11 +16,6 @@ pub(crate) fn target() -> PathBuf {
     chosen.map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
 
-/// The `hums` program.
-pub(crate) fn hums() -> PathBuf {
-    target().join("release/hums")
-}
-
 /// A path as a person would type it from the root.
 pub(crate) fn shown(path: &Path) -> String {
     path.strip_prefix(root()).unwrap_or(path).display().to_string()

@@ -6,14 +6,13 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::{env, fs};
 
 use anyhow::{Result, bail};
 
 use crate::apt::{self, Distribution, SourceFile};
 use crate::repo::FIRMWARE_TARGET;
-use crate::shell::Shell;
+use crate::shell::{Shell, is_root};
 
 /// The emulator's first version that has the STM32F405's 128 KiB of SRAM and its 64 KiB of CCM.
 const QEMU_MAJOR_MIN: u32 = 8;
@@ -38,10 +37,11 @@ pub(crate) enum Need {
     Influx,
     Victoria,
     Chromium,
+    Graphviz,
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 13] = [
         Self::Linker,
         Self::FirmwareTarget,
         Self::StaticTarget,
@@ -54,6 +54,7 @@ impl Need {
         Self::Influx,
         Self::Victoria,
         Self::Chromium,
+        Self::Graphviz,
     ];
 
     /// What it is and what it is for.
@@ -71,6 +72,7 @@ impl Need {
             Self::Influx => "influxdb, which takes the line protocol",
             Self::Victoria => "victoria-metrics, another database that takes the line protocol",
             Self::Chromium => "chromium and its driver, which look at the pages",
+            Self::Graphviz => "graphviz (dot), which draws the picture of the modules",
         }
     }
 
@@ -89,6 +91,7 @@ impl Need {
             Self::Influx => find_program("influxd").is_some(),
             Self::Victoria => find_program("victoria-metrics").is_some(),
             Self::Chromium => find_program("chromium").is_some() && find_program("chromedriver").is_some(),
+            Self::Graphviz => find_program("dot").is_some(),
         }
     }
 
@@ -114,6 +117,7 @@ impl Need {
             Self::Influx => &["influxdb"],
             Self::Victoria => &["victoria-metrics"],
             Self::Chromium => &["chromium", "chromium-driver", "fonts-dejavu-core"],
+            Self::Graphviz => &["graphviz"],
             Self::FirmwareTarget | Self::StaticTarget | Self::Rustfmt | Self::Clippy => &[],
         }
     }
@@ -308,11 +312,6 @@ fn find_program(name: &str) -> Option<PathBuf> {
     let path = env::var_os("PATH").unwrap_or_default();
     let system = ["/usr/sbin", "/sbin"].map(PathBuf::from);
     env::split_paths(&path).chain(system).map(|dir| dir.join(name)).find(|file| file.is_file())
-}
-
-pub(crate) fn is_root() -> bool {
-    static ROOT: OnceLock<bool> = OnceLock::new();
-    *ROOT.get_or_init(|| Shell::new("id").arg("-u").ask().is_some_and(|id| id.trim() == "0"))
 }
 
 fn may_be_root() -> bool {

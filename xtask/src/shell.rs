@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
 use anyhow::{Context as _, Result, bail};
 
@@ -30,7 +31,7 @@ impl Shell {
 
     /// As root: as it is for root, through `sudo -n` for anyone else.
     pub(crate) fn as_root(program: &str) -> Self {
-        if crate::setup::is_root() { Self::new(program) } else { Self::new("sudo").args(["-n", program]) }
+        if is_root() { Self::new(program) } else { Self::new("sudo").args(["-n", program]) }
     }
 
     /// In `folder`; elsewhere it is the root.
@@ -127,6 +128,11 @@ impl Shell {
         }
         Ok(())
     }
+}
+
+pub(crate) fn is_root() -> bool {
+    static ROOT: OnceLock<bool> = OnceLock::new();
+    *ROOT.get_or_init(|| Shell::new("id").arg("-u").ask().is_some_and(|id| id.trim() == "0"))
 }
 
 /// In single quotes where a shell would otherwise read it differently.

@@ -8,11 +8,13 @@ use crate::budgets;
 use crate::costs;
 use crate::demo;
 use crate::firmware::{self, Board};
+use crate::hums;
 use crate::oracle;
 use crate::prove;
-use crate::repo::{self, FIRMWARE_TARGET};
+use crate::repo::FIRMWARE_TARGET;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
+use crate::structure;
 
 /// One thing that is checked.
 struct Step {
@@ -23,8 +25,14 @@ struct Step {
 }
 
 /// In the order in which they fail soonest.
-const STEPS: [Step; 15] = [
+const STEPS: [Step; 16] = [
     Step { name: "fmt", about: "the formatting", needs: &[Need::Rustfmt], run: fmt },
+    Step {
+        name: "structure",
+        about: "no import goes in a circle, and docs/modules.dot is of this code",
+        needs: &[],
+        run: structure::check,
+    },
     Step {
         name: "clippy",
         about: "lints of what runs on this PC, warnings as errors",
@@ -209,17 +217,12 @@ fn unit() -> Result<()> {
     Shell::cargo().args(["test", "--workspace", "--exclude=hums-app", "--exclude=hums-tests"]).run()
 }
 
-/// Builds the `hums` that users build.
-pub(crate) fn build_hums() -> Result<()> {
-    Shell::cargo().args(["build", "--release", "--package=hums"]).run()
-}
-
 /// `cargo test` of the end-to-end tests with all that they may use.
 fn end_to_end(features: &str, target: &str) -> Result<()> {
-    build_hums()?;
+    hums::build()?;
     oracle::prepare()?;
     Shell::cargo()
-        .env("HUMS_BIN", repo::hums())
+        .env("HUMS_BIN", hums::program())
         .env("HUMS_PYTHON", oracle::python())
         .env("HUMS_DIALECT", oracle::dialect())
         .env("HUMS_FIRMWARE", Board::Emulated.image())

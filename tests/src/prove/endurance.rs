@@ -11,10 +11,11 @@ use hums::source::Chunk;
 use hums_core::params::Params;
 
 use super::card::Card;
+use super::figures::Figures;
 use super::memory::held_bytes;
+use super::options::Options;
 use super::record::Record;
 use super::stream::Stream;
-use super::{Figures, Options};
 use crate::flights::{OWN, own};
 
 /// 20 kB/s.

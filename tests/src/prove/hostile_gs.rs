@@ -15,9 +15,10 @@ use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal};
 
 use super::card::Card;
+use super::figures::Figures;
+use super::options::Options;
 use super::record::Record;
 use super::stream::Stream;
-use super::{Figures, Options};
 use crate::flights::{OWN, own};
 
 /// 10 kB/s of the vehicle; the flights in turn.

@@ -7,9 +7,11 @@
 mod card;
 mod damage;
 mod endurance;
+mod figures;
 mod hostile_gs;
 mod memory;
 mod noise;
+mod options;
 mod power_cuts;
 mod record;
 mod report;
@@ -18,26 +20,10 @@ mod stream;
 
 use anyhow::Result;
 
+pub use figures::Figures;
 pub use memory::Counting;
-pub use report::{Figures, Provenance, write as write_report};
-
-/// How much is tried.
-#[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// The short form, for every change; otherwise the long one.
-    pub short: bool,
-    /// Makes chance repeatable.
-    pub seed: u64,
-    /// How many cases instead of the campaign's own number.
-    pub runs: Option<u64>,
-}
-
-impl Options {
-    /// The number of cases: as asked, or one of these.
-    fn runs(&self, long: u64, short: u64) -> u64 {
-        self.runs.unwrap_or(if self.short { short } else { long })
-    }
-}
+pub use options::Options;
+pub use report::{Provenance, write as write_report};
 
 /// One campaign.
 #[derive(Debug)]

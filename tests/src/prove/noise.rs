@@ -5,9 +5,10 @@ use hums::logs::on_card;
 use rayon::prelude::*;
 
 use super::card::Card;
+use super::figures::Figures;
+use super::options::Options;
 use super::record::Record;
 use super::stream::{Stream, hash};
-use super::{Figures, Options};
 use crate::damage;
 use crate::flights::{OWN, own};
 

@@ -19,9 +19,10 @@ use hums_core::params::Params;
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};
+use super::figures::Figures;
+use super::options::Options;
 use super::record::Record;
 use super::stream::{FULL_RATE, Stream};
-use super::{Figures, Options};
 use crate::damage::Random;
 use crate::flights::own;
 

@@ -9,8 +9,9 @@ use hums_core::params::Params;
 use rayon::prelude::*;
 
 use super::card::Card;
+use super::figures::Figures;
+use super::options::Options;
 use super::stream::{FULL_RATE, Stream};
-use super::{Figures, Options};
 use crate::flights::{OWN, more, own};
 
 /// When the card stops answering, in seconds: at a moment for the short form, and at each of these for the long one.
