@@ -131,13 +131,13 @@ impl Companion {
 mod tests {
     use hums_core::Monitor;
     use hums_core::params::Params;
-    use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::{messages, packet, summary};
 
     use super::*;
 
     fn hear(companion: &mut Companion, at: Instant, packet: &packet::Packet) {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let mut encoder = Encoder::new();
         companion.frame(at, &Frame::parse(encoder.frame(&mut buffer, packet)).expect("a frame"));
     }

@@ -104,7 +104,7 @@ impl Craft {
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
         self.frames += 1;
         let lost = self.sequences.frame(at, frame);
-        if Some(Source { system: frame.system(), component: frame.component() }) == self.counted(at) {
+        if Some(frame.source()) == self.counted(at) {
             self.missing += u64::from(lost);
         }
         let before = self.companion.known();

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use hums_blackbox::{Entry, Gap};
-use hums_core::observation::{Autopilot, Observation, Source};
+use hums_core::observation::{Autopilot, Observation};
 use hums_link::{Check, Frame, observe};
 use serde::Serialize;
 
@@ -111,7 +111,7 @@ impl Collect for Told {
     fn entry(&mut self, entry: &Entry<'_>) {
         let Entry::Frame { at, bytes, verified: true, .. } = *entry else { return };
         let Some(frame) = Frame::again(bytes, Check::Verified) else { return };
-        let source = Source { system: frame.system(), component: frame.component() };
+        let source = frame.source();
         self.signs.push(Sign { at, source, sequence: frame.sequence() });
         if frame.id() == STATUSTEXT {
             self.texts.extend(Text::of(at, source, frame.payload()));

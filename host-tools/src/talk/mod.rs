@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
-use hums_link::encode::{COMPONENT, Encoder, GS_FRAME_BYTES_MAX};
+use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal, stamp};
 use hums_link::{Check, Frame, Framer};
@@ -84,7 +84,7 @@ impl Client {
 
     /// Sends a message.
     pub fn send(&mut self, packet: &Packet) -> Result<()> {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let now = hums_core::time::Instant::from_micros(self.begun.elapsed().as_micros() as u64);
         let frame = match &mut self.seal {
             Some(seal) => self.encoder.frame_signed(&mut buffer, packet, now, seal),

@@ -207,7 +207,7 @@ impl Influx {
 
 #[cfg(test)]
 mod tests {
-    use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::packet::Packet;
 
     use super::*;
@@ -231,10 +231,8 @@ mod tests {
         let queue = Arc::new(Queue::new().expect("a file"));
         let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");
         let mut encoder = Encoder::of(1, 1);
-        let frames: Vec<Vec<u8>> = packets
-            .iter()
-            .map(|packet| encoder.frame(&mut [0; GS_FRAME_BYTES_MAX], packet).to_vec())
-            .collect();
+        let frames: Vec<Vec<u8>> =
+            packets.iter().map(|packet| encoder.frame(&mut [0; FRAME_BYTES_MAX], packet).to_vec()).collect();
         let mut world = World::new(Limits::default());
         if know {
             let mut whole = World::new(Limits::default());

@@ -9,7 +9,7 @@ use hums_blackbox::record::Boot;
 use hums_core::time::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 use hums_onboard::persist::Kept;
-use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX};
+use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
 use hums_onboard::uplink::{self, Uplink};
 use hums_onboard::{Handover, Keeper, Monitoring, PortStatus, Reception, Service, Storage};
 use hums_recorder::CardStatus;
@@ -229,7 +229,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
 
     /// What the GS port can have sent by now.
     fn send_gs(&mut self) -> Result<()> {
-        let mut frame = [0; GS_FRAME_BYTES_MAX];
+        let mut frame = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.autopilot_out.take(&mut frame) {
             // An autopilot that has gone does not hear: its end shows in its own bytes.
             let _ = self.outside.autopilot.write_all(frame.get(..length).unwrap_or_default());

@@ -7,15 +7,17 @@
 //! without naming who asked ([`ANSWERS`]), heartbeats of the vehicle's other components, and once a second a frame of a
 //! definition that we do not have.
 
+use hums_core::Monitor;
 use hums_core::params::Param;
 use hums_core::time::{Instant, Span};
 use hums_link::encode::COMPONENT;
 use hums_link::frame::{Check, Frame};
 use hums_link::outlet::Class;
+use hums_link::request::Port;
 
-use crate::monitoring::Monitoring;
-use crate::queues::{GsIn, Path};
-use crate::secure;
+use super::secure;
+use super::ways::Ways;
+use crate::queues::Path;
 
 /// `RADIO`, `RADIO_STATUS`
 const RADIO: [u32; 2] = [166, 109];
@@ -26,42 +28,48 @@ const ANSWERS: [u32; 13] = [22, 49, 118, 120, 191, 192, 259, 300, 322, 395, 397,
 /// Between two frames of definitions that we do not have.
 const UNKNOWN: Span = Span::from_secs(1);
 
-impl Monitoring<'_> {
-    fn passes(&self, gs: &GsIn) -> bool {
-        gs.path() == Path::Port && self.monitor.params().get(Param::GsPass) > 0.5
+/// What passed, and what did not.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pass {
+    /// Frames that passed through for others, and found no room.
+    lost: u32,
+    /// When a frame of a definition that we do not have was passed down last.
+    unknown_at: Option<Instant>,
+}
+
+impl Pass {
+    pub(crate) const fn new() -> Self {
+        Self { lost: 0, unknown_at: None }
     }
 
     /// A frame of the ground station's port, to the autopilot.
-    pub(crate) fn pass_up(&mut self, now: Instant, frame: &Frame<'_>, gs: &mut GsIn) {
-        let Some(vehicle) = self.monitor.vehicle().source else { return };
+    pub(crate) fn up(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
+        let Some(vehicle) = monitor.vehicle().source else { return };
         let of = (frame.system(), frame.component());
         let pretends = of == (vehicle.system, vehicle.component) || of == (vehicle.system, COMPONENT);
         let stays = pretends
             || frame.target() == Some((vehicle.system, COMPONENT))
             || frame.id() == secure::SETUP
             || RADIO.contains(&frame.id());
-        if stays || !self.passes(gs) {
+        if stays || !is_on(monitor, ways) {
             return;
         }
-        let sent = self
-            .companion
-            .outlet
-            .pass(now, Class::Forward, frame.bytes(), &mut |bytes| gs.autopilot.put(bytes));
-        self.companion.not_passed += u32::from(!sent);
+        let sent = ways.pass(now, Port::Autopilot, Class::Forward, frame.bytes());
+        self.lost += u32::from(!sent);
     }
 
     /// A frame of the autopilot's port, to the ground station.
-    pub(crate) fn pass_down(&mut self, now: Instant, frame: &Frame<'_>, gs: &mut GsIn) {
-        if !self.passes(gs) || frame.id() == secure::SETUP {
+    pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
+        if !is_on(monitor, ways) || frame.id() == secure::SETUP {
             return;
         }
-        let Some(vehicle) = self.monitor.vehicle().source else { return };
+        let Some(vehicle) = monitor.vehicle().source else { return };
         let names_another = |(system, _): (u8, u8)| system != 0 && system != vehicle.system;
         let is_other = frame.component() != vehicle.component || frame.system() != vehicle.system;
         let passes = if frame.check() == Check::Unverified {
-            let due = self.companion.passed_at.is_none_or(|at| now.since(at) >= UNKNOWN);
+            let due = self.unknown_at.is_none_or(|at| now.since(at) >= UNKNOWN);
             if due {
-                self.companion.passed_at = Some(now);
+                self.unknown_at = Some(now);
             }
             due
         } else {
@@ -70,8 +78,12 @@ impl Monitoring<'_> {
                 || frame.id() == 0 && is_other
         };
         if passes {
-            let sent = self.summary.outlet.pass(now, Class::Bulk, frame.bytes(), &mut |bytes| gs.put(bytes));
-            self.companion.not_passed += u32::from(!sent);
+            let sent = ways.pass(now, Port::Gs, Class::Bulk, frame.bytes());
+            self.lost += u32::from(!sent);
         }
     }
+}
+
+fn is_on(monitor: &Monitor, ways: &Ways) -> bool {
+    ways.queues.path() == Path::Port && monitor.params().get(Param::GsPass) > 0.5
 }

@@ -15,16 +15,17 @@
 //! frame that is not recorded, as the signing guide asks of logs; an event says that it came. It is not passed on.
 
 use embedded_storage::nor_flash::NorFlash;
-use hums_core::params::Param;
+use hums_core::Monitor;
+use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_link::frame::Frame;
-use hums_link::request::{Port, Reply};
+use hums_link::outlet::Outlet;
+use hums_link::request::Port;
 use hums_link::signing::{KEY_BYTES, Key, Seal, Signing, Times, Verdict, stamp};
 use hums_store::Key as Item;
 
-use crate::monitoring::Monitoring;
 use crate::persist::{Handover, Keeper};
-use crate::queues::{Path, SectorsIn};
+use crate::queues::Path;
 
 /// Numbers of stored items: the key, and [`Times`] as three `u64`.
 const ITEM_KEY: u8 = 32;
@@ -36,6 +37,19 @@ pub(crate) const SETUP: u32 = 256;
 const SAVE: Span = Span::from_secs(1);
 /// Link ids: the summary stream and the answers at the ground station's port, and what goes to the autopilot.
 const LINKS: [u8; 2] = [0, 1];
+
+/// How a port is guarded now: 0 to 2.
+fn guard(params: &Params, port: Port) -> u8 {
+    params.get(match port {
+        Port::Gs => Param::GsSign,
+        Port::Autopilot => Param::ApSign,
+    }) as u8
+}
+
+/// Whether a port may bring a key.
+pub(crate) fn is_trusted(params: &Params, port: Port) -> bool {
+    params.get(Param::SignPort) as u8 == port as u8 + 1
+}
 
 /// What a request is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +65,7 @@ pub(crate) enum Trust {
 /// The monitor's part of signing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Secure {
-    pub(crate) signing: Signing,
+    signing: Signing,
     times: Times,
     key_due: bool,
     times_due: bool,
@@ -61,7 +75,7 @@ pub(crate) struct Secure {
     /// How often the store had been made anew when the key was handed over.
     remade: u32,
     /// Requests that were refused for their signature.
-    pub(crate) refused: u32,
+    refused: u32,
 }
 
 impl Secure {
@@ -77,31 +91,26 @@ impl Secure {
             refused: 0,
         }
     }
-}
 
-impl Monitoring<'_> {
     /// Takes the key and its times out of the store. At power-on, before anything is sent.
-    pub fn restore_signing<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
+    pub(crate) fn restore<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
         let mut bytes = [0; KEY_BYTES];
         let key = (keeper.item(ITEM_KEY, &mut bytes) == KEY_BYTES).then_some(Key(bytes));
         let mut bytes = [0; TIMES_BYTES];
         let len = keeper.item(ITEM_TIMES, &mut bytes);
-        let Secure { signing, times, last, .. } = &mut self.companion.secure;
         if let ([accepted, used, time], []) = bytes.as_chunks::<8>()
             && len == TIMES_BYTES
         {
             let number = |bytes: &[u8; 8]| u64::from_le_bytes(*bytes);
-            *times = Times { accepted: number(accepted), used: number(used), time: number(time) };
-            *last = times.used;
+            self.times = Times { accepted: number(accepted), used: number(used), time: number(time) };
+            self.last = self.times.used;
         }
-        signing.restore(key, *times);
+        self.signing.restore(key, self.times);
     }
 
-    /// Hands over what is due, at every tick and at the end.
-    pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) {
-        let seals = [&self.summary.outlet.seal, &self.companion.outlet.seal];
-        let last = seals.into_iter().flatten().map(Seal::last).max();
-        let Secure { signing, times, key_due, times_due, saved_at, remade, .. } = &mut self.companion.secure;
+    /// Hands over what is due, at every tick and at the end. `last` is the highest stamp that was signed with.
+    pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) {
+        let Self { signing, times, key_due, times_due, saved_at, remade, .. } = self;
         if core::mem::replace(remade, handover.remade()) != handover.remade() {
             (*key_due, *times_due) = (signing.key().is_some(), signing.key().is_some());
         }
@@ -124,27 +133,17 @@ impl Monitoring<'_> {
         }
     }
 
-    /// How a port is guarded now: 0 to 2.
-    fn guard(&self, port: Port) -> u8 {
-        let param = match port {
-            Port::Gs => Param::GsSign,
-            Port::Autopilot => Param::ApSign,
-        };
-        self.monitor.params().get(param) as u8
-    }
-
     /// What a frame's signature is worth on this port.
-    pub(crate) fn trust(&mut self, now: Instant, port: Port, frame: &Frame<'_>) -> Trust {
-        let guard = self.guard(port);
-        let Secure { signing, refused, .. } = &mut self.companion.secure;
-        if guard == 0 || signing.key().is_none() {
+    pub(crate) fn trust(&mut self, now: Instant, params: &Params, port: Port, frame: &Frame<'_>) -> Trust {
+        let guard = guard(params, port);
+        if guard == 0 || self.signing.key().is_none() {
             return Trust::Open;
         }
-        match signing.judge(now, frame) {
+        match self.signing.judge(now, frame) {
             Verdict::Good => Trust::Signed,
             Verdict::Unsigned if guard == 1 => Trust::Open,
             Verdict::Unsigned | Verdict::Wrong | Verdict::Replayed => {
-                *refused = refused.saturating_add(1);
+                self.refused = self.refused.saturating_add(1);
                 Trust::Refused
             }
         }
@@ -153,84 +152,49 @@ impl Monitoring<'_> {
     /// Something was changed; if by a signed frame, no frame that is older changes anything ever again.
     pub(crate) fn changed(&mut self, trust: Trust) {
         if trust == Trust::Signed {
-            let Secure { signing, times, times_due, .. } = &mut self.companion.secure;
-            times.accepted = signing.latest();
-            *times_due = true;
+            self.times.accepted = self.signing.latest();
+            self.times_due = true;
         }
     }
 
-    fn is_trusted(&self, port: Port) -> bool {
-        self.monitor.params().get(Param::SignPort) as u8 == port as u8 + 1
-    }
-
     /// Whether a request that is worth so much may set a parameter.
-    pub(crate) fn may_set(&self, port: Port, name: &str, trust: Trust) -> bool {
-        let guards = match name {
-            "SIGN_PORT" => true,
-            "GS_SIGN" | "AP_SIGN" => self.companion.secure.signing.key().is_some(),
+    pub(crate) fn may_set(&self, monitor: &Monitor, port: Port, param: Param, trust: Trust) -> bool {
+        let guards = match param {
+            Param::SignPort => true,
+            Param::GsSign | Param::ApSign => self.signing.key().is_some(),
             _ => false,
         };
         // With another rate at its port nothing is recorded any longer.
-        let deafens = name == "AP_BAUD" && self.monitor.vehicle().armed();
+        let deafens = param == Param::ApBaud && monitor.vehicle().armed();
         match trust {
             Trust::Refused => false,
             _ if deafens => false,
             Trust::Signed => true,
-            Trust::Open => !guards || self.is_trusted(port),
+            Trust::Open => !guards || is_trusted(monitor.params(), port),
         }
     }
 
-    /// Takes a key, if the port is trusted.
-    pub(crate) fn key_brought(
-        &mut self,
-        now: Instant,
-        port: Port,
-        key: Key,
-        stamp: u64,
-        by: (u8, u8),
-        sectors: &mut SectorsIn,
-    ) {
-        if !self.companion.limits[port as usize].allows(now) {
-            return;
+    /// Takes a key that a trusted port brought.
+    pub(crate) fn set_key(&mut self, now: Instant, key: Key, stamp: u64) {
+        if self.signing.key() != Some(&key) {
+            self.last = 0;
         }
-        let takes = self.is_trusted(port);
-        let what = match (takes, key.is_none()) {
-            (false, _) => "refused",
-            (true, false) => "set",
-            (true, true) => "removed",
-        };
-        self.tell_event(now, format_args!("signing key {what} by {}/{}", by.0, by.1), sectors);
-        if takes {
-            let Secure { signing, times, key_due, times_due, last, .. } = &mut self.companion.secure;
-            if signing.key() != Some(&key) {
-                *last = 0;
-            }
-            signing.set(now, key, stamp);
-            *times = Times { accepted: signing.latest(), used: *last, time: signing.clock.now(now) };
-            (*key_due, *times_due) = (true, true);
-            self.companion.replies.push(port, Reply::Keyed(!key.is_none()));
-        }
+        self.signing.set(now, key, stamp);
+        self.times =
+            Times { accepted: self.signing.latest(), used: self.last, time: self.signing.clock.now(now) };
+        (self.key_due, self.times_due) = (true, true);
     }
 
-    /// A key at the autopilot's port is not for the record: the record says that it came.
-    pub(crate) fn withhold(&mut self, now: Instant, frame: &Frame<'_>, sectors: &mut SectorsIn) {
-        let (system, component) = (frame.system(), frame.component());
-        if self.companion.limits[Port::Autopilot as usize].allows(now) {
-            self.tell_event(now, format_args!("a key of {system}/{component} is not recorded"), sectors);
-        }
-    }
-
-    /// Keeps both ways out signing as they should, in our time.
-    pub(crate) fn seal(&mut self, path: Path) {
+    /// Keeps both ways out signing as they should, in our time: the summary stream's, and the autopilot's.
+    pub(crate) fn seal(&mut self, path: Path, monitor: &Monitor, outlets: [&mut Outlet; 2]) {
+        let params = monitor.params();
         let carries = if path == Path::Autopilot { Port::Autopilot } else { Port::Gs };
-        let guards = [self.guard(carries), self.guard(Port::Autopilot)];
-        let Self { monitor, companion, summary, .. } = self;
-        let Secure { signing, last, .. } = &mut companion.secure;
+        let guards = [guard(params, carries), guard(params, Port::Autopilot)];
+        let Self { signing, last, .. } = self;
         let time = &monitor.vehicle().time;
         if let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) {
             signing.clock.is_at_least(at, stamp(utc_micros));
         }
-        let outlets = [&mut summary.outlet, &mut companion.outlet];
         for ((outlet, link), guard) in outlets.into_iter().zip(LINKS).zip(guards) {
             match (signing.key().filter(|_| guard > 0), &mut outlet.seal) {
                 (Some(key), Some(seal)) if seal.is_of(key) => seal.clock = signing.clock,

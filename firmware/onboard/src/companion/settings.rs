@@ -8,9 +8,11 @@ use hums_core::time::Instant;
 use hums_link::param_line::{self, Line};
 use hums_recorder::CardState;
 
-use crate::monitoring::Monitoring;
-use crate::queues::{GsIn, SectorsIn};
-use crate::shelf::{DATA_MAX, Want, What, Which};
+use super::library::Library;
+use crate::journal::Logbook;
+use crate::notices::Notices;
+use crate::queues::SectorsIn;
+use crate::shelf::{DATA_MAX, Reader, Want, What, Which};
 
 /// All parameters, each in the longest line.
 const BYTES_MAX: u32 = 16 * 1024;
@@ -64,36 +66,55 @@ impl Settings {
         }
         byte == b'\n'
     }
-}
 
-impl Monitoring<'_> {
     /// Reads on, a piece at a tick.
-    pub(crate) fn settings(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
-        let has_card = self.card.read().state == CardState::Recording;
-        let armed = self.monitor.vehicle().armed();
-        let settings = &mut self.companion.settings;
-        match settings.state {
+    pub(crate) fn tick(
+        &mut self,
+        now: Instant,
+        library: &mut Library,
+        book: &mut Logbook<'_>,
+        notices: &mut Notices,
+        sectors: &mut SectorsIn,
+        shelf: &mut Reader<'_>,
+    ) {
+        let has_card = book.card.read().state == CardState::Recording;
+        match self.state {
             State::NoCard if has_card => {
+                let armed = book.monitor.vehicle().armed();
                 let state = if armed { State::Done } else { State::Reading(0) };
-                *settings = Settings { state, ..Settings::new() };
+                *self = Self { state, ..Self::new() };
             }
-            State::Done if !has_card => settings.state = State::NoCard,
-            State::Reading(offset) => self.read_on(now, offset, sectors, gs),
+            State::Done if !has_card => self.state = State::NoCard,
+            State::Reading(offset) => {
+                self.read_on(now, offset, library, book, sectors, shelf);
+                if self.state == State::Done && self.refused > 0 {
+                    let text = "HUMS: PARAMS.TXT: lines refused, correct them";
+                    notices.note(now, 4, text, &mut book.journal, sectors);
+                }
+            }
             State::NoCard | State::Done => {}
         }
     }
 
-    fn read_on(&mut self, now: Instant, offset: u32, sectors: &mut SectorsIn, gs: &mut GsIn) {
-        let Some(ticket) = self.companion.settings.ticket else {
-            let ticket = self.companion.downloads.next_ticket();
-            if gs.shelf.want(Want { ticket, which: Which::Settings, what: What::Data(offset) }) {
-                self.companion.settings.ticket = Some(ticket);
+    fn read_on(
+        &mut self,
+        now: Instant,
+        offset: u32,
+        library: &mut Library,
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+        shelf: &mut Reader<'_>,
+    ) {
+        let Some(ticket) = self.ticket else {
+            let ticket = library.next_ticket();
+            if shelf.want(Want { ticket, which: Which::Settings, what: What::Data(offset) }) {
+                self.ticket = Some(ticket);
             }
             return;
         };
         let mut piece = heapless::Vec::<u8, DATA_MAX>::new();
         let mut bytes = None;
-        gs.shelf.answer(|answer, data| {
+        shelf.answer(|answer, data| {
             if answer.ticket == ticket {
                 bytes = Some(answer.bytes.min(BYTES_MAX));
                 // Fits: an answer is never longer.
@@ -102,40 +123,36 @@ impl Monitoring<'_> {
             true
         });
         let Some(bytes) = bytes else { return };
-        self.companion.settings.ticket = None;
+        self.ticket = None;
         for byte in &piece {
-            if self.companion.settings.take(*byte) {
-                self.line(now, sectors);
+            if self.take(*byte) {
+                self.line(now, book, sectors);
             }
         }
         let next = offset + piece.len() as u32;
         if !piece.is_empty() && next < bytes {
-            self.companion.settings.state = State::Reading(next);
+            self.state = State::Reading(next);
             return;
         }
-        self.line(now, sectors);
-        self.companion.settings.state = State::Done;
-        if self.companion.settings.refused > 0 {
-            self.note(now, 4, "HUMS: PARAMS.TXT has lines that are refused", sectors);
-        }
+        self.line(now, book, sectors);
+        self.state = State::Done;
     }
 
     /// Sets what a line says.
-    fn line(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        let settings = &mut self.companion.settings;
-        settings.number = settings.number.saturating_add(1);
-        let (number, long) = (settings.number, core::mem::take(&mut settings.long));
-        let line = core::mem::take(&mut settings.line);
+    fn line(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+        self.number = self.number.saturating_add(1);
+        let (number, long) = (self.number, core::mem::take(&mut self.long));
+        let line = core::mem::take(&mut self.line);
         let set = match core::str::from_utf8(&line).map(param_line::read) {
             _ if long => false,
             Ok(Line::Nothing) => true,
             Ok(Line::Set(name, value)) => param_line::value(value)
-                .is_some_and(|value| self.set_by_link(now, name, value, (0, 0), sectors)),
+                .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),
             Ok(Line::Wrong) | Err(_) => false,
         };
         if !set {
-            self.companion.settings.refused = self.companion.settings.refused.saturating_add(1);
-            self.tell_event(now, format_args!("PARAMS.TXT: line {number} is refused"), sectors);
+            self.refused = self.refused.saturating_add(1);
+            book.journal.by_hand(now, format_args!("PARAMS.TXT: line {number} is refused"), sectors);
         }
     }
 }

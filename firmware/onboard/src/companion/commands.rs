@@ -10,23 +10,22 @@
 //! | 31010 `USER_1` | another part is in a component's place, from 1: while disarmed |
 //! | 31011 `USER_2` | cancels the protective action that is announced |
 
-use core::fmt::Write as _;
-
-use hums_blackbox::record::{Event, Record};
+use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::health::{self, Level};
 use hums_core::params::TABLE;
 use hums_core::time::Instant;
-use hums_link::encode::{Severity, Text};
 use hums_link::messages;
 use hums_link::packet::Packet;
-use hums_link::request::{Port, Reply};
+use hums_link::request::{Port, Replies, Reply};
 use hums_link::summary;
+use hums_link::text::{Severity, Text};
 use hums_recorder::CardState;
 
-use crate::monitoring::{Identity, Monitoring};
+use super::limiter::{Asker, Limiter};
+use crate::journal::{By, Journal, Logbook};
 use crate::queues::SectorsIn;
-use crate::secure::Trust;
+use crate::records;
 
 const PROTOCOL: u16 = 519;
 const CAPABILITIES: u16 = 520;
@@ -46,22 +45,42 @@ pub(crate) const DENIED: u8 = 2;
 const UNSUPPORTED: u8 = 3;
 const FAILED: u8 = 4;
 
-/// Number of the event that records what somebody did over a link.
-pub(crate) const EVENT: u8 = 12;
+/// Answers in line, and what commands decide.
+#[derive(Clone, Debug)]
+pub(crate) struct Commands {
+    pub(crate) replies: Replies,
+    limits: [Limiter; 2],
+    /// Somebody stopped the record.
+    stopped: bool,
+}
 
-impl Monitoring<'_> {
+impl Commands {
+    pub(crate) const fn new() -> Self {
+        Self { replies: Replies::new(), limits: [Limiter::new(); 2], stopped: false }
+    }
+
+    /// Whether somebody at this port may change something now.
+    pub(crate) fn allows(&mut self, now: Instant, port: Port) -> bool {
+        self.limits[port as usize].allows(now)
+    }
+
+    /// Whether somebody stopped the record.
+    pub(crate) const fn stopped(&self) -> bool {
+        self.stopped
+    }
+
     /// Does what a command says; its `MAV_RESULT`.
     pub(crate) fn command(
         &mut self,
         now: Instant,
-        port: Port,
+        asker: Asker,
         command: u16,
         params: [f32; 2],
-        by: (u8, u8),
+        book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
     ) -> u8 {
         let mut reply = |reply| {
-            self.companion.replies.push(port, reply);
+            self.replies.push(asker.port, reply);
             ACCEPTED
         };
         match (command, params[0] as u32) {
@@ -70,15 +89,15 @@ impl Monitoring<'_> {
             (MESSAGE, 0) => reply(Reply::Heartbeat),
             (PREFLIGHT, _) => {
                 reply(Reply::Preflight);
-                if preflight(self.monitor).is_none() { ACCEPTED } else { FAILED }
+                if preflight(book.monitor).is_none() { ACCEPTED } else { FAILED }
             }
             // Which storage is it, and is it meant: a command that is sent by mistake has neither.
             (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
             (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
-                if !self.companion.limits[port as usize].allows(now) {
+                if !self.allows(now, asker.port) {
                     return TEMPORARILY_REJECTED;
                 }
-                self.act(now, port, command, number, by, sectors)
+                self.act(now, asker, command, number, book, sectors)
             }
             _ => UNSUPPORTED,
         }
@@ -87,61 +106,31 @@ impl Monitoring<'_> {
     fn act(
         &mut self,
         now: Instant,
-        port: Port,
+        asker: Asker,
         command: u16,
         number: u32,
-        by: (u8, u8),
+        book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
     ) -> u8 {
-        let armed = self.monitor.vehicle().armed();
+        let by = asker.by;
         match command {
             CANCEL => {
-                let cancelled = self.monitor.cancel_protection();
-                self.tell_event(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
+                let cancelled = book.monitor.cancel_protection();
+                book.journal.by_hand(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
                 if cancelled { ACCEPTED } else { FAILED }
             }
-            STOP | FORMAT | REPLACED if armed => TEMPORARILY_REJECTED,
-            FORMAT => self.format(now, by, sectors),
+            STOP | FORMAT | REPLACED if book.monitor.vehicle().armed() => TEMPORARILY_REJECTED,
+            FORMAT => format(now, by, book, sectors),
             REPLACED => {
                 let place = (number as usize).wrapping_sub(1);
                 // Its serial number can be given later; who did it is in the component's record.
-                if self.replace_component(now, place, "", by, sectors) { ACCEPTED } else { DENIED }
+                if records::replace_component(now, place, "", by, book, sectors) { ACCEPTED } else { DENIED }
             }
             _ => {
-                self.stop_or_record(now, command == STOP, port, by, sectors);
+                self.stop_or_record(now, command == STOP, asker, &mut book.journal, sectors);
                 ACCEPTED
             }
         }
-    }
-
-    /// Only a card that holds nothing for us is formatted over a link: nobody at a radio destroys logs.
-    fn format(&mut self, now: Instant, by: (u8, u8), sectors: &mut SectorsIn) -> u8 {
-        let state = self.card.read().state;
-        let may = state.wants_format();
-        let what = if may { "card is formatted" } else { "formatting refused, asked" };
-        self.tell_event(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
-        match state {
-            _ if may => {
-                self.card.want_format();
-                ACCEPTED
-            }
-            // It was asked for already, and the answer was lost.
-            CardState::Formatting => ACCEPTED,
-            CardState::Recording | CardState::Finished | CardState::Full => DENIED,
-            _ => FAILED,
-        }
-    }
-
-    /// Records that somebody did something; what does not fit into 50 characters is cut.
-    pub(crate) fn tell_event(
-        &mut self,
-        now: Instant,
-        what: core::fmt::Arguments<'_>,
-        sectors: &mut SectorsIn,
-    ) {
-        let mut text = Text::default();
-        let _ = text.write_fmt(what);
-        self.record(now, &Record::Event(Event { number: EVENT, text: text.as_str() }), sectors);
     }
 
     /// Never unnoticed: it is an event in the record, a text on the ground station, and a finding for as long as it
@@ -150,41 +139,37 @@ impl Monitoring<'_> {
         &mut self,
         now: Instant,
         stop: bool,
-        port: Port,
-        by: (u8, u8),
+        Asker { port, by }: Asker,
+        journal: &mut Journal<'_>,
         sectors: &mut SectorsIn,
     ) {
-        if self.companion.stopped == stop {
+        if self.stopped == stop {
             return;
         }
-        self.companion.stopped = stop;
+        self.stopped = stop;
         let what = if stop { "stopped" } else { "started" };
-        self.tell_event(now, format_args!("recording {what} by {}/{}", by.0, by.1), sectors);
+        journal.by_hand(now, format_args!("recording {what} by {}/{}", by.0, by.1), sectors);
         if stop {
-            self.companion.replies.push(port, Reply::Stopped);
+            self.replies.push(port, Reply::Stopped);
         }
     }
+}
 
-    /// Earlier logs are no longer offered and are the first to make room; not in flight.
-    pub(crate) fn erase(
-        &mut self,
-        now: Instant,
-        port: Port,
-        trust: Trust,
-        by: (u8, u8),
-        sectors: &mut SectorsIn,
-    ) {
-        if !self.companion.limits[port as usize].allows(now) {
-            return;
+/// Only a card that holds nothing for us is formatted over a link: nobody at a radio destroys logs.
+fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn) -> u8 {
+    let state = book.card.read().state;
+    let may = state.wants_format();
+    let what = if may { "card is formatted" } else { "formatting refused, asked" };
+    book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
+    match state {
+        _ if may => {
+            book.card.want_format();
+            ACCEPTED
         }
-        let may = !self.monitor.vehicle().armed();
-        let what = if may { "logs erased" } else { "erasing refused in flight, asked" };
-        self.tell_event(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
-        if may {
-            self.companion.downloads.erases = true;
-            self.companion.replies.push(port, Reply::Erased);
-            self.changed(trust);
-        }
+        // It was asked for already, and the answer was lost.
+        CardState::Formatting => ACCEPTED,
+        CardState::Recording | CardState::Finished | CardState::Full => DENIED,
+        _ => FAILED,
     }
 }
 
@@ -195,7 +180,7 @@ fn preflight(monitor: &Monitor) -> Option<&'static str> {
 }
 
 /// An answer as a message.
-pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Identity<'_>) -> Packet {
+pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Packet {
     match reply {
         Reply::Param(index) => match monitor.params().iter().nth(usize::from(index)) {
             Some((spec, value)) => messages::param_value(spec.name, value, index, TABLE.len() as u16),
