@@ -37,7 +37,7 @@ pub struct World {
     pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
-    /// Findings since this was cleared, with whose they are; what nobody clears stops at [`FOUND_MAX`].
+    /// Findings since this was cleared, with whose they are; what nobody clears stops at `FOUND_MAX`.
     pub found: Vec<(u8, Finding)>,
     limits: Limits,
     /// The vehicle that a log is of: the first one heard in it.
@@ -181,11 +181,12 @@ mod tests {
     use hums_link::packet::Packet;
 
     use super::*;
+    use crate::mavlink::ids::HEARTBEAT;
 
     /// HEARTBEAT of an `ArduPilot` quadrotor, disarmed.
     fn heartbeat(system: u8) -> Vec<u8> {
         let mut buffer = [0; FRAME_BYTES_MAX];
-        let packet = Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
+        let packet = Packet::new(HEARTBEAT).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
         Encoder::of(system, 1).frame(&mut buffer, &packet).to_vec()
     }
 

@@ -1,26 +1,31 @@
 //! QEMU with the firmware in it: its command line, its pipes, and how it ends.
 
+mod command;
+mod lines;
+
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::os::unix::fs::symlink;
 use std::os::unix::net::UnixStream;
-use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use serde::Deserialize;
 use tempfile::TempDir;
 
-/// The emulator's program.
-const PROGRAM: &str = "qemu-system-arm";
-/// The first version that models this chip's memory.
-const VERSION_MIN: u32 = 8;
+use command::{Arguments, PROGRAM, command, make_fifo};
+use lines::{Line, listen};
+
+pub use command::check;
+pub use lines::Again;
+
+use crate::files::settle;
+
 /// The firmware is to be started again.
 const EXIT_AGAIN: i32 = 3;
 /// How long the firmware may take until it listens.
@@ -30,67 +35,8 @@ const SHUTDOWN: Duration = Duration::from_mins(3);
 /// How long to wait for a socket to appear.
 const CONNECT: Duration = Duration::from_secs(10);
 
-const ADVICE: &str = "\n  Debian 12:        add bookworm-backports, then apt-get install -t bookworm-backports qemu-system-arm\
-                      \n  Debian 13, Ubuntu 24.04:  apt-get install qemu-system-arm\
-                      \n  in the source tree:       cargo xtask setup\
-                      \n  without an emulator:      hums sim runs the same pipeline on this PC";
-
-/// Says what to do where QEMU is missing or too old.
-pub fn check() -> Result<()> {
-    let output = match Command::new(PROGRAM).arg("--version").stdin(Stdio::null()).output() {
-        Ok(output) => output,
-        Err(error) => bail!(
-            "{PROGRAM} cannot be started ({error}); version {VERSION_MIN}.0 or later is needed:{ADVICE}"
-        ),
-    };
-    let text = String::from_utf8_lossy(&output.stdout);
-    let version = text.split("version ").nth(1).unwrap_or_default();
-    let major: Option<u32> = version.split('.').next().and_then(|major| major.trim().parse().ok());
-    match major {
-        Some(major) if major < VERSION_MIN => {
-            let found = version.split_whitespace().next().unwrap_or_default();
-            bail!(
-                "{PROGRAM} is {found}; it models this chip's memory only from version {VERSION_MIN}.0 on:{ADVICE}"
-            )
-        }
-        Some(_) => Ok(()),
-        None => bail!(
-            "{PROGRAM} --version says nothing that is understood; version {VERSION_MIN}.0 is needed:{ADVICE}"
-        ),
-    }
-}
-
 /// The bit of a count in the clock's pipe that says that the bytes are the ground station's.
 const FROM_GS: u32 = 1 << 31;
-
-/// A line of the firmware's.
-enum Line {
-    Ready,
-    Result(String),
-    Again(Again),
-}
-
-/// The firmware was reset, or its power went, and is to be started again.
-#[derive(Debug, Deserialize)]
-pub struct Again {
-    /// `reset` or `power`.
-    pub what: String,
-    /// When, in microseconds since its start.
-    pub at_us: u64,
-    /// How many bytes of its input it took out of the port.
-    pub taken: u64,
-    /// Frames that came in.
-    pub frames_in: u64,
-    /// Bytes that came in.
-    pub bytes_in: u64,
-    /// Bytes of them that belong to no frame.
-    pub bytes_not_frames: u64,
-    /// Blocks of the card that were written.
-    pub blocks_written: u64,
-    /// Memory that survived.
-    #[serde(skip)]
-    pub survived: Option<Vec<u8>>,
-}
 
 /// How a start of the firmware ended.
 pub enum Ended {
@@ -158,7 +104,8 @@ impl Qemu {
                 .context("what survived the reset cannot be handed over")?;
         }
         make_fifo(&at("feed"))?;
-        let mut child = command(&start, dir.path())
+        let Start { firmware, arguments, costs, .. } = &start;
+        let mut child = command(&Arguments { firmware, more: arguments, costs: *costs }, dir.path())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -265,7 +212,7 @@ impl Qemu {
         if let Some(downlink) = self.downlink.take()
             && let Ok(result) = downlink.join()
         {
-            result.context("--gs: cannot be written")?;
+            settle(result.map(drop), Path::new("--gs"))?;
         }
         match (status.code(), result) {
             (Some(0), Some(done @ Ended::Done(_))) => Ok(done),
@@ -314,80 +261,6 @@ impl Drop for Qemu {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-fn command(start: &Start<'_>, dir: &Path) -> Command {
-    let socket =
-        |id: &str, more: &str| format!("socket,id={id},path={},server=on,{more}", escaped(&dir.join(id)));
-    let mut arguments = "enable=on,target=native,arg=\"resets=1\"".to_owned();
-    for (key, file) in [("sd", "card"), ("store", "store"), ("feed", "feed")] {
-        let _ = write!(arguments, " \"{key}={}\"", escaped(&dir.join(file)));
-    }
-    for argument in start.arguments.iter().chain(start.costs.then(|| "cost=1".to_owned()).iter()) {
-        let _ = write!(arguments, " \"{argument}\"");
-    }
-    let mut command = Command::new(PROGRAM);
-    command
-        .args(["-M", "netduinoplus2", "-nodefaults", "-display", "none", "-monitor", "none", "-kernel"])
-        .arg(start.firmware)
-        // The mux puts a buffer before the UART, which quadruples its pace; -echr takes its escape byte away.
-        .args(["-chardev", &socket("ap", "wait=off,mux=on"), "-serial", "chardev:ap", "-echr", "256"])
-        .args(["-chardev", &socket("gs", "wait=on"), "-serial", "chardev:gs"])
-        .args(["-semihosting-config", &arguments])
-        .current_dir(dir)
-        // With this its clock counts instructions, as the firmware takes it for granted when it counts costs.
-        .args(if start.costs { &["-icount", "shift=3"][..] } else { &[] })
-        // Ctrl-C is for this program, which then lets the firmware close its log.
-        .process_group(0);
-    command
-}
-
-/// A path inside one of QEMU's options, where a comma ends the value.
-fn escaped(path: &Path) -> String {
-    path.display().to_string().replace(',', ",,")
-}
-
-fn make_fifo(path: &PathBuf) -> Result<()> {
-    // POSIX has the program; the system call would need unsafe code or one more library.
-    let status = Command::new("mkfifo").arg(path).status().context("mkfifo cannot be started")?;
-    if status.success() { Ok(()) } else { bail!("mkfifo {}: failed", path.display()) }
-}
-
-/// The firmware's lines, and QEMU's complaints.
-fn listen(child: &mut Child) -> Result<(Receiver<Line>, JoinHandle<String>)> {
-    let stdout = child.stdout.take().context("the emulator has no output")?;
-    let mut stderr = child.stderr.take().context("the emulator has no error output")?;
-    let (sender, lines) = channel();
-    std::thread::spawn(move || {
-        for line in BufReader::new(stdout).lines().map_while(Result::ok) {
-            let sent = match line.as_str() {
-                "ready" => sender.send(Line::Ready),
-                json if json.starts_with('{') => sender.send(Line::Result(json.to_owned())),
-                line if again(line).is_some() => {
-                    again(line).map_or(Ok(()), |again| sender.send(Line::Again(again)))
-                }
-                message => {
-                    eprintln!("firmware: {message}");
-                    Ok(())
-                }
-            };
-            if sent.is_err() {
-                break;
-            }
-        }
-    });
-    let complaints = std::thread::spawn(move || {
-        let mut text = String::new();
-        // Whatever could be read is told.
-        let _ = stderr.read_to_string(&mut text);
-        text
-    });
-    Ok((lines, complaints))
-}
-
-/// What it says when it is to be started again.
-fn again(line: &str) -> Option<Again> {
-    serde_json::from_str(line.strip_prefix("again ")?).ok()
 }
 
 fn forward(mut from: UnixStream, to: Ground) -> JoinHandle<std::io::Result<u64>> {

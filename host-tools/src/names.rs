@@ -1,12 +1,22 @@
-//! The names of usage counters, with their units, by the number that a log stores.
+//! Names of what a log stores as numbers: messages, usage counters, events, faults, sources of time.
+
+use std::borrow::Cow;
 
 use hums_core::baseline::Quantity;
-use hums_core::usage::{CounterName, counter_name};
+use hums_core::usage::{self, CounterName};
+
+/// The name of a message, `UNKNOWN_12345` where the dialect has none.
+pub fn message_name(id: u32) -> Cow<'static, str> {
+    match hums_dialect::message(id) {
+        Some(message) => Cow::Borrowed(message.name),
+        None => Cow::Owned(format!("UNKNOWN_{id}")),
+    }
+}
 
 /// The name of a counter, for instance `flight_time_s`, `motor0_run_time_s` or `esc_temperature_45_to_60_degc_s`;
 /// `counter_123` where this program does not know it.
-pub fn name(number: u8) -> String {
-    match counter_name(number) {
+pub fn counter_name(number: u8) -> String {
+    match usage::counter_name(number) {
         Some(CounterName::Vehicle(name)) => name.to_owned(),
         Some(CounterName::Motor(name, motor)) => format!("motor{motor}_{name}"),
         Some(CounterName::Exposure(quantity, from, to)) => {
@@ -28,6 +38,45 @@ pub fn name(number: u8) -> String {
     }
 }
 
+/// Where the time of day came from, by the number that a log stores.
+pub fn clock_source_name(number: u8) -> &'static str {
+    match number {
+        1 => "SYSTEM_TIME",
+        2 => "recording",
+        3 => "GNSS",
+        _ => "unknown",
+    }
+}
+
+/// What kind of fault the monitor had, by the number that a log stores.
+pub fn fault_name(number: u8) -> &'static str {
+    match number {
+        1 => "panic",
+        2 => "hard_fault",
+        3 => "watchdog",
+        _ => "unknown",
+    }
+}
+
+/// What happened, by the number that a log stores.
+pub fn event_name(number: u8) -> &'static str {
+    match number {
+        1 => "armed",
+        2 => "disarmed",
+        3 => "take_off",
+        4 => "landing",
+        5 => "snapshot",
+        6 => "card_in",
+        7 => "card_out",
+        8 => "critical",
+        9 => "phase",
+        10 => "autopilot_reboot",
+        11 => "other_airframe",
+        12 => "by_link",
+        _ => "other",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::HashSet;
@@ -36,7 +85,7 @@ mod tests {
 
     #[test]
     fn every_number_has_a_name_of_its_own_and_ranges_say_their_ends() {
-        let names: HashSet<String> = (0..=u8::MAX).map(name).collect();
+        let names: HashSet<String> = (0..=u8::MAX).map(counter_name).collect();
         assert_eq!(names.len(), 256);
         for range in
             ["vibration_below_1_m_s2_s", "vibration_1_to_2_5_m_s2_s", "esc_temperature_from_110_degc_s"]

@@ -57,26 +57,20 @@ struct Series {
     values: BTreeMap<u16, Extremes>,
 }
 
-/// Which plot, and which line of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Key {
-    /// The plot, in the order of the page.
-    pub plot: super::replay::Plot,
-    /// The line: a motor, a cell, an axis.
-    pub line: u8,
-}
+/// A line of a plot: the plot, and the line's number: a motor, a cell, an axis.
+pub type Line<P> = (P, u8);
 
-/// All series of a page, or of a live vehicle, by what names them there.
+/// All series of a page, or of a live vehicle, by the plots that there are.
 #[derive(Clone, Debug)]
-pub struct Store<K = Key> {
+pub struct Store<P> {
     grid: Grid,
-    series: BTreeMap<K, Series>,
+    series: BTreeMap<Line<P>, Series>,
 }
 
 /// What a series has in some of the intervals: their numbers, and the values of each in their order, a pair each.
 pub type Part = (Vec<u16>, Vec<f32>);
 
-impl<K> Default for Store<K> {
+impl<P> Default for Store<P> {
     fn default() -> Self {
         Self { grid: Grid { start_ms: None, interval_ms: INTERVAL_MS }, series: BTreeMap::new() }
     }
@@ -103,15 +97,15 @@ pub struct GridJson {
     intervals: usize,
 }
 
-impl<K: Copy + Ord> Store<K> {
+impl<P: Copy + Ord> Store<P> {
     /// Takes a value; what is not finite is none.
-    pub fn push(&mut self, at: Instant, key: K, value: f32) {
-        let known = self.series.contains_key(&key);
+    pub fn push(&mut self, at: Instant, line: Line<P>, value: f32) {
+        let known = self.series.contains_key(&line);
         if !value.is_finite() || (!known && self.series.len() >= SERIES_MAX) {
             return;
         }
         let interval = self.interval(at);
-        let series = self.series.entry(key).or_default();
+        let series = self.series.entry(line).or_default();
         let new = Extremes { low: value, high: value, rises: true };
         series.values.entry(interval).and_modify(|extremes| *extremes = extremes.with(value)).or_insert(new);
     }
@@ -140,17 +134,17 @@ impl<K: Copy + Ord> Store<K> {
     }
 
     /// What all series have in these intervals, for those that have anything.
-    pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (K, Part)> {
+    pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (Line<P>, Part)> {
         // An empty range is one that ends before it begins, which a map refuses.
         let some = intervals.start() <= intervals.end();
-        self.series.iter().filter(move |_| some).filter_map(move |(key, series)| {
+        self.series.iter().filter(move |_| some).filter_map(move |(line, series)| {
             let (mut numbers, mut values) = (Vec::new(), Vec::new());
             for (&number, extremes) in series.values.range(intervals.clone()) {
                 numbers.push(number);
                 let (low, high) = (extremes.low, extremes.high);
                 values.extend(if extremes.rises { [low, high] } else { [high, low] });
             }
-            (!numbers.is_empty()).then_some((*key, (numbers, values)))
+            (!numbers.is_empty()).then_some((*line, (numbers, values)))
         })
     }
 
@@ -163,18 +157,11 @@ impl<K: Copy + Ord> Store<K> {
             intervals: last.map_or(0, |last| usize::from(*last) + 1),
         }
     }
-}
 
-impl Store {
     /// The series of a plot, with this many decimals.
-    pub fn plot(
-        &self,
-        plot: super::replay::Plot,
-        decimals: u8,
-        label: impl Fn(u8) -> String,
-    ) -> Vec<SeriesJson> {
-        let of_plot = self.series.iter().filter(|(key, _)| key.plot == plot);
-        of_plot.map(|(key, series)| series.json(key.line, label(key.line), decimals)).collect()
+    pub fn plot(&self, plot: P, decimals: u8, label: impl Fn(u8) -> String) -> Vec<SeriesJson> {
+        let of_plot = self.series.range((plot, 0)..=(plot, u8::MAX));
+        of_plot.map(|((_, line), series)| series.json(*line, label(*line), decimals)).collect()
     }
 }
 
@@ -195,10 +182,10 @@ impl Series {
 
 #[cfg(test)]
 mod tests {
-    use super::super::replay::Plot;
     use super::*;
 
-    const KEY: Key = Key { plot: Plot::Height, line: 0 };
+    const HEIGHT: &str = "height";
+    const KEY: Line<&str> = (HEIGHT, 0);
 
     #[test]
     fn extremes_outlive_every_doubling() {
@@ -213,7 +200,7 @@ mod tests {
         }
         let grid = store.grid();
         assert!((1000..=2048).contains(&grid.intervals), "{grid:?}");
-        let series = &store.plot(Plot::Height, 1, |_| String::new())[0];
+        let series = &store.plot(HEIGHT, 1, |_| String::new())[0];
         assert_eq!(series.steps.len(), grid.intervals);
         let place = |wanted: f64| {
             series.values.iter().position(|value| (value - wanted).abs() < 0.01).expect("kept") / 2
@@ -231,7 +218,7 @@ mod tests {
             for value in values {
                 store.push(Instant::ZERO, KEY, value);
             }
-            assert_eq!(store.plot(Plot::Height, 1, |_| String::new())[0].values, kept);
+            assert_eq!(store.plot(HEIGHT, 1, |_| String::new())[0].values, kept);
         }
     }
 
@@ -242,7 +229,7 @@ mod tests {
         store.push(Instant::from_micros(u64::MAX), KEY, 2.0);
         store.push(Instant::ZERO, KEY, f32::NAN);
         store.push(Instant::ZERO, KEY, 3.0);
-        let series = &store.plot(Plot::Height, 1, |_| String::new())[0];
+        let series = &store.plot(HEIGHT, 1, |_| String::new())[0];
         assert!(series.steps.iter().all(|step| usize::from(*step) < INTERVALS_MAX));
         assert_eq!(series.values.len(), 2 * series.steps.len());
     }
