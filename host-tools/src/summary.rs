@@ -19,6 +19,9 @@ use crate::progress;
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
 pub const LISTED_MAX: usize = 10_000;
 
+/// Ids below half of this are counted in a table.
+const NEAR: usize = 1024;
+
 /// Frames of one message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MessageCount {
@@ -138,6 +141,8 @@ pub struct Contents {
     /// Entries whose time is before the entry before, within a group.
     pub times_fell: u64,
     last_at: Option<Instant>,
+    /// Counts of small ids, and whether verified, before they are added up.
+    near: Vec<MessageCount>,
     /// Whether checksums are looked at again.
     checks: bool,
 }
@@ -167,16 +172,26 @@ impl Contents {
         }
     }
 
-    fn frame(&mut self, bytes: &[u8], verified: bool) {
+    fn whole(&mut self, bytes: &[u8], verified: bool) {
         let Peek::Frame(frame) = peek(bytes) else {
             self.not_frames += 1;
             return;
         };
         self.not_frames += u64::from(frame.bytes.len() != bytes.len());
         self.bad_frames += u64::from(self.checks && verified && frame.check() == Check::Bad);
-        let count = self.messages.entry((frame.id, verified)).or_default();
+        self.count(frame.id, verified, bytes.len());
+    }
+
+    fn count(&mut self, id: u32, verified: bool, bytes: usize) {
+        let key = (id, verified);
+        // Most ids are small, and a frame comes for each of a log's some hundred bytes: a tree takes longer to search.
+        let place = (id as usize) << 1 | usize::from(verified);
+        let count = match self.near.get_mut(place) {
+            Some(count) => count,
+            None => self.messages.entry(key).or_default(),
+        };
         count.frames += 1;
-        count.bytes += bytes.len() as u64;
+        count.bytes += bytes as u64;
     }
 
     fn record(&mut self, record: &Record<'_>) {
@@ -250,6 +265,11 @@ impl Contents {
 
     /// Adds what the next group held.
     fn add(&mut self, next: Self) {
+        for (place, count) in next.near.iter().enumerate().filter(|(_, count)| count.frames > 0) {
+            let sum = self.messages.entry(((place >> 1) as u32, place & 1 != 0)).or_default();
+            sum.frames += count.frames;
+            sum.bytes += count.bytes;
+        }
         for (key, count) in next.messages {
             let sum = self.messages.entry(key).or_default();
             sum.frames += count.frames;
@@ -293,9 +313,19 @@ impl Collect for Contents {
         self.times_fell += u64::from(self.last_at.is_some_and(|last| at < last));
         self.last_at = Some(at);
         match entry {
-            Entry::Frame { bytes, verified, .. } => self.frame(bytes, *verified),
+            Entry::Frame { bytes, verified, .. } => self.whole(bytes, *verified),
             Entry::Record { record, .. } => self.record(record),
         }
+    }
+
+    fn only_counts(&self) -> bool {
+        !self.checks
+    }
+
+    fn frame(&mut self, at: Instant, id: u32, bytes: usize, verified: bool) {
+        self.times_fell += u64::from(self.last_at.is_some_and(|last| at < last));
+        self.last_at = Some(at);
+        self.count(id, verified, bytes);
     }
 }
 
@@ -342,8 +372,8 @@ impl Overview {
 
     fn read(log: &Log, checks: bool) -> Result<Self> {
         let bar = progress::bar(log);
-        let new = || Contents { checks, ..Contents::default() };
-        let mut contents = new();
+        let new = || Contents { checks, near: vec![MessageCount::default(); NEAR], ..Contents::default() };
+        let mut contents = Contents::default();
         let summary = read(log, new, &mut contents, |blocks| bar.set_position(blocks * 512))?;
         bar.finish_and_clear();
         contents.epoch_us = summary.epoch_us;

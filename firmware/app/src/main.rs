@@ -19,6 +19,7 @@ mod links;
 mod memory;
 mod registers;
 mod report;
+mod status;
 mod tasks;
 mod trap;
 mod watch;
@@ -75,9 +76,9 @@ fn start() -> board::Idle {
         boots,
     };
     let monitor = MONITOR.take();
-    let (items_in, items_out) = tasks::MAILBOX.split();
+    let (items_in, items_out) = status::MAILBOX.split();
     let keeper = restore(parts.store, items_out, parts.boot.cause, monitor);
-    let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor));
+    let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
     let monitoring = monitoring(monitor, identity);
     monitoring.restore_signing(keeper);
 
@@ -109,7 +110,7 @@ fn restore(
     cause: ResetCause,
     monitor: &mut Monitor,
 ) -> &'static mut Keeper<'static, board::StoreFlash> {
-    let keeper = KEEPER.init_with(|| Keeper::mount(store, items, &tasks::STORE_STATUS));
+    let keeper = KEEPER.init_with(|| Keeper::mount(store, items, &status::STORE_STATUS));
     if !cause.may_be_in_flight() {
         keeper.turn_ahead();
     }
@@ -120,6 +121,6 @@ fn restore(
 #[inline(never)]
 fn monitoring(monitor: &'static mut Monitor, identity: Boot<'static>) -> &'static mut Monitoring<'static> {
     MONITORING.init_with(|| {
-        Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+        Monitoring::new(monitor, WRITER.take(), identity, &status::CARD_STATUS, &status::PORT_STATUS)
     })
 }

@@ -168,21 +168,22 @@ impl<const N: usize> Coder for Writing<'_, N> {
     }
 }
 
-/// The reading end of the coder.
-pub(crate) struct Reading<'a> {
+/// The reading end of the coder, and what its user remembers beyond what both ends must.
+pub(crate) struct Reading<'a, R> {
     pub(crate) decoder: &'a mut Decoder,
     pub(crate) input: &'a [u8],
+    pub(crate) recall: &'a mut R,
 }
 
-impl Coder for Reading<'_> {
+impl<R> Coder for Reading<'_, R> {
     const WRITES: bool = false;
 
-    #[inline]
+    #[expect(clippy::inline_always, reason = "the reader's hottest path: a call more costs a tenth of it")]
+    #[inline(always)]
     fn symbol(&mut self, cdf: &mut Cdf, _: usize) -> usize {
-        let symbol = cdf.symbol_at(self.decoder.part(PROBABILITY_BITS));
-        let (start, size) = cdf.part_of(symbol);
+        let (width, offset) = self.decoder.parts();
+        let (symbol, start, size) = cdf.read(width, offset);
         self.decoder.take(start, size, self.input);
-        cdf.adapt(symbol);
         symbol
     }
 
@@ -198,7 +199,7 @@ impl Coder for Reading<'_> {
 
     #[inline]
     fn bit(&mut self, one: u32, _: bool) -> bool {
-        let bit = self.decoder.part(12) < one;
+        let bit = self.decoder.is_below(one, 12);
         let (start, size) = if bit { (0, one) } else { (one, 4_096 - one) };
         self.decoder.take(start, size, self.input);
         bit
@@ -209,50 +210,98 @@ impl Coder for Reading<'_> {
 pub(crate) struct Decoder {
     low: u32,
     range: u32,
-    code: u32,
+    /// How far into the interval the bytes point.
+    offset: u32,
     at: usize,
 }
 
 impl Decoder {
     /// Starts at byte `at` of the group's bytes. Needs `LOOKAHEAD` bytes, or the end of the stream.
     pub(crate) fn new(input: &[u8], at: usize) -> Self {
-        let mut decoder = Self { low: 0, range: u32::MAX, code: 0, at };
-        for _ in 0..LOOKAHEAD {
-            decoder.code = decoder.code << 8 | decoder.byte(input);
-        }
-        decoder
-    }
-
-    #[inline]
-    fn byte(&mut self, input: &[u8]) -> u32 {
-        let byte = input.get(self.at).copied().unwrap_or(0);
-        self.at = self.at.saturating_add(1);
-        u32::from(byte)
+        Self { low: 0, range: u32::MAX, offset: ahead(input, at), at: at.saturating_add(LOOKAHEAD) }
     }
 
     /// Which of the `1 << bits` parts comes next. `take` must follow with the symbol that holds it.
     #[inline]
     pub(crate) fn part(&mut self, bits: u32) -> u32 {
         self.range >>= bits;
-        (self.code.wrapping_sub(self.low) / self.range).min((1 << bits) - 1)
+        (self.offset / self.range).min((1 << bits) - 1)
+    }
+
+    /// Whether what comes next is one of the first so many of the `1 << bits` parts: `part` without dividing.
+    #[inline]
+    pub(crate) fn is_below(&mut self, parts: u32, bits: u32) -> bool {
+        self.range >>= bits;
+        self.offset < self.range.wrapping_mul(parts)
+    }
+
+    /// How wide each of the `2^16` parts is, and how far into all of them the next one lies: what `part` divides, for
+    /// whoever can do without. `take` must follow.
+    #[inline]
+    pub(crate) fn parts(&mut self) -> (u16, u32) {
+        self.range >>= PROBABILITY_BITS;
+        (self.range as u16, self.offset)
     }
 
     /// Removes the symbol that `part` found.
     #[inline]
     pub(crate) fn take(&mut self, start: u32, size: u32, input: &[u8]) {
-        self.low = self.low.wrapping_add(self.range.wrapping_mul(start));
+        let below = self.range.wrapping_mul(start);
+        self.low = self.low.wrapping_add(below);
+        self.offset = self.offset.wrapping_sub(below);
         self.range = self.range.wrapping_mul(size);
-        while let Some(range) = cut(self.low, self.range) {
-            self.code = self.code << 8 | self.byte(input);
-            self.low <<= 8;
-            self.range = range << 8;
+        // All bytes that are settled go at once: how many there are is as hard to foresee as the symbols.
+        let settled = (self.low ^ self.low.wrapping_add(self.range)).leading_zeros() & 0x18;
+        self.shift(settled, input);
+        if self.range < BOTTOM {
+            self.take_cut(input);
         }
+    }
+
+    /// The interval got too small without its top byte being settled: rare.
+    #[cold]
+    #[inline(never)]
+    fn take_cut(&mut self, input: &[u8]) {
+        while let Some(range) = cut(self.low, self.range) {
+            self.range = range;
+            self.shift(8, input);
+        }
+    }
+
+    /// Goes on by 0 to 24 bits.
+    #[inline]
+    fn shift(&mut self, bits: u32, input: &[u8]) {
+        let bits = bits & 31;
+        let pair = u64::from(self.offset) << 32 | u64::from(ahead(input, self.at));
+        self.offset = (pair << bits >> 32) as u32;
+        self.low <<= bits;
+        self.range <<= bits;
+        self.at += bits as usize / 8;
     }
 
     /// Bytes read of the group's bytes so far, those ahead included.
     pub(crate) fn position(&self) -> usize {
         self.at
     }
+}
+
+/// The next four bytes; zeros after the last one.
+#[inline]
+fn ahead(input: &[u8], at: usize) -> u32 {
+    match input.get(at..).and_then(|rest| rest.first_chunk()) {
+        Some(bytes) => u32::from_be_bytes(*bytes),
+        None => ahead_at_end(input, at),
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn ahead_at_end(input: &[u8], at: usize) -> u32 {
+    let mut bytes = [0; LOOKAHEAD];
+    for (place, byte) in bytes.iter_mut().zip(input.get(at..).unwrap_or_default()) {
+        *place = *byte;
+    }
+    u32::from_be_bytes(bytes)
 }
 
 #[cfg(test)]
@@ -277,7 +326,7 @@ mod tests {
             bytes.extend_from_slice(&end[..len]);
             let mut cdf = Cdf::FLAT;
             let mut decoder = Decoder::new(&bytes, 0);
-            let mut reading = Reading { decoder: &mut decoder, input: &bytes };
+            let mut reading = Reading { decoder: &mut decoder, input: &bytes, recall: &mut () };
             for index in 0..count {
                 assert_eq!(reading.symbol(&mut cdf, 0), (value(index) >> 28) as usize);
                 let bits = index % 33;

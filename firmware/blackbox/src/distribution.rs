@@ -1,5 +1,7 @@
 //! What the coder's probabilities are learned in: distributions over 16 symbols, and cells for single bits.
 
+mod at_once;
+
 /// Symbols of a distribution.
 pub(crate) const SYMBOLS: usize = 16;
 
@@ -100,16 +102,6 @@ impl Cdf {
         let end = if symbol == SYMBOLS - 1 { 1 << PROBABILITY_BITS } else { u32::from(self.0[symbol]) };
         let start = if symbol == 0 { 0 } else { u32::from(self.0[symbol - 1]) };
         (start, end - start)
-    }
-
-    /// The symbol that holds this part.
-    #[inline]
-    pub(crate) fn symbol_at(&self, part: u32) -> usize {
-        let mut symbol = 0;
-        for step in [8, 4, 2, 1] {
-            symbol += if u32::from(self.0[symbol + step - 1]) <= part { step } else { 0 };
-        }
-        symbol
     }
 
     /// Moves towards a symbol (modulo 16).
@@ -222,19 +214,6 @@ mod tests {
             cdf.adapt(symbol);
             assert_eq!(cdf.0, expected, "round {round}");
             assert!((0..SYMBOLS).all(|symbol| cdf.part_of(symbol).1 >= 1), "round {round}");
-        }
-    }
-
-    #[test]
-    fn the_symbol_at_a_part_is_the_one_that_owns_it() {
-        let mut cdf = Cdf::FLAT;
-        for symbol in [3, 3, 0, 15, 7, 7, 7] {
-            cdf.adapt(symbol);
-        }
-        for symbol in 0..SYMBOLS {
-            let (start, size) = cdf.part_of(symbol);
-            assert_eq!(cdf.symbol_at(start), symbol);
-            assert_eq!(cdf.symbol_at(start + size - 1), symbol);
         }
     }
 }

@@ -27,9 +27,8 @@ mod sector;
 mod writer;
 
 pub use assemble::{Assembler, BlockCounts, Step};
+pub use group::{Entry, GroupDecoder, GroupError, Outline};
 pub use hums_dialect::wire::FRAME_BYTES_MAX;
-
-pub use group::{Entry, GroupDecoder, GroupError};
 pub use preamble::Preamble;
 pub use reader::{Cause, Gap, Item, LogReader, Summary};
 pub use record::Record;

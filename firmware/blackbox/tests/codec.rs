@@ -8,7 +8,10 @@ mod common;
 use card::Card;
 use common::Random;
 use hums_blackbox::record::{Clock, Note, RECORD_BYTES_MAX};
-use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Record, SECTOR_BYTES, Sector, Writer};
+use hums_blackbox::{
+    Assembler, Entry, FRAME_BYTES_MAX, GroupDecoder, Item, LogReader, Outline, Record, SECTOR_BYTES, Sector,
+    Writer,
+};
 use hums_core::time::Instant;
 use proptest::prelude::*;
 
@@ -158,6 +161,61 @@ fn a_calm_link_is_small_and_comes_back() {
 #[test]
 fn a_rough_link_comes_back() {
     round_trip(&stream(8, 20_000, Link { messages: 60, odd_one_in: 5, signed: false }));
+}
+
+/// Reads with outlines only, but every seventh entry in full, and gives each frame's time, id, length and word.
+fn outlines(sectors: &[Sector]) -> Vec<(u64, u32, usize, bool)> {
+    let id = |bytes: &[u8]| match *bytes {
+        [0xfe, _, _, _, _, id, ..] => u32::from(id),
+        [0xfd, _, _, _, _, _, _, a, b, c, ..] => u32::from_le_bytes([a, b, c, 0]),
+        _ => panic!("no frame: {bytes:?}"),
+    };
+    let (mut assembler, mut decoder) = (Assembler::new(), Box::new(GroupDecoder::new()));
+    let mut steps: Vec<_> = sectors.iter().filter_map(|sector| assembler.feed(sector.bytes())).collect();
+    steps.extend(assembler.end());
+    let mut found = Vec::new();
+    for step in &steps {
+        decoder.push(&step.header, &step.sector).expect("in order");
+        loop {
+            let next = if found.len() % 7 == 0 {
+                decoder.next_entry().map(|entry| entry.map(Outline::Whole))
+            } else {
+                decoder.next_outline()
+            };
+            match next.map(|outline| outline.expect("sound")) {
+                Some(Outline::Frame { at, id, bytes, verified }) => {
+                    found.push((at.as_millis(), id, bytes, verified));
+                }
+                Some(Outline::Whole(Entry::Frame { at, bytes, verified })) => {
+                    found.push((at.as_millis(), id(bytes), bytes.len(), verified));
+                }
+                Some(Outline::Whole(Entry::Record { .. })) => {}
+                None => break,
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn an_outline_says_of_a_frame_what_the_frame_says() {
+    for (messages, odd_one_in, signed) in [(30, 0, false), (60, 5, false), (400, 3, true)] {
+        let frames = stream(13, 10_000, Link { messages, odd_one_in, signed });
+        let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
+        for (at, bytes, verified) in &frames {
+            writer.frame(Instant::from_millis(*at), bytes, *verified, &mut card).expect("room");
+        }
+        writer.finish(&mut card);
+        let found = outlines(&card.0);
+        assert_eq!(found.len(), frames.len());
+        for ((at, id, len, verified), (expected_at, bytes, expected)) in found.into_iter().zip(&frames) {
+            let expected_id = match bytes[0] {
+                0xfe => u32::from(bytes[5]),
+                _ => u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]),
+            };
+            assert_eq!((at, id, len, verified), (*expected_at, expected_id, bytes.len(), *expected));
+        }
+    }
 }
 
 #[test]

@@ -3,16 +3,24 @@
 use anyhow::Result;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
 
-use super::places::{Blocks, Log};
+use super::places::{BLOCK_BYTES, Blocks, Log};
 
 /// Sectors that belong together, in order: a group, or a part of one whose beginning is missing.
 pub type Group = Vec<Step>;
+
+/// Whether a block was set aside and never written, as most of a short log's segment was: the assembler only counts it,
+/// and takes as long as for a sector.
+fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
+    block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
+}
 
 /// Streams a log's groups.
 pub struct Groups<'a> {
     blocks: Blocks<'a>,
     assembler: Assembler,
     group: Group,
+    /// Blocks of zeros, which the assembler does not get.
+    empty: u64,
     ended: bool,
     ends_short: bool,
 }
@@ -25,6 +33,7 @@ impl<'a> Groups<'a> {
             blocks: log.blocks(),
             assembler,
             group: Vec::new(),
+            empty: 0,
             ended: false,
             ends_short: log.ends_short(),
         }
@@ -34,6 +43,10 @@ impl<'a> Groups<'a> {
     pub fn next_group(&mut self) -> Result<Option<Group>> {
         while !self.ended {
             let step = if let Some(block) = self.blocks.next_block()? {
+                if is_empty(&block) {
+                    self.empty += 1;
+                    continue;
+                }
                 self.assembler.feed(&block)
             } else {
                 self.ended = true;
@@ -43,7 +56,9 @@ impl<'a> Groups<'a> {
             let full = self.group.len() >= GROUP_SECTORS;
             let broken = step.missing > 0 || self.group.last().is_some_and(|last| last.header.partial);
             if !self.group.is_empty() && (step.header.starts_group() || broken || full) {
-                return Ok(Some(std::mem::replace(&mut self.group, vec![step])));
+                let mut next = Vec::with_capacity(GROUP_SECTORS);
+                next.push(step);
+                return Ok(Some(std::mem::replace(&mut self.group, next)));
             }
             self.group.push(step);
         }
@@ -52,7 +67,8 @@ impl<'a> Groups<'a> {
 
     /// What was seen so far.
     pub fn counts(&self) -> BlockCounts {
-        self.assembler.counts()
+        let counts = self.assembler.counts();
+        BlockCounts { blocks: counts.blocks + self.empty, empty: counts.empty + self.empty, ..counts }
     }
 
     /// The session that its sectors name, once one was seen.

@@ -11,7 +11,7 @@ use super::fat::{self, Extent};
 /// Bytes of a block: a sector of the log.
 pub const BLOCK_BYTES: usize = 512;
 /// How much is read at once.
-const READ_BYTES: u64 = 256 * 1024;
+const READ_BYTES: u64 = 64 * 1024;
 
 /// A part of a log: places in one file.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -7,7 +7,9 @@ use std::sync::mpsc;
 
 use anyhow::Result;
 use hums_blackbox::record::Keep;
-use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Record};
+use hums_blackbox::{
+    BlockCounts, Cause, Entry, GROUP_SECTORS, Gap, GroupDecoder, GroupError, Outline, Record, SECTOR_BYTES,
+};
 use hums_core::time::Instant;
 
 use super::groups::{Group, Groups};
@@ -17,10 +19,21 @@ use super::places::Log;
 const GROUPS_PER_THREAD: usize = 2;
 const GROUPS_MAX: usize = 16;
 
+/// A whole group: what is shorter is decoded here.
+const GROUP_BYTES: u64 = (GROUP_SECTORS * SECTOR_BYTES) as u64;
+
 /// What one group's entries become; made in parallel, handed on in order.
 pub trait Collect: Send {
     /// Takes the next entry of the group.
     fn entry(&mut self, entry: &Entry<'_>);
+
+    /// Whether frames are only counted: then `frame` gets them, which is cheaper, but for those that are odd.
+    fn only_counts(&self) -> bool {
+        false
+    }
+
+    /// Takes the next entry, which is a frame of this id and so many bytes, sound in its form.
+    fn frame(&mut self, _at: Instant, _id: u32, _bytes: usize, _verified: bool) {}
 }
 
 /// Where collected groups go, in order.
@@ -69,6 +82,10 @@ pub fn read<C: Collect>(
     deliver: &mut impl Deliver<C>,
     mut progress: impl FnMut(u64),
 ) -> Result<Summary> {
+    if log.bytes() > GROUP_BYTES && rayon::current_thread_index().is_none() {
+        // Its workers begin here: they are awake when the first groups are read.
+        rayon::current_num_threads();
+    }
     let mut groups = Groups::new(log);
     let mut stitch = Stitch::default();
     let (first, second) = (groups.next_group()?, groups.next_group()?);
@@ -178,6 +195,7 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
     let (mut error, mut begun, mut frames, mut last) = (None, None, 0, None);
     let mut keeps: Option<(Keep, Keep)> = None;
     let mut epoch_us = None;
+    let counts = collected.only_counts();
     for step in group {
         if let Err(why) = decoder.push(&step.header, &step.sector) {
             error = error.or(Some(why));
@@ -186,9 +204,14 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
         let preamble = decoder.preamble();
         begun.get_or_insert((Instant::from_millis(preamble.start_ms), preamble.frames_before));
         epoch_us = epoch_us.or(preamble.epoch_micros);
-        while let Some(entry) = decoder.next_entry() {
-            match entry {
-                Ok(entry) => {
+        while let Some(outline) = next(decoder, counts) {
+            match outline {
+                Ok(Outline::Frame { at, id, bytes, verified }) => {
+                    last = Some(at);
+                    frames += 1;
+                    collected.frame(at, id, bytes, verified);
+                }
+                Ok(Outline::Whole(entry)) => {
                     let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
                     last = Some(at);
                     frames += u32::from(matches!(entry, Entry::Frame { .. }));
@@ -225,6 +248,11 @@ fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: 
         keeps,
         epoch_us,
     }
+}
+
+/// The next entry, of a frame no more than its outline where that is enough.
+fn next(decoder: &mut GroupDecoder, counts: bool) -> Option<Result<Outline<'_>, GroupError>> {
+    if counts { decoder.next_outline() } else { Some(decoder.next_entry()?.map(Outline::Whole)) }
 }
 
 /// Puts groups together again and finds what is missing between them.

@@ -2,15 +2,19 @@
 //!
 //! ```text
 //! answer_speed HUMS PYTHON RECORDING.tlog...      the ratios: pymavlink's mavlogdump and gzip beside it
-//! answer_speed HUMS --long MIB RECORDING.tlog     memory: a log of so many MiB, made of one recording over and over
+//! answer_speed HUMS --long MIB RECORDING.tlog [WHAT...]
+//!                                                 memory: a log of so many MiB, made of one recording over and over, and
+//!                                                 all that can be made of it, or only what is named (`info`, `csv`, …)
 //! ```
+//! What goes into files takes up to 30 times the log's size for as long as it is measured.
+//!
 //! For instance: `cargo run --release -p hums-tests --bin answer_speed -- target/release/hums target/venv/bin/python
 //! tests/flights/ap_quad_guided.tlog`.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
@@ -33,13 +37,15 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match *words.as_slice() {
-        [hums, "--long", mib, recording] => long(Path::new(hums), mib, Path::new(recording)),
+        [hums, "--long", mib, recording, ref what @ ..] => {
+            long(Path::new(hums), mib, Path::new(recording), what)
+        }
         [hums, python, ref recordings @ ..] if !recordings.is_empty() => {
             recordings.iter().try_for_each(|one| ratios(Path::new(hums), Path::new(python), Path::new(one)))
         }
         _ => {
             eprintln!(
-                "usage: answer_speed HUMS PYTHON RECORDING.tlog... | answer_speed HUMS --long MIB RECORDING.tlog"
+                "usage: answer_speed HUMS PYTHON RECORDING.tlog... | answer_speed HUMS --long MIB RECORDING.tlog [WHAT...]"
             );
             return ExitCode::from(2);
         }
@@ -142,38 +148,48 @@ print('\\n'.join(sorted(t for t in types if t != 'BAD_DATA' and not t.startswith
     Ok(types)
 }
 
+/// What is made of a long log: its name and the command's words. What goes to standard output is not kept: all of a
+/// long log is hundreds of gigabytes of text.
+const MADE: [(&str, &[&str]); 9] = [
+    ("info", &["info"]),
+    ("verify", &["verify"]),
+    ("report", &["report", "-o", "OUT"]),
+    ("tlog", &["decode", "-o", "-", "--format", "tlog"]),
+    ("jsonl", &["decode", "-o", "-", "--format", "jsonl"]),
+    ("influx", &["decode", "-o", "-", "--format", "influx"]),
+    ("csv", &["decode", "-o", "OUT", "--format", "csv"]),
+    ("parquet", &["decode", "-o", "OUT", "--format", "parquet"]),
+    ("thesis", &["decode", "-o", "OUT", "--format", "thesis"]),
+];
+
 /// A long log as a recorder would have made it: groups of one recording over and over, later each time.
-fn long(hums: &Path, mib: &str, recording: &Path) -> Result<()> {
+fn long(hums: &Path, mib: &str, recording: &Path, what: &[&str]) -> Result<()> {
     let bytes = mib.parse::<u64>().context("MIB is a number")? << 20;
+    if let Some(unknown) = what.iter().find(|word| MADE.iter().all(|(name, _)| name != *word)) {
+        bail!("{unknown}: one of {}", MADE.map(|(name, _)| name).join(", "));
+    }
     let dir = tempfile::tempdir()?;
     let (log, short) = (dir.path().join("long.hum"), dir.path().join("short.hum"));
     Command::new(hums).arg("pack").arg(recording).arg("-o").arg(&short).output()?;
     let (written, frames) = lengthen(&short, &log, bytes)?;
     println!("a log of {} MiB with {frames} frames", written >> 20);
-    for (what, arguments) in [
-        ("info", &["info"][..]),
-        ("decode to csv, one type", &["decode", "-o", "OUT", "--format", "csv", "--message", "HEARTBEAT"]),
-        (
-            "decode to parquet, one type",
-            &["decode", "-o", "OUT", "--format", "parquet", "--message", "ATTITUDE"],
-        ),
-        ("decode to jsonl", &["decode", "-o", "-", "--format", "jsonl"]),
-    ] {
+    for (name, arguments) in MADE.iter().filter(|(name, _)| what.is_empty() || what.contains(name)) {
         let out = dir.path().join("out");
         let mut command = Command::new("sh");
-        // What it prints is not kept: a long log is hundreds of gigabytes of text.
-        let words: Vec<PathBuf> = arguments
-            .iter()
-            .map(|word| if *word == "OUT" { out.clone() } else { PathBuf::from(word) })
-            .collect();
+        let words = arguments.iter().map(|word| if *word == "OUT" { out.as_os_str() } else { word.as_ref() });
         command.args(["-c", "exec \"$@\" > /dev/null", "sh"]).arg(hums).args(words).arg(&log);
         let start = Instant::now();
         let outcome = child::run(&mut command, LIMIT).expect_code(&[0]);
         println!(
-            "{what}: {:.1} MiB of memory at most, {:.0} s",
+            "{name}: {:.1} MiB of memory at most, {:.0} s",
             outcome.memory_kib_max as f64 / 1024.0,
             start.elapsed().as_secs_f64()
         );
+        if out.is_dir() {
+            fs::remove_dir_all(&out)?;
+        } else if out.exists() {
+            fs::remove_file(&out)?;
+        }
     }
     Ok(())
 }

@@ -7,10 +7,10 @@ use embassy_time::{Duration, with_timeout};
 use hums_onboard::Task;
 use hums_onboard::queues::{AutopilotOut, FRAME_BYTES_MAX, GsOut};
 
-use super::SUPERVISOR;
 use crate::boards::board;
 use crate::boards::machine::Transmit;
 use crate::links::{self, now};
+use crate::status::SUPERVISOR;
 
 /// How often it reports in while there is nothing to send.
 const REPORT: Duration = Duration::from_millis(500);

@@ -6,12 +6,12 @@ use hums_onboard::Task;
 use hums_onboard::queues::FramesIn;
 use hums_onboard::reception::{Reception, SILENCE};
 
-use super::{PORT_STATUS, SUPERVISOR};
 use crate::boards::board;
 use crate::boards::machine::{FETCH_BYTES, Receive};
 use crate::costs::measure;
 use crate::links::{self, now};
 use crate::report::Stage;
+use crate::status::{PORT_STATUS, SUPERVISOR};
 
 #[embassy_executor::task]
 pub(crate) async fn run(mut port: board::AutopilotRx, mut frames: FramesIn<'static>) -> ! {

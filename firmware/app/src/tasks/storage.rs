@@ -11,7 +11,7 @@ use hums_onboard::{Keeper, Service, Storage, Task};
 use hums_recorder::HeldBlocks;
 use static_cell::{ConstStaticCell, StaticCell};
 
-use super::{CARD_STATUS, SUPERVISOR};
+use crate::status::{CARD_STATUS, SUPERVISOR};
 
 use crate::boards::board;
 use crate::costs::measure;

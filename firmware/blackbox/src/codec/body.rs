@@ -5,9 +5,10 @@ use core::ops::Range;
 use super::element::{Context, Distributions, ELEMENTS, Element, Elements, What};
 use super::frame::Frame;
 use super::links::{LINKS, Link, REGISTERS};
+use super::recall::{End, Recall, WORDS};
 use super::slots::{Length, Slot};
 use super::texts::Texts;
-use crate::coder::Coder;
+use crate::coder::{Coder, Reading};
 
 /// Context of bytes by their place.
 const AT: u32 = 0x100;
@@ -50,7 +51,7 @@ impl Body {
     }
 
     /// All of the payload.
-    pub(super) fn payload<C: Coder>(
+    pub(super) fn payload<C: End>(
         &mut self,
         coder: &mut C,
         slot: &mut Slot,
@@ -60,7 +61,15 @@ impl Body {
         let mut end = 0;
         if slot.layout.is_some() {
             let calm = slot.quiet && self.calm(coder, slot, frame)?;
-            end = self.fields(coder, slot, frame, elapsed_ms, calm)?;
+            end = match coder.reading() {
+                Some(mut reading) if calm || !slot.quiet => match reading.recall.end(limit(slot)) {
+                    Some(end) => self.lively(&mut reading, slot, frame, elapsed_ms).map(|()| end)?,
+                    None => self.fields(coder, slot, frame, elapsed_ms, calm)?,
+                },
+                _ => self.fields(coder, slot, frame, elapsed_ms, calm)?,
+            };
+        } else if !C::WRITES {
+            frame.clear();
         }
         if let Length::Fixed(len) = slot.length {
             for at in end..usize::from(len) {
@@ -69,12 +78,18 @@ impl Body {
                 frame.payload[at] = byte;
             }
         }
+        if let Some(reading) = coder.reading() {
+            match slot.length {
+                Length::Fixed(len) if usize::from(len) > end => reading.recall.forget(),
+                _ => reading.recall.keep(limit(slot), end),
+            }
+        }
         Some(())
     }
 
     /// The fields that the layout describes; gives where they end. `calm`: the quiet ones stay as they are.
     #[inline(never)]
-    fn fields<C: Coder>(
+    fn fields<C: End>(
         &mut self,
         coder: &mut C,
         slot: &mut Slot,
@@ -83,6 +98,10 @@ impl Body {
         calm: bool,
     ) -> Option<usize> {
         let limit = limit(slot);
+        if let Some(reading) = coder.reading() {
+            reading.recall.forget();
+            frame.clear();
+        }
         let (clock_us, clock_ms) = (self.common.clock_us, self.common.clock_ms);
         let mut context = Context { elapsed_ms, clock_us, clock_ms, neighbour: None, link: None };
         let (mut offset, mut quiet) = (0, 0);
@@ -95,6 +114,7 @@ impl Body {
             }
             let place = frame.place(offset);
             let stays = calm && element.is_quiet();
+            let left = elements.len();
             match what {
                 What::Text => {
                     let text = frame.payload.get_mut(offset..offset + size)?;
@@ -103,7 +123,7 @@ impl Body {
                 _ if stays => {
                     if !C::WRITES {
                         let upper = if what.is_wide() { elements.as_slice().first()?.last } else { 0 };
-                        put(place, u64::from(upper) << 32 | u64::from(element.last), size);
+                        *place = (u64::from(upper) << 32 | u64::from(element.last)).to_le_bytes();
                     }
                 }
                 What::Integer1 | What::Integer2 | What::Integer4 => {
@@ -113,7 +133,7 @@ impl Body {
                         self.common.publish(links_at(&mut link, slot.key.id, offset).1, element);
                     }
                     if !C::WRITES {
-                        put(place, u64::from(value), size);
+                        put(place, value, size);
                     }
                 }
                 What::Millis | What::Micros => self.common.time(coder, element, place, &context),
@@ -134,10 +154,51 @@ impl Body {
                 What::Upper => {}
             }
             quiet |= element.quiet_bits();
+            if let Some(reading) = coder.reading() {
+                reading.recall.visited(slot, left, offset, element);
+            }
             offset += size;
         }
         slot.quiet = Element::any_quiet(quiet);
         Some(offset)
+    }
+
+    /// The same of a frame whose quiet fields stay as they are in the frame before, for the reader: it visits the others.
+    #[inline(never)]
+    fn lively(
+        &mut self,
+        coder: &mut Reading<'_, Recall>,
+        slot: &mut Slot,
+        frame: &mut Frame,
+        elapsed_ms: u32,
+    ) -> Option<()> {
+        let (clock_us, clock_ms) = (self.common.clock_us, self.common.clock_ms);
+        let mut context = Context { elapsed_ms, clock_us, clock_ms, neighbour: None, link: None };
+        let mut link = usize::from(slot.links);
+        let elements = self.elements.list.get_mut(elements_in(slot))?;
+        let mut quiet = 0;
+        for word in 0..WORDS {
+            let (mut to_come, mut lively) = (*coder.recall.lively(word), 0);
+            while to_come != 0 {
+                let bit = to_come & to_come.wrapping_neg();
+                let index = word * 64 + to_come.trailing_zeros() as usize;
+                to_come ^= bit;
+                let offset = coder.recall.offset(slot, index)?;
+                let (element, rest) = elements.get_mut(index..)?.split_first_mut()?;
+                self.common.element(
+                    coder,
+                    (element, rest),
+                    (slot, frame),
+                    offset,
+                    (&mut link, &mut context),
+                )?;
+                quiet |= element.quiet_bits();
+                lively |= if element.is_quiet() { 0 } else { bit };
+            }
+            *coder.recall.lively(word) = lively;
+        }
+        slot.quiet |= Element::any_quiet(quiet);
+        Some(())
     }
 
     /// Whether all quiet elements stay as they are: one bit for all of them.
@@ -220,6 +281,44 @@ impl Body {
 }
 
 impl Common {
+    /// One element of a frame that is read, at this offset; `rest` are those after it.
+    #[inline]
+    fn element(
+        &mut self,
+        coder: &mut Reading<'_, Recall>,
+        (element, rest): (&mut Element, &mut [Element]),
+        (slot, frame): (&Slot, &mut Frame),
+        offset: usize,
+        (link, context): (&mut usize, &mut Context),
+    ) -> Option<()> {
+        let size = usize::from(element.size);
+        let place = frame.place(offset);
+        match element.what {
+            What::Float => {
+                let mut links = (None, None);
+                if element.has_links() {
+                    links = links_at(link, slot.key.id, offset);
+                }
+                self.float(coder, element, place, context, links);
+            }
+            What::Integer1 | What::Integer2 | What::Integer4 => {
+                let value = self.distributions.integer(coder, element, 0);
+                if element.has_links() {
+                    self.publish(links_at(link, slot.key.id, offset).1, element);
+                }
+                put(place, value, size);
+            }
+            What::Millis | What::Micros => self.time(coder, element, place, context),
+            What::Wide | What::WideTime => self.wide(coder, element, rest.first_mut()?, place, context),
+            What::Text => {
+                let text = frame.payload.get_mut(offset..offset + size)?;
+                self.texts.code(coder, element, text, false)?;
+            }
+            What::Instance | What::Upper => {}
+        }
+        Some(())
+    }
+
     #[inline]
     fn time<C: Coder>(
         &mut self,
@@ -237,7 +336,7 @@ impl Common {
         }
         self.advance(at_last.wrapping_add(step_us));
         if !C::WRITES {
-            put(place, u64::from(value), 4);
+            put(place, value, 4);
         }
     }
 
@@ -256,7 +355,7 @@ impl Common {
             self.advance(at_last.wrapping_add((value as u32).wrapping_sub(last)));
         }
         if !C::WRITES {
-            put(place, value, 8);
+            *place = value.to_le_bytes();
         }
     }
 
@@ -278,7 +377,7 @@ impl Common {
         context.neighbour = Some((f32::from_bits(value), f32::from_bits(last)));
         self.publish(publishes, element);
         if !C::WRITES {
-            put(place, u64::from(value), 4);
+            put(place, value, 4);
         }
     }
 
@@ -322,11 +421,14 @@ fn word(place: &[u8; 8]) -> u32 {
     u32::from_le_bytes([place[0], place[1], place[2], place[3]])
 }
 
-/// The lower `size` bytes of a value.
+/// A value of 1, 2 or 4 bytes in its place, and nothing else.
 #[inline]
-fn put(place: &mut [u8; 8], value: u64, size: usize) {
-    for (place, byte) in place.iter_mut().zip(value.to_le_bytes()).take(size) {
-        *place = byte;
+fn put(place: &mut [u8; 8], value: u32, size: usize) {
+    let [a, b, c, d] = value.to_le_bytes();
+    match size {
+        1 => place[0] = a,
+        2 => *place.first_chunk_mut().expect("two of eight") = [a, b],
+        _ => *place.first_chunk_mut().expect("four of eight") = [a, b, c, d],
     }
 }
 

@@ -3,7 +3,8 @@
 
 use hums_dialect::crc;
 use hums_dialect::wire::{
-    HEADER_V1_BYTES, HEADER_V2_BYTES, INCOMPAT_SIGNED, PAYLOAD_BYTES_MAX, SIGNATURE_BYTES, START_V1, START_V2,
+    CHECKSUM_BYTES, HEADER_V1_BYTES, HEADER_V2_BYTES, INCOMPAT_SIGNED, PAYLOAD_BYTES_MAX, SIGNATURE_BYTES,
+    START_V1, START_V2,
 };
 
 use crate::bytes::copy_few;
@@ -58,10 +59,9 @@ impl Frame {
         self.v2 && self.incompat & INCOMPAT_SIGNED != 0
     }
 
-    /// Nothing in it, as a frame to be read begins.
+    /// Nothing in the payload, as a frame to be read begins.
     pub(crate) fn clear(&mut self) {
         self.clear_payload(0);
-        self.len = 0;
     }
 
     /// Keeps `len` bytes of the payload; clears what a frame before left beyond.
@@ -110,8 +110,19 @@ impl Frame {
         Some(())
     }
 
-    /// Puts the frame together; gives its length.
-    pub(crate) fn assemble(&self, out: &mut [u8; ENTRY_BYTES_MAX]) -> usize {
+    /// Its length when put together.
+    pub(crate) fn bytes(&self) -> usize {
+        let head = if self.v2 { HEADER_V2_BYTES } else { HEADER_V1_BYTES };
+        head + self.len.min(PAYLOAD_BYTES_MAX)
+            + CHECKSUM_BYTES
+            + if self.signed() { SIGNATURE_BYTES } else { 0 }
+    }
+
+    /// Puts a frame together that was read, with the checksum that this seed makes, or with its own.
+    pub(crate) fn assemble(&mut self, seed: Option<u8>, out: &mut [u8; ENTRY_BYTES_MAX]) {
+        if let Some(seed) = seed {
+            self.checksum = crc::step(self.checksum_before_seed(), seed);
+        }
         let head = self.head();
         let head = &head[..if self.v2 { HEADER_V2_BYTES } else { HEADER_V1_BYTES }];
         let payload = &self.payload[..self.len.min(PAYLOAD_BYTES_MAX)];
@@ -121,7 +132,15 @@ impl Frame {
             out[at..at + part.len()].copy_from_slice(part);
             at += part.len();
         }
-        at
+    }
+
+    /// The message id as its head has it, if anyone knows what a frame with its flags means.
+    pub(crate) fn known_id(&self) -> Option<u32> {
+        match (self.v2, self.incompat) {
+            (false, _) => Some(self.id & 0xff),
+            (true, 0 | INCOMPAT_SIGNED) => Some(self.id & 0x00ff_ffff),
+            _ => None,
+        }
     }
 
     fn head(&self) -> [u8; HEADER_V2_BYTES] {
@@ -153,10 +172,23 @@ impl Frame {
         }
     }
 
-    /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it.
+    /// The payload's length without its zeros at the end, at least 1: what a MAVLink 2 sender keeps of it. Of a frame that
+    /// is read: there are only zeros beyond `full`.
     pub(crate) fn trimmed(&self, full: usize) -> usize {
-        let payload = &self.payload[..full.min(PAYLOAD_BYTES_MAX)];
-        payload.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1)
+        let words = self.payload.as_chunks().0;
+        let words = words.get(..full.div_ceil(size_of::<u64>())).unwrap_or_default();
+        for (index, word) in words.iter().enumerate().rev() {
+            let word = u64::from_le_bytes(*word);
+            if word != 0 {
+                return (index + 1) * size_of::<u64>() - word.leading_zeros() as usize / 8;
+            }
+        }
+        1
+    }
+
+    /// Of a frame that was read: bytes of the payload that may not be zero.
+    pub(crate) fn fill_ends(&mut self, at: usize) {
+        self.used = (at + size_of::<u64>()).min(self.payload.len());
     }
 }
 
@@ -170,9 +202,13 @@ mod tests {
         let mut frame = Frame::empty();
         frame.parse(&heartbeat).expect("a frame");
         assert_eq!(crc::step(frame.checksum_before_seed(), 50), frame.checksum);
-        let mut out = [0; ENTRY_BYTES_MAX];
-        let len = frame.assemble(&mut out);
-        assert_eq!(&out[..len], heartbeat);
+        assert_eq!(crc::extra_of(frame.checksum_before_seed(), frame.checksum), Some(50));
+        for seed in [None, Some(50)] {
+            let mut out = [0; ENTRY_BYTES_MAX];
+            frame.assemble(seed, &mut out);
+            assert_eq!(&out[..frame.bytes()], heartbeat);
+            frame.checksum = 0;
+        }
         assert!(frame.parse(&heartbeat[..16]).is_none());
         assert!(frame.parse(&[0xfd; 12]).is_none());
     }

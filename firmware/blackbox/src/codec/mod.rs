@@ -9,20 +9,22 @@ mod element;
 mod frame;
 mod header;
 mod links;
+mod recall;
 mod records;
 mod slots;
 mod text;
 mod texts;
 
-use hums_dialect::crc;
-
 use body::Body;
 pub(crate) use frame::Frame;
 use header::{Headers, REPEATED};
+use recall::End;
+pub(crate) use recall::Recall;
 use records::Records;
+pub(crate) use slots::SLOTS;
 use slots::{INSTANCE_BYTES, Key, Length, Next, Slots};
 
-use crate::coder::{Coder, Decoder, Encoder, Reading, Scratch, Writing};
+use crate::coder::{Coder, Encoder, Reading, Scratch, Writing};
 use crate::distribution::Cdf;
 use crate::layouts::Layouts;
 use crate::limits::ENTRY_BYTES_MAX;
@@ -131,27 +133,28 @@ impl Model {
         self.plain(coder, decoded, &mut buffer, plain);
     }
 
-    /// Reads an entry.
+    /// Reads an entry. Its bytes are in the buffer; those of a frame of the model are not put together yet, and it gives
+    /// which of `frames` it is.
     pub(crate) fn decode(
         &mut self,
-        decoder: &mut Decoder,
-        input: &[u8],
-        frame: &mut Frame,
+        coder: &mut Reading<'_, Recall>,
+        frames: &mut [Frame; SLOTS],
         buffer: &mut [u8; ENTRY_BYTES_MAX],
-    ) -> Result<Decoded, Corrupt> {
-        let coder = &mut Reading { decoder, input };
+    ) -> Result<(Decoded, Option<usize>), Corrupt> {
         let rough = self.headers.is_rough();
         let (next, expected) = self.slots.next(coder, Next::Plain, false, rough).ok_or(Corrupt)?;
         if next == Next::Plain || next == Next::Record {
             let verified = Kind::Frame { verified: false };
             let kind = if next == Next::Record { Kind::Record } else { verified };
-            return self.plain(coder, Decoded { kind, at_ms: 0, len: 0 }, buffer, false).ok_or(Corrupt);
+            let decoded = self.plain(coder, Decoded { kind, at_ms: 0, len: 0 }, buffer, false);
+            return Ok((decoded.ok_or(Corrupt)?, None));
         }
-        frame.clear();
+        let index = if let Next::Slot(slot) = next { usize::from(slot) } else { self.slots.used() };
+        let frame = frames.get_mut(index).ok_or(Corrupt)?;
+        coder.recall.turn_to(index);
         let (verified, at_ms) =
             self.frame(coder, (next, expected), NO_KEY, frame, false, 0).ok_or(Corrupt)?;
-        let len = frame.assemble(buffer);
-        Ok(Decoded { kind: Kind::Frame { verified }, at_ms, len })
+        Ok((Decoded { kind: Kind::Frame { verified }, at_ms, len: frame.bytes() }, Some(index)))
     }
 
     /// Whether the header of a frame to be written is as its slot lets expect.
@@ -242,7 +245,7 @@ impl Model {
     }
 
     /// A frame of a slot. Gives whether it is verified, and its time.
-    fn frame<C: Coder>(
+    fn frame<C: End>(
         &mut self,
         coder: &mut C,
         (next, expected): (Next, bool),
@@ -270,6 +273,10 @@ impl Model {
         slot.at_ms = at_ms as u32;
         slot.frames = slot.frames.saturating_add(1);
         if plan.header == REPEATED {
+            if let Some(reading) = coder.reading() {
+                reading.recall.forget();
+                frame.clear();
+            }
             self.body.restore(slot, frame);
         } else {
             self.body.payload(coder, slot, frame, elapsed_ms)?;
@@ -281,8 +288,11 @@ impl Model {
                     Length::Fixed(len) => usize::from(len),
                 };
             }
-            frame.checksum =
-                plan.checksum.unwrap_or_else(|| crc::step(frame.checksum_before_seed(), slot.seed));
+            frame.fill_ends(frame.len.max(usize::from(slot.described)));
+            frame.checksum = plan.checksum.unwrap_or(0);
+            if let Some(reading) = coder.reading() {
+                reading.recall.seed = plan.checksum.is_none().then_some(slot.seed);
+            }
         }
         if frame.signed() {
             self.headers.signature(coder, sender, frame)?;

@@ -238,6 +238,11 @@ impl Slots {
         Some(used as u8)
     }
 
+    /// How many slots there are.
+    pub(crate) fn used(&self) -> usize {
+        usize::from(self.used)
+    }
+
     /// Whether a further slot fits.
     pub(crate) fn has_room(&self) -> bool {
         usize::from(self.used) < SLOTS

@@ -12,7 +12,7 @@ use semihosting::{println, process};
 use super::clock;
 use crate::boards::machine::ResetCause;
 use crate::fault;
-use crate::tasks::{CARD_STATUS, PORT_STATUS};
+use crate::status::{CARD_STATUS, PORT_STATUS};
 
 /// The host is to start the emulator again.
 const EXIT_AGAIN: i32 = 3;

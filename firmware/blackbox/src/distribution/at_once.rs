@@ -1,0 +1,163 @@
+//! The reader's side of a distribution on a PC: all places at once, and no branch. A reader's processor cannot foresee
+//! what the symbols are, so each branch on one is guessed wrongly about as often as the symbol is news; and a division
+//! and a search wait for one another. Both are most of what reading takes.
+
+use super::Cdf;
+
+impl Cdf {
+    /// The symbol that holds a place among parts of this width, with where it begins and its size: what the reader
+    /// needs, who learns the symbol only here. Moves towards it as `adapt` does.
+    #[inline]
+    pub(crate) fn read(&mut self, width: u16, offset: u32) -> (usize, u32, u32) {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: SSE2 is part of x86-64.
+        unsafe {
+            sse2::read(&mut self.0, width, offset)
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            let part = (offset / u32::from(width)).min(u32::from(u16::MAX));
+            let mut symbol = 0;
+            for step in [8, 4, 2, 1] {
+                symbol += if u32::from(self.0[symbol + step - 1]) <= part { step } else { 0 };
+            }
+            let (start, size) = self.part_of(symbol);
+            self.adapt(symbol);
+            (symbol, start, size)
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod sse2 {
+    use core::arch::x86_64::{
+        __m128i, _mm_add_epi16, _mm_cmpgt_epi32, _mm_cvtsi32_si128, _mm_extract_epi16, _mm_loadu_si128,
+        _mm_movemask_epi8, _mm_mulhi_epu16, _mm_mullo_epi16, _mm_packs_epi16, _mm_packs_epi32,
+        _mm_set1_epi16, _mm_set1_epi32, _mm_srl_epi16, _mm_storeu_si128, _mm_sub_epi16, _mm_unpackhi_epi16,
+        _mm_unpacklo_epi16, _mm_xor_si128,
+    };
+
+    use super::super::{PROBABILITY_BITS, SPEED_LAST, SPEEDS, SURE, SYMBOLS, USES, USES_MAX, gain};
+
+    /// Ways to adapt, for the reader: by uses, and the last one for what is sure already and stays as it is.
+    const WAYS: usize = USES_MAX as usize + 2;
+    const STAYS: usize = WAYS - 1;
+
+    /// How far each way goes: `1 / 2^n` of it; nothing of 16 bits is left of it where it stays.
+    static SHIFTS: [u8; WAYS] = shifts();
+
+    const fn shifts() -> [u8; WAYS] {
+        let mut shifts = [SPEED_LAST as u8; WAYS];
+        let mut uses = 0;
+        while uses < SPEEDS.len() {
+            shifts[uses] = SPEEDS[uses];
+            uses += 1;
+        }
+        shifts[STAYS] = u16::BITS as u8;
+        shifts
+    }
+
+    /// What each place gains, the uses among them, by way and symbol.
+    static ALL_GAINS: [[[u16; SYMBOLS]; SYMBOLS]; WAYS] = all_gains();
+
+    const fn all_gains() -> [[[u16; SYMBOLS]; SYMBOLS]; WAYS] {
+        let mut gains = [[[0; SYMBOLS]; SYMBOLS]; WAYS];
+        let shifts = shifts();
+        let mut index = 0;
+        while index < STAYS * SYMBOLS * SYMBOLS {
+            let (rest, place) = (index / SYMBOLS, index % SYMBOLS);
+            let (uses, symbol) = (rest / SYMBOLS, rest % SYMBOLS);
+            gains[uses][symbol][place] = if place < USES {
+                gain(place, symbol, shifts[uses] as u32)
+            } else {
+                // One more, and what the step takes away from them.
+                (uses < USES_MAX as usize) as u16 + (uses as u16 >> shifts[uses])
+            };
+            index += 1;
+        }
+        gains
+    }
+
+    /// The symbol that holds a place among parts of this width, where it begins and its size; adapts the distribution.
+    #[inline]
+    #[target_feature(enable = "sse2")]
+    pub(super) fn read(places: &mut [u16; SYMBOLS], width: u16, offset: u32) -> (usize, u32, u32) {
+        let (lower, upper) = halves(places);
+        // Numbers without a sign are compared as ones with a sign, all moved by as much.
+        let moved = _mm_set1_epi32(i32::MIN);
+        let offset = _mm_set1_epi32(offset as i32 ^ i32::MIN);
+        let width = _mm_set1_epi16(width as i16);
+        let beyond = |places| {
+            let (low, high) = (_mm_mullo_epi16(places, width), _mm_mulhi_epu16(places, width));
+            let one = _mm_xor_si128(_mm_unpacklo_epi16(low, high), moved);
+            let other = _mm_xor_si128(_mm_unpackhi_epi16(low, high), moved);
+            _mm_packs_epi32(_mm_cmpgt_epi32(one, offset), _mm_cmpgt_epi32(other, offset))
+        };
+        // The first one that begins beyond the place; the last one is the uses, and no symbol begins there.
+        let beyond = _mm_movemask_epi8(_mm_packs_epi16(beyond(lower), beyond(upper))) as u32 | 1 << USES;
+        let symbol = beyond.trailing_zeros() as usize % SYMBOLS;
+
+        let (end, start) = (u32::from(places[symbol]), u32::from(places[symbol.wrapping_sub(1) % SYMBOLS]));
+        let end = if symbol == SYMBOLS - 1 { 1 << PROBABILITY_BITS } else { end };
+        let start = start & u32::from(symbol != 0).wrapping_neg();
+
+        let uses = (_mm_extract_epi16::<7>(upper) as usize).min(usize::from(USES_MAX));
+        let sure = symbol == 0 && uses == usize::from(USES_MAX) && places[0] >= SURE;
+        let way = if sure { STAYS } else { uses };
+        let shift = _mm_cvtsi32_si128(i32::from(SHIFTS[way]));
+        let gains = halves(&ALL_GAINS[way][symbol]);
+        let adapted =
+            |places, gains| _mm_add_epi16(_mm_sub_epi16(places, _mm_srl_epi16(places, shift)), gains);
+        let (to_lower, to_upper) = places.split_at_mut(SYMBOLS / 2);
+        // SAFETY: each is a half, of eight numbers: the 16 bytes that are written. They may lie anywhere.
+        unsafe {
+            _mm_storeu_si128(to_lower.as_mut_ptr().cast(), adapted(lower, gains.0));
+            _mm_storeu_si128(to_upper.as_mut_ptr().cast(), adapted(upper, gains.1));
+        }
+        (symbol, start, end - start)
+    }
+
+    #[inline]
+    #[target_feature(enable = "sse2")]
+    fn halves(places: &[u16; SYMBOLS]) -> (__m128i, __m128i) {
+        let (lower, upper) = places.split_at(SYMBOLS / 2);
+        // SAFETY: each is a half, of eight numbers: the 16 bytes that are read. They may lie anywhere.
+        unsafe { (_mm_loadu_si128(lower.as_ptr().cast()), _mm_loadu_si128(upper.as_ptr().cast())) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::SYMBOLS;
+    use super::*;
+
+    #[test]
+    fn what_is_read_is_the_symbol_that_owns_the_place_and_adapts_as_in_writing() {
+        let (mut read, mut written) = (Cdf::FLAT, Cdf::FLAT);
+        let mut state = 7_u32;
+        for round in 0..20_000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let symbol = match round % 1_000 {
+                0..500 => 0,
+                500..700 => 15,
+                _ => (state >> 20) as usize % 16,
+            };
+            let (start, size) = written.part_of(symbol);
+            // The narrowest and the widest parts, and their first and last places.
+            let width = [1, 0x100, u16::MAX, (state >> 8) as u16 | 1][round % 4];
+            let (first, last) = (start * u32::from(width), (start + size) * u32::from(width) - 1);
+            let offset = [first, last][round / 4 % 2];
+            assert_eq!(read.read(width, offset), (symbol, start, size), "round {round}");
+            written.adapt(symbol);
+            assert_eq!(read.0, written.0, "round {round}");
+        }
+    }
+
+    #[test]
+    fn what_lies_beyond_all_parts_is_the_last_symbol() {
+        let mut cdf = Cdf::FLAT;
+        for offset in [0xffff_ffff, 0x0001_0000] {
+            assert_eq!(cdf.read(1, offset).0, SYMBOLS - 1);
+        }
+    }
+}
