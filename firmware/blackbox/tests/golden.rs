@@ -12,6 +12,7 @@ use card::Card;
 use hums_blackbox::record::{Boot, Clock, Moment, Note, Stats, Usage};
 use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
 use hums_core::time::Instant;
+use hums_dialect::crc;
 
 /// Frames of the kinds that matter: floats that wander, counters, decimals, times, text, two senders, both versions, a
 /// wrong checksum, an unknown id, a signed one, a repeated one.
@@ -62,13 +63,8 @@ fn stream() -> Vec<(u64, Vec<u8>, bool)> {
             vec![0xfd, body.len() as u8, u8::from(signed), 0, sequence, system, 1, a, b, c]
         };
         bytes.extend_from_slice(&body);
-        let crc = bytes[1..].iter().chain([&extra]).fold(0xffff_u16, |crc, &byte| {
-            let mut x = byte ^ crc as u8;
-            x ^= x << 4;
-            let x = u16::from(x);
-            (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
-        });
-        bytes.extend_from_slice(&crc.to_le_bytes());
+        let sum = crc::step(crc::update(crc::START, &bytes[1..]), extra);
+        bytes.extend_from_slice(&sum.to_le_bytes());
         if signed && bytes[0] == 0xfd {
             bytes.push(7);
             bytes.extend_from_slice(&u64::from(index).to_le_bytes()[..6]);

@@ -173,8 +173,8 @@ impl Random {
     }
 
     fn observation(&mut self) -> Observation {
-        use LandedState::{InAir, Landing, OnGround, TakingOff, Unknown};
-        match self.below(28) {
+        let number = self.below(28);
+        match number {
             0..=2 => Observation::Heartbeat(self.heartbeat()),
             3 => Observation::SystemStatus(SystemStatus {
                 load: self.float(Fraction),
@@ -228,6 +228,15 @@ impl Random {
             }),
             17 => Observation::Rails(Rails { vcc: self.float(Volts), servo: self.float(Volts) }),
             18 => Observation::Battery(self.battery()),
+            19..=26 => self.machine(number),
+            _ => self.rare(),
+        }
+    }
+
+    /// The part of [`Self::observation`] that is about the machine: its number from 19 to 26.
+    fn machine(&mut self, number: u64) -> Observation {
+        use LandedState::{InAir, Landing, OnGround, TakingOff, Unknown};
+        match number {
             19 => Observation::Estimator(Estimator {
                 scale: self.pick(&[EstimatorScale::Variance, EstimatorScale::TestRatio]),
                 velocity: self.float(|value| value),
@@ -254,11 +263,10 @@ impl Random {
                 self.maybe(|random| SpeedSensor { index: random.next() as u8, rpm: Rpm(random.f32()) })
             })),
             25 => Observation::Landed(self.pick(&[Unknown, OnGround, InAir, TakingOff, Landing])),
-            26 => Observation::Processor(Processor {
+            _ => Observation::Processor(Processor {
                 temperature: self.float(Celsius),
                 voltage: self.float(Volts),
             }),
-            _ => self.rare(),
         }
     }
 

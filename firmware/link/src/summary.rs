@@ -19,6 +19,7 @@ use hums_core::usage::UsageCounter;
 use crate::frame::Frame;
 use crate::messages;
 use crate::outlet::{Class, Outlet};
+use crate::packet::Packet;
 use crate::text::{Severity, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
@@ -282,7 +283,7 @@ impl Summary {
             if self.outlet.send(now, Class::Forward, &packet, out) {
                 self.turns[index].took(now_ms, interval_ms(index));
                 if index == VALUES {
-                    self.next_value = (self.next_value + 1) % VALUE_NAMES.len();
+                    self.next_value = (self.next_value + 1) % (2 * VALUES_TOLD.len());
                 }
             }
         }
@@ -295,7 +296,7 @@ impl Summary {
 }
 
 /// Our heartbeat as the vehicle is.
-pub fn heartbeat(monitor: &Monitor) -> crate::packet::Packet {
+pub fn heartbeat(monitor: &Monitor) -> Packet {
     messages::heartbeat(match monitor.health().overall() {
         Level::Critical => 5,
         _ if monitor.vehicle().armed() => 4,
@@ -303,60 +304,51 @@ pub fn heartbeat(monitor: &Monitor) -> crate::packet::Packet {
     })
 }
 
-/// The values that are told in turn: the level of all and of each subsystem (0 ok, 1 advisory, 2 warning, 3 critical,
-/// 4 stale), what usage a pilot asks for, and how the box is doing. The overall level comes every other time.
-const VALUE_NAMES: [&str; 32] = [
-    "HUMS_LEVEL",
-    "L_POWER",
-    "HUMS_LEVEL",
-    "L_PROPULS",
-    "HUMS_LEVEL",
-    "L_ENGINE",
-    "HUMS_LEVEL",
-    "L_STRUCT",
-    "HUMS_LEVEL",
-    "L_NAVIG",
-    "HUMS_LEVEL",
-    "L_LINK",
-    "HUMS_LEVEL",
-    "L_COMPUT",
-    "HUMS_LEVEL",
-    "L_ATTITU",
-    "HUMS_LEVEL",
-    "L_RECORD",
-    "HUMS_LEVEL",
-    "FLT_TIME_S",
-    "HUMS_LEVEL",
-    "FLIGHTS",
-    "HUMS_LEVEL",
-    "DIST_M",
-    "HUMS_LEVEL",
-    "CPU_PCT",
-    "HUMS_LEVEL",
-    "STACK_PCT",
-    "HUMS_LEVEL",
-    "QUEUE_PCT",
-    "HUMS_LEVEL",
-    "SD_STALL_S",
+/// A value that is told in its turn.
+#[derive(Clone, Copy)]
+enum Told {
+    /// A part's level: 0 ok, 1 advisory, 2 warning, 3 critical, 4 stale.
+    Level(Subsystem),
+    /// Usage that a pilot asks for.
+    Usage(UsageCounter),
+    /// How the box is doing.
+    Own(fn(&OwnFigures) -> f32),
+}
+
+/// The overall level, on the scale of [`Told::Level`]: it comes every other time, before each of [`VALUES_TOLD`].
+const OVERALL: &str = "HUMS_LEVEL";
+
+/// What is told in turn, by the name that a ground station plots it by.
+const VALUES_TOLD: [(&str, Told); 16] = [
+    ("L_POWER", Told::Level(Subsystem::Power)),
+    ("L_PROPULS", Told::Level(Subsystem::Propulsion)),
+    ("L_ENGINE", Told::Level(Subsystem::Engine)),
+    ("L_STRUCT", Told::Level(Subsystem::Structure)),
+    ("L_NAVIG", Told::Level(Subsystem::Navigation)),
+    ("L_LINK", Told::Level(Subsystem::Link)),
+    ("L_COMPUT", Told::Level(Subsystem::Computer)),
+    ("L_ATTITU", Told::Level(Subsystem::Attitude)),
+    ("L_RECORD", Told::Level(Subsystem::Recorder)),
+    ("FLT_TIME_S", Told::Usage(UsageCounter::Flight)),
+    ("FLIGHTS", Told::Usage(UsageCounter::Flights)),
+    ("DIST_M", Told::Usage(UsageCounter::Distance)),
+    ("CPU_PCT", Told::Own(|own| own.cpu_percent)),
+    ("STACK_PCT", Told::Own(|own| own.stack_percent)),
+    ("QUEUE_PCT", Told::Own(|own| own.queue_percent)),
+    ("SD_STALL_S", Told::Own(|own| own.stall_s)),
 ];
 
-fn value(now: Instant, monitor: &Monitor, own: &OwnFigures, index: usize) -> crate::packet::Packet {
-    let usage = |counter| monitor.usage().value(counter).unwrap_or(0.0) as f32;
-    let value = match index {
-        19 => usage(UsageCounter::Flight),
-        21 => usage(UsageCounter::Flights),
-        23 => usage(UsageCounter::Distance),
-        25 => own.cpu_percent,
-        27 => own.stack_percent,
-        29 => own.queue_percent,
-        31 => own.stall_s,
-        _ if index % 2 == 1 => match Subsystem::ALL.get(index / 2) {
-            Some(subsystem) => f32::from(monitor.health().subsystem(*subsystem) as u8),
-            None => 0.0,
-        },
-        _ => f32::from(monitor.health().overall() as u8),
+/// The value whose turn it is at this place of the round.
+fn value(now: Instant, monitor: &Monitor, own: &OwnFigures, turn: usize) -> Packet {
+    let (name, value) = match VALUES_TOLD.get(turn / 2).filter(|_| turn % 2 == 1) {
+        None => (OVERALL, f32::from(monitor.health().overall() as u8)),
+        Some((name, Told::Level(subsystem))) => {
+            (*name, f32::from(monitor.health().subsystem(*subsystem) as u8))
+        }
+        Some((name, Told::Usage(counter))) => (*name, monitor.usage().value(*counter).unwrap_or(0.0) as f32),
+        Some((name, Told::Own(figure))) => (*name, figure(own)),
     };
-    messages::named_float(now, VALUE_NAMES.get(index).copied().unwrap_or_default(), value)
+    messages::named_float(now, name, value)
 }
 
 /// `HUMS_STATE`: the levels of all subsystems in one number, three bits each, in the order of [`Subsystem::ALL`] from

@@ -5,11 +5,11 @@
 //!
 //! * A log is a row of *segments*: files that are allocated whole when they are made ([`card::Card::create`]) and
 //!   written in place from then on, one block write a sector, without a directory or FAT update.
-//! * A new segment's FAT blocks are held back and written first, its directory entry last ([`gate::Gate`]): a cut in
+//! * A new segment's FAT blocks are held back and written first, its directory entry last (`gate::Gate`): a cut in
 //!   between leaves unused clusters, nothing else.
 //! * When the card is full the oldest segment is renamed, one block write, and written anew ([`card::Card::recycle`]).
 //!
-//! * Sectors that wait together and lie in a row are written with one command ([`chain::Chain`]).
+//! * Sectors that wait together and lie in a row are written with one command (`chain::Chain`).
 //! * Of a vehicle that is recorded by arming, while it is disarmed, only the last while is kept: small segments that are
 //!   renamed and overwritten in turn.
 //!

@@ -172,9 +172,12 @@ mod tests {
         }
     }
 
+    const AT: Instant = Instant::from_micros(1_234_567);
+    const ENTRIES: [(u8, f32); 5] = [(1, 12.25), (2, f32::MAX), (3, 0.0), (255, 1.0), (0, -1.0)];
+
     #[test]
-    fn every_kind_reads_back() {
-        let at = Instant::from_micros(1_234_567);
+    fn who_recorded_whom_and_what_was_found_read_back() {
+        let at = AT;
         reads_back(Record::Boot(Boot {
             version: "0.1.0",
             git: "abcdef",
@@ -210,7 +213,11 @@ mod tests {
             limit: 20.0,
             unit: "%",
         }));
-        let entries = [(1, 12.25), (2, f32::MAX), (3, 0.0), (255, 1.0), (0, -1.0)];
+    }
+
+    #[test]
+    fn what_was_counted_lost_and_worn_reads_back() {
+        let (at, entries) = (AT, ENTRIES);
         reads_back(Record::Usage(Usage::new(Moment::End, &entries)));
         reads_back(Record::Loss(Loss { what: Lost::QueueFull, count: 3, from: Instant::ZERO, to: at }));
         reads_back(Record::Stats(Stats { frames_in: 1, gs_bytes: 12, ..Stats::default() }));

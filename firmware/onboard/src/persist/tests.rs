@@ -264,7 +264,7 @@ fn an_item_that_makes_no_sense_is_told_and_the_others_are_read() {
         assert!((monitor.params().get(Param::CellVoltCrit) - 3.25).abs() < 1e-6);
         assert_eq!(monitor.params().get(Param::CellVoltWarn).to_bits(), 3.6_f32.to_bits());
         assert_eq!(keeper.status.read().unreadable, 2);
-        assert!(handover.news().is_some_and(|news| news.text.contains("unreadable")));
+        assert!(handover.news().is_some_and(|news| news.text.contains("stored item was lost")));
     });
 }
 
