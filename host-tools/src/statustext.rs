@@ -31,6 +31,17 @@ pub struct Text {
 }
 
 impl Text {
+    /// The level of a finding as grave as this, as the pages colour it. `MAV_SEVERITY` says what is a failure of a
+    /// primary system (critical and above) and what of a secondary one (error).
+    pub fn level(&self) -> &'static str {
+        match self.severity {
+            0..=2 => "critical",
+            3 | 4 => "warning",
+            5 => "advisory",
+            _ => "ok",
+        }
+    }
+
     /// From the payload of a frame whose checksum holds.
     pub fn of(at: Instant, source: Source, payload: &[u8]) -> Option<Self> {
         let payload = Payload::new(hums_dialect::message(STATUSTEXT)?, payload);

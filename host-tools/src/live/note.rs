@@ -50,13 +50,8 @@ impl Note {
             1 => "autopilot".to_owned(),
             other => format!("component {other}"),
         };
+        let level = text.level();
         let words = if ours { text.words.trim_start_matches(OURS).to_owned() } else { text.words };
-        let level = match text.severity {
-            0..=2 => "critical",
-            3 | 4 => "warning",
-            5 => "advisory",
-            _ => "ok",
-        };
         let kind = if ours { "finding" } else { "text" };
         Self { at_s: text.at.as_secs_f64(), kind, level, from, subsystem: "", words }
     }

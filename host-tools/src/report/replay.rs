@@ -51,6 +51,7 @@ pub struct Place {
 pub struct Said {
     at_s: f64,
     severity: u8,
+    level: &'static str,
     text: String,
 }
 
@@ -95,7 +96,8 @@ impl Replay {
 fn keep(texts: &mut Vec<Said>, count: &mut u64, text: Text) {
     *count += 1;
     if texts.len() < TEXTS_MAX {
-        texts.push(Said { at_s: text.at.as_secs_f64(), severity: text.severity, text: text.words });
+        let (at_s, severity, level) = (text.at.as_secs_f64(), text.severity, text.level());
+        texts.push(Said { at_s, severity, level, text: text.words });
     }
 }
 
