@@ -9,6 +9,13 @@ use std::{env, fs};
 
 use roxmltree::{Document, Node};
 
+#[path = "src/crc.rs"]
+#[expect(dead_code, unreachable_pub, reason = "the crate's own file, for its checksum over a definition")]
+mod crc;
+#[path = "src/wire.rs"]
+#[expect(dead_code, unreachable_pub, reason = "the crate's own file, for the longest payload")]
+mod wire;
+
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 /// The root of the definitions: everything that is published, ArduPilot's and PX4's dialects included.
@@ -37,7 +44,9 @@ struct Message {
 }
 
 fn main() -> Result<()> {
-    println!("cargo::rerun-if-changed=build.rs");
+    for ours in ["build.rs", "src/crc.rs", "src/wire.rs"] {
+        println!("cargo::rerun-if-changed={ours}");
+    }
     println!("cargo::rerun-if-changed=../../Cargo.lock");
     let definitions = mavlink_crate_dir()?.join("mavlink/message_definitions/v1.0");
     let mut messages = BTreeMap::new();
@@ -163,27 +172,19 @@ fn role(node: Node) -> &'static str {
     }
 }
 
-/// CRC-16/MCRF4XX, one byte.
-fn crc_accumulate(crc: u16, byte: u8) -> u16 {
-    let mut x = byte ^ (crc as u8);
-    x ^= x << 4;
-    let x = u16::from(x);
-    (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
-}
-
 /// The seed that makes two definitions of one id incompatible: name, then type, name and array length of each
 /// field but the extensions, in wire order (MAVLink serialization guide, "`CRC_EXTRA` calculation").
 fn crc_extra(message: &Message) -> u8 {
-    let feed = |crc, text: &str| text.bytes().chain([b' ']).fold(crc, crc_accumulate);
-    let mut crc = feed(0xffff, &message.name);
+    let feed = |sum, text: &str| crc::step(crc::update(sum, text.as_bytes()), b' ');
+    let mut sum = feed(crc::START, &message.name);
     for field in message.fields.iter().filter(|field| !field.extension) {
-        crc = feed(crc, &field.type_name);
-        crc = feed(crc, &field.name);
+        sum = feed(sum, &field.type_name);
+        sum = feed(sum, &field.name);
         if let Some(count) = field.array {
-            crc = crc_accumulate(crc, count as u8);
+            sum = crc::step(sum, count as u8);
         }
     }
-    (crc ^ (crc >> 8)) as u8
+    (sum ^ (sum >> 8)) as u8
 }
 
 fn render(messages: &BTreeMap<u32, Message>) -> Result<String> {
@@ -194,7 +195,7 @@ fn render(messages: &BTreeMap<u32, Message>) -> Result<String> {
             counted.map(|field| field.size * field.array.unwrap_or(1)).sum()
         };
         let (min, max) = (bytes(false), bytes(true));
-        if max > 255 {
+        if max > wire::PAYLOAD_BYTES_MAX {
             return Err(format!("{}: {max} bytes do not fit a frame", message.name).into());
         }
         let offset = |name: &str| -> usize {

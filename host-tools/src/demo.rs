@@ -10,6 +10,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
+use crate::files::make_directory;
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output::line;
@@ -26,7 +27,7 @@ const PORT: u16 = 8080;
 /// Runs `hums demo`.
 pub fn run(args: &cli::Demo) -> Result<Outcome> {
     let flight = flight(args)?;
-    fs::create_dir_all(&args.dir).with_context(|| format!("{}: cannot be made", args.dir.display()))?;
+    make_directory(&args.dir)?;
     let card = args.dir.join("card.img");
     // Each demo begins with an empty card.
     if card.exists() {

@@ -61,15 +61,39 @@ impl fmt::Display for ReaderGone {
 
 impl std::error::Error for ReaderGone {}
 
+/// Whether an error is that, however deep: a writer of standard output has it inside its `io::Error`.
+fn is_reader_gone(error: &anyhow::Error) -> bool {
+    let inner = |cause: &(dyn std::error::Error + 'static)| {
+        let error = cause.downcast_ref::<std::io::Error>().and_then(std::io::Error::get_ref);
+        cause.is::<ReaderGone>() || error.is_some_and(<dyn std::error::Error + Send + Sync>::is::<ReaderGone>)
+    };
+    error.chain().any(inner)
+}
+
 /// Says on standard error what went wrong, and gives the exit code.
 pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Losses) => ExitCode::from(3),
-        Err(error) if error.is::<ReaderGone>() => ExitCode::SUCCESS,
+        Err(error) if is_reader_gone(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("hums: {error:#}");
             ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::Context as _;
+
+    use super::*;
+
+    #[test]
+    fn a_reader_that_has_gone_is_found_under_what_else_is_said() {
+        let gone = || std::io::Error::other(ReaderGone);
+        let told: anyhow::Result<()> = Err(gone()).context("--gs: cannot be written");
+        assert!(is_reader_gone(&told.expect_err("an error")) && is_reader_gone(&ReaderGone.into()));
+        assert!(!is_reader_gone(&std::io::Error::other("full").into()));
     }
 }

@@ -56,8 +56,3 @@ impl Write for Stdout {
         self.0.flush().map_err(gone)
     }
 }
-
-/// Whether this error says that the reader of standard output has gone.
-pub fn is_reader_gone(error: &io::Error) -> bool {
-    error.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<ReaderGone>)
-}

@@ -12,6 +12,7 @@ use hums_link::{Check, Framer};
 
 use crate::cli;
 use crate::endpoint::Endpoint;
+use crate::files::cannot_write;
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::source::{self, Timing};
@@ -28,15 +29,15 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         )));
     }
     let mut source = source::open(&args.input, Timing { line_rate: None })?;
-    let context = || format!("{}: cannot be written", args.output.display());
+    let context = || cannot_write(&args.output);
     let file = BufWriter::new(File::create(&args.output).with_context(context)?);
     let mut packer = Packer::new(file);
     let mut last_us = 0;
     while let Some(chunk) = source.next().with_context(|| format!("{}: cannot be read", args.input))? {
         if packer.started.is_none() {
-            packer.start(source.utc_start_us())?;
+            packer.start(source.utc_start_us()).with_context(context)?;
         }
-        packer.chunk(chunk.at_us, &chunk.bytes, source.has_records())?;
+        packer.chunk(chunk.at_us, &chunk.bytes, source.has_records()).with_context(context)?;
         last_us = chunk.at_us;
     }
     let done = packer.finish(last_us).with_context(context)?;

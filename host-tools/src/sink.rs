@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
+use crate::files::cannot_write;
 use crate::output::Stdout;
 
 /// How long the reader waits before it looks whether anybody still listens.
@@ -50,9 +51,10 @@ impl Heard {
 
 /// Opens SINK.
 pub fn open(endpoint: &Endpoint) -> Result<Ground> {
-    let context = || format!("{endpoint}: cannot be opened for writing");
     let writer: Box<dyn Write + Send> = match endpoint {
-        Endpoint::File(path) => Box::new(BufWriter::new(File::create(path).with_context(context)?)),
+        Endpoint::File(path) => {
+            Box::new(BufWriter::new(File::create(path).with_context(|| cannot_write(path))?))
+        }
         Endpoint::Standard => Box::new(BufWriter::new(Stdout::new())),
         _ => {
             let duplex = duplex::open(endpoint, SILENCE)?;

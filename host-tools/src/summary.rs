@@ -9,11 +9,12 @@ use hums_core::component::Figures;
 use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
 
-use crate::decode::collect::lost;
-use crate::decode::{progress_bar, usage};
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, Summary, read};
+use crate::loss::lost;
 use crate::mavlink::frame::{Check, Peek, peek};
+use crate::names::{counter_name, message_name};
+use crate::progress;
 
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
 pub const LISTED_MAX: usize = 10_000;
@@ -164,10 +165,10 @@ impl Contents {
 
     /// The name of a message in reports.
     pub fn message_name(id: u32, verified: bool) -> String {
+        let name = message_name(id);
         match (hums_dialect::message(id), verified) {
-            (Some(message), true) => message.name.to_owned(),
-            (Some(message), false) => format!("{} (unverified)", message.name),
-            (None, _) => format!("UNKNOWN_{id}"),
+            (Some(_), false) => format!("{name} (unverified)"),
+            _ => name.into_owned(),
         }
     }
 
@@ -296,7 +297,7 @@ impl Contents {
 }
 
 fn named(counters: impl Iterator<Item = (u8, f32)>) -> impl Iterator<Item = (String, f64)> {
-    counters.map(|(number, value)| (usage::name(number), f64::from(value)))
+    counters.map(|(number, value)| (counter_name(number), f64::from(value)))
 }
 
 fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {
@@ -370,7 +371,7 @@ impl Overview {
     }
 
     fn read(log: &Log, checks: bool) -> Result<Self> {
-        let bar = progress_bar(log);
+        let bar = progress::bar(log);
         let new = || Contents { checks, near: vec![MessageCount::default(); NEAR], ..Contents::default() };
         let mut contents = Contents::default();
         let summary = read(log, new, &mut contents, |blocks| bar.set_position(blocks * 512))?;

@@ -54,6 +54,16 @@ fn civil(days: u64) -> (u64, u64, u64) {
     (year_of_era + era * 400 + u64::from(month <= 2), month, day)
 }
 
+/// Seconds as text, in microseconds.
+pub fn parse_seconds(text: &str) -> Option<u64> {
+    text.parse().ok().and_then(seconds_to_micros)
+}
+
+/// Seconds in microseconds, where they are a time.
+pub fn seconds_to_micros(seconds: f64) -> Option<u64> {
+    (seconds.is_finite() && (0.0..1e12).contains(&seconds)).then_some((seconds * 1e6).round() as u64)
+}
+
 /// A point in time on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum When {
@@ -67,7 +77,7 @@ impl std::str::FromStr for When {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if let Some(micros) = crate::card::faults::seconds(text) {
+        if let Some(micros) = parse_seconds(text) {
             return Ok(Self::SinceStart(micros));
         }
         let instant: Result<jiff::Timestamp, _> = text.parse();

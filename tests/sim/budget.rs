@@ -9,7 +9,7 @@ use hums::endpoint::Endpoint;
 use hums::run::sim::both_ports::{Board, Outcome, Side, run};
 use hums::source::{self, Chunk, Timing};
 use hums_core::params::Params;
-use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::{Fields, Packet};
 use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own};
@@ -132,7 +132,7 @@ fn greedy(now_us: u64) -> Vec<u8> {
     encoder.set_sequence((now_us / 100_000) as u8);
     let mut bytes = Vec::new();
     let mut say = |packet: &Packet| {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         bytes.extend_from_slice(encoder.frame(&mut buffer, packet));
     };
     say(&Packet::new(21).u8(0, 1).u8(1, 191));

@@ -72,20 +72,13 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let built = start.elapsed();
 
     let (card, gs, figures) = (folder.join("card.img"), folder.join("gs.bin"), folder.join("run.json"));
-    let mut hums = Shell::new(hums::program());
-    if emulated {
-        hums = hums.arg("emulate").arg("--firmware").arg(firmware::build(Board::Emulated)?);
+    let pipeline = if emulated {
+        Shell::new(hums::program()).arg("emulate").arg("--firmware").arg(firmware::build(Board::Emulated)?)
     } else {
-        hums = hums.arg("sim");
-    }
+        Shell::new(hums::program()).arg("sim")
+    };
     let recording = Instant::now();
-    let (json, code) = hums
-        .args(["--json".as_ref(), "--input".as_ref(), options.flight.as_os_str()])
-        .args(["--sd".as_ref(), card.as_os_str(), "--gs".as_ref(), gs.as_os_str()])
-        .output_and_code()?;
-    if code != 0 && code != DONE_WITH_LOSSES {
-        bail!("the recording failed with exit code {code}");
-    }
+    let json = record(pipeline, &options.flight, &card, &gs)?;
     fs::write(&figures, &json)?;
     let recorded = recording.elapsed();
     let decoded = folder.join("decoded");
@@ -131,6 +124,18 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     }
     println!("{:<30} target/release/hums live --open --input {}", "the dashboard", repo::shown(&card));
     Ok(())
+}
+
+/// Runs the flight through a pipeline; returns its figures.
+fn record(pipeline: Shell, flight: &Path, card: &Path, gs: &Path) -> Result<String> {
+    let (json, code) = pipeline
+        .args(["--json".as_ref(), "--input".as_ref(), flight.as_os_str()])
+        .args(["--sd".as_ref(), card.as_os_str(), "--gs".as_ref(), gs.as_os_str()])
+        .output_and_code()?;
+    if code != 0 && code != DONE_WITH_LOSSES {
+        bail!("the recording failed with exit code {code}");
+    }
+    Ok(json)
 }
 
 fn decode(card: &Path, to: &Path) -> Result<()> {

@@ -25,7 +25,7 @@ struct Step {
 }
 
 /// In the order in which they fail soonest.
-const STEPS: [Step; 16] = [
+const STEPS: [Step; 17] = [
     Step { name: "fmt", about: "the formatting", needs: &[Need::Rustfmt], run: fmt },
     Step {
         name: "structure",
@@ -45,6 +45,7 @@ const STEPS: [Step; 16] = [
         needs: &[Need::Clippy, Need::FirmwareTarget],
         run: clippy_firmware,
     },
+    Step { name: "doc", about: "the documentation builds without a warning", needs: &[], run: doc },
     Step {
         name: "no-std",
         about: "the core crates build where there is no std",
@@ -187,13 +188,9 @@ fn fmt() -> Result<()> {
 
 fn clippy() -> Result<()> {
     Shell::cargo()
-        .args(["clippy", "--workspace", "--exclude=hums-app", "--all-targets"])
-        .args([
-            "--features=hums-tests/emulator,hums-tests/browser,hums-tests/databases",
-            "--",
-            "-D",
-            "warnings",
-        ])
+        .args(["clippy", "--workspace", "--exclude=hums-app", "--all-targets", "--features"])
+        .arg(FEATURES.split(',').map(|name| format!("hums-tests/{name}")).collect::<Vec<_>>().join(","))
+        .args(["--", "-D", "warnings"])
         .run()
 }
 
@@ -202,6 +199,14 @@ fn clippy_firmware() -> Result<()> {
         Shell::cargo().arg("clippy").args(board.cargo_arguments()).args(["--", "-D", "warnings"]).run()?;
     }
     Ok(())
+}
+
+fn doc() -> Result<()> {
+    Shell::cargo()
+        .env("RUSTDOCFLAGS", "-D warnings")
+        .args(["doc", "--quiet", "--workspace", "--exclude=hums-app", "--lib", "--no-deps"])
+        .arg("--document-private-items")
+        .run()
 }
 
 fn no_std() -> Result<()> {
@@ -217,8 +222,11 @@ fn unit() -> Result<()> {
     Shell::cargo().args(["test", "--workspace", "--exclude=hums-app", "--exclude=hums-tests"]).run()
 }
 
-/// `cargo test` of the end-to-end tests with all that they may use.
-fn end_to_end(features: &str, target: &str) -> Result<()> {
+/// All of the end-to-end tests, in every step, so that nothing is built again for the next one.
+const FEATURES: &str = "emulator,browser,databases";
+
+/// `cargo test` of one part of the end-to-end tests, with all that it may use.
+fn end_to_end(target: &str) -> Result<()> {
     hums::build()?;
     oracle::prepare()?;
     Shell::cargo()
@@ -226,29 +234,29 @@ fn end_to_end(features: &str, target: &str) -> Result<()> {
         .env("HUMS_PYTHON", oracle::python())
         .env("HUMS_DIALECT", oracle::dialect())
         .env("HUMS_FIRMWARE", Board::Emulated.image())
-        .args(["test", "--package=hums-tests", "--features", features, "--test", target])
+        .args(["test", "--package=hums-tests", "--features", FEATURES, "--test", target])
         .run()
 }
 
 fn sim() -> Result<()> {
-    end_to_end("oracle", "sim")
+    end_to_end("sim")
 }
 
 fn answer() -> Result<()> {
-    end_to_end("oracle", "answer")
+    end_to_end("answer")
 }
 
 fn browser() -> Result<()> {
-    end_to_end("browser", "browser")
+    end_to_end("browser")
 }
 
 fn live() -> Result<()> {
-    end_to_end("databases", "live")
+    end_to_end("live")
 }
 
 fn emulator() -> Result<()> {
     firmware::build(Board::Emulated)?;
-    end_to_end("emulator", "emulator")
+    end_to_end("emulator")
 }
 
 /// Advisories need a network, which may be missing, and appear on their own day: told, and never a failure.
@@ -256,7 +264,8 @@ fn deny() -> Result<()> {
     let deny = || Shell::cargo().args(["deny", "--log-level", "warn"]);
     if Shell::cargo().args(["deny", "--version"]).ask().is_none() {
         eprintln!("cargo-deny is not installed: building it, once (some minutes)");
-        Shell::cargo().args(["install", "--quiet", "--locked", "cargo-deny"]).run()?;
+        // It has little to do: building it without optimisation takes a third of the time.
+        Shell::cargo().args(["install", "--quiet", "--locked", "--debug", "cargo-deny"]).run()?;
     }
     deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;
     if deny().args(["fetch", "db"]).ask().is_none() {

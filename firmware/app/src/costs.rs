@@ -8,48 +8,9 @@ use core::cell::RefCell;
 use critical_section::Mutex;
 use hums_core::time::Instant;
 
-use crate::boards::{CYCLE_BITS, board};
-
-/// The parts that are measured apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stage {
-    /// Nothing else; also the interrupts of ports and clock.
-    Idle,
-    /// Everything in a task that is none of the below: the executors, waiting and waking.
-    Tasks,
-    /// Bytes to frames.
-    Framer,
-    /// Frames out of their queue.
-    Monitor,
-    /// Frames to sectors.
-    Encode,
-    /// Frames to observations, and those to what the monitor knows.
-    Observe,
-    /// Frames on to the ground station.
-    Summary,
-    /// What happens by the clock: checks for silence, the summary.
-    Tick,
-    /// Sectors to the card.
-    Storage,
-}
-
-/// Number of stages.
-pub(crate) const STAGES: usize = 9;
-
-impl Stage {
-    /// All of them, in the order of [`totals`], with their names.
-    pub(crate) const NAMES: [(Self, &str); STAGES] = [
-        (Self::Idle, "idle"),
-        (Self::Tasks, "tasks"),
-        (Self::Framer, "framer"),
-        (Self::Monitor, "monitor"),
-        (Self::Encode, "encode"),
-        (Self::Observe, "observe"),
-        (Self::Summary, "summary"),
-        (Self::Tick, "tick"),
-        (Self::Storage, "storage"),
-    ];
-}
+use crate::boards::board;
+use crate::boards::machine::CYCLE_BITS;
+use crate::report::{STAGES, Stage};
 
 /// The processor's clock, 168 MHz on every board.
 const CYCLES_A_MICROSECOND: u64 = 168;

@@ -11,22 +11,20 @@
 //! | 7 | downlink | an alert has 50 ms; with it requests and uplink, which only move bytes between ports and queues |
 //! | 9 | storage | the sector queue holds 2.5 s; its library waits for the card with the processor |
 
-use cortex_m::interrupt::InterruptNumber;
-use cortex_m::peripheral::scb::VectActive;
-use cortex_m::peripheral::{NVIC, SCB};
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use hums_onboard::Task;
 
 use crate::boards::board;
-use crate::costs::{self, Stage};
+use crate::costs;
+use crate::exceptions::{DOWNLINK, MONITOR, RECEPTION, STORAGE};
 use crate::memory::depth;
+use crate::report::Stage;
 
-static RECEPTION: InterruptExecutor = InterruptExecutor::new();
-static MONITOR: InterruptExecutor = InterruptExecutor::new();
-static DOWNLINK: InterruptExecutor = InterruptExecutor::new();
-static STORAGE: InterruptExecutor = InterruptExecutor::new();
+static RECEPTION_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static MONITOR_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static DOWNLINK_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static STORAGE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
 /// Where to spawn each task.
 pub(crate) struct Spawners {
@@ -42,63 +40,15 @@ pub(crate) fn start() -> Spawners {
         port.set_priority(Priority::P1);
     }
     interrupt::TIM2.set_priority(Priority::P2);
-    interrupt::CAN1_TX.set_priority(Priority::P3);
-    interrupt::CAN1_RX0.set_priority(Priority::P5);
-    interrupt::CAN1_RX1.set_priority(Priority::P7);
-    interrupt::CAN1_SCE.set_priority(Priority::P9);
+    RECEPTION.set_priority(Priority::P3);
+    MONITOR.set_priority(Priority::P5);
+    DOWNLINK.set_priority(Priority::P7);
+    STORAGE.set_priority(Priority::P9);
     Spawners {
-        reception: RECEPTION.start(interrupt::CAN1_TX),
-        monitor: MONITOR.start(interrupt::CAN1_RX0),
-        downlink: DOWNLINK.start(interrupt::CAN1_RX1),
-        storage: STORAGE.start(interrupt::CAN1_SCE),
-    }
-}
-
-/// The number of the exception that runs; 0 is thread mode.
-pub(crate) fn running() -> u16 {
-    match SCB::vect_active() {
-        VectActive::ThreadMode => 0,
-        VectActive::Exception(exception) => (16 + i16::from(exception.irqn())) as u16,
-        VectActive::Interrupt { irqn } => 16 + u16::from(irqn),
-    }
-}
-
-/// The number of the exception that a task runs as.
-pub(crate) fn number_of(task: Task) -> u16 {
-    let interrupt = match task {
-        Task::Reception => interrupt::CAN1_TX,
-        Task::Monitor => interrupt::CAN1_RX0,
-        Task::Downlink => interrupt::CAN1_RX1,
-        Task::Storage => interrupt::CAN1_SCE,
-    };
-    16 + interrupt as u16
-}
-
-/// The most urgent task that has begun and not come to its end, for want of a stacked number: it ran until now.
-pub(crate) fn begun() -> u16 {
-    // As they interrupt each other.
-    let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
-    tasks.into_iter().map(number_of).find(|number| NVIC::is_active(Number(number - 16))).unwrap_or(0)
-}
-
-/// An interrupt by its number.
-#[derive(Clone, Copy)]
-struct Number(u16);
-
-// SAFETY: the numbers are those of interrupts that there are.
-unsafe impl InterruptNumber for Number {
-    fn number(self) -> u16 {
-        self.0
-    }
-}
-
-/// What runs as an exception, by its number.
-pub(crate) fn task_of(number: u16) -> &'static str {
-    match Task::ALL.into_iter().find(|task| number_of(*task) == number) {
-        Some(task) => task.name(),
-        None if number == 0 => "idle",
-        None if number < 16 => "exception",
-        None => "interrupt",
+        reception: RECEPTION_EXECUTOR.start(RECEPTION),
+        monitor: MONITOR_EXECUTOR.start(MONITOR),
+        downlink: DOWNLINK_EXECUTOR.start(DOWNLINK),
+        storage: STORAGE_EXECUTOR.start(STORAGE),
     }
 }
 
@@ -111,20 +61,20 @@ fn run(executor: &'static InterruptExecutor, urgency: usize) {
 
 #[interrupt]
 fn CAN1_TX() {
-    run(&RECEPTION, 1);
+    run(&RECEPTION_EXECUTOR, 1);
 }
 
 #[interrupt]
 fn CAN1_RX0() {
-    run(&MONITOR, 2);
+    run(&MONITOR_EXECUTOR, 2);
 }
 
 #[interrupt]
 fn CAN1_RX1() {
-    run(&DOWNLINK, 3);
+    run(&DOWNLINK_EXECUTOR, 3);
 }
 
 #[interrupt]
 fn CAN1_SCE() {
-    run(&STORAGE, 4);
+    run(&STORAGE_EXECUTOR, 4);
 }

@@ -15,8 +15,8 @@ use hums_blackbox::record;
 use hums_core::time::Instant;
 use hums_onboard::Task;
 
-use crate::boards::board;
-use crate::{executors, trap};
+use crate::exceptions;
+use crate::registers::{Registers, stacked};
 
 /// Bytes of the place that are kept: a file of ours and its line.
 const PLACE_BYTES: usize = 64;
@@ -24,8 +24,6 @@ const PLACE_BYTES: usize = 64;
 const FILE_BYTES: usize = PLACE_BYTES - 8;
 /// Bytes of the message that are kept.
 const MESSAGE_BYTES: usize = 128;
-/// In the order of [`record::Fault::registers`]: what the processor stacked, then four registers that say why.
-pub(crate) type Registers = [u32; 12];
 /// Messages that are remembered.
 const SEEN: usize = 8;
 /// Bytes of [`Fault::last_messages`].
@@ -145,7 +143,7 @@ pub(crate) fn take() -> Option<Fault> {
     }
     Some(Fault {
         kind: NOTE.kind.load(Ordering::Relaxed) as u8,
-        task: executors::task_of(NOTE.task.load(Ordering::Relaxed) as u16),
+        task: exceptions::task_of(NOTE.task.load(Ordering::Relaxed) as u16),
         registers: NOTE.registers.each_ref().map(|register| register.load(Ordering::Relaxed)),
         place: NOTE.place.read(),
         message: NOTE.message.read(),
@@ -216,7 +214,7 @@ pub(crate) fn count_start() -> u32 {
 
 /// Which task has been silent for too long, if any has.
 pub(crate) fn silent(task: Option<Task>) {
-    SILENT.store(task.map_or(0, |task| u32::from(executors::number_of(task))), Ordering::Relaxed);
+    SILENT.store(task.map_or(0, |task| u32::from(exceptions::number_of(task))), Ordering::Relaxed);
 }
 
 /// The watchdog is about to bite. `interrupted` ran until now; `None`: nothing did, all tasks wait.
@@ -226,13 +224,13 @@ pub(crate) fn silent(task: Option<Task>) {
 pub(crate) fn late(interrupted: Option<&ExceptionFrame>) {
     let running = interrupted.map_or(0, |frame| (frame.xpsr() & 0x1FF) as u16);
     let blamed = match SILENT.load(Ordering::Relaxed) as u16 {
-        0 if running == 0 => executors::number_of(Task::Monitor),
+        0 if running == 0 => exceptions::number_of(Task::Monitor),
         0 => running,
         silent => silent,
     };
     match interrupted.filter(|_| running == blamed) {
         Some(frame) => {
-            NOTE.keep_registers(trap::stacked(frame));
+            NOTE.keep_registers(stacked(frame));
             let place = format_args!("pc {:08x}", frame.pc());
             NOTE.keep(Kind::Watchdog, blamed, place, format_args!("hangs"));
         }
@@ -250,22 +248,35 @@ pub(crate) fn not_late() {
     NOTE.mark.store(0, Ordering::Relaxed);
 }
 
-/// The supply is too low to write anything: waits until it is back, or gone.
-pub(crate) fn supply_low(is_low: fn() -> bool) -> ! {
+/// The supply is too low to write anything: nobody is to go on before it is back.
+pub(crate) fn supply_low() {
     cortex_m::interrupt::disable();
     NOTE.keep_registers(Registers::default());
     let (place, message) = (format_args!("supply"), format_args!("below 2.7 V"));
-    NOTE.keep(Kind::Supply, executors::begun(), place, message);
-    while is_low() {}
-    board::restart();
+    NOTE.keep(Kind::Supply, exceptions::begun(), place, message);
 }
 
 /// The processor cannot go on. `overflow`: the stack was full, `place` is all that is known.
-pub(crate) fn processor(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) -> ! {
+pub(crate) fn processor(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) {
     NOTE.keep_registers(registers);
     let message = if overflow { "stack overflow" } else { "processor fault" };
     NOTE.keep(Kind::HardFault, running, place, format_args!("{message}"));
-    board::restart();
+}
+
+/// The program cannot go on.
+pub(crate) fn panicked(registers: Registers, info: &PanicInfo) {
+    NOTE.keep_registers(registers);
+    let (running, message) = (exceptions::running(), info.message());
+    match info.location() {
+        Some(place) => {
+            // The end of a long path says more than its beginning.
+            let file = place.file();
+            let file = file.get(file.len().saturating_sub(FILE_BYTES)..).unwrap_or(file);
+            let place = format_args!("{file}:{}", place.line());
+            NOTE.keep(Kind::Panic, running, place, format_args!("{message}"));
+        }
+        None => NOTE.keep(Kind::Panic, running, format_args!("?"), format_args!("{message}")),
+    }
 }
 
 fn text<const BYTES: usize>(text: &str) -> String<BYTES> {
@@ -340,22 +351,4 @@ impl fmt::Write for TextWriter<'_> {
         }
         Ok(())
     }
-}
-
-#[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
-    cortex_m::interrupt::disable();
-    NOTE.keep_registers(trap::now());
-    let (running, message) = (executors::running(), info.message());
-    match info.location() {
-        Some(place) => {
-            // The end of a long path says more than its beginning.
-            let file = place.file();
-            let file = file.get(file.len().saturating_sub(FILE_BYTES)..).unwrap_or(file);
-            let place = format_args!("{file}:{}", place.line());
-            NOTE.keep(Kind::Panic, running, place, format_args!("{message}"));
-        }
-        None => NOTE.keep(Kind::Panic, running, format_args!("?"), format_args!("{message}")),
-    }
-    board::restart();
 }

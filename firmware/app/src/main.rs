@@ -12,11 +12,14 @@
 
 mod boards;
 mod costs;
+mod exceptions;
 mod executors;
 mod fault;
 mod links;
 mod memory;
+mod registers;
 mod report;
+mod status;
 mod tasks;
 mod trap;
 mod watch;
@@ -30,7 +33,8 @@ use hums_onboard::queues::{Ends, Queues};
 use hums_onboard::{Handover, Keeper, Monitoring};
 use static_cell::{ConstStaticCell, StaticCell};
 
-use boards::{ResetCause, board};
+use boards::board;
+use boards::machine::ResetCause;
 use tasks::monitor;
 
 static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
@@ -72,9 +76,9 @@ fn start() -> board::Idle {
         boots,
     };
     let monitor = MONITOR.take();
-    let (items_in, items_out) = tasks::MAILBOX.split();
+    let (items_in, items_out) = status::MAILBOX.split();
     let keeper = restore(parts.store, items_out, parts.boot.cause, monitor);
-    let handover = HANDOVER.init_with(|| Handover::new(items_in, &tasks::STORE_STATUS, monitor));
+    let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
     let monitoring = monitoring(monitor, identity);
     monitoring.restore_signing(keeper);
 
@@ -106,7 +110,7 @@ fn restore(
     cause: ResetCause,
     monitor: &mut Monitor,
 ) -> &'static mut Keeper<'static, board::StoreFlash> {
-    let keeper = KEEPER.init_with(|| Keeper::mount(store, items, &tasks::STORE_STATUS));
+    let keeper = KEEPER.init_with(|| Keeper::mount(store, items, &status::STORE_STATUS));
     if !cause.may_be_in_flight() {
         keeper.turn_ahead();
     }
@@ -117,6 +121,6 @@ fn restore(
 #[inline(never)]
 fn monitoring(monitor: &'static mut Monitor, identity: Boot<'static>) -> &'static mut Monitoring<'static> {
     MONITORING.init_with(|| {
-        Monitoring::new(monitor, WRITER.take(), identity, &tasks::CARD_STATUS, &tasks::PORT_STATUS)
+        Monitoring::new(monitor, WRITER.take(), identity, &status::CARD_STATUS, &status::PORT_STATUS)
     })
 }

@@ -1,16 +1,19 @@
-//! The processor's own fault, caught whatever became of the stack.
+//! What nothing goes on after: a panic, and the processor's own fault, caught whatever became of the stack. Each leaves
+//! its note ([`fault`]), and the board starts anew.
 //!
 //! Every fault ends as `HardFault`, as the milder ones are not switched on. A stack that overflows does so below the
 //! memory that it lies at the bottom of (`memory.x`): nothing else is hurt, but the handler has no stack either. So it
 //! begins with a stack of its own: the other end of the same memory, whose contents nobody will ever go back to.
 
-use core::arch::{asm, naked_asm};
+use core::arch::naked_asm;
+use core::fmt;
+use core::panic::PanicInfo;
 
-use cortex_m::peripheral::SCB;
 use cortex_m_rt::ExceptionFrame;
 
-use crate::fault::{self, Registers};
-use crate::{executors, memory};
+use crate::boards::board;
+use crate::registers::{self, Registers, stacked};
+use crate::{exceptions, fault, memory};
 
 /// Stack that is left to the handler: where less is, it takes the other end.
 const HANDLER_BYTES: usize = 1_024;
@@ -40,51 +43,23 @@ unsafe extern "C" fn HardFault() -> ! {
 }
 
 extern "C" fn caught(stack: usize) -> ! {
-    let status = status();
+    let status = registers::status();
     let (bottom, top) = memory::stack_bounds();
     if stack < bottom || status[0] & STACKING != 0 {
         let mut registers = Registers::default();
         registers[8..].copy_from_slice(&status);
         let near = return_address();
         registers[5] = near;
-        fault::processor(executors::begun(), registers, true, format_args!("called from {near:08x}"));
+        give_up(exceptions::begun(), registers, true, format_args!("called from {near:08x}"));
     }
     if stack + size_of::<ExceptionFrame>() > top {
-        fault::processor(executors::begun(), Registers::default(), false, format_args!("stack {stack:08x}"));
+        give_up(exceptions::begun(), Registers::default(), false, format_args!("stack {stack:08x}"));
     }
     // SAFETY: the processor stacked its registers there, in memory that is the stack's by the checks above.
     let frame = unsafe { &*core::ptr::with_exposed_provenance::<ExceptionFrame>(stack) };
     // What ran before this exception is in the stacked status.
     let running = (frame.xpsr() & 0x1FF) as u16;
-    fault::processor(running, stacked(frame), false, format_args!("pc {:08x}", frame.pc()));
-}
-
-/// What was stacked, and why.
-pub(crate) fn stacked(frame: &ExceptionFrame) -> Registers {
-    let f = frame;
-    let [cfsr, hfsr, mmfar, bfar] = status();
-    [f.r0(), f.r1(), f.r2(), f.r3(), f.r12(), f.lr(), f.pc(), f.xpsr(), cfsr, hfsr, mmfar, bfar]
-}
-
-/// The registers of whoever calls, as far as they tell something: where it returns to, where it is, and as what it runs.
-#[inline]
-pub(crate) fn now() -> Registers {
-    let mut registers = Registers::default();
-    let xpsr: u32;
-    // SAFETY: reads the status register into another one.
-    unsafe { asm!("mrs {}, xpsr", out(reg) xpsr, options(nomem, nostack, preserves_flags)) };
-    registers[5] = cortex_m::register::lr::read();
-    registers[6] = cortex_m::register::pc::read();
-    registers[7] = xpsr;
-    registers
-}
-
-fn status() -> [u32; 4] {
-    // SAFETY: reading the status registers that every Cortex-M4 has (ARMv7-M, B3.2.2) has no side effect.
-    unsafe {
-        let scb = &*SCB::PTR;
-        [scb.cfsr.read(), scb.hfsr.read(), scb.mmfar.read(), scb.bfar.read()]
-    }
+    give_up(running, stacked(frame), false, format_args!("pc {:08x}", frame.pc()));
 }
 
 /// The innermost address on a full stack that a function of ours would return to; 0 where there is none.
@@ -92,4 +67,17 @@ fn return_address() -> u32 {
     let code = memory::code();
     let is_return = |word: &u32| word & 1 == 1 && code.contains(&(*word as usize));
     memory::stack_words().take(SEARCHED_WORDS).find(is_return).map_or(0, |word| word & !1)
+}
+
+/// The processor cannot go on. `overflow`: the stack was full, `place` is all that is known.
+fn give_up(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) -> ! {
+    fault::processor(running, registers, overflow, place);
+    board::restart();
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    cortex_m::interrupt::disable();
+    fault::panicked(registers::now(), info);
+    board::restart();
 }

@@ -14,8 +14,6 @@ use crate::boards::board;
 use crate::fault;
 use crate::memory::depth;
 
-/// All of `SysTick`'s 24 bits: 0.1 s at 168 MHz.
-pub(crate) const SYSTICK_RELOAD: u32 = 0x00FF_FFFF;
 /// The watchdog does not run yet.
 const NEVER: u32 = u32::MAX;
 
@@ -28,12 +26,6 @@ pub(crate) fn fed() {
     if since != NEVER && since >= board::LATE_TURNS {
         fault::not_late();
     }
-}
-
-/// Nobody is to feed it any more: it does not run where time does not.
-#[cfg(feature = "board-emulated")]
-pub(crate) fn off() {
-    SINCE_FED.store(NEVER, Ordering::Relaxed);
 }
 
 /// The exception itself: [`turn`] with what it interrupted.
@@ -51,7 +43,7 @@ fn look(interrupted: *const ExceptionFrame) {
     // SAFETY: the processor stacked its registers there as this exception began.
     let frame = unsafe { &*interrupted };
     let since = SINCE_FED.load(Ordering::Relaxed);
-    if since == NEVER {
+    if since == NEVER || !board::is_watched() {
         return;
     }
     let idle = frame.xpsr() & 0x1FF == 0;

@@ -2,9 +2,10 @@
 
 use hums_core::time::Instant;
 
-use crate::codec::{Decoded, ENTRY_BYTES_MAX, Frame, Kind, Model, Recall, SLOTS};
+use crate::codec::{Decoded, Frame, Kind, Model, Recall, SLOTS};
 use crate::coder::{Decoder, LOOKAHEAD, Reading};
 use crate::layouts::Layouts;
+use crate::limits::ENTRY_BYTES_MAX;
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
 use crate::record::Record;
 use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, Sector};

@@ -136,8 +136,8 @@ impl Layout {
                 let at = MESSAGE_HEAD_BYTES + 2 * index;
                 let (number, count) = (*bytes.get(at)?, *bytes.get(at + 1)?);
                 Some(FieldLayout {
-                    kind: *KINDS.get(usize::from(number & 0x0f))?,
-                    role: ROLES[usize::from(number >> 4 & 3)],
+                    kind: *Kind::ALL.get(usize::from(number & 0x0f))?,
+                    role: Role::ALL[usize::from(number >> 4 & 3)],
                     count: count.max(1),
                 })
             }
@@ -160,24 +160,6 @@ impl FieldLayout {
         self.kind.size() * self.count as usize
     }
 }
-
-/// The roles by their stored number.
-const ROLES: [Role; 4] = [Role::Plain, Role::Instance, Role::Millis, Role::Micros];
-
-/// The kinds by their stored number.
-const KINDS: [Kind; 11] = [
-    Kind::U8,
-    Kind::I8,
-    Kind::Char,
-    Kind::U16,
-    Kind::I16,
-    Kind::U32,
-    Kind::I32,
-    Kind::F32,
-    Kind::U64,
-    Kind::I64,
-    Kind::F64,
-];
 
 #[cfg(test)]
 mod tests {

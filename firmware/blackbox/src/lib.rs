@@ -19,6 +19,7 @@ mod crc;
 mod distribution;
 mod group;
 pub mod layouts;
+mod limits;
 mod preamble;
 mod reader;
 pub mod record;
@@ -26,8 +27,8 @@ mod sector;
 mod writer;
 
 pub use assemble::{Assembler, BlockCounts, Step};
-pub use codec::FRAME_BYTES_MAX;
 pub use group::{Entry, GroupDecoder, GroupError, Outline};
+pub use hums_dialect::wire::FRAME_BYTES_MAX;
 pub use preamble::Preamble;
 pub use reader::{Cause, Gap, Item, LogReader, Summary};
 pub use record::Record;

@@ -6,9 +6,10 @@
 //! taken back (the coder's state before it is kept) and becomes the first one of the next group.
 
 use hums_core::time::Instant;
+use hums_dialect::wire::FRAME_BYTES_MAX;
 
 use crate::bytes::copy_few;
-use crate::codec::{CODED_BYTES_MAX, Entry, FRAME_BYTES_MAX, Frame, Kind, Model, Out};
+use crate::codec::{CODED_BYTES_MAX, Entry, Frame, Kind, Model, Out};
 use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
 use crate::layouts::{self, Layouts};
 use crate::preamble::{PREAMBLE_BYTES, Preamble};

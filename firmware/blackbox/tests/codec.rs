@@ -1,5 +1,5 @@
 //! The codec, from outside: whatever a link carries comes back bit for bit, with its times.
-#![allow(clippy::panic, reason = "that is how a test fails")]
+#![expect(clippy::panic, reason = "that is how a test fails")]
 
 #[path = "common/card.rs"]
 mod card;

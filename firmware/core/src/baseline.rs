@@ -32,7 +32,7 @@ impl Quantity {
     pub const COUNT: usize = 2 + BATTERIES_MAX + MOTORS_MAX;
 
     /// The quantity of a place in the stored form.
-    pub const fn from_index(index: usize) -> Option<Self> {
+    pub(crate) const fn from_index(index: usize) -> Option<Self> {
         const MOTORS: usize = 2 + BATTERIES_MAX;
         match index {
             0 => Some(Self::Vibration),

@@ -203,7 +203,7 @@ impl Derived {
     }
 
     /// What is known of a battery's internal resistance.
-    pub fn resistance(&self, battery: usize) -> Option<&Resistance> {
+    pub(crate) fn resistance(&self, battery: usize) -> Option<&Resistance> {
         self.resistance.get(battery)
     }
 
@@ -214,7 +214,7 @@ impl Derived {
     }
 
     /// Cells of a battery: set, reported, or found from the highest voltage seen. 0 while nothing is known.
-    pub fn cell_count(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> u8 {
+    pub(crate) fn cell_count(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> u8 {
         let set = params.get(Param::BatCells) as u8;
         if set > 0 {
             return set;
@@ -309,7 +309,7 @@ impl Derived {
     }
 
     /// The latest load factor, in units of gravity.
-    pub fn load_factor_g(&self) -> Option<f32> {
+    pub(crate) fn load_factor_g(&self) -> Option<f32> {
         self.load_factor.get().copied()
     }
 

@@ -59,7 +59,7 @@ impl Quantity {
     }
 
     /// Where one range ends and the next begins. Stored counts are by range: these never change.
-    pub const fn edges(self) -> [f32; BINS - 1] {
+    pub(crate) const fn edges(self) -> [f32; BINS - 1] {
         match self {
             Self::EscTemperature => [30.0, 45.0, 60.0, 75.0, 90.0, 100.0, 110.0],
             Self::BatteryTemperature => [0.0, 15.0, 30.0, 40.0, 50.0, 60.0, 75.0],

@@ -97,11 +97,6 @@ impl Flight {
         self.airborne_since
     }
 
-    /// When it was armed, while it is armed.
-    pub const fn armed_since(&self) -> Option<Instant> {
-        self.armed_since
-    }
-
     /// One step, at least every 50 ms.
     pub fn step(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
         let height_m = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
@@ -184,7 +179,7 @@ impl Flight {
 }
 
 /// Speed upwards from the best source that is fresh, in m/s.
-pub fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+pub(crate) fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let global = vehicle.global.within(now, MOTION_AGE).map(|global| -global.velocity[2].0);
     let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.velocity[2].0);
     let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.climb).map(|climb| climb.0);

@@ -51,8 +51,8 @@ impl Happenings {
         self.waiting[WAITING_MAX - 1].take()
     }
 
-    /// Happenings that nobody took in time.
-    pub(crate) const fn lost(&self) -> u16 {
-        self.lost
+    /// How many found no place since this was asked last.
+    pub(crate) const fn take_lost(&mut self) -> u16 {
+        core::mem::replace(&mut self.lost, 0)
     }
 }

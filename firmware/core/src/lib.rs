@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod baseline;
-pub mod bytes;
+mod bytes;
 pub mod component;
 pub mod derived;
 pub mod exposure;
@@ -11,18 +11,18 @@ pub mod flight;
 pub mod half;
 pub mod happening;
 pub mod health;
-pub mod latest;
+mod latest;
 pub mod lifetime;
 pub mod monitor;
 pub mod observation;
 pub mod params;
 pub mod protect;
-pub mod rainflow;
+mod rainflow;
 pub mod snapshot;
 pub mod status;
 pub mod time;
-pub mod trend;
-pub mod trends;
+mod trend;
+mod trends;
 pub mod units;
 pub mod usage;
 pub mod vehicle;

@@ -1,16 +1,18 @@
 //! The monitor: vehicle, flight, health and usage, kept together in step.
 
+mod components;
+mod stored;
+
 use crate::baseline::{Baselines, Quantity};
-use crate::bytes::Unreadable;
-use crate::component::{COMPONENTS_MAX, Component, Figures, Kind, Label, Status};
+use crate::component::{COMPONENTS_MAX, Component, Kind};
 use crate::derived::Derived;
 use crate::exposure::Exposure;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
 use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
-use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Saving, Session};
-use crate::observation::{MOTORS_MAX, Observation, Source};
+use crate::lifetime::{Airframe, ItemKey, Lifetime, Saving};
+use crate::observation::{Observation, Source};
 use crate::params::Params;
 use crate::protect::{Protect, Request};
 use crate::snapshot::{Snapshot, Snapshots};
@@ -281,80 +283,6 @@ impl Monitor {
         &mut self.params
     }
 
-    /// Takes an item that was saved in an earlier session; to be called before the first tick, and for
-    /// [`ItemKey::Session`] once and last. One that cannot be read is as if there were none.
-    pub fn restore(&mut self, key: ItemKey, stored: &[u8]) -> Result<(), Unreadable> {
-        match key {
-            ItemKey::Lifetime => self.before = Lifetime::decode(stored)?,
-            ItemKey::Baselines => self.baselines = Baselines::decode(stored)?,
-            ItemKey::Exceedances => self.exceedances = Exceedances::decode(stored)?,
-            ItemKey::Exposure => self.exposure = Exposure::decode(stored)?,
-            ItemKey::Component(place) => {
-                let component = Component::decode(stored)?;
-                *self.components.get_mut(usize::from(place)).ok_or(Unreadable)? = component;
-            }
-            ItemKey::Session => {
-                let session = Session::decode(stored)?;
-                self.before.add(&session);
-                self.exposure.add(session.boots, session.exposure());
-                self.components
-                    .iter_mut()
-                    .for_each(|component| component.add(session.boots, &session.wear()));
-            }
-        }
-        Ok(())
-    }
-
-    /// The item to be saved next, if any is due; the same until it is [`Self::saved`]. To be saved in this order.
-    pub fn save_due(&mut self, now: Instant, room: Room) -> Option<ItemKey> {
-        self.saving.due(now, self.vehicle.armed(), room)
-    }
-
-    /// Everything that changed is due: the session ends, or the power is about to go.
-    pub const fn save_all(&mut self) {
-        self.saving.hurry_all();
-    }
-
-    /// Everything is due: what was stored is lost.
-    pub fn save_anew(&mut self) {
-        for key in ItemKey::ALL {
-            let used = match key {
-                ItemKey::Component(place) => self.component_figures(usize::from(place)).is_some(),
-                _ => true,
-            };
-            if used {
-                self.saving.hurry(key);
-            }
-        }
-    }
-
-    /// Writes an item as it is to be saved; gives its length.
-    pub fn encode_item(&self, key: ItemKey, out: &mut [u8; ITEM_BYTES_MAX]) -> usize {
-        match key {
-            ItemKey::Lifetime => {
-                encoded(out, |out| Lifetime { boots: self.boots(), ..self.before }.encode(out))
-            }
-            ItemKey::Baselines => encoded(out, |out| self.baselines.encode(out)),
-            ItemKey::Exceedances => {
-                out.first_chunk_mut().map_or(0, |out| self.exceedances.encode(self.usage.until(), out))
-            }
-            ItemKey::Exposure => encoded(out, |out| self.exposure.encode(self.boots(), out)),
-            ItemKey::Component(place) => {
-                let component = self.components.get(usize::from(place)).unwrap_or(&Component::NONE);
-                encoded(out, |out| component.encode(self.boots(), out))
-            }
-            ItemKey::Session => {
-                let (totals, wear) = (self.usage.totals(), self.usage.wear());
-                Session::now(self.boots(), self.heard(), &totals, &wear, &self.exposure).encode(out)
-            }
-        }
-    }
-
-    /// The item's bytes are with the store.
-    pub const fn saved(&mut self, key: ItemKey) {
-        self.saving.saved(key);
-    }
-
     /// Which power-on this is, from 1.
     const fn boots(&self) -> u32 {
         self.before.boots.saturating_add(1)
@@ -413,46 +341,14 @@ impl Monitor {
         &self.components
     }
 
-    /// What a component has run, and whether it may go on.
-    pub fn component_figures(&self, place: usize) -> Option<(Figures, Status)> {
-        let component = self.components.get(place).filter(|component| component.kind != Kind::None)?;
-        let wear = self.usage.wear();
-        Some((component.figures(&wear), component.status(place, &wear, &self.params)))
-    }
-
-    /// The part of a component's life that is used, percent; `None` where it has no limit.
-    pub fn component_used_percent(&self, place: usize) -> Option<f32> {
-        self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
-    }
-
-    /// Takes a component as another monitor of this vehicle has it in this very session: what is counted from here on
-    /// adds to it.
-    pub fn learn_component(&mut self, place: usize, known: Component) {
-        let known = known.in_session(&self.usage.wear());
-        if let Some(component) = self.components.get_mut(place) {
-            *component = known;
-        }
-    }
-
-    /// Another part is in a component's place. Gives the old one with what it had run, to be recorded; `None` where
-    /// there is no such component.
-    pub fn replace_component(&mut self, place: usize, serial: Label) -> Option<Component> {
-        let Self { usage, components, saving, .. } = self;
-        let component = components.get_mut(place).filter(|component| component.kind != Kind::None)?;
-        let old = component.replace(serial, &usage.wear());
-        saving.hurry(ItemKey::Component(place as u8));
-        self.forget_baselines(old.kind, old.number);
-        Some(old)
-    }
-
     /// What happened, in order, each once.
     pub fn take_happening(&mut self) -> Option<Happening> {
         self.happenings.take()
     }
 
-    /// Happenings that nobody took in time.
-    pub const fn happenings_lost(&self) -> u16 {
-        self.happenings.lost()
+    /// How many happenings found no place since this was asked last.
+    pub const fn take_happenings_lost(&mut self) -> u16 {
+        self.happenings.take_lost()
     }
 
     /// Half of a snapshot of what went on around a critical finding, each once.
@@ -474,44 +370,4 @@ impl Monitor {
     pub const fn trends(&self) -> &Trends {
         &self.trends
     }
-
-    /// What the operator calls a component, and its serial number, without replacing it.
-    pub fn name_component(&mut self, place: usize, name: Label, serial: Label) -> bool {
-        let Some(component) = self.components.get_mut(place) else { return false };
-        (component.name, component.serial) = (name, serial);
-        self.saving.hurry(ItemKey::Component(place as u8));
-        true
-    }
-
-    /// What was normal for the old part is not for the new one.
-    fn forget_baselines(&mut self, kind: Kind, number: u8) {
-        let concerned = |index: usize| number == 0 || usize::from(number) == index + 1;
-        match kind {
-            Kind::Airframe => self.baselines = Baselines::new(),
-            Kind::Battery => {
-                for battery in (0..BATTERIES_MAX).filter(|battery| concerned(*battery)) {
-                    self.baselines.forget(Quantity::Resistance(battery as u8));
-                    self.derived.forget_resistance(battery);
-                }
-            }
-            Kind::Motor | Kind::Propeller | Kind::Esc => {
-                for motor in (0..MOTORS_MAX).filter(|motor| concerned(*motor)) {
-                    self.baselines.forget(Quantity::MotorSpeed(motor as u8));
-                }
-                self.baselines.forget(Quantity::Vibration);
-                self.baselines.forget(Quantity::HoverThrottle);
-            }
-            Kind::None | Kind::Card | Kind::Engine | Kind::Other => return,
-        }
-        self.saving.hurry(ItemKey::Baselines);
-    }
-}
-
-/// Writes at the start of the buffer; gives the length.
-fn encoded<const N: usize>(out: &mut [u8; ITEM_BYTES_MAX], encode: impl FnOnce(&mut [u8; N])) -> usize {
-    const { assert!(N <= ITEM_BYTES_MAX) };
-    out.first_chunk_mut().map_or(0, |out| {
-        encode(out);
-        N
-    })
 }

@@ -27,6 +27,11 @@ macro_rules! params {
             $(#[doc = concat!("`", $name, "`: ", $source)] $variant,)*
         }
 
+        impl Param {
+            /// All of them, by their number.
+            pub const ALL: [Self; TABLE.len()] = [$(Self::$variant,)*];
+        }
+
         /// All parameters, in the order of [`Param`].
         pub const TABLE: &[ParamSpec] = &[
             $(ParamSpec {
@@ -205,6 +210,18 @@ params! {
     RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)";
 }
 
+impl Param {
+    /// The parameter with this name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|param| param.spec().name == name)
+    }
+
+    /// What is known of it but its value.
+    pub const fn spec(self) -> &'static ParamSpec {
+        &TABLE[self as usize]
+    }
+}
+
 impl Default for Params {
     fn default() -> Self {
         Self::defaults()
@@ -219,8 +236,8 @@ impl Params {
 
     /// Sets a parameter by name; `Err` says what is wrong with name or value, and nothing changed.
     pub fn set(&mut self, name: &str, value: f32) -> Result<(), ParamError> {
-        let index = TABLE.iter().position(|spec| spec.name == name).ok_or(ParamError::UnknownName)?;
-        let spec = &TABLE[index];
+        let param = Param::find(name).ok_or(ParamError::UnknownName)?;
+        let (index, spec) = (param as usize, param.spec());
         if !(spec.min..=spec.max).contains(&value) {
             return Err(ParamError::OutOfRange { min: spec.min, max: spec.max });
         }
@@ -291,6 +308,14 @@ mod tests {
             assert!(TABLE[..index].iter().all(|other| other.name != spec.name), "{}", spec.name);
             assert!((spec.min..=spec.max).contains(&spec.default), "{}", spec.name);
         }
+    }
+
+    #[test]
+    fn a_parameter_is_found_by_its_name_and_stands_at_its_number() {
+        for (index, param) in Param::ALL.into_iter().enumerate() {
+            assert_eq!((Param::find(param.spec().name), param as usize), (Some(param), index));
+        }
+        assert_eq!(Param::find("bat_rem_warn"), None);
     }
 
     #[test]

@@ -21,6 +21,9 @@ use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
 
+/// Bytes of a text that a ground station shows to the pilot as it comes: those of one `STATUSTEXT`.
+pub const TEXT_BYTES_MAX: usize = 50;
+
 /// Between two requests that are not answered.
 const AGAIN: Span = Span::from_secs(1);
 /// Requests at most.
@@ -140,8 +143,8 @@ pub struct Step {
 }
 
 impl Step {
-    /// What the pilot is told: `MAV_SEVERITY` and at most 50 characters.
-    pub fn text(&self) -> (u8, String<50>) {
+    /// What the pilot is told, with its `MAV_SEVERITY`.
+    pub fn text(&self) -> (u8, String<TEXT_BYTES_MAX>) {
         let name = self.action.name();
         let mut text = String::new();
         // Cut where it does not fit, which a test rules out.
@@ -374,7 +377,7 @@ mod tests {
         for action in [Action::Return, Action::Land] {
             for stage in Stage::ALL {
                 let (_, text) = Step { action, stage, detail: 255 }.text();
-                assert!(text.len() < 50, "{text}");
+                assert!(text.len() < TEXT_BYTES_MAX, "{text}");
                 assert!(!text.ends_with(':'), "{text}");
             }
         }

@@ -9,7 +9,7 @@ const POINTS: usize = 32;
 
 /// Counts the cycles of one load by range.
 #[derive(Clone, Copy, Debug)]
-pub struct Rainflow<const BINS: usize> {
+pub(crate) struct Rainflow<const BINS: usize> {
     /// The lowest range of each bin, ascending.
     edges: [f32; BINS],
     /// Half cycles of each bin.
@@ -24,12 +24,12 @@ pub struct Rainflow<const BINS: usize> {
 
 impl<const BINS: usize> Rainflow<BINS> {
     /// Counts ranges from `edges[0]` on; what turns back by less than `turn` has not turned.
-    pub const fn new(edges: [f32; BINS], turn: f32) -> Self {
+    pub(crate) const fn new(edges: [f32; BINS], turn: f32) -> Self {
         Self { edges, halves: [0; BINS], points: [0.0; POINTS], used: 0, extreme: None, turn }
     }
 
     /// Takes the next value of the load. A value that is no number is left out.
-    pub fn take(&mut self, value: f32) {
+    pub(crate) fn take(&mut self, value: f32) {
         if !value.is_finite() {
             return;
         }
@@ -93,7 +93,7 @@ impl<const BINS: usize> Rainflow<BINS> {
     }
 
     /// Cycles of a bin as if the history ended now: what has not paired counts half.
-    pub fn cycles(&self, bin: usize) -> f64 {
+    pub(crate) fn cycles(&self, bin: usize) -> f64 {
         let points = &self.points[..usize::from(self.used)];
         let open = self.extreme.filter(|_| !points.is_empty());
         let ends = points.iter().copied().skip(1).chain(open);

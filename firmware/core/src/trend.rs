@@ -5,7 +5,7 @@ use crate::time::Instant;
 
 /// A battery's internal resistance: the slope of its voltage over its current, from means that forget slowly.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Resistance {
+pub(crate) struct Resistance {
     current_a: f32,
     voltage_v: f32,
     variance_a2: f32,
@@ -30,7 +30,7 @@ impl Resistance {
     const SAMPLES_BASELINE: u16 = 480;
 
     /// Nothing known.
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self {
             current_a: 0.0,
             voltage_v: 0.0,
@@ -43,7 +43,7 @@ impl Resistance {
     }
 
     /// Takes what the battery says.
-    pub fn take(&mut self, battery: &Battery) {
+    pub(crate) fn take(&mut self, battery: &Battery) {
         let (Some(voltage), Some(current)) = (battery.voltage, battery.current) else { return };
         let (voltage_v, current_a) = (voltage.0, current.0);
         if !voltage_v.is_finite() || !current_a.is_finite() {
@@ -66,7 +66,7 @@ impl Resistance {
     }
 
     /// In ohm; `None` while the current has not varied enough to tell.
-    pub fn ohm(&self) -> Option<f32> {
+    pub(crate) fn ohm(&self) -> Option<f32> {
         let enough = self.samples >= Self::SAMPLES_MIN
             && self.variance_a2 >= Self::VARIANCE_MIN_A2
             && self.covariance_va * self.covariance_va
@@ -77,14 +77,14 @@ impl Resistance {
     }
 
     /// Sets the baseline that earlier flights found, ohm.
-    pub fn set_baseline(&mut self, ohm: f32) {
+    pub(crate) fn set_baseline(&mut self, ohm: f32) {
         if ohm.is_finite() && ohm > 0.0 {
             self.baseline_ohm = ohm;
         }
     }
 
     /// How far it is above its baseline, percent.
-    pub fn rise_percent(&self) -> Option<f32> {
+    pub(crate) fn rise_percent(&self) -> Option<f32> {
         let ohm = self.ohm()?;
         (self.baseline_ohm > 0.0).then(|| (ohm / self.baseline_ohm - 1.0) * 100.0)
     }
@@ -98,7 +98,7 @@ impl Default for Resistance {
 
 /// Events of the last half to whole minute, of a counter that may wrap or start again.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rate {
+pub(crate) struct Rate {
     count: u32,
     /// Of this half minute and of the one before.
     events: [u32; 2],
@@ -112,12 +112,12 @@ impl Rate {
     const STEP_MAX: u32 = 10_000;
 
     /// From the first value of the counter.
-    pub const fn new(at: Instant, count: u32) -> Self {
+    pub(crate) const fn new(at: Instant, count: u32) -> Self {
         Self { count, events: [0; 2], half_began_ms: at.as_millis() as u32 }
     }
 
     /// Takes the counter's value.
-    pub fn take(&mut self, at: Instant, count: u32) {
+    pub(crate) fn take(&mut self, at: Instant, count: u32) {
         let now_ms = at.as_millis() as u32;
         let age_ms = now_ms.wrapping_sub(self.half_began_ms);
         if age_ms >= Self::HALF_MS {
@@ -133,7 +133,7 @@ impl Rate {
     }
 
     /// Events in the time looked back on.
-    pub fn per_minute(&self) -> u32 {
+    pub(crate) fn per_minute(&self) -> u32 {
         self.events[0].saturating_add(self.events[1])
     }
 }

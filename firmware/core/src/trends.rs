@@ -127,7 +127,7 @@ impl Trends {
 
     /// How far a quantity is from its baseline: percent of it above it; of motor speeds, percent of the mean speed either
     /// way. `None` without a baseline or without enough steady flight.
-    pub fn departure(&self, quantity: Quantity, baselines: &Baselines) -> Option<f32> {
+    pub(crate) fn departure(&self, quantity: Quantity, baselines: &Baselines) -> Option<f32> {
         let (figure, normal) = (self.figure(quantity)?, baselines.get(quantity).known()?);
         Some(match quantity {
             Quantity::MotorSpeed(_) => (figure - normal).abs(),

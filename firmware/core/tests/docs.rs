@@ -1,7 +1,7 @@
 //! The documents that the tables make: `docs/parameters.md` and the table of checks in `docs/health.md` are what the
 //! code says, and `docs/usage.md` knows every counter. `HUMS_WRITE_DOCS=1 cargo test -p hums-core --test docs` writes
 //! the first two.
-#![allow(clippy::panic, clippy::unwrap_used)]
+#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use std::fmt::Write as _;
 use std::fs;

@@ -1,6 +1,6 @@
 //! Every check there is finds what it is there for, within its own debounce plus 100 ms: on either autopilot's scales,
 //! with an engine, with a second battery and with a twelfth motor.
-#![allow(clippy::panic, clippy::unwrap_used)]
+#![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
 mod common;
 

@@ -1,6 +1,5 @@
 //! Nothing that a vehicle can say, in whatever order, at whatever time and however often, panics or overflows, spoils a
 //! figure, or makes what is not known look healthy. (From bytes on: `hums-link`'s `tests/hostile.rs`.)
-#![allow(clippy::panic, clippy::unwrap_used)]
 
 use hums_core::Monitor;
 use hums_core::health::{EXPECTED, Level, Subsystem};

@@ -1,6 +1,6 @@
 //! Scripted faults in a simulated flight: each is found within its debounce plus 100 ms, and cleared when it has been
 //! well for two seconds, by more than the hysteresis.
-#![allow(clippy::panic, clippy::unwrap_used)]
+#![expect(clippy::panic, reason = "that is how a test fails")]
 
 mod common;
 

@@ -1,5 +1,5 @@
 //! Flights one after the other: what is normal is learned, kept, and what leaves it is found.
-#![allow(clippy::panic, clippy::unwrap_used)]
+#![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
 mod common;
 

@@ -1,25 +1,13 @@
 //! One MAVLink frame as it came: borrowed bytes and where its parts lie. Nothing is copied and nothing is altered, so
 //! that a frame can be recorded and forwarded bit for bit.
 
-use crate::crc;
+use hums_core::observation::Source;
+use hums_dialect::crc;
+use hums_dialect::wire::{
+    CHECKSUM_BYTES, HEADER_V1_BYTES, HEADER_V2_BYTES, INCOMPAT_SIGNED, SIGNATURE_BYTES, START_V1, START_V2,
+};
 
-/// The first byte of a MAVLink 1 frame.
-pub const START_V1: u8 = 0xfe;
-/// The first byte of a MAVLink 2 frame.
-pub const START_V2: u8 = 0xfd;
-/// Start byte, length, sequence, system, component, message id.
-pub const HEADER_V1: usize = 6;
-/// Start byte, length, two flag bytes, sequence, system, component, message id of three bytes.
-pub const HEADER_V2: usize = 10;
-/// The checksum's bytes.
-pub const CHECKSUM: usize = 2;
-/// Link id, time stamp of 6 bytes and signature of 6 bytes that follow the checksum of a signed frame.
-pub const SIGNATURE: usize = 13;
-/// The longest frame: MAVLink 2, 255 bytes of payload, signed.
-pub const FRAME_MAX: usize = HEADER_V2 + 255 + CHECKSUM + SIGNATURE;
-
-/// The only incompatibility flag there is: the frame is signed.
-pub(crate) const INCOMPAT_SIGNED: u8 = 1;
+use crate::packet::Fields;
 
 /// What the checksum says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -79,11 +67,15 @@ impl Header {
                     id: u32::from_le_bytes([id0, id1, id2, 0]),
                 })
             }
-            [START_V1] | [START_V1, _, ..] if bytes.len() < HEADER_V1 => Err(NoHeader::Incomplete(HEADER_V1)),
+            [START_V1] | [START_V1, _, ..] if bytes.len() < HEADER_V1_BYTES => {
+                Err(NoHeader::Incomplete(HEADER_V1_BYTES))
+            }
             // The flags come early: most false starts end here without waiting for more.
             [START_V2] | [START_V2, _] => Err(NoHeader::Incomplete(3)),
-            [START_V2, _, incompat, ..] if incompat & !INCOMPAT_SIGNED == 0 && bytes.len() < HEADER_V2 => {
-                Err(NoHeader::Incomplete(HEADER_V2))
+            [START_V2, _, incompat, ..]
+                if incompat & !INCOMPAT_SIGNED == 0 && bytes.len() < HEADER_V2_BYTES =>
+            {
+                Err(NoHeader::Incomplete(HEADER_V2_BYTES))
             }
             _ => Err(NoHeader::Invalid),
         }
@@ -92,7 +84,7 @@ impl Header {
     /// Where the payload begins.
     #[inline]
     pub(crate) const fn payload_at(&self) -> usize {
-        if self.version == 1 { HEADER_V1 } else { HEADER_V2 }
+        if self.version == 1 { HEADER_V1_BYTES } else { HEADER_V2_BYTES }
     }
 
     /// Where the checksum begins.
@@ -104,7 +96,7 @@ impl Header {
     /// All bytes of the frame.
     #[inline]
     pub(crate) const fn frame_len(&self) -> usize {
-        self.checksum_at() + CHECKSUM + if self.signed { SIGNATURE } else { 0 }
+        self.checksum_at() + CHECKSUM_BYTES + if self.signed { SIGNATURE_BYTES } else { 0 }
     }
 }
 
@@ -175,6 +167,12 @@ impl<'a> Frame<'a> {
         self.header.component
     }
 
+    /// Who sent it.
+    #[inline]
+    pub const fn source(&self) -> Source {
+        Source { system: self.header.system, component: self.header.component }
+    }
+
     /// The sender's count of frames, modulo 256.
     #[inline]
     pub const fn sequence(&self) -> u8 {
@@ -199,15 +197,13 @@ impl<'a> Frame<'a> {
         if message.target_system == hums_dialect::Message::NO_TARGET {
             return None;
         }
-        let payload = self.payload();
-        // What MAVLink 2 leaves out at the end is zero.
-        let at = |offset: u8| payload.get(usize::from(offset)).copied().unwrap_or(0);
+        let at = |offset: u8| Fields(self.payload()).u8(usize::from(offset));
         Some((at(message.target_system), at(message.target_component)))
     }
 
     /// What a signature is about (all bytes from the first to the checksum), and what follows them: link id, stamp and
     /// hash. `None` where it is not signed.
-    pub fn signature(&self) -> Option<(&'a [u8], &'a [u8; SIGNATURE])> {
+    pub fn signature(&self) -> Option<(&'a [u8], &'a [u8; SIGNATURE_BYTES])> {
         self.bytes.split_last_chunk().filter(|_| self.header.signed)
     }
 
@@ -274,9 +270,9 @@ mod tests {
     fn a_header_is_refused_as_soon_as_it_can_be() {
         assert_eq!(Header::read(&[START_V2, 9, 4]), Err(NoHeader::Invalid));
         assert_eq!(Header::read(&[START_V2, 9]), Err(NoHeader::Incomplete(3)));
-        assert_eq!(Header::read(&[START_V2, 9, 0, 0]), Err(NoHeader::Incomplete(HEADER_V2)));
-        assert_eq!(Header::read(&[START_V1]), Err(NoHeader::Incomplete(HEADER_V1)));
-        assert_eq!(Header::read(&[START_V1, 1, 2, 3, 4]), Err(NoHeader::Incomplete(HEADER_V1)));
+        assert_eq!(Header::read(&[START_V2, 9, 0, 0]), Err(NoHeader::Incomplete(HEADER_V2_BYTES)));
+        assert_eq!(Header::read(&[START_V1]), Err(NoHeader::Incomplete(HEADER_V1_BYTES)));
+        assert_eq!(Header::read(&[START_V1, 1, 2, 3, 4]), Err(NoHeader::Incomplete(HEADER_V1_BYTES)));
         assert_eq!(Header::read(&[0x55]), Err(NoHeader::Invalid));
         assert_eq!(Header::read(&[]), Err(NoHeader::Invalid));
     }

@@ -10,7 +10,7 @@
 //!
 //! # Frames of definitions that we do not have
 //! They must be recorded and passed on, yet line noise must not. For each checksum that does not fit we compute which
-//! `crc_extra` would make it fit ([`crc::extra_of`]; 1 in 256 of random bytes has one), and let the candidate through
+//! `crc_extra` would make it fit ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one), and let the candidate through
 //! as [`Check::Unverified`] if that extra is the one that this system used for this id before, or, at first sight, if
 //! it stands between frames: a frame (a damaged one, silence) before it, a start byte (or silence) after it, and no whole frame of
 //! a known definition inside. Without a frame before it, its extra is only remembered, and the next one comes through.
@@ -18,15 +18,17 @@
 //!
 //! # Limits
 //! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy, one
-//! step of the checksum; candidates that are not trusted may cost no more than [`CREDIT_PER_BYTE`] such steps for each
+//! step of the checksum; candidates that are not trusted may cost no more than four such steps for each
 //! byte received, so that no input can starve the other tasks.
 
-use crate::crc;
-use crate::frame::{self, Check, FRAME_MAX, Frame, Header, NoHeader, START_V1, START_V2};
+use hums_dialect::crc;
+use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
+
+use crate::frame::{self, Check, Frame, Header, NoHeader};
 use crate::seen::{Extra, Seen};
 
 /// Bytes held: the longest frame, the byte after it, and as much again so that bytes are seldom moved.
-const BUFFER: usize = 2 * FRAME_MAX;
+const BUFFER: usize = 2 * FRAME_BYTES_MAX;
 
 /// Steps of the checksum that candidates which are not trusted may cost, for each byte received.
 const CREDIT_PER_BYTE: u32 = 4;
@@ -71,7 +73,7 @@ pub struct Framer {
 }
 
 const _: () = assert!(size_of::<Framer>() <= 1_280);
-const _: () = assert!(BUFFER > FRAME_MAX + 1, "a decided candidate must always make room");
+const _: () = assert!(BUFFER > FRAME_BYTES_MAX + 1, "a decided candidate must always make room");
 
 /// What becomes of the first bytes held.
 enum Verdict {
@@ -131,7 +133,7 @@ impl Framer {
         self.after_frame = true;
     }
 
-    /// Bytes received and not yet decided: at most [`FRAME_MAX`].
+    /// Bytes received and not yet decided: at most [`FRAME_BYTES_MAX`].
     pub const fn held(&self) -> usize {
         self.end - self.start
     }
@@ -162,7 +164,7 @@ impl Framer {
                     self.consume(len);
                 }
                 Verdict::Wait(needed) => {
-                    debug_assert!(needed > self.held() && needed <= FRAME_MAX + 1);
+                    debug_assert!(needed > self.held() && needed <= FRAME_BYTES_MAX + 1);
                     self.needed = needed;
                     return;
                 }

@@ -2,7 +2,6 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod asking;
-mod crc;
 pub mod encode;
 pub mod frame;
 pub mod framer;

@@ -2,8 +2,9 @@
 
 use hums_core::time::Instant;
 
-use crate::encode::{COMPONENT, Severity, TEXT_BYTES_MAX};
+use crate::encode::COMPONENT;
 use crate::packet::Packet;
+use crate::text::{Severity, TEXT_BYTES_MAX};
 
 /// `MAV_TYPE_ONBOARD_CONTROLLER`
 const TYPE: u8 = 18;
@@ -51,7 +52,7 @@ pub fn command_long(command: u16, params: &[f32], system: u8, component: u8) -> 
 }
 
 /// `REQUEST_DATA_STREAM`: all messages of a group at `rate_hz`.
-pub fn request_data_stream(stream: u8, rate_hz: u16, system: u8, component: u8) -> Packet {
+pub(crate) fn request_data_stream(stream: u8, rate_hz: u16, system: u8, component: u8) -> Packet {
     Packet::new(66).u16(0, rate_hz).u8(2, system).u8(3, component).u8(4, stream).u8(5, 1)
 }
 
@@ -95,7 +96,7 @@ pub const fn concerns_us(target: (u8, u8), system: u8) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::frame::{Check, Frame};
 
     /// That the layouts are right is pymavlink's to say, in the end to end tests; here that they fit their messages.
@@ -117,7 +118,7 @@ mod tests {
             log_data(1, 0, &[1; 100]),
             file_transfer(255, 190, &[1; 300]),
         ];
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         for packet in packets {
             let message = hums_dialect::message(packet.id()).expect("a message of the dialect");
             assert!(packet.payload().len() <= usize::from(message.len_max), "{}", packet.id());

@@ -16,9 +16,9 @@
 //! to bulk that waits.
 
 use hums_core::time::{Instant, Span};
+use hums_dialect::wire::SIGNATURE_BYTES;
 
-use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
-use crate::frame::SIGNATURE;
+use crate::encode::{Encoder, FRAME_BYTES_MAX};
 use crate::packet::Packet;
 use crate::signing::Seal;
 
@@ -207,7 +207,7 @@ impl Outlet {
     }
 
     /// The same, where `more` bytes shall find room in the same second.
-    pub fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
+    pub(crate) fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
         let start = self.free_at.max(now);
         let busy = start.since(now);
         // A fast line would let more wait than the queue holds.
@@ -225,7 +225,7 @@ impl Outlet {
         if class == Class::Bulk {
             self.bulk_at = Some(now);
         }
-        if !waits || self.changing || bytes > GS_FRAME_BYTES_MAX {
+        if !waits || self.changing || bytes > FRAME_BYTES_MAX {
             return false;
         }
         let share = match class {
@@ -275,11 +275,11 @@ impl Outlet {
     /// Sends a message of ours, if it may go now.
     pub fn send(&mut self, now: Instant, class: Class, packet: &Packet, out: &mut impl FnMut(&[u8])) -> bool {
         // Signing is work: not for a frame that will not go.
-        let tail = if self.seal.is_some() { SIGNATURE } else { 0 };
+        let tail = if self.seal.is_some() { SIGNATURE_BYTES } else { 0 };
         if !self.fits(now, class, self.encoder.frame_len(packet) + tail) {
             return false;
         }
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let mut encoder = self.encoder;
         let frame = match &mut self.seal {
             Some(seal) => encoder.frame_signed(&mut buffer, packet, now, seal),

@@ -4,8 +4,7 @@
 //! Not by the `mavlink` crate's structures, because those refuse a number that their enumeration lacks, and a command
 //! that nobody knows must be answered too.
 
-/// The longest payload.
-pub const PAYLOAD_MAX: usize = 255;
+use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 
 /// A payload as sent: what MAVLink 2 left out at its end reads as zero.
 #[derive(Clone, Copy, Debug)]
@@ -60,13 +59,13 @@ impl<'a> Fields<'a> {
 pub struct Packet {
     id: u32,
     len: usize,
-    payload: [u8; PAYLOAD_MAX],
+    payload: [u8; PAYLOAD_BYTES_MAX],
 }
 
 impl Packet {
     /// A message whose fields are all zero.
     pub const fn new(id: u32) -> Self {
-        Self { id, len: 0, payload: [0; PAYLOAD_MAX] }
+        Self { id, len: 0, payload: [0; PAYLOAD_BYTES_MAX] }
     }
 
     /// Sets bytes; what lies beyond the longest payload is left out.

@@ -196,11 +196,11 @@ impl Replies {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::packet::Packet;
 
     fn asked(packet: &Packet) -> Option<(Vec<u8>, bool)> {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let bytes = Encoder::new().frame(&mut buffer, packet).to_vec();
         let some = read(&Frame::parse(&bytes)?).is_some();
         Some((bytes, some))

@@ -63,7 +63,7 @@ impl Sequences {
 
     /// Takes a frame; how many frames of its sender were lost right before it.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>) -> u8 {
-        let source = Source { system: frame.system(), component: frame.component() };
+        let source = frame.source();
         let now_s = at.as_micros() / Span::from_secs(1).as_micros();
         let known = |slot: &Option<Sender>| slot.is_none_or(|sender| sender.source == source);
         let Some(slot) = self.senders.iter_mut().find(|slot| known(slot)) else { return 0 };
@@ -92,7 +92,7 @@ impl Sequences {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::encode::{Encoder, FRAME_BYTES_MAX};
 
     const SOURCE: Source = Source { system: 1, component: 191 };
 
@@ -102,7 +102,7 @@ mod tests {
             let mut encoder = Encoder::new();
             encoder.set_system(1);
             encoder.set_sequence(number);
-            let mut buffer = [0; GS_FRAME_BYTES_MAX];
+            let mut buffer = [0; FRAME_BYTES_MAX];
             let bytes = encoder.frame(&mut buffer, &crate::messages::heartbeat(4));
             let frame = Frame::parse(bytes).expect("a frame of ours");
             lost += u32::from(sequences.frame(Instant::from_millis(from_ms + index * 10), &frame));

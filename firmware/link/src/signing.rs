@@ -20,9 +20,10 @@
 use core::fmt;
 
 use hums_core::time::Instant;
+use hums_dialect::wire::SIGNATURE_BYTES;
 use sha2::{Digest as _, Sha256};
 
-use crate::frame::{Frame, SIGNATURE};
+use crate::frame::Frame;
 
 /// Bytes of a key.
 pub const KEY_BYTES: usize = 32;
@@ -122,9 +123,9 @@ impl Seal {
     }
 
     /// What follows `frame`, which ends with its checksum and says that it is signed.
-    pub fn sign(&mut self, now: Instant, frame: &[u8]) -> [u8; SIGNATURE] {
+    pub fn sign(&mut self, now: Instant, frame: &[u8]) -> [u8; SIGNATURE_BYTES] {
         self.last = (self.last + 1).max(self.clock.now(now)).min(STAMP_MAX);
-        let mut tail = [0; SIGNATURE];
+        let mut tail = [0; SIGNATURE_BYTES];
         tail[0] = self.link;
         tail[1..7].copy_from_slice(&self.last.to_le_bytes()[..6]);
         let hash = self.key.hash(frame, &tail[..7]);
@@ -266,7 +267,7 @@ impl Signing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::messages;
 
     const KEY: Key = Key([7; KEY_BYTES]);
@@ -275,7 +276,7 @@ mod tests {
     fn signed(component: u8, key: Key, link: u8, stamp: u64) -> Vec<u8> {
         let mut clock = Clock::default();
         clock.is_at_least(NOW, stamp);
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let mut seal = Seal::new(key, link, clock, 0);
         let mut encoder = Encoder::of(255, component);
         encoder.frame_signed(&mut buffer, &messages::heartbeat(4), NOW, &mut seal).to_vec()
@@ -295,7 +296,7 @@ mod tests {
     fn the_signature_is_as_the_guide_says() {
         // As the guide has it: of key, frame to its checksum, link id, stamp. pymavlink checks it end to end.
         let bytes = signed(190, KEY, 3, 123_456_789);
-        let tail = &bytes[bytes.len() - SIGNATURE..];
+        let tail = &bytes[bytes.len() - SIGNATURE_BYTES..];
         assert_eq!(tail[..7], [3, 0x15, 0xcd, 0x5b, 0x07, 0, 0]);
         let mut by_hand = Sha256::new();
         by_hand.update([7; 32]);
@@ -320,7 +321,7 @@ mod tests {
     #[test]
     fn without_a_key_every_frame_is_unsigned() {
         assert_eq!(judge(&mut Signing::new(), &signed(190, KEY, 0, 5)), Verdict::Unsigned);
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let plain = Encoder::new().frame(&mut buffer, &messages::heartbeat(4)).to_vec();
         assert_eq!(judge(&mut with_key(), &plain), Verdict::Unsigned);
         let mut signing = with_key();

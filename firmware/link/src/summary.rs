@@ -5,7 +5,7 @@
 //! All of it goes through an [`Outlet`], which keeps the byte budget and lets findings overtake. What repeats takes
 //! turns: a message may go when its interval is nearly over, and how long it has waited, in intervals, is its score.
 //! Where the budget does not carry them all, a frame goes only if the one with the highest score would still find room
-//! after it; so each becomes the highest in time, and nothing starves. One that has waited [`STARVED`] times its interval
+//! after it; so each becomes the highest in time, and nothing starves. One that has waited four times its interval
 //! goes like a heartbeat.
 
 use hums_core::Monitor;
@@ -16,10 +16,10 @@ use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
 
-use crate::encode::{Severity, Text};
 use crate::frame::Frame;
 use crate::messages;
 use crate::outlet::{Class, Outlet};
+use crate::text::{Severity, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
@@ -405,169 +405,4 @@ pub fn text(finding: &Finding) -> Text {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::encode::{Encoder, GS_FRAME_BYTES_MAX};
-    use crate::packet::Packet;
-
-    const VEHICLE: Source = Source { system: 1, component: 1 };
-
-    fn finding(level: Level) -> Finding {
-        Finding {
-            at: Instant::ZERO,
-            subsystem: Subsystem::Power,
-            check: "batt_remaining",
-            instance: 0,
-            level,
-            previous: Level::Ok,
-            value: 14.9,
-            limit: 15.0,
-            unit: "%",
-        }
-    }
-
-    fn params(budget: f32) -> Params {
-        let mut params = Params::defaults();
-        params.set("GS_BUDGET", budget).expect("in range");
-        params
-    }
-
-    /// A frame of the vehicle, `bytes` long.
-    fn frame(id: u32, bytes: usize) -> Vec<u8> {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
-        let packet = Packet::new(id).bytes(0, &vec![1; bytes - 12]);
-        let mut frame = Encoder::new().frame(&mut buffer, &packet).to_vec();
-        frame[6] = 1;
-        frame
-    }
-
-    /// What a summary sends when each of `streams` (id, bytes, every so many ms) comes with jitter.
-    fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u32, usize)> {
-        let params = params(budget);
-        let mut summary = Summary::new(&params);
-        let monitor = Monitor::new(params);
-        summary.vehicle = Some(VEHICLE);
-        let frames: Vec<Vec<u8>> = streams.iter().map(|(id, bytes, _)| frame(*id, *bytes)).collect();
-        let mut sent = Vec::new();
-        let mut random = 12_345_u64;
-        let mut next: Vec<u64> = streams.iter().map(|(_, _, every)| every / 2).collect();
-        for now_ms in 0..seconds * 1_000 {
-            let now = Instant::from_millis(now_ms);
-            let mut out = |bytes: &[u8]| {
-                let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
-                sent.push((now_ms, id, bytes.len()));
-            };
-            for (index, (_, _, every)) in streams.iter().enumerate() {
-                if now_ms == next[index] {
-                    random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                    // Each comes up to a tenth of its interval early or late.
-                    let jitter = (random >> 33) % (every / 5 + 1);
-                    next[index] = (now_ms / every + 1) * every + every / 2 + jitter - every / 10;
-                    next[index] = next[index].max(now_ms + 1);
-                    let bytes = &frames[index];
-                    let frame = Frame::again(bytes, crate::Check::Verified).expect("a frame");
-                    summary.frame(now, &frame, &mut out);
-                }
-            }
-            if now_ms % 50 == 0 {
-                summary.tick(now, &monitor, &mut out);
-            }
-        }
-        sent
-    }
-
-    const ALL: &[(u32, usize, u64)] = &[
-        (0, 21, 1_000),
-        (1, 43, 500),
-        (2, 24, 1_000),
-        (24, 64, 200),
-        (30, 40, 20),
-        (33, 40, 100),
-        (65, 54, 200),
-        (74, 32, 50),
-        (147, 66, 1_000),
-        (193, 34, 200),
-        (241, 44, 200),
-        (245, 14, 500),
-        (291, 69, 100),
-    ];
-
-    #[test]
-    fn a_finding_reads_as_a_sentence_and_fits() {
-        assert_eq!(text(&finding(Level::Warning)).as_str(), "HUMS: battery low #1 14.90 % (limit 15)");
-        for check in health::checks() {
-            for level in Level::ALL {
-                let finding =
-                    Finding { check: check.name, unit: check.unit, value: -1234.5, ..finding(level) };
-                let told = text(&finding);
-                let has_end = matches!(level, Level::Ok | Level::Stale) || told.as_str().ends_with(')');
-                assert!(has_end && told.as_str().len() <= 50, "{}", told.as_str());
-            }
-        }
-    }
-
-    #[test]
-    fn forwarded_ids_are_sorted_for_the_search() {
-        assert!(FORWARDED.is_sorted_by(|a, b| a.0 < b.0));
-    }
-
-    #[test]
-    fn the_budget_holds_in_every_window_of_a_second_and_is_used() {
-        for budget in [100, 250, 400, 2_000, 5_000_u32] {
-            let sent = run(budget as f32, 60, ALL);
-            for (index, (start, ..)) in sent.iter().enumerate() {
-                let window = sent[index..].iter().take_while(|(at, ..)| *at < start + 1_000);
-                let bytes: usize = window.map(|(.., bytes)| bytes).sum();
-                assert!(bytes <= budget as usize, "{bytes} of {budget} bytes in the second from {start} ms");
-            }
-            let total: usize = sent.iter().map(|(.., bytes)| bytes).sum();
-            assert!(budget > 1_000 || total as u32 > budget * 60 / 2, "{total} bytes at {budget} B/s");
-        }
-    }
-
-    #[test]
-    fn nothing_starves_from_the_smallest_budget_up() {
-        for budget in [100.0, 150.0, 300.0, 1_000.0] {
-            let sent = run(budget, 240, ALL);
-            for (id, ..) in ALL.iter().chain(&[(251, 30, 0), (252, 30, 0)]) {
-                let times: Vec<u64> =
-                    sent.iter().filter(|(_, sent, _)| sent == id).map(|(at, ..)| *at).collect();
-                let longest = times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(u64::MAX);
-                // At 100 B/s all intervals are about twelve times as long.
-                assert!(longest < 90_000, "{id} at {budget} B/s: {longest} ms without one");
-            }
-            // The vehicle's heartbeats and ours, of 240 each: link loss is four in a row.
-            let beats: Vec<u64> = sent.iter().filter(|(_, id, _)| *id == 0).map(|(at, ..)| *at).collect();
-            assert!(beats.len() > 300, "{} heartbeats at {budget} B/s", beats.len());
-        }
-    }
-
-    #[test]
-    fn a_stream_of_one_a_second_is_not_halved_by_its_jitter() {
-        let sent = run(2_000.0, 100, &[(0, 21, 1_000), (24, 64, 1_000), (245, 14, 250)]);
-        let count = |id| sent.iter().filter(|(_, sent, _)| *sent == id).count();
-        assert!(count(24) >= 97, "{} of 100 positions", count(24));
-        assert!((97..=103).contains(&count(245)), "{} where one a second was wanted", count(245));
-    }
-
-    #[test]
-    fn a_critical_finding_overtakes_those_that_wait() {
-        let mut summary = Summary::new(&Params::defaults());
-        summary.outlet.set(Instant::ZERO, 0, 57_600);
-        for level in [Level::Warning, Level::Stale, Level::Critical, Level::Warning] {
-            summary.finding(Instant::ZERO, &finding(level), &mut |_| panic!("there is no budget"));
-        }
-        let order: Vec<_> = summary.waiting.iter().map(|finding| finding.level).collect();
-        assert_eq!(order, [Level::Critical, Level::Warning, Level::Warning, Level::Stale]);
-    }
-
-    #[test]
-    fn the_state_holds_every_subsystem() {
-        let monitor = Monitor::new(Params::defaults());
-        for (index, subsystem) in Subsystem::ALL.into_iter().enumerate() {
-            assert_eq!(state(&monitor) >> (3 * index) & 7, monitor.health().subsystem(subsystem) as i32);
-        }
-        assert_eq!(VALUE_NAMES.iter().filter(|name| name.starts_with("L_")).count(), Subsystem::ALL.len());
-        assert!(VALUE_NAMES.iter().all(|name| name.len() <= 10));
-    }
-}
+mod tests;

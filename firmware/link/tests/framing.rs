@@ -1,5 +1,5 @@
 //! The framer on real and damaged lines. The counts were made independently, with pymavlink's definitions.
-#![allow(clippy::panic, clippy::unwrap_used, clippy::similar_names)]
+#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 mod common;
 

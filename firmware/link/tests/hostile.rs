@@ -1,5 +1,4 @@
 //! Nothing that a line can carry may panic, overflow, or make a vehicle that nobody knows look healthy.
-#![allow(clippy::panic, clippy::unwrap_used)]
 
 use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Label};

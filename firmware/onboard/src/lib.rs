@@ -10,25 +10,23 @@
 //! [`queues`] is the home of all queues, with their capacities and what happens when each is full.
 #![cfg_attr(not(test), no_std)]
 
-mod commands;
 mod companion;
+mod journal;
 mod keeping;
-mod library;
 mod loss;
 pub mod monitoring;
-mod pass;
+mod notices;
 pub mod persist;
 pub mod port;
 pub mod queues;
 pub mod reception;
-mod secure;
-mod settings;
+mod records;
 pub mod shelf;
 pub mod storage;
 pub mod supervisor;
 pub mod uplink;
 
-pub use monitoring::{Identity, Monitoring};
+pub use monitoring::Monitoring;
 pub use persist::{Handover, Keeper, Mailbox, StoreStatus};
 pub use port::PortStatus;
 pub use reception::Reception;

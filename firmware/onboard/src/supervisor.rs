@@ -37,7 +37,7 @@ impl Task {
 
     /// How long it may be silent. The short ones have nothing to wait for but the ground station's port, 70 ms for its
     /// longest frame at 38,400 baud; storage waits for its card, and that has an end ([`SERVICE_MAX`]).
-    pub const fn silence_max(self) -> Span {
+    pub(crate) const fn silence_max(self) -> Span {
         match self {
             Self::Reception | Self::Monitor | Self::Downlink => Span::from_secs(1),
             Self::Storage => Span::from_secs(10),

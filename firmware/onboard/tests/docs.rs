@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use hums_link::text::TEXT_BYTES_MAX;
+
 /// Every string of the firmware's sources that begins with our name, without its tests.
 fn texts(folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("readable").flatten() {
@@ -18,18 +20,32 @@ fn texts(folder: &Path, found: &mut Vec<String>) {
     }
 }
 
+/// Every text that a pilot may read, without our name.
+fn all_texts() -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut found = Vec::new();
+    for folder in ["core/src", "link/src", "onboard/src", "recorder/src", "app/src"] {
+        texts(&root.join("firmware").join(folder), &mut found);
+    }
+    assert!(found.len() > 20, "{found:?}");
+    found
+}
+
+#[test]
+fn every_text_that_a_pilot_may_read_is_one_message() {
+    // Those with placeholders are tested where they are put together.
+    for text in all_texts().iter().filter(|text| !text.contains('{')) {
+        assert!("HUMS: ".len() + text.len() <= TEXT_BYTES_MAX, "{text}");
+    }
+}
+
 #[test]
 fn every_text_that_a_pilot_may_read_is_in_the_runbook() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let read = |name: &str| fs::read_to_string(root.join("docs").join(name)).expect("readable");
     // The card's have a document of their own.
     let known = read("runbook.md") + &read("cards.md").replace("| ", "card: ");
-    let mut found = Vec::new();
-    for folder in ["core/src", "link/src", "onboard/src", "recorder/src", "app/src"] {
-        texts(&root.join("firmware").join(folder), &mut found);
-    }
-    assert!(found.len() > 20, "{found:?}");
-    for text in found {
+    for text in all_texts() {
         // What stands between the placeholders.
         let pieces = text.split('{').map(|piece| piece.rsplit('}').next().unwrap_or_default().trim());
         for piece in pieces.filter(|piece| piece.chars().filter(char::is_ascii_alphabetic).count() > 3) {

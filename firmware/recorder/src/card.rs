@@ -1,17 +1,17 @@
 //! The log segments of one card, through `embedded-sdmmc`: find, make, overwrite, write in place.
 
-use core::fmt;
 use core::ops::ControlFlow;
 
 use embedded_sdmmc::{
-    Block, BlockDevice, BlockIdx, Error, Mode, RawDirectory, RawVolume, ShortFileName, VolumeIdx,
-    VolumeManager,
+    Block, BlockDevice, BlockIdx, Mode, RawDirectory, RawVolume, ShortFileName, VolumeIdx, VolumeManager,
 };
 
+pub use crate::card_error::CardError;
 use crate::chain::Chain;
 use crate::gate::{Gate, GateError, HeldBlocks};
 use crate::layout::{Layout, LayoutError};
 use crate::name::{EXTENSION, LogName};
+use crate::room::Room;
 use crate::status::{CardStatus, FatClock};
 
 type Manager<'a, D> = VolumeManager<Gate<'a, D>, FatClock<'a>, 1, 1, 1>;
@@ -21,61 +21,6 @@ const DIRECTORY_BLOCKS_MAX: u32 = 4_096;
 
 /// The attribute of a file that lists do not show.
 const HIDDEN: u8 = 2;
-
-/// Why a card operation failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CardError<E> {
-    /// The card failed or was pulled.
-    Device(E),
-    /// The card cannot be used as it is.
-    Foreign(LayoutError<E>),
-    /// The file system on it is damaged.
-    Damaged,
-    /// No free clusters.
-    Full,
-    /// There is no such segment.
-    NotFound,
-    /// No segment is open.
-    NotOpen,
-}
-
-impl<E: fmt::Debug> fmt::Display for CardError<E> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Device(error) => write!(f, "the card failed: {error:?}"),
-            Self::Foreign(why) => write!(f, "{why}"),
-            Self::Damaged => {
-                write!(f, "the card's file system is damaged: copy its files, then format it as FAT32")
-            }
-            Self::Full => write!(f, "the card is full and holds no log to overwrite: delete other files"),
-            Self::NotFound => write!(f, "there is no such log"),
-            Self::NotOpen => write!(f, "no log is open"),
-        }
-    }
-}
-
-impl<E> From<Error<GateError<E>>> for CardError<E>
-where
-    GateError<E>: core::error::Error,
-{
-    fn from(error: Error<GateError<E>>) -> Self {
-        match error {
-            Error::DeviceError(GateError::Device(error)) => Self::Device(error),
-            Error::NotEnoughSpace | Error::DiskFull => Self::Full,
-            Error::NotFound => Self::NotFound,
-            _ => Self::Damaged,
-        }
-    }
-}
-
-impl<E> From<GateError<E>> for CardError<E> {
-    fn from(error: GateError<E>) -> Self {
-        match error {
-            GateError::Device(error) => Self::Device(error),
-            GateError::Refused | GateError::Runaway => Self::Damaged,
-        }
-    }
-}
 
 /// One log segment in the card's root directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,7 +63,7 @@ pub struct Card<'a, D: BlockDevice> {
     clock: FatClock<'a>,
     held: &'a HeldBlocks,
     open: Option<Segment>,
-    free: FreeSearch,
+    room: Room,
 }
 
 impl<'a, D: BlockDevice> Card<'a, D> {
@@ -144,7 +89,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
                 clock,
                 held,
                 open: None,
-                free: FreeSearch::new(),
+                room: Room::new(),
             }),
             Err(error) => Err((manager.free().0.into_device(), error)),
         }
@@ -158,7 +103,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     }
 
     /// Gives the device back.
-    pub fn unmount(self) -> Option<D> {
+    pub(crate) fn unmount(self) -> Option<D> {
         self.manager.map(|manager| manager.free().0.into_device())
     }
 
@@ -208,8 +153,8 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     }
 
     /// Whether [`CardError::Full`] means that only a part of the card was searched: to try again searches more of it.
-    pub const fn may_have_room(&self) -> bool {
-        self.free.searched > 0
+    pub(crate) const fn may_have_room(&self) -> bool {
+        self.room.may_have_more()
     }
 
     /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters
@@ -236,9 +181,9 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     fn allocate(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
         let clusters = bytes.div_ceil(cluster_bytes).max(1);
-        let mut free = self.free;
-        let found = self.manager()?.device(|gate| free.find(gate, clusters));
-        self.free = free;
+        let mut room = self.room;
+        let found = self.manager()?.device(|gate| room.find(gate, clusters));
+        self.room = room;
         found?;
         let manager = self.manager()?;
         manager.device(|gate| gate.begin());
@@ -393,99 +338,17 @@ impl<'a, D: BlockDevice> Card<'a, D> {
 
     /// Counts a little further how much of the card logs can have, one block of the FAT at a call; the share in
     /// thousandths once all of it is counted.
-    pub fn count_room(&mut self) -> Result<Option<u32>, CardError<D::Error>> {
-        let mut free = self.free;
+    pub(crate) fn count_room(&mut self) -> Result<Option<u32>, CardError<D::Error>> {
+        let mut room = self.room;
+        let counted = self.manager()?.device(|gate| room.count(gate));
+        self.room = room;
+        let Some(free) = counted? else { return Ok(None) };
         let mut log_clusters = 0;
         let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
-        if free.counted < self.layout.fat_blocks {
-            let more = self.manager()?.device(|gate| free_in_block(gate, free.counted));
-            free.clusters += more?;
-            free.counted += 1;
-            self.free = free;
-            return Ok(None);
-        }
         self.logs(|entry| log_clusters += entry.bytes.div_ceil(cluster_bytes))?;
-        let room = u64::from(free.clusters) + u64::from(log_clusters);
+        let room = u64::from(free) + u64::from(log_clusters);
         Ok(Some((room * 1000 / u64::from(self.layout.clusters)).min(1000) as u32))
     }
-}
-
-/// FAT blocks that are looked through for one new segment beside its own: 64 ms of a usual card. All of a large card's FAT takes
-/// seconds, and frames wait meanwhile.
-const SEARCH_BLOCKS: u32 = 128;
-
-/// The search for free clusters, which goes on from segment to segment, and what is known of how many there are.
-#[derive(Clone, Copy, Debug)]
-struct FreeSearch {
-    /// The FAT block to look at next; `None`: where the information sector says.
-    next: Option<u32>,
-    /// FAT blocks looked through since some were found, and what free clusters they told of.
-    searched: u32,
-    found: u32,
-    /// So many clusters, and so no more than that, were not there in all of the FAT: nothing but another computer
-    /// makes clusters free.
-    too_many: u32,
-    /// FAT blocks whose free entries are counted, for how much room there is in all.
-    counted: u32,
-    /// Free clusters counted.
-    clusters: u32,
-}
-
-impl FreeSearch {
-    const fn new() -> Self {
-        Self { next: None, searched: 0, found: 0, too_many: u32::MAX, counted: 0, clusters: 0 }
-    }
-
-    /// Fails with [`CardError::Full`] unless that many clusters were found free. Asked before a segment is made, so
-    /// that one that does not fit leaves no half of a chain behind.
-    fn find<D: BlockDevice>(&mut self, gate: &Gate<'_, D>, wanted: u32) -> Result<(), CardError<D::Error>> {
-        if wanted >= self.too_many {
-            return Err(CardError::Full);
-        }
-        let fat_blocks = gate.layout().fat_blocks;
-        let mut next = match self.next {
-            Some(next) => next,
-            None => hint(gate)? / ENTRIES,
-        };
-        for _ in 0..SEARCH_BLOCKS + wanted / ENTRIES {
-            next %= fat_blocks;
-            self.found += free_in_block(gate, next)?;
-            if self.found >= wanted {
-                // This block may have some left for the next segment. What is counted changes under the count.
-                *self = Self { next: Some(next), too_many: self.too_many, ..Self::new() };
-                return Ok(());
-            }
-            next += 1;
-            self.next = Some(next);
-            self.searched += 1;
-            if self.searched >= fat_blocks {
-                (self.searched, self.found, self.too_many) = (0, 0, wanted);
-                break;
-            }
-        }
-        Err(CardError::Full)
-    }
-}
-
-/// The cluster from which on a search is to begin, as the information sector says; the first one where it does not.
-fn hint<D: BlockDevice>(gate: &Gate<'_, D>) -> Result<u32, GateError<D::Error>> {
-    let mut block = [Block::new()];
-    gate.read(&mut block, BlockIdx(gate.layout().info))?;
-    let hint = block[0].get(492..496).and_then(|hint| hint.try_into().ok()).map_or(0, u32::from_le_bytes);
-    Ok(if hint < gate.layout().clusters + 2 { hint } else { 0 })
-}
-
-/// FAT entries of a block.
-const ENTRIES: u32 = 128;
-
-/// Free clusters that one block of the FAT tells of.
-fn free_in_block<D: BlockDevice>(gate: &Gate<'_, D>, index: u32) -> Result<u32, GateError<D::Error>> {
-    let layout = gate.layout();
-    let mut block = [Block::new()];
-    gate.read(&mut block, BlockIdx(layout.fat_start + index))?;
-    let entries = (layout.clusters + 2).saturating_sub(index * ENTRIES).min(ENTRIES);
-    let is_free = |entry: &&[u8]| u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3] & 0x0F]) == 0;
-    Ok(block[0].chunks_exact(4).take(entries as usize).filter(is_free).count() as u32)
 }
 
 fn short_name<E>(name: LogName) -> Result<ShortFileName, CardError<E>> {

@@ -13,7 +13,7 @@ const ENTRIES: u32 = 128;
 
 /// A walk along one file's chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Chain {
+pub(crate) struct Chain {
     first: u32,
     /// Clusters of the file before the row that is known.
     before: u32,
@@ -25,13 +25,13 @@ pub struct Chain {
 
 impl Chain {
     /// The chain that begins at this cluster.
-    pub const fn new(first: u32) -> Self {
+    pub(crate) const fn new(first: u32) -> Self {
         Self { first, before: 0, cluster: first, length: 1 }
     }
 
     /// The card's block that holds block `index` of the file, and how many of the file's blocks lie in a row from there
     /// on: at least that one, and as many as it takes for `wanted` where they do and one look at the FAT shows it.
-    pub fn locate<D: BlockDevice>(
+    pub(crate) fn locate<D: BlockDevice>(
         &mut self,
         gate: &Gate<'_, D>,
         index: u32,

@@ -27,7 +27,7 @@ use crate::layout::Layout;
 /// Metadata blocks held back in a transaction: the FAT blocks of the segment in work, its directory block, and the
 /// information sector. An 8 MiB segment's chain lies in up to three blocks of each FAT where clusters have 32 KiB, as on
 /// cards of 32 GB; FAT blocks beyond this are written early, which is harmless: nothing refers to them yet.
-pub const HELD_BLOCKS: usize = 8;
+pub(crate) const HELD_BLOCKS: usize = 8;
 
 /// What went wrong below the file system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +68,7 @@ struct Held {
 }
 
 /// Blocks of log that are written with one command at most: the gain of more is small, and they take RAM.
-pub const BATCH_BLOCKS: usize = 8;
+pub(crate) const BATCH_BLOCKS: usize = 8;
 
 /// Room for the blocks that are held back, and for the sectors that are being written. Lent, because gate and recorder
 /// are moved with the card and this, 10 KiB, would come along on the firmware's stack each time.
@@ -86,7 +86,7 @@ impl HeldBlocks {
 }
 
 /// The gate. Its methods take `&self` because the library owns it and hands out only shared references.
-pub struct Gate<'a, D: BlockDevice> {
+pub(crate) struct Gate<'a, D: BlockDevice> {
     device: D,
     layout: Layout,
     transaction: Cell<bool>,
@@ -99,7 +99,7 @@ pub struct Gate<'a, D: BlockDevice> {
 
 impl<'a, D: BlockDevice> Gate<'a, D> {
     /// A gate for a card whose layout was checked.
-    pub fn new(device: D, layout: Layout, held: &'a HeldBlocks) -> Self {
+    pub(crate) fn new(device: D, layout: Layout, held: &'a HeldBlocks) -> Self {
         // What another gate left there is about another mount.
         held.metadata.borrow_mut().clear();
         Self {
@@ -114,39 +114,39 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     }
 
     /// The card.
-    pub const fn device(&self) -> &D {
+    pub(crate) const fn device(&self) -> &D {
         &self.device
     }
 
     /// Gives the card back; what was held back is forgotten.
-    pub fn into_device(self) -> D {
+    pub(crate) fn into_device(self) -> D {
         self.device
     }
 
     /// The layout that the gate guards.
-    pub const fn layout(&self) -> &Layout {
+    pub(crate) const fn layout(&self) -> &Layout {
         &self.layout
     }
 
     /// Lets the next operation read at most `blocks` blocks.
-    pub fn allow_reads(&self, blocks: u32) {
+    pub(crate) fn allow_reads(&self, blocks: u32) {
         self.reads_left.set(blocks);
     }
 
     /// Holds metadata back from now on.
-    pub fn begin(&self) {
+    pub(crate) fn begin(&self) {
         self.failure.set(None);
         self.held.borrow_mut().clear();
         self.transaction.set(true);
     }
 
     /// While on (within a transaction), writes into clusters go nowhere.
-    pub fn discard_data(&self, on: bool) {
+    pub(crate) fn discard_data(&self, on: bool) {
         self.discard.set(on);
     }
 
     /// Writes what was held back, FAT blocks first, directory entries last.
-    pub fn commit(&self) -> Result<(), GateError<D::Error>> {
+    pub(crate) fn commit(&self) -> Result<(), GateError<D::Error>> {
         self.transaction.set(false);
         self.discard.set(false);
         let mut held = self.held.borrow_mut();
@@ -161,7 +161,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
 
     /// What of the card failed in the transaction, if it did. The library calls any failure of an allocation a full
     /// card, so it has to be asked for here.
-    pub fn take_failure(&self) -> Option<D::Error> {
+    pub(crate) fn take_failure(&self) -> Option<D::Error> {
         self.failure.take()
     }
 
@@ -174,14 +174,14 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     }
 
     /// Forgets what was held back. The library may still remember some of it: open the volume anew.
-    pub fn abort(&self) {
+    pub(crate) fn abort(&self) {
         self.transaction.set(false);
         self.discard.set(false);
         self.held.borrow_mut().clear();
     }
 
     /// Writes blocks of a file in place, in one command. Not for use within a transaction.
-    pub fn write_data(&self, blocks: &[Block], start: BlockIdx) -> Result<(), GateError<D::Error>> {
+    pub(crate) fn write_data(&self, blocks: &[Block], start: BlockIdx) -> Result<(), GateError<D::Error>> {
         let last = start.0.saturating_add((blocks.len() as u32).saturating_sub(1));
         if self.transaction.get() || !self.layout.is_data(start.0) || !self.layout.is_data(last) {
             return Err(GateError::Refused);

@@ -131,7 +131,7 @@ impl Layout {
     }
 
     /// Whether a block holds FAT entries.
-    pub const fn is_fat(&self, block: u32) -> bool {
+    pub(crate) const fn is_fat(&self, block: u32) -> bool {
         block >= self.fat_start && block < self.data_start
     }
 

@@ -16,17 +16,19 @@
 //! [`spi`] is the driver of a real card; the PC's and the emulator's cards are files.
 //!
 //! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before `embedded-sdmmc` sees the card, and
-//! [`gate::Gate`] checks what it reads of the FAT and bounds how much it may read.
+//! `gate::Gate` checks what it reads of the FAT and bounds how much it may read.
 #![cfg_attr(not(test), no_std)]
 
 pub mod card;
-pub mod chain;
+mod card_error;
+mod chain;
 pub mod format;
-pub mod gate;
+mod gate;
 pub mod layout;
-pub mod name;
+mod name;
 pub mod recorder;
 mod ring;
+mod room;
 pub mod spi;
 pub mod status;
 

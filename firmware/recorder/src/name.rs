@@ -4,7 +4,7 @@
 use core::fmt;
 
 /// The extension of log files.
-pub const EXTENSION: &str = "HUM";
+pub(crate) const EXTENSION: &str = "HUM";
 
 /// The name of one segment of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -24,7 +24,7 @@ impl LogName {
     pub const SHORT_BYTES: usize = 11;
 
     /// The name that follows within the session, or `None` when the numbers are used up.
-    pub const fn next_segment(self) -> Option<Self> {
+    pub(crate) const fn next_segment(self) -> Option<Self> {
         if self.segment < Self::SEGMENT_MAX {
             Some(Self { session: self.session, segment: self.segment + 1 })
         } else {
@@ -33,7 +33,7 @@ impl LogName {
     }
 
     /// The first segment of the next session, or `None` when the numbers are used up.
-    pub const fn next_session(self) -> Option<Self> {
+    pub(crate) const fn next_session(self) -> Option<Self> {
         if self.session < Self::SESSION_MAX {
             Some(Self { session: self.session + 1, segment: 0 })
         } else {

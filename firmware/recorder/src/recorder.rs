@@ -11,26 +11,25 @@
 //! What fails is tried again, then given a new segment, then the card is given up and looked for once a second. A
 //! sector is only counted lost when it can never be written: the caller keeps it until then.
 
-mod formatting;
+mod segments;
+mod slot;
 mod trouble;
 
 use embedded_sdmmc::Block;
-use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES, Sector};
+use hums_blackbox::{GROUP_SECTORS, Sector};
 use hums_core::time::{Instant, Span};
 
 use crate::CardDevice;
-use crate::card::{Card, CardError, LogEntry};
-use crate::format::Formatting;
+use crate::card::{Card, CardError};
+use crate::format::FormatError;
 use crate::gate::HeldBlocks;
 use crate::name::LogName;
-use crate::ring::{self, Ring};
 use crate::status::{CardState, CardStatus};
+pub use segments::SEGMENT_BYTES_MAX;
+use segments::{Log, Segments};
+use slot::Slot;
 use trouble::may_work_elsewhere;
 
-/// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
-pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
-/// Segments that even a small card should hold, so that overwriting the oldest loses little.
-const SEGMENTS_MIN: u64 = 16;
 /// How often a missing or failing card is looked for.
 const RETRY: Span = Span::from_secs(1);
 /// How often one block is tried before the segment is given up.
@@ -49,44 +48,15 @@ pub enum Written {
 pub struct Recorder<'a, D: CardDevice> {
     status: &'a CardStatus,
     held: &'a HeldBlocks,
-    /// Any number that differs from one power-on to the next.
-    entropy: u32,
     slot: Slot<'a, D>,
     retry_at: Instant,
-    log: Option<Log>,
     /// The card in the slot is another one than the group's beginning was written to: nothing is readable on it before
     /// the next group.
     await_group: bool,
-    /// The segments of a disarmed vehicle.
-    ring: Ring,
+    segments: Segments<'a>,
     /// How much room this card has was counted.
     room_known: bool,
     finished: bool,
-}
-
-// One of these exists, in a static: the size of the largest variant is the budget.
-#[allow(clippy::large_enum_variant)]
-enum Slot<'a, D: CardDevice> {
-    /// The device, while no usable card is in it.
-    Waiting(D),
-    Mounted(Card<'a, D>),
-    /// A card that is being formatted.
-    Formatting(D, Formatting),
-    /// Only while the value is being replaced.
-    Moving,
-}
-
-/// The session's log on the card that is in.
-#[derive(Clone, Copy)]
-struct Log {
-    name: LogName,
-    /// What seals its sectors.
-    session: u32,
-    volume_id: u32,
-    /// The sector number at block 0 of the open segment; `None` before the first sector.
-    base: Option<u32>,
-    /// Where the next partial sector goes: at its own place, or one further.
-    partial_further: bool,
 }
 
 impl<'a, D: CardDevice> Recorder<'a, D> {
@@ -97,12 +67,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Self {
             status,
             held,
-            entropy,
             slot,
             retry_at: Instant::ZERO,
-            log: None,
             await_group: false,
-            ring: Ring::new(),
+            segments: Segments::new(status, entropy),
             room_known: false,
             finished: false,
         }
@@ -110,16 +78,21 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Looks for a card if there is none, at most once a second. Whether a session is open now.
     pub fn ready(&mut self, now: Instant) -> bool {
-        self.begin_service();
-        if matches!(self.slot, Slot::Mounted(_)) {
+        self.slot.begin_service();
+        if self.slot.is_mounted() {
             return true;
         }
         if self.finished || now < self.retry_at {
             return false;
         }
         self.retry_at = now + RETRY;
-        if !self.mount() {
-            return false;
+        match self.slot.mount(self.status, self.held) {
+            Ok(true) => {}
+            Ok(false) => return false,
+            Err(error) => {
+                self.tell(&error);
+                return false;
+            }
         }
         self.room_known = false;
         self.status.set_room_permille(None);
@@ -127,24 +100,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             Ok(()) => true,
             Err(error) => {
                 self.give_up(now, &error);
-                false
-            }
-        }
-    }
-
-    /// Not within its caller: the volumes that are moved here are not to lie on the stack below what follows.
-    #[inline(never)]
-    fn mount(&mut self) -> bool {
-        let Slot::Waiting(device) = core::mem::replace(&mut self.slot, Slot::Moving) else { return false };
-        device.reset();
-        match Card::mount(device, self.status, self.held) {
-            Ok(card) => {
-                self.slot = Slot::Mounted(card);
-                true
-            }
-            Err((device, error)) => {
-                self.slot = Slot::Waiting(device);
-                self.tell(&error);
                 false
             }
         }
@@ -219,18 +174,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    fn begin_service(&self) {
-        match &self.slot {
-            Slot::Waiting(device) | Slot::Formatting(device, _) => device.begin_service(),
-            Slot::Mounted(card) => card.device(D::begin_service).unwrap_or_default(),
-            Slot::Moving => {}
-        }
-    }
-
     fn count_retries(&self) {
-        if let Slot::Mounted(card) = &self.slot {
-            self.status.count_write_errors(card.device(D::take_retries).unwrap_or_default());
-        }
+        self.status.count_write_errors(self.slot.take_retries());
     }
 
     /// With nothing to write: counts a little further how much room there is on the card.
@@ -238,7 +183,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         if self.room_known {
             return;
         }
-        let Slot::Mounted(card) = &mut self.slot else { return };
+        let Some(card) = self.slot.card() else { return };
         match card.count_room() {
             Ok(None) => {}
             Ok(room) => {
@@ -253,39 +198,58 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Ends the session: nothing more is written, and the card can be pulled.
     pub fn finish(&mut self) {
         self.finished = true;
-        if matches!(self.slot, Slot::Mounted(_)) {
+        if self.slot.is_mounted() {
             self.status.set_state(CardState::Finished);
         }
-        self.release();
+        self.slot.release();
     }
 
     /// The name of the segment in work.
     pub fn log_name(&self) -> Option<LogName> {
-        self.log.filter(|_| matches!(self.slot, Slot::Mounted(_))).map(|log| log.name)
+        self.segments.log.filter(|_| self.slot.is_mounted()).map(|log| log.name)
     }
 
     /// The card, for serving stored logs; `None` while there is none.
     pub const fn card(&mut self) -> Option<&mut Card<'a, D>> {
-        if let Slot::Mounted(card) = &mut self.slot { Some(card) } else { None }
+        self.slot.card()
     }
 
     /// Gives the device back, with whatever is on it.
-    pub fn into_device(mut self) -> Option<D> {
-        self.release();
-        if let Slot::Waiting(device) = self.slot { Some(device) } else { None }
+    pub fn into_device(self) -> Option<D> {
+        self.slot.into_device()
+    }
+
+    /// Formats the card if somebody asked for it, a little at each call; whether there was something to do: call again
+    /// at once. What is on the card is lost; a new session begins on it.
+    pub fn format(&mut self, now: Instant) -> bool {
+        if self.status.take_format_wanted() && !self.finished {
+            self.retry_at = now + RETRY;
+            if self.slot.begin_format(self.segments.volume_id(now)) {
+                self.status.set_state(CardState::Formatting);
+            }
+        }
+        self.slot.begin_service();
+        match self.slot.format() {
+            None => return false,
+            Some(Ok(false)) => {}
+            Some(Ok(true)) => self.retry_at = now,
+            Some(Err(FormatError::Device(error))) => self.tell(&CardError::Device(error)),
+            Some(Err(FormatError::TooSmall)) => self.status.set_state(CardState::Foreign),
+        }
+        true
     }
 
     fn try_write(&mut self, now: Instant, first: &Sector) -> Result<(), CardError<D::Error>> {
         let number = first.number();
         let keep = self.status.waiting().filter(|(from, _)| number >= *from).map(|(_, keep)| keep);
-        self.ring.keep(keep);
+        self.segments.ring.keep(keep);
         if self.must_move(now, first)? {
             self.next_segment(now)?;
         }
-        let mut log = self.log.ok_or(CardError::NotOpen)?;
-        if self.ring.is_empty() {
+        let mut log = self.segments.log.ok_or(CardError::NotOpen)?;
+        if self.segments.ring.is_empty() {
             // The segment of the power-on is the first that may go.
-            self.ring.begin(log.name, now);
+            self.segments.ring.begin(log.name, now);
         }
         let mut at = number.wrapping_sub(*log.base.get_or_insert(number));
         let blocks = self.mounted()?.open_blocks();
@@ -301,7 +265,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         };
         let written = self.write_sealed(&log, at, count)?;
         self.status.count_blocks(written as u32);
-        self.log = Some(log);
+        self.segments.log = Some(log);
         self.drop_written(written);
         Ok(())
     }
@@ -319,18 +283,18 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Whether this sector belongs into a new segment.
     fn must_move(&mut self, now: Instant, sector: &Sector) -> Result<bool, CardError<D::Error>> {
-        let Some(Log { base: Some(base), .. }) = self.log else { return Ok(false) };
+        let Some(Log { base: Some(base), .. }) = self.segments.log else { return Ok(false) };
         let blocks = self.mounted()?.open_blocks();
         let at = sector.number().wrapping_sub(base);
         if at >= blocks {
             // Also a number from before this segment (a restarted count) gets a segment of its own.
             return Ok(true);
         }
-        if self.ring.asks_for_group(now) {
+        if self.segments.ring.asks_for_group(now) {
             self.status.want_group();
         }
         let fits = at.saturating_add(GROUP_SECTORS as u32) <= blocks;
-        Ok(sector.starts_group() && at > 0 && (!fits || self.ring.is_due(now)))
+        Ok(sector.starts_group() && at > 0 && (!fits || self.segments.ring.is_due(now)))
     }
 
     /// How many of the sectors that wait, the first one being sector `number`, go right behind each other: full ones,
@@ -353,112 +317,15 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.held.batch.borrow_mut().drain(..count);
     }
 
-    /// Opens a segment on a card just mounted: the session goes on where the same card came back, and is a new one on
-    /// another card.
+    /// Opens a segment on a card just mounted.
     fn begin(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
-        let volume_id = self.mounted()?.layout().volume_id;
-        let newest = self.survey(LogName { session: 0, segment: 0 })?.newest;
-        let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
-        let log = if let Some(log) = resumed {
-            log
-        } else {
-            let name = newest.map_or(Some(LogName { session: 1, segment: 0 }), LogName::next_session);
-            // The numbers end at 99,999; the last session number then goes on with its segments.
-            let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
-            let session = mix(mix(volume_id, name.session), self.entropy);
-            Log { name, session, volume_id, base: None, partial_further: true }
-        };
-        let before = self.log.replace(log);
-        self.ring.clear();
-        if Some(log.name) == newest {
-            self.next_segment(now)?;
-        } else {
-            self.open_segment(now, log.name)?;
-        }
-        if let Some(before) = before {
-            self.await_group = before.session != log.session;
-            self.status.want_group();
-        }
+        let card = self.slot.card().ok_or(CardError::NotOpen)?;
+        self.await_group = self.segments.begin(now, card)?;
         Ok(())
     }
 
     fn next_segment(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
-        let log = self.log.ok_or(CardError::NotOpen)?;
-        // What is recorded around one arming is a log of its own.
-        let begins_waiting = self.ring.is_on() && self.ring.is_empty() && log.base.is_some();
-        let name = if begins_waiting { log.name.next_session() } else { log.name.next_segment() };
-        self.open_segment(now, name.ok_or(CardError::Full)?)
-    }
-
-    /// Makes a segment, or overwrites the oldest one when the card has no room, or the oldest one of those that are
-    /// kept only for a while when that while is over.
-    fn open_segment(&mut self, now: Instant, name: LogName) -> Result<(), CardError<D::Error>> {
-        let overwrote = match self.ring.release(now) {
-            Some(old) => self.recycle(&old, name)?,
-            None => self.create_or_overwrite(name)?,
-        };
-        if let Some(log) = &mut self.log {
-            log.name = name;
-            log.base = None;
-            log.partial_further = true;
-        }
-        self.ring.begin(name, now);
-        self.status.begin_segment(name.session, overwrote);
-        self.status.set_state(CardState::Recording);
-        Ok(())
-    }
-
-    /// Overwrites the segment `old`, which no longer counts; makes a new one where it is gone.
-    fn recycle(&mut self, old: &LogName, name: LogName) -> Result<bool, CardError<D::Error>> {
-        let mut found = None;
-        self.mounted()?.logs(|entry| {
-            if entry.name == *old {
-                found = Some(entry);
-            }
-        })?;
-        match found {
-            Some(entry) => {
-                self.mounted()?.recycle(&entry, name)?;
-                self.status.count_released();
-                Ok(false)
-            }
-            None => self.create_or_overwrite(name),
-        }
-    }
-
-    fn create_or_overwrite(&mut self, name: LogName) -> Result<bool, CardError<D::Error>> {
-        let bytes_max = if self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
-        let bytes = (self.mounted()?.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(bytes_max)) as u32;
-        loop {
-            match self.mounted()?.create(name, bytes) {
-                Ok(()) => return Ok(false),
-                Err(CardError::Full) => {}
-                Err(error) => return Err(error),
-            }
-            if let Some(oldest) = self.survey(name)?.oldest {
-                self.ring.forget(oldest.name);
-                self.mounted()?.recycle(&oldest, name)?;
-                return Ok(true);
-            }
-            if !self.mounted()?.may_have_room() {
-                return Err(CardError::Full);
-            }
-        }
-    }
-
-    /// The newest log on the card, and the oldest one that may be overwritten.
-    fn survey(&mut self, except: LogName) -> Result<Survey, CardError<D::Error>> {
-        let mut survey = Survey { newest: None, oldest: None };
-        let open = self.mounted()?.open_name();
-        self.mounted()?.logs(|entry| {
-            survey.newest = survey.newest.max(Some(entry.name));
-            let usable = entry.bytes as usize >= 2 * GROUP_SECTORS * SECTOR_BYTES;
-            let older = survey.oldest.is_none_or(|oldest| entry.name < oldest.name);
-            if usable && older && entry.name != except && Some(entry.name) != open {
-                survey.oldest = Some(entry);
-            }
-        })?;
-        Ok(survey)
+        self.segments.next(now, self.slot.card().ok_or(CardError::NotOpen)?)
     }
 
     fn mounted(&mut self) -> Result<&mut Card<'a, D>, CardError<D::Error>> {
@@ -475,30 +342,14 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     fn give_up(&mut self, now: Instant, error: &CardError<D::Error>) {
         self.tell(error);
         self.retry_at = now + RETRY;
-        self.release();
+        self.slot.release();
     }
 
-    fn release(&mut self) {
-        self.slot = match core::mem::replace(&mut self.slot, Slot::Moving) {
-            Slot::Mounted(card) => card.unmount().map_or(Slot::Moving, Slot::Waiting),
-            other => other,
-        };
+    fn tell(&self, error: &CardError<D::Error>) {
+        self.status.set_state(trouble::state::<D>(error));
     }
 }
 
 fn sector_of(block: &Block) -> Sector {
     Sector::from_bytes(block.contents)
-}
-
-struct Survey {
-    newest: Option<LogName>,
-    oldest: Option<LogEntry>,
-}
-
-/// Mixes two numbers into one whose every bit depends on all of theirs (the finalizer of `MurmurHash3`).
-const fn mix(a: u32, b: u32) -> u32 {
-    let mut hash = a.rotate_left(16) ^ b.wrapping_mul(0x9E37_79B1);
-    hash = (hash ^ (hash >> 16)).wrapping_mul(0x85EB_CA6B);
-    hash = (hash ^ (hash >> 13)).wrapping_mul(0xC2B2_AE35);
-    hash ^ (hash >> 16)
 }

@@ -86,7 +86,6 @@ pub struct CardStatus {
     busy_since_ms: AtomicU32,
     /// Thousandths of the card that logs can have.
     room: AtomicU32,
-    queue_sectors_max: AtomicU32,
     group_wanted: AtomicBool,
     format_wanted: AtomicBool,
     /// From this sector on only the latest are kept; [`KEEP_ALL`]: all are.
@@ -124,8 +123,6 @@ pub struct CardReading {
     /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
     /// file allocation table was counted, which takes a while on a large card.
     pub room_permille: Option<u32>,
-    /// The most sectors that waited at once.
-    pub queue_sectors_max: u32,
 }
 
 impl Default for CardStatus {
@@ -151,7 +148,6 @@ impl CardStatus {
             stall_ms_max: AtomicU32::new(0),
             busy_since_ms: AtomicU32::new(IDLE),
             room: AtomicU32::new(UNCOUNTED),
-            queue_sectors_max: AtomicU32::new(0),
             group_wanted: AtomicBool::new(false),
             format_wanted: AtomicBool::new(false),
             waiting_from: AtomicU32::new(KEEP_ALL),
@@ -175,7 +171,6 @@ impl CardStatus {
             sectors_lost: self.sectors_lost.load(Ordering::Relaxed),
             stall_ms_max: self.stall_ms_max.load(Ordering::Relaxed),
             room_permille: Some(self.room.load(Ordering::Relaxed)).filter(|room| *room != UNCOUNTED),
-            queue_sectors_max: self.queue_sectors_max.load(Ordering::Relaxed),
         }
     }
 
@@ -208,7 +203,7 @@ impl CardStatus {
     }
 
     /// Notes how much of the card logs can have, in thousandths; `None`: not counted.
-    pub fn set_room_permille(&self, room: Option<u32>) {
+    pub(crate) fn set_room_permille(&self, room: Option<u32>) {
         self.room.store(room.unwrap_or(UNCOUNTED), Ordering::Relaxed);
     }
 
@@ -230,11 +225,6 @@ impl CardStatus {
             // A service is far shorter than the 49 days after which the number repeats.
             since => Span::from_millis(u64::from((now.as_millis() as u32).wrapping_sub(since))),
         }
-    }
-
-    /// Notes how many sectors wait.
-    pub fn note_queue_sectors(&self, sectors: u32) {
-        self.queue_sectors_max.fetch_max(sectors, Ordering::Relaxed);
     }
 
     /// Storage asks for a new group: what comes next should be readable without what came before.

@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use crate::utc::{parse_seconds, seconds_to_micros};
+
 /// All faults of one run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
@@ -59,7 +61,10 @@ impl FromStr for Stall {
             || format!("`{text}` is not MS@T, for instance 2500@60 (milliseconds, from second 60 on)");
         let (ms, from) = text.split_once('@').ok_or_else(wrong)?;
         let ms: f64 = ms.parse().map_err(|_| wrong())?;
-        Ok(Self { for_us: micros(ms / 1e3).ok_or_else(wrong)?, from_us: seconds(from).ok_or_else(wrong)? })
+        Ok(Self {
+            for_us: seconds_to_micros(ms / 1e3).ok_or_else(wrong)?,
+            from_us: parse_seconds(from).ok_or_else(wrong)?,
+        })
     }
 }
 
@@ -78,20 +83,10 @@ impl FromStr for CardOut {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("`{text}` is not T..T, for instance 30..45.5 (seconds; `30..` for good)");
         let (from, to) = text.split_once("..").ok_or_else(wrong)?;
-        let from_us = if from.is_empty() { 0 } else { seconds(from).ok_or_else(wrong)? };
-        let to_us = if to.is_empty() { u64::MAX } else { seconds(to).ok_or_else(wrong)? };
+        let from_us = if from.is_empty() { 0 } else { parse_seconds(from).ok_or_else(wrong)? };
+        let to_us = if to.is_empty() { u64::MAX } else { parse_seconds(to).ok_or_else(wrong)? };
         if from_us < to_us { Ok(Self { from_us, to_us }) } else { Err(wrong()) }
     }
-}
-
-/// Seconds as text, in microseconds.
-pub fn seconds(text: &str) -> Option<u64> {
-    text.parse().ok().and_then(micros)
-}
-
-/// Seconds in microseconds, where they are a time.
-fn micros(seconds: f64) -> Option<u64> {
-    (seconds.is_finite() && (0.0..1e12).contains(&seconds)).then_some((seconds * 1e6).round() as u64)
 }
 
 /// A probability as text.

@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::BLOCKS_MIN;
 
+use crate::files::cannot_write;
 use crate::outcome::usage;
 
 /// The size of an image that is made, in MiB, unless `--card-size` says otherwise.
@@ -55,7 +56,7 @@ pub fn open_or_make(path: &Path, size_mib: Option<u64>) -> Result<(File, Found)>
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let file = OpenOptions::new().read(true).write(true).create_new(true).open(path);
-            let file = file.with_context(|| format!("{}: cannot be made", path.display()))?;
+            let file = file.with_context(|| cannot_write(path))?;
             let bytes = size_mib.unwrap_or(SIZE_MIB) << 20;
             file.set_len(bytes).with_context(|| format!("{}: cannot have {bytes} bytes", path.display()))?;
             Ok((file, Found::Made))

@@ -1,138 +1,25 @@
-//! A group's entries as text, made by many threads at once.
+//! A group's entries as text and columns, made by many threads at once.
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use anyhow::Result;
-use hums_blackbox::record::{Loss, Lost};
 use hums_blackbox::{Entry, Gap, Record};
 use hums_core::time::Instant;
 use hums_link::{self as link, Check, observe};
 
-use super::Context;
-use super::influx::{Lines, Observed};
+use super::context::Context;
+use super::influx::Lines;
 use super::parquet::Batches;
-use super::record::{Cell, CellType, Row, rows};
+use super::record::{gap_row, rows};
+use super::reference::Observed;
+use super::row::Row;
+use super::table::Table;
 use super::text::{push_csv_cells, push_hex, push_integer, push_json_object, push_json_text};
-use crate::cli;
 use crate::logs::reader::Collect;
+use crate::loss::lost;
 use crate::mavlink::frame::{Frame, Peek, peek};
 use crate::mavlink::values::Payload;
-use crate::outcome::usage;
-use crate::utc::{When, push_iso8601, push_seconds};
-
-/// A table of the CSV output.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Table {
-    /// Frames of one message that we have the definition of.
-    Message(u32),
-    /// Frames of an id that we have a definition of, made with another one.
-    Unverified(u32),
-    /// Frames of an id that we have no definition of.
-    Unknown(u32),
-    /// The monitor's own.
-    Hums(&'static str),
-}
-
-impl Table {
-    /// The table of a frame; `known` says that its definition is ours.
-    pub fn of(frame: &Frame<'_>, known: bool) -> Self {
-        match (known, frame.message()) {
-            (true, _) => Self::Message(frame.id),
-            (false, Some(_)) => Self::Unverified(frame.id),
-            (false, None) => Self::Unknown(frame.id),
-        }
-    }
-
-    /// Its file's name, without an ending.
-    pub fn file_name(self) -> String {
-        let name = |id| {
-            hums_dialect::message(id)
-                .map_or_else(|| format!("UNKNOWN_{id}"), |message| message.name.to_owned())
-        };
-        match self {
-            Self::Message(id) => name(id),
-            Self::Unverified(id) => format!("UNVERIFIED_{}", name(id)),
-            Self::Unknown(id) => format!("UNKNOWN_{id}"),
-            Self::Hums(name) => name.to_owned(),
-        }
-    }
-}
-
-/// Which entries are wanted.
-#[derive(Clone, Debug, Default)]
-pub struct Selection {
-    from: Option<When>,
-    to: Option<When>,
-    /// Message ids; empty: all.
-    ids: Vec<u32>,
-}
-
-impl Selection {
-    /// As the command line says it.
-    pub fn new(args: &cli::Decode) -> Result<Self> {
-        let ids = args.message.iter().map(|name| id_of(name)).collect::<Result<_>>()?;
-        Ok(Self { from: args.from, to: args.to, ids })
-    }
-
-    /// A time in UTC selects nothing in a log that has none: that is told, not guessed.
-    pub fn check_without_utc(&self, log: &str) -> Result<()> {
-        if [self.from, self.to].iter().any(|when| matches!(when, Some(When::Utc(_)))) {
-            return Err(usage(format!(
-                "{log}: the time of day is not known in this log; give --from and --to as seconds since its start"
-            )));
-        }
-        Ok(())
-    }
-
-    /// Whether this time is wanted.
-    pub fn has_time(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        !self.is_before(at, epoch_us) && !self.is_after(at, epoch_us)
-    }
-
-    /// Whether any of a gap is in the time wanted.
-    pub fn overlaps(&self, gap: &Gap, epoch_us: Option<u64>) -> bool {
-        !gap.to.is_some_and(|to| self.is_before(to, epoch_us))
-            && !gap.from.is_some_and(|from| self.is_after(from, epoch_us))
-    }
-
-    fn is_before(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        self.from.and_then(|from| compare(at, from, epoch_us)).is_some_and(Ordering::is_lt)
-    }
-
-    fn is_after(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        self.to.and_then(|to| compare(at, to, epoch_us)).is_some_and(Ordering::is_gt)
-    }
-
-    fn has_id(&self, id: u32) -> bool {
-        self.ids.is_empty() || self.ids.contains(&id)
-    }
-}
-
-/// How a time lies to a limit; `None` where one is UTC and the other cannot be.
-fn compare(at: Instant, limit: When, epoch_us: Option<u64>) -> Option<Ordering> {
-    let boot = at.as_micros();
-    match limit {
-        When::SinceStart(limit) => Some(boot.cmp(&limit)),
-        When::Utc(limit) => Some(epoch_us?.saturating_add(boot).cmp(&limit)),
-    }
-}
-
-/// A message's id by its name, `UNKNOWN_12345` and plain numbers included.
-fn id_of(name: &str) -> Result<u32> {
-    let upper = name.to_ascii_uppercase();
-    if let Some(message) = hums_dialect::messages().iter().find(|message| message.name == upper) {
-        return Ok(message.id);
-    }
-    let number = upper.strip_prefix("UNKNOWN_").unwrap_or(&upper);
-    number.parse().map_err(|_| {
-        let mut near: Vec<&str> = hums_dialect::messages().iter().map(|message| message.name).collect();
-        near.retain(|known| known.contains(&upper) || upper.contains(known));
-        near.truncate(5);
-        let hint = if near.is_empty() { String::new() } else { format!("; there is {}", near.join(", ")) };
-        usage(format!("--message {name}: no message has this name{hint}"))
-    })
-}
+use crate::names::message_name;
+use crate::utc::{push_iso8601, push_seconds};
 
 /// One group as text and columns.
 #[derive(Debug)]
@@ -246,10 +133,7 @@ impl<'a> Collected<'a> {
         out.extend_from_slice(b",\"id\":");
         push_integer(out, u64::from(frame.id));
         out.extend_from_slice(b",\"message\":");
-        match frame.message() {
-            Some(message) => push_json_text(out, message.name.as_bytes()),
-            None => push_json_text(out, format!("UNKNOWN_{}", frame.id).as_bytes()),
-        }
+        push_json_text(out, message_name(frame.id).as_bytes());
         if let Some(payload) = known {
             out.extend_from_slice(b",\"fields\":");
             push_json_object(out, payload);
@@ -317,31 +201,6 @@ impl Collect for Collected<'_> {
             Entry::Record { .. } => {}
         }
     }
-}
-
-/// How much a loss record says the recorder lost. Noise on the line is not the recorder's loss: it was no frame.
-pub fn lost(loss: &Loss) -> u64 {
-    match loss.what {
-        Lost::NotFrames | Lost::DamagedFrames => 0,
-        Lost::UartOverrun | Lost::QueueFull | Lost::Card | Lost::Records | Lost::Other => loss.count,
-    }
-}
-
-/// A gap as a row.
-pub fn gap_row(gap: &Gap) -> Row {
-    let time = |at: Option<Instant>| at.map_or(Cell::Unknown(CellType::Time), Cell::Time);
-    let frames = gap.frames.map_or(Cell::Unknown(CellType::Count), |frames| Cell::Count(u64::from(frames)));
-    Row::new(
-        "HUMS_GAP",
-        vec![
-            ("from[s]", time(gap.from)),
-            ("to[s]", time(gap.to)),
-            ("cause", Cell::Text(gap.cause.name().to_owned())),
-            ("sectors_lost", Cell::Count(u64::from(gap.sectors_lost))),
-            ("sectors_skipped", Cell::Count(u64::from(gap.sectors_skipped))),
-            ("frames_missing", frames),
-        ],
-    )
 }
 
 /// The first two cells of every row.

@@ -14,7 +14,7 @@ use arrow_buffer::OffsetBuffer;
 use arrow_schema::{DataType, Field};
 use hums_dialect::Kind;
 
-use super::record::{Cell, CellType};
+use super::row::{Cell, CellType};
 use crate::mavlink::values::{Scalar, Value};
 
 /// One field's values.

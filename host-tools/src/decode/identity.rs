@@ -10,6 +10,7 @@ use hums_link::{Check, Frame, observe};
 
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, read};
+use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
 use crate::utc::iso8601;
 
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
@@ -61,8 +62,8 @@ struct Known {
     uid: Option<u64>,
 }
 
-/// `HEARTBEAT` and `AUTOPILOT_VERSION`.
-const TELLING: [u32; 2] = [0, 148];
+/// What tells who it is.
+const TELLING: [u32; 2] = [HEARTBEAT, AUTOPILOT_VERSION];
 
 impl Collect for Known {
     fn entry(&mut self, entry: &Entry<'_>) {

@@ -13,23 +13,23 @@
 //! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a message may
 //! come twice: the second one's time is a nanosecond later, so that none replaces another.
 
-use hums_core::observation::{Observation, Source};
+use hums_core::observation::Observation;
 use hums_core::time::Instant;
 use hums_dialect::{Field, Kind};
 
-use super::names::free_name;
-use super::record::{Cell, Row};
+use super::field_names::free_name;
 use super::reference::{Quantity, Reference};
+use super::row::{Cell, Row};
+use super::table::Table;
 use super::text::{push_finite, push_hex, push_integer};
 use crate::mavlink::frame::Frame;
+use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
 use crate::mavlink::values::{Payload, Scalar, Value};
 
 /// Columns of records that are tags: few values, and what one groups by.
 const TAGS: [&str; 3] = ["subsystem", "check", "counter"];
 /// Names that the database or our tags have already: a field called `time` would be dropped.
 pub(super) const TAKEN: [&str; 5] = ["time", "vehicle", "session", "system", "component"];
-/// `ACTUATOR_OUTPUT_STATUS`
-const ACTUATORS: u32 = 375;
 
 /// The tags of every point.
 #[derive(Clone, Debug, Default)]
@@ -91,11 +91,7 @@ impl Lines {
     /// A point for a frame.
     pub fn frame(&mut self, tags: &Tags, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
         let start = self.begin();
-        let name = match (frame.message(), known) {
-            (Some(message), Some(_)) => message.name.to_owned(),
-            (Some(message), None) => format!("UNVERIFIED_{}", message.name),
-            (None, _) => format!("UNKNOWN_{}", frame.id),
-        };
+        let name = Table::of(frame, known.is_some()).name();
         self.text.extend_from_slice(name.as_bytes());
         self.text.extend_from_slice(b",component=");
         push_integer(&mut self.text, u64::from(frame.component));
@@ -115,7 +111,7 @@ impl Lines {
         }
         let count = fields.count;
         self.end(start, at, count);
-        if let Some(payload) = known.filter(|_| frame.id == ACTUATORS) {
+        if let Some(payload) = known.filter(|_| frame.id == ACTUATOR_OUTPUT_STATUS) {
             self.actuators(tags, at, payload);
         }
     }
@@ -344,15 +340,4 @@ impl Clock {
         self.last_ns = if close { self.last_ns + 1 } else { ns };
         self.last_ns
     }
-}
-
-/// What a frame told, kept until the frames before it have been taken.
-#[derive(Clone, Copy, Debug)]
-pub struct Observed {
-    /// When it came.
-    pub at: Instant,
-    /// Who said it.
-    pub source: Source,
-    /// What it says.
-    pub observation: Observation,
 }

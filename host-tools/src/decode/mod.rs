@@ -16,16 +16,19 @@
 
 pub mod collect;
 pub mod columns;
+pub mod context;
+pub mod field_names;
 pub mod identity;
 pub mod influx;
-mod names;
 pub mod parquet;
 pub mod record;
 pub mod reference;
+pub mod row;
+pub mod selection;
 pub mod side_by_side;
+pub mod table;
 pub mod text;
 pub mod thesis;
-pub mod usage;
 mod wear;
 pub mod write;
 
@@ -34,16 +37,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::Result;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::cli::{self, Format};
+use crate::cli;
 use crate::logs::reader::{self, Summary};
 use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage as usage_error};
-use crate::output;
-use collect::{Collected, Selection};
+use crate::{output, progress};
+use collect::Collected;
+use context::{Context, Formats};
 use identity::{Extent, Identity};
 use influx::Tags;
+use selection::Selection;
 use side_by_side::side_by_side;
 use write::{Destination, Writers, Written};
 
@@ -61,9 +65,20 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     }
     let standard_output = args.output == Path::new("-");
     if standard_output && (found.logs.len() != 1 || !formats.is_single_file()) {
+        let why = match found.logs.len() {
+            1 => "these formats are more than that".to_owned(),
+            count => format!("there are {count} logs"),
+        };
         return Err(usage_error(format!(
-            "-o -: standard output takes one log in one format of a single file (tlog, jsonl or influx); there are {} \
-             logs",
+            "-o -: standard output takes one log in one format of a single file (tlog, jsonl or influx), and {why}; \
+             name a file or a directory"
+        )));
+    }
+    let one_file = found.logs.len() == 1 && formats.is_single_file();
+    if args.output.is_file() && !one_file {
+        return Err(usage_error(format!(
+            "-o {}: is a file, and {} logs in these formats need a directory; name one that is there, or none yet",
+            args.output.display(),
             found.logs.len()
         )));
     }
@@ -83,59 +98,6 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
         },
     )?;
     Ok(outcome)
-}
-
-/// Which formats are asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[allow(clippy::struct_excessive_bools, reason = "any set of formats can be asked for")]
-pub struct Formats {
-    /// A ground station's log.
-    pub tlog: bool,
-    /// Tables.
-    pub csv: bool,
-    /// Objects.
-    pub jsonl: bool,
-    /// Line protocol.
-    pub influx: bool,
-    /// Columns.
-    pub parquet: bool,
-    /// The reference system's tables.
-    pub thesis: bool,
-}
-
-impl Formats {
-    fn new(formats: &[Format]) -> Self {
-        let has = |format| formats.contains(&format);
-        Self {
-            tlog: has(Format::Tlog),
-            csv: has(Format::Csv),
-            jsonl: has(Format::Jsonl),
-            influx: has(Format::Influx),
-            parquet: has(Format::Parquet),
-            thesis: has(Format::Thesis),
-        }
-    }
-
-    /// Whether a log becomes exactly one file.
-    pub fn is_single_file(self) -> bool {
-        let single = u8::from(self.tlog) + u8::from(self.jsonl) + u8::from(self.influx);
-        single == 1 && !self.csv && !self.parquet && !self.thesis
-    }
-}
-
-/// What all parts of one log's decoding need to know.
-#[derive(Clone, Debug, Default)]
-pub struct Context {
-    /// What to write.
-    pub formats: Formats,
-    /// UTC at power-on, microseconds since 1970.
-    pub epoch_us: Option<u64>,
-    /// What of it is wanted.
-    pub selection: Selection,
-    /// Who flew and when, where a format asks for it.
-    pub identity: Identity,
-    /// The same for the line protocol.
-    pub tags: Tags,
 }
 
 /// What to do with each log.
@@ -216,7 +178,7 @@ impl Task<'_> {
             Destination::new(self.output, log, self.logs, self.formats)
         };
         let mut writers = Writers::new(context, destination, parquet.map(Path::to_owned))?;
-        let bar = progress_bar(log);
+        let bar = progress::bar(log);
         let new = || Collected::new(context);
         let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
         bar.finish_and_clear();
@@ -256,23 +218,6 @@ fn partition(output: &Path, identity: &Identity) -> PathBuf {
         .join(format!("vehicle={}", identity.vehicle))
         .join(format!("date={date}"))
         .join(format!("session={}", identity.session))
-}
-
-/// A bar over the log's bytes, on a terminal only.
-pub fn progress_bar(log: &Log) -> ProgressBar {
-    let bar = ProgressBar::new(log.bytes());
-    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {bytes}/{total_bytes} {eta}") {
-        bar.set_style(style);
-    }
-    bar.set_message(log.name.clone());
-    bar
-}
-
-/// A path inside `dir` for a log's name, which may have directories of its own.
-pub(crate) fn inside(dir: &Path, name: &str) -> PathBuf {
-    name.split('/')
-        .filter(|part| !matches!(*part, "" | "." | ".."))
-        .fold(dir.to_owned(), |path, part| path.join(part))
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@
 //! arrays text); the fields' metadata has their `units` and `enum`. Each table begins with `boot_s`, seconds since the
 //! monitor's power-on, and `utc`, null where nobody told it; those of frames go on with `system` and `component`.
 //!
-//! Memory is bounded: what waits to be encoded is at most [`PENDING_MAX`], and when the row groups in work are more
-//! than [`WRITERS_MAX`], the largest are written out.
+//! Memory is bounded: what waits to be encoded is at most `PENDING_MAX`, and when the row groups in work are more
+//! than `WRITERS_MAX`, the largest are written out.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
@@ -26,11 +26,11 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use rayon::prelude::*;
 
-use super::collect::Table;
 use super::columns::{Column, TextColumn, cell_array, cell_data_type};
-use super::names::free_name;
-use super::record::Row;
-use super::write::make_directory;
+use super::field_names::free_name;
+use super::row::Row;
+use super::table::Table;
+use crate::files::{cannot_write, make_directory};
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
@@ -267,7 +267,7 @@ impl ParquetTables {
     /// Takes a group's columns.
     pub fn put(&mut self, batches: Batches) -> Result<()> {
         for (table, batch) in batches.finish() {
-            let batch = batch.with_context(|| format!("{}: its columns do not fit", table.file_name()))?;
+            let batch = batch.with_context(|| format!("{}: its columns do not fit", table.name()))?;
             self.pending_bytes += batch.get_array_memory_size();
             if let Some(file) = self.tables.get_mut(&table) {
                 file.pending.push(batch);
@@ -325,7 +325,7 @@ impl TableFile {
         let properties = texts.fold(properties.clone(), |properties, field| {
             properties.set_column_dictionary_enabled(vec![field.name().clone()].into(), true)
         });
-        let path = dir.join(format!("{}.parquet", table.file_name()));
+        let path = dir.join(format!("{}.parquet", table.name()));
         let file = File::create(&path).with_context(|| cannot_write(&path))?;
         let writer = ArrowWriter::try_new(file, first.schema(), Some(properties.build()))
             .with_context(|| cannot_write(&path))?;
@@ -338,10 +338,6 @@ impl TableFile {
         }
         Ok(())
     }
-}
-
-fn cannot_write(path: &Path) -> String {
-    format!("{}: cannot be written", path.display())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! The quantities come from the same observation model that the firmware checks health with, so its scales and its
 //! "unknown" values hold here too: ESC values from `ESC_STATUS` and `ESC_INFO` (PX4) or `ESC_TELEMETRY_*` (ArduPilot),
 //! the battery from `BATTERY_STATUS` or, where that is silent, `SYS_STATUS`, and so on.
-//! A value older than [`AGE_MAX`] is no value: better an empty cell than a stale number.
+//! A value older than `AGE_MAX` is no value: better an empty cell than a stale number.
 
 use hums_core::flight::Flight;
 use hums_core::observation::{Esc, Observation, Source};
@@ -117,6 +117,17 @@ impl Quantity {
             Self::EscTemperature(motor) => format!("esc_temperature{motor}"),
         })
     }
+}
+
+/// What a frame told, kept until the frames before it have been taken.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed {
+    /// When it came.
+    pub at: Instant,
+    /// Who said it.
+    pub source: Source,
+    /// What it says.
+    pub observation: Observation,
 }
 
 /// The vehicle as the reference system sees it, replayed from its observations.

@@ -16,9 +16,9 @@ use hums_blackbox::Gap;
 use hums_core::observation::{Observation, Source};
 use hums_core::time::{Instant, Span};
 
-use super::collect::Selection;
 use super::reference::{MOTORS, Quantity, Reference};
-use super::write::{create, settle};
+use super::selection::Selection;
+use crate::files::{create, settle};
 use crate::mavlink::values::Scalar;
 
 /// A vehicle that was not heard for so long tells nothing about this second.

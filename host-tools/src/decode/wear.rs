@@ -2,7 +2,8 @@
 
 use hums_blackbox::record::{Component, Exceedance, Lifetime, Snapshot};
 
-use super::record::{Cell, Row};
+use super::row::{Cell, Row};
+use crate::names::counter_name;
 
 /// One row a counter.
 pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
@@ -13,7 +14,7 @@ pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
             ("uid", Cell::Text(format!("{:016x}", life.uid))),
             ("boots", Cell::Count(u64::from(life.boots))),
             ("sessions", Cell::Count(u64::from(life.sessions))),
-            ("counter", Cell::Text(super::usage::name(number))),
+            ("counter", Cell::Text(counter_name(number))),
             ("value", Cell::Single(value)),
         ];
         Row::new("HUMS_LIFETIME", cells)

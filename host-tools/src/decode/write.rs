@@ -1,26 +1,27 @@
 //! The files of the output formats.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use hums_blackbox::Gap;
 
-use super::collect::{Collected, Table, gap_row};
+use super::collect::Collected;
+use super::context::{Context, Formats};
 use super::influx::{Clock, Lines};
 use super::parquet::ParquetTables;
+use super::record::gap_row;
 use super::reference::Reference;
+use super::table::Table;
 use super::text::columns;
 use super::thesis::Thesis;
-use super::{Context, Formats, inside};
+use crate::files::{appended, cannot_write, create, inside, make_directory, says_directory, settle};
 use crate::logs::Log;
 use crate::logs::reader::Deliver;
-use crate::output::{self, Stdout};
+use crate::output::Stdout;
 
-/// Room for a group's lines of a busy message; there may be some hundred of these.
-const BUFFER_BYTES: usize = 16 * 1024;
 /// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
 const OPEN_MAX: usize = 256;
 
@@ -38,8 +39,7 @@ pub enum Destination {
 impl Destination {
     /// By the rule that `hums decode --help` tells.
     pub fn new(output: &Path, log: &Log, logs: usize, formats: Formats) -> Self {
-        let says_directory = output.is_dir() || output.as_os_str().to_string_lossy().ends_with(['/', '\\']);
-        if logs == 1 && formats.is_single_file() && !says_directory {
+        if logs == 1 && formats.is_single_file() && !says_directory(output) {
             return Self::File(output.to_owned());
         }
         Self::Named(inside(output, &log.name))
@@ -63,13 +63,6 @@ impl Destination {
     }
 }
 
-/// Appended, not replaced: a log's own name may have a dot in it.
-fn appended(name: &Path, extension: &str) -> PathBuf {
-    let mut name = name.to_owned().into_os_string();
-    name.push(format!(".{extension}"));
-    PathBuf::from(name)
-}
-
 /// A single file, open.
 struct Single {
     out: Box<dyn Write + Send>,
@@ -79,7 +72,10 @@ struct Single {
 impl Single {
     fn open(destination: &Destination, extension: &str) -> Result<Self> {
         match destination.path(extension) {
-            None => Ok(Self { out: Box::new(BufWriter::new(Stdout::new())), path: PathBuf::from("-") }),
+            None => Ok(Self {
+                out: Box::new(BufWriter::new(Stdout::new())),
+                path: PathBuf::from("standard output"),
+            }),
             Some(path) => Ok(Self { out: Box::new(create(&path)?), path }),
         }
     }
@@ -92,20 +88,6 @@ impl Single {
         settle(self.out.flush(), &self.path)?;
         Ok(self.path)
     }
-}
-
-/// Makes a file, and its directory where there is none.
-pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
-    if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-        make_directory(dir)?;
-    }
-    let file = File::create(path).with_context(|| format!("{}: cannot be written", path.display()))?;
-    Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
-}
-
-/// Makes a directory, unless it is there.
-pub(super) fn make_directory(dir: &Path) -> Result<()> {
-    fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
 /// What was written.
@@ -241,13 +223,13 @@ impl<'a> Writers<'a> {
 
     fn table(&mut self, table: Table, lines: &[u8]) -> Result<()> {
         let Some(dir) = self.destination.dir() else { return Ok(()) };
-        let path = dir.join(format!("{}.csv", table.file_name()));
+        let path = dir.join(format!("{}.csv", table.name()));
         if let Some(file) = self.tables.get_mut(&table) {
             return write(file, lines, &path);
         }
         let mut file = if self.begun.contains(&table) {
             let file = File::options().append(true).open(&path);
-            BufWriter::new(file.with_context(|| format!("{}: cannot be written", path.display()))?)
+            BufWriter::new(file.with_context(|| cannot_write(&path))?)
         } else {
             let mut file = create(&path)?;
             let own = match table {
@@ -262,7 +244,7 @@ impl<'a> Writers<'a> {
         if self.tables.len() >= OPEN_MAX
             && let Some((closed, mut file)) = self.tables.pop_last()
         {
-            settle(file.flush(), &dir.join(closed.file_name()))?;
+            settle(file.flush(), &dir.join(closed.name()))?;
         }
         self.tables.insert(table, file);
         Ok(())
@@ -307,7 +289,7 @@ impl<'a> Writers<'a> {
         }
         if let (true, Some(dir)) = (self.context.formats.csv, self.destination.dir()) {
             for (table, file) in &mut self.tables {
-                settle(file.flush(), &dir.join(table.file_name()))?;
+                settle(file.flush(), &dir.join(table.name()))?;
             }
             let tables = self.begun.len();
             lines.push(format!("{}: {tables} tables, {frames} frames, {records} records", dir.display()));
@@ -360,12 +342,4 @@ fn header(table: Table, own: &[&str]) -> String {
 
 fn write(file: &mut impl Write, bytes: &[u8], path: &Path) -> Result<()> {
     settle(file.write_all(bytes), path)
-}
-
-/// An error in terms of the file; a reader of standard output that has gone ends it quietly.
-pub(super) fn settle(result: std::io::Result<()>, path: &Path) -> Result<()> {
-    match result {
-        Err(error) if output::is_reader_gone(&error) => Err(crate::outcome::ReaderGone.into()),
-        result => result.with_context(|| format!("{}: cannot be written", path.display())),
-    }
 }

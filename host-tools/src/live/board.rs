@@ -7,7 +7,8 @@ use hums_core::health::{self, EXPECTED, Level, Subsystem, When};
 use hums_core::time::{Instant, Span};
 use serde::Serialize;
 
-use super::craft::{Craft, words};
+use super::craft::Craft;
+use super::note::words;
 
 /// As long as a heartbeat may be missed.
 const SILENT: Span = Span::from_secs(5);

@@ -8,10 +8,8 @@ use hums_link::packet::Fields;
 use hums_link::{Check, Frame};
 use serde::Serialize;
 
-/// `HEARTBEAT`, `NAMED_VALUE_FLOAT`, `NAMED_VALUE_INT`.
-const HEARTBEAT: u32 = 0;
-const NAMED_FLOAT: u32 = 251;
-const NAMED_INT: u32 = 252;
+use crate::mavlink::ids::{HEARTBEAT, NAMED_VALUE_FLOAT, NAMED_VALUE_INT};
+
 /// Five heartbeats missed: it is gone.
 const GONE: Span = Span::from_secs(5);
 /// The levels come every two seconds where the budget allows; over the slowest radio every half minute.
@@ -58,8 +56,8 @@ impl Companion {
         let fields = Fields(&payload);
         match frame.id() {
             HEARTBEAT => self.heard = Some(at),
-            NAMED_FLOAT => self.float(at, fields.text(8, 10).unwrap_or_default(), fields.f32(4)),
-            NAMED_INT if fields.text(8, 10) == Some("HUMS_STATE") => {
+            NAMED_VALUE_FLOAT => self.float(at, fields.text(8, 10).unwrap_or_default(), fields.f32(4)),
+            NAMED_VALUE_INT if fields.text(8, 10) == Some("HUMS_STATE") => {
                 self.named = true;
                 self.heard = Some(at);
                 let packed = fields.u32(4);
@@ -133,13 +131,13 @@ impl Companion {
 mod tests {
     use hums_core::Monitor;
     use hums_core::params::Params;
-    use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::{messages, packet, summary};
 
     use super::*;
 
     fn hear(companion: &mut Companion, at: Instant, packet: &packet::Packet) {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let mut encoder = Encoder::new();
         companion.frame(at, &Frame::parse(encoder.frame(&mut buffer, packet)).expect("a frame"));
     }

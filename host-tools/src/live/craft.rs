@@ -7,23 +7,23 @@ use std::collections::BTreeMap;
 use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
-use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::observation::{Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
 use hums_link::sequence::Sequences;
-use hums_link::{Frame, observe, summary};
+use hums_link::{Check, Frame, observe};
 
 use super::companion::Companion;
-use super::history::{History, Note, Plot};
-use super::texts::Texts;
-use super::values::Told;
+use super::history::History;
+use super::latest::Latest;
+use super::note::Note;
+use super::plots::Plot;
 use crate::decode::reference::Reference;
+use crate::mavlink::ids::STATUSTEXT;
+use crate::statustext::{Text, Texts};
 
-/// `STATUSTEXT`
-const STATUSTEXT: u32 = 253;
 /// By then a HUMS on board has told of itself.
 const SETTLE: Span = Span::from_secs(5);
 /// When the whole vehicle is silent for so long, that its ESCs are says nothing of them.
@@ -41,7 +41,7 @@ pub struct Craft {
     /// The reference system's view of it.
     pub reference: Reference,
     /// When each of the reference system's quantities was told last.
-    pub told: Told,
+    pub latest: Latest,
     /// A HUMS on board.
     pub companion: Companion,
     /// `RPM`, `RAW_RPM`: the first two sensors.
@@ -71,7 +71,7 @@ impl Craft {
         Self {
             monitor: Monitor::new(*params),
             reference: Reference::new(),
-            told: Told::default(),
+            latest: Latest::default(),
             companion: Companion::default(),
             speed_sensors: [None; 2],
             worries: BTreeMap::new(),
@@ -104,7 +104,7 @@ impl Craft {
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
         self.frames += 1;
         let lost = self.sequences.frame(at, frame);
-        if Some(Source { system: frame.system(), component: frame.component() }) == self.counted(at) {
+        if Some(frame.source()) == self.counted(at) {
             self.missing += u64::from(lost);
         }
         let before = self.companion.known();
@@ -113,8 +113,11 @@ impl Craft {
             // What was missing until now was left out by it.
             self.missing = 0;
         }
-        if frame.id() == STATUSTEXT {
-            self.texts.frame(at, frame, &mut |at, note| keep(history, at, note));
+        if frame.id() == STATUSTEXT && frame.check() == Check::Verified {
+            let source = Source { system: frame.system(), component: frame.component() };
+            if let Some(text) = Text::of(at, source, frame.payload()) {
+                self.texts.take(text, &mut |text| say(history, text));
+            }
         }
         if let Some((source, observation)) = observe(frame) {
             self.observe(at, source, &observation, history);
@@ -137,7 +140,7 @@ impl Craft {
         for (_, quantities) in self.reference.told_by(observation) {
             for quantity in quantities {
                 if let Some(value) = self.reference.value(at, quantity) {
-                    self.told.set(at, quantity, value);
+                    self.latest.set(at, quantity, value);
                 }
             }
         }
@@ -200,25 +203,17 @@ impl Craft {
             } else {
                 worries.insert(key, *finding)
             };
-            keep(history, now, found(finding));
+            keep(history, now, Note::finding(finding));
             findings(finding);
         });
         while let Some(happening) = self.monitor.take_happening() {
-            if let Some(words) = told(happening) {
-                let note = Note {
-                    at_s: now.as_secs_f64(),
-                    kind: "event",
-                    level: "ok",
-                    from: "here".to_owned(),
-                    subsystem: "",
-                    words: words.to_owned(),
-                };
+            if let Some(note) = Note::event(now, happening) {
                 keep(history, now, note);
             }
         }
         // Nobody takes these here, and they are made anew.
         while self.monitor.take_snapshot(now).is_some() {}
-        self.texts.tick(now, &mut |at, note| keep(history, at, note));
+        self.texts.pass(now, &mut |text| say(history, text));
         if now.since(self.link_at) >= LINK_EVERY {
             self.link_at = now;
             if let (Some(history), Some(loss)) = (history, self.loss) {
@@ -239,31 +234,6 @@ fn keep(history: &mut Option<&mut History>, at: Instant, note: Note) {
     }
 }
 
-/// A finding of the checks here.
-fn found(finding: &Finding) -> Note {
-    Note {
-        at_s: finding.at.as_secs_f64(),
-        kind: "finding",
-        level: finding.level.name(),
-        from: "here".to_owned(),
-        subsystem: finding.subsystem.name(),
-        words: words(finding),
-    }
-}
-
-/// A finding in words.
-pub fn words(finding: &Finding) -> String {
-    summary::text(finding).as_str().trim_start_matches("HUMS: ").to_owned()
-}
-
-/// What a pilot wants to see on the time line.
-fn told(happening: Happening) -> Option<&'static str> {
-    match happening {
-        Happening::Armed => Some("armed"),
-        Happening::Disarmed => Some("disarmed"),
-        Happening::TakeOff => Some("take-off"),
-        Happening::Landing => Some("landing"),
-        Happening::AutopilotReboot => Some("the autopilot has rebooted"),
-        _ => None,
-    }
+fn say(history: &mut Option<&mut History>, text: Text) {
+    keep(history, text.at, Note::text(text));
 }

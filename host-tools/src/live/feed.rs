@@ -1,6 +1,6 @@
 //! A live source: bytes as they come, on this PC's clock, until Ctrl-C.
 //!
-//! The thread waits for bytes at most [`SILENCE`], takes them through the framer into the world, and publishes twenty
+//! The thread waits for bytes at most `SILENCE`, takes them through the framer into the world, and publishes twenty
 //! to thirty times a second. A connection that breaks is opened again; meanwhile the values grow old, and the page says so.
 
 use std::sync::Arc;
@@ -10,9 +10,9 @@ use anyhow::Result;
 use hums_core::time::Instant;
 use hums_link::framer::Framer;
 
-use super::PUBLISH;
 use super::hub::{Hub, Published};
 use super::influx::Influx;
+use super::rate::{PUBLISH, Rate};
 use super::show::{self, Around, SourceJson};
 use super::told::Limits;
 use super::world::World;
@@ -46,33 +46,6 @@ pub struct Feed {
     epoch_us: u64,
     heard: Option<Wall>,
     rate: Rate,
-}
-
-/// Frames a second.
-#[derive(Debug)]
-pub struct Rate {
-    since: Wall,
-    frames: u64,
-    /// Of the last whole second.
-    pub frames_s: f64,
-}
-
-impl Default for Rate {
-    /// From now on.
-    fn default() -> Self {
-        Self { since: Wall::now(), frames: 0, frames_s: 0.0 }
-    }
-}
-
-impl Rate {
-    /// So many frames there were until now.
-    pub fn count(&mut self, frames: u64) {
-        let passed = self.since.elapsed().as_secs_f64();
-        if passed >= 1.0 {
-            self.frames_s = frames.saturating_sub(self.frames) as f64 / passed;
-            (self.frames, self.since) = (frames, Wall::now());
-        }
-    }
 }
 
 impl Feed {

@@ -9,108 +9,28 @@
 use std::collections::VecDeque;
 
 use hums_core::observation::{Esc, Observation};
-use hums_core::time::{Instant, Span};
+use hums_core::time::Instant;
+use hums_core::units::Position;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use crate::decode::reference::{Quantity, Reference};
-use crate::report::series::Store;
+use super::note::Note;
+use super::plots::{Line, Plot, line_of};
+use crate::decode::reference::Reference;
+use crate::series::{self, Store};
+use crate::track::{Point, Track};
 
 /// Sayings kept at most; older ones go.
 const NOTES_MAX: usize = 2_000;
-/// Points of the track at most: when it is full every second one goes.
-const TRACK_MAX: usize = 4_096;
-const TRACK_EVERY: Span = Span::from_millis(100);
-
-/// What is drawn over time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs, reason = "the names say it, `name` gives the page's")]
-pub enum Plot {
-    FlightTime,
-    BatteryVolts,
-    BatteryAmperes,
-    BatteryPercent,
-    Temperature,
-    Pressure,
-    EscRpm,
-    EscAmperes,
-    EscVolts,
-    EscCelsius,
-    Altitude,
-    Velocity,
-    Speed,
-    Climb,
-    AccelModule,
-    Vibration,
-    Estimator,
-    Satellites,
-    Loss,
-}
-
-impl Plot {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::FlightTime => "flight_time",
-            Self::BatteryVolts => "battery_volts",
-            Self::BatteryAmperes => "battery_amperes",
-            Self::BatteryPercent => "battery_percent",
-            Self::Temperature => "temperature",
-            Self::Pressure => "pressure",
-            Self::EscRpm => "esc_rpm",
-            Self::EscAmperes => "esc_amperes",
-            Self::EscVolts => "esc_volts",
-            Self::EscCelsius => "esc_celsius",
-            Self::Altitude => "altitude",
-            Self::Velocity => "velocity",
-            Self::Speed => "speed",
-            Self::Climb => "climb",
-            Self::AccelModule => "accel_module",
-            Self::Vibration => "vibration",
-            Self::Estimator => "estimator",
-            Self::Satellites => "satellites",
-            Self::Loss => "loss",
-        }
-    }
-}
-
-/// One line of a plot.
-pub type Line = (Plot, u8);
-
-/// Something that was found, said, or happened.
-#[derive(Clone, Debug, Serialize)]
-pub struct Note {
-    /// Seconds since the first byte.
-    pub at_s: f64,
-    /// `finding`, `text` or `event`.
-    pub kind: &'static str,
-    /// A level's name; of a text, by its severity.
-    pub level: &'static str,
-    /// Who says it: `here` (these checks), `on board` (a HUMS on the vehicle), `autopilot`, `component 42`.
-    pub from: String,
-    /// The subsystem, for findings.
-    pub subsystem: &'static str,
-    /// In words: text of the world, never markup.
-    pub words: String,
-}
-
-/// A place at a time.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    at: Instant,
-    latitude: f64,
-    longitude: f64,
-    height_m: f32,
-}
 
 /// Everything that is kept.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    store: Store<Line>,
+    store: Store<Plot>,
     notes: VecDeque<(Instant, Note)>,
     /// Notes that went, so that the others keep their numbers.
     notes_gone: u64,
-    track: Vec<Place>,
-    track_every: Span,
+    track: Track,
     generation: u64,
 }
 
@@ -141,7 +61,7 @@ pub struct Part {
 
 /// Each line's new intervals: `"altitude:0": [numbers, values]`.
 #[derive(Debug)]
-struct Series(Vec<(Line, crate::report::series::Part)>);
+struct Series(Vec<(Line, series::Part)>);
 
 impl Serialize for Series {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -198,7 +118,7 @@ impl History {
         match observation {
             Observation::GlobalPosition(global) => {
                 if let Some(place) = global.position {
-                    self.place(at, place.latitude_deg, place.longitude_deg, global.relative_altitude.0);
+                    self.place(at, place, Some(global.relative_altitude.0));
                 }
             }
             Observation::Gnss(gnss) if gnss.instance == 0 => {
@@ -207,7 +127,7 @@ impl History {
                 }
                 let alone = reference.vehicle().global.get().is_none();
                 if let Some(place) = gnss.position.filter(|_| alone) {
-                    self.place(at, place.latitude_deg, place.longitude_deg, f32::NAN);
+                    self.place(at, place, None);
                 }
             }
             Observation::Battery(battery) if battery.id == 0 => {
@@ -251,21 +171,10 @@ impl History {
         }
     }
 
-    fn place(&mut self, at: Instant, latitude: f64, longitude: f64, height_m: f32) {
-        let every = self.track_every.max(TRACK_EVERY);
-        if self.track.last().is_some_and(|last| at.since(last.at) < every) {
-            return;
-        }
-        if self.track.len() >= TRACK_MAX {
-            let mut odd = false;
-            self.track.retain(|_| {
-                odd = !odd;
-                odd
-            });
-            self.track_every = Span::from_micros(every.as_micros().saturating_mul(2));
+    fn place(&mut self, at: Instant, position: Position, height_m: Option<f32>) {
+        if self.track.push(at, position, height_m) {
             self.generation += 1;
         }
-        self.track.push(Place { at, latitude, longitude, height_m });
     }
 
     /// What a page that has this much does not have yet of the time up to `until`; moves the cursor there. `None` where
@@ -288,9 +197,10 @@ impl History {
         let notes: Vec<_> = self.notes.iter().take(known).skip(skip).map(|(_, note)| note.clone()).collect();
         cursor.notes = self.notes_gone + known as u64;
 
-        let places = self.track.partition_point(|place| place.at <= until);
-        let new = self.track.get(cursor.places..places).unwrap_or_default();
-        let track: Vec<_> = new.iter().map(Place::told).collect();
+        let points = self.track.points();
+        let places = points.partition_point(|place| place.at <= until);
+        let new = points.get(cursor.places..places).unwrap_or_default();
+        let track: Vec<_> = new.iter().map(told).collect();
         cursor.places = places;
 
         let something = reset || !series.is_empty() || !notes.is_empty() || !track.is_empty();
@@ -307,32 +217,9 @@ impl History {
     }
 }
 
-impl Place {
-    fn told(&self) -> (f64, f64, f64, Option<f32>) {
-        let height_m = self.height_m.is_finite().then_some(self.height_m);
-        (self.at.as_secs_f64(), self.latitude, self.longitude, height_m)
-    }
-}
-
-/// Where a quantity is drawn; `None` where it is only shown as a number.
-fn line_of(quantity: Quantity) -> Option<Line> {
-    Some(match quantity {
-        Quantity::FlightTime => (Plot::FlightTime, 0),
-        Quantity::BatteryPercent => (Plot::BatteryPercent, 0),
-        Quantity::BatteryVolts => (Plot::BatteryVolts, 0),
-        Quantity::Temperature => (Plot::Temperature, 0),
-        Quantity::Pressure => (Plot::Pressure, 0),
-        Quantity::AccelerationModule => (Plot::AccelModule, 0),
-        Quantity::Velocity(axis) => (Plot::Velocity, axis as u8),
-        Quantity::Altitude => (Plot::Altitude, 0),
-        Quantity::GroundSpeed => (Plot::Speed, 0),
-        Quantity::AirSpeed => (Plot::Speed, 1),
-        Quantity::ClimbRate => (Plot::Climb, 0),
-        Quantity::EscRpm(motor) => (Plot::EscRpm, motor as u8),
-        Quantity::EscVoltage(motor) => (Plot::EscVolts, motor as u8),
-        Quantity::EscCurrent(motor) => (Plot::EscAmperes, motor as u8),
-        _ => return None,
-    })
+fn told(place: &Point) -> (f64, f64, f64, Option<f32>) {
+    let height_m = place.height_m.filter(|height_m| height_m.is_finite());
+    (place.at.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
 }
 
 #[cfg(test)]
@@ -401,15 +288,5 @@ mod tests {
         let told = follow(&mut cursor, &history, seconds(13_000));
         assert_eq!((told.0, told.2), (false, NOTES_MAX));
         assert_eq!(follow(&mut cursor, &history, seconds(13_000)).2, 0);
-    }
-
-    #[test]
-    fn a_track_of_a_day_stays_in_bounds_and_keeps_its_beginning() {
-        let mut history = History::default();
-        for second in 0..86_400 {
-            history.place(seconds(second), second as f64, 0.0, 1.0);
-        }
-        assert!(history.track.len() <= TRACK_MAX && history.track.len() >= TRACK_MAX / 2);
-        assert!(history.track[0].at == seconds(0) && history.generation > 0);
     }
 }

@@ -18,12 +18,15 @@ pub mod guard;
 pub mod history;
 pub mod hub;
 pub mod influx;
+pub mod latest;
+pub mod note;
 pub mod playback;
+pub mod plots;
+pub mod rate;
 pub mod recording;
 pub mod server;
 pub mod show;
 pub mod spool;
-pub mod texts;
 pub mod told;
 pub mod values;
 pub mod world;
@@ -33,7 +36,7 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context as _, Result, anyhow};
 
@@ -43,14 +46,12 @@ use self::hub::Hub;
 use self::influx::Influx;
 use self::influx::target::Target;
 use self::playback::Player;
+use self::rate::PUBLISH;
 use self::told::Limits;
 use crate::cli;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
 use crate::output;
-
-/// Twenty times a second.
-const PUBLISH: Duration = Duration::from_millis(50);
 
 /// Runs `hums live`.
 pub fn run(args: &cli::Live) -> Result<Outcome> {

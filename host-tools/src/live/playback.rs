@@ -10,10 +10,9 @@ use anyhow::{Context as _, Result};
 use hums_core::time::{Instant, Span};
 use hums_link::Frame;
 
-use super::PUBLISH;
-use super::feed::Rate;
 use super::hub::{Command, Hub, Published};
 use super::influx::{Figures, Influx};
+use super::rate::{PUBLISH, Rate};
 use super::recording::{self, Heard, Opened};
 use super::show::{self, Around, SourceJson};
 use super::spool::{Spool, SpoolWriter, Spooled};

@@ -1,7 +1,7 @@
 //! The page, and the one connection that carries its data: a WebSocket.
 //!
 //! Each page has a task that looks at the newest state when it can send, so a slow one skips states; a page that takes
-//! nothing for [`PATIENCE`] is dropped.
+//! nothing for `PATIENCE` is dropped.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -11,8 +11,7 @@ use hums_link::encode::COMPONENT;
 use hums_link::packet::Fields;
 use hums_link::{Check, Frame};
 
-/// `PARAM_VALUE`
-const PARAM_VALUE: u32 = 22;
+use crate::mavlink::ids::PARAM_VALUE;
 
 /// The limits that hold here: those that the user gave, and the box's own for all others.
 #[derive(Clone, Debug, Default)]

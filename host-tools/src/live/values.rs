@@ -6,90 +6,9 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeTuple, Serializer};
 
 use super::craft::Craft;
+use super::latest::{ESC, MOTION, QUANTITIES, SLOW};
 use crate::decode::reference::Quantity;
 use crate::mavlink::values::Scalar;
-
-/// Streams of motion come several times a second, over a thin radio once a second.
-const MOTION: Span = Span::from_millis(2_500);
-/// Everything else may come every two seconds.
-const SLOW: Span = Span::from_millis(6_000);
-
-/// Quantities of the reference system that are one for the vehicle, with the page's names.
-const QUANTITIES: [(&str, Quantity, Span); 23] = [
-    ("flight_time", Quantity::FlightTime, SLOW),
-    ("battery_percent", Quantity::BatteryPercent, SLOW),
-    ("battery_volts", Quantity::BatteryVolts, SLOW),
-    ("temperature", Quantity::Temperature, SLOW),
-    ("pressure", Quantity::Pressure, SLOW),
-    ("accel_front", Quantity::Acceleration(0), MOTION),
-    ("accel_right", Quantity::Acceleration(1), MOTION),
-    ("accel_down", Quantity::Acceleration(2), MOTION),
-    ("accel_module", Quantity::AccelerationModule, MOTION),
-    ("velocity_north", Quantity::Velocity(0), MOTION),
-    ("velocity_east", Quantity::Velocity(1), MOTION),
-    ("velocity_down", Quantity::Velocity(2), MOTION),
-    ("velocity_module", Quantity::VelocityModule, MOTION),
-    ("gnss_speed", Quantity::GnssSpeed, MOTION),
-    ("altitude", Quantity::Altitude, MOTION),
-    ("latitude", Quantity::Latitude, MOTION),
-    ("longitude", Quantity::Longitude, MOTION),
-    ("airspeed", Quantity::AirSpeed, MOTION),
-    ("groundspeed", Quantity::GroundSpeed, MOTION),
-    ("heading", Quantity::Heading, MOTION),
-    ("throttle", Quantity::Throttle, MOTION),
-    ("hud_altitude", Quantity::HudAltitude, MOTION),
-    ("climb", Quantity::ClimbRate, MOTION),
-];
-const PLACES: usize = QUANTITIES.len() + 6 * MOTORS_MAX;
-
-/// When each quantity was told last, and what.
-#[derive(Clone, Debug)]
-pub struct Told([Option<(Instant, Scalar)>; PLACES]);
-
-impl Default for Told {
-    fn default() -> Self {
-        Self([None; PLACES])
-    }
-}
-
-/// A name of the page's, and the quantity of a motor.
-type OfMotor = (&'static str, fn(usize) -> Quantity);
-
-/// What of an ESC is shown.
-const ESC: [OfMotor; 6] = [
-    ("rpm", Quantity::EscRpm),
-    ("volts", Quantity::EscVoltage),
-    ("amperes", Quantity::EscCurrent),
-    ("failures", Quantity::EscFailures),
-    ("errors", Quantity::EscErrors),
-    ("celsius", Quantity::EscTemperature),
-];
-
-fn place(quantity: Quantity) -> Option<usize> {
-    let motors = QUANTITIES.len();
-    Some(match quantity {
-        Quantity::EscRpm(motor) => motors + motor,
-        Quantity::EscVoltage(motor) => motors + MOTORS_MAX + motor,
-        Quantity::EscCurrent(motor) => motors + 2 * MOTORS_MAX + motor,
-        Quantity::EscFailures(motor) => motors + 3 * MOTORS_MAX + motor,
-        Quantity::EscErrors(motor) => motors + 4 * MOTORS_MAX + motor,
-        Quantity::EscTemperature(motor) => motors + 5 * MOTORS_MAX + motor,
-        other => QUANTITIES.iter().position(|(_, of, _)| *of == other)?,
-    })
-}
-
-impl Told {
-    /// A quantity was told.
-    pub fn set(&mut self, at: Instant, quantity: Quantity, value: Scalar) {
-        if let Some(slot) = place(quantity).and_then(|place| self.0.get_mut(place)) {
-            *slot = Some((at, value));
-        }
-    }
-
-    fn get(&self, quantity: Quantity) -> Option<(Instant, Scalar)> {
-        *self.0.get(place(quantity)?)?
-    }
-}
 
 /// A value, its age in milliseconds, and 1 where it is stale.
 #[derive(Clone, Copy, Debug)]
@@ -139,7 +58,7 @@ impl<'a> Values<'a> {
     fn each(&self, mut each: impl FnMut(&'static str, Shown)) {
         let (craft, now) = (self.craft, self.now);
         for (name, quantity, limit) in &QUANTITIES {
-            if let Some((at, value)) = craft.told.get(*quantity) {
+            if let Some((at, value)) = craft.latest.get(*quantity) {
                 // The time in the air goes on between heartbeats.
                 let running = *quantity == Quantity::FlightTime && now.since(at) <= *limit;
                 let value =
@@ -283,7 +202,7 @@ pub struct Motors<'a>(pub Values<'a>);
 impl Serialize for Motors<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let Values { craft, now } = self.0;
-        let heard = |motor: usize| ESC.iter().any(|(_, of)| craft.told.get(of(motor)).is_some());
+        let heard = |motor: usize| ESC.iter().any(|(_, of)| craft.latest.get(of(motor)).is_some());
         let count = (0..MOTORS_MAX).rev().find(|motor| heard(*motor)).map_or(0, |last| last + 1);
         serializer.collect_seq((0..count).map(|number| Motor { craft, now, number }))
     }
@@ -299,7 +218,7 @@ impl Serialize for Motor<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for (name, of) in ESC {
-            if let Some((at, value)) = self.craft.told.get(of(self.number)) {
+            if let Some((at, value)) = self.craft.latest.get(of(self.number)) {
                 map.serialize_entry(name, &Shown::new(self.now, at, value, SLOW))?;
             }
         }
@@ -310,19 +229,6 @@ impl Serialize for Motor<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_quantity_has_a_place_of_its_own() {
-        let mut places: Vec<usize> = QUANTITIES.iter().filter_map(|(_, of, _)| place(*of)).collect();
-        for motor in 0..MOTORS_MAX {
-            places.extend(ESC.iter().filter_map(|(_, of)| place(of(motor))));
-        }
-        places.sort_unstable();
-        let count = places.len();
-        places.dedup();
-        assert_eq!(places.len(), count);
-        assert!(places.iter().all(|place| *place < PLACES));
-    }
 
     #[test]
     fn a_value_is_as_short_as_it_was_sent_and_says_its_age() {

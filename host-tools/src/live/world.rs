@@ -37,7 +37,7 @@ pub struct World {
     pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
-    /// Findings since this was cleared, with whose they are; what nobody clears stops at [`FOUND_MAX`].
+    /// Findings since this was cleared, with whose they are; what nobody clears stops at `FOUND_MAX`.
     pub found: Vec<(u8, Finding)>,
     limits: Limits,
     /// The vehicle that a log is of: the first one heard in it.
@@ -176,16 +176,17 @@ impl World {
 #[cfg(test)]
 mod tests {
     use hums_core::component::{Figures, Kind, Status};
-    use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::messages;
     use hums_link::packet::Packet;
 
     use super::*;
+    use crate::mavlink::ids::HEARTBEAT;
 
     /// HEARTBEAT of an `ArduPilot` quadrotor, disarmed.
     fn heartbeat(system: u8) -> Vec<u8> {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
-        let packet = Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
+        let mut buffer = [0; FRAME_BYTES_MAX];
+        let packet = Packet::new(HEARTBEAT).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
         Encoder::of(system, 1).frame(&mut buffer, &packet).to_vec()
     }
 
@@ -282,7 +283,7 @@ mod tests {
         let mut encoder = Encoder::new();
         encoder.set_system(1);
         for (name, value) in [("CMP1_KIND", 1.0), ("CMP1_FLIGHTS", 50.0), ("CMP1_HOURS", 25.0)] {
-            let mut buffer = [0; GS_FRAME_BYTES_MAX];
+            let mut buffer = [0; FRAME_BYTES_MAX];
             let frame = encoder.frame(&mut buffer, &messages::param_value(name, value, 0, 100)).to_vec();
             hear(&mut world, &mut histories, Instant::from_millis(5), &frame);
         }

@@ -54,12 +54,11 @@ pub struct Frame<'a> {
 impl Frame<'_> {
     /// Whether the checksum holds. Looks at every byte: not for those who know it already.
     pub fn check(&self) -> Check {
-        let Some(message) = self.message() else { return Check::Unknown };
-        let end = if self.bytes.first() == Some(&MAGIC_V1) { 6 } else { 10 } + self.payload.len();
-        let covered = self.bytes.get(1..end).unwrap_or_default();
-        let sum = covered.iter().chain([&message.crc_extra]).fold(0xffff, |crc, &byte| accumulate(crc, byte));
-        let byte = |at: usize| self.bytes.get(at).copied().unwrap_or(0);
-        if sum == u16::from_le_bytes([byte(end), byte(end + 1)]) { Check::Good } else { Check::Bad }
+        if self.message().is_none() {
+            return Check::Unknown;
+        }
+        let checked = hums_link::Frame::parse(self.bytes).map(|frame| frame.check());
+        if checked == Some(hums_link::Check::Verified) { Check::Good } else { Check::Bad }
     }
 
     /// The definition of the message, where the dialect has one.
@@ -96,13 +95,6 @@ fn length(bytes: &[u8]) -> Option<usize> {
         [MAGIC_V2, length, SIGNED, ..] => Some(10 + usize::from(length) + 2 + 13),
         _ => None,
     }
-}
-
-/// CRC-16/MCRF4XX, one byte: MAVLink's checksum.
-fn accumulate(crc: u16, byte: u8) -> u16 {
-    let x = byte ^ (crc as u8);
-    let x = u16::from(x ^ (x << 4));
-    (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
 }
 
 #[cfg(test)]

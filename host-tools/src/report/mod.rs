@@ -1,26 +1,32 @@
 //! `hums report`: one page for each session, whole in itself: no network, no file beside it.
 //!
-//! [`series`] samples what the vehicle told, so that a page of hours stays below a few megabytes; [`replay`] reads the
-//! log in order and finds flights and phases with the firmware's own rules; [`trend`] compares with the sessions before
-//! on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them (`assets/`).
+//! [`replay`] reads the log in order: [`samples`] keeps what the vehicle told, so that a page of hours stays below a few
+//! megabytes, [`flights`] finds flights and phases with the firmware's own rules, [`frames`] counts; [`trend`] compares
+//! with the sessions before on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them
+//! (`program`, from the modules in `assets/`), which [`plots`] tells what to draw.
 //!
 //! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
 //! own policy lets no other script run and loads nothing.
 
+pub mod flights;
+pub mod frames;
 pub mod page;
+pub mod plots;
+mod program;
 pub mod replay;
-pub mod series;
+pub mod samples;
 pub mod trend;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 
 use crate::cli;
-use crate::decode::{inside, side_by_side::side_by_side};
+use crate::decode::side_by_side::side_by_side;
+use crate::files::{appended, cannot_write, inside, make_directory, says_directory};
 use crate::logs::{self, Log};
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::summary::Overview;
 
@@ -43,9 +49,9 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         let html = page::html(overview, &replay::Replay::of(log)?, &trend::of(overview, earlier))?;
         let path = wanted.path(log);
         if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-            fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))?;
+            make_directory(dir)?;
         }
-        fs::write(&path, &html).with_context(|| format!("{}: cannot be written", path.display()))?;
+        fs::write(&path, &html).with_context(|| cannot_write(&path))?;
         output::line(&format!("{}: session {}, {} bytes", path.display(), log.name, html.len()))?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
     }
@@ -69,20 +75,22 @@ fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
     };
-    let says_directory =
-        args.output.is_dir() || args.output.as_os_str().to_string_lossy().ends_with(['/', '\\']);
+    let directory = says_directory(&args.output);
     let sessions = match &args.session {
         Some(name) => {
             let Some(index) = logs.iter().position(|log| log.name == *name) else {
                 let names: Vec<&str> = logs.iter().map(|log| log.name.as_str()).collect();
-                bail!("there is no session {name}; there is {}", names.join(", "));
+                return Err(usage(format!(
+                    "--session {name}: there is no such session; there is {}",
+                    names.join(", ")
+                )));
             };
             vec![index]
         }
-        None if says_directory => (0..logs.len()).collect(),
+        None if directory => (0..logs.len()).collect(),
         None => vec![last],
     };
-    Ok(Wanted { sessions, output: args.output.clone(), directory: says_directory })
+    Ok(Wanted { sessions, output: args.output.clone(), directory })
 }
 
 impl Wanted {
@@ -90,8 +98,6 @@ impl Wanted {
         if !self.directory {
             return self.output.clone();
         }
-        let mut path = inside(Path::new(&self.output), &log.name).into_os_string();
-        path.push(".html");
-        path.into()
+        appended(&inside(&self.output, &log.name), "html")
     }
 }

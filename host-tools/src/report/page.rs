@@ -6,19 +6,20 @@ use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use hums_blackbox::record::Stats;
-use hums_core::observation::Autopilot;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use super::replay::{Flight, PhaseSpan, Plot, Replay, Text, TrackPoint};
-use super::series::{GridJson, SeriesJson};
+use super::flights::{Flight, PhaseSpan};
+use super::plots::{About, Plot, about};
+use super::program::program;
+use super::replay::{Place, Replay, Said};
 use super::trend::Trend;
 use crate::info::json::LogJson;
+use crate::series::{GridJson, SeriesJson};
 use crate::summary::Overview;
 
 const TEMPLATE: &str = include_str!("assets/page.html");
 const STYLE: &str = include_str!("assets/page.css");
-const PROGRAM: &str = include_str!("assets/page.js");
 /// uPlot 1.6.32, MIT (`src/assets/uPlot.LICENSE`).
 const UPLOT: &str = include_str!("../assets/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("../assets/uPlot.min.css");
@@ -33,8 +34,8 @@ struct Data<'a> {
     plots: Vec<PlotJson>,
     flights: &'a [Flight],
     phases: &'a [PhaseSpan],
-    track: &'a [TrackPoint],
-    texts: &'a [Text],
+    track: Vec<Place>,
+    texts: &'a [Said],
     texts_count: u64,
     stats: Option<StatsJson>,
     trend: &'a Trend,
@@ -89,17 +90,18 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
         version: env!("CARGO_PKG_VERSION"),
         log: LogJson::new(log),
         epoch_us: log.contents.epoch_us,
-        grid: replay.store.grid(),
+        grid: replay.samples.store.grid(),
         plots: plots(replay),
-        flights: &replay.flights,
-        phases: &replay.phases,
-        track: &replay.track,
+        flights: replay.flights.all(),
+        phases: replay.flights.phases(),
+        track: replay.track(),
         texts: &replay.texts,
         texts_count: replay.texts_count,
         stats: log.contents.stats.as_ref().map(StatsJson::from),
         trend,
     };
-    let programs = [UPLOT, PROGRAM];
+    let program = program();
+    let programs = [UPLOT, program.as_str()];
     // Only these two programs may run, whatever else may ever get onto the page.
     let hashes: Vec<String> = programs
         .iter()
@@ -110,7 +112,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
         ("{{scripts}}", hashes.join(" ").as_str()),
         ("{{style}}", [UPLOT_STYLE, STYLE].concat().as_str()),
         ("{{uplot}}", UPLOT),
-        ("{{program}}", PROGRAM),
+        ("{{program}}", program.as_str()),
         // Last, so that nothing in it is taken for a mark.
         ("{{data}}", harmless(&serde_json::to_string(&data)?).as_str()),
     ] {
@@ -133,80 +135,6 @@ fn harmless(json: &str) -> String {
     out
 }
 
-/// Group, title, unit, decimals and the lines' names of a plot.
-type About = (Plot, &'static str, &'static str, &'static str, u8, fn(u8) -> String);
-
-fn named(names: &[&str], line: u8) -> String {
-    names.get(usize::from(line)).map_or_else(|| format!("{}", line + 1), |name| (*name).to_owned())
-}
-
-/// The plots, in the order of the page.
-fn about(autopilot: Autopilot) -> Vec<About> {
-    let motor = |line: u8| format!("Motor {}", line + 1);
-    let battery = |line: u8| if line == 0 { "Battery".into() } else { format!("Battery {}", line + 1) };
-    let px4 = autopilot == Autopilot::Px4;
-    let axes: fn(u8) -> String = if px4 {
-        |line| named(&["Coning", "Gyro, high frequency", "Accelerometer, high frequency"], line)
-    } else {
-        |line| named(&["Forward", "Right", "Down"], line)
-    };
-    let (vibration, estimator) = if px4 { ("PX4 metrics", "test ratio") } else { ("m/s\u{b2}", "variance") };
-    vec![
-        (Plot::Height, "Motion", "Height above home", "m", 2, |_| "Height".into()),
-        (Plot::Speed, "Motion", "Speed", "m/s", 2, |line| named(&["Ground", "Air", "GNSS"], line)),
-        (Plot::Vertical, "Motion", "Climb rate", "m/s", 2, |_| "Climb".into()),
-        (Plot::Attitude, "Motion", "Attitude", "\u{b0}", 1, |line| named(&["Roll", "Pitch"], line)),
-        (Plot::PackVolts, "Battery", "Voltage", "V", 3, battery),
-        (Plot::CellVolts, "Battery", "Cells", "V", 3, |line| format!("Cell {}", line + 1)),
-        (Plot::PackAmperes, "Battery", "Current", "A", 2, battery),
-        (Plot::PackPercent, "Battery", "Remaining", "%", 0, battery),
-        (Plot::MotorRpm, "Motors", "Speed", "rpm", 0, motor),
-        (Plot::MotorAmperes, "Motors", "Current", "A", 2, motor),
-        (Plot::MotorVolts, "Motors", "Voltage", "V", 2, motor),
-        (Plot::MotorCelsius, "Motors", "ESC temperature", "\u{b0}C", 1, motor),
-        (Plot::EscErrors, "Motors", "ESC errors", "count", 0, motor),
-        (Plot::SpeedSensors, "Motors", "Speed sensors", "rpm", 0, |line| format!("Sensor {}", line + 1)),
-        (Plot::Engine, "Motors", "Engine", "", 1, |line| {
-            named(&["Speed (rpm)", "Load (%)", "Fuel flow", "Cylinder head (\u{b0}C)"], line)
-        }),
-        (Plot::Vibration, "Structure", "Vibration", vibration, 3, axes),
-        (Plot::Clips, "Structure", "Clipped samples", "count", 0, |line| {
-            format!("Accelerometer {}", line + 1)
-        }),
-        (Plot::Estimator, "Navigation", "Estimator", estimator, 3, |line| {
-            named(&["Velocity", "Horizontal position", "Vertical position", "Compass"], line)
-        }),
-        (Plot::Satellites, "Navigation", "Satellites and fix", "", 0, |line| {
-            named(&["Satellites", "Fix type", "Satellites, 2nd receiver", "Fix type, 2nd receiver"], line)
-        }),
-        (Plot::Dilution, "Navigation", "GNSS accuracy", "", 2, |line| {
-            named(&["HDOP", "Horizontal accuracy (m)", "HDOP, 2nd", "Accuracy, 2nd (m)"], line)
-        }),
-        (Plot::Link, "Link", "Signal strength", "device units", 0, |line| {
-            named(&["RC", "Radio", "Radio, far end", "Noise", "Noise, far end"], line)
-        }),
-        (Plot::Frames, "Link", "Frames", "per second", 0, |line| {
-            named(&["Received", "Missing by the sender's count"], line)
-        }),
-        (Plot::Temperature, "Computer", "Temperatures", "\u{b0}C", 1, |line| {
-            named(
-                &[
-                    "Air",
-                    "Inertial sensor",
-                    "Processor",
-                    "",
-                    "Battery",
-                    "Battery 2",
-                    "Battery 3",
-                    "Battery 4",
-                ],
-                line,
-            )
-        }),
-        (Plot::Load, "Computer", "Autopilot load", "%", 1, |_| "Load".into()),
-    ]
-}
-
 fn plots(replay: &Replay) -> Vec<PlotJson> {
     let json = |(plot, group, title, unit, decimals, label): About| PlotJson {
         id: format!("{plot:?}"),
@@ -215,13 +143,15 @@ fn plots(replay: &Replay) -> Vec<PlotJson> {
         unit,
         decimals,
         stepped: matches!(plot, Plot::Clips | Plot::EscErrors | Plot::Satellites),
-        series: replay.store.plot(plot, decimals, label),
+        series: replay.samples.store.plot(plot, decimals, label),
     };
     about(replay.autopilot).into_iter().map(json).filter(|plot| !plot.series.is_empty()).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use hums_core::observation::Autopilot;
+
     use super::*;
 
     #[test]
@@ -235,11 +165,12 @@ mod tests {
 
     #[test]
     fn each_mark_of_the_template_stands_once() {
+        let program = program();
         for mark in ["{{scripts}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"] {
             assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
-            assert!(!UPLOT.contains(mark) && !PROGRAM.contains(mark) && !STYLE.contains(mark), "{mark}");
+            assert!(!UPLOT.contains(mark) && !program.contains(mark) && !STYLE.contains(mark), "{mark}");
         }
-        for text in [UPLOT, PROGRAM] {
+        for text in [UPLOT, program.as_str()] {
             assert!(!text.contains("</script"), "a program would end early");
         }
     }

@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::cli::Run;
+use crate::files::cannot_write;
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
 
@@ -40,11 +41,7 @@ impl Arrivals {
 
     fn new(run: &Run, tap: Option<&Path>) -> Result<Self> {
         let (source, autopilot) = source::open_both(&run.input, Timing { line_rate: run.faults.line_rate })?;
-        let create = |path: &Path| {
-            File::create(path)
-                .map(BufWriter::new)
-                .with_context(|| format!("{}: cannot be written", path.display()))
-        };
+        let create = |path: &Path| File::create(path).map(BufWriter::new).with_context(|| cannot_write(path));
         Ok(Self {
             source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
             name: run.input.to_string(),

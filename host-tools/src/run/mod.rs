@@ -99,7 +99,9 @@ fn hear(ground: &mut Ground, now_us: u64, machine: &mut impl Machine) -> Result<
 fn pace(run: &Run) -> Result<(Speed, bool)> {
     let live = run.input.is_live();
     match run.speed {
-        Some(Speed::Max) if live => Err(usage(format!("--speed max: {} comes in its own time", run.input))),
+        Some(Speed::Max) if live => {
+            Err(usage(format!("--speed max: {} comes in its own time; leave --speed out", run.input)))
+        }
         Some(speed) => Ok((speed, live)),
         None => Ok((if live { Speed::Real } else { Speed::Max }, live)),
     }
@@ -108,6 +110,16 @@ fn pace(run: &Run) -> Result<(Speed, bool)> {
 /// Makes the card image where it is missing, and gives it for reading and writing.
 fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
     let (file, found) = image::open_or_make(path, size_mib)?;
+    let bytes = file.metadata().map_or(u64::MAX, |about| about.len());
+    if bytes < image::SIZE_MIB_MIN << 20 {
+        // What a recorder does with such a card is worth a run, too.
+        eprintln!(
+            "hums: {}: is no image of an SD card: {bytes} bytes, and a FAT32 card has {} MiB at least; nothing can be \
+             recorded on it",
+            path.display(),
+            image::SIZE_MIB_MIN
+        );
+    }
     if found == Found::Made {
         let context = || format!("{}: cannot be formatted", path.display());
         let card =

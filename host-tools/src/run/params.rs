@@ -11,8 +11,11 @@ use crate::outcome::usage;
 /// The parameters that a file sets, in its order; none where there is no file.
 pub(crate) fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("--params {}: cannot be read", path.display()))?;
+    let bytes =
+        std::fs::read(path).with_context(|| format!("--params {}: cannot be read", path.display()))?;
+    let text = String::from_utf8(bytes).map_err(|_| {
+        usage(format!("--params {}: is no text; it wants lines of NAME VALUE", path.display()))
+    })?;
     let mut params = Vec::new();
     for (index, line) in text.lines().enumerate() {
         match parameter(line) {

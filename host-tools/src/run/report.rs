@@ -5,12 +5,14 @@ use std::path::Path;
 
 use anyhow::Result;
 use hums_blackbox::record::Stats;
+use hums_core::health;
 use serde::Serialize;
 
+use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output;
-use crate::summary::Overview;
+use crate::summary::{FindingLine, Overview};
 
 /// The object of `--json`; its names are a contract.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -81,6 +83,38 @@ pub struct Finding {
     pub unit: String,
 }
 
+impl From<&health::Finding> for Finding {
+    fn from(finding: &health::Finding) -> Self {
+        Self {
+            subsystem: finding.subsystem.name().to_owned(),
+            check: finding.check.to_owned(),
+            instance: finding.instance,
+            level: finding.level.name().to_owned(),
+            time_s: finding.at.as_secs_f64(),
+            value: known(finding.value),
+            unit: finding.unit.to_owned(),
+        }
+    }
+}
+
+impl From<&FindingLine> for Finding {
+    fn from(finding: &FindingLine) -> Self {
+        Self {
+            subsystem: finding.subsystem.to_owned(),
+            check: finding.check.clone(),
+            instance: finding.instance,
+            level: finding.level.to_owned(),
+            time_s: finding.at.as_secs_f64(),
+            value: known(finding.value),
+            unit: finding.unit.clone(),
+        }
+    }
+}
+
+fn known(value: f32) -> Option<f64> {
+    value.is_finite().then_some(f64::from(value))
+}
+
 impl Report {
     /// Takes over the recorder's own counters.
     pub fn set_stats(&mut self, stats: &Stats) {
@@ -109,16 +143,7 @@ impl Report {
             self.usage =
                 overview.contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
             for finding in &overview.contents.findings {
-                let value = f64::from(finding.value);
-                self.findings.push(Finding {
-                    subsystem: finding.subsystem.to_owned(),
-                    check: finding.check.clone(),
-                    instance: finding.instance,
-                    level: finding.level.to_owned(),
-                    time_s: finding.at.as_secs_f64(),
-                    value: value.is_finite().then_some(value),
-                    unit: finding.unit.clone(),
-                });
+                self.findings.push(Finding::from(finding));
             }
         }
         Ok(frames)
@@ -134,6 +159,16 @@ impl Report {
             output::line(&self.text())?;
         }
         Ok(Outcome::lossy(self.frames_lost > 0))
+    }
+
+    /// What is strange about an input of which nothing came out.
+    pub fn remark(&self, input: &Endpoint) -> Option<String> {
+        (self.bytes_in > 0 && self.frames_in == 0).then(|| {
+            format!(
+                "{input}: not one MAVLink frame was in {} bytes; is it a recording of MAVLink?",
+                self.bytes_in
+            )
+        })
     }
 
     fn text(&self) -> String {

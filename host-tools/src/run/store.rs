@@ -44,7 +44,7 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
 /// What the file holds, and the file for writing.
 fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if path.is_dir() {
-        bail!("--store {}: is a directory", path.display());
+        bail!("--store {}: is a directory; name a file", path.display());
     }
     let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
     let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 
-use super::{Chunk, Source};
+use super::stream::{Chunk, Source};
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::interrupt;

@@ -14,48 +14,23 @@ pub mod noise;
 pub mod paced;
 pub mod raw;
 pub mod sniff;
+mod stream;
 pub mod tlog;
+
+pub use stream::{Chunk, Source};
 
 use std::fs::File;
 use std::io::{self, Read, Write};
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
 use crate::endpoint::Endpoint;
+use crate::logs::{self, Content};
 use crate::outcome::usage;
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
 pub const RAW_BAUD: u32 = 115_200;
-
-/// Bytes that arrive together.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Chunk {
-    /// When the last of them is there, in microseconds since the first byte of the input; never falls.
-    pub at_us: u64,
-    /// The bytes; may be none where only time passed (a live source that is silent).
-    pub bytes: Vec<u8>,
-}
-
-/// A stream of chunks.
-pub trait Source: Send {
-    /// The next chunk; `None` at the end.
-    fn next(&mut self) -> io::Result<Option<Chunk>>;
-
-    /// UTC at the first byte, microseconds since 1970, where the input told it (known once a chunk was read).
-    fn utc_start_us(&self) -> Option<u64> {
-        None
-    }
-
-    /// Whether each chunk is a record of its own (a frame of a tlog), not just some bytes of a stream.
-    fn has_records(&self) -> bool {
-        false
-    }
-
-    /// A sentence about what was strange in the input, once it has been read.
-    fn remark(&self) -> Option<String> {
-        None
-    }
-}
 
 /// The way back to a source that hears.
 pub type Way = Box<dyn Write + Send>;
@@ -90,6 +65,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
             if file.metadata()?.is_dir() {
                 bail!("{}: is a directory; give a recording (tlog or raw MAVLink bytes)", path.display());
             }
+            refuse_our_own(path)?;
             Box::new(file)
         }
         _ => Box::new(io::stdin()),
@@ -105,12 +81,19 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
     })
 }
 
-/// Reads what there is, going on after an interrupted call; 0 at the end.
-fn read_some(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
-    loop {
-        match input.read(buffer) {
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            result => return result,
-        }
+/// What HUMS itself has recorded is full of frames, but not as they came.
+fn refuse_our_own(path: &Path) -> Result<()> {
+    // What is no file (a pipe) can be read but once.
+    if !path.is_file() {
+        return Ok(());
     }
+    let name = path.display();
+    let what = match logs::find::look(path)? {
+        Content::Log => "a log of HUMS",
+        Content::Image if !logs::on_card(path).is_empty() => "an SD card with logs of HUMS",
+        _ => return Ok(()),
+    };
+    bail!(
+        "{name}: is {what}, not a recording; `hums decode {name} -o OUT --format tlog` makes recordings of it"
+    )
 }

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use super::{Chunk, Source};
+use super::stream::{Chunk, Source};
 use crate::rng::Rng;
 
 const PURPOSE: u64 = 1;

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::io;
 
-use super::{Chunk, Source};
+use super::stream::{Chunk, Source};
 
 /// Bits on the line for one byte: start, eight data, stop.
 const BITS_PER_BYTE: u64 = 10;

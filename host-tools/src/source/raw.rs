@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-use super::{Chunk, Source};
+use super::stream::{Chunk, Source, read_some};
 
 const CHUNK_BYTES: usize = 4096;
 
@@ -21,7 +21,7 @@ impl<R: Read> Raw<R> {
 impl<R: Read + Send> Source for Raw<R> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         let mut bytes = vec![0; CHUNK_BYTES];
-        let got = super::read_some(&mut self.input, &mut bytes)?;
+        let got = read_some(&mut self.input, &mut bytes)?;
         bytes.truncate(got);
         Ok((got > 0).then_some(Chunk { at_us: 0, bytes }))
     }

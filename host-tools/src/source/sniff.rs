@@ -5,7 +5,7 @@
 
 use std::io::{self, Cursor, Read};
 
-use super::read_some;
+use super::stream::read_some;
 use crate::mavlink::frame::FRAME_BYTES_MAX;
 use crate::mavlink::frame::{Check, Peek, peek};
 

@@ -9,7 +9,7 @@
 
 use std::io::{self, Read};
 
-use super::{Chunk, Source, read_some};
+use super::stream::{Chunk, Source, read_some};
 use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
 
 const TIME_BYTES: usize = 8;

@@ -9,6 +9,7 @@ use hums_link::packet::Fields;
 
 use super::Client;
 use crate::cli;
+use crate::mavlink::ids::{COMMAND_ACK, STATUSTEXT};
 use crate::outcome::{Outcome, usage};
 use crate::output::Stdout;
 
@@ -29,7 +30,7 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     let packet = messages::command_long(FORMAT, &[1.0, 1.0], system, component);
     let answer = client.ask(&packet, ANSWER, TRIES, |frame| {
         let fields = Fields(frame.payload());
-        (frame.id() == 77 && fields.u16(0) == FORMAT).then(|| fields.u8(2))
+        (frame.id() == COMMAND_ACK && fields.u16(0) == FORMAT).then(|| fields.u8(2))
     })?;
     match answer.context("no answer; is its firmware as new as this program?")? {
         0 => {}
@@ -43,7 +44,7 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     eprintln!("the card is being formatted");
     let end = Instant::now() + PATIENCE;
     let told = client.until(end, |frame| {
-        let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == 253)?;
+        let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT)?;
         let state = text.strip_prefix("HUMS: card: ")?;
         (!state.starts_with("is being")).then(|| state.to_owned())
     })?;

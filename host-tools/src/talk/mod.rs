@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
-use hums_link::encode::{COMPONENT, Encoder, GS_FRAME_BYTES_MAX};
+use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal, stamp};
 use hums_link::{Check, Frame, Framer};
@@ -18,6 +18,7 @@ use hums_link::{Check, Frame, Framer};
 use crate::cli::Link;
 use crate::duplex::{self, Duplex};
 use crate::interrupt;
+use crate::mavlink::ids::HEARTBEAT;
 use crate::outcome::usage;
 
 /// A ground station's usual identity.
@@ -27,7 +28,7 @@ const OUR_COMPONENT: u8 = 190;
 /// How long the board may keep silent at first.
 const CONNECT: Duration = Duration::from_secs(15);
 /// How often we say that we are there: radios and UDP peers learn from it where to answer.
-const HEARTBEAT: Duration = Duration::from_secs(1);
+const PRESENCE: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
 /// Our link id: unlike a ground station's first, so that each counts its own time.
 const LINK: u8 = 17;
@@ -67,7 +68,7 @@ impl Client {
             heartbeat_at: None,
         };
         let end = Instant::now() + CONNECT;
-        let board = client.until(end, |frame| (frame.id() == 0).then(|| frame.system()))?;
+        let board = client.until(end, |frame| (frame.id() == HEARTBEAT).then(|| frame.system()))?;
         client.system = board.with_context(|| {
             format!(
                 "{endpoint}: no board of ours is heard (component {COMPONENT}); is GS_PATH as it should be?"
@@ -83,7 +84,7 @@ impl Client {
 
     /// Sends a message.
     pub fn send(&mut self, packet: &Packet) -> Result<()> {
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let now = hums_core::time::Instant::from_micros(self.begun.elapsed().as_micros() as u64);
         let frame = match &mut self.seal {
             Some(seal) => self.encoder.frame_signed(&mut buffer, packet, now, seal),
@@ -134,10 +135,10 @@ impl Client {
     }
 
     fn receive(&mut self) -> Result<()> {
-        if self.heartbeat_at.is_none_or(|at| at.elapsed() >= HEARTBEAT) {
+        if self.heartbeat_at.is_none_or(|at| at.elapsed() >= PRESENCE) {
             self.heartbeat_at = Some(Instant::now());
             // MAV_TYPE_GCS, MAV_AUTOPILOT_INVALID, MAV_STATE_ACTIVE.
-            self.send(&Packet::new(0).u8(4, 6).u8(5, 8).u8(7, 4).u8(8, 3))?;
+            self.send(&Packet::new(HEARTBEAT).u8(4, 6).u8(5, 8).u8(7, 4).u8(8, 3))?;
         }
         // The largest UDP datagram.
         let mut buffer = vec![0; 65_536];
@@ -162,7 +163,10 @@ pub fn key(path: &Path) -> Result<Key> {
         fs::read_to_string(path).with_context(|| format!("--key {}: cannot be read", path.display()))?;
     let text = text.trim_end_matches(['\r', '\n']);
     if text.is_empty() {
-        return Err(usage(format!("--key {}: is empty", path.display())));
+        return Err(usage(format!(
+            "--key {}: is empty; it wants 64 hexadecimal digits, or a passphrase",
+            path.display()
+        )));
     }
     let digits = text.as_bytes().as_chunks::<2>();
     let bytes: Option<Vec<u8>> = digits

@@ -11,6 +11,9 @@ use hums_link::signing::{KEY_BYTES, Key};
 
 use super::Client;
 use crate::cli::{self, Link, ParamsAction};
+use crate::mavlink::ids::{
+    PARAM_REQUEST_LIST, PARAM_REQUEST_READ, PARAM_SET, PARAM_VALUE, SETUP_SIGNING, STATUSTEXT,
+};
 use crate::outcome::{Outcome, usage};
 use crate::output::Stdout;
 use crate::talk;
@@ -60,8 +63,12 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
         ParamsAction::Set { name, value, at } => {
             let mut client = Client::connect(at)?;
             let (system, component) = client.target();
-            let packet =
-                Packet::new(23).f32(0, *value).u8(4, system).u8(5, component).text(6, 16, name).u8(22, 9);
+            let packet = Packet::new(PARAM_SET)
+                .f32(0, *value)
+                .u8(4, system)
+                .u8(5, component)
+                .text(6, 16, name)
+                .u8(22, 9);
             let kept = client
                 .ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == *name))?
                 .with_context(|| format!("{name}: no answer; is there such a parameter?"))?;
@@ -87,18 +94,19 @@ fn sign(at: &Link, remove: bool) -> Result<()> {
     let mut client = Client::connect(&Link { key: None, ..at.clone() })?;
     let key = if remove { Key([0; KEY_BYTES]) } else { key };
     let (system, component) = client.target();
-    let packet = Packet::new(256).u64(0, talk::stamp_now()).u8(8, system).u8(9, component).bytes(10, &key.0);
+    let packet =
+        Packet::new(SETUP_SIGNING).u64(0, talk::stamp_now()).u8(8, system).u8(9, component).bytes(10, &key.0);
     let text = if remove { "HUMS: signing key removed" } else { "HUMS: signing key set" };
     let said = client.ask(&packet, ANSWER, TRIES, |frame| {
         let fields = Fields(frame.payload());
-        (frame.id() == 253 && fields.text(1, 50) == Some(text)).then_some(())
+        (frame.id() == STATUSTEXT && fields.text(1, 50) == Some(text)).then_some(())
     })?;
     said.context("the board does not take the key: does its SIGN_PORT trust this port? See docs/companion.md")
 }
 
 fn value_of(frame: &Frame<'_>) -> Option<Param> {
     let fields = Fields(frame.payload());
-    (frame.id() == 22).then(|| Param {
+    (frame.id() == PARAM_VALUE).then(|| Param {
         name: fields.text(8, 16).unwrap_or_default().to_owned(),
         value: fields.f32(0),
         index: fields.u16(6),
@@ -108,7 +116,8 @@ fn value_of(frame: &Frame<'_>) -> Option<Param> {
 
 fn read(client: &mut Client, name: &str) -> Result<Param> {
     let (system, component) = client.target();
-    let packet = Packet::new(20).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name);
+    let packet =
+        Packet::new(PARAM_REQUEST_READ).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name);
     let answer =
         client.ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == name))?;
     answer.with_context(|| format!("{name}: no answer; is there such a parameter?"))
@@ -117,7 +126,7 @@ fn read(client: &mut Client, name: &str) -> Result<Param> {
 /// The whole list; what was lost on the way is asked for one by one.
 fn list(client: &mut Client) -> Result<Vec<Param>> {
     let (system, component) = client.target();
-    let request = Packet::new(21).u8(0, system).u8(1, component);
+    let request = Packet::new(PARAM_REQUEST_LIST).u8(0, system).u8(1, component);
     let mut values: BTreeMap<u16, Param> = BTreeMap::new();
     let first = client.ask(&request, GAP, TRIES, value_of)?.context("no list of parameters comes")?;
     let count = first.count.min(COUNT_MAX);
@@ -134,7 +143,7 @@ fn list(client: &mut Client) -> Result<Vec<Param>> {
         if values.contains_key(&index) {
             continue;
         }
-        let packet = Packet::new(20).u16(0, index).u8(2, system).u8(3, component);
+        let packet = Packet::new(PARAM_REQUEST_READ).u16(0, index).u8(2, system).u8(3, component);
         let wanted = |frame: &Frame<'_>| value_of(frame).filter(|value| value.index == index);
         let value = client.ask(&packet, ANSWER, TRIES, wanted)?;
         values.insert(index, value.with_context(|| format!("parameter {index} of {count}: no answer"))?);

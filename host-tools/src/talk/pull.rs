@@ -13,6 +13,8 @@ use hums_link::packet::Fields;
 
 use super::Client;
 use crate::cli;
+use crate::files::{appended, cannot_write, make_directory};
+use crate::mavlink::ids::FILE_TRANSFER_PROTOCOL;
 use crate::outcome::Outcome;
 use crate::output::Stdout;
 
@@ -48,7 +50,7 @@ impl Answer {
     fn read(frame: &Frame<'_>) -> Option<Self> {
         let fields = Fields(frame.payload().get(3..)?);
         let size = usize::from(fields.u8(4).min(DATA_MAX));
-        (frame.id() == 110).then(|| Self {
+        (frame.id() == FILE_TRANSFER_PROTOCOL).then(|| Self {
             sequence: fields.u16(0),
             opcode: fields.u8(3),
             of: fields.u8(5),
@@ -71,13 +73,14 @@ struct Ftp {
 
 /// Runs `hums pull`.
 pub fn run(args: &cli::Pull) -> Result<Outcome> {
-    fs::create_dir_all(&args.output).with_context(|| format!("{}: cannot be made", args.output.display()))?;
+    make_directory(&args.output)?;
     let mut ftp = Ftp { client: Client::connect(&args.at)?, sequence: 0 };
     ftp.ask(RESET, 0, 0, b"")?;
     let mut logs = ftp.list()?;
     logs.sort();
     if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
-        bail!("{missing}: the board has no such log");
+        let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
+        bail!("{missing}: the board has no such log; it has {}", names.join(", "));
     }
     logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
     let newest = args.last.unwrap_or(logs.len()).min(logs.len());
@@ -147,8 +150,8 @@ impl Ftp {
     }
 
     fn pull(&mut self, name: &str, path: &Path) -> Result<()> {
-        let part = path.with_extension("part");
-        let context = || format!("{}: cannot be written", part.display());
+        let part = appended(path, "part");
+        let context = || cannot_write(&part);
         let mut file = OpenOptions::new().create(true).append(true).open(&part).with_context(context)?;
         let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes())?;
         if opened.opcode != ACK {

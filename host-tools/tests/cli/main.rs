@@ -1,6 +1,7 @@
 //! The program as a user runs it.
-#![allow(clippy::panic, reason = "a test that cannot go on says why")]
+#![expect(clippy::panic, reason = "a test that cannot go on says why")]
 
+mod help;
 mod read;
 mod record;
 mod support;

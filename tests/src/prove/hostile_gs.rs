@@ -10,7 +10,7 @@ use hums::run::sim::both_ports::{Board, Outcome, Side, run as power_on};
 use hums::source::Chunk;
 use hums_core::params::{Params, TABLE};
 use hums_core::time::Instant;
-use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal};
 
@@ -298,7 +298,7 @@ impl Hostile {
             _ => (255, 190),
         };
         let mut encoder = if who == (255, 190) { self.encoder } else { Encoder::of(who.0, who.1) };
-        let mut buffer = [0; GS_FRAME_BYTES_MAX];
+        let mut buffer = [0; FRAME_BYTES_MAX];
         let now = Instant::from_millis(self.frames);
         let mut frame = if self.rng.chance(0.2) {
             let mut key = [0; 32];

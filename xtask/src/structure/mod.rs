@@ -54,5 +54,5 @@ fn no_circle(crates: &[source::Crate], imports: &[resolve::Import]) -> Result<()
     if circles.is_empty() {
         return Ok(());
     }
-    bail!("imports go in a circle:\n  {}", circles.join("\n  "));
+    bail!("imports go in a circle:\n  {}", circles.join("\n\n  "));
 }

@@ -11,7 +11,7 @@ use petgraph::algo::tred::{dag_to_toposorted_adjacency_list, dag_transitive_redu
 use petgraph::graph::DiGraph;
 use petgraph::visit::IntoNeighbors as _;
 
-use super::resolve::{Import, Place};
+use super::resolve::{Import, room};
 use super::source::Crate;
 
 /// Arrows between things with names.
@@ -104,15 +104,6 @@ impl Floor {
         let Some(left) = limit.checked_sub(1) else { return 0 };
         let above = self.arrows.iter().filter(|(_, to)| to == room);
         above.map(|(from, _)| 1 + self.depth(from, left)).max().unwrap_or(0)
-    }
-}
-
-/// What is drawn as one box: the crate's root, or a module of it with all below.
-fn room(crates: &[Crate], place: Place) -> String {
-    let krate = &crates[place.0];
-    match krate.modules[place.1].path.first() {
-        Some(module) => format!("{}::{module}", krate.name),
-        None => krate.name.clone(),
     }
 }
 

@@ -59,31 +59,48 @@ fn is_below(crates: &[Crate], place: Place, above: Place) -> bool {
     place.0 == above.0 && path(place).starts_with(path(above))
 }
 
-/// Files that need each other, and folders that do, a line each.
+/// Files that need each other, and a crate's folders that do, a paragraph each.
 pub(super) fn circles(crates: &[Crate], imports: &[Import]) -> Vec<String> {
-    let mut graph = DiGraphMap::<Place, ()>::new();
-    for import in imports {
-        graph.add_edge(import.from, import.to, ());
+    let file = |place: Place| crates[place.0].modules[place.1].file.clone();
+    let mut circles = circles_of(imports, file);
+    if circles.is_empty() {
+        let within = imports.iter().filter(|import| import.from.0 == import.to.0).copied();
+        circles = circles_of(&within.collect::<Vec<_>>(), |place| room(crates, place));
     }
-    let name = |place: &Place| {
-        let module = &crates[place.0].modules[place.1];
-        module.file.clone()
+    let lines = |circle: &BTreeSet<Import>| {
+        let arrows: Vec<String> =
+            circle.iter().map(|import| format!("{} -> {}", file(import.from), file(import.to))).collect();
+        arrows.join("\n  ")
     };
-    let mut lines: Vec<String> = tarjan_scc(&graph)
-        .into_iter()
-        .filter(|circle| circle.len() > 1)
-        .map(|mut circle| {
-            circle.sort_unstable();
-            let within: Vec<String> = imports
-                .iter()
-                .filter(|import| circle.contains(&import.from) && circle.contains(&import.to))
-                .map(|import| format!("{} -> {}", name(&import.from), name(&import.to)))
-                .collect();
-            format!("{}:\n    {}", crates[circle[0].0].name, within.join("\n    "))
-        })
-        .collect();
-    lines.sort();
-    lines
+    circles.iter().map(lines).collect()
+}
+
+/// The imports that go in a circle, once places with the same key are one.
+fn circles_of(imports: &[Import], key: impl Fn(Place) -> String) -> Vec<BTreeSet<Import>> {
+    let keys: Vec<(String, String)> = imports.iter().map(|i| (key(i.from), key(i.to))).collect();
+    let mut graph = DiGraphMap::<&str, ()>::new();
+    for (from, to) in keys.iter().filter(|(from, to)| from != to) {
+        graph.add_edge(from, to, ());
+    }
+    let inside = |circle: &[&str]| {
+        let is_in = |(from, to): &(String, String)| {
+            from != to && circle.contains(&from.as_str()) && circle.contains(&to.as_str())
+        };
+        imports.iter().zip(&keys).filter(|(_, key)| is_in(key)).map(|(import, _)| *import).collect()
+    };
+    let mut circles: Vec<BTreeSet<Import>> =
+        tarjan_scc(&graph).iter().filter(|circle| circle.len() > 1).map(|circle| inside(circle)).collect();
+    circles.sort();
+    circles
+}
+
+/// What the picture draws as one box: the crate's root, or a module of it with all below.
+pub(super) fn room(crates: &[Crate], place: Place) -> String {
+    let krate = &crates[place.0];
+    match krate.modules[place.1].path.first() {
+        Some(module) => format!("{}::{module}", krate.name),
+        None => krate.name.clone(),
+    }
 }
 
 struct Resolver<'a> {
@@ -214,7 +231,7 @@ mod tests {
     fn two_files_that_need_each_other_are_a_circle() {
         let crates = [krate("super::b::Bee", "crate::a::Aye")];
         let found = circles(&crates, &imports(&crates));
-        assert_eq!(found, ["x:\n    a.rs -> b.rs\n    b.rs -> a.rs"]);
+        assert_eq!(found, ["a.rs -> b.rs\n  b.rs -> a.rs"]);
     }
 
     #[test]

@@ -45,12 +45,10 @@ use feed::Feed;
 pub(crate) use store::StoreFlash;
 pub(crate) use uart::{AutopilotRx, AutopilotTx, GsRx, GsTx};
 
-use super::{Boot, Parts, ResetCause};
-use crate::costs::Stage;
+use super::machine::{Boot, Machine, Parts, ResetCause, SYSTICK_RELOAD};
 use crate::fault;
 use crate::memory::depth;
-use crate::report::Report;
-use crate::watch::{self, SYSTICK_RELOAD};
+use crate::report::{Report, Stage};
 
 /// The board's name.
 pub(crate) const NAME: &str = "emulated";
@@ -71,10 +69,6 @@ const PATH_BYTES: usize = 512;
 
 /// There was no feed, or it cannot be opened.
 const EXIT_NO_FEED: i32 = 2;
-/// The host is to start the emulator again.
-const EXIT_AGAIN: i32 = 3;
-/// As Rust programs end that panic.
-const EXIT_FAULT: i32 = 101;
 /// All tasks wait, and nothing will ever come.
 const EXIT_STUCK: i32 = 102;
 
@@ -98,6 +92,21 @@ struct Arguments {
     provoked: Option<provoke::Plan>,
 }
 
+/// The types of its parts.
+pub(crate) struct Board;
+
+impl Machine for Board {
+    type AutopilotRx = AutopilotRx;
+    type AutopilotTx = AutopilotTx;
+    type GsRx = GsRx;
+    type GsTx = GsTx;
+    type Card = Card;
+    type StoreFlash = StoreFlash;
+    type Led = Led;
+    type Watchdog = Watchdog;
+    type Idle = Idle;
+}
+
 /// Memory that survives a reset.
 pub(crate) fn remember() {
     if Arguments::read().resets {
@@ -106,7 +115,7 @@ pub(crate) fn remember() {
 }
 
 /// Reads the arguments, opens what they name and switches the ports on.
-pub(crate) fn take() -> Parts {
+pub(crate) fn take() -> Parts<Board> {
     start_systick();
     let arguments = Arguments::read();
     TELL_COSTS.store(arguments.tell_costs, Ordering::Relaxed);
@@ -232,7 +241,6 @@ impl Idle {
                     ended = true;
                     // What is still to be done is bounded, and the monitor does not feed it any more.
                     BITES_AT_MS.store(u32::MAX, Ordering::Relaxed);
-                    watch::off();
                     ENDED.signal(());
                 }
                 None if alarm_us == u64::MAX => {
@@ -247,6 +255,11 @@ impl Idle {
             }
         }
     }
+}
+
+/// Before it is fed first, and after the end of the input, nobody is to feed it: time does not go on.
+pub(crate) fn is_watched() -> bool {
+    BITES_AT_MS.load(Ordering::Relaxed) != u32::MAX
 }
 
 /// The emulator has no watchdog: this is its bite.

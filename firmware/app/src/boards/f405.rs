@@ -20,13 +20,14 @@ use embassy_stm32::usart::{self, Uart};
 use embassy_stm32::{bind_interrupts, pac, rcc};
 use static_cell::ConstStaticCell;
 
+use super::machine::{Boot, Parts};
 use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
 pub(crate) use super::stm32f4::{
-    AutopilotRx, AutopilotTx, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, TIME_STOPS_WITH_TASKS,
-    Watchdog, bites_soon, busy_cycles, cycles, done, ended, remember, restart,
+    AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash,
+    TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, cycles, done, ended, is_watched, remember,
+    restart,
 };
 use super::stm32f4::{CardPort, PortRx, PortTx, clocks, reset_cause, start_counters, watch_supply};
-use super::{Boot, Parts};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f405";
@@ -50,7 +51,7 @@ static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_B
 static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
 
 /// Starts clocks, ports and card. The watchdog runs from its first feeding on.
-pub(crate) fn take() -> Parts {
+pub(crate) fn take() -> Parts<Board> {
     let (cause, cause_register) = reset_cause();
     let p = embassy_stm32::init(clocks(rcc::HseMode::Oscillator));
     watch_supply();

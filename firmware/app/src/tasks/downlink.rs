@@ -5,11 +5,12 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_time::{Duration, with_timeout};
 use hums_onboard::Task;
-use hums_onboard::queues::{AutopilotOut, GS_FRAME_BYTES_MAX, GsOut};
+use hums_onboard::queues::{AutopilotOut, FRAME_BYTES_MAX, GsOut};
 
-use super::SUPERVISOR;
-use crate::boards::{Transmit, board};
+use crate::boards::board;
+use crate::boards::machine::Transmit;
 use crate::links::{self, now};
+use crate::status::SUPERVISOR;
 
 /// How often it reports in while there is nothing to send.
 const REPORT: Duration = Duration::from_millis(500);
@@ -20,7 +21,7 @@ pub(crate) static BAUD_AUTOPILOT: AtomicU32 = AtomicU32::new(0);
 
 #[embassy_executor::task]
 pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
-    let mut frame = [0; GS_FRAME_BYTES_MAX];
+    let mut frame = [0; FRAME_BYTES_MAX];
     loop {
         SUPERVISOR.report(Task::Downlink, now());
         set_baud(&mut port, &BAUD_GS);
@@ -37,7 +38,7 @@ pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
 /// To the autopilot.
 #[embassy_executor::task]
 pub(crate) async fn requests(mut port: board::AutopilotTx, mut queue: AutopilotOut<'static>) -> ! {
-    let mut frame = [0; GS_FRAME_BYTES_MAX];
+    let mut frame = [0; FRAME_BYTES_MAX];
     loop {
         set_baud(&mut port, &BAUD_AUTOPILOT);
         if let Some(length) = queue.take(&mut frame) {

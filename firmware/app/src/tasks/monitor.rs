@@ -11,13 +11,14 @@ use hums_onboard::{Handover, Task};
 use hums_recorder::CardState;
 
 use super::downlink::{BAUD_AUTOPILOT, BAUD_GS};
-use super::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
-use crate::boards::{ResetCause, board};
-use crate::costs::{self, Stage, measure};
+use crate::boards::board;
+use crate::boards::machine::ResetCause;
+use crate::costs::{self, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};
 use crate::memory;
-use crate::report::Report;
+use crate::report::{Report, Stage};
+use crate::status::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
 use crate::watch;
 
 /// Ticks of one half of the LED's blinking while the card records: 0.5 s.

@@ -6,14 +6,12 @@ use hums_onboard::Task;
 use hums_onboard::queues::FramesIn;
 use hums_onboard::reception::{Reception, SILENCE};
 
-use super::{PORT_STATUS, SUPERVISOR};
-use crate::boards::{Receive, board};
-use crate::costs::{Stage, measure};
+use crate::boards::board;
+use crate::boards::machine::{FETCH_BYTES, Receive};
+use crate::costs::measure;
 use crate::links::{self, now};
-
-/// Bytes fetched at a time: 5 ms at 921,600 baud, five times what comes between two looks. After a delay it takes
-/// several, without a pause between them.
-pub(crate) const FETCH_BYTES: usize = 512;
+use crate::report::Stage;
+use crate::status::{PORT_STATUS, SUPERVISOR};
 
 #[embassy_executor::task]
 pub(crate) async fn run(mut port: board::AutopilotRx, mut frames: FramesIn<'static>) -> ! {

@@ -11,11 +11,12 @@ use hums_onboard::{Keeper, Service, Storage, Task};
 use hums_recorder::HeldBlocks;
 use static_cell::{ConstStaticCell, StaticCell};
 
-use super::{CARD_STATUS, SUPERVISOR};
+use crate::status::{CARD_STATUS, SUPERVISOR};
 
 use crate::boards::board;
-use crate::costs::{Stage, measure};
+use crate::costs::measure;
 use crate::links::{self, now};
+use crate::report::Stage;
 
 /// How often it reports in while there is nothing to write.
 const REPORT: Duration = Duration::from_secs(1);

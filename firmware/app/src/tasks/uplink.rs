@@ -4,7 +4,8 @@ use embassy_time::with_timeout;
 use hums_onboard::queues::UplinkIn;
 use hums_onboard::uplink::{SILENCE, Uplink};
 
-use crate::boards::{Receive, board};
+use crate::boards::board;
+use crate::boards::machine::Receive;
 use crate::links::{self, now};
 
 /// Bytes fetched at a time: 22 ms at 57,600 baud.

@@ -1,10 +1,10 @@
 //! From a message's layout to the elements of its slot.
 
+use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 use hums_dialect::{Kind, Role};
 
 use super::body::Body;
 use super::element::{Element, What};
-use super::frame::PAYLOAD_BYTES_MAX;
 use super::links::{self, LINKS};
 use super::slots::{INSTANCE_BYTES, Key, Slot};
 use crate::layouts::{FieldLayout, Layout, Place};

@@ -1,7 +1,10 @@
 //! A frame's header, length and checksum: as expected in nearly every frame. And its signature.
 
+use hums_dialect::crc;
+use hums_dialect::wire::SIGNATURE_BYTES;
+
 use super::body::Body;
-use super::frame::{self, Frame, SIGNATURE_BYTES};
+use super::frame::Frame;
 use super::slots::{Length, Sender, Slot};
 use crate::coder::Coder;
 use crate::distribution::Cdf;
@@ -188,7 +191,7 @@ fn is_usual(slot: &Slot, frame: &Frame, verified: bool) -> bool {
 
 /// Whether the checksum is that of the slot's seed.
 fn checks(slot: &Slot, frame: &Frame) -> bool {
-    frame::crc_add(frame.checksum_before_seed(), slot.seed) == frame.checksum
+    crc::step(frame.checksum_before_seed(), slot.seed) == frame.checksum
 }
 
 /// What is not as expected, in full.
@@ -205,10 +208,7 @@ fn spelled_out<C: Coder>(coder: &mut C, slot: &mut Slot, frame: &mut Frame, veri
     plan.length = Some(frame.len);
     let mut seed = None;
     if C::WRITES {
-        let before = frame.checksum_before_seed();
-        // Several seeds may make it right only in theory; the slot's own comes first.
-        let same = frame::crc_add(before, slot.seed) == frame.checksum;
-        seed = if same { Some(slot.seed) } else { frame::seed_for(before, frame.checksum) };
+        seed = crc::extra_of(frame.checksum_before_seed(), frame.checksum);
     }
     if coder.bits16(u32::from(seed.is_some()), 1) != 0 {
         let seed = coder.bits16(u32::from(seed.unwrap_or(0)), 8) as u8;

@@ -27,14 +27,7 @@ use slots::{INSTANCE_BYTES, Key, Length, Next, Slots};
 use crate::coder::{Coder, Encoder, Reading, Scratch, Writing};
 use crate::distribution::Cdf;
 use crate::layouts::Layouts;
-use crate::record::RECORD_BYTES_MAX;
-
-/// The longest frame: a MAVLink 2 header, 255 bytes of payload, checksum and signature.
-pub const FRAME_BYTES_MAX: usize = 10 + 255 + 2 + 13;
-
-/// The longest entry.
-pub(crate) const ENTRY_BYTES_MAX: usize =
-    if FRAME_BYTES_MAX > RECORD_BYTES_MAX { FRAME_BYTES_MAX } else { RECORD_BYTES_MAX };
+use crate::limits::ENTRY_BYTES_MAX;
 
 /// What the coder may make of an entry at most, bytes. An entry that would become longer starts a new group, where
 /// its bytes go out as they are: with length and time that is `ENTRY_BYTES_MAX` and 20 more.

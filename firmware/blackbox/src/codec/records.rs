@@ -1,11 +1,11 @@
 //! Records: each number against the same number of the last record of its kind, times against the entry's own time;
 //! the bytes by the text model.
 
-use super::ENTRY_BYTES_MAX;
 use super::element::{integer_class, integer_rest};
 use super::text::TextModel;
 use crate::coder::Coder;
 use crate::distribution::Cdf;
+use crate::limits::ENTRY_BYTES_MAX;
 use crate::record::Shape;
 
 /// Kinds whose last record is kept, each in the place of its number modulo this.

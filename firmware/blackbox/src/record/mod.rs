@@ -17,6 +17,7 @@ mod wear;
 
 use core::fmt;
 
+pub use crate::limits::{NAME_BYTES_MAX, RECORD_BYTES_MAX, TEXT_BYTES_MAX};
 pub use boot::{Boot, Fault};
 pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
@@ -28,15 +29,6 @@ pub use wear::{Component, Exceedance, Why};
 
 use stored::{Fields, Sink};
 pub(crate) use stored::{HEAD_BYTES, Shape};
-
-/// The longest stored record, kind and version included. A longer one is refused (`TooLong`).
-pub const RECORD_BYTES_MAX: usize = 512;
-
-/// The longest text (a message, a note) in a record; longer ones are cut at a character's border.
-pub const TEXT_BYTES_MAX: usize = 200;
-
-/// The longest name (a version, a parameter, a place in the source) in a record; longer ones are cut likewise.
-pub const NAME_BYTES_MAX: usize = 96;
 
 // The longest records: a boot and a fault.
 const _: () = assert!(HEAD_BYTES + 4 + 4 + 4 * (1 + NAME_BYTES_MAX) + 12 <= RECORD_BYTES_MAX);

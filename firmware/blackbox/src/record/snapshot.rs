@@ -6,8 +6,8 @@ use hums_core::protect::{Action, Stage};
 use hums_core::snapshot::{COLUMNS_MAX, INTERVAL, SAMPLES, columns};
 use hums_core::time::{Instant, Span};
 
-use super::RECORD_BYTES_MAX;
 use super::stored::{Fields, Sink};
+use crate::limits::RECORD_BYTES_MAX;
 
 /// Bytes of the values of a snapshot at most.
 const VALUES_MAX: usize = 2 * COLUMNS_MAX * SAMPLES;

@@ -3,8 +3,8 @@
 
 use hums_core::time::Instant;
 
-use super::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
 use crate::bytes::Fields as Bytes;
+use crate::limits::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
 
 /// Bytes of the head: kind; version, and in the upper four bits times; words; halves.
 pub(crate) const HEAD_BYTES: usize = 4;

@@ -1,7 +1,7 @@
 //! Usage counters at one moment: of the session, and of the airframe's life.
 
-use super::RECORD_BYTES_MAX;
 use super::stored::{Fields, HEAD_BYTES, Sink};
+use crate::limits::RECORD_BYTES_MAX;
 
 /// When a usage snapshot was taken. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Health: checks of everything the vehicle says, what they find, and roll-ups of that.
 //!
-//! Each subsystem's checks are a table in a file of its own; [`CHECKS`] is all of them. A roll-up is never better than
+//! Each subsystem's checks are a table in a file of its own; `tables` puts them together. A roll-up is never better than
 //! its worst part that is known, and where nothing is known it is not OK but stale.
 
 mod attitude;

@@ -34,7 +34,6 @@ const _: () = assert!(Baselines::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Exceedances::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Exposure::BYTES <= ITEM_BYTES_MAX);
 const _: () = assert!(Component::BYTES <= ITEM_BYTES_MAX);
-const _: () = assert!(Session::BYTES_MAX <= ITEM_BYTES_MAX);
 
 /// What a stored item is. The numbers are stored and never change meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -14,7 +14,7 @@
 //!
 //! Of a quad with four ESCs after half an hour that is some 155 bytes; at most [`Session::BYTES_MAX`].
 
-use super::{COUNTERS_V1, Lifetime};
+use super::{COUNTERS_V1, ITEM_BYTES_MAX, Lifetime};
 use crate::bytes::{Put, Take, Unreadable, amount, tenths};
 use crate::exposure::{BINS, Exposure, Quantity, Tenths};
 use crate::observation::MOTORS_MAX;
@@ -160,6 +160,8 @@ impl Session {
         Ok(Self { boots, heard, totals, battery_cycles, exposure })
     }
 }
+
+const _: () = assert!(Session::BYTES_MAX <= ITEM_BYTES_MAX);
 
 impl Lifetime {
     /// Adds the session that was saved last, if it is not in it already.

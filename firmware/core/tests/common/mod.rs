@@ -1,5 +1,5 @@
 //! A simulated quad, which scripts make say what they want.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(dead_code, missing_docs, unreachable_pub, reason = "each test file uses its own part of this")]
 
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss,

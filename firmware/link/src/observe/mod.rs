@@ -4,19 +4,17 @@
 //! linked. Their decoders refuse a message whole when one field has a number that their enumeration lacks; a newer
 //! sender's HEARTBEAT must not vanish for that, so such fields are set to zero and the rest is read.
 
+mod fields;
 mod motion;
 mod power;
 mod propulsion;
 mod system;
 
 use hums_core::observation::{Observation, Source};
-use mavlink::MavlinkVersion;
 use mavlink::dialects::ardupilotmega as ap;
 
 use crate::frame::{Check, Frame};
-
-/// The longest payload.
-const PAYLOAD_MAX: usize = 255;
+use fields::read;
 
 /// What a frame says, and who says it; `None` where it is none of our business: an id that we do not use, a checksum
 /// that is not verified, a HEARTBEAT of something that is no vehicle.
@@ -24,8 +22,7 @@ pub fn observe(frame: &Frame<'_>) -> Option<(Source, Observation)> {
     if frame.check() != Check::Verified {
         return None;
     }
-    let observation = by_id(frame.id(), frame.payload())?;
-    Some((Source { system: frame.system(), component: frame.component() }, observation))
+    Some((frame.source(), by_id(frame.id(), frame.payload())?))
 }
 
 fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
@@ -68,37 +65,6 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         11_039 => Observation::Processor(system::processor(payload)?),
         _ => return None,
     })
-}
-
-/// Decodes a payload. `enumerations` are the offsets of the bytes that hold enumerations: where a sender uses a number
-/// that ours lacks, they are read as zero.
-fn read<M: mavlink::MessageData>(payload: &[u8], enumerations: &[usize]) -> Option<M> {
-    if let Ok(message) = M::deser(MavlinkVersion::V2, payload) {
-        return Some(message);
-    }
-    let mut bytes = [0; PAYLOAD_MAX];
-    bytes.get_mut(..payload.len())?.copy_from_slice(payload);
-    for &at in enumerations {
-        *bytes.get_mut(at)? = 0;
-    }
-    M::deser(MavlinkVersion::V2, &bytes).ok()
-}
-
-/// A byte of a payload: those that MAVLink 2 left out are zero.
-fn byte(payload: &[u8], at: usize) -> u8 {
-    payload.get(at).copied().unwrap_or(0)
-}
-
-/// A value that is unknown where it is `unknown`.
-fn unless<T: PartialEq + Copy>(value: T, unknown: T) -> Option<T> {
-    (value != unknown).then_some(value)
-}
-
-/// UTC is told from the time since boot by its size: no vehicle has been up since before 2000.
-fn unix_time(micros: u64) -> Option<u64> {
-    const YEAR_2000_US: u64 = 946_684_800_000_000;
-    const YEAR_2200_US: u64 = 7_258_118_400_000_000;
-    (YEAR_2000_US..YEAR_2200_US).contains(&micros).then_some(micros)
 }
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use hums_core::units::{
 };
 use mavlink::dialects::ardupilotmega as ap;
 
-use super::{byte, read, unless};
+use super::fields::{read, unless};
+use crate::packet::Fields;
 
 /// Standard gravity, m/s2.
 const GRAVITY: f32 = hums_core::derived::GRAVITY;
@@ -50,7 +51,7 @@ pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
     /// Where the fix stands: the only enumeration.
     const FIX: usize = 28;
     let gps = read::<ap::GPS_RAW_INT_DATA>(payload, &[FIX])?;
-    let fix = byte(payload, FIX);
+    let fix = Fields(payload).u8(FIX);
     let has_position = fix >= FIX_2D;
     Some(Gnss {
         instance: 0,
@@ -67,7 +68,7 @@ pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
 pub(super) fn gnss2(payload: &[u8]) -> Option<Gnss> {
     const FIX: usize = 32;
     let gps = read::<ap::GPS2_RAW_DATA>(payload, &[FIX])?;
-    let fix = byte(payload, FIX);
+    let fix = Fields(payload).u8(FIX);
     let has_position = fix >= FIX_2D;
     Some(Gnss {
         instance: 1,
@@ -86,9 +87,9 @@ pub(super) fn gnss_integrity(payload: &[u8]) -> GnssIntegrity {
     // 0 is unknown; a state that is newer than our list is unknown too.
     let known = |state: u8| if state <= 3 { state } else { 0 };
     GnssIntegrity {
-        instance: byte(payload, 8),
-        jamming: known(byte(payload, 10)),
-        spoofing: known(byte(payload, 11)),
+        instance: Fields(payload).u8(8),
+        jamming: known(Fields(payload).u8(10)),
+        spoofing: known(Fields(payload).u8(11)),
     }
 }
 

@@ -4,8 +4,7 @@ use hums_core::observation::{Battery, CELLS_MAX, Rails};
 use hums_core::units::{AmpereHours, Celsius, Volts, WattHours};
 use mavlink::dialects::ardupilotmega as ap;
 
-use super::read;
-use super::system::{current, percent, voltage};
+use super::fields::{current, percent, read, voltage};
 
 /// No lithium cell is charged above this, mV: what says more is the sum of several.
 const CELL_MAX_MV: u16 = 5_000;

@@ -4,7 +4,8 @@ use hums_core::observation::{ESC_GROUP, Engine, Esc, EscGroup, SpeedSensor};
 use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Rpm, Volts};
 use mavlink::dialects::ardupilotmega as ap;
 
-use super::{byte, read, unless};
+use super::fields::{read, unless};
+use crate::packet::Fields;
 
 /// PX4: failure flags, errors, temperature. The connection type may be newer than our list.
 pub(super) fn esc_info(payload: &[u8]) -> Option<EscGroup> {
@@ -102,6 +103,6 @@ pub(super) fn rpm(payload: &[u8]) -> Option<[Option<SpeedSensor>; 2]> {
 /// PX4: one sensor a message.
 pub(super) fn raw_rpm(payload: &[u8]) -> Option<[Option<SpeedSensor>; 2]> {
     let rpm = read::<ap::RAW_RPM_DATA>(payload, &[]).map(|rpm| rpm.frequency)?;
-    let index = byte(payload, 4);
+    let index = Fields(payload).u8(4);
     Some([Rpm(rpm).finite().map(|rpm| SpeedSensor { index, rpm }), None])
 }

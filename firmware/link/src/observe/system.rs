@@ -4,10 +4,11 @@ use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, Processor, RadioControl,
     SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
 };
-use hums_core::units::{Amperes, Celsius, Fraction, Volts};
+use hums_core::units::{Celsius, Fraction};
 use mavlink::dialects::ardupilotmega as ap;
 
-use super::{byte, read, unix_time, unless};
+use super::fields::{current, percent, read, unix_time, unless, voltage};
+use crate::packet::Fields;
 
 /// A vehicle is one whose autopilot is not INVALID; some ground stations and companions claim one nevertheless, so
 /// types that cannot be vehicles are left out too. Type, autopilot and state are bytes 4, 5 and 7: read as they are,
@@ -15,9 +16,10 @@ use super::{byte, read, unix_time, unless};
 pub(super) fn heartbeat(payload: &[u8]) -> Option<Heartbeat> {
     const AUTOPILOT_INVALID: u8 = 8;
     const ARMED: u8 = 1 << 7;
-    let mode = u32::from_le_bytes([byte(payload, 0), byte(payload, 1), byte(payload, 2), byte(payload, 3)]);
+    let fields = Fields(payload);
+    let mode = fields.u32(0);
     let (type_number, autopilot_number, base_mode, state) =
-        (byte(payload, 4), byte(payload, 5), byte(payload, 6), byte(payload, 7));
+        (fields.u8(4), fields.u8(5), fields.u8(6), fields.u8(7));
     if autopilot_number == AUTOPILOT_INVALID {
         return None;
     }
@@ -51,21 +53,6 @@ pub(super) fn status(payload: &[u8]) -> Option<SystemStatus> {
         remaining: percent(status.battery_remaining),
         unhealthy,
     })
-}
-
-/// Millivolts; 65535 is unknown, and nothing runs from 0 V.
-pub(super) fn voltage(millivolts: u16) -> Option<Volts> {
-    (millivolts != 0 && millivolts != u16::MAX).then(|| Volts(f32::from(millivolts) / 1e3))
-}
-
-/// Centiamperes; -1 is unknown, and PX4 scales its own -1 A for unknown to -100.
-pub(super) fn current(centiamperes: i16) -> Option<Amperes> {
-    (centiamperes != -1 && centiamperes != -100).then(|| Amperes(f32::from(centiamperes) / 100.0))
-}
-
-/// -1 is unknown.
-pub(super) fn percent(percent: i8) -> Option<Fraction> {
-    (0..=100).contains(&percent).then(|| Fraction(f32::from(percent) / 100.0))
 }
 
 pub(super) fn time(payload: &[u8]) -> Option<SystemTime> {
@@ -103,7 +90,7 @@ pub(super) fn identity(payload: &[u8]) -> Option<AutopilotIdentity> {
 
 pub(super) fn landed(payload: &[u8]) -> LandedState {
     // Two bytes, both enumerations; the vehicle's state is the second.
-    match byte(payload, 1) {
+    match Fields(payload).u8(1) {
         1 => LandedState::OnGround,
         2 => LandedState::InAir,
         3 => LandedState::TakingOff,
@@ -121,5 +108,6 @@ pub(super) fn flight_information(payload: &[u8]) -> Option<Observation> {
 
 /// Read as it is: the list of commands grows faster than any definition.
 pub(super) fn command_ack(payload: &[u8]) -> CommandAck {
-    CommandAck { command: u16::from_le_bytes([byte(payload, 0), byte(payload, 1)]), result: byte(payload, 2) }
+    let fields = Fields(payload);
+    CommandAck { command: fields.u16(0), result: fields.u8(2) }
 }

@@ -5,6 +5,7 @@ use mavlink::dialects::ardupilotmega as ap;
 use mavlink::{MavlinkVersion, MessageData};
 use proptest::prelude::*;
 
+use super::fields::unix_time;
 use super::*;
 
 /// What the message says, as sent: MAVLink 2, zeros at the end left out.

@@ -1,5 +1,5 @@
 //! Recordings, read without the code under test.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(dead_code, missing_docs, unreachable_pub, reason = "each test file uses its own part of this")]
 
 use std::path::{Path, PathBuf};
 

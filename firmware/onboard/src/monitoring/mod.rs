@@ -6,35 +6,32 @@
 
 mod figures;
 mod happenings;
-mod notices;
-mod records;
 mod slot;
 
-use hums_blackbox::record::{
-    Boot, Event, Fault, FindingRecord, Lost, Moment, Note, Parameter, Record, Vehicle as VehicleRecord,
-};
-use hums_blackbox::{Sector, SectorSink, Writer};
+use embedded_storage::nor_flash::NorFlash;
+use hums_blackbox::Writer;
+use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Moment, Note, Record, Stats};
 use hums_core::health::{Finding, Level};
 use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, monitor};
 use hums_link::frame::{Check, Frame};
 use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
-use hums_recorder::status::{CardReading, CardStatus};
+use hums_recorder::status::CardStatus;
 
-use crate::companion::Companion;
+use crate::companion::{self, Companion};
+use crate::journal::{Journal, Logbook};
 use crate::keeping::Keeping;
-use crate::loss::Losses;
-use crate::port::{PortReading, PortStatus};
-use crate::queues::{FramesOut, GsIn, SectorsIn};
+use crate::notices::{Notice, Notices};
+use crate::persist::{Handover, Keeper};
+use crate::port::PortStatus;
+use crate::queues::{FramesOut, GsIn, Path, SectorsIn, UplinkOut};
+use crate::records::Recorded;
 use crate::supervisor::Task;
-pub use happenings::By;
-
+use figures::Figures;
 pub use figures::Machine;
-use figures::Sums;
 use happenings::CRITICAL;
-use notices::{Notice, Notices};
-use slot::Told;
+use slot::Slot;
 
 /// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = monitor::TICK;
@@ -47,9 +44,6 @@ const USAGE: Span = Span::from_secs(60);
 
 /// The `MAV_SEVERITY` of a restart after a fault.
 const FAULT_SEVERITY: u8 = 4;
-
-/// What the board knows of itself: what the first record of a log says.
-pub type Identity<'a> = Boot<'a>;
 
 /// What happens to a frame, one after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,116 +63,76 @@ pub enum Step {
 
 /// The pipeline between the frame queue and the queues of sectors and of GS frames.
 pub struct Monitoring<'a> {
-    /// Lent, as the writer is: either is too large to be moved over the firmware's stack.
-    pub(crate) monitor: &'a mut Monitor,
-    writer: &'a mut Writer,
-    pub(crate) summary: Summary,
-    pub(crate) companion: Companion,
+    book: Logbook<'a>,
+    summary: Summary,
+    companion: Companion,
     sequences: Sequences,
-    pub(crate) card: &'a CardStatus,
-    port: &'a PortStatus,
-    pub(crate) identity: Identity<'a>,
-    /// The vehicle as it was recorded last.
-    vehicle: VehicleRecord,
-    /// UTC of power-on as it was recorded last, microseconds since 1970.
-    epoch_micros: Option<u64>,
-    losses: Losses,
+    identity: Boot<'a>,
+    recorded: Recorded,
     notices: Notices,
-    slot: Told,
+    slot: Slot,
     keeping: Keeping,
-    port_before: PortReading,
-    card_before: CardReading,
-    sums: Sums,
-    machine: Machine,
-    /// Frames that found no room in the sector queue.
-    refused: u64,
-    queue_sectors_max: usize,
+    figures: Figures<'a>,
     partial_at: Instant,
     stats_at: Instant,
-    usage_at: Instant,
 }
 
 impl<'a> Monitoring<'a> {
-    /// Before the first frame.
+    /// Before the first frame. `identity` is what the board knows of itself: the first record of each file.
     pub fn new(
         monitor: &'a mut Monitor,
         writer: &'a mut Writer,
-        identity: Identity<'a>,
+        identity: Boot<'a>,
         card: &'a CardStatus,
         port: &'a PortStatus,
     ) -> Self {
         Self {
             summary: Summary::new(monitor.params()),
             companion: Companion::new(monitor.params()),
-            monitor,
-            writer,
+            book: Logbook { monitor, journal: Journal::new(writer), card },
             sequences: Sequences::new(),
-            card,
-            port,
             identity,
-            vehicle: VehicleRecord::default(),
-            epoch_micros: None,
-            losses: Losses::new(),
+            recorded: Recorded::new(),
             notices: Notices::new(),
-            slot: Told::new(),
+            slot: Slot::new(),
             keeping: Keeping::new(),
-            port_before: PortReading::default(),
-            card_before: card.read(),
-            sums: Sums::default(),
-            machine: Machine::default(),
-            refused: 0,
-            queue_sectors_max: 0,
+            figures: Figures::new(port, card),
             partial_at: Instant::ZERO,
             stats_at: Instant::ZERO,
-            usage_at: Instant::ZERO,
         }
     }
 
     /// Writes what a log begins with: who records, and every parameter that is not at its default.
     pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
         self.keep(now, sectors);
-        self.heading(now, sectors);
-        self.record_usage(now, Moment::Start, sectors);
-    }
-
-    /// What each file of a log says of itself: one that is read alone, because those before it made room, misses
-    /// nothing but their time.
-    fn heading(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        let boot = Record::Boot(self.identity);
-        self.record(now, &boot, sectors);
-        let params = *self.monitor.params();
-        for (spec, value) in params.iter() {
-            // Bit for bit: only a value that was set differs from its default.
-            if value.to_bits() != spec.default.to_bits() {
-                let parameter =
-                    Parameter { name: spec.name, value: f64::from(value), changed: false, by: (0, 0) };
-                self.record(now, &Record::Parameter(parameter), sectors);
-            }
-        }
-        self.vehicle = VehicleRecord::default();
+        self.recorded.heading(now, &self.identity, &mut self.book, sectors);
+        self.recorded.usage(now, Moment::Start, &mut self.book, sectors);
     }
 
     /// What of the record is to be kept, by whether the vehicle is armed.
     fn keep(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        let Self { keeping, monitor, card, writer, .. } = self;
-        let armed = monitor.vehicle().armed();
-        keeping.tick(now, monitor.params(), armed, card, writer, sectors);
-        if self.keeping.takes_new_file(self.card) {
-            self.heading(now, sectors);
-            // All of it, also what was recorded before.
-            self.usage_at = Instant::ZERO;
-            self.record_usage(now, Moment::Periodic, sectors);
+        let Self { book, keeping, recorded, identity, .. } = self;
+        let armed = book.monitor.vehicle().armed();
+        keeping.tick(now, book.monitor.params(), armed, book.card, book.journal.writer(), sectors);
+        if keeping.takes_new_file(book.card) {
+            recorded.heading(now, identity, book, sectors);
+            recorded.usage_anew(now, book, sectors);
         }
     }
 
     /// Records how the boot before this one ended, with a word on what came before, and tells the ground station as soon
     /// as the vehicle is known. To be called after [`Self::start`].
     pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, before: &str, sectors: &mut SectorsIn) {
-        self.record(now, &Record::Fault(*fault), sectors);
-        self.record(now, &Record::Note(Note { severity: FAULT_SEVERITY, text: before }), sectors);
+        let journal = &mut self.book.journal;
+        journal.record(now, &Record::Fault(*fault), sectors);
+        journal.record(now, &Record::Note(Note { severity: FAULT_SEVERITY, text: before }), sectors);
         let task = Task::ALL.into_iter().map(Task::name).find(|name| *name == fault.task);
-        // There is room: nothing was told yet.
-        let _ = self.notices.push(Notice::Restarted(restart_words(fault), task));
+        self.notices.push(Notice::Restarted(restart_words(fault), task));
+    }
+
+    /// Records a text of our own, and tells the ground station; `severity` is a `MAV_SEVERITY`.
+    pub fn note(&mut self, now: Instant, severity: u8, text: &'static str, sectors: &mut SectorsIn) {
+        self.notices.note(now, severity, text, &mut self.book.journal, sectors);
     }
 
     /// Takes one frame from the queue through the pipeline; `false` when there is none.
@@ -208,27 +162,28 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
         begin: &mut impl FnMut(Step),
     ) {
+        let Self { book, summary, companion, .. } = self;
         let whole = Frame::again(bytes, Check::Unverified);
         begin(Step::Encode { at, id: whole.as_ref().map_or(0, Frame::id) });
-        let key = whole.filter(|frame| frame.id() == crate::secure::SETUP);
+        let key = whole.filter(|frame| frame.id() == companion::SETUP);
         if let Some(frame) = key {
-            self.withhold(at, &frame, sectors);
-        } else if !self.companion.stopped && self.writer.frame(at, bytes, verified, sectors).is_err() {
-            self.refused += 1;
-            self.losses.count(at, Lost::QueueFull, 1);
+            companion.withhold(at, &frame, &mut book.journal, sectors);
+        } else if !companion.stopped() {
+            book.journal.frame(at, bytes, verified, sectors);
         }
         begin(Step::Observe);
         // What is not ours by its checksum is recorded but not believed.
         let check = if verified { Check::Verified } else { Check::Unverified };
         let Some(frame) = Frame::again(bytes, check) else { return };
         if !verified {
-            self.pass_down(at, &frame, gs);
+            companion.pass_down(at, &frame, book, summary, gs);
             return;
         }
         self.observe(at, &frame);
-        self.heard(at, &frame, sectors, gs);
+        let Self { book, summary, companion, .. } = self;
+        companion.heard(at, &frame, book, summary, sectors, gs);
         begin(Step::Summary);
-        self.summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
+        summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
     }
 
     /// Not within its caller: an observation is not to lie on the stack below a conversation.
@@ -236,8 +191,30 @@ impl<'a> Monitoring<'a> {
     fn observe(&mut self, at: Instant, frame: &Frame<'_>) {
         self.sequences.frame(at, frame);
         if let Some((source, observation)) = hums_link::observe(frame) {
-            self.monitor.observe(at, source, &observation);
+            self.book.monitor.observe(at, source, &observation);
         }
+    }
+
+    /// Takes one frame of the ground station from its queue; `false` when there is none.
+    pub fn uplink(
+        &mut self,
+        now: Instant,
+        uplink: &mut UplinkOut,
+        sectors: &mut SectorsIn,
+        gs: &mut GsIn,
+    ) -> bool {
+        uplink.take(|_, verified, bytes| {
+            // Where the autopilot carries our stream, the port is nobody's.
+            if gs.path() == Path::Autopilot {
+                return;
+            }
+            let check = if verified { Check::Verified } else { Check::Unverified };
+            let Self { book, summary, companion, identity, .. } = self;
+            if let Some(frame) = Frame::again(bytes, check) {
+                companion.uplink(now, &frame, book, summary, sectors, gs);
+            }
+            companion.answer(now, book.monitor, identity, summary, gs);
+        })
     }
 
     /// What time alone asks for, every [`TICK`]. Each finding is recorded, told to the GS, and given to `findings`.
@@ -248,49 +225,90 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
         findings: &mut impl FnMut(&Finding),
     ) {
-        if self.card.take_group_wanted() && !self.writer.restart(sectors) {
-            self.card.want_group();
+        let Logbook { journal, card, .. } = &mut self.book;
+        if card.take_group_wanted() && !journal.writer().restart(sectors) {
+            card.want_group();
         }
         self.keep(now, sectors);
-        self.count_losses(now, sectors);
-        self.tell_slot(now, sectors);
+        let Self { book, figures, slot, notices, .. } = self;
+        figures.count(now, book.card, &mut book.journal, sectors);
+        slot.tick(now, book.card.read().state, &mut book.journal, notices, sectors);
         self.check(now, sectors, gs, findings);
-        self.record_happenings(now, sectors);
-        self.record_vehicle(now, sectors);
-        self.record_clock(now, sectors);
-        self.losses_to_record(now, false, sectors);
+        let Self { book, recorded, notices, .. } = self;
+        happenings::record(now, book, recorded, notices, sectors);
+        recorded.vehicle(now, book, sectors);
+        recorded.clock(now, book, sectors);
+        book.journal.record_losses(now, false, sectors);
         if now.since(self.stats_at) >= STATS {
             self.stats_at = now;
             self.record_stats(now, sectors, gs);
         }
-        if now.since(self.usage_at) >= USAGE {
-            self.record_usage(now, Moment::Periodic, sectors);
+        if now.since(self.recorded.usage_at()) >= USAGE {
+            self.recorded.usage(now, Moment::Periodic, &mut self.book, sectors);
         }
-        self.partial(now, sectors);
-        self.tell_notices(now, gs);
-        self.summary.own = self.own_figures();
-        self.summary.tick(now, self.monitor, &mut |bytes| gs.tell(bytes));
-        self.converse(now, sectors, gs);
+        // Unless full sectors keep storage busy anyway.
+        if now.since(self.partial_at) >= PARTIAL && sectors.is_empty() {
+            self.partial_at = now;
+            self.book.journal.partial(sectors);
+        }
+        self.talk(now, sectors, gs);
+    }
+
+    /// What time alone asks for at the ports.
+    fn talk(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
+        let Self { book, summary, companion, notices, figures, identity, .. } = self;
+        let is_known = book.monitor.vehicle().source.is_some();
+        notices.tell(now, is_known, &mut summary.outlet, gs);
+        summary.own = figures.own(book.card);
+        summary.tick(now, book.monitor, &mut |bytes| gs.tell(bytes));
+        companion.converse(now, book, summary, notices, sectors, gs);
+        companion.answer(now, book.monitor, identity, summary, gs);
     }
 
     /// Ends the record in order: everything that is still open is written. The queues then hold what storage has to
     /// write before the power may go.
     pub fn finish(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &GsIn) {
-        self.count_losses(now, sectors);
-        self.losses_to_record(now, true, sectors);
-        self.record_usage(now, Moment::End, sectors);
+        let Self { book, figures, recorded, .. } = self;
+        figures.count(now, book.card, &mut book.journal, sectors);
+        book.journal.record_losses(now, true, sectors);
+        recorded.usage(now, Moment::End, book, sectors);
         self.record_stats(now, sectors, gs);
-        sectors.with_reserve(|sink| self.writer.finish(sink));
+        sectors.with_reserve(|sink| self.book.journal.writer().finish(sink));
     }
 
     /// What the monitor knows.
     pub const fn monitor(&self) -> &Monitor {
-        self.monitor
+        self.book.monitor
     }
 
     /// What the monitor knows, to be changed: what is restored, saved, set.
     pub const fn monitor_mut(&mut self) -> &mut Monitor {
-        self.monitor
+        self.book.monitor
+    }
+
+    /// The line rates that count now, in baud: of the ground station's port and of the autopilot's.
+    pub const fn bauds(&self) -> (u32, u32) {
+        (self.summary.outlet.baud(), self.companion.baud())
+    }
+
+    /// The machine's figures, as they are now: recorded with the others, and told to the ground station.
+    pub const fn set_machine(&mut self, machine: Machine) {
+        self.figures.machine = machine;
+    }
+
+    /// The pipeline's figures since power-on.
+    pub fn stats(&self, gs: &GsIn) -> Stats {
+        self.figures.stats(self.book.card, &self.book.journal, gs)
+    }
+
+    /// Takes the signing key and its times out of the store. At power-on, before anything is sent.
+    pub fn restore_signing<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
+        self.companion.restore(keeper);
+    }
+
+    /// Hands over what of the signing key and its times is due, at every tick and at the end.
+    pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) {
+        self.companion.save(now, &self.summary, handover);
     }
 
     // Not within the tick: what one of these takes of the stack is not to lie below what another takes.
@@ -303,15 +321,16 @@ impl<'a> Monitoring<'a> {
         gs: &mut GsIn,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let link = self.sequences.reading(now, self.monitor.vehicle().source);
-        let recorder = self.recorder_status(now, sectors);
-        let Self { monitor, writer, summary, losses, .. } = self;
+        let Self { book, summary, companion, sequences, figures, .. } = self;
+        let link = sequences.reading(now, book.monitor.vehicle().source);
+        let recorder = figures.recorder(now, companion.stopped(), book.card, &book.journal, sectors);
+        let Logbook { monitor, journal, .. } = book;
         monitor.tick(now, &link, &recorder, &mut |finding| {
-            write(now, &Record::Finding(FindingRecord::from(finding)), writer, losses, sectors);
+            journal.record(now, &Record::Finding(FindingRecord::from(finding)), sectors);
             if finding.level == Level::Critical {
                 // Marks the place for whoever looks through the record.
-                let event = Record::Event(Event { number: CRITICAL, text: finding.check });
-                write(now, &event, writer, losses, sectors);
+                let event = Event { number: CRITICAL, text: finding.check };
+                journal.record(now, &Record::Event(event), sectors);
             }
             summary.finding(now, finding, &mut |bytes| gs.tell(bytes));
             findings(finding);
@@ -319,51 +338,10 @@ impl<'a> Monitoring<'a> {
     }
 
     #[inline(never)]
-    fn losses_to_record(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
-        let Self { losses, writer, .. } = self;
-        losses.flush(now, all, |loss| {
-            sectors.with_reserve(|sink| writer.record(now, &Record::Loss(*loss), sink)).is_ok()
-        });
-    }
-
-    /// Writes a record, from the reserve if need be; a record that still finds no room is a counted loss.
-    pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
-        write(now, record, self.writer, &mut self.losses, sectors)
-    }
-
-    #[inline(never)]
     fn record_stats(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &GsIn) {
         let stats = Record::Stats(self.stats(gs));
-        self.record(now, &stats, sectors);
+        self.book.journal.record(now, &stats, sectors);
     }
-
-    /// Gives storage a copy of the sector in progress, unless full sectors keep it busy anyway.
-    #[inline(never)]
-    fn partial(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        if now.since(self.partial_at) < PARTIAL || !sectors.is_empty() {
-            return;
-        }
-        self.partial_at = now;
-        let mut copy = Sector::zeroed();
-        if self.writer.partial(&mut copy) {
-            sectors.put(&copy);
-        }
-    }
-}
-
-/// As [`Monitoring::record`], where the monitor is in use.
-fn write(
-    now: Instant,
-    record: &Record<'_>,
-    writer: &mut Writer,
-    losses: &mut Losses,
-    sectors: &mut SectorsIn,
-) -> bool {
-    let written = sectors.with_reserve(|sink| writer.record(now, record, sink)).is_ok();
-    if !written {
-        losses.count(now, Lost::Records, 1);
-    }
-    written
 }
 
 /// How a start ended, in words for a pilot.

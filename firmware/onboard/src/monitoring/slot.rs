@@ -4,8 +4,8 @@ use hums_blackbox::record::{Event, Record};
 use hums_core::time::{Instant, Span};
 use hums_recorder::CardState;
 
-use super::Monitoring;
-use super::notices::Notice;
+use crate::journal::Journal;
+use crate::notices::{Notice, Notices};
 use crate::queues::SectorsIn;
 
 /// The next change is told no sooner, so that a card that comes and goes does not fill the line.
@@ -19,63 +19,68 @@ const CARD_OUT: u8 = 7;
 
 /// What was told of the slot.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Told {
-    state: CardState,
-    at: Option<Instant>,
+pub(super) struct Slot {
+    told: CardState,
+    told_at: Option<Instant>,
 }
 
-impl Told {
+impl Slot {
     pub(super) const fn new() -> Self {
-        Self { state: CardState::Unknown, at: None }
+        Self { told: CardState::Unknown, told_at: None }
     }
-}
 
-impl Monitoring<'_> {
     /// Records and tells a new state of the card. That all is well at the beginning is not told: the heartbeat says it.
-    pub(super) fn tell_slot(&mut self, now: Instant, sectors: &mut SectorsIn) {
-        let state = self.card.read().state;
-        let Told { state: before, at } = self.slot;
-        if state == before || at.is_some_and(|at| now.since(at) < QUIET) {
+    pub(super) fn tick(
+        &mut self,
+        now: Instant,
+        state: CardState,
+        journal: &mut Journal<'_>,
+        notices: &mut Notices,
+        sectors: &mut SectorsIn,
+    ) {
+        if state == self.told || self.told_at.is_some_and(|at| now.since(at) < QUIET) {
             return;
         }
         let Some(text) = words(state) else { return };
-        let is_first = before == CardState::Unknown && state == CardState::Recording;
-        self.slot = Told { state, at: Some(now).filter(|_| !is_first) };
+        let is_first = self.told == CardState::Unknown && state == CardState::Recording;
+        *self = Self { told: state, told_at: Some(now).filter(|_| !is_first) };
         let number = if state == CardState::Recording { CARD_IN } else { CARD_OUT };
-        self.record(now, &Record::Event(Event { number, text }), sectors);
+        journal.record(now, &Record::Event(Event { number, text }), sectors);
         if !is_first {
             let severity = if state == CardState::Recording { NOTICE } else { WARNING };
-            // Full: the record has it, and the finding tells that nothing is recorded.
-            let _ = self.notices.push(Notice::Text(severity, text));
+            // Where no more can wait, the finding tells that nothing is recorded.
+            notices.push(Notice::Text(severity, text));
         }
     }
 }
 
-/// At most 50 characters: one STATUSTEXT. `docs/cards.md` says what to do.
+/// One STATUSTEXT each. `docs/cards.md` says what to do.
 const fn words(state: CardState) -> Option<&'static str> {
     Some(match state {
         CardState::Unknown | CardState::Finished => return None,
         CardState::Recording => "HUMS: card: recording",
-        CardState::Absent => "HUMS: card: none found",
+        CardState::Absent => "HUMS: card: none found, push one in",
         CardState::Foreign => "HUMS: card: not FAT32, format it",
         CardState::ExFat => "HUMS: card: exFAT, format it as FAT32",
         CardState::Unpartitioned => "HUMS: card: no partition table, format it",
         CardState::Damaged => "HUMS: card: FAT32 is damaged, copy and format it",
         CardState::Full => "HUMS: card: full of other files, delete some",
         CardState::Failing => "HUMS: card: fails, use another one",
-        CardState::Locked => "HUMS: card: write protected",
+        CardState::Locked => "HUMS: card: write protected, use another one",
         CardState::Formatting => "HUMS: card: is being formatted",
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use hums_link::text::TEXT_BYTES_MAX;
+
     use super::*;
 
     #[test]
     fn every_text_is_one_message() {
         for text in (0..=u8::MAX).filter_map(|number| words(CardState::from_number(number))) {
-            assert!(text.len() <= 50 && text.starts_with("HUMS: card: "), "{text}");
+            assert!(text.len() <= TEXT_BYTES_MAX && text.starts_with("HUMS: card: "), "{text}");
         }
     }
 }

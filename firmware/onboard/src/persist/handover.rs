@@ -77,11 +77,11 @@ impl<'a> Handover<'a> {
                 StoreState::Absent => news(5, "HUMS: no store, counters end with the power"),
                 StoreState::New => news(6, "HUMS: the store is new, all counters begin"),
                 StoreState::Remade => news(3, "HUMS: store unreadable, counters begin anew"),
-                StoreState::Failed => news(3, "HUMS: the store does not work"),
+                StoreState::Failed => news(3, "HUMS: store broken, counters end with the power"),
             };
         }
         if newer(&mut told.unreadable, now.unreadable) {
-            return news(4, "HUMS: a stored item was unreadable");
+            return news(4, "HUMS: a stored item was lost and begins anew");
         }
         if newer(&mut told.remade, now.remade) {
             return news(3, "HUMS: store unreadable, made anew");
@@ -96,7 +96,7 @@ impl<'a> Handover<'a> {
             return news(5, "HUMS: store full, saving waits for the ground");
         }
         if newer(&mut told.failed, now.failed) {
-            return news(4, "HUMS: an item could not be saved");
+            return news(4, "HUMS: saving failed, have the board replaced");
         }
         None
     }
@@ -107,7 +107,7 @@ impl<'a> Handover<'a> {
     }
 
     /// How often the store was found unreadable since power-on, and made anew: what is in it has to be put again.
-    pub fn remade(&self) -> u32 {
+    pub(crate) fn remade(&self) -> u32 {
         self.status.read().remade
     }
 

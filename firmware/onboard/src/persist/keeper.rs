@@ -58,7 +58,7 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         Self { store, items, status, waits: false, turned: false }
     }
 
-    /// Makes [`AHEAD`] of a sector free where less is. Takes an erase: not after a reset that may have come in flight.
+    /// Makes five eighths of a sector free where less is. Takes an erase: not after a reset that may have come in flight.
     pub fn turn_ahead(&mut self) {
         if let Some(store) = &mut self.store
             && store.turn_ahead(F::ERASE_SIZE * AHEAD.0 / AHEAD.1).is_err()

@@ -1,26 +1,24 @@
 //! What an error of the card is to whoever records, and to the pilot.
 
-use super::Recorder;
 use crate::card::CardError;
 use crate::layout::{EXFAT_TYPE, LayoutError};
 use crate::status::CardState;
 use crate::{CardDevice, Trouble};
 
-impl<D: CardDevice> Recorder<'_, D> {
-    pub(super) fn tell(&self, error: &CardError<D::Error>) {
-        self.status.set_state(match error {
-            CardError::Device(error) => match D::trouble(error) {
-                Trouble::Gone => CardState::Absent,
-                Trouble::Locked => CardState::Locked,
-                Trouble::Stuck | Trouble::Refusing => CardState::Failing,
-            },
-            CardError::Foreign(LayoutError::NoPartitionTable) => CardState::Unpartitioned,
-            CardError::Foreign(LayoutError::NotFat32(EXFAT_TYPE)) => CardState::ExFat,
-            CardError::Foreign(LayoutError::NotFat32(_) | LayoutError::Device(_)) => CardState::Foreign,
-            CardError::Foreign(LayoutError::BadVolume(_)) | CardError::Damaged => CardState::Damaged,
-            CardError::Full => CardState::Full,
-            CardError::NotFound | CardError::NotOpen => CardState::Failing,
-        });
+/// What to tell of a card that met this error.
+pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
+    match error {
+        CardError::Device(error) => match D::trouble(error) {
+            Trouble::Gone => CardState::Absent,
+            Trouble::Locked => CardState::Locked,
+            Trouble::Stuck | Trouble::Refusing => CardState::Failing,
+        },
+        CardError::Foreign(LayoutError::NoPartitionTable) => CardState::Unpartitioned,
+        CardError::Foreign(LayoutError::NotFat32(EXFAT_TYPE)) => CardState::ExFat,
+        CardError::Foreign(LayoutError::NotFat32(_) | LayoutError::Device(_)) => CardState::Foreign,
+        CardError::Foreign(LayoutError::BadVolume(_)) | CardError::Damaged => CardState::Damaged,
+        CardError::Full => CardState::Full,
+        CardError::NotFound | CardError::NotOpen => CardState::Failing,
     }
 }
 

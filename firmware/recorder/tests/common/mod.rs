@@ -1,6 +1,5 @@
 //! A card in memory.
-// Each test file uses its own part of this.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(dead_code, missing_docs, unreachable_pub, reason = "each test file uses its own part of this")]
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;

@@ -1,6 +1,8 @@
 // Bars: a name, a bar from zero, a number.
 
-import { el, say, toggle, fixed } from "./dom.js";
+import { say, toggle } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed } from "./shown.js";
 
 export const bars = (rows) => {
   const made = rows.map(({ id, title, size, decimals = 2, unit = "", both = false, limits = null }) => {

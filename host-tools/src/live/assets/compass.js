@@ -1,6 +1,8 @@
 // The heading: the rose turns, the vehicle looks up.
 
-import { svg, say, attribute, panel, fixed } from "./dom.js";
+import { say, attribute, panel } from "./dom.js";
+import { svg } from "./elements.js";
+import { fixed } from "./shown.js";
 
 const QUARTERS = ["N", "E", "S", "W"];
 

@@ -1,6 +1,8 @@
 // What a health monitor shows besides: vibration, estimator, GNSS, radio, and an engine where there is one.
 
-import { el, say, panel, fixed, toggle } from "./dom.js";
+import { say, panel, toggle } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed } from "./shown.js";
 import { bars } from "./bar.js";
 
 const FIXES = ["none", "none", "2D", "3D", "3D, DGPS", "RTK float", "RTK fixed", "static", "PPP"];

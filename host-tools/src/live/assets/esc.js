@@ -1,6 +1,9 @@
 // The reference system's second row: ESC Information, for as many motors as there are.
 
-import { el, say, panel, toggle, whole, fixed, shape, shapeIs } from "./dom.js";
+import { shape, shapeIs } from "./badge.js";
+import { say, panel, toggle } from "./dom.js";
+import { el } from "./elements.js";
+import { whole, fixed } from "./shown.js";
 import { gauge } from "./gauge.js";
 import { plot } from "./plot.js";
 

@@ -1,6 +1,8 @@
 // A round gauge: an arc from the lowest to the highest value, its limits beside it, the number in the middle.
 
-import { el, svg, say, attribute, toggle, panel, fixed } from "./dom.js";
+import { say, attribute, toggle, panel } from "./dom.js";
+import { el, svg } from "./elements.js";
+import { fixed } from "./shown.js";
 
 const FROM = -120, TO = 120, RADIUS = 46, CENTRE = [60, 58];
 const point = (degrees, radius) => {

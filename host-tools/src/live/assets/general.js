@@ -1,6 +1,7 @@
 // The reference system's first row: General Information.
 
-import { el, clock } from "./dom.js";
+import { el } from "./elements.js";
+import { clock } from "./shown.js";
 import { gauge } from "./gauge.js";
 import { stat } from "./spark.js";
 

@@ -1,6 +1,9 @@
 // The health board, usage and what is due, recorder and link.
 
-import { el, say, attribute, toggle, panel, badge, fixed, whole, clock, age } from "./dom.js";
+import { badge } from "./badge.js";
+import { say, attribute, toggle, panel } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed, whole, clock, age } from "./shown.js";
 
 const SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude", "recorder"];
 
@@ -107,4 +110,3 @@ export const link = () => {
     },
   };
 };
-

@@ -1,6 +1,8 @@
 // The horizon: the ground turns and moves behind a fixed vehicle, as it looks from inside.
 
-import { el, svg, say, attribute, panel, fixed } from "./dom.js";
+import { say, attribute, panel } from "./dom.js";
+import { el, svg } from "./elements.js";
+import { fixed } from "./shown.js";
 
 // Pixels a degree of pitch.
 const DEGREE = 2.2;

@@ -1,6 +1,6 @@
 // The keyboard: everything that a click does.
 
-import { el } from "./dom.js";
+import { el } from "./elements.js";
 
 const HELP = [
   ["Space", "play or pause a recording"], ["\u2190 \u2192", "5 seconds back or on; with Shift 30"], ["Home End", "its beginning or end"],

@@ -1,6 +1,10 @@
 // What comes from hums goes to the instruments, at most once a frame.
 
-import { el, say, attribute, toggle, badge, age, words, whole } from "./dom.js";
+import { badge } from "./badge.js";
+import { say, attribute, toggle } from "./dom.js";
+import { el } from "./elements.js";
+import { age, whole } from "./shown.js";
+import { words } from "./text.js";
 import { board, usage, link } from "./health.js";
 import { condition } from "./condition.js";
 import { connect } from "./link.js";

@@ -1,6 +1,8 @@
 // The track over ground, to scale and without tiles: no network is needed for it.
 
-import { el, say, panel, fixed } from "./dom.js";
+import { say, panel } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed } from "./shown.js";
 import { colour, whenColoursChange } from "./colours.js";
 
 const EVERY_MS = 100;

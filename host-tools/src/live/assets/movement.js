@@ -1,6 +1,8 @@
 // The reference system's third row: Movement Information; with horizon, heading and track.
 
-import { el, say, panel, fixed } from "./dom.js";
+import { say, panel } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed } from "./shown.js";
 import { bars } from "./bar.js";
 import { compass } from "./compass.js";
 import { gauge } from "./gauge.js";

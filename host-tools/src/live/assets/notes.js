@@ -1,6 +1,9 @@
 // Findings as they come, what the vehicle says, and what happened: the newest first.
 
-import { el, panel, badge, clock, toggle } from "./dom.js";
+import { badge } from "./badge.js";
+import { panel, toggle } from "./dom.js";
+import { el } from "./elements.js";
+import { clock } from "./shown.js";
 
 // Rows on the page at most; the server keeps more.
 const ROWS_MAX = 200;

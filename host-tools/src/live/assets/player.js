@@ -1,6 +1,8 @@
 // A recording's time: play and pause, where it is, how fast; findings stand on the line.
 
-import { el, say, attribute, clock, svg } from "./dom.js";
+import { say, attribute } from "./dom.js";
+import { el, svg } from "./elements.js";
+import { clock } from "./shown.js";
 import { colour, whenColoursChange } from "./colours.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16, 32];

@@ -1,6 +1,8 @@
 // Lines over time, of the whole flight or of its last minutes.
 
-import { el, say, panel, fixed, clock } from "./dom.js";
+import { say, panel } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed, clock } from "./shown.js";
 import { colour, line as lineColour, whenColoursChange } from "./colours.js";
 
 const EVERY_MS = 100;

@@ -1,6 +1,8 @@
 // A number with its course below: a stat with a sparkline.
 
-import { el, say, panel, fixed, toggle } from "./dom.js";
+import { say, panel, toggle } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed } from "./shown.js";
 import { colour } from "./colours.js";
 
 // Pixels of the picture, twice as fine as it is shown.

@@ -4,6 +4,7 @@
 //! ([`writer`]). A database that is away costs nothing: batches wait in memory, beyond a limit in a file
 //! ([`queue`]), and are written when it is back.
 
+mod figures;
 pub mod names;
 pub mod queue;
 pub mod target;
@@ -18,8 +19,8 @@ use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Moment, USAGE_ENTRIES_MAX, Usage};
 use hums_core::time::{Instant, Span};
 use hums_link::{Frame, observe};
-use serde::Serialize;
 
+pub use self::figures::Figures;
 use self::names::Names;
 use self::queue::{Batch, Queue};
 use self::target::Target;
@@ -37,23 +38,6 @@ const BATCH_AGE: Duration = Duration::from_millis(250);
 const USAGE_EVERY: Span = Span::from_secs(10);
 /// How long is waited for the database at the end.
 const LAST_WAIT: Duration = Duration::from_secs(15);
-
-/// What became of the points.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Figures {
-    /// The database has them.
-    pub written: u64,
-    /// They wait, in memory or in the file.
-    pub waiting: u64,
-    /// Bytes of them that are in the file.
-    pub spilled_bytes: u64,
-    /// The database refuses them for what they are.
-    pub rejected: u64,
-    /// Neither memory nor the file took them.
-    pub lost: u64,
-    /// What the database said last when it did not take a batch; empty while all is well.
-    pub trouble: String,
-}
 
 /// The side that makes points.
 pub struct Influx {
@@ -223,22 +207,23 @@ impl Influx {
 
 #[cfg(test)]
 mod tests {
-    use hums_link::encode::{Encoder, GS_FRAME_BYTES_MAX};
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::packet::Packet;
 
     use super::*;
     use crate::live::told::Limits;
+    use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
 
     /// What was told of the autopilot's id.
     const UID: u64 = 0x0031_002a_3035_510a;
 
     fn heartbeat() -> Packet {
-        Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3)
+        Packet::new(HEARTBEAT).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3)
     }
 
     /// `AUTOPILOT_VERSION`
     fn version() -> Packet {
-        Packet::new(148).u32(8, UID as u32).u32(12, (UID >> 32) as u32)
+        Packet::new(AUTOPILOT_VERSION).u32(8, UID as u32).u32(12, (UID >> 32) as u32)
     }
 
     /// Flies these packets past; gives the lines that the database would get, the last ones by the end.
@@ -246,10 +231,8 @@ mod tests {
         let queue = Arc::new(Queue::new().expect("a file"));
         let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");
         let mut encoder = Encoder::of(1, 1);
-        let frames: Vec<Vec<u8>> = packets
-            .iter()
-            .map(|packet| encoder.frame(&mut [0; GS_FRAME_BYTES_MAX], packet).to_vec())
-            .collect();
+        let frames: Vec<Vec<u8>> =
+            packets.iter().map(|packet| encoder.frame(&mut [0; FRAME_BYTES_MAX], packet).to_vec()).collect();
         let mut world = World::new(Limits::default());
         if know {
             let mut whole = World::new(Limits::default());

@@ -9,7 +9,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant as Wall};
 
-use super::Figures;
+use super::figures::Figures;
 
 /// Half a minute of a fast link, a quarter of an hour of a usual one.
 pub const MEMORY_BYTES: usize = 16 * 1024 * 1024;

@@ -46,7 +46,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     })?
     .0;
     let earlier = logs::on_card(&run.sd).len();
-    let mut reboots = VecDeque::from(run.faults.reboot_at.clone());
+    let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run)?;
     let mut board = Board::start(Fixed {
@@ -69,6 +69,9 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let mut report = counters.into_report();
     let frames = report.read_card(&run.sd, earlier)?;
     before.add_to(&mut report, frames);
+    if let Some(remark) = report.remark(&run.input) {
+        eprintln!("hums: {remark}");
+    }
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }
 

@@ -7,7 +7,8 @@ use anyhow::{Result, anyhow};
 use hums_core::params::Params;
 use hums_store::{Key, Store};
 
-use super::pipeline::{Memory, Outside, Pipeline};
+use super::outside::{Memory, Outside};
+use super::pipeline::Pipeline;
 use super::{PowerOn, identity};
 use crate::card::SimCard;
 use crate::run::Machine as _;

@@ -7,6 +7,7 @@
 //! Power-on is the moment of the first input byte.
 
 pub mod both_ports;
+mod outside;
 mod pipeline;
 
 use std::fs::File;
@@ -18,7 +19,8 @@ use anyhow::{Context, Result, bail};
 use hums_blackbox::record::{Boot, Stats};
 use hums_core::params::Params;
 use hums_recorder::status::CardReading;
-use pipeline::{Memory, Outside, Pipeline};
+use outside::{Memory, Outside};
+use pipeline::Pipeline;
 
 use super::arrivals::Arrivals;
 use super::ground::{self, Ground};
@@ -55,7 +57,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         gs,
         autopilot: arrivals.take_autopilot(),
         report: Report::default(),
-        reboots: run.faults.reboot_at.clone(),
+        reboots: run.faults.reboot_at_us.clone(),
         boots: 0,
         entropy: run.faults.seed as u32,
         power_on_us: 0,
@@ -78,6 +80,9 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         eprintln!("hums: {remark}");
     }
     let report = world.settle(&run.sd, earlier)?;
+    if let Some(remark) = report.remark(&run.input) {
+        eprintln!("hums: {remark}");
+    }
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }
 

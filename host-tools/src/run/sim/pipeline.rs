@@ -1,27 +1,21 @@
 //! The tasks of one power-on, and the events that move them.
 
-use std::io::Write;
+mod ending;
 
-use anyhow::{Context, Result};
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-use hums_blackbox::Writer;
-use hums_blackbox::record::{Boot, Stats};
-use hums_core::Monitor;
-use hums_core::params::Params;
+use std::path::Path;
+
+use anyhow::Result;
+use hums_blackbox::record::Boot;
 use hums_core::time::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 use hums_onboard::persist::Kept;
-use hums_onboard::port::PortReading;
-use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
+use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
 use hums_onboard::uplink::{self, Uplink};
-use hums_onboard::{
-    Handover, Keeper, Mailbox, Monitoring, PortStatus, Reception, Service, Storage, StoreStatus,
-};
-use hums_recorder::status::CardReading;
-use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Trouble};
+use hums_onboard::{Handover, Keeper, Monitoring, PortStatus, Reception, Service, Storage};
+use hums_recorder::CardStatus;
 
-use crate::card::SimCard;
-use crate::card::sim::CardError;
+use super::outside::{Memory, Outside, Slot};
+use crate::files::settle;
 use crate::run::Machine;
 use crate::run::report::Finding;
 use crate::run::store::FileFlash;
@@ -31,83 +25,6 @@ use crate::source::Chunk;
 const SILENCE: Span = Span::from_millis(20);
 /// How soon storage looks again after it found no card.
 const NO_CARD_RETRY: Span = Span::from_millis(100);
-/// How long the end of a run waits for a card that is out, before what waits for it is lost.
-const CARD_PATIENCE: Span = Span::from_secs(5);
-
-/// What a power-on begins with empty: all that is static on the board.
-pub(super) struct Memory {
-    card_status: CardStatus,
-    port_status: PortStatus,
-    store_status: StoreStatus,
-    mailbox: Mailbox,
-    held: HeldBlocks,
-    queues: Box<Queues>,
-    writer: Box<Writer>,
-    monitor: Box<Monitor>,
-}
-
-impl Memory {
-    pub(super) fn new(params: &Params) -> Self {
-        Self {
-            card_status: CardStatus::new(),
-            port_status: PortStatus::new(),
-            store_status: StoreStatus::new(),
-            mailbox: Mailbox::new(),
-            held: HeldBlocks::new(),
-            queues: Box::new(Queues::new()),
-            writer: Box::new(Writer::new()),
-            monitor: Box::new(Monitor::new(*params)),
-        }
-    }
-}
-
-impl Memory {
-    /// What storage says of the card.
-    pub(super) fn card_reading(&self) -> CardReading {
-        self.card_status.read()
-    }
-}
-
-/// What is around the board.
-pub(super) struct Outside<'a, 'w> {
-    pub(super) card: &'a SimCard,
-    pub(super) flash: &'a FileFlash,
-    pub(super) gs: &'w mut (dyn Write + Send),
-    pub(super) autopilot: &'w mut (dyn Write + Send),
-    pub(super) findings: &'w mut Vec<Finding>,
-    /// When this power-on is, in microseconds since the first input byte.
-    pub(super) power_on_us: u64,
-    /// When our own power goes for a moment, in the same.
-    pub(super) reboot_at_us: Option<u64>,
-}
-
-/// The slot that the card is in, as the recorder sees it.
-struct Slot<'a>(&'a SimCard);
-
-impl BlockDevice for Slot<'_> {
-    type Error = CardError;
-
-    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {
-        self.0.read(blocks, start)
-    }
-
-    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
-        self.0.write(blocks, start)
-    }
-
-    fn num_blocks(&self) -> Result<BlockCount, CardError> {
-        self.0.num_blocks()
-    }
-}
-
-impl CardDevice for Slot<'_> {
-    fn trouble(error: &CardError) -> Trouble {
-        match error {
-            CardError::PowerGone | CardError::Absent => Trouble::Gone,
-            CardError::WriteRefused | CardError::OutOfRange | CardError::Image(_) => Trouble::Refusing,
-        }
-    }
-}
 
 /// The tasks of one power-on.
 pub(super) struct Pipeline<'a, 'w> {
@@ -288,15 +205,9 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Self { monitoring, ends, outside, now, .. } = self;
         let Outside { findings, power_on_us, .. } = outside;
         monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
-            let value = f64::from(finding.value);
             findings.push(Finding {
-                subsystem: finding.subsystem.name().to_owned(),
-                check: finding.check.to_owned(),
-                instance: finding.instance,
-                level: finding.level.name().to_owned(),
-                time_s: (power_on_us.saturating_add(finding.at.as_micros())) as f64 / 1e6,
-                value: value.is_finite().then_some(value),
-                unit: finding.unit.to_owned(),
+                time_s: power_on_us.saturating_add(finding.at.as_micros()) as f64 / 1e6,
+                ..Finding::from(finding)
             });
         });
         let frames = self.port_status.read().frames;
@@ -318,7 +229,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
 
     /// What the GS port can have sent by now.
     fn send_gs(&mut self) -> Result<()> {
-        let mut frame = [0; GS_FRAME_BYTES_MAX];
+        let mut frame = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.autopilot_out.take(&mut frame) {
             // An autopilot that has gone does not hear: its end shows in its own bytes.
             let _ = self.outside.autopilot.write_all(frame.get(..length).unwrap_or_default());
@@ -330,12 +241,8 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             let bits = length as u64 * 10;
             self.gs_at = self.now.max(self.gs_at) + Span::from_micros(bits * 1_000_000 / baud);
             let bytes = frame.get(..length).unwrap_or_default();
-            if let Err(error) = self.outside.gs.write_all(bytes).and_then(|()| self.outside.gs.flush()) {
-                if crate::output::is_reader_gone(&error) {
-                    return Err(crate::outcome::ReaderGone.into());
-                }
-                return Err(error).context("--gs: cannot be written");
-            }
+            let sent = self.outside.gs.write_all(bytes).and_then(|()| self.outside.gs.flush());
+            settle(sent, Path::new("--gs"))?;
         }
         Ok(())
     }
@@ -356,44 +263,9 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         };
     }
 
-    /// The input has ended: the record is closed and written out. Gives the frames that found no card.
-    pub(super) fn finish(&mut self) -> Result<u64> {
-        self.reception.idle(self.now, &mut self.ends.frames_in);
-        self.drain()?;
-        self.save_all();
-        let Ends { sectors_in, gs_in, .. } = &mut self.ends;
-        self.monitoring.finish(self.now, sectors_in, gs_in);
-        let patience = self.now + CARD_PATIENCE;
-        while !self.storage.is_done(&self.ends.sectors_out) && !self.is_dead() {
-            let at = self.storage_at.unwrap_or(self.now).max(self.now);
-            if at > patience && self.slot_is_empty() {
-                break;
-            }
-            self.now = at;
-            self.storage();
-        }
-        if let Some((until, _)) = self.busy {
-            self.now = self.now.max(until);
-            self.end_service();
-        }
-        self.storage.finish();
-        // The port sends what it has, at its pace.
-        self.now = self.now.max(self.gs_at);
-        for _ in 0..1000 {
-            self.send_gs()?;
-            self.now = self.now.max(self.gs_at);
-        }
-        Ok(self.storage.abandon(&mut self.ends.sectors_out))
-    }
-
-    /// Hands over everything that is to outlive power, as fast as the store takes it.
-    fn save_all(&mut self) {
-        self.monitoring.save_signing(self.now, &mut self.handover);
-        while !self.handover.finish(self.now, self.monitoring.monitor_mut()) && !self.is_dead() {
-            self.keep(true);
-        }
-        self.keep(true);
-        self.note();
+    /// Whether power has gone at a write that the command line chose.
+    fn is_dead(&self) -> bool {
+        self.outside.card.is_dead() || self.outside.flash.is_dead()
     }
 
     /// Saves what was handed over.
@@ -406,44 +278,5 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         while let Some(news) = self.handover.news() {
             self.monitoring.note(self.now, news.severity, news.text, &mut self.ends.sectors_in);
         }
-    }
-
-    /// Whether power has gone at a write that the command line chose.
-    fn is_dead(&self) -> bool {
-        self.outside.card.is_dead() || self.outside.flash.is_dead()
-    }
-
-    fn slot_is_empty(&self) -> bool {
-        self.slot_status.read().state != hums_recorder::CardState::Recording
-    }
-
-    /// The figures of this power-on.
-    pub(super) fn stats(&self) -> Stats {
-        let mut stats = self.monitoring.stats(&self.ends.gs_in);
-        catch_up(&mut stats, self.port_status.read());
-        stats
-    }
-
-    /// Parameters as they are now.
-    pub(super) fn params(&self) -> Params {
-        *self.monitoring.monitor().params()
-    }
-
-    /// Whether the card no longer holds all that was logged: old segments were overwritten.
-    pub(super) fn has_overwritten(&self) -> bool {
-        let card = self.slot_status.read();
-        card.segments_overwritten + card.segments_released > 0
-    }
-}
-
-/// The monitor adds up the port's counters at each tick; power may have gone since the last one.
-fn catch_up(stats: &mut Stats, port: PortReading) {
-    for (sum, counter) in [
-        (&mut stats.frames_in, port.frames),
-        (&mut stats.bytes_in, port.bytes),
-        (&mut stats.bytes_not_frames, port.bytes_not_frames),
-    ] {
-        // The counter is the sum modulo 2^32, and ahead of it.
-        *sum += u64::from(counter.wrapping_sub(*sum as u32));
     }
 }

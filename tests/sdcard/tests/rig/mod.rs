@@ -15,7 +15,7 @@ use hums_core::health::Level;
 use hums_core::params::Params;
 use hums_core::time::{Instant, Span};
 use hums_link::frame::{Check, Frame};
-use hums_onboard::queues::{Ends, GS_FRAME_BYTES_MAX, Queues};
+use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Monitoring, PortStatus, Service, Storage, Supervisor, Task};
 use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName, SpiCard};
@@ -170,7 +170,7 @@ impl Rig {
 
     /// What reaches the ground station.
     fn listen(&mut self) {
-        let mut bytes = [0; GS_FRAME_BYTES_MAX];
+        let mut bytes = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.gs_out.take(&mut bytes) {
             let Some(frame) = Frame::again(&bytes[..length], Check::Verified) else { continue };
             let mut payload = frame.payload().to_vec();

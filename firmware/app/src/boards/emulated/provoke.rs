@@ -17,6 +17,9 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use hums_onboard::Task;
 
 use super::clock;
+use super::reset::reset;
+use crate::boards::machine::ResetCause;
+use crate::fault;
 
 /// What is to go wrong.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -95,7 +98,10 @@ pub(super) fn here(task: Task) -> bool {
             core::hint::spin_loop();
         },
         Some(What::Silence) => true,
-        Some(What::Supply) => crate::fault::supply_low(|| false),
+        Some(What::Supply) => {
+            fault::supply_low();
+            reset(ResetCause::Software)
+        }
         None => false,
     }
 }

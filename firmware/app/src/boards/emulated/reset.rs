@@ -9,15 +9,22 @@ use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::{println, process};
 
-use super::{EXIT_AGAIN, EXIT_FAULT, clock, uart};
-use crate::boards::ResetCause;
+use super::clock;
+use crate::boards::machine::ResetCause;
 use crate::fault;
-use crate::tasks::{CARD_STATUS, PORT_STATUS};
+use crate::status::{CARD_STATUS, PORT_STATUS};
+
+/// The host is to start the emulator again.
+const EXIT_AGAIN: i32 = 3;
+/// As Rust programs end that panic.
+const EXIT_FAULT: i32 = 101;
 
 const FILE: &CStr = c"uninit";
 /// A word of the file.
 const WORD: usize = 4;
 
+/// Bytes taken out of the autopilot's port since the start: what the host need not send again.
+static TAKEN: AtomicU32 = AtomicU32::new(0);
 static AGAIN: AtomicBool = AtomicBool::new(false);
 static CAUSE: AtomicU32 = AtomicU32::new(0);
 
@@ -76,6 +83,11 @@ pub(super) fn reset(cause: ResetCause) -> ! {
     end("reset")
 }
 
+/// Bytes were taken out of the autopilot's port.
+pub(super) fn took(bytes: u32) {
+    TAKEN.fetch_add(bytes, Ordering::Relaxed);
+}
+
 /// Power goes: nothing survives.
 pub(super) fn power_off() -> ! {
     end("power")
@@ -89,7 +101,7 @@ fn end(what: &str) -> ! {
          \"bytes_not_frames\":{},\"blocks_written\":{}}}",
         what,
         clock::now_us(),
-        uart::taken(),
+        TAKEN.load(Ordering::Relaxed),
         port.frames,
         port.bytes,
         port.bytes_not_frames,

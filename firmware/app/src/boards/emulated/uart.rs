@@ -18,9 +18,8 @@ use embassy_time::Timer;
 use heapless::Vec;
 use hums_onboard::Task;
 
-use super::provoke;
-use crate::boards::{Overrun, Receive, Transmit};
-use crate::tasks::reception::FETCH_BYTES;
+use super::{provoke, reset};
+use crate::boards::machine::{FETCH_BYTES, Overrun, Receive, Transmit};
 
 /// Bytes that are received as one piece; a feed record of more is several pieces at the same time.
 const PIECE_BYTES: usize = FETCH_BYTES;
@@ -42,8 +41,6 @@ struct Inbox<const BYTES: usize> {
     received: Mutex<RefCell<Vec<u8, BYTES>>>,
     /// Bytes still due of the current piece.
     due: AtomicU32,
-    /// Bytes taken since the start.
-    taken: AtomicU32,
     waker: AtomicWaker,
 }
 
@@ -83,11 +80,6 @@ pub(super) fn init() -> ((AutopilotRx, AutopilotTx), (GsRx, GsTx)) {
     (autopilot, (PortRx(&GS), GsTx { baud: GS_BAUD }))
 }
 
-/// Bytes taken out of the autopilot's port since the start: what the host need not send again after a reset.
-pub(super) fn taken() -> u32 {
-    AUTOPILOT.taken.load(Ordering::Relaxed)
-}
-
 /// Takes `count` bytes from the autopilot's port, or from the ground station's, piece by piece, and lets the port's task
 /// have each piece. Returns when all are in; the caller is idle, so no task waits meanwhile.
 pub(super) fn receive(from_gs: bool, count: u32) {
@@ -101,8 +93,7 @@ pub(super) fn receive(from_gs: bool, count: u32) {
 impl<const BYTES: usize> Inbox<BYTES> {
     const fn new(registers: pac::usart::Usart) -> Self {
         let received = Mutex::new(RefCell::new(Vec::new()));
-        let [due, taken] = [const { AtomicU32::new(0) }; 2];
-        Self { registers, received, due, taken, waker: AtomicWaker::new() }
+        Self { registers, received, due: AtomicU32::new(0), waker: AtomicWaker::new() }
     }
 
     fn fetch(&self, count: u32) {
@@ -125,32 +116,34 @@ impl<const BYTES: usize> Inbox<BYTES> {
         }
     }
 
-    fn on_interrupt(&self) {
-        let mut due = self.due.load(Ordering::Relaxed);
+    /// Gives how many bytes it took.
+    fn on_interrupt(&self) -> u32 {
+        let before = self.due.load(Ordering::Relaxed);
+        let mut due = before;
         critical_section::with(|cs| {
             let mut received = self.received.borrow_ref_mut(cs);
             while due > 0 && self.registers.sr().read().rxne() {
                 // Never full: a piece is asked for when the one before is gone.
                 let _ = received.push(self.registers.dr().read().dr() as u8);
                 due -= 1;
-                self.taken.fetch_add(1, Ordering::Relaxed);
             }
         });
         if due == 0 {
             self.registers.cr1().modify(|w| w.set_rxneie(false));
         }
         self.due.store(due, Ordering::Release);
+        before - due
     }
 }
 
 #[interrupt]
 fn USART1() {
-    AUTOPILOT.on_interrupt();
+    reset::took(AUTOPILOT.on_interrupt());
 }
 
 #[interrupt]
 fn USART2() {
-    GS.on_interrupt();
+    let _ = GS.on_interrupt();
 }
 
 impl<const BYTES: usize> Receive for PortRx<BYTES> {

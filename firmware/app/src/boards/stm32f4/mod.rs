@@ -16,12 +16,12 @@ use embassy_time::Duration;
 pub(crate) use card::{Card, CardPort};
 pub(crate) use flash::StoreFlash;
 pub(crate) use port::{PortRx, PortTx};
-pub(crate) use reset::reset_cause;
+pub(crate) use reset::{reset_cause, restart};
 pub(crate) use supply::watch_supply;
 pub(crate) use watchdog::Watchdog;
 
-use crate::costs::Stage;
-use crate::report::Report;
+use crate::boards::machine::{Machine, SYSTICK_RELOAD};
+use crate::report::{Report, Stage};
 
 use defmt_rtt as _;
 
@@ -52,6 +52,21 @@ pub(crate) type GsRx = PortRx;
 /// Transmission to the ground station.
 pub(crate) type GsTx = PortTx;
 
+/// The types of its parts.
+pub(crate) struct Board;
+
+impl Machine for Board {
+    type AutopilotRx = AutopilotRx;
+    type AutopilotTx = AutopilotTx;
+    type GsRx = GsRx;
+    type GsTx = GsTx;
+    type Card = Card;
+    type StoreFlash = StoreFlash;
+    type Led = Led;
+    type Watchdog = Watchdog;
+    type Idle = Idle;
+}
+
 /// RAM survives a reset by itself.
 pub(crate) const fn remember() {}
 
@@ -80,7 +95,7 @@ pub(crate) fn start_counters() {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
         core.SYST.set_clock_source(SystClkSource::Core);
-        core.SYST.set_reload(crate::watch::SYSTICK_RELOAD);
+        core.SYST.set_reload(SYSTICK_RELOAD);
         core.SYST.clear_current();
         core.SYST.enable_interrupt();
         core.SYST.enable_counter();
@@ -131,6 +146,11 @@ pub(crate) const fn busy_cycles(counted: u64) -> u64 {
     counted
 }
 
+/// The watchdog is to be fed.
+pub(crate) const fn is_watched() -> bool {
+    true
+}
+
 /// The watchdog is about to bite, and needs no help.
 pub(crate) const fn bites_soon() {}
 
@@ -142,9 +162,4 @@ pub(crate) fn done(report: &Report) {
         defmt::info!("{=str}: {=u64} cycles", name, cycles);
     }
     defmt::info!("stack: {=usize} of {=usize} bytes", stack.0, stack.1);
-}
-
-/// Starts anew.
-pub(crate) fn restart() -> ! {
-    cortex_m::peripheral::SCB::sys_reset()
 }

@@ -9,7 +9,7 @@ use embassy_stm32::pac;
 use embassy_stm32::usart::{UartRx, UartTx};
 use embassy_time::{Duration, Timer};
 
-use crate::boards::{Overrun, Receive, Transmit};
+use crate::boards::machine::{Overrun, Receive, Transmit};
 
 /// A port's reception: a DMA ring.
 pub(crate) struct PortRx {

@@ -1,8 +1,8 @@
-//! Why the machine started.
+//! Why the machine started, and how it starts anew.
 
 use embassy_stm32::pac;
 
-use crate::boards::ResetCause;
+use crate::boards::machine::ResetCause;
 
 /// Reads why the machine started, and clears it for the next time.
 pub(crate) fn reset_cause() -> (ResetCause, u32) {
@@ -21,4 +21,9 @@ pub(crate) fn reset_cause() -> (ResetCause, u32) {
         ResetCause::Pin
     };
     (cause, flags.0)
+}
+
+/// Starts anew.
+pub(crate) fn restart() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
 }

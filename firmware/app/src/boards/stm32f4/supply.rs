@@ -9,6 +9,9 @@ use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt;
 use embassy_stm32::pac;
 
+use super::reset::restart;
+use crate::fault;
+
 /// The PVD's line into the interrupt controller (RM0090, 12.2.5).
 const LINE: usize = 16;
 /// 2.7 V falling, the fifth of the detector's eight levels (RM0090, 5.4.1).
@@ -37,5 +40,7 @@ fn is_low() -> bool {
 
 #[interrupt]
 fn PVD() {
-    crate::fault::supply_low(is_low)
+    fault::supply_low();
+    while is_low() {}
+    restart();
 }

@@ -1,0 +1,110 @@
+//! What every board is made of: the types of its parts, and what is known of its start.
+
+use embedded_storage::nor_flash::NorFlash;
+use hums_recorder::CardDevice;
+
+/// Bits of `cycles()` that count: `SysTick` has 24, and the cycle counter is read as if it had no more.
+pub(crate) const CYCLE_BITS: u32 = 24;
+
+/// What `SysTick` begins again with: all of its bits, 0.1 s at 168 MHz.
+pub(crate) const SYSTICK_RELOAD: u32 = (1 << CYCLE_BITS) - 1;
+
+/// Bytes that reception fetches at a time: 5 ms at 921,600 baud, five times what comes between two looks. After a delay
+/// it takes several, without a pause between them.
+pub(crate) const FETCH_BYTES: usize = 512;
+
+/// The types of a board's parts.
+pub(crate) trait Machine {
+    type AutopilotRx: Receive;
+    type AutopilotTx: Transmit;
+    type GsRx: Receive;
+    type GsTx: Transmit;
+    type Card: CardDevice;
+    /// Two sectors.
+    type StoreFlash: NorFlash;
+    type Led;
+    type Watchdog;
+    type Idle;
+}
+
+/// What the app gets of a board.
+pub(crate) struct Parts<M: Machine> {
+    pub(crate) autopilot: (M::AutopilotRx, M::AutopilotTx),
+    pub(crate) gs: (M::GsRx, M::GsTx),
+    pub(crate) card: M::Card,
+    pub(crate) store: Option<M::StoreFlash>,
+    pub(crate) led: M::Led,
+    pub(crate) watchdog: M::Watchdog,
+    pub(crate) idle: M::Idle,
+    pub(crate) boot: Boot,
+}
+
+/// Bytes were lost before the reception task could fetch them: it came too late and the receive buffer ran over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+pub(crate) struct Overrun;
+
+/// The receiving half of a port.
+pub(crate) trait Receive {
+    /// Waits for bytes and gives as many as have come and fit, at least one. Damaged bytes are given like others: the
+    /// frame's checksum finds them.
+    async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun>;
+}
+
+/// The sending half of a port.
+pub(crate) trait Transmit {
+    /// Sends all of `bytes`; returns when the port has taken the last.
+    async fn transmit(&mut self, bytes: &[u8]);
+
+    /// The port's baud rate, both ways, from the next frame on.
+    fn set_baud(&mut self, baud: u32);
+}
+
+/// Why the machine started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[cfg_attr(
+    feature = "board-emulated",
+    expect(dead_code, reason = "the emulator knows only how to be started")
+)]
+pub(crate) enum ResetCause {
+    /// Power came.
+    PowerOn,
+    /// The supply sagged.
+    BrownOut,
+    /// The reset button or the debugger.
+    Pin,
+    /// The firmware itself, after a fault.
+    Software,
+    /// The watchdog was not fed.
+    Watchdog,
+}
+
+impl ResetCause {
+    /// Whether it may have come in flight. Power that comes on its own is a pilot's.
+    pub(crate) const fn may_be_in_flight(self) -> bool {
+        !matches!(self, Self::PowerOn | Self::Pin)
+    }
+
+    /// As the log names it.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::PowerOn => "power-on",
+            Self::BrownOut => "brown-out",
+            Self::Pin => "pin",
+            Self::Software => "software",
+            Self::Watchdog => "watchdog",
+        }
+    }
+}
+
+/// What is known about this machine and this start of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Boot {
+    /// The processor's own number, the same for ever.
+    pub(crate) id: [u8; 12],
+    /// Why it started.
+    pub(crate) cause: ResetCause,
+    /// The register that says so.
+    pub(crate) cause_register: u32,
+    /// Differs from one start to the next.
+    pub(crate) entropy: u32,
+}

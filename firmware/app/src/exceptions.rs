@@ -1,0 +1,62 @@
+//! What runs, told by the number of the exception that it runs as: each task has an interrupt that no board uses
+//! otherwise.
+
+use cortex_m::interrupt::InterruptNumber;
+use cortex_m::peripheral::scb::VectActive;
+use cortex_m::peripheral::{NVIC, SCB};
+use embassy_stm32::interrupt::Interrupt;
+use hums_onboard::Task;
+
+/// What each task runs as. The handlers in `executors` bear these names, as the vector table has them.
+pub(crate) const RECEPTION: Interrupt = Interrupt::CAN1_TX;
+pub(crate) const MONITOR: Interrupt = Interrupt::CAN1_RX0;
+pub(crate) const DOWNLINK: Interrupt = Interrupt::CAN1_RX1;
+pub(crate) const STORAGE: Interrupt = Interrupt::CAN1_SCE;
+
+/// The number of the exception that runs; 0 is thread mode.
+pub(crate) fn running() -> u16 {
+    match SCB::vect_active() {
+        VectActive::ThreadMode => 0,
+        VectActive::Exception(exception) => (16 + i16::from(exception.irqn())) as u16,
+        VectActive::Interrupt { irqn } => 16 + u16::from(irqn),
+    }
+}
+
+/// The number of the exception that a task runs as.
+pub(crate) fn number_of(task: Task) -> u16 {
+    let interrupt = match task {
+        Task::Reception => RECEPTION,
+        Task::Monitor => MONITOR,
+        Task::Downlink => DOWNLINK,
+        Task::Storage => STORAGE,
+    };
+    16 + interrupt as u16
+}
+
+/// The most urgent task that has begun and not come to its end, for want of a stacked number: it ran until now.
+pub(crate) fn begun() -> u16 {
+    // As they interrupt each other.
+    let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
+    tasks.into_iter().map(number_of).find(|number| NVIC::is_active(Number(number - 16))).unwrap_or(0)
+}
+
+/// An interrupt by its number.
+#[derive(Clone, Copy)]
+struct Number(u16);
+
+// SAFETY: the numbers are those of interrupts that there are.
+unsafe impl InterruptNumber for Number {
+    fn number(self) -> u16 {
+        self.0
+    }
+}
+
+/// What runs as an exception, by its number.
+pub(crate) fn task_of(number: u16) -> &'static str {
+    match Task::ALL.into_iter().find(|task| number_of(*task) == number) {
+        Some(task) => task.name(),
+        None if number == 0 => "idle",
+        None if number < 16 => "exception",
+        None => "interrupt",
+    }
+}

@@ -1,0 +1,65 @@
+//! What the monitor knows of the vehicle's parts, and what becomes of that when one is replaced.
+
+use super::Monitor;
+use crate::baseline::{Baselines, Quantity};
+use crate::component::{Component, Figures, Kind, Label, Status};
+use crate::lifetime::ItemKey;
+use crate::observation::MOTORS_MAX;
+use crate::vehicle::BATTERIES_MAX;
+
+impl Monitor {
+    /// What a component has run, and whether it may go on.
+    pub fn component_figures(&self, place: usize) -> Option<(Figures, Status)> {
+        let component = self.components.get(place).filter(|component| component.kind != Kind::None)?;
+        let wear = self.usage.wear();
+        Some((component.figures(&wear), component.status(place, &wear, &self.params)))
+    }
+
+    /// The part of a component's life that is used, percent; `None` where it has no limit.
+    pub fn component_used_percent(&self, place: usize) -> Option<f32> {
+        self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
+    }
+
+    /// Takes a component as another monitor of this vehicle has it in this very session: what is counted from here on
+    /// adds to it.
+    pub fn learn_component(&mut self, place: usize, known: Component) {
+        let known = known.in_session(&self.usage.wear());
+        if let Some(component) = self.components.get_mut(place) {
+            *component = known;
+        }
+    }
+
+    /// Another part is in a component's place. Gives the old one with what it had run, to be recorded; `None` where
+    /// there is no such component.
+    pub fn replace_component(&mut self, place: usize, serial: Label) -> Option<Component> {
+        let Self { usage, components, saving, .. } = self;
+        let component = components.get_mut(place).filter(|component| component.kind != Kind::None)?;
+        let old = component.replace(serial, &usage.wear());
+        saving.hurry(ItemKey::Component(place as u8));
+        self.forget_baselines(old.kind, old.number);
+        Some(old)
+    }
+
+    /// What was normal for the old part is not for the new one.
+    fn forget_baselines(&mut self, kind: Kind, number: u8) {
+        let concerned = |index: usize| number == 0 || usize::from(number) == index + 1;
+        match kind {
+            Kind::Airframe => self.baselines = Baselines::new(),
+            Kind::Battery => {
+                for battery in (0..BATTERIES_MAX).filter(|battery| concerned(*battery)) {
+                    self.baselines.forget(Quantity::Resistance(battery as u8));
+                    self.derived.forget_resistance(battery);
+                }
+            }
+            Kind::Motor | Kind::Propeller | Kind::Esc => {
+                for motor in (0..MOTORS_MAX).filter(|motor| concerned(*motor)) {
+                    self.baselines.forget(Quantity::MotorSpeed(motor as u8));
+                }
+                self.baselines.forget(Quantity::Vibration);
+                self.baselines.forget(Quantity::HoverThrottle);
+            }
+            Kind::None | Kind::Card | Kind::Engine | Kind::Other => return,
+        }
+        self.saving.hurry(ItemKey::Baselines);
+    }
+}

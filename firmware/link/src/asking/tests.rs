@@ -1,0 +1,168 @@
+use super::*;
+use crate::packet::Fields;
+
+/// An autopilot by script.
+#[derive(Default)]
+struct Script {
+    autopilot: Autopilot,
+    /// What it sends: id and how often a second.
+    streams: Vec<(u32, u32)>,
+    /// What it cannot send.
+    unknown: Vec<u32>,
+    /// Promised and never sent.
+    empty: Vec<u32>,
+    /// Does not answer commands.
+    deaf: bool,
+    /// Answers every `SET_MESSAGE_INTERVAL` with this `MAV_RESULT`.
+    refuses: Option<u8>,
+    reboots: u32,
+    identified: bool,
+    baud: u32,
+    /// What it was asked: when in ms, command (or stream with the highest bit), first parameter.
+    asked: Vec<(u64, u16, u32)>,
+}
+
+impl Script {
+    fn new(autopilot: Autopilot) -> Self {
+        Self { autopilot, baud: 921_600, ..Self::default() }
+    }
+
+    fn run(&mut self, asking: &mut Asking, from_s: u64, to_s: u64) {
+        for now_ms in (from_s * 1_000..to_s * 1_000).step_by(50) {
+            for (id, hz) in &self.streams {
+                // So many a second, spread over it.
+                let count = |ms: u64| ms * u64::from(*hz) / 1_000;
+                (count(now_ms)..count(now_ms + 50)).for_each(|_| asking.seen(*id));
+            }
+            let known = Known {
+                source: Source { system: 1, component: 1 },
+                autopilot: self.autopilot,
+                reboots: self.reboots,
+                identified: self.identified,
+                baud: self.baud,
+            };
+            let mut sent = Vec::new();
+            asking.tick(Instant::from_millis(now_ms), Some(&known), &mut |packet| {
+                sent.push(packet.clone());
+                true
+            });
+            assert!(sent.len() <= 1, "one at a time");
+            for packet in &sent {
+                self.take(now_ms, packet, asking);
+            }
+        }
+    }
+
+    fn take(&mut self, now_ms: u64, packet: &Packet, asking: &mut Asking) {
+        let fields = Fields(packet.payload());
+        if packet.id() == 66 {
+            let (stream, rate) = (fields.u8(4), u32::from(fields.u16(0)));
+            self.asked.push((now_ms, 0x8000 | u16::from(stream), rate));
+            if stream == 10 {
+                self.streams.push((30, rate));
+            }
+            return;
+        }
+        let (command, id, interval_us) = (fields.u16(28), fields.f32(0) as u32, fields.f32(4));
+        self.asked.push((now_ms, command, id));
+        if self.deaf {
+            return;
+        }
+        let result = match self.refuses.filter(|_| command == SET_MESSAGE_INTERVAL) {
+            Some(result) => result,
+            None if self.unknown.contains(&id) => 4,
+            None => 0,
+        };
+        if result == 0 && command == SET_MESSAGE_INTERVAL && !self.empty.contains(&id) {
+            self.streams.retain(|(stream, _)| *stream != id);
+            self.streams.push((id, (1e6 / interval_us).round() as u32));
+        }
+        self.identified |= result == 0 && command == REQUEST_MESSAGE;
+        asking.answered(command, result);
+    }
+
+    fn count(&self, command: u16, id: u32) -> usize {
+        self.asked.iter().filter(|(_, asked, of)| (*asked, *of) == (command, id)).count()
+    }
+
+    fn rate(&self, id: u32) -> Option<u32> {
+        self.streams.iter().find(|(stream, _)| *stream == id).map(|(_, hz)| *hz)
+    }
+}
+
+#[test]
+fn a_px4_is_asked_for_what_is_missing_and_left_alone_with_the_rest() {
+    let mut px4 = Script { streams: vec![(30, 50), (105, 50), (1, 1)], ..Script::new(Autopilot::Px4) };
+    px4.empty = vec![290, 291];
+    let mut asking = Asking::new();
+    px4.run(&mut asking, 0, 5);
+    assert_eq!(px4.asked, [], "first it listens");
+    px4.run(&mut asking, 5, 60);
+    assert_eq!((px4.rate(30), px4.rate(105)), (Some(50), Some(50)), "never made slower");
+    assert_eq!((px4.rate(1), px4.rate(230), px4.rate(33)), (Some(2), Some(2), Some(5)));
+    assert!(px4.identified);
+    assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 193), 0, "that is ArduPilot's");
+    assert_eq!(px4.count(SET_MESSAGE_INTERVAL, 33), 1, "what comes is not asked for again");
+    px4.run(&mut asking, 60, 3_600);
+    let promised = px4.count(SET_MESSAGE_INTERVAL, 291);
+    assert!((5..20).contains(&promised), "{promised} times asked for what never comes, in an hour");
+}
+
+#[test]
+fn a_reboot_and_a_stream_that_falls_silent_are_asked_again() {
+    let mut px4 = Script::new(Autopilot::Px4);
+    let mut asking = Asking::new();
+    px4.run(&mut asking, 0, 60);
+    assert_eq!(px4.rate(33), Some(5));
+    px4.streams.clear();
+    px4.reboots = 1;
+    px4.run(&mut asking, 60, 100);
+    assert_eq!(px4.rate(33), Some(5), "after a reboot");
+    px4.streams.retain(|(id, _)| *id != 33);
+    px4.run(&mut asking, 100, 140);
+    assert_eq!(px4.rate(33), Some(5), "after silence");
+}
+
+#[test]
+fn what_is_refused_is_not_asked_for_again_until_a_reboot() {
+    let mut copter = Script { unknown: vec![225, 226], ..Script::new(Autopilot::ArduPilot) };
+    let mut asking = Asking::new();
+    copter.run(&mut asking, 0, 1_000);
+    assert_eq!((copter.count(SET_MESSAGE_INTERVAL, 225), copter.count(SET_MESSAGE_INTERVAL, 226)), (1, 1));
+    assert_eq!(copter.rate(193), Some(2));
+    copter.reboots = 1;
+    copter.run(&mut asking, 1_000, 1_100);
+    assert_eq!(copter.count(SET_MESSAGE_INTERVAL, 225), 2);
+}
+
+#[test]
+fn an_old_ardupilot_is_asked_for_groups() {
+    for (deaf, refuses) in [(true, None), (false, Some(3))] {
+        let mut old = Script { deaf, refuses, ..Script::new(Autopilot::ArduPilot) };
+        let mut asking = Asking::new();
+        old.run(&mut asking, 0, 120);
+        for (stream, _) in GROUPS {
+            let asked = old.asked.iter().filter(|(_, what, _)| *what == 0x8000 | u16::from(stream)).count();
+            assert!(asked > 0, "group {stream}, deaf: {deaf}");
+        }
+        assert_eq!(old.rate(30), Some(8));
+        let commands = old.asked.iter().filter(|(_, what, _)| *what == SET_MESSAGE_INTERVAL).count();
+        assert!(commands <= 9, "{commands} commands that it does not know");
+    }
+}
+
+#[test]
+fn a_slow_line_is_not_asked_for_more_than_it_carries() {
+    let mut px4 = Script { baud: 19_200, ..Script::new(Autopilot::Px4) };
+    let mut asking = Asking::new();
+    px4.run(&mut asking, 0, 120);
+    let bytes = |id: u32| WANTED.iter().find(|wanted| wanted.0 == id).map_or(0, |wanted| u32::from(wanted.3));
+    let all: u32 = px4.streams.iter().map(|(id, hz)| hz * bytes(*id)).sum();
+    assert!(px4.streams.len() > 10 && all <= 19_200 / 10, "{all} bytes a second: {:?}", px4.streams);
+}
+
+#[test]
+fn without_a_vehicle_nothing_is_asked() {
+    let mut asking = Asking::new();
+    asking.tick(Instant::from_millis(60_000), None, &mut |_| panic!("nobody is there"));
+}

@@ -1,0 +1,228 @@
+//! What a command of a ground station does, and the answers in line as messages.
+//!
+//! | `MAV_CMD` | does |
+//! |---|---|
+//! | 401 `RUN_PREARM_CHECKS` | tells what stands against a flight; accepted when nothing does |
+//! | 512 `REQUEST_MESSAGE` | `HEARTBEAT`, `AUTOPILOT_VERSION`, `PROTOCOL_VERSION` |
+//! | 519, 520 | the same by their older commands |
+//! | 526 `STORAGE_FORMAT` | formats a card that cannot be recorded on as it is: while disarmed |
+//! | 2510, 2511 `LOGGING_START`, `_STOP` | records again; stops recording, while disarmed |
+//! | 31010 `USER_1` | another part is in a component's place, from 1: while disarmed |
+//! | 31011 `USER_2` | cancels the protective action that is announced |
+
+use hums_blackbox::record::Boot;
+use hums_core::Monitor;
+use hums_core::health::{self, Level};
+use hums_core::params::TABLE;
+use hums_core::time::Instant;
+use hums_link::messages;
+use hums_link::packet::Packet;
+use hums_link::request::{Port, Replies, Reply};
+use hums_link::summary;
+use hums_link::text::{Severity, Text};
+use hums_recorder::CardState;
+
+use super::limiter::{Asker, Limiter};
+use crate::journal::{By, Journal, Logbook};
+use crate::queues::SectorsIn;
+use crate::records;
+
+const PROTOCOL: u16 = 519;
+const CAPABILITIES: u16 = 520;
+/// `MAV_CMD_REQUEST_MESSAGE`
+pub(crate) const MESSAGE: u16 = 512;
+const PREFLIGHT: u16 = 401;
+const RECORD: u16 = 2510;
+const STOP: u16 = 2511;
+const FORMAT: u16 = 526;
+const REPLACED: u16 = 31_010;
+const CANCEL: u16 = 31_011;
+/// `MAV_RESULT`
+pub(crate) const ACCEPTED: u8 = 0;
+const TEMPORARILY_REJECTED: u8 = 1;
+/// Of `MAV_RESULT` as well.
+pub(crate) const DENIED: u8 = 2;
+const UNSUPPORTED: u8 = 3;
+const FAILED: u8 = 4;
+
+/// Answers in line, and what commands decide.
+#[derive(Clone, Debug)]
+pub(crate) struct Commands {
+    pub(crate) replies: Replies,
+    limits: [Limiter; 2],
+    /// Somebody stopped the record.
+    stopped: bool,
+}
+
+impl Commands {
+    pub(crate) const fn new() -> Self {
+        Self { replies: Replies::new(), limits: [Limiter::new(); 2], stopped: false }
+    }
+
+    /// Whether somebody at this port may change something now.
+    pub(crate) fn allows(&mut self, now: Instant, port: Port) -> bool {
+        self.limits[port as usize].allows(now)
+    }
+
+    /// Whether somebody stopped the record.
+    pub(crate) const fn stopped(&self) -> bool {
+        self.stopped
+    }
+
+    /// Does what a command says; its `MAV_RESULT`.
+    pub(crate) fn command(
+        &mut self,
+        now: Instant,
+        asker: Asker,
+        command: u16,
+        params: [f32; 2],
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+    ) -> u8 {
+        let mut reply = |reply| {
+            self.replies.push(asker.port, reply);
+            ACCEPTED
+        };
+        match (command, params[0] as u32) {
+            (CAPABILITIES, _) | (MESSAGE, 148) => reply(Reply::Version),
+            (PROTOCOL, _) | (MESSAGE, 300) => reply(Reply::Protocol),
+            (MESSAGE, 0) => reply(Reply::Heartbeat),
+            (PREFLIGHT, _) => {
+                reply(Reply::Preflight);
+                if preflight(book.monitor).is_none() { ACCEPTED } else { FAILED }
+            }
+            // Which storage is it, and is it meant: a command that is sent by mistake has neither.
+            (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
+            (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
+                if !self.allows(now, asker.port) {
+                    return TEMPORARILY_REJECTED;
+                }
+                self.act(now, asker, command, number, book, sectors)
+            }
+            _ => UNSUPPORTED,
+        }
+    }
+
+    fn act(
+        &mut self,
+        now: Instant,
+        asker: Asker,
+        command: u16,
+        number: u32,
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+    ) -> u8 {
+        let by = asker.by;
+        match command {
+            CANCEL => {
+                let cancelled = book.monitor.cancel_protection();
+                book.journal.by_hand(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
+                if cancelled { ACCEPTED } else { FAILED }
+            }
+            STOP | FORMAT | REPLACED if book.monitor.vehicle().armed() => TEMPORARILY_REJECTED,
+            FORMAT => format(now, by, book, sectors),
+            REPLACED => {
+                let place = (number as usize).wrapping_sub(1);
+                // Its serial number can be given later; who did it is in the component's record.
+                if records::replace_component(now, place, "", by, book, sectors) { ACCEPTED } else { DENIED }
+            }
+            _ => {
+                self.stop_or_record(now, command == STOP, asker, &mut book.journal, sectors);
+                ACCEPTED
+            }
+        }
+    }
+
+    /// Never unnoticed: it is an event in the record, a text on the ground station, and a finding for as long as it
+    /// lasts; and it ends when the vehicle is armed.
+    pub(crate) fn stop_or_record(
+        &mut self,
+        now: Instant,
+        stop: bool,
+        Asker { port, by }: Asker,
+        journal: &mut Journal<'_>,
+        sectors: &mut SectorsIn,
+    ) {
+        if self.stopped == stop {
+            return;
+        }
+        self.stopped = stop;
+        let what = if stop { "stopped" } else { "started" };
+        journal.by_hand(now, format_args!("recording {what} by {}/{}", by.0, by.1), sectors);
+        if stop {
+            self.replies.push(port, Reply::Stopped);
+        }
+    }
+}
+
+/// Only a card that holds nothing for us is formatted over a link: nobody at a radio destroys logs.
+fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn) -> u8 {
+    let state = book.card.read().state;
+    let may = state.wants_format();
+    let what = if may { "card is formatted" } else { "formatting refused, asked" };
+    book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
+    match state {
+        _ if may => {
+            book.card.want_format();
+            ACCEPTED
+        }
+        // It was asked for already, and the answer was lost.
+        CardState::Formatting => ACCEPTED,
+        CardState::Recording | CardState::Finished | CardState::Full => DENIED,
+        _ => FAILED,
+    }
+}
+
+/// The first thing that stands against a flight.
+fn preflight(monitor: &Monitor) -> Option<&'static str> {
+    let bad = |level| matches!(level, Level::Warning | Level::Critical);
+    monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, ..)| check.name)
+}
+
+/// An answer as a message.
+pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Packet {
+    match reply {
+        Reply::Param(index) => match monitor.params().iter().nth(usize::from(index)) {
+            Some((spec, value)) => messages::param_value(spec.name, value, index, TABLE.len() as u16),
+            // Only indices of the table are put in line.
+            None => messages::heartbeat(0),
+        },
+        Reply::Ack(command, result, (system, component)) => {
+            messages::command_ack(command, result, system, component)
+        }
+        Reply::Version => messages::autopilot_version(version(identity.version), identity.git, &identity.uid),
+        Reply::Protocol => messages::protocol_version(),
+        Reply::Heartbeat => summary::heartbeat(monitor),
+        Reply::Preflight => match preflight(monitor) {
+            Some(check) => {
+                let words = health::words(check);
+                messages::status_text(
+                    Severity::Warning,
+                    Text::new(format_args!("HUMS: not ready: {words}")).as_str(),
+                )
+            }
+            None => messages::status_text(Severity::Info, "HUMS: ready"),
+        },
+        Reply::Keyed(true) => messages::status_text(Severity::Notice, "HUMS: signing key set"),
+        Reply::Keyed(false) => messages::status_text(Severity::Notice, "HUMS: signing key removed"),
+        Reply::Erased => messages::status_text(Severity::Notice, "HUMS: earlier logs are erased"),
+        Reply::Stopped => messages::status_text(Severity::Warning, "HUMS: recording stopped by command"),
+    }
+}
+
+/// `1.2.3` as three numbers.
+fn version(text: &str) -> [u8; 3] {
+    let mut numbers = text.split(['.', '-', '+']).map(|part| part.parse().unwrap_or(0));
+    [(); 3].map(|()| numbers.next().unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_version_is_three_numbers_whatever_it_says() {
+        assert_eq!(version("1.22.3"), [1, 22, 3]);
+        assert_eq!((version("0.1.0-rc1"), version("")), ([0, 1, 0], [0, 0, 0]));
+    }
+}

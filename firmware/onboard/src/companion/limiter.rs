@@ -1,0 +1,53 @@
+//! Who asks, and how often somebody may change something.
+
+use hums_core::time::Instant;
+use hums_link::request::Port;
+
+use crate::journal::By;
+
+/// Who asks, and where the answer goes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Asker {
+    pub(crate) port: Port,
+    pub(crate) by: By,
+}
+
+/// Settings and commands that a port may send at once, and how many more each second.
+const REQUESTS_MAX: u32 = 20;
+const REQUESTS_PER_S: u32 = 5;
+
+/// So many at once, and so many a second.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limiter {
+    left: u32,
+    at: Instant,
+}
+
+impl Limiter {
+    pub(crate) const fn new() -> Self {
+        Self { left: REQUESTS_MAX, at: Instant::ZERO }
+    }
+
+    pub(crate) fn allows(&mut self, now: Instant) -> bool {
+        let gained = now.since(self.at).as_millis() * u64::from(REQUESTS_PER_S) / 1_000;
+        if gained > 0 {
+            self.left = (u64::from(self.left) + gained).min(u64::from(REQUESTS_MAX)) as u32;
+            self.at = now;
+        }
+        let allows = self.left > 0;
+        self.left = self.left.saturating_sub(1);
+        allows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flood_of_settings_is_cut_to_a_few_a_second() {
+        let mut limiter = Limiter::new();
+        let allowed = (0..10_000).filter(|now_ms| limiter.allows(Instant::from_millis(*now_ms))).count();
+        assert!((60..=75).contains(&allowed), "{allowed} in ten seconds");
+    }
+}

@@ -1,0 +1,404 @@
+//! The monitor as a companion: what it asks of the autopilot, and what it answers to those who ask.
+//!
+//! Part of the monitor task: a question comes as a frame, from the frame queue (the autopilot's port, which carries
+//! ground stations' questions as well) or from the uplink queue (the ground station's own port), and is answered at the
+//! port that it came from, within that port's budget. What is asked can change settings, stop the record and ask for
+//! data, and nothing else; a flood of it is cut by [`limiter`] and by the line of answers, which is short.
+
+mod commands;
+mod library;
+mod limiter;
+mod pass;
+mod secure;
+mod settings;
+mod ways;
+
+use embedded_storage::nor_flash::NorFlash;
+use hums_blackbox::record::Boot;
+use hums_core::params::{Param, Params, TABLE};
+use hums_core::time::{Instant, Span};
+use hums_core::{Monitor, protect};
+use hums_link::asking::{Asking, Known};
+use hums_link::encode::COMPONENT;
+use hums_link::frame::Frame;
+use hums_link::messages;
+use hums_link::outlet::{Class, Outlet};
+use hums_link::packet::Fields;
+use hums_link::request::{self, Asked, Port, Reply, Request};
+use hums_link::signing::{Key, Seal};
+use hums_link::summary::{self, Summary};
+
+use crate::journal::{Journal, Logbook};
+use crate::notices::Notices;
+use crate::persist::{Handover, Keeper};
+use crate::queues::{GsIn, Path, SectorsIn};
+use commands::Commands;
+use library::Library;
+use limiter::Asker;
+use pass::Pass;
+pub(crate) use secure::SETUP;
+use secure::{Secure, Trust};
+use settings::Settings;
+use ways::Ways;
+
+/// Bytes that may wait at the autopilot's port. Its queue has room for them, for as many of the summary where the
+/// autopilot carries it, and for the longest frame.
+const WAITING_BYTES: u32 = 400;
+/// How often the autopilot hears of us: it routes only to those it has heard.
+const HEARTBEAT: Span = Span::from_secs(1);
+/// The monitor itself: nobody waits for an answer.
+const NOBODY: Asker = Asker { port: Port::Gs, by: (0, 0) };
+
+/// What the monitor task keeps for its conversations.
+#[derive(Clone, Debug)]
+pub(crate) struct Companion {
+    /// The autopilot port's way out.
+    outlet: Outlet,
+    asking: Asking,
+    commands: Commands,
+    heartbeat_at: Option<Instant>,
+    library: Library,
+    secure: Secure,
+    /// What the protective action asks of the autopilot, until it is sent.
+    protect: Option<protect::Request>,
+    pass: Pass,
+    settings: Settings,
+}
+
+impl Companion {
+    pub(crate) const fn new(params: &Params) -> Self {
+        Self {
+            outlet: Outlet::new(
+                params.get(Param::ApBudget) as u32,
+                params.get(Param::ApBaud) as u32,
+                WAITING_BYTES,
+            ),
+            asking: Asking::new(),
+            commands: Commands::new(),
+            heartbeat_at: None,
+            library: Library::new(),
+            secure: Secure::new(),
+            protect: None,
+            pass: Pass::new(),
+            settings: Settings::new(),
+        }
+    }
+
+    /// The rate of the autopilot's port that counts now.
+    pub(crate) const fn baud(&self) -> u32 {
+        self.outlet.baud()
+    }
+
+    /// Whether somebody stopped the record.
+    pub(crate) const fn stopped(&self) -> bool {
+        self.commands.stopped()
+    }
+
+    /// Takes the signing key out of the store: see [`secure`].
+    pub(crate) fn restore<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
+        self.secure.restore(keeper);
+    }
+
+    /// Hands over what of the signing key is due.
+    pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) {
+        let seals = [&summary.outlet.seal, &self.outlet.seal];
+        self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover);
+    }
+
+    /// A frame of the ground station's own port.
+    pub(crate) fn uplink(
+        &mut self,
+        now: Instant,
+        frame: &Frame<'_>,
+        book: &mut Logbook<'_>,
+        summary: &mut Summary,
+        sectors: &mut SectorsIn,
+        gs: &mut GsIn,
+    ) {
+        self.asked(now, Port::Gs, frame, book, sectors);
+        let mut ways = Ways { gs: &mut summary.outlet, autopilot: &mut self.outlet, queues: gs };
+        self.pass.up(now, frame, book.monitor, &mut ways);
+    }
+
+    /// Looks at a frame of the autopilot's port: an answer to us, a question, or what we need to know is there.
+    pub(crate) fn heard(
+        &mut self,
+        now: Instant,
+        frame: &Frame<'_>,
+        book: &mut Logbook<'_>,
+        summary: &mut Summary,
+        sectors: &mut SectorsIn,
+        gs: &mut GsIn,
+    ) {
+        if book.monitor.vehicle().source == Some(frame.source()) {
+            self.asking.seen(frame.id());
+            if frame.id() == 77 {
+                let fields = Fields(frame.payload());
+                let target = (fields.u8(8), fields.u8(9));
+                if messages::concerns_us(target, self.outlet.encoder.system()) {
+                    self.asking.answered(fields.u16(0), fields.u8(2));
+                }
+            }
+        }
+        self.asked(now, Port::Autopilot, frame, book, sectors);
+        self.pass_down(now, frame, book, summary, gs);
+    }
+
+    /// A frame of the autopilot's port is passed on to the ground station, if it should be.
+    pub(crate) fn pass_down(
+        &mut self,
+        now: Instant,
+        frame: &Frame<'_>,
+        book: &Logbook<'_>,
+        summary: &mut Summary,
+        gs: &mut GsIn,
+    ) {
+        let mut ways = Ways { gs: &mut summary.outlet, autopilot: &mut self.outlet, queues: gs };
+        self.pass.down(now, frame, book.monitor, &mut ways);
+    }
+
+    fn asked(
+        &mut self,
+        now: Instant,
+        port: Port,
+        frame: &Frame<'_>,
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+    ) {
+        let Some(asked) = request::read(frame) else { return };
+        let system = self.outlet.encoder.system();
+        if !messages::concerns_us(asked.target, system) {
+            return;
+        }
+        let asker = Asker { port, by: (frame.system(), frame.component()) };
+        if asker.by == (system, COMPONENT) {
+            // Our own, that came back; or somebody who says that he is us.
+            return;
+        }
+        if let Request::Key(key, stamp) = asked.request {
+            // Never for all, says the guide: only for who is named.
+            if asked.target == (system, COMPONENT) {
+                self.key_brought(now, asker, key, stamp, book, sectors);
+            }
+            return;
+        }
+        let trust = self.secure.trust(now, book.monitor.params(), port, frame);
+        match asked.request {
+            Request::ParamSet(name, value) => {
+                let Some(param) = Param::find(name) else { return };
+                let may =
+                    self.secure.may_set(book.monitor, port, param, trust) && self.commands.allows(now, port);
+                // Refused or not, the answer is the value that counts now.
+                if may && book.set_parameter(now, name, value, asker.by, sectors) {
+                    self.secure.changed(trust);
+                }
+                self.commands.replies.push(port, Reply::Param(param as u16));
+            }
+            // What is for all components of the vehicle is for the autopilot to answer, unless it is a question.
+            Request::Command(command, params) if asked.target.1 != 0 || command == commands::MESSAGE => {
+                let result = match trust {
+                    Trust::Refused => commands::DENIED,
+                    _ => self.commands.command(now, asker, command, params, book, sectors),
+                };
+                if result == commands::ACCEPTED {
+                    self.secure.changed(trust);
+                }
+                let is_broadcast = asked.target.1 == 0;
+                if !is_broadcast || result == commands::ACCEPTED {
+                    self.commands.replies.push(port, Reply::Ack(command, result, asker.by));
+                }
+            }
+            _ if trust == Trust::Refused => {}
+            _ => self.asked_for_data(now, asker, trust, &asked, book, sectors),
+        }
+    }
+
+    /// Parameters and logs are asked for.
+    fn asked_for_data(
+        &mut self,
+        now: Instant,
+        asker: Asker,
+        trust: Trust,
+        asked: &Asked<'_>,
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+    ) {
+        let replies = &mut self.commands.replies;
+        match asked.request {
+            Request::ParamList => replies.list(asker.port, TABLE.len() as u16),
+            Request::ParamAt(index) if usize::from(index) < TABLE.len() => {
+                replies.push(asker.port, Reply::Param(index));
+            }
+            Request::ParamNamed(name) => {
+                if let Some(param) = Param::find(name) {
+                    replies.push(asker.port, Reply::Param(param as u16));
+                }
+            }
+            Request::LogErase if asked.target.1 != 0 => self.erase(now, asker, trust, book, sectors),
+            // Of the broadcasts of a vehicle only those that name us: the autopilot has logs and files of its own.
+            ref about_logs if asked.target.1 != 0 => {
+                self.library.asked(asker, about_logs);
+            }
+            _ => {}
+        }
+    }
+
+    /// Earlier logs are no longer offered and are the first to make room; not in flight.
+    fn erase(
+        &mut self,
+        now: Instant,
+        Asker { port, by }: Asker,
+        trust: Trust,
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+    ) {
+        if !self.commands.allows(now, port) {
+            return;
+        }
+        let may = !book.monitor.vehicle().armed();
+        let what = if may { "logs erased" } else { "erasing refused in flight, asked" };
+        book.journal.by_hand(now, format_args!("{what} by {}/{}", by.0, by.1), sectors);
+        if may {
+            self.library.erases = true;
+            self.commands.replies.push(port, Reply::Erased);
+            self.secure.changed(trust);
+        }
+    }
+
+    /// Takes a key, if the port is trusted.
+    fn key_brought(
+        &mut self,
+        now: Instant,
+        Asker { port, by }: Asker,
+        key: Key,
+        stamp: u64,
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+    ) {
+        if !self.commands.allows(now, port) {
+            return;
+        }
+        let takes = secure::is_trusted(book.monitor.params(), port);
+        let what = match (takes, key.is_none()) {
+            (false, _) => "refused",
+            (true, false) => "set",
+            (true, true) => "removed",
+        };
+        book.journal.by_hand(now, format_args!("signing key {what} by {}/{}", by.0, by.1), sectors);
+        if takes {
+            self.secure.set_key(now, key, stamp);
+            self.commands.replies.push(port, Reply::Keyed(!key.is_none()));
+        }
+    }
+
+    /// A key at the autopilot's port is not for the record: the record says that it came.
+    pub(crate) fn withhold(
+        &mut self,
+        now: Instant,
+        frame: &Frame<'_>,
+        journal: &mut Journal<'_>,
+        sectors: &mut SectorsIn,
+    ) {
+        let (system, component) = (frame.system(), frame.component());
+        if self.commands.allows(now, Port::Autopilot) {
+            journal.by_hand(now, format_args!("a key of {system}/{component} is not recorded"), sectors);
+        }
+    }
+
+    /// What time alone asks for, every tick: our heartbeat to the autopilot, what we ask of it, settings on a card.
+    #[inline(never)]
+    pub(crate) fn converse(
+        &mut self,
+        now: Instant,
+        book: &mut Logbook<'_>,
+        summary: &mut Summary,
+        notices: &mut Notices,
+        sectors: &mut SectorsIn,
+        gs: &mut GsIn,
+    ) {
+        gs.set_path(match book.monitor.params().get(Param::GsPath) as u8 {
+            0 => Path::Nobody,
+            2 => Path::Autopilot,
+            _ => Path::Port,
+        });
+        summary.forwards = gs.path() == Path::Port;
+        if self.commands.stopped() && book.monitor.vehicle().armed() {
+            self.commands.stop_or_record(now, false, NOBODY, &mut book.journal, sectors);
+        }
+        self.secure.seal(gs.path(), book.monitor, [&mut summary.outlet, &mut self.outlet]);
+        self.tell_autopilot(now, book.monitor, gs);
+        self.settings.tick(now, &mut self.library, book, notices, sectors, &mut gs.shelf);
+    }
+
+    fn tell_autopilot(&mut self, now: Instant, monitor: &mut Monitor, gs: &mut GsIn) {
+        let Self { outlet, asking, heartbeat_at, protect, .. } = self;
+        if let Some(request) = monitor.take_request() {
+            *protect = Some(request);
+        }
+        let params = monitor.params();
+        outlet.set(now, params.get(Param::ApBudget) as u32, params.get(Param::ApBaud) as u32);
+        let mut out = |bytes: &[u8]| gs.autopilot.put(bytes);
+        if let Some(source) = monitor.vehicle().source {
+            outlet.encoder.set_system(source.system);
+            // Before it is known whose system we are part of, the autopilot need not hear of us.
+            if heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
+                && outlet.send(now, Class::Own, &summary::heartbeat(monitor), &mut out)
+            {
+                *heartbeat_at = Some(now);
+            }
+        }
+        // The protective action: what the autopilot answers is the monitor's to see.
+        if let (Some(request), Some(source)) = (*protect, monitor.vehicle().source) {
+            let packet = messages::command_long(request.command, &[], source.system, source.component);
+            if outlet.send(now, Class::Critical, &packet.u8(32, request.confirmation), &mut out) {
+                *protect = None;
+            }
+        }
+        if params.get(Param::ApStreams) > 0.5 {
+            let known = known(monitor);
+            asking.tick(now, known.as_ref(), &mut |packet| outlet.send(now, Class::Own, packet, &mut out));
+        }
+    }
+
+    /// Sends what can be sent of the answers in line.
+    pub(crate) fn answer(
+        &mut self,
+        now: Instant,
+        monitor: &Monitor,
+        identity: &Boot<'_>,
+        summary: &mut Summary,
+        gs: &mut GsIn,
+    ) {
+        let mut ways = Ways { gs: &mut summary.outlet, autopilot: &mut self.outlet, queues: gs };
+        let replies = &mut self.commands.replies;
+        for _ in 0..replies.len() {
+            let Some((port, reply)) = replies.first() else { break };
+            let packet = commands::packet(reply, monitor, identity);
+            replies.done(ways.send(now, port, Class::Own, &packet));
+        }
+        for port in Port::ALL {
+            while let Some(index) = replies.listed(port) {
+                let packet = commands::packet(Reply::Param(index), monitor, identity);
+                if !ways.send(now, port, Class::Bulk, &packet) {
+                    break;
+                }
+                replies.listed_done(port, TABLE.len() as u16);
+            }
+        }
+        // What the card answers meanwhile is not for those who download.
+        if !self.settings.is_reading() {
+            self.library.lend(now, &mut ways);
+        }
+    }
+}
+
+fn known(monitor: &Monitor) -> Option<Known> {
+    let vehicle = monitor.vehicle();
+    Some(Known {
+        source: vehicle.source?,
+        autopilot: vehicle.heartbeat.get()?.autopilot,
+        reboots: vehicle.reboots,
+        identified: vehicle.identity.get().is_some(),
+        baud: monitor.params().get(Param::ApBaud) as u32,
+    })
+}

@@ -1,0 +1,89 @@
+//! The back-channel (`GS_PASS`): one radio, at our port, serves the autopilot too. What is not for us passes unaltered,
+//! signatures and all, within each port's budget; what finds no room is lost and counted, and asked for again by whoever
+//! needs it, as on any radio.
+//!
+//! Up goes everything but what names us, what says that it comes from the vehicle itself, reports of the radio about its
+//! link with us, and keys. Down goes, beside the summary stream, what names somebody else, what answers a question
+//! without naming who asked ([`ANSWERS`]), heartbeats of the vehicle's other components, and once a second a frame of a
+//! definition that we do not have.
+
+use hums_core::Monitor;
+use hums_core::params::Param;
+use hums_core::time::{Instant, Span};
+use hums_link::encode::COMPONENT;
+use hums_link::frame::{Check, Frame};
+use hums_link::outlet::Class;
+use hums_link::request::Port;
+
+use super::secure;
+use super::ways::Ways;
+use crate::queues::Path;
+
+/// `RADIO`, `RADIO_STATUS`
+const RADIO: [u32; 2] = [166, 109];
+/// Messages that answer and name nobody: `PARAM_VALUE`, `GPS_GLOBAL_ORIGIN`, `LOG_ENTRY`, `LOG_DATA`,
+/// `MAG_CAL_PROGRESS`, `MAG_CAL_REPORT`, `CAMERA_INFORMATION`, `PROTOCOL_VERSION`, `PARAM_EXT_VALUE`,
+/// `COMPONENT_INFORMATION`, `COMPONENT_METADATA`, `EVENT`, `CURRENT_EVENT_SEQUENCE`.
+const ANSWERS: [u32; 13] = [22, 49, 118, 120, 191, 192, 259, 300, 322, 395, 397, 410, 411];
+/// Between two frames of definitions that we do not have.
+const UNKNOWN: Span = Span::from_secs(1);
+
+/// What passed, and what did not.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pass {
+    /// Frames that passed through for others, and found no room.
+    lost: u32,
+    /// When a frame of a definition that we do not have was passed down last.
+    unknown_at: Option<Instant>,
+}
+
+impl Pass {
+    pub(crate) const fn new() -> Self {
+        Self { lost: 0, unknown_at: None }
+    }
+
+    /// A frame of the ground station's port, to the autopilot.
+    pub(crate) fn up(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
+        let Some(vehicle) = monitor.vehicle().source else { return };
+        let of = (frame.system(), frame.component());
+        let pretends = of == (vehicle.system, vehicle.component) || of == (vehicle.system, COMPONENT);
+        let stays = pretends
+            || frame.target() == Some((vehicle.system, COMPONENT))
+            || frame.id() == secure::SETUP
+            || RADIO.contains(&frame.id());
+        if stays || !is_on(monitor, ways) {
+            return;
+        }
+        let sent = ways.pass(now, Port::Autopilot, Class::Forward, frame.bytes());
+        self.lost += u32::from(!sent);
+    }
+
+    /// A frame of the autopilot's port, to the ground station.
+    pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
+        if !is_on(monitor, ways) || frame.id() == secure::SETUP {
+            return;
+        }
+        let Some(vehicle) = monitor.vehicle().source else { return };
+        let names_another = |(system, _): (u8, u8)| system != 0 && system != vehicle.system;
+        let is_other = frame.component() != vehicle.component || frame.system() != vehicle.system;
+        let passes = if frame.check() == Check::Unverified {
+            let due = self.unknown_at.is_none_or(|at| now.since(at) >= UNKNOWN);
+            if due {
+                self.unknown_at = Some(now);
+            }
+            due
+        } else {
+            frame.target().is_some_and(names_another) && frame.id() != 77
+                || ANSWERS.contains(&frame.id())
+                || frame.id() == 0 && is_other
+        };
+        if passes {
+            let sent = ways.pass(now, Port::Gs, Class::Bulk, frame.bytes());
+            self.lost += u32::from(!sent);
+        }
+    }
+}
+
+fn is_on(monitor: &Monitor, ways: &Ways) -> bool {
+    ways.queues.path() == Path::Port && monitor.params().get(Param::GsPass) > 0.5
+}

@@ -1,0 +1,207 @@
+//! Who may do what: signatures of what is asked, keys, and what of it outlives power.
+//!
+//! `GS_SIGN` and `AP_SIGN` say how a port is guarded once there is a key: 0 not at all; 1 our frames are signed, and what
+//! is signed has to be right; 2 whatever is not signed is refused as well. A refused setting is answered with the value
+//! that stays, a refused command with "denied", and anything else not at all.
+//!
+//! # Where a key comes from
+//! With `SETUP_SIGNING`, over the port that `SIGN_PORT` trusts: none, unless the card's `PARAMS.TXT` says so. Not the
+//! autopilot's by default, because ArduPilot routes that message like any other that names us, from its own radio too.
+//! `SIGN_PORT` is changed over the trusted port, with a signature, or by the card, and so are the other two while there
+//! is a key: whoever guards the door may open it.
+//!
+//! # Where a key never goes
+//! It is no parameter and no message of ours. A `SETUP_SIGNING` at the autopilot's port, for whomever it is, is the one
+//! frame that is not recorded, as the signing guide asks of logs; an event says that it came. It is not passed on.
+
+use embedded_storage::nor_flash::NorFlash;
+use hums_core::Monitor;
+use hums_core::params::{Param, Params};
+use hums_core::time::{Instant, Span};
+use hums_link::frame::Frame;
+use hums_link::outlet::Outlet;
+use hums_link::request::Port;
+use hums_link::signing::{KEY_BYTES, Key, Seal, Signing, Times, Verdict, stamp};
+use hums_store::Key as Item;
+
+use crate::persist::{Handover, Keeper};
+use crate::queues::Path;
+
+/// Numbers of stored items: the key, and [`Times`] as three `u64`.
+const ITEM_KEY: u8 = 32;
+const ITEM_TIMES: u8 = 33;
+const TIMES_BYTES: usize = 24;
+/// `SETUP_SIGNING`
+pub(crate) const SETUP: u32 = 256;
+/// Times are stored no more often.
+const SAVE: Span = Span::from_secs(1);
+/// Link ids: the summary stream and the answers at the ground station's port, and what goes to the autopilot.
+const LINKS: [u8; 2] = [0, 1];
+
+/// How a port is guarded now: 0 to 2.
+fn guard(params: &Params, port: Port) -> u8 {
+    params.get(match port {
+        Port::Gs => Param::GsSign,
+        Port::Autopilot => Param::ApSign,
+    }) as u8
+}
+
+/// Whether a port may bring a key.
+pub(crate) fn is_trusted(params: &Params, port: Port) -> bool {
+    params.get(Param::SignPort) as u8 == port as u8 + 1
+}
+
+/// What a request is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Trust {
+    /// Nobody asks for more.
+    Open,
+    /// It is signed with our key.
+    Signed,
+    /// It should be signed and is not, or not rightly.
+    Refused,
+}
+
+/// The monitor's part of signing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Secure {
+    signing: Signing,
+    times: Times,
+    key_due: bool,
+    times_due: bool,
+    saved_at: Option<Instant>,
+    /// Stamps of ours go on from here.
+    last: u64,
+    /// How often the store had been made anew when the key was handed over.
+    remade: u32,
+    /// Requests that were refused for their signature.
+    refused: u32,
+}
+
+impl Secure {
+    pub(crate) const fn new() -> Self {
+        Self {
+            signing: Signing::new(),
+            times: Times { accepted: 0, used: 0, time: 0 },
+            key_due: false,
+            times_due: false,
+            saved_at: None,
+            last: 0,
+            remade: 0,
+            refused: 0,
+        }
+    }
+
+    /// Takes the key and its times out of the store. At power-on, before anything is sent.
+    pub(crate) fn restore<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
+        let mut bytes = [0; KEY_BYTES];
+        let key = (keeper.item(ITEM_KEY, &mut bytes) == KEY_BYTES).then_some(Key(bytes));
+        let mut bytes = [0; TIMES_BYTES];
+        let len = keeper.item(ITEM_TIMES, &mut bytes);
+        if let ([accepted, used, time], []) = bytes.as_chunks::<8>()
+            && len == TIMES_BYTES
+        {
+            let number = |bytes: &[u8; 8]| u64::from_le_bytes(*bytes);
+            self.times = Times { accepted: number(accepted), used: number(used), time: number(time) };
+            self.last = self.times.used;
+        }
+        self.signing.restore(key, self.times);
+    }
+
+    /// Hands over what is due, at every tick and at the end. `last` is the highest stamp that was signed with.
+    pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) {
+        let Self { signing, times, key_due, times_due, saved_at, remade, .. } = self;
+        if core::mem::replace(remade, handover.remade()) != handover.remade() {
+            (*key_due, *times_due) = (signing.key().is_some(), signing.key().is_some());
+        }
+        if *key_due {
+            let bytes = signing.key().map_or([0; KEY_BYTES], |key| key.0);
+            *key_due = !handover.put(Item::item(ITEM_KEY), &bytes);
+        }
+        if let Some(last) = last {
+            *times_due |= times.keep_ahead(signing.clock.now(now), last);
+        }
+        if *times_due && saved_at.is_none_or(|at| now.since(at) >= SAVE) {
+            let mut bytes = [0; TIMES_BYTES];
+            let numbers = [times.accepted, times.used, times.time];
+            for (bytes, number) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(numbers) {
+                *bytes = number.to_le_bytes();
+            }
+            if handover.put(Item::item(ITEM_TIMES), &bytes) {
+                (*times_due, *saved_at) = (false, Some(now));
+            }
+        }
+    }
+
+    /// What a frame's signature is worth on this port.
+    pub(crate) fn trust(&mut self, now: Instant, params: &Params, port: Port, frame: &Frame<'_>) -> Trust {
+        let guard = guard(params, port);
+        if guard == 0 || self.signing.key().is_none() {
+            return Trust::Open;
+        }
+        match self.signing.judge(now, frame) {
+            Verdict::Good => Trust::Signed,
+            Verdict::Unsigned if guard == 1 => Trust::Open,
+            Verdict::Unsigned | Verdict::Wrong | Verdict::Replayed => {
+                self.refused = self.refused.saturating_add(1);
+                Trust::Refused
+            }
+        }
+    }
+
+    /// Something was changed; if by a signed frame, no frame that is older changes anything ever again.
+    pub(crate) fn changed(&mut self, trust: Trust) {
+        if trust == Trust::Signed {
+            self.times.accepted = self.signing.latest();
+            self.times_due = true;
+        }
+    }
+
+    /// Whether a request that is worth so much may set a parameter.
+    pub(crate) fn may_set(&self, monitor: &Monitor, port: Port, param: Param, trust: Trust) -> bool {
+        let guards = match param {
+            Param::SignPort => true,
+            Param::GsSign | Param::ApSign => self.signing.key().is_some(),
+            _ => false,
+        };
+        // With another rate at its port nothing is recorded any longer.
+        let deafens = param == Param::ApBaud && monitor.vehicle().armed();
+        match trust {
+            Trust::Refused => false,
+            _ if deafens => false,
+            Trust::Signed => true,
+            Trust::Open => !guards || is_trusted(monitor.params(), port),
+        }
+    }
+
+    /// Takes a key that a trusted port brought.
+    pub(crate) fn set_key(&mut self, now: Instant, key: Key, stamp: u64) {
+        if self.signing.key() != Some(&key) {
+            self.last = 0;
+        }
+        self.signing.set(now, key, stamp);
+        self.times =
+            Times { accepted: self.signing.latest(), used: self.last, time: self.signing.clock.now(now) };
+        (self.key_due, self.times_due) = (true, true);
+    }
+
+    /// Keeps both ways out signing as they should, in our time: the summary stream's, and the autopilot's.
+    pub(crate) fn seal(&mut self, path: Path, monitor: &Monitor, outlets: [&mut Outlet; 2]) {
+        let params = monitor.params();
+        let carries = if path == Path::Autopilot { Port::Autopilot } else { Port::Gs };
+        let guards = [guard(params, carries), guard(params, Port::Autopilot)];
+        let Self { signing, last, .. } = self;
+        let time = &monitor.vehicle().time;
+        if let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) {
+            signing.clock.is_at_least(at, stamp(utc_micros));
+        }
+        for ((outlet, link), guard) in outlets.into_iter().zip(LINKS).zip(guards) {
+            match (signing.key().filter(|_| guard > 0), &mut outlet.seal) {
+                (Some(key), Some(seal)) if seal.is_of(key) => seal.clock = signing.clock,
+                (Some(key), seal) => *seal = Some(Seal::new(*key, link, signing.clock, *last)),
+                // Who signs again goes on from there.
+                (None, seal) => *last = seal.take().map_or(*last, |seal| seal.last().max(*last)),
+            }
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! `PARAMS.TXT` on the card: parameters for whoever has the card in hand, in the form that ground stations keep them.
+//!
+//! Read once when a card is found, unless the vehicle is armed by then; each line is set, recorded and kept as if a
+//! ground station had set it, at every power-on as long as the file is there. A line that cannot be set is an event in
+//! the record and a text for the ground station. [`BYTES_MAX`] of the file are read, [`LINE_MAX`] of a line.
+
+use hums_core::time::Instant;
+use hums_link::param_line::{self, Line};
+use hums_recorder::CardState;
+
+use super::library::Library;
+use crate::journal::Logbook;
+use crate::notices::Notices;
+use crate::queues::SectorsIn;
+use crate::shelf::{DATA_MAX, Reader, Want, What, Which};
+
+/// All parameters, each in the longest line.
+const BYTES_MAX: u32 = 16 * 1024;
+/// A line without its comment.
+const LINE_MAX: usize = 64;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// There is no card.
+    NoCard,
+    /// The bytes from here on are asked for.
+    Reading(u32),
+    /// It was read, or there is none.
+    Done,
+}
+
+/// How far it is read.
+#[derive(Clone, Debug)]
+pub(crate) struct Settings {
+    state: State,
+    ticket: Option<u16>,
+    line: heapless::Vec<u8, LINE_MAX>,
+    /// The line is longer than there is room.
+    long: bool,
+    number: u16,
+    refused: u16,
+}
+
+impl Settings {
+    pub(crate) const fn new() -> Self {
+        Self {
+            state: State::NoCard,
+            ticket: None,
+            line: heapless::Vec::new(),
+            long: false,
+            number: 0,
+            refused: 0,
+        }
+    }
+
+    /// Whether what the card answers is ours.
+    pub(crate) const fn is_reading(&self) -> bool {
+        matches!(self.state, State::Reading(_))
+    }
+
+    /// A byte of the file; `true` at the end of a line.
+    fn take(&mut self, byte: u8) -> bool {
+        if byte != b'\n' {
+            let comment = self.line.contains(&b'#');
+            self.long |= !comment && self.line.push(byte).is_err();
+        }
+        byte == b'\n'
+    }
+
+    /// Reads on, a piece at a tick.
+    pub(crate) fn tick(
+        &mut self,
+        now: Instant,
+        library: &mut Library,
+        book: &mut Logbook<'_>,
+        notices: &mut Notices,
+        sectors: &mut SectorsIn,
+        shelf: &mut Reader<'_>,
+    ) {
+        let has_card = book.card.read().state == CardState::Recording;
+        match self.state {
+            State::NoCard if has_card => {
+                let armed = book.monitor.vehicle().armed();
+                let state = if armed { State::Done } else { State::Reading(0) };
+                *self = Self { state, ..Self::new() };
+            }
+            State::Done if !has_card => self.state = State::NoCard,
+            State::Reading(offset) => {
+                self.read_on(now, offset, library, book, sectors, shelf);
+                if self.state == State::Done && self.refused > 0 {
+                    let text = "HUMS: PARAMS.TXT: lines refused, correct them";
+                    notices.note(now, 4, text, &mut book.journal, sectors);
+                }
+            }
+            State::NoCard | State::Done => {}
+        }
+    }
+
+    fn read_on(
+        &mut self,
+        now: Instant,
+        offset: u32,
+        library: &mut Library,
+        book: &mut Logbook<'_>,
+        sectors: &mut SectorsIn,
+        shelf: &mut Reader<'_>,
+    ) {
+        let Some(ticket) = self.ticket else {
+            let ticket = library.next_ticket();
+            if shelf.want(Want { ticket, which: Which::Settings, what: What::Data(offset) }) {
+                self.ticket = Some(ticket);
+            }
+            return;
+        };
+        let mut piece = heapless::Vec::<u8, DATA_MAX>::new();
+        let mut bytes = None;
+        shelf.answer(|answer, data| {
+            if answer.ticket == ticket {
+                bytes = Some(answer.bytes.min(BYTES_MAX));
+                // Fits: an answer is never longer.
+                let _ = piece.extend_from_slice(data);
+            }
+            true
+        });
+        let Some(bytes) = bytes else { return };
+        self.ticket = None;
+        for byte in &piece {
+            if self.take(*byte) {
+                self.line(now, book, sectors);
+            }
+        }
+        let next = offset + piece.len() as u32;
+        if !piece.is_empty() && next < bytes {
+            self.state = State::Reading(next);
+            return;
+        }
+        self.line(now, book, sectors);
+        self.state = State::Done;
+    }
+
+    /// Sets what a line says.
+    fn line(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+        self.number = self.number.saturating_add(1);
+        let (number, long) = (self.number, core::mem::take(&mut self.long));
+        let line = core::mem::take(&mut self.line);
+        let set = match core::str::from_utf8(&line).map(param_line::read) {
+            _ if long => false,
+            Ok(Line::Nothing) => true,
+            Ok(Line::Set(name, value)) => param_line::value(value)
+                .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),
+            Ok(Line::Wrong) | Err(_) => false,
+        };
+        if !set {
+            self.refused = self.refused.saturating_add(1);
+            book.journal.by_hand(now, format_args!("PARAMS.TXT: line {number} is refused"), sectors);
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! The ways out: each port's outlet, which says what may go when, with the queue behind it.
+
+use hums_core::time::Instant;
+use hums_link::outlet::{Class, Outlet};
+use hums_link::packet::Packet;
+use hums_link::request::Port;
+
+use crate::queues::GsIn;
+
+/// Both ports' ways out, lent for one call.
+pub(crate) struct Ways<'w, 'q> {
+    pub(crate) gs: &'w mut Outlet,
+    pub(crate) autopilot: &'w mut Outlet,
+    pub(crate) queues: &'w mut GsIn<'q>,
+}
+
+impl Ways<'_, '_> {
+    /// Sends a message of ours, if its port's budget allows.
+    pub(crate) fn send(&mut self, now: Instant, port: Port, class: Class, packet: &Packet) -> bool {
+        let Self { gs, autopilot, queues } = self;
+        match port {
+            Port::Gs => gs.send(now, class, packet, &mut |bytes| queues.put(bytes)),
+            Port::Autopilot => autopilot.send(now, class, packet, &mut |bytes| queues.autopilot.put(bytes)),
+        }
+    }
+
+    /// Passes a frame of somebody else's on, likewise.
+    pub(crate) fn pass(&mut self, now: Instant, port: Port, class: Class, frame: &[u8]) -> bool {
+        let Self { gs, autopilot, queues } = self;
+        match port {
+            Port::Gs => gs.pass(now, class, frame, &mut |bytes| queues.put(bytes)),
+            Port::Autopilot => autopilot.pass(now, class, frame, &mut |bytes| queues.autopilot.put(bytes)),
+        }
+    }
+
+    /// The longest bulk frame that a port's budget lets through.
+    pub(crate) fn bulk_frame_max(&self, port: Port) -> usize {
+        match port {
+            Port::Gs => self.gs.bulk_frame_max(),
+            Port::Autopilot => self.autopilot.bulk_frame_max(),
+        }
+    }
+}

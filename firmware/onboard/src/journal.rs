@@ -1,0 +1,129 @@
+//! The record's writing end for the whole monitor task: frames and records go in, and what finds no room is a counted
+//! loss. With it, what most records are about: the monitor's knowledge and the card's state.
+
+use core::fmt::{Arguments, Write as _};
+
+use hums_blackbox::record::{Event, Loss, Lost, Parameter, Record};
+use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
+use hums_core::Monitor;
+use hums_core::time::Instant;
+use hums_link::text::Text;
+use hums_recorder::status::CardStatus;
+
+use crate::loss::Losses;
+use crate::queues::SectorsIn;
+
+/// Number of the event that records what somebody did over a link.
+const BY_HAND: u8 = 12;
+
+/// Who did something: MAVLink system and component id; 0, 0 is the monitor itself.
+pub(crate) type By = (u8, u8);
+
+/// The writer, and what could not be written.
+pub(crate) struct Journal<'a> {
+    writer: &'a mut Writer,
+    losses: Losses,
+    /// Frames that found no room in the sector queue.
+    refused: u64,
+}
+
+impl<'a> Journal<'a> {
+    pub(crate) const fn new(writer: &'a mut Writer) -> Self {
+        Self { writer, losses: Losses::new(), refused: 0 }
+    }
+
+    /// Writes a frame, where that leaves the reserve to records.
+    pub(crate) fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool, sectors: &mut SectorsIn) {
+        if self.writer.frame(at, bytes, verified, sectors).is_err() {
+            self.refused += 1;
+            self.lose(at, Lost::QueueFull, 1);
+        }
+    }
+
+    /// Writes a record, from the reserve if need be; whether there was room. Where there was none it is a loss.
+    pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
+        let written = sectors.with_reserve(|sink| self.writer.record(now, record, sink)).is_ok();
+        if !written {
+            self.lose(now, Lost::Records, 1);
+        }
+        written
+    }
+
+    /// Records that somebody did something; what does not fit into 50 characters is cut.
+    pub(crate) fn by_hand(&mut self, now: Instant, what: Arguments<'_>, sectors: &mut SectorsIn) {
+        let mut text = Text::default();
+        // Cut where it is full.
+        let _ = text.write_fmt(what);
+        self.record(now, &Record::Event(Event { number: BY_HAND, text: text.as_str() }), sectors);
+    }
+
+    /// Counts a loss, to be recorded.
+    pub(crate) fn lose(&mut self, now: Instant, what: Lost, count: u64) {
+        self.losses.count(now, what, count);
+    }
+
+    /// Records the losses whose time has come, or, at the end, all.
+    // Not within its caller: what one step of a tick takes of the stack is not to lie below what another takes.
+    #[inline(never)]
+    pub(crate) fn record_losses(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
+        let Self { losses, writer, .. } = self;
+        let mut write =
+            |loss: &Loss| sectors.with_reserve(|sink| writer.record(now, &Record::Loss(*loss), sink)).is_ok();
+        losses.flush(now, all, &mut write);
+    }
+
+    /// Frames that found no room.
+    pub(crate) const fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// What was written.
+    pub(crate) const fn counters(&self) -> Counters {
+        self.writer.counters()
+    }
+
+    /// The writer itself, for [`crate::keeping`].
+    pub(crate) const fn writer(&mut self) -> &mut Writer {
+        self.writer
+    }
+
+    /// Gives storage a copy of the sector in progress.
+    #[inline(never)]
+    pub(crate) fn partial(&self, sectors: &mut SectorsIn) {
+        let mut copy = Sector::zeroed();
+        if self.writer.partial(&mut copy) {
+            sectors.put(&copy);
+        }
+    }
+}
+
+/// What the monitor knows, and where it is written down.
+pub(crate) struct Logbook<'a> {
+    /// Lent, as the writer is: either is too large to be moved over the firmware's stack.
+    pub(crate) monitor: &'a mut Monitor,
+    pub(crate) journal: Journal<'a>,
+    pub(crate) card: &'a CardStatus,
+}
+
+impl Logbook<'_> {
+    /// Sets a parameter because somebody asked for it: recorded, and in force at once. `false` where it is refused.
+    pub(crate) fn set_parameter(
+        &mut self,
+        now: Instant,
+        name: &str,
+        value: f32,
+        by: By,
+        sectors: &mut SectorsIn,
+    ) -> bool {
+        let params = self.monitor.params_mut();
+        let before = params.iter().find(|(spec, _)| spec.name == name).map(|(_, value)| value.to_bits());
+        if params.set(name, value).is_err() {
+            return false;
+        }
+        if before != Some(value.to_bits()) {
+            let parameter = Parameter { name, value: f64::from(value), changed: true, by };
+            self.journal.record(now, &Record::Parameter(parameter), sectors);
+        }
+        true
+    }
+}

@@ -1,0 +1,189 @@
+//! All queues: one writer and one reader each, nobody ever waits, a full queue is a counted loss.
+//!
+//! | queue | from | to | capacity | when it is full |
+//! |---|---|---|---|---|
+//! | frames | reception | monitor | [`FRAME_QUEUE_BYTES`] | the frame is lost, counted in [`crate::PortStatus`] |
+//! | sectors | monitor | storage | [`SECTOR_QUEUE_SECTORS`] | frames are refused before they are encoded, and counted; [`SECTOR_RESERVE`] stays for records |
+//! | GS | monitor | downlink | [`GS_QUEUE_BYTES`] | the frame is lost, counted; the summary stream repeats what matters |
+//! | uplink | uplink | monitor | [`UPLINK_QUEUE_BYTES`] | the frame is lost, counted; whoever asks the ground station's port must ask again |
+//! | autopilot | monitor | requests | [`AUTOPILOT_QUEUE_BYTES`] | the frame is lost, counted; requests are repeated |
+
+mod capacities;
+mod frames;
+mod level;
+mod ports;
+mod sectors;
+
+use bbqueue::nicknames::Churrasco;
+use heapless::spsc;
+use hums_blackbox::Sector;
+pub use hums_link::encode::FRAME_BYTES_MAX;
+
+use crate::shelf::{Server, Shelf};
+pub use capacities::{
+    AUTOPILOT_QUEUE_BYTES, FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS,
+    SECTOR_RESERVE, UPLINK_QUEUE_BYTES,
+};
+pub use frames::{FramesIn, FramesOut, UplinkIn, UplinkOut};
+use level::Level;
+pub use ports::{AutopilotOut, GsIn, GsOut, Path, PortIn, PortOut};
+pub use sectors::{SectorsIn, SectorsOut};
+
+// The queue keeps one place empty to tell full from empty.
+type SectorQueue = spsc::Queue<Sector, { SECTOR_QUEUE_SECTORS + 1 }>;
+const _: () = assert!(size_of::<SectorQueue>() <= 72 * 1024);
+const _: () = assert!(SECTOR_QUEUE_BYTES >= 66 * 1024);
+
+type FrameQueue = Churrasco<FRAME_QUEUE_BYTES>;
+type GsQueue = Churrasco<GS_QUEUE_BYTES>;
+type UplinkQueue = Churrasco<UPLINK_QUEUE_BYTES>;
+type AutopilotQueue = Churrasco<AUTOPILOT_QUEUE_BYTES>;
+
+/// All queues of the firmware; one static.
+pub struct Queues {
+    frames: FrameQueue,
+    gs: GsQueue,
+    uplink: UplinkQueue,
+    autopilot: AutopilotQueue,
+    sectors: SectorQueue,
+    shelf: Shelf,
+    levels: [Level; 4],
+}
+
+/// The ends of all queues, each for one task.
+pub struct Ends<'a> {
+    /// For reception.
+    pub frames_in: FramesIn<'a>,
+    /// For the monitor.
+    pub frames_out: FramesOut<'a>,
+    /// For the monitor.
+    pub sectors_in: SectorsIn<'a>,
+    /// For storage.
+    pub sectors_out: SectorsOut<'a>,
+    /// For the monitor.
+    pub gs_in: GsIn<'a>,
+    /// For the downlink.
+    pub gs_out: GsOut<'a>,
+    /// For the uplink.
+    pub uplink_in: UplinkIn<'a>,
+    /// For the monitor.
+    pub uplink_out: UplinkOut<'a>,
+    /// For storage.
+    pub shelf: Server<'a>,
+    /// For the task that sends to the autopilot.
+    pub autopilot_out: AutopilotOut<'a>,
+}
+
+impl Default for Queues {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Queues {
+    /// Empty queues.
+    pub const fn new() -> Self {
+        Self {
+            frames: Churrasco::new(),
+            gs: Churrasco::new(),
+            uplink: Churrasco::new(),
+            autopilot: Churrasco::new(),
+            sectors: spsc::Queue::new(),
+            shelf: Shelf::new(),
+            levels: [const { Level::new() }; 4],
+        }
+    }
+
+    /// Hands out the ends, once.
+    pub fn split(&mut self) -> Ends<'_> {
+        let (sectors_in, sectors_out) = self.sectors.split();
+        let (reader, shelf) = self.shelf.split();
+        let [frames, gs, uplink, autopilot] = &self.levels;
+        Ends {
+            frames_in: FramesIn(self.frames.framed_producer(), frames),
+            frames_out: FramesOut(self.frames.framed_consumer(), frames),
+            sectors_in: SectorsIn { queue: sectors_in, reserve: SECTOR_RESERVE, deepest: 0 },
+            sectors_out: SectorsOut(sectors_out),
+            gs_in: GsIn {
+                gs: PortIn::new(self.gs.framed_producer(), gs),
+                autopilot: PortIn::new(self.autopilot.framed_producer(), autopilot),
+                shelf: reader,
+                path: Path::Port,
+            },
+            shelf,
+            gs_out: PortOut(self.gs.framed_consumer(), gs),
+            uplink_in: FramesIn(self.uplink.framed_producer(), uplink),
+            uplink_out: FramesOut(self.uplink.framed_consumer(), uplink),
+            autopilot_out: PortOut(self.autopilot.framed_consumer(), autopilot),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::frames::STAMP_BYTES;
+    use hums_blackbox::SectorSink as _;
+
+    use super::*;
+
+    #[test]
+    fn a_full_frame_queue_refuses_and_keeps_what_it_has() {
+        let mut queues = Box::new(Queues::new());
+        let mut ends = queues.split();
+        let mut taken = 0;
+        while ends.frames_in.put(taken, true, &[taken as u8; 100]) {
+            taken += 1;
+        }
+        assert!(taken as usize >= FRAME_QUEUE_BYTES / 120, "{taken} frames of 100 bytes");
+        for expected in 0..taken {
+            let mut seen = false;
+            ends.frames_out.take(|at, verified, frame| {
+                seen = (at, verified, frame) == (expected, true, &[expected as u8; 100][..]);
+            });
+            assert!(seen, "frame {expected}");
+        }
+        assert!(!ends.frames_out.take(|_, _, _| panic!("the queue should be empty")));
+    }
+
+    #[test]
+    fn how_full_a_queue_was_is_remembered_when_it_is_empty_again() {
+        let mut queues = Box::new(Queues::new());
+        let mut ends = queues.split();
+        let mut out = [0; FRAME_BYTES_MAX];
+        for frames in [3, 1] {
+            for _ in 0..frames {
+                ends.frames_in.put(0, true, &[1; 50]);
+                ends.gs_in.put(&[7; 100]);
+            }
+            while ends.frames_out.take(|_, _, _| {}) && ends.gs_out.take(&mut out).is_some() {}
+            assert_eq!(ends.frames_in.bytes_max(), 3 * (50 + STAMP_BYTES as u32));
+            assert_eq!(ends.gs_in.bytes_max(), 300);
+        }
+    }
+
+    #[test]
+    fn the_reserve_is_kept_for_records() {
+        let mut queues = Box::new(Queues::new());
+        let mut ends = queues.split();
+        let sector = Sector::zeroed();
+        while ends.sectors_in.room() > 0 {
+            ends.sectors_in.put(&sector);
+        }
+        assert_eq!(ends.sectors_in.len(), SECTOR_QUEUE_SECTORS - SECTOR_RESERVE);
+        assert_eq!(ends.sectors_in.with_reserve(|sink| sink.room()), SECTOR_RESERVE);
+        assert_eq!(ends.sectors_in.room(), 0);
+    }
+
+    #[test]
+    fn a_full_gs_queue_counts_what_it_refuses() {
+        let mut queues = Box::new(Queues::new());
+        let mut ends = queues.split();
+        for _ in 0..100 {
+            ends.gs_in.put(&[7; 100]);
+        }
+        assert_eq!(ends.gs_in.frames() + ends.gs_in.lost(), 100);
+        assert!(ends.gs_in.lost() > 0);
+        let mut out = [0; FRAME_BYTES_MAX];
+        assert_eq!(ends.gs_out.take(&mut out), Some(100));
+    }
+}

@@ -1,0 +1,137 @@
+//! What leaves by the ports: a queue each, and which way the summary stream goes.
+
+use bbqueue::nicknames::Churrasco;
+use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
+use hums_link::encode::FRAME_BYTES_MAX;
+
+use super::capacities::{AUTOPILOT_QUEUE_BYTES, GS_QUEUE_BYTES};
+use super::level::Level;
+use crate::shelf::Reader;
+
+/// The monitor's ends of what is around it: both ports, and the logs on the card.
+pub struct GsIn<'a> {
+    pub(super) gs: PortIn<'a, GS_QUEUE_BYTES>,
+    /// To the autopilot.
+    pub autopilot: PortIn<'a, AUTOPILOT_QUEUE_BYTES>,
+    /// To storage and back: the logs on the card.
+    pub shelf: Reader<'a>,
+    pub(super) path: Path,
+}
+
+/// The way of the summary stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// There is none.
+    Nobody,
+    /// A radio at the ground station's port.
+    Port,
+    /// The autopilot carries it.
+    Autopilot,
+}
+
+impl GsIn<'_> {
+    /// Queues a frame for the GS, or counts it lost.
+    pub fn put(&mut self, frame: &[u8]) {
+        self.gs.put(frame);
+    }
+
+    /// Queues a frame of the summary stream, on its way.
+    pub fn tell(&mut self, frame: &[u8]) {
+        match self.path {
+            Path::Nobody => {}
+            Path::Port => self.gs.put(frame),
+            Path::Autopilot => self.autopilot.put(frame),
+        }
+    }
+
+    /// The way of the summary stream.
+    pub const fn path(&self) -> Path {
+        self.path
+    }
+
+    /// Another way for the summary stream.
+    pub const fn set_path(&mut self, path: Path) {
+        self.path = path;
+    }
+
+    /// Frames queued since power-on.
+    pub const fn frames(&self) -> u64 {
+        self.gs.frames
+    }
+
+    /// Bytes queued since power-on.
+    pub const fn bytes(&self) -> u64 {
+        self.gs.bytes
+    }
+
+    /// Frames that found the queue full.
+    pub const fn lost(&self) -> u64 {
+        self.gs.lost
+    }
+
+    /// The most bytes that waited for the GS port at once.
+    pub fn bytes_max(&self) -> u32 {
+        self.gs.level.max()
+    }
+}
+
+/// The writing end of a port's queue, with what went in.
+pub struct PortIn<'a, const BYTES: usize> {
+    queue: FramedProducer<&'a Churrasco<BYTES>>,
+    level: &'a Level,
+    frames: u64,
+    bytes: u64,
+    lost: u64,
+}
+
+impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
+    pub(super) const fn new(queue: FramedProducer<&'a Churrasco<BYTES>>, level: &'a Level) -> Self {
+        Self { queue, level, frames: 0, bytes: 0, lost: 0 }
+    }
+
+    /// Queues a frame, or counts it lost.
+    pub fn put(&mut self, frame: &[u8]) {
+        let len = frame.len() as u16;
+        let Ok(mut grant) = self.queue.grant(len) else {
+            self.lost += 1;
+            return;
+        };
+        grant.copy_from_slice(frame);
+        self.level.rise(frame.len());
+        grant.commit(len);
+        self.frames += 1;
+        self.bytes += frame.len() as u64;
+    }
+
+    /// Frames queued since power-on.
+    pub const fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Frames that found the queue full.
+    pub const fn lost(&self) -> u64 {
+        self.lost
+    }
+}
+
+/// The reading end of a port's queue.
+pub struct PortOut<'a, const BYTES: usize>(
+    pub(super) FramedConsumer<&'a Churrasco<BYTES>>,
+    pub(super) &'a Level,
+);
+/// The GS queue's reading end.
+pub type GsOut<'a> = PortOut<'a, GS_QUEUE_BYTES>;
+/// The autopilot queue's reading end.
+pub type AutopilotOut<'a> = PortOut<'a, AUTOPILOT_QUEUE_BYTES>;
+
+impl<const BYTES: usize> PortOut<'_, BYTES> {
+    /// Copies the oldest frame into `out` and takes it out of the queue; its length, or `None` when there is none.
+    pub fn take(&mut self, out: &mut [u8; FRAME_BYTES_MAX]) -> Option<usize> {
+        let grant = self.0.read().ok()?;
+        let len = grant.len().min(out.len());
+        out[..len].copy_from_slice(&grant[..len]);
+        self.1.fall(grant.len());
+        grant.release();
+        Some(len)
+    }
+}

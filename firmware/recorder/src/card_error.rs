@@ -1,0 +1,63 @@
+//! Why a card cannot do what it was asked to.
+
+use core::fmt;
+
+use embedded_sdmmc::Error;
+
+use crate::gate::GateError;
+use crate::layout::LayoutError;
+
+/// Why a card operation failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CardError<E> {
+    /// The card failed or was pulled.
+    Device(E),
+    /// The card cannot be used as it is.
+    Foreign(LayoutError<E>),
+    /// The file system on it is damaged.
+    Damaged,
+    /// No free clusters.
+    Full,
+    /// There is no such segment.
+    NotFound,
+    /// No segment is open.
+    NotOpen,
+}
+
+impl<E: fmt::Debug> fmt::Display for CardError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Device(error) => write!(f, "the card failed: {error:?}"),
+            Self::Foreign(why) => write!(f, "{why}"),
+            Self::Damaged => {
+                write!(f, "the card's file system is damaged: copy its files, then format it as FAT32")
+            }
+            Self::Full => write!(f, "the card is full and holds no log to overwrite: delete other files"),
+            Self::NotFound => write!(f, "there is no such log"),
+            Self::NotOpen => write!(f, "no log is open"),
+        }
+    }
+}
+
+impl<E> From<Error<GateError<E>>> for CardError<E>
+where
+    GateError<E>: core::error::Error,
+{
+    fn from(error: Error<GateError<E>>) -> Self {
+        match error {
+            Error::DeviceError(GateError::Device(error)) => Self::Device(error),
+            Error::NotEnoughSpace | Error::DiskFull => Self::Full,
+            Error::NotFound => Self::NotFound,
+            _ => Self::Damaged,
+        }
+    }
+}
+
+impl<E> From<GateError<E>> for CardError<E> {
+    fn from(error: GateError<E>) -> Self {
+        match error {
+            GateError::Device(error) => Self::Device(error),
+            GateError::Refused | GateError::Runaway => Self::Damaged,
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Which segment is written: the session's next one, made where there is room and else in the place of the oldest.
+
+use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
+use hums_core::time::Instant;
+
+use crate::CardDevice;
+use crate::card::{Card, CardError, LogEntry};
+use crate::name::LogName;
+use crate::ring::{self, Ring};
+use crate::status::{CardState, CardStatus};
+
+/// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
+pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
+/// Segments that even a small card should hold, so that overwriting the oldest loses little.
+const SEGMENTS_MIN: u64 = 16;
+
+/// The session's log on the card that is in.
+#[derive(Clone, Copy)]
+pub(super) struct Log {
+    pub(super) name: LogName,
+    /// What seals its sectors.
+    pub(super) session: u32,
+    volume_id: u32,
+    /// The sector number at block 0 of the open segment; `None` before the first sector.
+    pub(super) base: Option<u32>,
+    /// Where the next partial sector goes: at its own place, or one further.
+    pub(super) partial_further: bool,
+}
+
+/// The session's segments on whatever card is there.
+pub(super) struct Segments<'a> {
+    status: &'a CardStatus,
+    /// Any number that differs from one power-on to the next.
+    entropy: u32,
+    pub(super) log: Option<Log>,
+    /// The segments of a disarmed vehicle.
+    pub(super) ring: Ring,
+}
+
+impl<'a> Segments<'a> {
+    pub(super) const fn new(status: &'a CardStatus, entropy: u32) -> Self {
+        Self { status, entropy, log: None, ring: Ring::new() }
+    }
+
+    /// A number for a card that is formatted now.
+    pub(super) const fn volume_id(&self, now: Instant) -> u32 {
+        mix(self.entropy, now.as_micros() as u32)
+    }
+
+    /// Opens a segment on a card just mounted: the session goes on where the same card came back, and is a new one on
+    /// another card. Whether it is another one than the group's beginning was written to.
+    pub(super) fn begin<D: CardDevice>(
+        &mut self,
+        now: Instant,
+        card: &mut Card<'_, D>,
+    ) -> Result<bool, CardError<D::Error>> {
+        let volume_id = card.layout().volume_id;
+        let newest = survey(card, LogName { session: 0, segment: 0 })?.newest;
+        let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
+        let log = if let Some(log) = resumed {
+            log
+        } else {
+            let name = newest.map_or(Some(LogName { session: 1, segment: 0 }), LogName::next_session);
+            // The numbers end at 99,999; the last session number then goes on with its segments.
+            let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
+            let session = mix(mix(volume_id, name.session), self.entropy);
+            Log { name, session, volume_id, base: None, partial_further: true }
+        };
+        let before = self.log.replace(log);
+        self.ring.clear();
+        if Some(log.name) == newest {
+            self.next(now, card)?;
+        } else {
+            self.open(now, log.name, card)?;
+        }
+        if before.is_some() {
+            self.status.want_group();
+        }
+        Ok(before.is_some_and(|before| before.session != log.session))
+    }
+
+    /// Opens the one after it.
+    pub(super) fn next<D: CardDevice>(
+        &mut self,
+        now: Instant,
+        card: &mut Card<'_, D>,
+    ) -> Result<(), CardError<D::Error>> {
+        let log = self.log.ok_or(CardError::NotOpen)?;
+        // What is recorded around one arming is a log of its own.
+        let begins_waiting = self.ring.is_on() && self.ring.is_empty() && log.base.is_some();
+        let name = if begins_waiting { log.name.next_session() } else { log.name.next_segment() };
+        self.open(now, name.ok_or(CardError::Full)?, card)
+    }
+
+    /// Makes a segment, or overwrites the oldest one when the card has no room, or the oldest one of those that are
+    /// kept only for a while when that while is over.
+    fn open<D: CardDevice>(
+        &mut self,
+        now: Instant,
+        name: LogName,
+        card: &mut Card<'_, D>,
+    ) -> Result<(), CardError<D::Error>> {
+        let overwrote = match self.ring.release(now) {
+            Some(old) => self.recycle(&old, name, card)?,
+            None => self.create_or_overwrite(name, card)?,
+        };
+        if let Some(log) = &mut self.log {
+            log.name = name;
+            log.base = None;
+            log.partial_further = true;
+        }
+        self.ring.begin(name, now);
+        self.status.begin_segment(name.session, overwrote);
+        self.status.set_state(CardState::Recording);
+        Ok(())
+    }
+
+    /// Overwrites the segment `old`, which no longer counts; makes a new one where it is gone.
+    fn recycle<D: CardDevice>(
+        &mut self,
+        old: &LogName,
+        name: LogName,
+        card: &mut Card<'_, D>,
+    ) -> Result<bool, CardError<D::Error>> {
+        let mut found = None;
+        card.logs(|entry| {
+            if entry.name == *old {
+                found = Some(entry);
+            }
+        })?;
+        match found {
+            Some(entry) => {
+                card.recycle(&entry, name)?;
+                self.status.count_released();
+                Ok(false)
+            }
+            None => self.create_or_overwrite(name, card),
+        }
+    }
+
+    fn create_or_overwrite<D: CardDevice>(
+        &mut self,
+        name: LogName,
+        card: &mut Card<'_, D>,
+    ) -> Result<bool, CardError<D::Error>> {
+        let bytes_max = if self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
+        let bytes = (card.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(bytes_max)) as u32;
+        loop {
+            match card.create(name, bytes) {
+                Ok(()) => return Ok(false),
+                Err(CardError::Full) => {}
+                Err(error) => return Err(error),
+            }
+            if let Some(oldest) = survey(card, name)?.oldest {
+                self.ring.forget(oldest.name);
+                card.recycle(&oldest, name)?;
+                return Ok(true);
+            }
+            if !card.may_have_room() {
+                return Err(CardError::Full);
+            }
+        }
+    }
+}
+
+struct Survey {
+    newest: Option<LogName>,
+    oldest: Option<LogEntry>,
+}
+
+/// The newest log on the card, and the oldest one that may be overwritten.
+fn survey<D: CardDevice>(card: &Card<'_, D>, except: LogName) -> Result<Survey, CardError<D::Error>> {
+    let mut survey = Survey { newest: None, oldest: None };
+    let open = card.open_name();
+    card.logs(|entry| {
+        survey.newest = survey.newest.max(Some(entry.name));
+        let usable = entry.bytes as usize >= 2 * GROUP_SECTORS * SECTOR_BYTES;
+        let older = survey.oldest.is_none_or(|oldest| entry.name < oldest.name);
+        if usable && older && entry.name != except && Some(entry.name) != open {
+            survey.oldest = Some(entry);
+        }
+    })?;
+    Ok(survey)
+}
+
+/// Mixes two numbers into one whose every bit depends on all of theirs (the finalizer of `MurmurHash3`).
+const fn mix(a: u32, b: u32) -> u32 {
+    let mut hash = a.rotate_left(16) ^ b.wrapping_mul(0x9E37_79B1);
+    hash = (hash ^ (hash >> 16)).wrapping_mul(0x85EB_CA6B);
+    hash = (hash ^ (hash >> 13)).wrapping_mul(0xC2B2_AE35);
+    hash ^ (hash >> 16)
+}

@@ -1,0 +1,108 @@
+//! What is in the card's slot: a device without a usable card, a card, or one that is being formatted.
+
+use crate::CardDevice;
+use crate::card::{Card, CardError};
+use crate::format::{FormatError, Formatting};
+use crate::gate::HeldBlocks;
+use crate::status::CardStatus;
+
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one of these exists, in a static: its largest variant is the budget"
+)]
+pub(super) enum Slot<'a, D: CardDevice> {
+    /// The device, while no usable card is in it.
+    Waiting(D),
+    Mounted(Card<'a, D>),
+    /// A card that is being formatted.
+    Formatting(D, Formatting),
+    /// Only while the value is being replaced.
+    Moving,
+}
+
+impl<'a, D: CardDevice> Slot<'a, D> {
+    /// Opens the card that is in; `false` where the slot is not waiting for one.
+    // Not within its caller: the volumes that are moved here are not to lie on the stack below what follows.
+    #[inline(never)]
+    pub(super) fn mount(
+        &mut self,
+        status: &'a CardStatus,
+        held: &'a HeldBlocks,
+    ) -> Result<bool, CardError<D::Error>> {
+        if !matches!(self, Self::Waiting(_)) {
+            return Ok(false);
+        }
+        let Self::Waiting(device) = core::mem::replace(self, Self::Moving) else { return Ok(false) };
+        device.reset();
+        match Card::mount(device, status, held) {
+            Ok(card) => {
+                *self = Self::Mounted(card);
+                Ok(true)
+            }
+            Err((device, error)) => {
+                *self = Self::Waiting(device);
+                Err(error)
+            }
+        }
+    }
+
+    /// Closes the card that is in.
+    pub(super) fn release(&mut self) {
+        *self = match core::mem::replace(self, Self::Moving) {
+            Self::Mounted(card) => card.unmount().map_or(Self::Moving, Self::Waiting),
+            other => other,
+        };
+    }
+
+    /// Begins to format the card that is in; `false` where there is no device to do it with.
+    pub(super) fn begin_format(&mut self, volume_id: u32) -> bool {
+        self.release();
+        let Self::Waiting(device) = core::mem::replace(self, Self::Moving) else { return false };
+        device.reset();
+        *self = Self::Formatting(device, Formatting::new(volume_id));
+        true
+    }
+
+    /// Formats a little further; whether it is done, and `None` where no card is being formatted.
+    pub(super) fn format(&mut self) -> Option<Result<bool, FormatError<D::Error>>> {
+        let Self::Formatting(device, formatting) = self else { return None };
+        let done = formatting.step(device);
+        if !matches!(done, Ok(false))
+            && let Self::Formatting(device, _) = core::mem::replace(self, Self::Moving)
+        {
+            *self = Self::Waiting(device);
+        }
+        Some(done)
+    }
+
+    /// Tells the device that storage is served from now on: what it may take begins anew.
+    pub(super) fn begin_service(&self) {
+        match self {
+            Self::Waiting(device) | Self::Formatting(device, _) => device.begin_service(),
+            Self::Mounted(card) => card.device(D::begin_service).unwrap_or_default(),
+            Self::Moving => {}
+        }
+    }
+
+    /// What the device tried again since it was asked last.
+    pub(super) fn take_retries(&self) -> u32 {
+        match self {
+            Self::Mounted(card) => card.device(D::take_retries).unwrap_or_default(),
+            Self::Waiting(_) | Self::Formatting(..) | Self::Moving => 0,
+        }
+    }
+
+    pub(super) const fn is_mounted(&self) -> bool {
+        matches!(self, Self::Mounted(_))
+    }
+
+    pub(super) const fn card(&mut self) -> Option<&mut Card<'a, D>> {
+        if let Self::Mounted(card) = self { Some(card) } else { None }
+    }
+
+    /// The device, with whatever is on its card.
+    pub(super) fn into_device(mut self) -> Option<D> {
+        self.release();
+        if let Self::Waiting(device) = self { Some(device) } else { None }
+    }
+}

@@ -1,0 +1,106 @@
+//! How much room there is: free clusters, found for one more segment and counted for the share that logs can have.
+
+use embedded_sdmmc::{Block, BlockDevice, BlockIdx};
+
+use crate::card_error::CardError;
+use crate::gate::{Gate, GateError};
+
+/// FAT blocks that are looked through for one new segment beside its own: 64 ms of a usual card. All of a large card's FAT takes
+/// seconds, and frames wait meanwhile.
+const SEARCH_BLOCKS: u32 = 128;
+
+/// The search for free clusters, which goes on from segment to segment, and what is known of how many there are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Room {
+    /// The FAT block to look at next; `None`: where the information sector says.
+    next: Option<u32>,
+    /// FAT blocks looked through since some were found, and what free clusters they told of.
+    searched: u32,
+    found: u32,
+    /// So many clusters, and so no more than that, were not there in all of the FAT: nothing but another computer
+    /// makes clusters free.
+    too_many: u32,
+    /// FAT blocks whose free entries are counted, for how much room there is in all.
+    counted: u32,
+    /// Free clusters counted.
+    clusters: u32,
+}
+
+impl Room {
+    pub(crate) const fn new() -> Self {
+        Self { next: None, searched: 0, found: 0, too_many: u32::MAX, counted: 0, clusters: 0 }
+    }
+
+    /// Whether only a part of the FAT was searched: to try again searches more of it.
+    pub(crate) const fn may_have_more(&self) -> bool {
+        self.searched > 0
+    }
+
+    /// Counts the free clusters of one more block of the FAT; how many there are once all of it is counted.
+    pub(crate) fn count<D: BlockDevice>(
+        &mut self,
+        gate: &Gate<'_, D>,
+    ) -> Result<Option<u32>, CardError<D::Error>> {
+        if self.counted >= gate.layout().fat_blocks {
+            return Ok(Some(self.clusters));
+        }
+        self.clusters += free_in_block(gate, self.counted)?;
+        self.counted += 1;
+        Ok(None)
+    }
+
+    /// Fails with [`CardError::Full`] unless that many clusters were found free. Asked before a segment is made, so
+    /// that one that does not fit leaves no half of a chain behind.
+    pub(crate) fn find<D: BlockDevice>(
+        &mut self,
+        gate: &Gate<'_, D>,
+        wanted: u32,
+    ) -> Result<(), CardError<D::Error>> {
+        if wanted >= self.too_many {
+            return Err(CardError::Full);
+        }
+        let fat_blocks = gate.layout().fat_blocks;
+        let mut next = match self.next {
+            Some(next) => next,
+            None => hint(gate)? / ENTRIES,
+        };
+        for _ in 0..SEARCH_BLOCKS + wanted / ENTRIES {
+            next %= fat_blocks;
+            self.found += free_in_block(gate, next)?;
+            if self.found >= wanted {
+                // This block may have some left for the next segment. What is counted changes under the count.
+                *self = Self { next: Some(next), too_many: self.too_many, ..Self::new() };
+                return Ok(());
+            }
+            next += 1;
+            self.next = Some(next);
+            self.searched += 1;
+            if self.searched >= fat_blocks {
+                (self.searched, self.found, self.too_many) = (0, 0, wanted);
+                break;
+            }
+        }
+        Err(CardError::Full)
+    }
+}
+
+/// The cluster from which on a search is to begin, as the information sector says; the first one where it does not.
+fn hint<D: BlockDevice>(gate: &Gate<'_, D>) -> Result<u32, GateError<D::Error>> {
+    let mut block = [Block::new()];
+    gate.read(&mut block, BlockIdx(gate.layout().info))?;
+    let hint = block[0].get(492..496).and_then(|hint| hint.try_into().ok()).map_or(0, u32::from_le_bytes);
+    Ok(if hint < gate.layout().clusters + 2 { hint } else { 0 })
+}
+
+/// FAT entries of a block.
+const ENTRIES: u32 = 128;
+
+/// Free clusters that one block of the FAT tells of.
+fn free_in_block<D: BlockDevice>(gate: &Gate<'_, D>, index: u32) -> Result<u32, GateError<D::Error>> {
+    let layout = gate.layout();
+    let mut block = [Block::new()];
+    gate.read(&mut block, BlockIdx(layout.fat_start + index))?;
+    let entries = (layout.clusters + 2).saturating_sub(index * ENTRIES).min(ENTRIES);
+    let is_free = |entry: &&[u8]| u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3] & 0x0F]) == 0;
+    Ok(block[0].chunks_exact(4).take(entries as usize).filter(is_free).count() as u32)
+}

@@ -1,0 +1,55 @@
+//! `hums live`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::endpoint::Endpoint;
+
+const LIVE_EXAMPLES: &str = "Examples:
+  hums live --input udpin:0.0.0.0:14550 --open
+  hums live --input serial:/dev/ttyUSB0:57600
+  hums live --input flight.tlog --open
+  hums live --input card.img --session 00001
+  hums live --input udpin:0.0.0.0:14550 --influx http://127.0.0.1:8086 --org drones --bucket hums --token T
+  hums live --input udpin:0.0.0.0:14550 --listen 192.168.1.5:8080
+
+The address to open is printed to standard output. Ctrl-C ends it. A recording or a log is played, and can be paused,
+sought and played at other speeds. Nothing is sent to the vehicle. With --listen on an address that other machines reach,
+a token is made and stands in the printed address; the page shows nothing without it.";
+
+/// `hums live`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = LIVE_EXAMPLES)]
+pub struct Live {
+    /// A link (udpin:, udpout:, tcp:, serial:), a recording (tlog or raw MAVLink, `-`), or a log (file, image, folder)
+    #[arg(long, value_name = "SRC")]
+    pub input: Endpoint,
+    /// Of several sessions this one, by the name that `hums info` gives; otherwise the newest
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
+    /// Where the page is served; port 0 is any free one
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8080")]
+    pub listen: String,
+    /// The page's token instead of one that is made; then asked for on 127.0.0.1 too
+    #[arg(long, value_name = "TOKEN")]
+    pub listen_token: Option<String>,
+    /// Set these limits before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
+    #[arg(long, value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// Show the page in the browser
+    #[arg(long)]
+    pub open: bool,
+    /// Also write every message to this database, as `hums decode --format influx` would: http://ADDR:PORT
+    #[arg(long, value_name = "URL", help_heading = "Database")]
+    pub influx: Option<String>,
+    /// Its token (1.x: USER:PASSWORD); otherwise the environment's `HUMS_INFLUX_TOKEN`
+    #[arg(long, value_name = "T", help_heading = "Database")]
+    pub token: Option<String>,
+    /// Its organisation: `InfluxDB` 2 or 3; without it `InfluxDB` 1.x and `VictoriaMetrics`
+    #[arg(long, value_name = "O", help_heading = "Database")]
+    pub org: Option<String>,
+    /// Its bucket or database
+    #[arg(long, value_name = "B", default_value = "hums", help_heading = "Database")]
+    pub bucket: String,
+}

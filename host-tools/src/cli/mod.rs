@@ -1,0 +1,133 @@
+//! The command line, as clap reads it and `--help` teaches it.
+
+mod demo;
+mod live;
+mod read;
+mod run;
+mod talk;
+
+use clap::{Parser, Subcommand};
+
+pub use demo::{Dashboard, Demo};
+pub use live::Live;
+pub use read::{Decode, Format, Info, Pack, Report, Verify};
+pub use run::{Emulate, FaultFlags, Run, Sim, Speed};
+pub use talk::{FormatCard, Link, Params, ParamsAction, Pull};
+
+const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.
+
+The firmware listens at the autopilot's UART, records every frame on an SD card, checks the vehicle's health and sends
+a summary to the ground station. This program runs the same pipeline on this PC, and reads the cards.";
+
+const AFTER: &str = "Where bytes come from and go to (SRC, SINK):
+  FILE                  a tlog or raw MAVLink bytes, told apart by what is in it
+  -                     standard input or output
+  udpin:ADDR:PORT       a UDP port of this PC that others send to, e.g. udpin:0.0.0.0:14550
+  udpout:ADDR:PORT      a UDP port of another machine
+  tcp:ADDR:PORT         a TCP server
+  serial:DEVICE:BAUD    a serial port, e.g. serial:/dev/ttyUSB0:921600
+
+Examples:
+  hums demo                                                  a recorded flight through all of it
+  hums sim --input flight.tlog --sd card.img                 record a flight onto an SD card image
+  hums info card.img                                         what is on a card
+  hums decode card.img -o out --format tlog,csv              a card's logs for other tools
+  hums live --input udpin:0.0.0.0:14550 --open               the vehicle as it flies, in the browser
+
+Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage (all that could be read was read).
+Results go to standard output, everything else to standard error.";
+
+/// The whole command line.
+#[derive(Debug, Parser)]
+#[command(name = "hums", version, about = ABOUT, after_help = AFTER, max_term_width = 110)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
+    Sim(Sim),
+    /// The same with the real Cortex-M4 firmware image, in QEMU
+    Emulate(Emulate),
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines, line protocol, Parquet, the thesis's tables
+    Decode(Decode),
+    /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
+    Info(Info),
+    /// Check everything that can be checked about a log or a card
+    Verify(Verify),
+    /// Write a page about a flight: plots, map, findings, usage, trend; one HTML file, no network
+    Report(Report),
+    /// Show the vehicle as it flies, on a page that this program serves: from a link, a recording or a log
+    Live(Live),
+    /// Write one log file from a recording, without a card's file system
+    Pack(Pack),
+    /// List, read or set the board's parameters over MAVLink
+    Params(Params),
+    /// Download the board's logs over MAVLink
+    Pull(Pull),
+    /// Have the board format a card that it cannot record on
+    Format(FormatCard),
+    /// Show it: a recorded flight is recorded, decoded and summed up, and played on the dashboard
+    Demo(Demo),
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn every_example_of_every_help_is_a_command_line() {
+        let mut examples = 0;
+        let mut root = Cli::command();
+        let helps: Vec<String> = std::iter::once(root.render_long_help().to_string())
+            .chain(Cli::command().get_subcommands_mut().map(|command| command.render_long_help().to_string()))
+            .collect();
+        for help in &helps {
+            assert!(help.contains("Examples:"), "{help}");
+            for line in help.lines().filter_map(|line| line.strip_prefix("  hums ")) {
+                // A remark stands after three spaces, and a pipe is the shell's.
+                let line =
+                    line.split("   ").next().unwrap_or_default().split(" | ").next().unwrap_or_default();
+                let words = std::iter::once("hums").chain(line.split_whitespace());
+                assert!(Cli::try_parse_from(words).is_ok(), "hums {line}");
+                examples += 1;
+            }
+        }
+        assert!(examples >= 20, "{examples} examples");
+    }
+
+    #[test]
+    fn every_command_of_the_documents_is_a_command_line() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let documents = std::fs::read_dir(root.join("docs")).expect("the documents");
+        let mut paths: Vec<_> = documents.map(|entry| entry.expect("a document").path()).collect();
+        paths.push(root.join("README.md"));
+        let mut commands = 0;
+        for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "md")) {
+            let text = std::fs::read_to_string(path).expect("a document");
+            for line in text.lines().map(|line| line.trim_start_matches("target/release/")) {
+                let Some(line) = line.strip_prefix("hums ") else { continue };
+                // Commands stand in a column; what stands in the next one is a remark.
+                let (name, arguments) = line.split_once(' ').unwrap_or((line, ""));
+                let arguments = arguments.trim_start().split("   ").next().unwrap_or_default();
+                let line = format!("{name} {}", arguments.split(" | ").next().unwrap_or_default());
+                let words = std::iter::once("hums").chain(line.split_whitespace());
+                let parsed = Cli::try_parse_from(words);
+                assert!(parsed.is_ok(), "{}: hums {line}: {parsed:?}", path.display());
+                commands += 1;
+            }
+        }
+        assert!(commands >= 20, "{commands} commands");
+    }
+
+    #[test]
+    fn the_definition_of_the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+}

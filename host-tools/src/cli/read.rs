@@ -1,0 +1,146 @@
+//! What reads logs: `hums decode`, `hums info`, `hums verify`, `hums report`; and `hums pack`, which makes one.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use crate::endpoint::Endpoint;
+use crate::utc::When;
+
+const DECODE_EXAMPLES: &str = "Examples:
+  hums decode card.img -o flight.tlog --format tlog
+  hums decode card.img -o out --format tlog,csv,jsonl
+  hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
+  hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
+  hums decode cards/ -o fleet --format parquet
+  hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8086/write?db=hums
+
+Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
+it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
+OUT/LOG/ATTITUDE.csv, OUT/LOG/thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
+`-o -` is standard output.
+Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
+
+/// `hums decode`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = DECODE_EXAMPLES)]
+pub struct Decode {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
+    /// The file or directory to write
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// What to write, several with commas
+    #[arg(long, value_enum, value_delimiter = ',', required = true)]
+    pub format: Vec<Format>,
+    /// Leave out what is earlier: seconds since the session's start, or UTC as 2026-11-21T10:13:42Z
+    #[arg(long, value_name = "T")]
+    pub from: Option<When>,
+    /// Leave out what is later
+    #[arg(long, value_name = "T")]
+    pub to: Option<When>,
+    /// Only these MAVLink messages, by name; HUMS records and gaps stay
+    #[arg(long, value_name = "NAME")]
+    pub message: Vec<String>,
+}
+
+/// What to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// A ground station's log: opens in Mission Planner, QGroundControl, MAVProxy, pymavlink
+    Tlog,
+    /// A table for each message type, units in the header
+    Csv,
+    /// An object a line, in order of time
+    Jsonl,
+    /// Line protocol, with the reference system's measurement HUMS
+    Influx,
+    /// Typed columns by vehicle, date and session, for `DuckDB`, Spark, pandas
+    Parquet,
+    /// The reference system's four tables, a row a second
+    Thesis,
+}
+
+const INFO_EXAMPLES: &str = "Examples:
+  hums info card.img
+  hums info --json 00001_00.HUM";
+
+/// `hums info`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = INFO_EXAMPLES)]
+pub struct Info {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+const VERIFY_EXAMPLES: &str = "Examples:
+  hums verify card.img
+  hums verify --json card.img
+
+Checks the file system's structures, every sector's checksum and number, every group's decoding, every frame's own
+checksum and the order of times. Exit code 3 means damage or losses were found.";
+
+/// `hums verify`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = VERIFY_EXAMPLES)]
+pub struct Verify {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+const REPORT_EXAMPLES: &str = "Examples:
+  hums report card.img -o report.html
+  hums report card.img -o pages/
+  hums report card.img --session 00001 -o report.html
+
+With a directory for -o each session gets a page, named after it; otherwise the newest gets one. The page compares with
+the sessions before on the same card.";
+
+/// `hums report`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = REPORT_EXAMPLES)]
+pub struct Report {
+    /// Logs, card images, or directories with such
+    #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
+    pub inputs: Vec<PathBuf>,
+    /// The page to write, or a directory for a page a session
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// Only this session, by the name that `hums info` gives
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
+}
+
+const PACK_EXAMPLES: &str = "Examples:
+  hums pack flight.tlog -o flight.hum
+  hums decode flight.hum -o back.tlog --format tlog";
+
+/// `hums pack`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = PACK_EXAMPLES)]
+pub struct Pack {
+    /// A tlog or raw MAVLink bytes
+    #[arg(value_name = "TLOG")]
+    pub input: Endpoint,
+    /// The log file to write
+    #[arg(short, long, value_name = "LOG")]
+    pub output: PathBuf,
+}

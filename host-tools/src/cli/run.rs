@@ -1,0 +1,154 @@
+//! `hums sim` and `hums emulate`, and what they share.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use crate::card::faults::{self, CardOut, Cut, Stall};
+use crate::endpoint::Endpoint;
+use crate::utc::parse_seconds;
+
+const SIM_EXAMPLES: &str = "Examples:
+  hums sim --input flight.tlog --sd card.img --gs gs.bin
+  hums sim --input flight.tlog --sd card.img --json --line-rate 921600
+  hums sim --input udpin:0.0.0.0:14550 --sd card.img --gs udpout:127.0.0.1:14551
+  hums sim --input flight.tlog --sd card.img --gs udpin:127.0.0.1:14551 --speed real
+  hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
+  hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
+  hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
+
+Raw bytes carry no times: they come as on a line at 115,200 baud. --sd is kept: a second run adds a session to it.";
+
+/// What `sim` and `emulate` share.
+#[derive(Args, Clone, Debug)]
+pub struct Run {
+    /// Where the autopilot's bytes come from: a file (tlog or raw MAVLink), `-`, udpin:, udpout:, tcp: or serial:
+    #[arg(long, value_name = "SRC")]
+    pub input: Endpoint,
+    /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
+    #[arg(long, value_name = "IMAGE")]
+    pub sd: PathBuf,
+    /// Where the bytes for the ground station go; where somebody is there (udp, tcp, serial), its own are heard too
+    #[arg(long, value_name = "SINK")]
+    pub gs: Option<Endpoint>,
+    /// What the ground station sends, with the times that it has in this file
+    #[arg(long, value_name = "SRC")]
+    pub gs_input: Option<Endpoint>,
+    /// The flash in which counters and parameters outlive power (32 KiB; made when missing); without it all begin anew
+    #[arg(long, value_name = "FILE")]
+    pub store: Option<PathBuf>,
+    /// Set these parameters before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
+    #[arg(long, value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// As fast as possible on a virtual clock (repeatable), or in real time; live inputs are always real
+    #[arg(long, value_enum)]
+    pub speed: Option<Speed>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// What to put in the way
+    #[command(flatten)]
+    pub faults: FaultFlags,
+}
+
+/// How fast time passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Speed {
+    /// A virtual clock, as fast as the machine goes
+    Max,
+    /// The wall's clock
+    Real,
+}
+
+/// Faults; each run is repeatable.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Faults (each may be given several times)")]
+pub struct FaultFlags {
+    /// Power goes at the N-th 512-byte block write (torn: half of that block is old); the run ends there
+    #[arg(long, value_name = "N[:torn]")]
+    pub cut_after_writes: Vec<Cut>,
+    /// Power goes at the N-th word that is written to the store, or sector that is erased; the run ends there
+    #[arg(long, value_name = "N", overrides_with = "cut_store_after")]
+    pub cut_store_after: Option<u64>,
+    /// The card answers nothing for MS milliseconds from T seconds on
+    #[arg(long, value_name = "MS@T")]
+    pub stall: Vec<Stall>,
+    /// The card is out of its slot from T to T seconds
+    #[arg(long, value_name = "T..T")]
+    pub card_out: Vec<CardOut>,
+    /// Each block write fails with this probability
+    #[arg(long, value_name = "P", value_parser = faults::probability, overrides_with = "write_error")]
+    pub write_error: Option<f64>,
+    /// The size of the card image that is made, in MiB
+    #[arg(long, value_name = "MIB", overrides_with = "card_size")]
+    pub card_size: Option<u64>,
+    /// Each byte from the autopilot is damaged with this probability
+    #[arg(long, value_name = "P", value_parser = faults::probability, overrides_with = "noise")]
+    pub noise: Option<f64>,
+    /// Ignore the recorded times: feed the bytes back to back at this rate
+    #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(1..), overrides_with = "line_rate")]
+    pub line_rate: Option<u32>,
+    /// Our own power goes for a moment T seconds after the first byte; the card stays
+    #[arg(long = "reboot-at", value_name = "T", value_parser = micros)]
+    pub reboot_at_us: Vec<u64>,
+    /// Which of the possible random faults happen
+    #[arg(long, value_name = "N", default_value_t = 0, overrides_with = "seed")]
+    pub seed: u64,
+}
+
+fn micros(text: &str) -> Result<u64, String> {
+    parse_seconds(text).ok_or_else(|| format!("`{text}` is no time: seconds since the first byte"))
+}
+
+/// `hums sim`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = SIM_EXAMPLES)]
+pub struct Sim {
+    /// The run.
+    #[command(flatten)]
+    pub run: Run,
+    /// Also write the bytes as they arrived at the UART, noise and all, to this file
+    #[arg(long, value_name = "FILE")]
+    pub tap: Option<PathBuf>,
+}
+
+const EMULATE_EXAMPLES: &str = "Examples:
+  hums emulate --input flight.tlog --sd card.img
+  hums emulate --input flight.tlog --sd card.img --json --firmware target/thumbv7em-none-eabihf/firmware/hums-firmware
+
+Needs qemu-system-arm 8.0 or later. Inside the source tree a missing firmware image is built first.";
+
+/// What the firmware understands of `--provoke`.
+fn provoked(text: &str) -> Result<String, String> {
+    let (what, at_s) = text.split_once('@').unwrap_or((text, "0"));
+    let (what, task) = what.split_once(':').unwrap_or((what, "downlink"));
+    let one_of = |word: &str, known: &[&str]| {
+        known.contains(&word).then_some(()).ok_or(format!("{word} is none of {}", known.join(", ")))
+    };
+    one_of(what, &["panic", "bus-fault", "overflow", "spin", "silence", "supply"])?;
+    one_of(task, &["reception", "monitor", "downlink", "storage"])?;
+    if what == "silence" && task != "downlink" {
+        return Err(format!("{task} has no place where it could wait for ever: only downlink has; or spin"));
+    }
+    at_s.parse::<u32>().map_err(|_| format!("{at_s} is no whole number of seconds"))?;
+    Ok(text.to_owned())
+}
+
+/// `hums emulate`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = EMULATE_EXAMPLES)]
+pub struct Emulate {
+    /// The run.
+    #[command(flatten)]
+    pub run: Run,
+    /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
+    #[arg(long, value_name = "ELF")]
+    pub firmware: Option<PathBuf>,
+    /// What is to go wrong, once, in the firmware itself: panic, bus-fault, overflow (of the stack), spin, silence or
+    /// supply; in reception, monitor, downlink (the default) or storage; from some second on (0)
+    #[arg(long, value_name = "WHAT[:TASK][@SECONDS]", value_parser = provoked)]
+    pub provoke: Option<String>,
+    /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
+    #[arg(long)]
+    pub costs: bool,
+}

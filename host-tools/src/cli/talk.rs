@@ -1,0 +1,122 @@
+//! What talks with the board: `hums params`, `hums pull`, `hums format`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use crate::endpoint::Endpoint;
+
+const PARAMS_EXAMPLES: &str = "Examples:
+  hums params list --link serial:/dev/ttyUSB0:57600
+  hums params get GS_BUDGET BAT_REM_WARN --link udpin:0.0.0.0:14550
+  hums params set GS_BUDGET 1000 --link tcp:192.168.1.5:5760
+  hums params sign --key key.txt --link serial:/dev/ttyUSB0:57600
+
+The list is lines of NAME VALUE, which `hums sim --params` reads back.";
+
+/// `hums params`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = PARAMS_EXAMPLES)]
+pub struct Params {
+    /// What to do.
+    #[command(subcommand)]
+    pub action: ParamsAction,
+}
+
+/// Where the board is.
+#[derive(Args, Clone, Debug)]
+pub struct Link {
+    /// Where the board is: udpin:, udpout:, tcp: or serial:
+    #[arg(long, value_name = "SRC")]
+    pub link: Endpoint,
+    /// Sign what is sent with the key in this file: 64 hexadecimal digits, or a passphrase as Mission Planner takes it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+}
+
+/// What to do with parameters.
+#[derive(Clone, Debug, Subcommand)]
+pub enum ParamsAction {
+    /// All of them, in the board's order
+    List {
+        /// Where the board is.
+        #[command(flatten)]
+        at: Link,
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
+    /// Some of them
+    Get {
+        /// Names, for instance `GS_BUDGET`
+        #[arg(required = true, value_name = "NAME")]
+        names: Vec<String>,
+        /// Where the board is.
+        #[command(flatten)]
+        at: Link,
+    },
+    /// Give the board the key of --key, over the port that its `SIGN_PORT` trusts
+    Sign {
+        /// Where the board is.
+        #[command(flatten)]
+        at: Link,
+        /// Take the key away
+        #[arg(long)]
+        remove: bool,
+    },
+    /// Set one; fails where the board keeps another value
+    Set {
+        /// The name
+        #[arg(value_name = "NAME")]
+        name: String,
+        /// The value
+        #[arg(value_name = "VALUE", allow_negative_numbers = true)]
+        value: f32,
+        /// Where the board is.
+        #[command(flatten)]
+        at: Link,
+    },
+}
+
+const PULL_EXAMPLES: &str = "Examples:
+  hums pull --link serial:/dev/ttyUSB0:57600 -o logs
+  hums pull --link udpin:0.0.0.0:14550 -o logs --last 1
+  hums pull --link tcp:192.168.1.5:5760 -o logs 00001_00.HUM
+
+A file that is there already with the same length is left; one that was begun (NAME.part) is gone on with.";
+
+/// `hums pull`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = PULL_EXAMPLES)]
+pub struct Pull {
+    /// Where the board is.
+    #[command(flatten)]
+    pub at: Link,
+    /// The directory for the logs; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Only these, by name
+    #[arg(value_name = "NAME")]
+    pub names: Vec<String>,
+    /// Only the newest so many
+    #[arg(long, value_name = "N")]
+    pub last: Option<usize>,
+}
+
+const FORMAT_EXAMPLES: &str = "Examples:
+  hums format --yes --link serial:/dev/ttyUSB0:57600
+
+Only a card that the board cannot use as it is (exFAT, no partition table, another file system, a damaged one), and
+only while the vehicle is disarmed.";
+
+/// `hums format`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = FORMAT_EXAMPLES)]
+pub struct FormatCard {
+    /// Where the board is.
+    #[command(flatten)]
+    pub at: Link,
+    /// Everything on the card may be lost
+    #[arg(long)]
+    pub yes: bool,
+}

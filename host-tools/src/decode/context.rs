@@ -1,0 +1,60 @@
+//! What is asked for, and what all parts of a log's decoding need to know.
+
+use super::identity::Identity;
+use super::influx::Tags;
+use super::selection::Selection;
+use crate::cli::Format;
+
+/// Which formats are asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "any set of formats can be asked for")]
+pub struct Formats {
+    /// A ground station's log.
+    pub tlog: bool,
+    /// Tables.
+    pub csv: bool,
+    /// Objects.
+    pub jsonl: bool,
+    /// Line protocol.
+    pub influx: bool,
+    /// Columns.
+    pub parquet: bool,
+    /// The reference system's tables.
+    pub thesis: bool,
+}
+
+impl Formats {
+    /// These.
+    pub fn new(formats: &[Format]) -> Self {
+        let has = |format| formats.contains(&format);
+        Self {
+            tlog: has(Format::Tlog),
+            csv: has(Format::Csv),
+            jsonl: has(Format::Jsonl),
+            influx: has(Format::Influx),
+            parquet: has(Format::Parquet),
+            thesis: has(Format::Thesis),
+        }
+    }
+
+    /// Whether a log becomes exactly one file.
+    pub fn is_single_file(self) -> bool {
+        let single = u8::from(self.tlog) + u8::from(self.jsonl) + u8::from(self.influx);
+        single == 1 && !self.csv && !self.parquet && !self.thesis
+    }
+}
+
+/// What all parts of one log's decoding need to know.
+#[derive(Clone, Debug, Default)]
+pub struct Context {
+    /// What to write.
+    pub formats: Formats,
+    /// UTC at power-on, microseconds since 1970.
+    pub epoch_us: Option<u64>,
+    /// What of it is wanted.
+    pub selection: Selection,
+    /// Who flew and when, where a format asks for it.
+    pub identity: Identity,
+    /// The same for the line protocol.
+    pub tags: Tags,
+}

@@ -1,0 +1,87 @@
+//! Which part of a log is wanted: `--from`, `--to`, `--message`.
+
+use std::cmp::Ordering;
+
+use anyhow::Result;
+use hums_blackbox::Gap;
+use hums_core::time::Instant;
+
+use crate::cli;
+use crate::outcome::usage;
+use crate::utc::When;
+
+/// Which entries are wanted.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    from: Option<When>,
+    to: Option<When>,
+    /// Message ids; empty: all.
+    ids: Vec<u32>,
+}
+
+impl Selection {
+    /// As the command line says it.
+    pub fn new(args: &cli::Decode) -> Result<Self> {
+        let ids = args.message.iter().map(|name| id_of(name)).collect::<Result<_>>()?;
+        Ok(Self { from: args.from, to: args.to, ids })
+    }
+
+    /// A time in UTC selects nothing in a log that has none: that is told, not guessed.
+    pub fn check_without_utc(&self, log: &str) -> Result<()> {
+        if [self.from, self.to].iter().any(|when| matches!(when, Some(When::Utc(_)))) {
+            return Err(usage(format!(
+                "{log}: the time of day is not known in this log; give --from and --to as seconds since its start"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Whether this time is wanted.
+    pub fn has_time(&self, at: Instant, epoch_us: Option<u64>) -> bool {
+        !self.is_before(at, epoch_us) && !self.is_after(at, epoch_us)
+    }
+
+    /// Whether any of a gap is in the time wanted.
+    pub fn overlaps(&self, gap: &Gap, epoch_us: Option<u64>) -> bool {
+        !gap.to.is_some_and(|to| self.is_before(to, epoch_us))
+            && !gap.from.is_some_and(|from| self.is_after(from, epoch_us))
+    }
+
+    fn is_before(&self, at: Instant, epoch_us: Option<u64>) -> bool {
+        self.from.and_then(|from| compare(at, from, epoch_us)).is_some_and(Ordering::is_lt)
+    }
+
+    fn is_after(&self, at: Instant, epoch_us: Option<u64>) -> bool {
+        self.to.and_then(|to| compare(at, to, epoch_us)).is_some_and(Ordering::is_gt)
+    }
+
+    /// Whether frames of this message are wanted.
+    pub fn has_id(&self, id: u32) -> bool {
+        self.ids.is_empty() || self.ids.contains(&id)
+    }
+}
+
+/// How a time lies to a limit; `None` where one is UTC and the other cannot be.
+fn compare(at: Instant, limit: When, epoch_us: Option<u64>) -> Option<Ordering> {
+    let boot = at.as_micros();
+    match limit {
+        When::SinceStart(limit) => Some(boot.cmp(&limit)),
+        When::Utc(limit) => Some(epoch_us?.saturating_add(boot).cmp(&limit)),
+    }
+}
+
+/// A message's id by its name, `UNKNOWN_12345` and plain numbers included.
+fn id_of(name: &str) -> Result<u32> {
+    let upper = name.to_ascii_uppercase();
+    if let Some(message) = hums_dialect::messages().iter().find(|message| message.name == upper) {
+        return Ok(message.id);
+    }
+    let number = upper.strip_prefix("UNKNOWN_").unwrap_or(&upper);
+    number.parse().map_err(|_| {
+        let mut near: Vec<&str> = hums_dialect::messages().iter().map(|message| message.name).collect();
+        near.retain(|known| known.contains(&upper) || upper.contains(known));
+        near.truncate(5);
+        let hint = if near.is_empty() { String::new() } else { format!("; there is {}", near.join(", ")) };
+        usage(format!("--message {name}: no message has this name{hint}; `hums info LOG` lists a log's"))
+    })
+}

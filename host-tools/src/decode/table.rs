@@ -1,0 +1,37 @@
+//! The tables that a log becomes: one for each message and for each record of the monitor's own.
+
+use crate::mavlink::frame::Frame;
+use crate::names::message_name;
+
+/// One of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Table {
+    /// Frames of one message that we have the definition of.
+    Message(u32),
+    /// Frames of an id that we have a definition of, made with another one.
+    Unverified(u32),
+    /// Frames of an id that we have no definition of.
+    Unknown(u32),
+    /// The monitor's own.
+    Hums(&'static str),
+}
+
+impl Table {
+    /// The table of a frame; `known` says that its definition is ours.
+    pub fn of(frame: &Frame<'_>, known: bool) -> Self {
+        match (known, frame.message()) {
+            (true, _) => Self::Message(frame.id),
+            (false, Some(_)) => Self::Unverified(frame.id),
+            (false, None) => Self::Unknown(frame.id),
+        }
+    }
+
+    /// Its name: that of its file, and of the points of the line protocol.
+    pub fn name(self) -> String {
+        match self {
+            Self::Message(id) | Self::Unknown(id) => message_name(id).into_owned(),
+            Self::Unverified(id) => format!("UNVERIFIED_{}", message_name(id)),
+            Self::Hums(name) => name.to_owned(),
+        }
+    }
+}

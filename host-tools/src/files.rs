@@ -1,0 +1,58 @@
+//! Files that results are written to.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+
+/// Room for a group's lines of a busy message; there may be some hundred of these.
+const BUFFER_BYTES: usize = 16 * 1024;
+
+/// Makes a file, and its directory where there is none.
+pub fn create(path: &Path) -> Result<BufWriter<File>> {
+    if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
+        make_directory(dir)?;
+    }
+    let file = File::create(path).with_context(|| cannot_write(path))?;
+    Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
+}
+
+/// Makes a directory, unless it is there.
+pub fn make_directory(dir: &Path) -> Result<()> {
+    if dir.is_file() {
+        bail!("{}: is a file, and a directory is needed there; name another output", dir.display());
+    }
+    fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
+}
+
+/// That a file cannot be written, and where it is that, that its folder is missing.
+pub fn cannot_write(path: &Path) -> String {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+    let why = folder.map_or_else(String::new, |folder| format!("; there is no folder {}", folder.display()));
+    format!("{}: cannot be written{why}", path.display())
+}
+
+/// An error in terms of the file.
+pub fn settle(result: io::Result<()>, path: &Path) -> Result<()> {
+    result.with_context(|| cannot_write(path))
+}
+
+/// Whether an output is named as a directory: it is one, or its name ends like one.
+pub fn says_directory(output: &Path) -> bool {
+    output.is_dir() || output.as_os_str().to_string_lossy().ends_with(['/', '\\'])
+}
+
+/// A path inside `dir` for a log's name, which may have directories of its own.
+pub fn inside(dir: &Path, name: &str) -> PathBuf {
+    name.split('/')
+        .filter(|part| !matches!(*part, "" | "." | ".."))
+        .fold(dir.to_owned(), |path, part| path.join(part))
+}
+
+/// A path with an extension. Appended, not replaced: a log's own name may have a dot in it.
+pub fn appended(name: &Path, extension: &str) -> PathBuf {
+    let mut name = name.to_owned().into_os_string();
+    name.push(format!(".{extension}"));
+    PathBuf::from(name)
+}

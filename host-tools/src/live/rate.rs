@@ -1,0 +1,33 @@
+//! How often pages are told, and how many frames come a second.
+
+use std::time::{Duration, Instant as Wall};
+
+/// Twenty times a second.
+pub const PUBLISH: Duration = Duration::from_millis(50);
+
+/// Frames a second.
+#[derive(Debug)]
+pub struct Rate {
+    since: Wall,
+    frames: u64,
+    /// Of the last whole second.
+    pub frames_s: f64,
+}
+
+impl Default for Rate {
+    /// From now on.
+    fn default() -> Self {
+        Self { since: Wall::now(), frames: 0, frames_s: 0.0 }
+    }
+}
+
+impl Rate {
+    /// So many frames there were until now.
+    pub fn count(&mut self, frames: u64) {
+        let passed = self.since.elapsed().as_secs_f64();
+        if passed >= 1.0 {
+            self.frames_s = frames.saturating_sub(self.frames) as f64 / passed;
+            (self.frames, self.since) = (frames, Wall::now());
+        }
+    }
+}

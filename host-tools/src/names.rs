@@ -1,0 +1,96 @@
+//! Names of what a log stores as numbers: messages, usage counters, events, faults, sources of time.
+
+use std::borrow::Cow;
+
+use hums_core::baseline::Quantity;
+use hums_core::usage::{self, CounterName};
+
+/// The name of a message, `UNKNOWN_12345` where the dialect has none.
+pub fn message_name(id: u32) -> Cow<'static, str> {
+    match hums_dialect::message(id) {
+        Some(message) => Cow::Borrowed(message.name),
+        None => Cow::Owned(format!("UNKNOWN_{id}")),
+    }
+}
+
+/// The name of a counter, for instance `flight_time_s`, `motor0_run_time_s` or `esc_temperature_45_to_60_degc_s`;
+/// `counter_123` where this program does not know it.
+pub fn counter_name(number: u8) -> String {
+    match usage::counter_name(number) {
+        Some(CounterName::Vehicle(name)) => name.to_owned(),
+        Some(CounterName::Motor(name, motor)) => format!("motor{motor}_{name}"),
+        Some(CounterName::Exposure(quantity, from, to)) => {
+            let (name, unit) = (quantity.name(), quantity.unit());
+            let range = match (from.is_finite(), to.is_finite()) {
+                (false, _) => format!("below_{to}"),
+                (true, false) => format!("from_{from}"),
+                (true, true) => format!("{from}_to_{to}"),
+            };
+            format!("{name}_{}_{unit}_s", range.replace('.', "_"))
+        }
+        Some(CounterName::Baseline(quantity)) => match quantity {
+            Quantity::Vibration => "baseline_vibration_m_s2".to_owned(),
+            Quantity::HoverThrottle => "baseline_hover_throttle".to_owned(),
+            Quantity::Resistance(battery) => format!("baseline_battery{battery}_resistance_ohm"),
+            Quantity::MotorSpeed(motor) => format!("baseline_motor{motor}_speed_off_percent"),
+        },
+        None => format!("counter_{number}"),
+    }
+}
+
+/// Where the time of day came from, by the number that a log stores.
+pub fn clock_source_name(number: u8) -> &'static str {
+    match number {
+        1 => "SYSTEM_TIME",
+        2 => "recording",
+        3 => "GNSS",
+        _ => "unknown",
+    }
+}
+
+/// What kind of fault the monitor had, by the number that a log stores.
+pub fn fault_name(number: u8) -> &'static str {
+    match number {
+        1 => "panic",
+        2 => "hard_fault",
+        3 => "watchdog",
+        _ => "unknown",
+    }
+}
+
+/// What happened, by the number that a log stores.
+pub fn event_name(number: u8) -> &'static str {
+    match number {
+        1 => "armed",
+        2 => "disarmed",
+        3 => "take_off",
+        4 => "landing",
+        5 => "snapshot",
+        6 => "card_in",
+        7 => "card_out",
+        8 => "critical",
+        9 => "phase",
+        10 => "autopilot_reboot",
+        11 => "other_airframe",
+        12 => "by_link",
+        _ => "other",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn every_number_has_a_name_of_its_own_and_ranges_say_their_ends() {
+        let names: HashSet<String> = (0..=u8::MAX).map(counter_name).collect();
+        assert_eq!(names.len(), 256);
+        for range in
+            ["vibration_below_1_m_s2_s", "vibration_1_to_2_5_m_s2_s", "esc_temperature_from_110_degc_s"]
+        {
+            assert!(names.contains(range), "{range}");
+        }
+    }
+}

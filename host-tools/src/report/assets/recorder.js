@@ -1,0 +1,32 @@
+// The recorder itself: sizes, gaps, losses.
+
+import { data, log, start } from "./data.js";
+import { el } from "./elements.js";
+import { bytes, fixed, plural, whole } from "./format.js";
+import { cells, facts, rows, section } from "./layout.js";
+import { words } from "./text.js";
+
+export const recorderSection = () => {
+  const recorder = section("recorder", "Recorder");
+  const stats = data.stats;
+  recorder.append(el("div", { class: "split" },
+    el("div", { class: "panel" }, facts([
+      ["Frames", `${whole(log.frames)} recorded, ${whole(log.frames_missing)} missing`],
+      ["Records", whole(log.records)],
+      ["Size", `${bytes(log.log_bytes)}; as a tlog ${bytes(log.tlog_bytes)}: ${fixed(log.ratio, 2)} times smaller`],
+      ["Sectors", `${whole(log.sectors)}, ${whole(log.sectors_damaged)} damaged`],
+      ["Ending", log.closed ? "in order" : "by power-off"],
+      ["Received", stats && `${whole(stats.frames_in)} frames, ${bytes(stats.bytes_in)}, of which ${bytes(stats.bytes_not_frames)} were no frame`],
+      ["Queue, fullest", stats && stats.queue_bytes_capacity ? `${bytes(stats.queue_bytes_max)} of ${bytes(stats.queue_bytes_capacity)} (${fixed(stats.queue_bytes_max / stats.queue_bytes_capacity * 100, 0)} %)` : null],
+      ["Card, longest stall", stats && `${whole(stats.sd_stall_ms_max)} ms`],
+      ["To the ground station", stats && `${whole(stats.gs_frames)} frames, ${bytes(stats.gs_bytes)}`],
+    ])),
+    el("div", { class: "panel scroll" },
+      log.gaps.length || log.losses.length ? rows([["What"], ["From", "n"], ["To", "n"], ["How much", "n"]], [
+        ...log.gaps.map((g) => cells([`gap: ${g.cause}, ${plural(g.sectors_lost + g.sectors_skipped, "sector")}`,
+          g.from_s == null ? "the beginning" : fixed(g.from_s - start, 3) + " s", g.to_s == null ? "the end" : fixed(g.to_s - start, 3) + " s",
+          g.frames_missing == null ? "unknown" : plural(g.frames_missing, "frame")], ["", "n", "n", "n"], { class: "gap" })),
+        ...log.losses.map((l) => cells([`lost: ${words(l.what)}`, fixed(l.from_s - start, 3) + " s", fixed(l.to_s - start, 3) + " s", whole(l.count)], ["", "n", "n", "n"])),
+      ]) : el("p", { class: "ok" }, "No gap, no loss: every frame that arrived is here."),
+      log.gaps_count > log.gaps.length ? el("p", { class: "dim" }, `and ${whole(log.gaps_count - log.gaps.length)} more gaps`) : null)));
+};

@@ -1,0 +1,125 @@
+//! Flights and their phases, by the rules of the firmware.
+
+use hums_core::flight::ground_speed_mps;
+use hums_core::time::{Instant, Span};
+use serde::Serialize;
+
+use crate::decode::reference::{Quantity, Reference};
+
+/// Kept one by one at most.
+const FLIGHTS_MAX: usize = 500;
+const PHASES_MAX: usize = 2_000;
+/// A phase that lasts less is part of the one before.
+const PHASE_MIN: Span = Span::from_secs(2);
+
+/// One flight: from take-off to landing, or to the end of the log.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Flight {
+    from_s: f64,
+    to_s: f64,
+    landed: bool,
+    height_max_m: f32,
+    speed_max_m_s: f32,
+    percent_from: Option<f32>,
+    percent_to: Option<f32>,
+}
+
+/// A time in one phase.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PhaseSpan {
+    phase: &'static str,
+    from_s: f64,
+    to_s: f64,
+}
+
+/// The flights of a log, and the phases of all of it.
+#[derive(Debug, Default)]
+pub struct Flights {
+    flights: Vec<Flight>,
+    phases: Vec<PhaseSpan>,
+}
+
+impl Flights {
+    /// The flights, in order.
+    pub fn all(&self) -> &[Flight] {
+        &self.flights
+    }
+
+    /// The phases, in order.
+    pub fn phases(&self) -> &[PhaseSpan] {
+        &self.phases
+    }
+
+    /// Follows what the vehicle has just told; `airborne` says where it was before that.
+    pub fn follow(&mut self, at: Instant, airborne: bool, reference: &Reference) {
+        match (airborne, reference.flight().airborne_since()) {
+            (false, Some(since)) if self.flights.len() < FLIGHTS_MAX => self.begin(since, at, reference),
+            (true, None) => self.extend(at, true, reference),
+            (true, Some(_)) => self.extend(at, false, reference),
+            _ => {}
+        }
+        self.extend_phase(at, reference);
+    }
+
+    /// The log ends here.
+    pub fn end(&mut self, at: Instant, reference: &Reference) {
+        self.extend_phase(at, reference);
+        if reference.flight().airborne() {
+            self.extend(at, false, reference);
+        }
+    }
+
+    fn begin(&mut self, since: Instant, at: Instant, reference: &Reference) {
+        self.flights.push(Flight {
+            from_s: since.as_secs_f64(),
+            to_s: at.as_secs_f64(),
+            landed: false,
+            height_max_m: 0.0,
+            speed_max_m_s: 0.0,
+            percent_from: percent(at, reference),
+            percent_to: None,
+        });
+    }
+
+    fn extend(&mut self, at: Instant, landed: bool, reference: &Reference) {
+        let vehicle = reference.vehicle();
+        let height_m = vehicle.global.get().map(|global| global.relative_altitude.0);
+        let speed = ground_speed_mps(at, vehicle);
+        let percent = percent(at, reference);
+        if let Some(flight) = self.flights.last_mut().filter(|flight| !flight.landed) {
+            (flight.to_s, flight.landed) = (at.as_secs_f64(), landed);
+            flight.height_max_m = flight.height_max_m.max(height_m.unwrap_or(0.0));
+            flight.speed_max_m_s = flight.speed_max_m_s.max(speed.unwrap_or(0.0));
+            flight.percent_to = percent.or(flight.percent_to);
+        }
+    }
+
+    /// The phase goes on, or another begins; one too short to matter is taken back.
+    fn extend_phase(&mut self, at: Instant, reference: &Reference) {
+        let phase = reference.flight().phase(at, reference.vehicle()).name();
+        let at_s = at.as_secs_f64();
+        let full = self.phases.len() >= PHASES_MAX;
+        if let Some(last) = self.phases.last_mut() {
+            last.to_s = last.to_s.max(at_s);
+            if last.phase == phase || full {
+                return;
+            }
+            let short = at_s - last.from_s < f64::from(PHASE_MIN.as_secs_f32());
+            if short && self.phases.len() > 1 {
+                self.phases.pop();
+                if let Some(before) = self.phases.last_mut() {
+                    before.to_s = at_s;
+                    if before.phase == phase {
+                        return;
+                    }
+                }
+            }
+        }
+        self.phases.push(PhaseSpan { phase, from_s: at_s, to_s: at_s });
+    }
+}
+
+/// What is left of the battery.
+fn percent(at: Instant, reference: &Reference) -> Option<f32> {
+    Some(reference.value(at, Quantity::BatteryPercent)?.as_f64() as f32)
+}

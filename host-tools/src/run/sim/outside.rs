@@ -1,0 +1,91 @@
+//! What a power-on begins with, and what is around the board.
+
+use std::io::Write;
+
+use anyhow::Result;
+use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
+use hums_blackbox::Writer;
+use hums_core::Monitor;
+use hums_core::params::Params;
+use hums_onboard::queues::Queues;
+use hums_onboard::{Mailbox, PortStatus, StoreStatus};
+use hums_recorder::status::CardReading;
+use hums_recorder::{CardDevice, CardStatus, HeldBlocks, Trouble};
+
+use crate::card::SimCard;
+use crate::card::sim::CardError;
+use crate::run::report::Finding;
+use crate::run::store::FileFlash;
+
+/// What a power-on begins with empty: all that is static on the board.
+pub(super) struct Memory {
+    pub(super) card_status: CardStatus,
+    pub(super) port_status: PortStatus,
+    pub(super) store_status: StoreStatus,
+    pub(super) mailbox: Mailbox,
+    pub(super) held: HeldBlocks,
+    pub(super) queues: Box<Queues>,
+    pub(super) writer: Box<Writer>,
+    pub(super) monitor: Box<Monitor>,
+}
+
+impl Memory {
+    pub(super) fn new(params: &Params) -> Self {
+        Self {
+            card_status: CardStatus::new(),
+            port_status: PortStatus::new(),
+            store_status: StoreStatus::new(),
+            mailbox: Mailbox::new(),
+            held: HeldBlocks::new(),
+            queues: Box::new(Queues::new()),
+            writer: Box::new(Writer::new()),
+            monitor: Box::new(Monitor::new(*params)),
+        }
+    }
+
+    /// What storage says of the card.
+    pub(super) fn card_reading(&self) -> CardReading {
+        self.card_status.read()
+    }
+}
+
+/// What is around the board.
+pub(super) struct Outside<'a, 'w> {
+    pub(super) card: &'a SimCard,
+    pub(super) flash: &'a FileFlash,
+    pub(super) gs: &'w mut (dyn Write + Send),
+    pub(super) autopilot: &'w mut (dyn Write + Send),
+    pub(super) findings: &'w mut Vec<Finding>,
+    /// When this power-on is, in microseconds since the first input byte.
+    pub(super) power_on_us: u64,
+    /// When our own power goes for a moment, in the same.
+    pub(super) reboot_at_us: Option<u64>,
+}
+
+/// The slot that the card is in, as the recorder sees it.
+pub(super) struct Slot<'a>(pub(super) &'a SimCard);
+
+impl BlockDevice for Slot<'_> {
+    type Error = CardError;
+
+    fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {
+        self.0.read(blocks, start)
+    }
+
+    fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
+        self.0.write(blocks, start)
+    }
+
+    fn num_blocks(&self) -> Result<BlockCount, CardError> {
+        self.0.num_blocks()
+    }
+}
+
+impl CardDevice for Slot<'_> {
+    fn trouble(error: &CardError) -> Trouble {
+        match error {
+            CardError::PowerGone | CardError::Absent => Trouble::Gone,
+            CardError::WriteRefused | CardError::OutOfRange | CardError::Image(_) => Trouble::Refusing,
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! How a power-on ends, and what it came to.
+
+use anyhow::Result;
+use hums_blackbox::record::Stats;
+use hums_core::params::Params;
+use hums_core::time::Span;
+use hums_onboard::port::PortReading;
+use hums_onboard::queues::Ends;
+use hums_recorder::CardState;
+
+use super::Pipeline;
+
+/// How long the end of a run waits for a card that is out, before what waits for it is lost.
+const CARD_PATIENCE: Span = Span::from_secs(5);
+
+impl Pipeline<'_, '_> {
+    /// The input has ended: the record is closed and written out. Gives the frames that found no card.
+    pub(in crate::run::sim) fn finish(&mut self) -> Result<u64> {
+        self.reception.idle(self.now, &mut self.ends.frames_in);
+        self.drain()?;
+        self.save_all();
+        let Ends { sectors_in, gs_in, .. } = &mut self.ends;
+        self.monitoring.finish(self.now, sectors_in, gs_in);
+        let patience = self.now + CARD_PATIENCE;
+        while !self.storage.is_done(&self.ends.sectors_out) && !self.is_dead() {
+            let at = self.storage_at.unwrap_or(self.now).max(self.now);
+            if at > patience && self.slot_is_empty() {
+                break;
+            }
+            self.now = at;
+            self.storage();
+        }
+        if let Some((until, _)) = self.busy {
+            self.now = self.now.max(until);
+            self.end_service();
+        }
+        self.storage.finish();
+        // The port sends what it has, at its pace.
+        self.now = self.now.max(self.gs_at);
+        for _ in 0..1000 {
+            self.send_gs()?;
+            self.now = self.now.max(self.gs_at);
+        }
+        Ok(self.storage.abandon(&mut self.ends.sectors_out))
+    }
+
+    /// Hands over everything that is to outlive power, as fast as the store takes it.
+    fn save_all(&mut self) {
+        self.monitoring.save_signing(self.now, &mut self.handover);
+        while !self.handover.finish(self.now, self.monitoring.monitor_mut()) && !self.is_dead() {
+            self.keep(true);
+        }
+        self.keep(true);
+        self.note();
+    }
+
+    fn slot_is_empty(&self) -> bool {
+        self.slot_status.read().state != CardState::Recording
+    }
+
+    /// The figures of this power-on.
+    pub(in crate::run::sim) fn stats(&self) -> Stats {
+        let mut stats = self.monitoring.stats(&self.ends.gs_in);
+        catch_up(&mut stats, self.port_status.read());
+        stats
+    }
+
+    /// Parameters as they are now.
+    pub(in crate::run::sim) fn params(&self) -> Params {
+        *self.monitoring.monitor().params()
+    }
+
+    /// Whether the card no longer holds all that was logged: old segments were overwritten.
+    pub(in crate::run::sim) fn has_overwritten(&self) -> bool {
+        let card = self.slot_status.read();
+        card.segments_overwritten + card.segments_released > 0
+    }
+}
+
+/// The monitor adds up the port's counters at each tick; power may have gone since the last one.
+fn catch_up(stats: &mut Stats, port: PortReading) {
+    for (sum, counter) in [
+        (&mut stats.frames_in, port.frames),
+        (&mut stats.bytes_in, port.bytes),
+        (&mut stats.bytes_not_frames, port.bytes_not_frames),
+    ] {
+        // The counter is the sum modulo 2^32, and ahead of it.
+        *sum += u64::from(counter.wrapping_sub(*sum as u32));
+    }
+}

@@ -1,0 +1,236 @@
+//! Quantities over time, sampled so that no extreme is lost: all of them share one row of equal intervals, of which
+//! each keeps its lowest and its highest value in the order in which they came. When the row is full, neighbours are
+//! joined and the intervals become twice as long: memory and page are bounded, however long the flight is.
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+use hums_core::time::Instant;
+use serde::Serialize;
+
+/// Intervals at most: as many as a large screen has columns.
+const INTERVALS_MAX: usize = 2048;
+/// The first length of an interval.
+const INTERVAL_MS: u64 = 50;
+/// Series at most: all that the model of a vehicle can fill.
+const SERIES_MAX: usize = 256;
+
+/// The row of intervals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grid {
+    start_ms: Option<u64>,
+    interval_ms: u64,
+}
+
+/// What one interval keeps of one series.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Extremes {
+    low: f32,
+    high: f32,
+    /// The lowest came first.
+    rises: bool,
+}
+
+impl Extremes {
+    /// With a later value.
+    fn with(self, value: f32) -> Self {
+        if value < self.low {
+            Self { low: value, rises: false, ..self }
+        } else if value > self.high {
+            Self { high: value, rises: true, ..self }
+        } else {
+            self
+        }
+    }
+
+    /// With what a later interval kept.
+    fn joined(self, later: Self) -> Self {
+        let (first, second) = if later.rises { (later.low, later.high) } else { (later.high, later.low) };
+        self.with(first).with(second)
+    }
+}
+
+/// One quantity.
+#[derive(Clone, Debug, Default)]
+struct Series {
+    /// By interval; a map, because slow quantities fill few of them.
+    values: BTreeMap<u16, Extremes>,
+}
+
+/// A line of a plot: the plot, and the line's number: a motor, a cell, an axis.
+pub type Line<P> = (P, u8);
+
+/// All series of a page, or of a live vehicle, by the plots that there are.
+#[derive(Clone, Debug)]
+pub struct Store<P> {
+    grid: Grid,
+    series: BTreeMap<Line<P>, Series>,
+}
+
+/// What a series has in some of the intervals: their numbers, and the values of each in their order, a pair each.
+pub type Part = (Vec<u16>, Vec<f32>);
+
+impl<P> Default for Store<P> {
+    fn default() -> Self {
+        Self { grid: Grid { start_ms: None, interval_ms: INTERVAL_MS }, series: BTreeMap::new() }
+    }
+}
+
+/// A series as the page takes it.
+#[derive(Debug, Serialize)]
+pub struct SeriesJson {
+    /// What it is called.
+    pub label: String,
+    /// Which line of its plot: lines of one number have one colour in all plots.
+    pub line: u8,
+    /// Steps from interval to interval, the first from 0.
+    steps: Vec<u16>,
+    /// The values of each interval in their order; a whole number of pairs.
+    values: Vec<f64>,
+}
+
+/// The row of intervals as the page takes it.
+#[derive(Debug, Serialize)]
+pub struct GridJson {
+    start_s: f64,
+    interval_s: f64,
+    intervals: usize,
+}
+
+impl<P: Copy + Ord> Store<P> {
+    /// Takes a value; what is not finite is none.
+    pub fn push(&mut self, at: Instant, line: Line<P>, value: f32) {
+        let known = self.series.contains_key(&line);
+        if !value.is_finite() || (!known && self.series.len() >= SERIES_MAX) {
+            return;
+        }
+        let interval = self.interval(at);
+        let series = self.series.entry(line).or_default();
+        let new = Extremes { low: value, high: value, rises: true };
+        series.values.entry(interval).and_modify(|extremes| *extremes = extremes.with(value)).or_insert(new);
+    }
+
+    /// The interval of a time; makes room for it first. What is before the first one counts to it.
+    pub fn interval(&mut self, at: Instant) -> u16 {
+        let start_ms = *self.grid.start_ms.get_or_insert(at.as_millis());
+        let since_ms = at.as_millis().saturating_sub(start_ms);
+        while since_ms / self.grid.interval_ms >= INTERVALS_MAX as u64 {
+            self.grid.interval_ms = self.grid.interval_ms.saturating_mul(2);
+            for series in self.series.values_mut() {
+                let mut joined: BTreeMap<u16, Extremes> = BTreeMap::new();
+                for (interval, later) in std::mem::take(&mut series.values) {
+                    let into = joined.entry(interval / 2);
+                    into.and_modify(|extremes| *extremes = extremes.joined(later)).or_insert(later);
+                }
+                series.values = joined;
+            }
+        }
+        (since_ms / self.grid.interval_ms) as u16
+    }
+
+    /// The first interval's time and the intervals' length, milliseconds; `None` before the first value.
+    pub fn spacing_ms(&self) -> Option<(u64, u64)> {
+        Some((self.grid.start_ms?, self.grid.interval_ms))
+    }
+
+    /// What all series have in these intervals, for those that have anything.
+    pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (Line<P>, Part)> {
+        // An empty range is one that ends before it begins, which a map refuses.
+        let some = intervals.start() <= intervals.end();
+        self.series.iter().filter(move |_| some).filter_map(move |(line, series)| {
+            let (mut numbers, mut values) = (Vec::new(), Vec::new());
+            for (&number, extremes) in series.values.range(intervals.clone()) {
+                numbers.push(number);
+                let (low, high) = (extremes.low, extremes.high);
+                values.extend(if extremes.rises { [low, high] } else { [high, low] });
+            }
+            (!numbers.is_empty()).then_some((*line, (numbers, values)))
+        })
+    }
+
+    /// The row of intervals.
+    pub fn grid(&self) -> GridJson {
+        let last = self.series.values().filter_map(|series| series.values.keys().next_back()).max();
+        GridJson {
+            start_s: self.grid.start_ms.unwrap_or(0) as f64 / 1e3,
+            interval_s: self.grid.interval_ms as f64 / 1e3,
+            intervals: last.map_or(0, |last| usize::from(*last) + 1),
+        }
+    }
+
+    /// The series of a plot, with this many decimals.
+    pub fn plot(&self, plot: P, decimals: u8, label: impl Fn(u8) -> String) -> Vec<SeriesJson> {
+        let of_plot = self.series.range((plot, 0)..=(plot, u8::MAX));
+        of_plot.map(|((_, line), series)| series.json(*line, label(*line), decimals)).collect()
+    }
+}
+
+impl Series {
+    fn json(&self, line: u8, label: String, decimals: u8) -> SeriesJson {
+        let scale = 10_f64.powi(i32::from(decimals));
+        let rounded = |value: f32| (f64::from(value) * scale).round() / scale;
+        let (mut steps, mut values, mut before) = (Vec::new(), Vec::new(), 0);
+        for (&interval, extremes) in &self.values {
+            steps.push(interval - before);
+            before = interval;
+            let (low, high) = (rounded(extremes.low), rounded(extremes.high));
+            values.extend(if extremes.rises { [low, high] } else { [high, low] });
+        }
+        SeriesJson { label, line, steps, values }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEIGHT: &str = "height";
+    const KEY: Line<&str> = (HEIGHT, 0);
+
+    #[test]
+    fn extremes_outlive_every_doubling() {
+        let mut store = Store::default();
+        for second in 0..100_000_u64 {
+            let value = match second {
+                777 => 99.0,
+                55_555 => -99.0,
+                _ => (second % 7) as f32,
+            };
+            store.push(Instant::from_millis(second * 1000), KEY, value);
+        }
+        let grid = store.grid();
+        assert!((1000..=2048).contains(&grid.intervals), "{grid:?}");
+        let series = &store.plot(HEIGHT, 1, |_| String::new())[0];
+        assert_eq!(series.steps.len(), grid.intervals);
+        let place = |wanted: f64| {
+            series.values.iter().position(|value| (value - wanted).abs() < 0.01).expect("kept") / 2
+        };
+        let at = |second: f64| (second / grid.interval_s) as usize;
+        assert_eq!((place(99.0), place(-99.0)), (at(777.0), at(55_555.0)));
+    }
+
+    #[test]
+    fn the_order_of_extremes_is_kept() {
+        for (values, kept) in
+            [([1.0, 5.0, 3.0], [1.0, 5.0]), ([5.0, 1.0, 3.0], [5.0, 1.0]), ([3.0, 5.0, 1.0], [5.0, 1.0])]
+        {
+            let mut store = Store::default();
+            for value in values {
+                store.push(Instant::ZERO, KEY, value);
+            }
+            assert_eq!(store.plot(HEIGHT, 1, |_| String::new())[0].values, kept);
+        }
+    }
+
+    #[test]
+    fn a_time_beyond_all_reason_and_a_clock_set_back_stay_in_bounds() {
+        let mut store = Store::default();
+        store.push(Instant::from_millis(1000), KEY, 1.0);
+        store.push(Instant::from_micros(u64::MAX), KEY, 2.0);
+        store.push(Instant::ZERO, KEY, f32::NAN);
+        store.push(Instant::ZERO, KEY, 3.0);
+        let series = &store.plot(HEIGHT, 1, |_| String::new())[0];
+        assert!(series.steps.iter().all(|step| usize::from(*step) < INTERVALS_MAX));
+        assert_eq!(series.values.len(), 2 * series.steps.len());
+    }
+}

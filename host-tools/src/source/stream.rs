@@ -1,0 +1,43 @@
+//! A stream of bytes with the times at which they arrive.
+
+use std::io::{self, Read};
+
+/// Bytes that arrive together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chunk {
+    /// When the last of them is there, in microseconds since the first byte of the input; never falls.
+    pub at_us: u64,
+    /// The bytes; may be none where only time passed (a live source that is silent).
+    pub bytes: Vec<u8>,
+}
+
+/// A stream of chunks.
+pub trait Source: Send {
+    /// The next chunk; `None` at the end.
+    fn next(&mut self) -> io::Result<Option<Chunk>>;
+
+    /// UTC at the first byte, microseconds since 1970, where the input told it (known once a chunk was read).
+    fn utc_start_us(&self) -> Option<u64> {
+        None
+    }
+
+    /// Whether each chunk is a record of its own (a frame of a tlog), not just some bytes of a stream.
+    fn has_records(&self) -> bool {
+        false
+    }
+
+    /// A sentence about what was strange in the input, once it has been read.
+    fn remark(&self) -> Option<String> {
+        None
+    }
+}
+
+/// Reads what there is, going on after an interrupted call; 0 at the end.
+pub(super) fn read_some(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
+    loop {
+        match input.read(buffer) {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            result => return result,
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! What a vehicle's components say in words: `STATUSTEXT`, long ones put together from their parts.
+
+use hums_core::observation::Source;
+use hums_core::time::{Instant, Span};
+
+use crate::mavlink::ids::STATUSTEXT;
+use crate::mavlink::values::{Payload, Value};
+
+/// A text of several parts that lacks the next one for so long is as long as it is.
+const PATIENCE: Span = Span::from_secs(1);
+/// The longest text that is put together, bytes.
+const BYTES_MAX: usize = 1_000;
+/// A part with less than this is the last one: it has a NUL.
+const PART_BYTES: usize = 50;
+
+/// A text, or what one message has of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Text {
+    /// When its first part came.
+    pub at: Instant,
+    /// Who says it.
+    pub source: Source,
+    /// `MAV_SEVERITY`: 0 is an emergency, 7 is for debugging.
+    pub severity: u8,
+    /// Text of the world, never markup.
+    pub words: String,
+    /// The number that its parts share; 0 where there is but one.
+    id: u16,
+    /// Nothing follows.
+    ends: bool,
+}
+
+impl Text {
+    /// From the payload of a frame whose checksum holds.
+    pub fn of(at: Instant, source: Source, payload: &[u8]) -> Option<Self> {
+        let payload = Payload::new(hums_dialect::message(STATUSTEXT)?, payload);
+        let bytes = payload.fields().find_map(|(_, value)| match value {
+            Value::Text(bytes) => Some(bytes),
+            _ => None,
+        })?;
+        let id = payload.number("id").unwrap_or(0.0) as u16;
+        let severity = payload.number("severity").unwrap_or(0.0) as u8;
+        let words = String::from_utf8_lossy(bytes).into_owned();
+        Some(Self { at, source, severity, words, id, ends: id == 0 || bytes.len() < PART_BYTES })
+    }
+}
+
+/// Puts texts together.
+#[derive(Clone, Debug, Default)]
+pub struct Texts(Option<Text>);
+
+impl Texts {
+    /// Takes the next message; gives what is whole.
+    pub fn take(&mut self, next: Text, whole: &mut impl FnMut(Text)) {
+        self.pass(next.at, whole);
+        let ends = next.ends;
+        match &mut self.0 {
+            Some(open) if next.id != 0 && open.id == next.id && open.source == next.source => {
+                if open.words.len() < BYTES_MAX {
+                    open.words.push_str(&next.words);
+                }
+            }
+            _ => {
+                self.end(whole);
+                self.0 = Some(next);
+            }
+        }
+        if ends {
+            self.end(whole);
+        }
+    }
+
+    /// Time passes: what has waited long enough is whole.
+    pub fn pass(&mut self, now: Instant, whole: &mut impl FnMut(Text)) {
+        if self.0.as_ref().is_some_and(|open| now.since(open.at) > PATIENCE) {
+            self.end(whole);
+        }
+    }
+
+    /// Nothing follows.
+    pub fn end(&mut self, whole: &mut impl FnMut(Text)) {
+        if let Some(text) = self.0.take() {
+            whole(text);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SOURCE: Source = Source { system: 1, component: 1 };
+
+    fn part(at_ms: u64, id: u16, words: &str) -> Text {
+        let mut payload = vec![4];
+        payload.extend_from_slice(words.as_bytes());
+        payload.resize(51, 0);
+        payload.extend_from_slice(&id.to_le_bytes());
+        Text::of(Instant::from_millis(at_ms), SOURCE, &payload).expect("a text")
+    }
+
+    fn told(parts: impl IntoIterator<Item = Text>) -> Vec<String> {
+        let (mut texts, mut told) = (Texts::default(), Vec::new());
+        let mut take = |text: Text| told.push(text.words);
+        parts.into_iter().for_each(|part| texts.take(part, &mut take));
+        texts.end(&mut take);
+        told
+    }
+
+    #[test]
+    fn parts_of_one_number_are_one_text_and_the_next_text_of_that_number_is_another() {
+        let long = "a".repeat(50);
+        let parts =
+            [part(0, 7, &long), part(10, 7, "b"), part(20, 7, "c"), part(30, 0, "d"), part(40, 0, "e")];
+        assert_eq!(told(parts), [format!("{long}b"), "c".into(), "d".into(), "e".into()]);
+    }
+
+    #[test]
+    fn a_text_whose_end_was_lost_is_told_as_far_as_it_came() {
+        let long = "a".repeat(50);
+        assert_eq!(told([part(0, 7, &long), part(1_500, 7, "b")]), [long.clone(), "b".into()]);
+        assert_eq!(told([part(0, 7, &long), part(10, 0, "b")]), [long, "b".into()]);
+    }
+
+    #[test]
+    fn a_text_without_end_is_bounded() {
+        let long = "a".repeat(50);
+        let told = told((0..100).map(|at| part(at, 7, &long)));
+        assert!(told.iter().all(|words| words.len() <= BYTES_MAX), "{}", told.len());
+    }
+}

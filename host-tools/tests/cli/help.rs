@@ -1,0 +1,110 @@
+//! The examples of every `--help`, taken out of its text and run in a directory that has the files that they name.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::net::UdpSocket;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use tempfile::TempDir;
+
+use super::support::{hums, px4, run, text};
+
+/// What runs until Ctrl-C, and is well when it has told where its page is.
+const SERVES: &str = "live";
+/// Commands whose examples need an emulator (`tests/emulator` runs it) or a board (`tests/sim/companion.rs` plays one).
+const ELSEWHERE: [&str; 4] = ["emulate", "params", "pull", "format"];
+
+/// The examples of a help text, without remarks and without what stands after a pipe.
+fn examples(help: &str) -> Vec<String> {
+    let lines = help.lines().filter_map(|line| line.strip_prefix("  hums "));
+    let plain = |line: &str| Some(line.split("   ").next()?.split(" | ").next()?.trim().to_owned());
+    lines.filter_map(plain).collect()
+}
+
+/// The help texts of the program and of all its commands.
+fn helps(dir: &Path) -> Vec<String> {
+    let of_all = text(&run(dir, "--help", 0));
+    let commands = of_all.split("Commands:\n").nth(1).expect("a list of commands");
+    let names = commands.lines().take_while(|line| !line.is_empty());
+    let names = names.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
+    let names: Vec<&str> = names.filter(|name| !matches!(*name, "" | "help")).collect();
+    assert!(names.len() > 10, "{names:?}");
+    std::iter::once(of_all.clone())
+        .chain(names.iter().map(|name| text(&run(dir, &format!("{name} --help"), 0))))
+        .collect()
+}
+
+/// Whether an example waits for somebody, or takes as long as the flight did.
+fn waits(example: &str) -> bool {
+    let for_a_link = ["serial:", "tcp:", "192.168."].iter().any(|form| example.contains(form));
+    let live = example.starts_with(SERVES);
+    for_a_link || (!live && (example.contains("udpin:") || example.contains("udpout:")))
+}
+
+/// Starts what serves a page, and ends it when it has told where.
+fn serve(dir: &Path, example: &str) {
+    let port = UdpSocket::bind("127.0.0.1:0").expect("a port").local_addr().expect("its address").port();
+    let example = example.replace(":14550", &format!(":{port}"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hums"));
+    command
+        .current_dir(dir)
+        .env("PATH", "")
+        .args(example.split_whitespace())
+        .args(["--listen", "127.0.0.1:0"]);
+    let mut program = command.stdout(Stdio::piped()).spawn().expect("it runs");
+    let mut first = String::new();
+    let read = BufReader::new(program.stdout.take().expect("it is piped")).read_line(&mut first);
+    program.kill().expect("it is ours");
+    program.wait().expect("it is ours");
+    assert!(read.is_ok() && first.starts_with("http://127.0.0.1:"), "hums {example}\n{first}");
+}
+
+/// A directory with what examples name: a recording, a card with one session, a folder with such a card, a log file.
+fn furnished() -> TempDir {
+    let dir = tempfile::tempdir().expect("directory");
+    let path = |name: &str| dir.path().join(name);
+    fs::copy(px4(), path("flight.tlog")).expect("a copy");
+    fs::write(path("hums.param"), "CELL_VOLT_WARN 3.6\n").expect("a file");
+    fs::create_dir(path("cards")).expect("a directory");
+    run(dir.path(), "sim --input flight.tlog --sd card.img", 0);
+    run(dir.path(), "sim --input flight.tlog --sd cards/card.img", 0);
+    run(dir.path(), "pack flight.tlog -o 00001_00.HUM", 0);
+    dir
+}
+
+/// Runs an example to its end.
+fn works(dir: &Path, example: &str) {
+    // Without a path there is no emulator: the demo runs the same pipeline on this PC.
+    let output = hums().current_dir(dir).env("PATH", "").args(example.split_whitespace()).output();
+    let output = output.expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    // 3: what an example of a fault recorded has losses.
+    assert!(matches!(output.status.code(), Some(0 | 3)), "hums {example}\n{said}");
+}
+
+#[test]
+fn every_example_that_needs_nobody_works_as_it_is_typed() {
+    let anywhere = tempfile::tempdir().expect("directory");
+    let (mut ran, mut elsewhere) = (BTreeSet::new(), BTreeSet::new());
+    for help in helps(anywhere.path()) {
+        let dir = furnished();
+        for example in examples(&help) {
+            let command = example.split(' ').next().unwrap_or_default().to_owned();
+            if ELSEWHERE.contains(&command.as_str()) {
+                elsewhere.insert(command);
+            } else if !waits(&example) {
+                if command == SERVES {
+                    serve(dir.path(), &example);
+                } else {
+                    works(dir.path(), &example);
+                }
+                ran.insert(command);
+            }
+        }
+    }
+    let commands = ["decode", "demo", "info", "live", "pack", "report", "sim", "verify"].map(String::from);
+    assert_eq!(ran, BTreeSet::from(commands), "each of these ran");
+    assert_eq!(elsewhere, BTreeSet::from(ELSEWHERE.map(String::from)), "each of these has an example");
+}
