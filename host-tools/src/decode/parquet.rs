@@ -23,7 +23,7 @@ use hums_core::time::Instant;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use rayon::prelude::*;
 
 use super::columns::{Column, TextColumn, cell_array, cell_data_type};
@@ -37,11 +37,11 @@ use crate::mavlink::values::Payload;
 /// Bytes of columns that wait to be encoded, all tables together.
 const PENDING_MAX: usize = 2 << 20;
 /// Bytes of row groups in work, all tables together.
-const WRITERS_MAX: usize = 12 << 20;
+const WRITERS_MAX: usize = 24 << 20;
 /// Rows of a row group at most: what engines like to read at once.
 const GROUP_ROWS: usize = 128 * 1024;
-/// Bytes of a page and of a column's dictionary at most.
-const PAGE_BYTES: usize = 64 * 1024;
+/// Bytes of a page and of a column's dictionary at most. Each column that is open holds a page that is not compressed yet.
+const PAGE_BYTES: usize = 32 * 1024;
 
 /// Names that every table has: its own first columns, and those that its place among the directories adds.
 const TAKEN: [&str; 5] = ["boot_s", "utc", "vehicle", "date", "session"];
@@ -233,7 +233,7 @@ impl RowColumns {
 /// The tables of one session, open.
 pub struct ParquetTables {
     dir: PathBuf,
-    properties: WriterProperties,
+    properties: WriterPropertiesBuilder,
     tables: BTreeMap<Table, TableFile>,
     pending_bytes: usize,
 }
@@ -255,9 +255,12 @@ impl ParquetTables {
             .set_max_row_group_row_count(Some(GROUP_ROWS))
             .set_data_page_size_limit(PAGE_BYTES)
             .set_dictionary_page_size_limit(PAGE_BYTES)
+            .set_dictionary_enabled(false)
+            // What there is to know of each page would be kept until the file's end.
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_offset_index_disabled(true)
             .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned())
-            .set_key_value_metadata(Some(about))
-            .build();
+            .set_key_value_metadata(Some(about));
         Ok(Self { dir, properties, tables: BTreeMap::new(), pending_bytes: 0 })
     }
 
@@ -311,10 +314,20 @@ impl ParquetTables {
 }
 
 impl TableFile {
-    fn create(dir: &Path, table: Table, first: RecordBatch, properties: &WriterProperties) -> Result<Self> {
+    fn create(
+        dir: &Path,
+        table: Table,
+        first: RecordBatch,
+        properties: &WriterPropertiesBuilder,
+    ) -> Result<Self> {
+        // A dictionary takes 73 kB of each column that is open, and a log has hundreds of columns; texts gain most by it.
+        let texts = first.schema_ref().fields().iter().filter(|field| *field.data_type() == DataType::Utf8);
+        let properties = texts.fold(properties.clone(), |properties, field| {
+            properties.set_column_dictionary_enabled(vec![field.name().clone()].into(), true)
+        });
         let path = dir.join(format!("{}.parquet", table.name()));
         let file = File::create(&path).with_context(|| cannot_write(&path))?;
-        let writer = ArrowWriter::try_new(file, first.schema(), Some(properties.clone()))
+        let writer = ArrowWriter::try_new(file, first.schema(), Some(properties.build()))
             .with_context(|| cannot_write(&path))?;
         Ok(Self { path, writer, pending: vec![first] })
     }
