@@ -1,4 +1,4 @@
-//! Several logs at once: each is read by a thread of its own, whose groups all share the pool of workers. The results
+//! Several logs at once: each is read by a thread of its own and its workers. The results
 //! are told in the logs' order, and only as many are in work that memory stays bounded.
 
 use std::collections::BTreeMap;
@@ -8,7 +8,9 @@ use std::thread;
 
 use anyhow::Result;
 
-/// Logs in work at most. Reading one leaves workers idle while it writes; a few fill these pauses.
+use crate::logs::in_order::workers;
+
+/// Logs in work at most: writing one leaves its workers idle; a few fill these pauses.
 const AT_ONCE: usize = 4;
 
 /// Calls `work` for each item, some side by side, and `tell` with the results in the items' order. The first error of
@@ -18,12 +20,10 @@ pub fn side_by_side<I: Sync, R: Send>(
     work: impl Fn(&I) -> R + Sync,
     mut tell: impl FnMut(R) -> Result<()>,
 ) -> Result<()> {
-    let alone = || rayon::current_num_threads() <= 1;
-    // One item asks for no worker: a small log is read before they would be awake.
-    if items.len() <= 1 || alone() {
+    let threads = items.len().min(AT_ONCE).min(workers());
+    if threads <= 1 {
         return items.iter().try_for_each(|item| tell(work(item)));
     }
-    let threads = items.len().min(AT_ONCE).min(rayon::current_num_threads());
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
     let (sender, results) = mpsc::channel();
     thread::scope(|scope| {

@@ -7,6 +7,7 @@
 pub mod fat;
 pub mod find;
 pub mod groups;
+pub mod in_order;
 pub mod places;
 pub mod reader;
 

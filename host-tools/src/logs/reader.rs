@@ -2,25 +2,19 @@
 //! gaps between them. Memory is bounded by the groups in work, whatever the log's size.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
-use std::sync::mpsc;
 
 use anyhow::Result;
 use hums_blackbox::record::Keep;
-use hums_blackbox::{
-    BlockCounts, Cause, Entry, GROUP_SECTORS, Gap, GroupDecoder, GroupError, Outline, Record, SECTOR_BYTES,
-};
+use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
 use hums_core::time::Instant;
 
 use super::groups::{Group, Groups};
+use super::in_order::{in_order, workers};
 use super::places::Log;
 
-/// Groups in work for each thread, and at most: each becomes up to some megabytes of text.
-const GROUPS_PER_THREAD: usize = 2;
+/// Groups in work for each worker, and at most: each becomes up to some megabytes of text.
+const GROUPS_PER_WORKER: usize = 2;
 const GROUPS_MAX: usize = 16;
-
-/// A whole group: what is shorter is decoded here.
-const GROUP_BYTES: u64 = (GROUP_SECTORS * SECTOR_BYTES) as u64;
 
 /// What one group's entries become; made in parallel, handed on in order.
 pub trait Collect: Send {
@@ -75,85 +69,34 @@ pub struct Summary {
 
 /// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
 ///
-/// Workers decode while this thread reads the next groups and hands on what is done; it never waits for a whole batch.
+/// Groups are decoded side by side; this thread reads them, hands on what is done, and decodes too.
 pub fn read<C: Collect>(
     log: &Log,
     new: impl Fn() -> C + Sync,
     deliver: &mut impl Deliver<C>,
     mut progress: impl FnMut(u64),
 ) -> Result<Summary> {
-    if log.bytes() > GROUP_BYTES && rayon::current_thread_index().is_none() {
-        // Its workers begin here: they are awake when the first groups are read.
-        rayon::current_num_threads();
-    }
     let mut groups = Groups::new(log);
     let mut stitch = Stitch::default();
-    let (first, second) = (groups.next_group()?, groups.next_group()?);
-    let is_short = second.is_none();
-    let mut ahead = first.into_iter().chain(second);
-    let mut next = |groups: &mut Groups<'_>| match ahead.next() {
-        Some(group) => Ok(Some(group)),
-        None => groups.next_group(),
+    let workers = workers();
+    let ahead_max = (workers * GROUPS_PER_WORKER).min(GROUPS_MAX);
+    let next = || {
+        let group = groups.next_group()?;
+        progress(groups.counts().blocks);
+        Ok(group)
     };
-    if is_short || rayon::current_thread_index().is_some() {
-        // Waking workers for one group takes longer than decoding it here; a worker may not wait for others.
-        while let Some(group) = next(&mut groups)? {
-            stitch.take(decode_here(&group, new()), deliver)?;
-            progress(groups.counts().blocks);
-        }
-    } else {
-        let groups_max = (rayon::current_num_threads() * GROUPS_PER_THREAD).clamp(1, GROUPS_MAX);
-        rayon::in_place_scope(|scope| -> Result<()> {
-            let (sender, results) = mpsc::channel();
-            let mut waiting = BTreeMap::new();
-            let (mut given, mut taken) = (0_usize, 0);
-            loop {
-                while given - taken < groups_max {
-                    let Some(group) = next(&mut groups)? else { break };
-                    let (new, promise) = (&new, Promise { sender: sender.clone(), index: given, kept: None });
-                    scope.spawn(move |_| promise.keep(decode_here(&group, new())));
-                    given += 1;
-                }
-                if taken == given {
-                    break;
-                }
-                // A worker that panicked sends nothing; the scope's end tells.
-                let Ok((index, Some(group))) = results.recv() else { break };
-                waiting.insert(index, group);
-                while let Some(group) = waiting.remove(&taken) {
-                    taken += 1;
-                    stitch.take(group, deliver)?;
-                    progress(groups.counts().blocks);
-                }
-            }
-            Ok(())
-        })?;
-    }
+    in_order(
+        workers,
+        ahead_max,
+        next,
+        |group| decode_here(&group, new()),
+        |decoded| stitch.take(decoded, deliver),
+    )?;
     stitch.end(groups.damaged_at_end(), deliver)?;
     let mut summary = stitch.summary;
     summary.session = groups.session();
     summary.blocks = groups.counts();
     Ok(summary)
-}
-
-/// What a worker sends when it is done: nothing, where it panics, so that nobody waits for it.
-struct Promise<C> {
-    sender: mpsc::Sender<(usize, Option<Decoded<C>>)>,
-    index: usize,
-    kept: Option<Decoded<C>>,
-}
-
-impl<C> Promise<C> {
-    fn keep(mut self, decoded: Decoded<C>) {
-        self.kept = Some(decoded);
-    }
-}
-
-impl<C> Drop for Promise<C> {
-    fn drop(&mut self) {
-        // Where nobody listens any more, reading has ended with an error.
-        let _ = self.sender.send((self.index, self.kept.take()));
-    }
 }
 
 /// Decodes with this thread's decoder, which is large and made once.

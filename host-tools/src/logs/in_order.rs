@@ -1,0 +1,215 @@
+//! Work done side by side and handed on in its order, in bounded memory.
+//!
+//! The calling thread is one of the workers: it fetches items, hands on what is done, and works itself whenever there is
+//! nothing else to do. So one core needs no thread at all, and nobody waits for a thread that is not awake yet.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::mpsc;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+use anyhow::Result;
+
+/// How many may work: as many as there are processors that this program may use, or as `RAYON_NUM_THREADS` says, which
+/// the libraries obey as well.
+pub fn workers() -> usize {
+    let told = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok());
+    let told = told.filter(|count| *count > 0);
+    told.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from))
+}
+
+/// Calls `work` for each item that `next` gives, and `take` with the results in the items' order. `ahead_max` items at
+/// most are in work or wait for an earlier one. The first error ends it.
+pub(super) fn in_order<T: Send, R: Send>(
+    workers: usize,
+    ahead_max: usize,
+    mut next: impl FnMut() -> Result<Option<T>>,
+    work: impl Fn(T) -> R + Sync,
+    mut take: impl FnMut(R) -> Result<()>,
+) -> Result<()> {
+    let queue = Queue { state: Mutex::default(), more: Condvar::new() };
+    let (sender, results) = mpsc::channel();
+    let (mut given, mut taken, mut ended) = (0, 0, false);
+    let mut waiting = BTreeMap::new();
+    thread::scope(|scope| {
+        let mut sender = Some(sender);
+        let _closing = Closing(&queue);
+        loop {
+            while !ended && given - taken < ahead_max {
+                match next()? {
+                    Some(item) => queue.push((given, item)),
+                    None => ended = true,
+                }
+                given += usize::from(!ended);
+            }
+            // After the first items are there: a single one is sooner done than a thread awake.
+            if let Some(sender) = sender.take() {
+                for _ in 1..workers.min(given) {
+                    let (queue, work, sender) = (&queue, &work, sender.clone());
+                    scope.spawn(move || {
+                        while let Some((index, item)) = queue.wait() {
+                            let promise = Promise { sender: &sender, index, result: None };
+                            promise.keep(work(item));
+                        }
+                    });
+                }
+            }
+            waiting.extend(results.try_iter());
+            if let Some(result) = waiting.remove(&taken) {
+                // A worker that panicked gives nothing; the end of the scope tells.
+                let Some(result) = result else { break };
+                taken += 1;
+                take(result)?;
+            } else if let Some((index, item)) = queue.try_take() {
+                waiting.insert(index, Some(work(item)));
+            } else if taken == given {
+                break;
+            } else {
+                waiting.extend(results.recv());
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Items that wait for a worker, oldest first.
+struct Queue<T> {
+    state: Mutex<(VecDeque<T>, bool)>,
+    more: Condvar,
+}
+
+impl<T> Queue<T> {
+    fn lock(&self) -> MutexGuard<'_, (VecDeque<T>, bool)> {
+        // Nobody panics while holding it.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn push(&self, item: T) {
+        self.lock().0.push_back(item);
+        self.more.notify_one();
+    }
+
+    fn try_take(&self) -> Option<T> {
+        self.lock().0.pop_front()
+    }
+
+    /// Waits for an item; `None` once it is closed.
+    fn wait(&self) -> Option<T> {
+        let waits = |state: &mut (VecDeque<T>, bool)| state.0.is_empty() && !state.1;
+        let mut state = self.more.wait_while(self.lock(), waits).unwrap_or_else(PoisonError::into_inner);
+        if state.1 { None } else { state.0.pop_front() }
+    }
+}
+
+/// Closes the queue on every way out.
+struct Closing<'a, T>(&'a Queue<T>);
+
+impl<T> Drop for Closing<'_, T> {
+    fn drop(&mut self) {
+        self.0.lock().1 = true;
+        self.0.more.notify_all();
+    }
+}
+
+/// What a worker sends when it is done: nothing, where it panics, so that nobody waits for it.
+struct Promise<'a, R> {
+    sender: &'a mpsc::Sender<(usize, Option<R>)>,
+    index: usize,
+    result: Option<R>,
+}
+
+impl<R> Promise<'_, R> {
+    fn keep(mut self, result: R) {
+        self.result = Some(result);
+    }
+}
+
+impl<R> Drop for Promise<'_, R> {
+    fn drop(&mut self) {
+        // Where nobody listens any more, the work has ended with an error.
+        let _ = self.sender.send((self.index, self.result.take()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use anyhow::ensure;
+
+    use super::*;
+
+    fn numbers(end: usize) -> impl FnMut() -> Result<Option<usize>> {
+        let mut at = 0..end;
+        move || Ok(at.next())
+    }
+
+    #[test]
+    fn results_come_in_order_whoever_is_done_first() {
+        for workers in [1, 2, 5] {
+            let mut taken = Vec::new();
+            let work = |item: usize| {
+                thread::sleep(std::time::Duration::from_micros((item as u64 * 7 % 5) * 300));
+                item
+            };
+            in_order(workers, 6, numbers(40), work, |item| {
+                taken.push(item);
+                Ok(())
+            })
+            .expect("no error");
+            assert!(taken.iter().copied().eq(0..40), "{workers}");
+        }
+    }
+
+    #[test]
+    fn no_more_than_the_limit_is_held() {
+        let (begun, held_max) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let mut taken = 0;
+        let mut source = numbers(100);
+        let next = || {
+            begun.fetch_add(1, Ordering::Relaxed);
+            source()
+        };
+        in_order(
+            4,
+            7,
+            next,
+            |item| item,
+            |_| {
+                held_max.fetch_max(begun.load(Ordering::Relaxed) - taken, Ordering::Relaxed);
+                taken += 1;
+                Ok(())
+            },
+        )
+        .expect("no error");
+        // The one that is taken counts until it has been.
+        assert!(held_max.into_inner() <= 8);
+    }
+
+    #[test]
+    fn an_error_ends_it_and_nobody_waits() {
+        let refuse = |item| {
+            ensure!(item != 3, "enough");
+            Ok(())
+        };
+        assert!(in_order(3, 8, numbers(1_000), |item| item, refuse).is_err());
+        let mut left = 5;
+        let next = || {
+            left -= 1;
+            ensure!(left > 0, "the card is gone");
+            Ok(Some(left))
+        };
+        assert!(in_order(3, 8, next, |item| item, |_| Ok(())).is_err());
+    }
+
+    #[test]
+    #[should_panic(expected = "a scoped thread panicked")]
+    fn a_worker_that_panics_is_told() {
+        let work = |item: usize| {
+            // On the calling thread it would be told anyway.
+            assert!(thread::current().name().is_some() || item < 10, "for this test");
+            thread::sleep(std::time::Duration::from_millis(1));
+        };
+        let _ = in_order(4, 8, numbers(100), work, |()| Ok(()));
+    }
+}
