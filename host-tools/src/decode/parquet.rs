@@ -8,9 +8,11 @@
 //! arrays text); the fields' metadata has their `units` and `enum`. Each table begins with `boot_s`, seconds since the
 //! monitor's power-on, and `utc`, null where nobody told it; those of frames go on with `system` and `component`.
 //!
-//! Memory is bounded: what waits to be encoded is at most `PENDING_MAX`, and when the row groups in work are more
-//! than `WRITERS_MAX`, the largest are written out.
+//! Memory is bounded: rows wait as plain columns, `PENDING_MAX` in all; then the tables with the most become row groups
+//! and are written out. So no encoder is open longer than for one row group, which costs far more than the rows in it.
 
+use std::cmp::Reverse;
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -19,6 +21,7 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result};
 use arrow_array::{ArrayRef, Float64Array, RecordBatch, TimestampMicrosecondArray, UInt8Array, UInt32Array};
 use arrow_schema::{DataType, Field, Schema, SchemaRef, TimeUnit};
+use arrow_select::concat::concat_batches;
 use hums_core::time::Instant;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
@@ -35,12 +38,12 @@ use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
 /// Bytes of columns that wait to be encoded, all tables together.
-const PENDING_MAX: usize = 2 << 20;
-/// Bytes of row groups in work, all tables together.
-const WRITERS_MAX: usize = 24 << 20;
+const PENDING_MAX: usize = 20 << 20;
+/// Batches of a table that wait, before they are made one: each array of a batch takes some 200 bytes besides its values.
+const BATCHES_MAX: usize = 16;
 /// Rows of a row group at most: what engines like to read at once.
 const GROUP_ROWS: usize = 128 * 1024;
-/// Bytes of a page and of a column's dictionary at most. Each column that is open holds a page that is not compressed yet.
+/// Bytes of a page and of a column's dictionary at most.
 const PAGE_BYTES: usize = 32 * 1024;
 
 /// Names that every table has: its own first columns, and those that its place among the directories adds.
@@ -235,13 +238,13 @@ pub struct ParquetTables {
     dir: PathBuf,
     properties: WriterPropertiesBuilder,
     tables: BTreeMap<Table, TableFile>,
-    pending_bytes: usize,
 }
 
 struct TableFile {
     path: PathBuf,
     writer: ArrowWriter<File>,
     pending: Vec<RecordBatch>,
+    pending_bytes: usize,
 }
 
 impl ParquetTables {
@@ -261,54 +264,42 @@ impl ParquetTables {
             .set_offset_index_disabled(true)
             .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(about));
-        Ok(Self { dir, properties, tables: BTreeMap::new(), pending_bytes: 0 })
+        Ok(Self { dir, properties, tables: BTreeMap::new() })
     }
 
     /// Takes a group's columns.
     pub fn put(&mut self, batches: Batches) -> Result<()> {
         for (table, batch) in batches.finish() {
             let batch = batch.with_context(|| format!("{}: its columns do not fit", table.name()))?;
-            self.pending_bytes += batch.get_array_memory_size();
-            if let Some(file) = self.tables.get_mut(&table) {
-                file.pending.push(batch);
-            } else {
-                let file = TableFile::create(&self.dir, table, batch, &self.properties)?;
-                self.tables.insert(table, file);
-            }
+            let file = match self.tables.entry(table) {
+                Entry::Occupied(file) => file.into_mut(),
+                Entry::Vacant(place) => {
+                    place.insert(TableFile::create(&self.dir, table, &batch.schema(), &self.properties)?)
+                }
+            };
+            file.push(batch)?;
         }
-        if self.pending_bytes > PENDING_MAX { self.encode() } else { Ok(()) }
+        let pending_bytes = self.tables.values().map(|file| file.pending_bytes).sum();
+        if pending_bytes > PENDING_MAX { self.write_largest(pending_bytes) } else { Ok(()) }
     }
 
-    /// Encodes what waits, each table by itself.
-    fn encode(&mut self) -> Result<()> {
-        self.pending_bytes = 0;
-        self.tables.par_iter_mut().try_for_each(|(_, file)| file.encode())?;
-        let mut bytes: usize = self.tables.values().map(|file| file.writer.memory_size()).sum();
-        while bytes > WRITERS_MAX {
-            let Some(largest) = self.tables.values_mut().max_by_key(|file| file.writer.memory_size()) else {
-                break;
-            };
-            let before = largest.writer.memory_size();
-            largest.writer.flush().with_context(|| cannot_write(&largest.path))?;
-            let freed = before.saturating_sub(largest.writer.memory_size());
-            if freed == 0 {
-                break;
-            }
-            bytes -= freed;
-        }
-        Ok(())
+    /// Makes room: half of what waits, in as few row groups as can be.
+    fn write_largest(&mut self, pending_bytes: usize) -> Result<()> {
+        let mut files: Vec<&mut TableFile> = self.tables.values_mut().collect();
+        files.sort_unstable_by_key(|file| Reverse(file.pending_bytes));
+        let mut chosen_bytes = 0;
+        let chosen = files.iter().position(|file| {
+            chosen_bytes += file.pending_bytes;
+            chosen_bytes >= pending_bytes / 2
+        });
+        files.truncate(chosen.map_or(files.len(), |last| last + 1));
+        files.par_iter_mut().try_for_each(|file| file.write_group())
     }
 
     /// Writes what is still held, and each file's end; gives the directory and how many tables there are.
     pub fn finish(mut self) -> Result<(PathBuf, usize)> {
-        self.encode()?;
         let tables = self.tables.len();
-        let tables_done: Result<Vec<()>> = self
-            .tables
-            .into_par_iter()
-            .map(|(_, file)| file.writer.close().map(|_| ()).with_context(|| cannot_write(&file.path)))
-            .collect();
-        tables_done?;
+        std::mem::take(&mut self.tables).into_par_iter().try_for_each(|(_, file)| file.close())?;
         Ok((self.dir, tables))
     }
 }
@@ -317,26 +308,46 @@ impl TableFile {
     fn create(
         dir: &Path,
         table: Table,
-        first: RecordBatch,
+        schema: &SchemaRef,
         properties: &WriterPropertiesBuilder,
     ) -> Result<Self> {
         // A dictionary takes 73 kB of each column that is open, and a log has hundreds of columns; texts gain most by it.
-        let texts = first.schema_ref().fields().iter().filter(|field| *field.data_type() == DataType::Utf8);
+        let texts = schema.fields().iter().filter(|field| *field.data_type() == DataType::Utf8);
         let properties = texts.fold(properties.clone(), |properties, field| {
             properties.set_column_dictionary_enabled(vec![field.name().clone()].into(), true)
         });
         let path = dir.join(format!("{}.parquet", table.name()));
         let file = File::create(&path).with_context(|| cannot_write(&path))?;
-        let writer = ArrowWriter::try_new(file, first.schema(), Some(properties.build()))
+        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties.build()))
             .with_context(|| cannot_write(&path))?;
-        Ok(Self { path, writer, pending: vec![first] })
+        Ok(Self { path, writer, pending: Vec::new(), pending_bytes: 0 })
     }
 
-    fn encode(&mut self) -> Result<()> {
+    fn push(&mut self, batch: RecordBatch) -> Result<()> {
+        self.pending_bytes += batch.get_array_memory_size();
+        self.pending.push(batch);
+        // Those made one before stay apart, so that no row is copied again and again.
+        let small = self.pending.iter().rev().take_while(|batch| batch.num_rows() < GROUP_ROWS / 64).count();
+        if small >= BATCHES_MAX {
+            let few = self.pending.split_off(self.pending.len() - small);
+            self.pending.push(concat_batches(&few[0].schema(), &few)?);
+            self.pending_bytes = self.pending.iter().map(RecordBatch::get_array_memory_size).sum();
+        }
+        Ok(())
+    }
+
+    /// Writes what waits, as a row group.
+    fn write_group(&mut self) -> Result<()> {
+        self.pending_bytes = 0;
         for batch in self.pending.drain(..) {
             self.writer.write(&batch).with_context(|| cannot_write(&self.path))?;
         }
-        Ok(())
+        self.writer.flush().with_context(|| cannot_write(&self.path))
+    }
+
+    fn close(mut self) -> Result<()> {
+        self.write_group()?;
+        self.writer.close().map(|_| ()).with_context(|| cannot_write(&self.path))
     }
 }
 
