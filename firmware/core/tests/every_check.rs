@@ -232,3 +232,26 @@ fn there_is_no_check_that_nothing_shows_to_work() {
         assert!(here || due || ELSEWHERE.contains(&check.name), "{}", check.name);
     }
 }
+
+#[test]
+fn what_a_check_says_is_its_own() {
+    // The same fault on another autopilot's scale, and after another time.
+    let twins = [["vibration", "vibration_px4"], ["cell_deviation", "cell_dev_lasting"]];
+    let all: Vec<_> = checks().collect();
+    for (index, one) in all.iter().enumerate() {
+        assert!(!one.words.is_empty(), "{}", one.name);
+        for other in all[..index].iter().filter(|other| other.words == one.words) {
+            let twin = twins.iter().any(|twins| twins.contains(&one.name) && twins.contains(&other.name));
+            assert!(twin, "{} and {}", one.name, other.name);
+        }
+    }
+}
+
+#[test]
+fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
+    let flags = ["batt_fault", "esc_failure", "autopilot_reboot", "autopilot_state", "sensors"];
+    for check in checks() {
+        let due = DUE.iter().any(|(name, _)| *name == check.name);
+        assert_eq!(check.alarm_only, due || flags.contains(&check.name), "{}", check.name);
+    }
+}

@@ -315,3 +315,18 @@ fn holds_a_known_frame(candidate: &[u8]) -> bool {
                 .is_some_and(|(computed, sent)| crc::step(computed, crc_extra) == sent)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn credit_that_was_spent_comes_back_with_the_bytes_up_to_its_limit() {
+        let mut framer = Framer::new();
+        framer.credit = 0;
+        framer.push(&[0; 100], &mut |_| {});
+        assert_eq!(framer.credit, 100 * CREDIT_PER_BYTE);
+        framer.push(&[0; 2_000], &mut |_| {});
+        assert_eq!(framer.credit, CREDIT_MAX);
+    }
+}

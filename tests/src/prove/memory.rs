@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 static HELD: AtomicUsize = AtomicUsize::new(0);
 
 /// The system's allocator, with a count of the bytes that are held. A program that wants to know what it
-/// [`held_bytes`] names it as its `#[global_allocator]`.
+/// `held_bytes` names it as its `#[global_allocator]`.
 #[derive(Debug)]
 pub struct Counting;
 
