@@ -72,7 +72,8 @@ def main():
     folder = sys.argv[2]
     os.makedirs(folder, exist_ok=True)
     prompt = Prompt(sys.argv[1], folder)
-    out = {"detected": prompt.expect(r"Detected vehicle 1:191", 20)}
+    # Its first start compiles all of it: a slow machine takes half a minute.
+    out = {"detected": prompt.expect(r"Detected vehicle 1:191", 60)}
 
     def show(name):
         return prompt.ask(f"param show {name}", rf"{name} {{2,}}(\S+)", 4, 2)

@@ -296,7 +296,7 @@ fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
         let set = log.lines().any(|line| line.contains(name) && line.contains(value));
         assert!(set, "{name} is not set to {value}");
     }
-    for told in ["line 5 is refused", "line 6 is refused", "line 7 is refused", "PARAMS.TXT has lines"] {
+    for told in ["line 5 is refused", "line 6 is refused", "line 7 is refused", "PARAMS.TXT: lines refused"] {
         assert!(log.contains(told), "{told}");
     }
     assert!(!log.contains("line 1 is refused") && !log.contains("line 4 is refused"));
