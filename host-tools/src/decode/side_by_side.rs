@@ -1,14 +1,9 @@
-//! Several logs at once: each is read by a thread of its own and its workers. The results
-//! are told in the logs' order, and only as many are in work that memory stays bounded.
-
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
-use std::thread;
+//! Several logs at once: each is read by a worker of its own and the workers that this one has in turn. The results are
+//! told in the logs' order, and only as many are in work that memory stays bounded.
 
 use anyhow::Result;
 
-use crate::logs::in_order::workers;
+use crate::logs::in_order::{in_order, workers};
 
 /// Logs in work at most: writing one leaves its workers idle; a few fill these pauses.
 const AT_ONCE: usize = 4;
@@ -18,43 +13,15 @@ const AT_ONCE: usize = 4;
 pub fn side_by_side<I: Sync, R: Send>(
     items: &[I],
     work: impl Fn(&I) -> R + Sync,
-    mut tell: impl FnMut(R) -> Result<()>,
+    tell: impl FnMut(R) -> Result<()>,
 ) -> Result<()> {
-    let threads = items.len().min(AT_ONCE).min(workers());
-    if threads <= 1 {
-        return items.iter().try_for_each(|item| tell(work(item)));
-    }
-    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let (sender, results) = mpsc::channel();
-    thread::scope(|scope| {
-        for _ in 0..threads {
-            let (sender, next, stop, work) = (sender.clone(), &next, &stop, &work);
-            scope.spawn(move || {
-                while !stop.load(Ordering::Relaxed) {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(item) = items.get(index) else { break };
-                    if sender.send((index, work(item))).is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        let mut waiting = BTreeMap::new();
-        let mut told = 0;
-        for (index, result) in results {
-            waiting.insert(index, result);
-            while let Some(result) = waiting.remove(&told) {
-                told += 1;
-                tell(result).inspect_err(|_| stop.store(true, Ordering::Relaxed))?;
-            }
-        }
-        Ok(())
-    })
+    let mut next = items.iter();
+    in_order(workers().min(AT_ONCE), items.len(), || Ok(next.next()), work, tell)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::thread;
     use std::time::Duration;
 
     use super::*;

@@ -20,7 +20,7 @@ pub fn workers() -> usize {
 
 /// Calls `work` for each item that `next` gives, and `take` with the results in the items' order. `ahead_max` items at
 /// most are in work or wait for an earlier one. The first error ends it.
-pub(super) fn in_order<T: Send, R: Send>(
+pub fn in_order<T: Send, R: Send>(
     workers: usize,
     ahead_max: usize,
     mut next: impl FnMut() -> Result<Option<T>>,
