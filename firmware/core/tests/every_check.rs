@@ -8,8 +8,8 @@ use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level, checks};
 use hums_core::observation::{
-    Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Heartbeat, Observation, Processor,
-    RadioControl, Rails, TelemetryRadio, VehicleKind,
+    Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Gnss, Heartbeat, Observation,
+    Processor, RadioControl, Rails, TelemetryRadio, VehicleKind,
 };
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
@@ -55,7 +55,7 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 48] = [
+const FAULTS: [(&str, u8, Level, Fault); 50] = [
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
@@ -109,6 +109,9 @@ const FAULTS: [(&str, u8, Level, Fault); 48] = [
         quad.estimator.velocity = Some(1.5);
     }),
     ("gps_satellites", 0, Level::Warning, |quad, _| quad.gnss.satellites = Some(6)),
+    ("gps_satellites", 1, Level::Warning, |_, more| {
+        more.push(Observation::Gnss(Gnss { instance: 1, fix: 3, satellites: Some(6), ..Gnss::default() }));
+    }),
     ("gps_hdop", 0, Level::Warning, |quad, _| quad.gnss.hdop = Some(2.5)),
     ("gps_accuracy", 0, Level::Warning, |quad, _| quad.gnss.accuracy = Some(Metres(3.0))),
     ("gps_fix", 0, Level::Critical, |quad, _| quad.gnss.fix = 1),
@@ -118,8 +121,9 @@ const FAULTS: [(&str, u8, Level, Fault); 48] = [
     ("rc_rssi", 0, Level::Critical, |_, more| {
         more.push(Observation::RadioControl(RadioControl { rssi: Some(20) }));
     }),
-    ("radio_rssi", 0, Level::Warning, |_, more| radio(more, 30, 5)),
-    ("radio_margin", 0, Level::Warning, |_, more| radio(more, 90, 85)),
+    ("radio_rssi", 0, Level::Warning, |_, more| radio(more, [30, 90], [5, 5])),
+    ("radio_margin", 0, Level::Warning, |_, more| radio(more, [90, 90], [85, 30])),
+    ("radio_margin", 0, Level::Warning, |_, more| radio(more, [90, 90], [30, 85])),
     ("load", 0, Level::Critical, |quad, _| quad.system.load = Some(Fraction(0.97))),
     ("mcu_temperature", 0, Level::Critical, |_, more| {
         more.push(Observation::Processor(Processor { temperature: Some(Celsius(105.0)), voltage: None }));
@@ -182,14 +186,10 @@ fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
     quad.escs[motor].as_mut().unwrap()
 }
 
-fn radio(more: &mut Vec<Observation>, rssi: u8, noise: u8) {
-    let radio = TelemetryRadio {
-        rssi: Some(rssi),
-        remote_rssi: Some(rssi),
-        noise: Some(noise),
-        remote_noise: Some(noise),
-        errors: 0,
-    };
+/// What both ends hear, and the noise there.
+fn radio(more: &mut Vec<Observation>, rssi: [u8; 2], noise: [u8; 2]) {
+    let ([rssi, remote_rssi], [noise, remote_noise]) = (rssi.map(Some), noise.map(Some));
+    let radio = TelemetryRadio { rssi, remote_rssi, noise, remote_noise, errors: 0 };
     more.push(Observation::TelemetryRadio(radio));
 }
 
@@ -213,6 +213,32 @@ fn every_check_finds_what_it_is_there_for_in_time() {
 }
 
 #[test]
+fn what_else_is_fitted_and_well_has_no_finding() {
+    let findings = fly(&LIMITS, |_, more| {
+        let (remaining, temperature) = (Some(Fraction(0.8)), Some(Celsius(35.0)));
+        more.push(Observation::Battery(Battery { id: 1, remaining, temperature, ..Battery::default() }));
+        rail(more, 5.0);
+        more.push(Observation::Engine(Engine {
+            cylinder_head: Some(Celsius(150.0)),
+            exhaust: Some(Celsius(700.0)),
+            fuel_pressure: Some(Hectopascals(300.0)),
+            ..Engine::default()
+        }));
+        more.push(Observation::Gnss(Gnss {
+            instance: 1,
+            fix: 3,
+            satellites: Some(14),
+            hdop: Some(0.9),
+            ..Gnss::default()
+        }));
+        more.push(Observation::RadioControl(RadioControl { rssi: Some(200) }));
+        radio(more, [90, 90], [30, 30]);
+        more.push(Observation::Processor(Processor { temperature: Some(Celsius(50.0)), voltage: None }));
+    });
+    assert_eq!(findings, []);
+}
+
+#[test]
 fn each_kind_of_component_is_due_in_its_own_subsystem() {
     for (name, kind) in DUE {
         let limits = [("CMP1_KIND", kind), ("CMP1_FLIGHTS", 1.0)];
@@ -230,6 +256,19 @@ fn there_is_no_check_that_nothing_shows_to_work() {
         let here = FAULTS.iter().any(|(name, ..)| *name == check.name);
         let due = DUE.iter().any(|(name, _)| *name == check.name);
         assert!(here || due || ELSEWHERE.contains(&check.name), "{}", check.name);
+    }
+}
+
+#[test]
+fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
+    for check in checks() {
+        let instances = match check.name {
+            name if name.starts_with("batt_") || name.starts_with("cell_") => 4,
+            name if name.starts_with("esc_") || name.starts_with("motor_") => 12,
+            name if name.starts_with("gps_") => 2,
+            _ => 1,
+        };
+        assert_eq!(check.instances, instances, "{}", check.name);
     }
 }
 

@@ -33,7 +33,6 @@ const GNSS: Check = Check {
     words: "GPS satellites",
     side: Side::Below,
     warn: Some(Param::GpsSatsWarn),
-    critical: None,
     hysteresis: 0.0,
     debounce_warn: Span::from_secs(2),
     instances: RECEIVERS_MAX as u8,
@@ -85,7 +84,6 @@ pub(super) const CHECKS: &[Check] = &[
         words: "GPS fix lost",
         warn: None,
         critical: Some(Param::GpsFixCrit),
-        debounce_critical: Span::from_secs(1),
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix))),
         ..GNSS
     },

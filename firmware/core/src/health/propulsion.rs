@@ -65,7 +65,6 @@ pub(super) const CHECKS: &[Check] = &[
         critical: None,
         hysteresis: 2.0,
         debounce_warn: Span::from_secs(1),
-        when: When::Armed,
         stale_after: STALE_SLOW,
         read: errors_per_minute,
         ..ESC
@@ -93,8 +92,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(3),
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
-        // Only steady flight says something; ESCs that stop talking are `esc_silent`.
-        stale_after: None,
+        // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
         read: |inputs, motor| {
             let Inputs { now, vehicle, flight, derived, .. } = *inputs;
             derived.motor_imbalance(now, vehicle, flight, motor)
