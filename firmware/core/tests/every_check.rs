@@ -6,10 +6,10 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::health::{Finding, Level, checks};
+use hums_core::health::{self, Finding, Level, checks};
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Gnss, Heartbeat, Observation,
-    Processor, RadioControl, Rails, TelemetryRadio, VehicleKind,
+    Processor, RadioControl, Rails, SystemStatus, TelemetryRadio, VehicleKind,
 };
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
@@ -55,7 +55,7 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 50] = [
+const FAULTS: [(&str, u8, Level, Fault); 51] = [
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
@@ -74,6 +74,7 @@ const FAULTS: [(&str, u8, Level, Fault); 50] = [
         more.push(Observation::Escs(EscGroup { first: 8, escs: [None, None, None, Some(esc)] }));
     }),
     ("esc_failure", 2, Level::Critical, |quad, _| esc(quad, 2).failures = Some(32)),
+    ("esc_failure", 0, Level::Critical, |quad, _| esc(quad, 0).failures = Some(64)),
     ("esc_failure", 1, Level::Warning, |quad, _| esc(quad, 1).failures = Some(4)),
     ("motor_loss", 1, Level::Critical, |quad, _| esc(quad, 1).current = Some(Amperes(0.0))),
     ("motor_imbalance", 0, Level::Critical, |quad, _| esc(quad, 0).rpm = Some(Rpm(7_500.0))),
@@ -214,7 +215,8 @@ fn every_check_finds_what_it_is_there_for_in_time() {
 
 #[test]
 fn what_else_is_fitted_and_well_has_no_finding() {
-    let findings = fly(&LIMITS, |_, more| {
+    let findings = fly(&LIMITS, |quad, more| {
+        cells(quad, 3.89);
         let (remaining, temperature) = (Some(Fraction(0.8)), Some(Celsius(35.0)));
         more.push(Observation::Battery(Battery { id: 1, remaining, temperature, ..Battery::default() }));
         rail(more, 5.0);
@@ -236,6 +238,30 @@ fn what_else_is_fitted_and_well_has_no_finding() {
         more.push(Observation::Processor(Processor { temperature: Some(Celsius(50.0)), voltage: None }));
     });
     assert_eq!(findings, []);
+}
+
+#[test]
+fn the_autopilots_figure_of_the_battery_counts_where_no_battery_reports_itself() {
+    let own = Battery { id: 1, remaining: Some(Fraction(0.8)), ..Battery::default() };
+    for (reports, expected) in [(None, vec![(0, Level::Critical, 5.0)]), (Some(own), vec![])] {
+        let mut monitor = Monitor::new(Params::defaults());
+        let mut quad = Quad::healthy();
+        quad.system = SystemStatus { remaining: Some(Fraction(0.05)), ..quad.system };
+        let mut found = Vec::new();
+        for now_ms in (0..5_000).step_by(100) {
+            let now = Instant::from_millis(now_ms);
+            let said = quad.says(now_ms).into_iter().filter(|said| !matches!(said, Observation::Battery(_)));
+            for observation in said.chain(reports.map(Observation::Battery)) {
+                monitor.observe(now, AUTOPILOT, &observation);
+            }
+            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+                let Finding { check, instance, level, value, .. } = *finding;
+                found.extend((check == "batt_remaining").then_some((instance, level, value)));
+            });
+        }
+        assert_eq!(found, expected);
+    }
 }
 
 #[test]
@@ -268,7 +294,12 @@ fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
             name if name.starts_with("gps_") => 2,
             _ => 1,
         };
-        assert_eq!(check.instances, instances, "{}", check.name);
+        assert_eq!(
+            (check.instances, health::instances(check.name)),
+            (instances, instances),
+            "{}",
+            check.name
+        );
     }
 }
 
@@ -279,11 +310,13 @@ fn what_a_check_says_is_its_own() {
     let all: Vec<_> = checks().collect();
     for (index, one) in all.iter().enumerate() {
         assert!(!one.words.is_empty(), "{}", one.name);
+        assert_eq!(health::words(one.name), one.words);
         for other in all[..index].iter().filter(|other| other.words == one.words) {
             let twin = twins.iter().any(|twins| twins.contains(&one.name) && twins.contains(&other.name));
             assert!(twin, "{} and {}", one.name, other.name);
         }
     }
+    assert_eq!((health::words("of_later"), health::instances("of_later")), ("of_later", 0), "no such check");
 }
 
 #[test]

@@ -127,15 +127,12 @@ fn largest(estimator: &Estimator) -> Option<f32> {
 }
 
 fn second_largest(estimator: &Estimator) -> Option<f32> {
-    let (mut first, mut second) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
-    for value in [estimator.velocity, estimator.position_horizontal, estimator.compass].into_iter().flatten()
-    {
-        if value > first {
-            (first, second) = (value, first);
-        } else if value > second {
-            second = value;
-        }
-    }
+    let known = [estimator.velocity, estimator.position_horizontal, estimator.compass].into_iter().flatten();
+    let (_, second) = known
+        .filter(|value| !value.is_nan())
+        .fold((f32::NEG_INFINITY, f32::NEG_INFINITY), |(first, second), value| {
+            (first.max(value), second.max(first.min(value)))
+        });
     Some(second).filter(|second| second.is_finite())
 }
 
