@@ -6,7 +6,7 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::health::{CLEAR, Finding, Level};
+use hums_core::health::{CLEAR, Finding, Level, Subsystem};
 use hums_core::observation::{Observation, SystemTime};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
@@ -20,10 +20,11 @@ const END_MS: u64 = 100_000;
 
 /// Flies for two minutes; `script` changes the quad between [`FAULT_MS`] and [`END_MS`].
 fn fly(script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
-    fly_with(&Params::defaults(), script)
+    fly_with(&Params::defaults(), script).1
 }
 
-fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
+/// The same with other parameters; gives the monitor as it is at the end as well.
+fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<Finding>) {
     let mut monitor = Monitor::new(*params);
     let mut findings = Vec::new();
     for now_ms in (0..120_000).step_by(50) {
@@ -40,7 +41,7 @@ fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
         let link = LinkReading { frames_lost: Some(quad.lost), at: now };
         monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
     }
-    findings
+    (monitor, findings)
 }
 
 /// The check reaches the level within its debounce plus 100 ms, is the only one to complain besides `also`, and is
@@ -66,6 +67,17 @@ fn found(findings: &[Finding], check: &str, instance: u8, level: Level, debounce
 #[test]
 fn a_healthy_flight_has_no_finding() {
     assert_eq!(fly(|_, _| {}), []);
+}
+
+#[test]
+fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
+    let (monitor, _) = fly_with(&Params::defaults(), |_, _| {});
+    let health = monitor.health();
+    assert_eq!(health.overall(), Level::Ok);
+    for subsystem in Subsystem::ALL {
+        let level = if subsystem == Subsystem::Engine { Level::Stale } else { Level::Ok };
+        assert_eq!(health.subsystem(subsystem), level, "{subsystem:?}");
+    }
 }
 
 #[test]
@@ -302,7 +314,7 @@ fn a_warning_falls_with_its_value_or_where_it_is_latched_at_disarming() {
     latched.set("HEALTH_LATCH", 1.0).unwrap();
     let falls = [(42_000, Level::Warning), (52_000, Level::Ok)];
     for (params, falls) in [(&Params::defaults(), &falls[..]), (&latched, &[(60_000, Level::Ok)])] {
-        let findings = fly_with(params, |now_ms, quad| {
+        let (_, findings) = fly_with(params, |now_ms, quad| {
             quad.armed = now_ms < 60_000;
             let load = match now_ms {
                 ..30_000 | 40_000..50_000 => 0.88,
