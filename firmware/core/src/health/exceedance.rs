@@ -217,9 +217,10 @@ impl Exceedances {
     /// It is another airframe: what was before this session was not its own.
     pub(crate) fn forget_life(&mut self) {
         for place in &mut self.entries {
-            *place = place
-                .filter(|entry| entry.session.happened())
-                .map(|entry| Entry { before: Crossings::NONE, ..entry });
+            match place {
+                Some(entry) if entry.session.happened() => entry.before = Crossings::NONE,
+                _ => *place = None,
+            }
         }
     }
 
