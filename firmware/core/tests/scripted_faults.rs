@@ -330,6 +330,27 @@ fn a_warning_falls_with_its_value_or_where_it_is_latched_at_disarming() {
 }
 
 #[test]
+fn a_latched_warning_whose_message_stops_comes_back_with_it_until_disarming() {
+    let mut latched = Params::defaults();
+    latched.set("HEALTH_LATCH", 1.0).unwrap();
+    let come_back = [Level::Warning, Level::Stale, Level::Warning, Level::Ok];
+    let fall = [Level::Warning, Level::Stale, Level::Ok];
+    for (params, expected) in [(&Params::defaults(), &fall[..]), (&latched, &come_back)] {
+        let (_, findings) = fly_with(params, |now_ms, quad| {
+            quad.armed = now_ms < 60_000;
+            quad.system.load = match now_ms {
+                ..30_000 => Some(Fraction(0.88)),
+                30_000..45_000 => None,
+                _ => Some(Fraction(0.3)),
+            };
+        });
+        let load = findings.iter().filter(|finding| finding.check == "load");
+        let load: Vec<_> = load.map(|finding| finding.level).collect();
+        assert_eq!(load, expected);
+    }
+}
+
+#[test]
 fn a_card_that_keeps_the_recorder_waiting() {
     let findings = fly(|_, quad| quad.recorder.stall = Span::from_millis(800));
     found(&findings, "card_stall", 0, Level::Warning, 0, &[]);

@@ -125,6 +125,8 @@ impl Stamp {
 pub struct State {
     /// `None` until the value has been seen while the check applied.
     level: Option<Level>,
+    /// What it does not fall below, while levels are held: a warning or a critical level.
+    held: Option<Level>,
     bad: Stamp,
     very_bad: Stamp,
     better: Stamp,
@@ -150,7 +152,14 @@ pub struct Change {
 impl State {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { level: None, bad: Stamp::NONE, very_bad: Stamp::NONE, better: Stamp::NONE, seen: Stamp::NONE }
+        Self {
+            level: None,
+            held: None,
+            bad: Stamp::NONE,
+            very_bad: Stamp::NONE,
+            better: Stamp::NONE,
+            seen: Stamp::NONE,
+        }
     }
 
     /// The level, or `None` while the check has had nothing to say.
@@ -186,6 +195,31 @@ impl State {
             return self.go(Level::Stale, f32::NAN, f32::NAN);
         }
         self.judge(check, now, reading?.value, params)
+    }
+
+    /// After a step, where levels are not to fall: a warning stays one, and what grew old comes back as what it was.
+    pub(super) fn hold(&mut self, before: &Self, change: Option<Change>) -> Option<Change> {
+        self.held = before.held;
+        let change = change?;
+        let known = [before.held, Some(change.previous), Some(change.level)];
+        self.held = if known.contains(&Some(Level::Critical)) {
+            Some(Level::Critical)
+        } else {
+            known.contains(&Some(Level::Warning)).then_some(Level::Warning)
+        };
+        match self.held {
+            Some(held) if change.level != Level::Stale && change.level != held => {
+                *self = Self { level: Some(held), held: Some(held), ..*before };
+                (change.previous != held).then_some(Change { level: held, ..change })
+            }
+            _ => Some(change),
+        }
+    }
+
+    /// After a step, where levels may fall.
+    pub(super) const fn release(&mut self, change: Option<Change>) -> Option<Change> {
+        self.held = None;
+        change
     }
 
     fn judge(&mut self, check: &Check, now: Instant, value: f32, params: &Params) -> Option<Change> {

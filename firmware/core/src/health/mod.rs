@@ -67,20 +67,14 @@ impl Health {
             };
             let reading = (check.read)(inputs, instance);
             let before = *state;
-            let Some(change) = state.step(check, inputs.now, reading, applies, inputs.params) else {
+            let change = state.step(check, inputs.now, reading, applies, inputs.params);
+            let change = if latched { state.hold(&before, change) } else { state.release(change) };
+            let Some(change) = change else {
                 if let (Some(Level::Warning | Level::Critical), Some(reading)) = (state.level(), reading) {
                     exceedances.note(place, instance, check.side, reading.value);
                 }
                 continue;
             };
-            let falls = matches!(
-                (change.previous, change.level),
-                (Level::Warning | Level::Critical, Level::Ok) | (Level::Critical, Level::Warning)
-            );
-            if latched && falls {
-                *state = before;
-                continue;
-            }
             let finding = Finding {
                 at: inputs.now,
                 subsystem: check.subsystem,
