@@ -285,6 +285,28 @@ fn a_payload_longer_than_our_definition_is_verified_as_a_newer_one() {
 }
 
 #[test]
+fn a_mavlink_1_frame_of_a_length_that_no_encoder_makes_waits_for_a_frame_after_it() {
+    let frame = |payload: &[u8]| {
+        let mut frame = vec![0xfe, payload.len() as u8, 0, 1, 1, 0];
+        frame.extend_from_slice(payload);
+        let crc = mcrf4xx(frame[1..].iter().copied().chain([50]));
+        frame.extend_from_slice(&crc.to_le_bytes());
+        frame
+    };
+    let mut framer = Framer::new();
+    let mut seen = Vec::new();
+    let mut sink = |frame: Frame<'_>| seen.push((frame.payload().len(), frame.check()));
+    framer.push(&frame(&[4; 9]), &mut sink);
+    assert_eq!(framer.held(), 0, "as our definition has it");
+    let short = frame(&[4; 8]);
+    framer.push(&short, &mut sink);
+    assert_eq!(framer.held(), short.len(), "perhaps by chance");
+    framer.push(&[0xfe], &mut sink);
+    assert_eq!(framer.held(), 1);
+    assert_eq!(seen, [(9, Check::Verified), (8, Check::Verified)]);
+}
+
+#[test]
 fn a_frame_with_unknown_flags_is_no_frame_and_hides_none() {
     let mut line = frame_v2(0, 0, &[4; 9], 50);
     line[2] = 2;
