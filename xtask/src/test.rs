@@ -225,8 +225,8 @@ fn unit() -> Result<()> {
 /// All of the end-to-end tests, in every step, so that nothing is built again for the next one.
 const FEATURES: &str = "emulator,browser,databases";
 
-/// `cargo test` of one part of the end-to-end tests, with all that it may use.
-fn end_to_end(target: &str) -> Result<()> {
+/// `cargo test` of one part of the end-to-end tests, with all that it may use; `options` are the test runner's.
+fn end_to_end(target: &str, options: &[&str]) -> Result<()> {
     hums::build()?;
     oracle::prepare()?;
     Shell::cargo()
@@ -234,29 +234,32 @@ fn end_to_end(target: &str) -> Result<()> {
         .env("HUMS_PYTHON", oracle::python())
         .env("HUMS_DIALECT", oracle::dialect())
         .env("HUMS_FIRMWARE", Board::Emulated.image())
-        .args(["test", "--package=hums-tests", "--features", FEATURES, "--test", target])
+        .args(["test", "--package=hums-tests", "--features", FEATURES, "--test", target, "--"])
+        .args(options)
         .run()
 }
 
 fn sim() -> Result<()> {
-    end_to_end("sim")
+    // Half of their time they wait: links are as slow as radios are.
+    let threads = 2 * std::thread::available_parallelism().map_or(1, usize::from);
+    end_to_end("sim", &["--test-threads", &threads.to_string()])
 }
 
 fn answer() -> Result<()> {
-    end_to_end("answer")
+    end_to_end("answer", &[])
 }
 
 fn browser() -> Result<()> {
-    end_to_end("browser")
+    end_to_end("browser", &[])
 }
 
 fn live() -> Result<()> {
-    end_to_end("live")
+    end_to_end("live", &[])
 }
 
 fn emulator() -> Result<()> {
     firmware::build(Board::Emulated)?;
-    end_to_end("emulator")
+    end_to_end("emulator", &[])
 }
 
 /// Advisories need a network, which may be missing, and appear on their own day: told, and never a failure.

@@ -8,13 +8,15 @@
 //! arrays text); the fields' metadata has their `units` and `enum`. Each table begins with `boot_s`, seconds since the
 //! monitor's power-on, and `utc`, null where nobody told it; those of frames go on with `system` and `component`.
 //!
-//! Memory is bounded: rows wait as plain columns, `PENDING_MAX` in all; then the tables with the most become row groups
+//! Memory is bounded: rows wait as plain columns, 20 MiB in all; then the tables with the most become row groups
 //! and are written out. So no encoder is open longer than for one row group, which costs far more than the rows in it.
+//! What a file says of its row groups stands at its end and waits until then: a session of days goes on in
+//! `ATTITUDE.2.parquet`.
 
 use std::cmp::Reverse;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -25,7 +27,7 @@ use arrow_select::concat::concat_batches;
 use hums_core::time::Instant;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use rayon::prelude::*;
 
@@ -37,8 +39,8 @@ use crate::files::{cannot_write, make_directory};
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
-/// Bytes of columns that wait to be encoded, all tables together.
-const PENDING_MAX: usize = 20 << 20;
+/// What is held at most: some 60 MB with all that the readers hold.
+const LIMITS: Limits = Limits { pending_bytes: 20 << 20, chunks: 12_000 };
 /// Batches of a table that wait, before they are made one: each array of a batch takes some 200 bytes besides its values.
 const BATCHES_MAX: usize = 16;
 /// Rows of a row group at most: what engines like to read at once.
@@ -233,11 +235,24 @@ impl RowColumns {
     }
 }
 
+/// What the tables of one session hold at most, all together.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// Bytes of columns that wait to be encoded.
+    pending_bytes: usize,
+    /// Columns of row groups written, of files that are open: each takes some 800 bytes until its file's end.
+    chunks: usize,
+}
+
 /// The tables of one session, open.
 pub struct ParquetTables {
     dir: PathBuf,
+    limits: Limits,
     properties: WriterPropertiesBuilder,
+    /// The file of each table that is open.
     tables: BTreeMap<Table, TableFile>,
+    /// Files of each table so far.
+    parts: BTreeMap<Table, u32>,
 }
 
 struct TableFile {
@@ -245,6 +260,8 @@ struct TableFile {
     writer: ArrowWriter<File>,
     pending: Vec<RecordBatch>,
     pending_bytes: usize,
+    /// Columns of the row groups written.
+    chunks: usize,
 }
 
 impl ParquetTables {
@@ -264,7 +281,7 @@ impl ParquetTables {
             .set_offset_index_disabled(true)
             .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(about));
-        Ok(Self { dir, properties, tables: BTreeMap::new() })
+        Ok(Self { dir, limits: LIMITS, properties, tables: BTreeMap::new(), parts: BTreeMap::new() })
     }
 
     /// Takes a group's columns.
@@ -274,13 +291,20 @@ impl ParquetTables {
             let file = match self.tables.entry(table) {
                 Entry::Occupied(file) => file.into_mut(),
                 Entry::Vacant(place) => {
-                    place.insert(TableFile::create(&self.dir, table, &batch.schema(), &self.properties)?)
+                    let part = self.parts.entry(table).or_default();
+                    *part += 1;
+                    let file = TableFile::create(&self.dir, table, *part, &batch.schema(), &self.properties);
+                    place.insert(file?)
                 }
             };
             file.push(batch)?;
         }
         let pending_bytes = self.tables.values().map(|file| file.pending_bytes).sum();
-        if pending_bytes > PENDING_MAX { self.write_largest(pending_bytes) } else { Ok(()) }
+        if pending_bytes > self.limits.pending_bytes {
+            self.write_largest(pending_bytes)?;
+            self.close_longest()?;
+        }
+        Ok(())
     }
 
     /// Makes room: half of what waits, in as few row groups as can be.
@@ -296,11 +320,30 @@ impl ParquetTables {
         files.par_iter_mut().try_for_each(|file| file.write_group())
     }
 
+    /// Ends the files with the most row groups, if there are too many: their tables go on in further ones.
+    fn close_longest(&mut self) -> Result<()> {
+        while self.tables.values().map(|file| file.chunks).sum::<usize>() > self.limits.chunks
+            && let Some((&table, _)) = self.tables.iter().max_by_key(|(_, file)| file.chunks)
+            && let Some(file) = self.tables.remove(&table)
+        {
+            file.close()?;
+        }
+        Ok(())
+    }
+
     /// Writes what is still held, and each file's end; gives the directory and how many tables there are.
     pub fn finish(mut self) -> Result<(PathBuf, usize)> {
-        let tables = self.tables.len();
+        let tables = self.parts.len();
         std::mem::take(&mut self.tables).into_par_iter().try_for_each(|(_, file)| file.close())?;
         Ok((self.dir, tables))
+    }
+}
+
+/// The name of a table's `part`th file, from 1: `ATTITUDE.*parquet` is all of them.
+fn file_name(table: Table, part: u32) -> String {
+    match part {
+        ..=1 => format!("{}.parquet", table.name()),
+        part => format!("{}.{part}.parquet", table.name()),
     }
 }
 
@@ -308,19 +351,23 @@ impl TableFile {
     fn create(
         dir: &Path,
         table: Table,
+        part: u32,
         schema: &SchemaRef,
         properties: &WriterPropertiesBuilder,
     ) -> Result<Self> {
+        let path = dir.join(file_name(table, part));
+        // What an earlier decoding, perhaps of more, has left would be read with this table.
+        let further = (part + 1..).map(|part| dir.join(file_name(table, part)));
+        further.take_while(|path| fs::remove_file(path).is_ok()).count();
         // A dictionary takes 73 kB of each column, and files of numbers are a sixth smaller without; texts gain by it.
         let texts = schema.fields().iter().filter(|field| *field.data_type() == DataType::Utf8);
         let properties = texts.fold(properties.clone(), |properties, field| {
             properties.set_column_dictionary_enabled(vec![field.name().clone()].into(), true)
         });
-        let path = dir.join(format!("{}.parquet", table.name()));
         let file = File::create(&path).with_context(|| cannot_write(&path))?;
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties.build()))
             .with_context(|| cannot_write(&path))?;
-        Ok(Self { path, writer, pending: Vec::new(), pending_bytes: 0 })
+        Ok(Self { path, writer, pending: Vec::new(), pending_bytes: 0, chunks: 0 })
     }
 
     fn push(&mut self, batch: RecordBatch) -> Result<()> {
@@ -342,7 +389,9 @@ impl TableFile {
         for batch in self.pending.drain(..) {
             self.writer.write(&batch).with_context(|| cannot_write(&self.path))?;
         }
-        self.writer.flush().with_context(|| cannot_write(&self.path))
+        self.writer.flush().with_context(|| cannot_write(&self.path))?;
+        self.chunks = self.writer.flushed_row_groups().iter().map(RowGroupMetaData::num_columns).sum();
+        Ok(())
     }
 
     fn close(mut self) -> Result<()> {
@@ -353,6 +402,10 @@ impl TableFile {
 
 #[cfg(test)]
 mod tests {
+    use arrow_array::cast::AsArray as _;
+    use arrow_array::types::Float64Type;
+    use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
     use super::*;
 
     #[test]
@@ -368,18 +421,57 @@ mod tests {
         }
     }
 
+    fn frame(id: u32) -> Frame<'static> {
+        Frame { bytes: &[], id, sequence: 0, system: 1, component: 1, payload: &[0x5a; 255] }
+    }
+
+    #[test]
+    fn a_session_of_many_row_groups_goes_on_in_further_files_and_no_row_is_lost() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let decode = |limits| {
+            let mut tables = ParquetTables::new(dir.path().to_owned(), &[]).expect("tables");
+            tables.limits = limits;
+            for second in 0..2000_u32 {
+                let mut batches = Batches::default();
+                for id in [0, 30] {
+                    let frame = frame(id);
+                    let payload = frame.message().map(|message| Payload::new(message, frame.payload));
+                    batches.frame(
+                        Instant::from_millis(u64::from(second) * 1000),
+                        None,
+                        &frame,
+                        payload.as_ref(),
+                    );
+                }
+                tables.put(batches).expect("put");
+            }
+            assert_eq!(tables.finish().expect("finish").1, 2);
+            let mut seconds = Vec::new();
+            let files = (1..).map(|part| dir.path().join(file_name(Table::Message(30), part)));
+            let files: Vec<PathBuf> = files.take_while(|path| path.exists()).collect();
+            for path in &files {
+                let file = File::open(path).expect("a file");
+                let reader = ParquetRecordBatchReaderBuilder::try_new(file)
+                    .and_then(ParquetRecordBatchReaderBuilder::build);
+                for batch in reader.expect("a Parquet file") {
+                    let batch = batch.expect("a batch");
+                    seconds.extend_from_slice(batch.column(0).as_primitive::<Float64Type>().values());
+                }
+            }
+            assert!(seconds.iter().copied().eq((0..2000_u32).map(f64::from)), "{seconds:?}");
+            files.len()
+        };
+        let few = decode(Limits { pending_bytes: 20_000, chunks: 100 });
+        assert!(few > 3, "{few}");
+        let one = decode(LIMITS);
+        assert_eq!(one, 1, "what was there before stayed");
+    }
+
     #[test]
     fn every_message_makes_a_batch_of_its_schema() {
         for message in hums_dialect::messages() {
             let mut batches = Batches::default();
-            let frame = Frame {
-                bytes: &[],
-                id: message.id,
-                sequence: 0,
-                system: 1,
-                component: 1,
-                payload: &[0x5a; 255],
-            };
+            let frame = frame(message.id);
             let payload = Payload::new(message, frame.payload);
             batches.frame(Instant::from_millis(5), Some(7), &frame, Some(&payload));
             batches.frame(Instant::from_millis(6), None, &frame, Some(&payload));

@@ -16,7 +16,7 @@ pub fn side_by_side<I: Sync, R: Send>(
     tell: impl FnMut(R) -> Result<()>,
 ) -> Result<()> {
     let mut next = items.iter();
-    in_order(workers().min(AT_ONCE), items.len(), || Ok(next.next()), work, tell)
+    in_order(workers().min(AT_ONCE), None, items.len(), || Ok(next.next()), work, tell)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
 use hums_core::time::Instant;
 
+use super::apart::Apart;
 use super::groups::{Group, Groups};
 use super::in_order::{in_order, workers};
 use super::places::Log;
@@ -85,8 +86,10 @@ pub fn read<C: Collect>(
         progress(groups.counts().blocks);
         Ok(group)
     };
+    let apart = Apart::begin();
     in_order(
         workers,
+        apart.as_ref(),
         ahead_max,
         next,
         |group| decode_here(&group, new()),
