@@ -6,10 +6,10 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::health::{Finding, Level, checks};
+use hums_core::health::{self, Finding, Level, checks};
 use hums_core::observation::{
-    Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Heartbeat, Observation, Processor,
-    RadioControl, Rails, TelemetryRadio, VehicleKind,
+    Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Gnss, Heartbeat, Observation,
+    Processor, RadioControl, Rails, SystemStatus, TelemetryRadio, VehicleKind,
 };
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
@@ -55,7 +55,7 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 48] = [
+const FAULTS: [(&str, u8, Level, Fault); 51] = [
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
@@ -74,6 +74,7 @@ const FAULTS: [(&str, u8, Level, Fault); 48] = [
         more.push(Observation::Escs(EscGroup { first: 8, escs: [None, None, None, Some(esc)] }));
     }),
     ("esc_failure", 2, Level::Critical, |quad, _| esc(quad, 2).failures = Some(32)),
+    ("esc_failure", 0, Level::Critical, |quad, _| esc(quad, 0).failures = Some(64)),
     ("esc_failure", 1, Level::Warning, |quad, _| esc(quad, 1).failures = Some(4)),
     ("motor_loss", 1, Level::Critical, |quad, _| esc(quad, 1).current = Some(Amperes(0.0))),
     ("motor_imbalance", 0, Level::Critical, |quad, _| esc(quad, 0).rpm = Some(Rpm(7_500.0))),
@@ -109,6 +110,9 @@ const FAULTS: [(&str, u8, Level, Fault); 48] = [
         quad.estimator.velocity = Some(1.5);
     }),
     ("gps_satellites", 0, Level::Warning, |quad, _| quad.gnss.satellites = Some(6)),
+    ("gps_satellites", 1, Level::Warning, |_, more| {
+        more.push(Observation::Gnss(Gnss { instance: 1, fix: 3, satellites: Some(6), ..Gnss::default() }));
+    }),
     ("gps_hdop", 0, Level::Warning, |quad, _| quad.gnss.hdop = Some(2.5)),
     ("gps_accuracy", 0, Level::Warning, |quad, _| quad.gnss.accuracy = Some(Metres(3.0))),
     ("gps_fix", 0, Level::Critical, |quad, _| quad.gnss.fix = 1),
@@ -118,8 +122,9 @@ const FAULTS: [(&str, u8, Level, Fault); 48] = [
     ("rc_rssi", 0, Level::Critical, |_, more| {
         more.push(Observation::RadioControl(RadioControl { rssi: Some(20) }));
     }),
-    ("radio_rssi", 0, Level::Warning, |_, more| radio(more, 30, 5)),
-    ("radio_margin", 0, Level::Warning, |_, more| radio(more, 90, 85)),
+    ("radio_rssi", 0, Level::Warning, |_, more| radio(more, [30, 90], [5, 5])),
+    ("radio_margin", 0, Level::Warning, |_, more| radio(more, [90, 90], [85, 30])),
+    ("radio_margin", 0, Level::Warning, |_, more| radio(more, [90, 90], [30, 85])),
     ("load", 0, Level::Critical, |quad, _| quad.system.load = Some(Fraction(0.97))),
     ("mcu_temperature", 0, Level::Critical, |_, more| {
         more.push(Observation::Processor(Processor { temperature: Some(Celsius(105.0)), voltage: None }));
@@ -182,14 +187,10 @@ fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
     quad.escs[motor].as_mut().unwrap()
 }
 
-fn radio(more: &mut Vec<Observation>, rssi: u8, noise: u8) {
-    let radio = TelemetryRadio {
-        rssi: Some(rssi),
-        remote_rssi: Some(rssi),
-        noise: Some(noise),
-        remote_noise: Some(noise),
-        errors: 0,
-    };
+/// What both ends hear, and the noise there.
+fn radio(more: &mut Vec<Observation>, rssi: [u8; 2], noise: [u8; 2]) {
+    let ([rssi, remote_rssi], [noise, remote_noise]) = (rssi.map(Some), noise.map(Some));
+    let radio = TelemetryRadio { rssi, remote_rssi, noise, remote_noise, errors: 0 };
     more.push(Observation::TelemetryRadio(radio));
 }
 
@@ -209,6 +210,57 @@ fn every_check_finds_what_it_is_there_for_in_time() {
         let in_time = debounce.as_millis()..=debounce.as_millis() + smoothing_ms + 100;
         assert!(found.at.as_millis() >= FAULT_MS, "{name} {instance} before anything was wrong: {found:?}");
         assert!(in_time.contains(&after_ms), "{name} {instance} {level:?} after {after_ms} ms: {in_time:?}");
+    }
+}
+
+#[test]
+fn what_else_is_fitted_and_well_has_no_finding() {
+    let findings = fly(&LIMITS, |quad, more| {
+        cells(quad, 3.89);
+        let (remaining, temperature) = (Some(Fraction(0.8)), Some(Celsius(35.0)));
+        more.push(Observation::Battery(Battery { id: 1, remaining, temperature, ..Battery::default() }));
+        rail(more, 5.0);
+        more.push(Observation::Engine(Engine {
+            cylinder_head: Some(Celsius(150.0)),
+            exhaust: Some(Celsius(700.0)),
+            fuel_pressure: Some(Hectopascals(300.0)),
+            ..Engine::default()
+        }));
+        more.push(Observation::Gnss(Gnss {
+            instance: 1,
+            fix: 3,
+            satellites: Some(14),
+            hdop: Some(0.9),
+            ..Gnss::default()
+        }));
+        more.push(Observation::RadioControl(RadioControl { rssi: Some(200) }));
+        radio(more, [90, 90], [30, 30]);
+        more.push(Observation::Processor(Processor { temperature: Some(Celsius(50.0)), voltage: None }));
+    });
+    assert_eq!(findings, []);
+}
+
+#[test]
+fn the_autopilots_figure_of_the_battery_counts_where_no_battery_reports_itself() {
+    let own = Battery { id: 1, remaining: Some(Fraction(0.8)), ..Battery::default() };
+    for (reports, expected) in [(None, vec![(0, Level::Critical, 5.0)]), (Some(own), vec![])] {
+        let mut monitor = Monitor::new(Params::defaults());
+        let mut quad = Quad::healthy();
+        quad.system = SystemStatus { remaining: Some(Fraction(0.05)), ..quad.system };
+        let mut found = Vec::new();
+        for now_ms in (0..5_000).step_by(100) {
+            let now = Instant::from_millis(now_ms);
+            let said = quad.says(now_ms).into_iter().filter(|said| !matches!(said, Observation::Battery(_)));
+            for observation in said.chain(reports.map(Observation::Battery)) {
+                monitor.observe(now, AUTOPILOT, &observation);
+            }
+            let link = LinkReading { frames_lost: Some(0.0), at: now };
+            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+                let Finding { check, instance, level, value, .. } = *finding;
+                found.extend((check == "batt_remaining").then_some((instance, level, value)));
+            });
+        }
+        assert_eq!(found, expected);
     }
 }
 
@@ -234,17 +286,37 @@ fn there_is_no_check_that_nothing_shows_to_work() {
 }
 
 #[test]
+fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
+    for check in checks() {
+        let instances = match check.name {
+            name if name.starts_with("batt_") || name.starts_with("cell_") => 4,
+            name if name.starts_with("esc_") || name.starts_with("motor_") => 12,
+            name if name.starts_with("gps_") => 2,
+            _ => 1,
+        };
+        assert_eq!(
+            (check.instances, health::instances(check.name)),
+            (instances, instances),
+            "{}",
+            check.name
+        );
+    }
+}
+
+#[test]
 fn what_a_check_says_is_its_own() {
     // The same fault on another autopilot's scale, and after another time.
     let twins = [["vibration", "vibration_px4"], ["cell_deviation", "cell_dev_lasting"]];
     let all: Vec<_> = checks().collect();
     for (index, one) in all.iter().enumerate() {
         assert!(!one.words.is_empty(), "{}", one.name);
+        assert_eq!(health::words(one.name), one.words);
         for other in all[..index].iter().filter(|other| other.words == one.words) {
             let twin = twins.iter().any(|twins| twins.contains(&one.name) && twins.contains(&other.name));
             assert!(twin, "{} and {}", one.name, other.name);
         }
     }
+    assert_eq!((health::words("of_later"), health::instances("of_later")), ("of_later", 0), "no such check");
 }
 
 #[test]

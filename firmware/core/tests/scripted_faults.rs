@@ -6,7 +6,7 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::health::{CLEAR, Finding, Level};
+use hums_core::health::{CLEAR, Finding, Level, Subsystem};
 use hums_core::observation::{Observation, SystemTime};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, Recording};
@@ -20,7 +20,12 @@ const END_MS: u64 = 100_000;
 
 /// Flies for two minutes; `script` changes the quad between [`FAULT_MS`] and [`END_MS`].
 fn fly(script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
-    let mut monitor = Monitor::new(Params::defaults());
+    fly_with(&Params::defaults(), script).1
+}
+
+/// The same with other parameters; gives the monitor as it is at the end as well.
+fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<Finding>) {
+    let mut monitor = Monitor::new(*params);
     let mut findings = Vec::new();
     for now_ms in (0..120_000).step_by(50) {
         let now = Instant::from_millis(now_ms);
@@ -36,7 +41,7 @@ fn fly(script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
         let link = LinkReading { frames_lost: Some(quad.lost), at: now };
         monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
     }
-    findings
+    (monitor, findings)
 }
 
 /// The check reaches the level within its debounce plus 100 ms, is the only one to complain besides `also`, and is
@@ -65,6 +70,17 @@ fn a_healthy_flight_has_no_finding() {
 }
 
 #[test]
+fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
+    let (monitor, _) = fly_with(&Params::defaults(), |_, _| {});
+    let health = monitor.health();
+    assert_eq!(health.overall(), Level::Ok);
+    for subsystem in Subsystem::ALL {
+        let level = if subsystem == Subsystem::Engine { Level::Stale } else { Level::Ok };
+        assert_eq!(health.subsystem(subsystem), level, "{subsystem:?}");
+    }
+}
+
+#[test]
 fn a_battery_that_collapses() {
     let findings = fly(|_, quad| quad.battery.voltage = Some(Volts(13.2)));
     found(&findings, "cell_voltage", 0, Level::Critical, 5_000, &[]);
@@ -86,6 +102,45 @@ fn one_esc_that_gets_hot() {
 fn one_motor_that_draws_nothing() {
     let findings = fly(|_, quad| quad.escs[1].as_mut().unwrap().current = Some(Amperes(0.0)));
     found(&findings, "motor_loss", 1, Level::Critical, 500, &[]);
+}
+
+#[test]
+fn a_motor_is_lost_by_its_share_of_the_others_current_while_thrust_is_asked_for() {
+    // Each ESC's amperes, the throttle, and the share of motor 1 that is too little, percent.
+    let cases = [
+        ([2.0, 0.25, 4.0, 6.0], 0.5, Some(6.25)),
+        ([2.0, 0.41, 4.0, 6.0], 0.5, None),
+        ([5.0, 0.0, 5.0, 5.0], 0.21, Some(0.0)),
+        ([5.0, 0.0, 5.0, 5.0], 0.2, None),
+        ([0.6, 0.0, 0.6, 0.6], 0.5, Some(0.0)),
+        ([0.5, 0.0, 0.5, 0.5], 0.5, None),
+    ];
+    for (currents, throttle, share) in cases {
+        let findings = fly(|_, quad| {
+            quad.throttle = throttle;
+            for (esc, current) in quad.escs.iter_mut().zip(currents) {
+                esc.as_mut().unwrap().current = Some(Amperes(current));
+            }
+        });
+        let lost = findings.iter().filter(|finding| finding.level == Level::Critical);
+        let lost: Vec<_> = lost.map(|finding| (finding.check, finding.instance, finding.value)).collect();
+        let expected: Vec<_> = share.into_iter().map(|share| ("motor_loss", 1, share)).collect();
+        assert_eq!(lost, expected, "{currents:?} at {throttle}");
+    }
+}
+
+#[test]
+fn an_esc_that_fell_silent_says_nothing_of_the_others_current() {
+    let findings = fly(|now_ms, quad| {
+        quad.escs[3].as_mut().unwrap().current = Some(Amperes(30.0));
+        if now_ms >= FAULT_MS + 2_000 {
+            quad.escs[3] = None;
+        }
+        if now_ms >= FAULT_MS + 10_000 {
+            quad.escs[1].as_mut().unwrap().current = Some(Amperes(0.6));
+        }
+    });
+    assert!(findings.iter().all(|finding| finding.instance == 3), "{findings:?}");
 }
 
 #[test]
@@ -236,6 +291,42 @@ fn frames_that_are_lost() {
 fn a_recorder_that_stops_while_armed() {
     let findings = fly(|_, quad| quad.recorder.recording = Recording::Stopped);
     found(&findings, "recording", 0, Level::Critical, 1_000, &[]);
+}
+
+#[test]
+fn a_recorder_that_stops_on_the_ground_is_a_warning() {
+    let findings = fly(|_, quad| {
+        quad.armed = false;
+        quad.recorder.recording = Recording::Stopped;
+    });
+    // Until the next heartbeat it is not known that the vehicle is disarmed, which is less than the debounce.
+    found(&findings, "recording", 0, Level::Warning, 1_000, &[]);
+}
+
+#[test]
+fn a_failed_check_before_arming_is_no_sensor() {
+    assert_eq!(fly(|_, quad| quad.system.unhealthy = 1 << 28 | 1 << 16), []);
+}
+
+#[test]
+fn a_warning_falls_with_its_value_or_where_it_is_latched_at_disarming() {
+    let mut latched = Params::defaults();
+    latched.set("HEALTH_LATCH", 1.0).unwrap();
+    let falls = [(42_000, Level::Warning), (52_000, Level::Ok)];
+    for (params, falls) in [(&Params::defaults(), &falls[..]), (&latched, &[(60_000, Level::Ok)])] {
+        let (_, findings) = fly_with(params, |now_ms, quad| {
+            quad.armed = now_ms < 60_000;
+            let load = match now_ms {
+                ..30_000 | 40_000..50_000 => 0.88,
+                30_000..40_000 => 0.97,
+                _ => 0.3,
+            };
+            quad.system.load = Some(Fraction(load));
+        });
+        let load = findings.iter().filter(|finding| finding.check == "load");
+        let load: Vec<_> = load.map(|finding| (finding.at.as_millis(), finding.level)).collect();
+        assert_eq!(load, [&[(22_000, Level::Warning), (32_000, Level::Critical)], falls].concat());
+    }
 }
 
 #[test]

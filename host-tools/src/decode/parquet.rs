@@ -39,8 +39,8 @@ use crate::files::{cannot_write, make_directory};
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
-/// What is held at most: some 60 MB with all that the readers hold.
-const LIMITS: Limits = Limits { pending_bytes: 20 << 20, chunks: 12_000 };
+/// What is held at most: some 55 MiB with all that reading takes.
+const LIMITS: Limits = Limits { pending_bytes: 20 << 20, chunks: 8_000 };
 /// Batches of a table that wait, before they are made one: each array of a batch takes some 200 bytes besides its values.
 const BATCHES_MAX: usize = 16;
 /// Rows of a row group at most: what engines like to read at once.

@@ -95,7 +95,7 @@ fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
 
 /// How many. The bits for the pre-arm checks (28) and the receiver (16) say nothing about a sensor.
 fn unhealthy_sensors(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    const NOT_SENSORS: u32 = 1 << 28 | 1 << 16;
+    const NOT_SENSORS: u32 = 0x1001_0000;
     let slot = &inputs.vehicle.system;
     Reading::new(slot.at(), slot.get().map(|system| (system.unhealthy & !NOT_SENSORS).count_ones() as f32))
 }

@@ -127,11 +127,12 @@ impl Exceedances {
         let Some(entry) = self.entry(check, finding) else { return };
         let now_tenths = tenths(finding.at);
         entry.session.extend(entry.level, now_tenths.saturating_sub(entry.since_tenths));
-        let rises = |level: Level| finding.level == level && rank(finding.previous) < rank(level);
-        if rises(Level::Warning) {
-            entry.session.warnings = entry.session.warnings.saturating_add(1);
-        } else if rises(Level::Critical) {
-            entry.session.criticals = entry.session.criticals.saturating_add(1);
+        match finding.level {
+            Level::Warning if finding.previous != Level::Critical => {
+                entry.session.warnings = entry.session.warnings.saturating_add(1);
+            }
+            Level::Critical => entry.session.criticals = entry.session.criticals.saturating_add(1),
+            _ => {}
         }
         if rank(finding.level) > 0 {
             entry.session.peak = worse(entry.session.peak, finding.value, side);
@@ -215,12 +216,10 @@ impl Exceedances {
 
     /// It is another airframe: what was before this session was not its own.
     pub(crate) fn forget_life(&mut self) {
-        for entry in self.entries.iter_mut().flatten() {
-            entry.before = Crossings::NONE;
-        }
         for place in &mut self.entries {
-            if place.is_some_and(|entry| entry.session.warnings == 0 && entry.session.criticals == 0) {
-                *place = None;
+            match place {
+                Some(entry) if entry.session.happened() => entry.before = Crossings::NONE,
+                _ => *place = None,
             }
         }
     }
@@ -297,106 +296,4 @@ const fn hash(name: &str) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::health::Subsystem;
-
-    const TILT: u8 = 3;
-
-    fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
-        Finding {
-            at: Instant::from_millis(at_ms),
-            subsystem: Subsystem::Attitude,
-            check: "tilt",
-            instance: 0,
-            level,
-            previous,
-            value,
-            limit: 45.0,
-            unit: "deg",
-        }
-    }
-
-    #[test]
-    fn a_crossing_is_counted_with_its_peak_and_its_time() {
-        let mut exceedances = Exceedances::new();
-        exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
-        exceedances.note(TILT, 0, Side::Above, 55.0);
-        exceedances.change(TILT, Side::Above, &finding(12_000, Level::Warning, Level::Critical, 62.0));
-        exceedances.note(TILT, 0, Side::Above, 70.0);
-        exceedances.note(TILT, 0, Side::Above, f32::NAN);
-        exceedances.change(TILT, Side::Above, &finding(13_500, Level::Critical, Level::Warning, 50.0));
-        exceedances.change(TILT, Side::Above, &finding(14_500, Level::Warning, Level::Ok, 20.0));
-        exceedances.change(TILT, Side::Above, &finding(20_000, Level::Ok, Level::Warning, 46.0));
-        let tilt = exceedances.iter(Instant::from_millis(21_000)).next().expect("exceeded");
-        let expected =
-            Crossings { warnings: 2, criticals: 1, warning_tenths: 40, critical_tenths: 15, peak: 70.0 };
-        assert_eq!(tilt.session, expected);
-    }
-
-    #[test]
-    fn what_neither_began_nor_lasted_nor_ended_since_has_not_changed() {
-        let mut exceedances = Exceedances::new();
-        exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
-        let changed = |exceedances: &Exceedances, since_ms| {
-            let now = Instant::from_millis(60_000);
-            exceedances.changed(now, Instant::from_millis(since_ms)).count()
-        };
-        assert_eq!(changed(&exceedances, 50_000), 1, "it lasts");
-        exceedances.change(TILT, Side::Above, &finding(30_000, Level::Warning, Level::Ok, 20.0));
-        assert_eq!(changed(&exceedances, 30_000), 1, "it ended");
-        assert_eq!(changed(&exceedances, 30_100), 0);
-        assert_eq!(exceedances.iter(Instant::from_millis(60_000)).count(), 1);
-    }
-
-    #[test]
-    fn not_knowing_is_neither_a_crossing_nor_a_time() {
-        let mut exceedances = Exceedances::new();
-        exceedances.change(TILT, Side::Above, &finding(1_000, Level::Ok, Level::Stale, f32::NAN));
-        assert_eq!(exceedances.iter(Instant::from_millis(2_000)).count(), 0);
-        exceedances.change(TILT, Side::Above, &finding(3_000, Level::Stale, Level::Warning, 50.0));
-        exceedances.change(TILT, Side::Above, &finding(4_000, Level::Warning, Level::Stale, f32::NAN));
-        let tilt = exceedances.iter(Instant::from_millis(99_000)).next().expect("exceeded");
-        assert_eq!((tilt.session.warnings, tilt.session.warning_tenths), (1, 10));
-    }
-
-    #[test]
-    fn a_life_adds_up_over_sessions() {
-        let mut stored = [0; Exceedances::BYTES];
-        let mut length = 0;
-        for session in 1..=3_u8 {
-            let mut exceedances = Exceedances::decode(&stored[..length]).unwrap_or_default();
-            exceedances.change(
-                TILT,
-                Side::Above,
-                &finding(0, Level::Ok, Level::Warning, f32::from(4 - session.min(3))),
-            );
-            let now = Instant::from_millis(2_000);
-            let tilt = exceedances.iter(now).next().expect("exceeded");
-            assert_eq!((tilt.session.warnings, tilt.lifetime.warnings), (1, u16::from(session)));
-            assert_eq!((tilt.lifetime.warning_tenths, tilt.lifetime.peak), (20 * u32::from(session), 3.0));
-            length = exceedances.encode(now, &mut stored);
-        }
-    }
-
-    #[test]
-    fn one_too_many_is_counted_and_a_critical_one_makes_room() {
-        let mut exceedances = Exceedances::new();
-        for instance in 0..30 {
-            let warning = Finding { instance, ..finding(0, Level::Ok, Level::Warning, 50.0) };
-            exceedances.change(TILT, Side::Above, &warning);
-        }
-        assert_eq!(exceedances.left_out(), 6);
-        let critical = Finding { instance: 31, ..finding(0, Level::Ok, Level::Critical, 70.0) };
-        exceedances.change(TILT, Side::Above, &critical);
-        let kept = exceedances.iter(Instant::ZERO).any(|exceedance| exceedance.instance == 31);
-        assert!(kept && exceedances.left_out() == 7);
-    }
-
-    #[test]
-    fn no_two_checks_have_the_same_hash() {
-        let mut hashes: Vec<u32> = checks().map(|check| hash(check.name)).collect();
-        hashes.sort_unstable();
-        assert!(hashes.windows(2).all(|pair| pair[0] != pair[1]) && hashes[0] != 0);
-    }
-}
+mod tests;

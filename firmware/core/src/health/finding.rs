@@ -127,3 +127,39 @@ pub struct Finding {
     /// The unit of both, for instance `V`, `%`, `degC`; empty for a plain number.
     pub unit: &'static str,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_and_name_of_a_level_is_what_logs_know() {
+        let known = ["ok", "advisory", "warning", "critical", "stale"];
+        for number in 0..=u8::MAX {
+            let level = Level::from_number(number);
+            assert_eq!(level.map(Level::name), known.get(usize::from(number)).copied());
+            assert!(level.is_none_or(|level| level as u8 == number), "{number}");
+        }
+        assert_eq!(Level::ALL.map(Level::name), known);
+    }
+
+    #[test]
+    fn every_number_and_name_of_a_subsystem_is_what_logs_know() {
+        let known = [
+            "power",
+            "propulsion",
+            "engine",
+            "structure",
+            "navigation",
+            "link",
+            "computer",
+            "attitude",
+            "recorder",
+        ];
+        for number in 0..=u8::MAX {
+            let subsystem = Subsystem::from_number(number);
+            assert_eq!(subsystem.map(Subsystem::name), known.get(usize::from(number)).copied());
+            assert!(subsystem.is_none_or(|subsystem| subsystem as u8 == number), "{number}");
+        }
+    }
+}

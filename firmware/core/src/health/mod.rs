@@ -73,8 +73,10 @@ impl Health {
                 }
                 continue;
             };
-            let falls = matches!(change.previous, Level::Warning | Level::Critical)
-                && (change.level as u8) < change.previous as u8;
+            let falls = matches!(
+                (change.previous, change.level),
+                (Level::Warning | Level::Critical, Level::Ok) | (Level::Critical, Level::Warning)
+            );
             if latched && falls {
                 *state = before;
                 continue;

@@ -33,7 +33,6 @@ const GNSS: Check = Check {
     words: "GPS satellites",
     side: Side::Below,
     warn: Some(Param::GpsSatsWarn),
-    critical: None,
     hysteresis: 0.0,
     debounce_warn: Span::from_secs(2),
     instances: RECEIVERS_MAX as u8,
@@ -85,7 +84,6 @@ pub(super) const CHECKS: &[Check] = &[
         words: "GPS fix lost",
         warn: None,
         critical: Some(Param::GpsFixCrit),
-        debounce_critical: Span::from_secs(1),
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix))),
         ..GNSS
     },
@@ -129,15 +127,12 @@ fn largest(estimator: &Estimator) -> Option<f32> {
 }
 
 fn second_largest(estimator: &Estimator) -> Option<f32> {
-    let (mut first, mut second) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
-    for value in [estimator.velocity, estimator.position_horizontal, estimator.compass].into_iter().flatten()
-    {
-        if value > first {
-            (first, second) = (value, first);
-        } else if value > second {
-            second = value;
-        }
-    }
+    let known = [estimator.velocity, estimator.position_horizontal, estimator.compass].into_iter().flatten();
+    let (_, second) = known
+        .filter(|value| !value.is_nan())
+        .fold((f32::NEG_INFINITY, f32::NEG_INFINITY), |(first, second), value| {
+            (first.max(value), second.max(first.min(value)))
+        });
     Some(second).filter(|second| second.is_finite())
 }
 

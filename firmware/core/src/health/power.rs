@@ -96,7 +96,6 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::BatFaultWarn),
         critical: None,
         hysteresis: 0.0,
-        when: When::Always,
         alarm_only: true,
         read: faults,
         ..BATTERY
@@ -109,7 +108,6 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::BatTempWarn),
         critical: Some(Param::BatTempCrit),
         hysteresis: 3.0,
-        when: When::Always,
         read: temperature_c,
         ..BATTERY
     },

@@ -65,7 +65,6 @@ pub(super) const CHECKS: &[Check] = &[
         critical: None,
         hysteresis: 2.0,
         debounce_warn: Span::from_secs(1),
-        when: When::Armed,
         stale_after: STALE_SLOW,
         read: errors_per_minute,
         ..ESC
@@ -93,8 +92,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_warn: Span::from_secs(3),
         debounce_critical: Span::from_secs(1),
         when: When::InFlight,
-        // Only steady flight says something; ESCs that stop talking are `esc_silent`.
-        stale_after: None,
+        // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
         read: |inputs, motor| {
             let Inputs { now, vehicle, flight, derived, .. } = *inputs;
             derived.motor_imbalance(now, vehicle, flight, motor)
@@ -167,11 +165,11 @@ fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
 /// `ESC_FAILURE_FLAGS`: over current 1, over voltage 2, over temperature 4, over rpm 8, inconsistent command 16, motor
 /// stuck 32, generic 64. A motor that is stuck or an ESC that failed cannot be flown on.
 fn failure_rank(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
-    const CRITICAL: u16 = 32 | 64;
+    const STUCK_OR_FAILED: u16 = 0x60;
     let motor = motor(inputs, number)?;
     let rank = |flags: u16| match flags {
         0 => 0.0,
-        flags if flags & CRITICAL != 0 => 2.0,
+        flags if flags & STUCK_OR_FAILED != 0 => 2.0,
         _ => 1.0,
     };
     Reading::new(motor.at, motor.esc.failures.map(rank))
