@@ -336,4 +336,16 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_flush_names_a_number_within_even_the_smallest_interval() {
+        for low in [0, 1, 0xffff, 0x1234_0000, 0x1234_0001, 0x1234_ffff, 0x12ff_ffff, 0xfffe_ffff] {
+            let encoder = Encoder { low, range: BOTTOM };
+            let (end, len) = encoder.flush();
+            let mut bytes = [0; 4];
+            bytes[..len].copy_from_slice(&end[..len]);
+            let named = u32::from_be_bytes(bytes);
+            assert!(named.wrapping_sub(low) < BOTTOM, "{named:x} from {low:x} on");
+        }
+    }
 }

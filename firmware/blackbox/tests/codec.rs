@@ -4,9 +4,12 @@
 #[path = "common/card.rs"]
 mod card;
 mod common;
+#[path = "common/frames.rs"]
+mod frames;
 
 use card::Card;
 use common::Random;
+use frames::{Frame, checksum, frames_of};
 use hums_blackbox::record::{Clock, Note, RECORD_BYTES_MAX};
 use hums_blackbox::{
     Assembler, Entry, FRAME_BYTES_MAX, GroupDecoder, Item, LogReader, Outline, Record, SECTOR_BYTES, Sector,
@@ -14,8 +17,6 @@ use hums_blackbox::{
 };
 use hums_core::time::Instant;
 use proptest::prelude::*;
-
-type Frame = (u64, Vec<u8>, bool);
 
 fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {
     let mut reader = Box::new(LogReader::new());
@@ -59,15 +60,6 @@ impl Random {
     fn chance(&mut self, one_in: usize) -> bool {
         self.below(one_in) == 0
     }
-}
-
-fn checksum(bytes: &[u8], seed: u8) -> u16 {
-    bytes.iter().chain([&seed]).fold(0xffff, |crc, &byte| {
-        let mut x = byte ^ crc as u8;
-        x ^= x << 4;
-        let x = u16::from(x);
-        (crc >> 8) ^ (x << 8) ^ (x << 3) ^ (x >> 4)
-    })
 }
 
 /// How rough a link is.
@@ -219,6 +211,31 @@ fn an_outline_says_of_a_frame_what_the_frame_says() {
 }
 
 #[test]
+fn frames_with_flags_that_we_know_need_no_more_than_their_outline() {
+    let frames = [
+        vec![0xfe, 1, 0, 1, 1, 200, 7, 1, 2],
+        vec![0xfd, 1, 0, 0, 1, 1, 1, 3, 2, 1, 7, 1, 2],
+        [&[0xfd, 1, 1, 0, 2, 1, 1, 4, 3, 2, 7, 1, 2][..], &[9; 13]].concat(),
+        vec![0xfd, 1, 2, 0, 3, 1, 1, 5, 4, 3, 7, 1, 2],
+    ];
+    let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
+    for bytes in &frames {
+        writer.frame(Instant::ZERO, bytes, false, &mut card).expect("room");
+    }
+    assert!(writer.finish(&mut card));
+    let (mut assembler, mut decoder) = (Assembler::new(), Box::new(GroupDecoder::new()));
+    for step in [assembler.feed(card.0[0].bytes()), assembler.end()].into_iter().flatten() {
+        decoder.push(&step.header, &step.sector).expect("in order");
+    }
+    for (id, len) in [(200, 9), (0x01_0203, 13), (0x02_0304, 26)] {
+        let outline = Outline::Frame { at: Instant::ZERO, id, bytes: len, verified: false };
+        assert_eq!(decoder.next_outline(), Some(Ok(outline)));
+    }
+    let whole = Entry::Frame { at: Instant::ZERO, bytes: &frames[3], verified: false };
+    assert_eq!(decoder.next_outline(), Some(Ok(Outline::Whole(whole))));
+}
+
+#[test]
 fn signed_frames_come_back() {
     round_trip(&stream(9, 10_000, Link { messages: 20, odd_one_in: 20, signed: true }));
 }
@@ -336,37 +353,6 @@ fn recorded_flights_come_back() {
         }
     }
     println!("{flights} recordings; the made-up streams above stand in where there are none");
-}
-
-/// Whether the checksum is that of our definition.
-fn checks(frame: &[u8]) -> bool {
-    let (id, payload_at) = match *frame {
-        [0xfe, _, _, _, _, id, ..] => (u32::from(id), 6),
-        [0xfd, _, _, _, _, _, _, a, b, c, ..] => (u32::from_le_bytes([a, b, c, 0]), 10),
-        _ => return false,
-    };
-    let end = payload_at + usize::from(frame[1]);
-    let found = frame.get(end..end + 2).map(|bytes| u16::from(bytes[0]) | u16::from(bytes[1]) << 8);
-    hums_dialect::message(id)
-        .is_some_and(|message| found == Some(checksum(&frame[1..end], message.crc_extra)))
-}
-
-fn frames_of(tlog: &[u8]) -> Vec<Frame> {
-    let (mut frames, mut rest, mut start, mut latest) = (Vec::new(), tlog, None, 0);
-    while let Some((time, tail)) = rest.split_first_chunk::<8>() {
-        let len = match *tail {
-            [0xfe, len, ..] => usize::from(len) + 8,
-            [0xfd, len, flags, ..] => usize::from(len) + 12 + if flags & 1 == 1 { 13 } else { 0 },
-            _ => break,
-        };
-        let Some((frame, tail)) = tail.split_at_checked(len) else { break };
-        let time = u64::from_be_bytes(*time);
-        let start = *start.get_or_insert(time);
-        latest = time.saturating_sub(start).max(latest);
-        frames.push((latest / 1_000, frame.to_vec(), checks(frame)));
-        rest = tail;
-    }
-    frames
 }
 
 proptest! {

@@ -113,7 +113,7 @@ impl Framer {
         self.counts.bytes = self.counts.bytes.wrapping_add(bytes.len() as u64);
         let mut rest = bytes;
         while !rest.is_empty() {
-            if self.start > 0 && BUFFER - self.end < rest.len() {
+            if BUFFER - self.end < rest.len() {
                 self.buffer.copy_within(self.start..self.end, 0);
                 self.end -= self.start;
                 self.start = 0;

@@ -67,11 +67,8 @@ impl Seen {
     /// Whether the message at `index` has come from `system` with a right checksum. Of a system that has no place of
     /// its own: whether it came from any that share the last one.
     pub(crate) fn was_verified(&self, system: u8, index: usize) -> bool {
-        let place = match self.place_of(system) {
-            Some(place) => place,
-            None if usize::from(self.systems_used) == SYSTEMS => SYSTEMS - 1,
-            None => return false,
-        };
+        // The last place is empty until a system has it.
+        let place = self.place_of(system).unwrap_or(SYSTEMS - 1);
         self.verified[place].get(index / 32).is_none_or(|word| word & (1 << (index % 32)) != 0)
     }
 
@@ -113,7 +110,8 @@ impl Seen {
 }
 
 const fn key_of(system: u8, id: u32) -> u32 {
-    (system as u32) << 24 | (id & 0x00ff_ffff)
+    let [a, b, c, _] = id.to_le_bytes();
+    u32::from_le_bytes([a, b, c, system])
 }
 
 #[cfg(test)]
@@ -148,6 +146,17 @@ mod tests {
         seen.learn(1, 50_000, 4);
         assert_eq!(seen.extra(1, 50_000), Extra::Confirmed(4));
         assert_eq!(seen.extra(2, 50_000), Extra::None);
+    }
+
+    #[test]
+    fn extras_of_several_ids_are_confirmed_each_by_itself_and_another_extra_begins_anew() {
+        let mut seen = Seen::new();
+        seen.learn(1, 50_000, 3);
+        seen.learn(1, 50_001, 5);
+        seen.learn(1, 50_001, 5);
+        assert_eq!((seen.extra(1, 50_000), seen.extra(1, 50_001)), (Extra::Once(3), Extra::Confirmed(5)));
+        seen.learn(1, 50_001, 6);
+        assert_eq!((seen.extra(1, 50_000), seen.extra(1, 50_001)), (Extra::Once(3), Extra::Once(6)));
     }
 
     #[test]

@@ -21,6 +21,7 @@ fn frames_in_pieces(bytes: &[u8], piece: usize) -> (Vec<(Vec<u8>, Check)>, Frame
     assert_eq!(counts.bytes, bytes.len() as u64);
     assert_eq!(counts.bytes, counts.bytes_in_frames + counts.bytes_not_frames);
     assert_eq!(counts.frames, frames.len() as u64);
+    assert_eq!(counts.unverified, unverified(&frames) as u64);
     (frames, framer)
 }
 
@@ -223,6 +224,39 @@ fn an_unknown_id_after_noise_is_believed_at_its_second_sight() {
 }
 
 #[test]
+fn an_unknown_id_that_no_frame_follows_is_noise_at_first_sight() {
+    let mut line = frame_v2(UNKNOWN_ID, 0, b"first", 77);
+    line.extend([0x55; 3]);
+    line.extend(frame_v2(0, 1, &[4; 9], 50));
+    let (frames, _) = frames_in_pieces(&line, 5);
+    assert_eq!((frames.len(), unverified(&frames)), (1, 0));
+}
+
+#[test]
+fn an_unknown_id_after_noise_is_not_believed_when_its_second_sight_has_another_extra() {
+    let mut line = Vec::new();
+    for extra in [77, 78] {
+        line.extend([0x55; 3]);
+        line.extend(frame_v2(UNKNOWN_ID, 0, b"perhaps", extra));
+        line.extend(frame_v2(0, 1, &[4; 9], 50));
+    }
+    let (frames, _) = frames_in_pieces(&line, 5);
+    assert_eq!((frames.len(), unverified(&frames)), (2, 0));
+}
+
+#[test]
+fn an_unknown_id_around_a_whole_known_frame_gives_way_to_it_but_not_to_a_damaged_one() {
+    let inside = frame_v2(0, 7, &[4; 9], 50);
+    let after = frame_v2(0, 8, &[4; 9], 50);
+    for (inside, good) in [(inside.clone(), true), (frame_v2(0, 7, &[4; 9], 51), false)] {
+        let around = frame_v2(UNKNOWN_ID, 0, &[b"left", &inside[..], b"right"].concat(), 77);
+        let expected = if good { (inside, Check::Verified) } else { (around.clone(), Check::Unverified) };
+        let (frames, _) = frames_in_pieces(&[around, after.clone()].concat(), 5);
+        assert_eq!(frames, [expected, (after.clone(), Check::Verified)]);
+    }
+}
+
+#[test]
 fn an_unknown_id_with_another_extra_than_before_is_damage() {
     let mut line = frame_v2(UNKNOWN_ID, 0, b"first", 77);
     line.extend(frame_v2(UNKNOWN_ID, 1, b"second", 77));
@@ -248,6 +282,28 @@ fn a_payload_longer_than_our_definition_is_verified_as_a_newer_one() {
     let frame = frame_v2(0, 0, &[7; 30], 50);
     let (frames, _) = frames_in_pieces(&frame, 1);
     assert_eq!(frames, [(frame, Check::Verified)]);
+}
+
+#[test]
+fn a_mavlink_1_frame_of_a_length_that_no_encoder_makes_waits_for_a_frame_after_it() {
+    let frame = |payload: &[u8]| {
+        let mut frame = vec![0xfe, payload.len() as u8, 0, 1, 1, 0];
+        frame.extend_from_slice(payload);
+        let crc = mcrf4xx(frame[1..].iter().copied().chain([50]));
+        frame.extend_from_slice(&crc.to_le_bytes());
+        frame
+    };
+    let mut framer = Framer::new();
+    let mut seen = Vec::new();
+    let mut sink = |frame: Frame<'_>| seen.push((frame.payload().len(), frame.check()));
+    framer.push(&frame(&[4; 9]), &mut sink);
+    assert_eq!(framer.held(), 0, "as our definition has it");
+    let short = frame(&[4; 8]);
+    framer.push(&short, &mut sink);
+    assert_eq!(framer.held(), short.len(), "perhaps by chance");
+    framer.push(&[0xfe], &mut sink);
+    assert_eq!(framer.held(), 1);
+    assert_eq!(seen, [(9, Check::Verified), (8, Check::Verified)]);
 }
 
 #[test]

@@ -433,7 +433,7 @@ fn put(place: &mut [u8; 8], value: u32, size: usize) {
 }
 
 /// The links of the field at an offset; moves on to them.
-fn links_at(at: &mut usize, id: u32, offset: usize) -> Links {
+pub(super) fn links_at(at: &mut usize, id: u32, offset: usize) -> Links {
     let mut found = (None, None);
     while let Some(link) = LINKS.get(*at).filter(|link| link.id == id && usize::from(link.offset) <= offset) {
         if usize::from(link.offset) == offset {

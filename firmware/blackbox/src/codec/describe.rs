@@ -3,9 +3,9 @@
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 use hums_dialect::{Kind, Role};
 
-use super::body::Body;
+use super::body::{Body, links_at};
 use super::element::{Element, What};
-use super::links::{self, LINKS};
+use super::links;
 use super::slots::{INSTANCE_BYTES, Key, Slot};
 use crate::layouts::{FieldLayout, Layout, Place};
 
@@ -80,12 +80,8 @@ impl Body {
         while let Some(field) = layout.field(index) {
             let (what, count, size) = elements_of(field);
             for _ in 0..count {
-                while LINKS.get(link).is_some_and(|link| link.id == id && usize::from(link.offset) < offset) {
-                    link += 1;
-                }
-                let linked =
-                    LINKS.get(link).is_some_and(|link| link.id == id && usize::from(link.offset) == offset);
-                let mut element = Element::new(what, size, linked && size <= 4);
+                let linked = !matches!(links_at(&mut link, id, offset), (None, None));
+                let mut element = Element::new(what, size, linked);
                 if what == What::Integer2 || what == What::Integer4 {
                     element.exponent = u8::from(matches!(field.kind, Kind::I16 | Kind::I32));
                 }

@@ -72,7 +72,7 @@ impl Frame {
             beyond.fill(0);
         }
         // Whoever fills it in says less.
-        self.used = PAYLOAD_BYTES_MAX + 9;
+        self.used = self.payload.len();
     }
 
     /// Takes a frame apart; `None` where the bytes are not exactly one.

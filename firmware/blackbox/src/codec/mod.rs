@@ -317,9 +317,6 @@ impl Model {
         for place in key.instance.get_mut(..instance)? {
             *place = coder.bits16(u32::from(*place), 8) as u8;
         }
-        if !C::WRITES {
-            key.instance[instance..].fill(0);
-        }
         let mut slot = self.body.describe(key, place, layout);
         (slot.instance_at, slot.instance_size) = (instance_at as u8, instance as u8);
         self.slots.add(slot)

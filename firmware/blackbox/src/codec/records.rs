@@ -70,7 +70,7 @@ impl Records {
             OTHER_KIND => coder.bits16(u32::from(shape.kind), 8) as u8,
             kind => kind as u8,
         };
-        let kind = usize::from(shape.kind) % KINDS;
+        let kind = usize::from(shape.kind);
         let packed = u32::from_le_bytes([shape.version, shape.words, shape.halves, 0]);
         [shape.version, shape.words, shape.halves, _] =
             self.number(coder, kind, 0, packed, None).to_le_bytes();

@@ -198,3 +198,17 @@ impl Elements {
         Some(first)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elements_are_claimed_until_the_last_one_and_no_further() {
+        let mut elements = Elements::new();
+        assert_eq!(elements.claim(ELEMENTS - 1), Some(0));
+        assert_eq!(elements.claim(2), None);
+        assert_eq!(elements.claim(1), Some(ELEMENTS as u16 - 1));
+        assert_eq!(elements.claim(1), None);
+    }
+}

@@ -1,0 +1,141 @@
+//! Golden sums: length and CRC-32 of what version 1 makes of whole recordings and of a made-up stream of everything
+//! (`common/kinds.rs`). As the golden files they never change: writer and reader share the model, so that a change of it
+//! would still read back what it wrote, and only fixed bytes notice. A group names the table of layouts: a new dialect
+//! (`layouts`) makes new sums, a new version of the format adds its own.
+#![expect(clippy::panic, reason = "that is how a test fails")]
+
+#[path = "common/card.rs"]
+mod card;
+mod common;
+#[path = "common/frames.rs"]
+mod frames;
+#[path = "common/kinds.rs"]
+mod kinds;
+
+use std::path::Path;
+
+use card::Card;
+use frames::{Frame, checks, frame_len, frames_of};
+use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
+use hums_core::time::Instant;
+use kinds::{Entry, entries};
+
+/// The log of batches of entries, each in groups of its own.
+fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
+    let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
+    for batch in batches {
+        for entry in batch {
+            match entry {
+                Entry::Frame(at, bytes, verified) => {
+                    writer.frame(Instant::from_millis(*at), bytes, *verified, &mut card).expect("room");
+                }
+                Entry::Record(at, bytes) => {
+                    let at = Instant::from_millis(*at);
+                    writer.record(at, &Record::read(bytes), &mut card).expect("room");
+                }
+            }
+        }
+        assert!(writer.restart(&mut card));
+    }
+    assert!(writer.finish(&mut card));
+    card.0.iter().flat_map(|sector| *sector.bytes()).collect()
+}
+
+/// The log reads back as what was written: to the writer times only advance.
+fn reads_back(log: &[u8], batches: &[Vec<Entry>]) {
+    let (mut expected, mut latest) = (batches.iter().flatten(), 0);
+    let mut reader = Box::new(LogReader::new());
+    let mut blocks = log.as_chunks::<SECTOR_BYTES>().0.iter();
+    loop {
+        match blocks.next() {
+            Some(block) => reader.feed(block),
+            None => reader.end(),
+        }
+        while let Some(item) = reader.next() {
+            match (item, expected.next()) {
+                (Item::Frame { at, bytes, verified, .. }, Some(Entry::Frame(then, frame, fits))) => {
+                    latest = latest.max(*then);
+                    assert_eq!((at.as_millis(), bytes, verified), (latest, &frame[..], *fits));
+                }
+                (Item::Record { at, record, .. }, Some(Entry::Record(then, stored))) => {
+                    latest = latest.max(*then);
+                    assert_eq!((at.as_millis(), record), (latest, Record::read(stored)));
+                }
+                (Item::End(summary), None) => return assert!(summary.closed, "{summary:?}"),
+                (item, entry) => panic!("{item:?} instead of {entry:?}"),
+            }
+        }
+    }
+}
+
+/// CRC-32 as zlib computes it.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
+    })
+}
+
+/// Name, length, CRC-32.
+type Sum = (&'static str, usize, u32);
+
+fn sum_of(name: &'static str, batches: &[Vec<Entry>]) -> Sum {
+    let log = write(batches);
+    reads_back(&log, batches);
+    (name, log.len(), crc32(&log))
+}
+
+const CHANGED: &str = "the coded form has changed: that is a new version of the format";
+
+/// The frames of our definitions among a line's bytes, as 57,600 baud carry them.
+fn frames_of_line(line: &[u8]) -> Vec<Frame> {
+    const MICROS_PER_BYTE: usize = 10_000_000 / 57_600;
+    let (mut frames, mut at) = (Vec::new(), 0);
+    while at < line.len() {
+        let frame =
+            frame_len(&line[at..]).and_then(|len| line.get(at..at + len)).filter(|frame| checks(frame));
+        at += frame.map_or(1, <[u8]>::len);
+        if let Some(frame) = frame {
+            frames.push(((at * MICROS_PER_BYTE / 1_000) as u64, frame.to_vec(), true));
+        }
+    }
+    frames
+}
+
+/// The repository's own recordings.
+const RECORDINGS: [Sum; 4] = [
+    ("ap_quad_guided.tlog", 354_304, 0x7c32_50f1),
+    ("ap_quad_faults.tlog", 479_744, 0x506b_2d40),
+    ("ap_quad_signed.raw", 436_736, 0xa38c_a76e),
+    ("px4_hil_quad_low.tlog", 217_088, 0x7acb_9adf),
+];
+
+#[test]
+fn recordings_are_coded_as_they_always_were() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/flights");
+    let found = RECORDINGS.map(|(name, ..)| {
+        let recording = std::fs::read(folder.join(name)).expect("readable");
+        let frames = match name.rsplit_once('.') {
+            Some((_, "raw")) => frames_of_line(&recording),
+            _ => frames_of(&recording),
+        };
+        let batch = frames.into_iter().map(|(at, bytes, verified)| Entry::Frame(at, bytes, verified));
+        sum_of(name, &[batch.collect()])
+    });
+    assert_eq!(found, RECORDINGS, "{CHANGED}");
+}
+
+/// All messages of the dialect, so many at once; entries of each batch; one frame in so many odd.
+const MADE_UP: [(usize, usize, usize, Sum); 3] = [
+    (16, 1_000, 0, ("calm", 427_008, 0x7e70_a380)),
+    (20, 1_000, 6, ("rough", 413_184, 0xa554_8033)),
+    (400, 6_000, 10, ("more than the model holds", 279_552, 0xe988_86dc)),
+];
+
+#[test]
+fn every_kind_of_message_and_value_and_oddity_is_coded_as_it_always_was() {
+    for (at_once, count, odd_one_in, sum) in MADE_UP {
+        let batches = (100..).zip(hums_dialect::messages().chunks(at_once));
+        let batches = batches.map(|(seed, messages)| entries(seed, messages, count, odd_one_in));
+        assert_eq!(sum_of(sum.0, &batches.collect::<Vec<_>>()), sum, "{CHANGED}");
+    }
+}
