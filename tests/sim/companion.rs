@@ -160,10 +160,26 @@ fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_af
         assert_eq!(said["replayed"], serde_json::json!([23.0, 23.0]), "{said}");
         assert_eq!(said["after"], 24.0, "{said}");
     }
+    // The two that were not signed, at least, in each session.
+    assert!(statistic(&dir, "requests_refused").into_iter().all(|refused| refused >= 2), "not recorded");
     // The key is on the card in no form.
     let card = fs::read(dir.path().join("card.img")).unwrap();
     let key: Vec<u8> = (1..33).collect();
     assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
+}
+
+/// What each session's last statistics on the card say.
+fn statistic(dir: &TempDir, name: &str) -> Vec<u64> {
+    let (image, out) = (dir.path().join("card.img"), dir.path().join("decoded"));
+    let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
+    hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0, 3]);
+    let logs = fs::read_dir(out).unwrap().map(|log| fs::read_to_string(log.unwrap().path()).unwrap());
+    logs.map(|log| {
+        let mut rows = log.lines().rev().map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let stats = rows.find(|row| row["record"] == "HUMS_STATS").unwrap();
+        stats["fields"][name].as_u64().unwrap()
+    })
+    .collect()
 }
 
 /// Both ports are pymavlink's: an autopilot of the test's own and a ground station.

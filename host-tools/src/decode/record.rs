@@ -172,6 +172,10 @@ fn stats_cells(stats: &Stats) -> Vec<(&'static str, Cell)> {
         ("cpu_permille_max", count(stats.cpu_permille_max)),
         ("stack_bytes_max", count(stats.stack_bytes_max)),
         ("stack_bytes_capacity", count(stats.stack_bytes_capacity)),
+        ("gs_frames_lost", count(stats.gs_frames_lost)),
+        ("autopilot_frames_lost", count(stats.autopilot_frames_lost)),
+        ("passed_frames_lost", count(stats.passed_frames_lost)),
+        ("requests_refused", count(stats.requests_refused)),
     ]
 }
 

@@ -65,6 +65,10 @@ struct StatsJson {
     sd_stall_ms_max: u64,
     gs_frames: u64,
     gs_bytes: u64,
+    gs_frames_lost: u64,
+    autopilot_frames_lost: u64,
+    passed_frames_lost: u64,
+    requests_refused: u64,
 }
 
 impl From<&Stats> for StatsJson {
@@ -80,6 +84,10 @@ impl From<&Stats> for StatsJson {
             sd_stall_ms_max: stats.sd_stall_ms_max,
             gs_frames: stats.gs_frames,
             gs_bytes: stats.gs_bytes,
+            gs_frames_lost: stats.gs_frames_lost,
+            autopilot_frames_lost: stats.autopilot_frames_lost,
+            passed_frames_lost: stats.passed_frames_lost,
+            requests_refused: stats.requests_refused,
         }
     }
 }

@@ -19,7 +19,8 @@ STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_no
               "blocks_written", "queue_bytes_max", "queue_bytes_capacity", "sd_stall_ms_max", "gs_frames",
               "gs_bytes", "frame_queue_bytes_max", "frame_queue_bytes_capacity", "gs_queue_bytes_max",
               "gs_queue_bytes_capacity", "cpu_permille", "cpu_permille_max", "stack_bytes_max",
-              "stack_bytes_capacity"]
+              "stack_bytes_capacity", "gs_frames_lost", "autopilot_frames_lost", "passed_frames_lost",
+              "requests_refused"]
 # Fields with their types: those of the module struct, `text`, `time` (in seconds), so many bytes (negative: of words),
 # or a list of names.
 RECORDS = {

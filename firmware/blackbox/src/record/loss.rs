@@ -152,4 +152,12 @@ statistics! {
     stack_bytes_max,
     /// What the stack holds, bytes.
     stack_bytes_capacity,
+    /// Frames for the ground station that found their queue full.
+    gs_frames_lost,
+    /// Frames for the autopilot that found their queue full.
+    autopilot_frames_lost,
+    /// Frames of others that were to be passed on and found no room within the port's budget.
+    passed_frames_lost,
+    /// Requests refused for their signature.
+    requests_refused,
 }

@@ -94,6 +94,16 @@ impl Companion {
         self.commands.stopped()
     }
 
+    /// Frames of others that found no room.
+    pub(crate) const fn passed_lost(&self) -> u32 {
+        self.pass.lost
+    }
+
+    /// Requests that were refused for their signature.
+    pub(crate) const fn requests_refused(&self) -> u32 {
+        self.secure.refused
+    }
+
     /// Takes the signing key out of the store: see [`secure`].
     pub(crate) fn restore<F: NorFlash>(&mut self, keeper: &mut Keeper<'_, F>) {
         self.secure.restore(keeper);

@@ -32,7 +32,7 @@ const UNKNOWN: Span = Span::from_secs(1);
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pass {
     /// Frames that passed through for others, and found no room.
-    lost: u32,
+    pub(super) lost: u32,
     /// When a frame of a definition that we do not have was passed down last.
     unknown_at: Option<Instant>,
 }
@@ -55,7 +55,7 @@ impl Pass {
             return;
         }
         let sent = ways.pass(now, Port::Autopilot, Class::Forward, frame.bytes());
-        self.lost += u32::from(!sent);
+        self.lost = self.lost.saturating_add(u32::from(!sent));
     }
 
     /// A frame of the autopilot's port, to the ground station.
@@ -79,7 +79,7 @@ impl Pass {
         };
         if passes {
             let sent = ways.pass(now, Port::Gs, Class::Bulk, frame.bytes());
-            self.lost += u32::from(!sent);
+            self.lost = self.lost.saturating_add(u32::from(!sent));
         }
     }
 }

@@ -75,7 +75,7 @@ pub(crate) struct Secure {
     /// How often the store had been made anew when the key was handed over.
     remade: u32,
     /// Requests that were refused for their signature.
-    refused: u32,
+    pub(super) refused: u32,
 }
 
 impl Secure {

@@ -7,6 +7,7 @@ use hums_core::time::{Instant, Span};
 use hums_link::summary::OwnFigures;
 use hums_recorder::status::{CardState, CardStatus};
 
+use crate::companion::Companion;
 use crate::journal::Journal;
 use crate::port::{PortReading, PortStatus};
 use crate::queues::{
@@ -72,7 +73,13 @@ impl<'a> Figures<'a> {
     }
 
     /// For the record.
-    pub(super) fn stats(&self, card: &CardStatus, journal: &Journal<'_>, gs: &GsIn) -> Stats {
+    pub(super) fn stats(
+        &self,
+        card: &CardStatus,
+        journal: &Journal<'_>,
+        companion: &Companion,
+        gs: &GsIn,
+    ) -> Stats {
         let card = card.read();
         let counters = journal.counters();
         let card_lost = u64::from(card.frames_lost);
@@ -97,6 +104,10 @@ impl<'a> Figures<'a> {
             cpu_permille_max: u64::from(self.machine.cpu_permille_max),
             stack_bytes_max: u64::from(self.machine.stack_bytes_max),
             stack_bytes_capacity: u64::from(self.machine.stack_bytes),
+            gs_frames_lost: gs.lost(),
+            autopilot_frames_lost: gs.autopilot.lost(),
+            passed_frames_lost: u64::from(companion.passed_lost()),
+            requests_refused: u64::from(companion.requests_refused()),
         }
     }
 

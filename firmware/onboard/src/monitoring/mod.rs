@@ -298,7 +298,7 @@ impl<'a> Monitoring<'a> {
 
     /// The pipeline's figures since power-on.
     pub fn stats(&self, gs: &GsIn) -> Stats {
-        self.figures.stats(self.book.card, &self.book.journal, gs)
+        self.figures.stats(self.book.card, &self.book.journal, &self.companion, gs)
     }
 
     /// Takes the signing key and its times out of the store. At power-on, before anything is sent.

@@ -20,6 +20,8 @@ export const recorderSection = () => {
       ["Queue, fullest", stats && stats.queue_bytes_capacity ? `${bytes(stats.queue_bytes_max)} of ${bytes(stats.queue_bytes_capacity)} (${fixed(stats.queue_bytes_max / stats.queue_bytes_capacity * 100, 0)} %)` : null],
       ["Card, longest stall", stats && `${whole(stats.sd_stall_ms_max)} ms`],
       ["To the ground station", stats && `${whole(stats.gs_frames)} frames, ${bytes(stats.gs_bytes)}`],
+      ["Not sent, ports full", stats && `${plural(stats.gs_frames_lost, "frame")} to the ground station, ${whole(stats.autopilot_frames_lost)} to the autopilot, ${whole(stats.passed_frames_lost)} of others`],
+      ["Refused for their signature", stats && plural(stats.requests_refused, "request")],
     ])),
     el("div", { class: "panel scroll" },
       log.gaps.length || log.losses.length ? rows([["What"], ["From", "n"], ["To", "n"], ["How much", "n"]], [
