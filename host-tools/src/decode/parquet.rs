@@ -268,6 +268,8 @@ impl ParquetTables {
     /// Tables in `dir`; `about` goes into each file's metadata.
     pub fn new(dir: PathBuf, about: &[(&str, String)]) -> Result<Self> {
         make_directory(&dir)?;
+        // Makes the threads that encode: while a log is read they would inherit the one core that its reader keeps to.
+        rayon::current_num_threads();
         let about =
             about.iter().map(|(name, value)| KeyValue::new((*name).to_owned(), value.clone())).collect();
         let properties = WriterProperties::builder()

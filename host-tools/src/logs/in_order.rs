@@ -51,7 +51,8 @@ pub fn in_order<T: Send, R: Send>(
             }
             // After the first items are there: a single one is sooner done than a thread awake.
             if let Some(sender) = sender.take() {
-                for _ in 1..workers.min(given) {
+                let helpers = workers.min(given).saturating_sub(1);
+                for _ in 0..helpers {
                     let (queue, work, sender) = (&queue, &work, sender.clone());
                     scope.spawn(move || {
                         if let Some(apart) = apart {
@@ -63,7 +64,7 @@ pub fn in_order<T: Send, R: Send>(
                         }
                     });
                 }
-                if let Some(apart) = apart {
+                if let Some(apart) = apart.filter(|_| helpers > 0) {
                     apart.stay();
                 }
             }
