@@ -3,9 +3,13 @@
 //!
 //! # Time
 //! A stamp counts 10 µs since 2015 and grows with every frame of a stream, which is a system, a component and a link id.
-//! [`Clock`] gives it from UTC where that is known. It never goes back, and neither do stamps over a power-off: a bound
-//! above all that were used is stored ahead of time ([`Times::used`]), and those of the next power-on begin there, one
-//! after the other until time has caught up.
+//! [`Clock`] gives it from UTC where that is known. It goes back for nothing but a key that is set, and neither do stamps
+//! over a power-off: a bound above all that were used is stored ahead of time ([`Times::used`]), and those of the next
+//! power-on begin there, one after the other until time has caught up.
+//!
+//! A date from a GPS receiver may be wrong (a week number that rolled over, a spoofer). One that is more than
+//! [`JUMP`] ahead of our time counts only when it has lasted for [`JUMP_LASTS`] ([`Clock::hear_utc`]): a clock that is years
+//! ahead would refuse every new stream for years. A good signature counts at once: whoever has the key has the time too.
 //!
 //! # Replay
 //! A frame whose stamp is not above its stream's last one is refused. A stream that was not heard since power-on has to
@@ -19,7 +23,7 @@
 
 use core::fmt;
 
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use hums_dialect::wire::SIGNATURE_BYTES;
 use sha2::{Digest as _, Sha256};
 
@@ -33,6 +37,18 @@ pub const STREAMS_MAX: usize = 8;
 const EPOCH_MICROS: u64 = 1_420_070_400_000_000;
 /// A minute of stamps: how far a stream that is new may be behind.
 pub const MINUTE: u64 = 6_000_000;
+/// A date that is further ahead of our time than this has to last: a day of stamps.
+pub const JUMP: u64 = 24 * 60 * MINUTE;
+/// How long it has to last.
+pub const JUMP_LASTS: Span = Span::from_secs(60);
+/// Dates of one clock agree to this: a second of stamps.
+const JUMP_AGREES: u64 = 100_000;
+/// Our stamps are stored ahead by this at first, by ...
+const AHEAD_MIN: u64 = 2 * MINUTE;
+/// ... this part of the time since power-on later, ...
+const AHEAD_PART: u64 = 30;
+/// ... and by this at most. After power-off we begin so much ahead of UTC, and whoever hears us follows.
+const AHEAD_MAX: u64 = 10 * MINUTE;
 /// Stamps have 48 bits: until the year 2104.
 const STAMP_MAX: u64 = (1 << 48) - 1;
 /// Bytes of the hash that are sent.
@@ -72,11 +88,13 @@ pub const fn stamp(utc_micros: u64) -> u64 {
     utc_micros.saturating_sub(EPOCH_MICROS) / 10
 }
 
-/// Our own time as stamps count it; it never goes back.
+/// Our own time as stamps count it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
     /// The stamp of power-on.
     begin: u64,
+    /// A date far ahead that has to last: the stamp of power-on by it, and when it was heard first.
+    jump: Option<(u64, Instant)>,
 }
 
 impl Clock {
@@ -84,6 +102,27 @@ impl Clock {
     pub const fn now(&self, now: Instant) -> u64 {
         let stamp = self.begin.saturating_add(now.as_micros() / 10);
         if stamp < STAMP_MAX { stamp } else { STAMP_MAX }
+    }
+
+    /// What the autopilot says the time is; `false` where it is too far ahead to be believed yet.
+    pub fn hear_utc(&mut self, at: Instant, stamp: u64) -> bool {
+        let begin = stamp.min(STAMP_MAX).saturating_sub(at.as_micros() / 10);
+        if begin > self.begin.saturating_add(JUMP) {
+            match self.jump {
+                Some((first, since)) if begin.abs_diff(first) <= JUMP_AGREES => {
+                    if at.since(since) < JUMP_LASTS {
+                        return false;
+                    }
+                }
+                _ => {
+                    self.jump = Some((begin, at));
+                    return false;
+                }
+            }
+        }
+        self.jump = None;
+        self.begin = self.begin.max(begin);
+        true
     }
 
     /// Now is at least this stamp.
@@ -168,17 +207,20 @@ pub struct Times {
 
 impl Times {
     /// Looks whether `used` is still ahead enough of our time and of the last stamp, and sets it so; `true` when it has
-    /// to be stored. Once a minute at most.
-    pub const fn keep_ahead(&mut self, time: u64, last: u64) -> bool {
+    /// to be stored: at first every two minutes, later every thirtieth of the time since power-on, every ten minutes at
+    /// most. In the first six hours that is some 90 times.
+    pub fn keep_ahead(&mut self, since_power_on: Instant, time: u64, last: u64) -> bool {
         // Behind the last stamp there is one for each frame until time has caught up.
-        let (wanted, next) = if time > last {
-            (time + MINUTE / 2, time + MINUTE)
+        let (from, ahead) = if time > last {
+            (time, (since_power_on.as_micros() / 10 / AHEAD_PART).clamp(AHEAD_MIN, AHEAD_MAX))
         } else {
-            (last + MINUTE / 12, last + MINUTE / 6)
+            (last, MINUTE / 6)
         };
-        if wanted <= self.used {
+        // A moment before it is too late: what is stored takes a while to get there.
+        if from + MINUTE / 12 <= self.used {
             return false;
         }
+        let next = from + ahead;
         (self.used, self.time) = (next, time);
         true
     }
@@ -200,7 +242,7 @@ impl Signing {
     pub const fn new() -> Self {
         Self {
             key: None,
-            clock: Clock { begin: 0 },
+            clock: Clock { begin: 0, jump: None },
             streams: [Stream { last: 0, who: [0; 3] }; STREAMS_MAX],
             floor: 0,
         }
@@ -218,13 +260,17 @@ impl Signing {
         self.clock.is_at_least(Instant::ZERO, times.time.min(STAMP_MAX));
     }
 
-    /// Another key, or none; `stamp` is the time that whoever brought it thinks it is. With the same key time does not
-    /// go back.
+    /// A key, or none; `stamp` is the time that whoever brought it thinks it is, and it is the time from now on, also with
+    /// the key that there was: this is how a clock that a wrong date has set is put right. Nothing older than a minute
+    /// before it is accepted. 0 is no time: the same key then changes nothing.
     pub fn set(&mut self, now: Instant, key: Key, stamp: u64) {
-        if self.key != Some(key) {
-            *self = Self { key: Some(key).filter(|key| !key.is_none()), ..Self::new() };
+        if stamp == 0 && self.key == Some(key) {
+            return;
         }
-        self.clock.is_at_least(now, stamp.min(STAMP_MAX));
+        let stamp = stamp.min(STAMP_MAX);
+        *self = Self { key: Some(key).filter(|key| !key.is_none()), ..Self::new() };
+        self.floor = stamp.saturating_sub(MINUTE);
+        self.clock.is_at_least(now, stamp);
     }
 
     /// Judges a frame, and remembers its stamp if it is good. Without a key every frame counts as unsigned.
@@ -343,8 +389,10 @@ mod tests {
         let frame = signed(190, KEY, 0, 50 * MINUTE);
         assert_eq!(judge(&mut signing, &frame), Verdict::Good);
         let mut times = Times { accepted: signing.latest(), ..Times::default() };
-        assert!(times.keep_ahead(50 * MINUTE, 0) && !times.keep_ahead(50 * MINUTE + 9, 50 * MINUTE));
-        assert_eq!(times.used, 51 * MINUTE);
+        assert!(
+            times.keep_ahead(NOW, 50 * MINUTE, 0) && !times.keep_ahead(NOW, 50 * MINUTE + 9, 50 * MINUTE)
+        );
+        assert_eq!(times.used, 52 * MINUTE);
         let mut later = Signing::new();
         later.restore(signing.key().copied(), times);
         assert_eq!(judge(&mut later, &frame), Verdict::Replayed);
@@ -381,12 +429,58 @@ mod tests {
     fn power_that_comes_and_goes_does_not_carry_stamps_away() {
         let mut times = Times::default();
         let time = 50 * MINUTE;
-        assert!(times.keep_ahead(time, 0));
+        assert!(times.keep_ahead(NOW, time, 0));
         for _ in 0..5 {
             let last = times.used;
-            assert!(times.keep_ahead(time, last), "each begins above the one before");
+            assert!(times.keep_ahead(NOW, time, last), "each begins above the one before");
             assert!(times.used > last && times.used <= last + MINUTE / 6);
         }
+    }
+
+    #[test]
+    fn in_six_hours_times_are_stored_a_hundred_times_at_most_and_always_in_time() {
+        let (mut times, mut stored) = (Times::default(), 0);
+        for second in 0..6 * 3_600_u64 {
+            let now = Instant::from_millis(second * 1_000);
+            let time = 50 * MINUTE + second * 100_000;
+            stored += u32::from(times.keep_ahead(now, time, time - 1));
+            assert!(times.used > time, "a stamp is above what is stored after {second} s");
+            assert!(times.used <= time + AHEAD_MAX);
+        }
+        assert!((60..=100).contains(&stored), "{stored}");
+    }
+
+    #[test]
+    fn one_wrong_date_locks_nobody_out() {
+        let years = 12 * 365 * JUMP;
+        let mut signing = with_key();
+        signing.clock.is_at_least(NOW, 50 * MINUTE);
+        let at = |second: u64| NOW + Span::from_secs(second);
+        assert!(!signing.clock.hear_utc(at(1), 50 * MINUTE + years), "once");
+        assert!(signing.clock.hear_utc(at(2), 50 * MINUTE + 200_000), "and the right one again");
+        assert!(!signing.clock.hear_utc(at(70), 50 * MINUTE + years), "and the wrong one, later");
+        assert_eq!(judge(&mut signing, &signed(190, KEY, 0, 50 * MINUTE)), Verdict::Good);
+        // A board that lay on a shelf for a year: the date lasts.
+        assert!(!signing.clock.hear_utc(at(100), years));
+        assert!(!signing.clock.hear_utc(at(159), years + 59 * 100_000));
+        assert!(signing.clock.hear_utc(at(160), years + 60 * 100_000));
+        assert_eq!(signing.clock.now(at(160)), years + 60 * 100_000);
+    }
+
+    #[test]
+    fn the_same_key_brought_again_sets_the_time_back() {
+        let mut signing = with_key();
+        let ahead = 12 * 365 * JUMP;
+        signing.clock.is_at_least(NOW, ahead);
+        let frame = signed(190, KEY, 0, 50 * MINUTE);
+        assert_eq!(judge(&mut signing, &frame), Verdict::Replayed, "years behind");
+        signing.set(NOW, KEY, 50 * MINUTE);
+        assert_eq!(judge(&mut signing, &frame), Verdict::Good);
+        assert_eq!(
+            judge(&mut signing, &signed(191, KEY, 0, 49 * MINUTE)),
+            Verdict::Replayed,
+            "a minute before it"
+        );
     }
 
     #[test]

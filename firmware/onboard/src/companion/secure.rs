@@ -16,6 +16,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
+use hums_core::lifetime::Room;
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_link::frame::Frame;
@@ -72,6 +73,8 @@ pub(crate) struct Secure {
     saved_at: Option<Instant>,
     /// Stamps of ours go on from here.
     last: u64,
+    /// A key was set, and the time with it: both ways out begin anew.
+    reseal: bool,
     /// How often the store had been made anew when the key was handed over.
     remade: u32,
     /// Requests that were refused for their signature.
@@ -87,6 +90,7 @@ impl Secure {
             times_due: false,
             saved_at: None,
             last: 0,
+            reseal: false,
             remade: 0,
             refused: 0,
         }
@@ -118,8 +122,10 @@ impl Secure {
             let bytes = signing.key().map_or([0; KEY_BYTES], |key| key.0);
             *key_due = !handover.put(Item::item(ITEM_KEY), &bytes);
         }
-        if let Some(last) = last {
-            *times_due |= times.keep_ahead(signing.clock.now(now), last);
+        // By time alone nothing is stored that landing needs the room for. After a power-off stamps may then begin below
+        // the last one, and are refused until UTC is known.
+        if let Some(last) = last.filter(|_| handover.room() == Room::Enough) {
+            *times_due |= times.keep_ahead(now, signing.clock.now(now), last);
         }
         if *times_due && saved_at.is_none_or(|at| now.since(at) >= SAVE) {
             let mut bytes = [0; TIMES_BYTES];
@@ -176,8 +182,8 @@ impl Secure {
 
     /// Takes a key that a trusted port brought.
     pub(crate) fn set_key(&mut self, now: Instant, key: Key, stamp: u64) {
-        if self.signing.key() != Some(&key) {
-            self.last = 0;
+        if stamp > 0 || self.signing.key() != Some(&key) {
+            (self.last, self.reseal) = (0, true);
         }
         self.signing.set(now, key, stamp);
         self.times =
@@ -190,14 +196,15 @@ impl Secure {
         let params = monitor.params();
         let carries = if path == Path::Autopilot { Port::Autopilot } else { Port::Gs };
         let guards = [guard(params, carries), guard(params, Port::Autopilot)];
-        let Self { signing, last, .. } = self;
+        let Self { signing, last, reseal, .. } = self;
+        let reseal = core::mem::take(reseal);
         let time = &monitor.vehicle().time;
         if let (Some(at), Some(utc_micros)) = (time.at(), time.get().and_then(|time| time.utc_micros)) {
-            signing.clock.is_at_least(at, stamp(utc_micros));
+            signing.clock.hear_utc(at, stamp(utc_micros));
         }
         for ((outlet, link), guard) in outlets.into_iter().zip(LINKS).zip(guards) {
             match (signing.key().filter(|_| guard > 0), &mut outlet.seal) {
-                (Some(key), Some(seal)) if seal.is_of(key) => seal.clock = signing.clock,
+                (Some(key), Some(seal)) if seal.is_of(key) && !reseal => seal.clock = signing.clock,
                 (Some(key), seal) => *seal = Some(Seal::new(*key, link, signing.clock, *last)),
                 // Who signs again goes on from there.
                 (None, seal) => *last = seal.take().map_or(*last, |seal| seal.last().max(*last)),

@@ -1,7 +1,5 @@
 //! The monitor task's side: what is to be saved, and what is to be told about it.
 
-use core::sync::atomic::Ordering;
-
 use hums_core::Monitor;
 use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
 use hums_core::params::Params;
@@ -9,10 +7,13 @@ use hums_core::time::{Instant, Span};
 use hums_store::{Key, param_value};
 
 use super::mailbox::MailboxIn;
-use super::status::{StoreReading, StoreState, StoreStatus};
+use super::status::{Calm, StoreReading, StoreState, StoreStatus};
 
 /// No frame for this long, and disarmed: nothing will be missed while the processor stands still for an erase.
 pub const QUIET: Span = Span::from_secs(5);
+
+/// Disarmed on the ground for this long: a store that is nearly full may be erased although the autopilot talks.
+pub const GROUNDED: Span = Span::from_secs(10);
 
 /// The monitor task's side: what is to be saved, and what is to be told about it.
 pub struct Handover<'a> {
@@ -22,6 +23,8 @@ pub struct Handover<'a> {
     remade: u32,
     frames: u32,
     frames_at: Instant,
+    /// The vehicle was armed, flew, or was not known to be disarmed.
+    active_at: Instant,
 }
 
 /// Something about the store that is to be recorded and told.
@@ -38,7 +41,7 @@ impl<'a> Handover<'a> {
     pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, monitor: &mut Monitor) -> Self {
         monitor.params_mut().all_saved();
         let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };
-        Self { items, status, told, remade: 0, frames: 0, frames_at: Instant::ZERO }
+        Self { items, status, told, remade: 0, frames: 0, frames_at: Instant::ZERO, active_at: Instant::ZERO }
     }
 
     /// At every tick: hands over what is due. `frames` is what reception has counted.
@@ -47,8 +50,16 @@ impl<'a> Handover<'a> {
             (self.frames, self.frames_at) = (frames, now);
         }
         let disarmed = monitor.vehicle().heartbeat.get().is_some_and(|heartbeat| !heartbeat.armed);
-        let quiet = disarmed && now.since(self.frames_at) >= QUIET;
-        self.status.quiet.store(quiet, Ordering::Relaxed);
+        if !disarmed || monitor.flight().airborne() {
+            self.active_at = now;
+        }
+        self.status.set_calm(if disarmed && now.since(self.frames_at) >= QUIET {
+            Calm::Silent
+        } else if now.since(self.active_at) >= GROUNDED {
+            Calm::Grounded
+        } else {
+            Calm::None
+        });
         if newer(&mut self.remade, self.status.read().remade) {
             // Nothing of it is there any more.
             monitor.params_mut().all_unsaved();
@@ -95,10 +106,18 @@ impl<'a> Handover<'a> {
         if newer(&mut told.refused, now.refused) {
             return news(5, "HUMS: store full, saving waits for the ground");
         }
+        if newer(&mut told.erased, now.erased) {
+            return news(5, "HUMS: flash erased, up to 0.8 s not recorded");
+        }
         if newer(&mut told.failed, now.failed) {
             return news(4, "HUMS: saving failed, have the board replaced");
         }
         None
+    }
+
+    /// Whether the store has room to spare.
+    pub(crate) fn room(&self) -> Room {
+        self.status.read().room
     }
 
     /// Hands over an item of somebody else's; `false` when it found no room.

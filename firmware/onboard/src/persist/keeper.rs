@@ -9,10 +9,12 @@ use hums_core::params::ParamError;
 use hums_store::{Error, Found, Key, Saved, Store, param};
 
 use super::mailbox::MailboxOut;
-use super::status::{StoreState, StoreStatus, count};
+use super::status::{Calm, StoreState, StoreStatus, count};
 
 /// What part of a sector is free before a flight, at the least.
 const AHEAD: (usize, usize) = (5, 8);
+/// A sector with less than this part of it free is erased on the ground even while the autopilot talks.
+const SCARCE: (usize, usize) = (1, 4);
 /// What landing and disarming need: all exceedances, the baselines, and the session's counters twice.
 const RESERVE: usize = 1_280;
 const _: () = assert!(Exceedances::BYTES + Baselines::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16 <= RESERVE);
@@ -35,8 +37,10 @@ pub struct Keeper<'a, F: NorFlash> {
     pub(crate) status: &'a StoreStatus,
     /// The oldest item has been counted as waiting.
     waits: bool,
-    /// What there is to do while it is quiet has been done.
+    /// What there is to do in this calm has been done.
     turned: bool,
+    /// Less than [`SCARCE`] of the sector in use is free.
+    scarce: bool,
 }
 
 impl<'a, F: NorFlash> Keeper<'a, F> {
@@ -55,17 +59,19 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
             });
             Some(store)
         });
-        Self { store, items, status, waits: false, turned: false }
+        Self { store, items, status, waits: false, turned: false, scarce: false }
     }
 
-    /// Makes five eighths of a sector free where less is. Takes an erase: not after a reset that may have come in flight.
-    pub fn turn_ahead(&mut self) {
-        if let Some(store) = &mut self.store
-            && store.turn_ahead(F::ERASE_SIZE * AHEAD.0 / AHEAD.1).is_err()
-        {
+    /// Makes five eighths of a sector free where less is; whether that took an erase. Not after a reset that may have come
+    /// in flight.
+    pub fn turn_ahead(&mut self) -> bool {
+        let Some(store) = &mut self.store else { return false };
+        let turned = store.turn_ahead(F::ERASE_SIZE * AHEAD.0 / AHEAD.1);
+        if turned.is_err() {
             count(&self.status.failed);
         }
         self.look_for_room();
+        turned.unwrap_or(false)
     }
 
     /// Gives the monitor everything that is stored, the last session after all else: it is added to the others. An item
@@ -96,17 +102,26 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         got.and_then(Result::ok).flatten().unwrap_or(0)
     }
 
-    /// Saves one item. An erase is allowed while nothing can be missed, or if `may_erase` says so.
+    /// Saves one item. An erase is allowed where [`Calm`] allows it (the table in [`super`]), or if `may_erase` says so.
     pub fn service(&mut self, may_erase: bool) -> Kept {
+        let calm = self.status.calm();
+        let erases = calm == Calm::Silent || (calm == Calm::Grounded && self.scarce);
+        self.turned &= calm != Calm::None;
+        if erases && !self.turned {
+            // Before anything is saved: the next flight has room then, and a save needs no erase of its own.
+            self.turned = true;
+            if self.turn_ahead() && calm == Calm::Grounded {
+                count(&self.status.erased);
+            }
+        }
         let Self { store, items, status, waits, .. } = self;
         let Some(store) = store else {
             return items.oldest(|_, _| (Kept::Took, true)).unwrap_or(Kept::Idle);
         };
-        let quiet = status.is_quiet();
-        if *waits && !may_erase && !quiet {
+        if *waits && !may_erase && !erases {
             return Kept::Waits;
         }
-        store.allow_erase(may_erase || quiet);
+        store.allow_erase(may_erase || calm == Calm::Silent);
         let kept = items.oldest(|key, value| match store.save(key, value) {
             Ok(saved) => {
                 count(&status.saved);
@@ -130,12 +145,7 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         let kept = kept.unwrap_or(Kept::Idle);
         if kept == Kept::Took {
             self.look_for_room();
-        } else if quiet && !self.turned {
-            // Between two flights is the time: the next one has room then.
-            self.turned = true;
-            self.turn_ahead();
         }
-        self.turned &= quiet;
         kept
     }
 
@@ -144,6 +154,7 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         if let Some(store) = &mut self.store
             && let Ok(room) = store.room()
         {
+            self.scarce = room < F::ERASE_SIZE * SCARCE.0 / SCARCE.1;
             self.status.set_room(if room < RESERVE { Room::Reserve } else { Room::Enough });
         }
     }

@@ -16,10 +16,16 @@
 //! gets no instruction out of the flash; between two words everything more urgent goes on. So a save of the session's
 //! counters, 43 words, delays nobody by more than 0.1 ms, and the ports' rings hold 44 ms.
 //!
-//! An erase takes 0.25 to 0.5 s. It is done at power-on before reception begins ([`Keeper::turn_ahead`]: at least five
-//! eighths of a sector are free afterwards), and otherwise only while nothing can be missed: disarmed, and no frame for
-//! [`handover::QUIET`]. Then room is made for the next flight. A save that would need an erase in flight stays in the
-//! mailbox, and what comes after it with its owner; it is counted and told.
+//! An erase takes 0.4 s, 0.8 s at the longest (datasheet, table 40, 16 KiB, writes of 8 bits). There are three times for it:
+//!
+//! | when | what is lost |
+//! |---|---|
+//! | at power-on, before reception begins ([`Keeper::turn_ahead`]); at least five eighths of a sector are free afterwards | nothing |
+//! | disarmed, and no frame for [`handover::QUIET`]: room is made for the next flight | nothing |
+//! | disarmed on the ground for [`handover::GROUNDED`] while the autopilot talks, and only where the sector is more than three quarters full | frames of up to 0.8 s; it is recorded and told |
+//!
+//! The third is for a board that stays powered beside an autopilot that never falls silent. A save that would need an
+//! erase at any other time stays in the mailbox, and what comes after it with its owner; it is counted and told.
 //!
 //! # How long a sector lasts
 //! | item | bytes in the flash | how often |
@@ -29,6 +35,7 @@
 //! | a component | 78 | once a power-on |
 //! | the session's counters, of a quad | 170 | in flight every two minutes, after an hour every thirtieth of the time; twice at the end of a flight |
 //! | baselines | 116 | a landing that taught something |
+//! | times of signatures | 40 | with a key: at first every two minutes, later every thirtieth of the time since power-on, every ten minutes at most; not out of the reserve |
 //! | exceedances | 36 with one, 520 with 24 | a quarter of an hour in which a limit was crossed, and landing |
 //!
 //! A power-on with four components begins with 0.8 KB. Of the 10 KB that are free at the least, 1.25 KB are kept for
@@ -50,4 +57,4 @@ mod tests;
 pub use handover::{Handover, News};
 pub use keeper::{Keeper, Kept};
 pub use mailbox::Mailbox;
-pub use status::{StoreState, StoreStatus};
+pub use status::{Calm, StoreState, StoreStatus};

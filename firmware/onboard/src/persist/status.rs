@@ -21,6 +21,19 @@ pub enum StoreState {
     Failed = 4,
 }
 
+/// What an erase would cost now, as the monitor sees it. An erase stops the processor for up to 0.8 s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Calm {
+    /// The vehicle is armed, flies, or was disarmed a moment ago: no erase.
+    #[default]
+    None = 0,
+    /// Disarmed on the ground for [`GROUNDED`](super::handover::GROUNDED), and the autopilot talks: frames would be lost.
+    Grounded = 1,
+    /// Disarmed, and no frame for [`QUIET`](super::handover::QUIET): nothing would be lost.
+    Silent = 2,
+}
+
 /// What the keeper tells the monitor, and what it is told: atomics, so that neither waits.
 #[derive(Debug, Default)]
 pub struct StoreStatus {
@@ -30,7 +43,8 @@ pub struct StoreStatus {
     pub(crate) refused: AtomicU32,
     pub(crate) failed: AtomicU32,
     pub(crate) remade: AtomicU32,
-    pub(crate) quiet: AtomicBool,
+    pub(crate) erased: AtomicU32,
+    calm: AtomicU8,
     reserve_only: AtomicBool,
 }
 
@@ -49,6 +63,8 @@ pub struct StoreReading {
     pub failed: u32,
     /// Times that it was found unreadable later, and made anew.
     pub remade: u32,
+    /// Erases while the autopilot talked: frames were lost with each.
+    pub erased: u32,
     /// Whether there is room to spare.
     pub room: Room,
 }
@@ -63,7 +79,8 @@ impl StoreStatus {
             refused: AtomicU32::new(0),
             failed: AtomicU32::new(0),
             remade: AtomicU32::new(0),
-            quiet: AtomicBool::new(false),
+            erased: AtomicU32::new(0),
+            calm: AtomicU8::new(Calm::None as u8),
             reserve_only: AtomicBool::new(false),
         }
     }
@@ -83,13 +100,22 @@ impl StoreStatus {
             refused: self.refused.load(Ordering::Relaxed),
             failed: self.failed.load(Ordering::Relaxed),
             remade: self.remade.load(Ordering::Relaxed),
+            erased: self.erased.load(Ordering::Relaxed),
             room: if self.reserve_only.load(Ordering::Relaxed) { Room::Reserve } else { Room::Enough },
         }
     }
 
-    /// Whether an erase would make nobody miss anything, as the monitor sees it.
-    pub fn is_quiet(&self) -> bool {
-        self.quiet.load(Ordering::Relaxed)
+    /// What an erase would cost now, as the monitor sees it.
+    pub fn calm(&self) -> Calm {
+        match self.calm.load(Ordering::Relaxed) {
+            1 => Calm::Grounded,
+            2 => Calm::Silent,
+            _ => Calm::None,
+        }
+    }
+
+    pub(crate) fn set_calm(&self, calm: Calm) {
+        self.calm.store(calm as u8, Ordering::Relaxed);
     }
 
     pub(crate) fn set_room(&self, room: Room) {

@@ -7,7 +7,7 @@ use hums_core::status::{LinkReading, RecorderStatus};
 use hums_store::sim::SimFlash;
 
 use super::keeper::{Keeper, Kept};
-use super::{Handover, Mailbox, StoreStatus};
+use super::{Calm, Handover, Mailbox, StoreStatus};
 use hums_core::Monitor;
 use hums_core::lifetime::{ItemKey, Room};
 use hums_core::observation::{
@@ -214,6 +214,56 @@ fn between_two_flights_room_is_made_for_the_next_one() {
             }
             assert_eq!(keeper.status.read().room, Room::Enough, "flight {flight}");
         }
+    });
+}
+
+#[test]
+fn a_board_that_stays_on_beside_an_autopilot_that_never_falls_silent_keeps_its_counters() {
+    let mut flash = Flash::blank();
+    let mut flown = 0.0;
+    let mut erases = 0;
+    session(&mut flash, |monitor, handover, keeper| {
+        for second in 0..12 * 3_600_u64 {
+            // A flight of ten minutes in each hour, and a key whose times are stored every two minutes.
+            let flies = (600..1_200).contains(&(second % 3_600));
+            live(second, flies, monitor, handover, second as u32);
+            if second % 120 == 0 {
+                handover.put(Key::item(33), &second.to_le_bytes().repeat(3));
+            }
+            let before = keeper.status.read().erased;
+            while keeper.service(false) == Kept::Took {}
+            let now = keeper.status.read();
+            assert!(now.erased == before || !flies, "erased in flight");
+            assert_eq!(now.refused, 0, "after {second} s something waits");
+            let told = std::iter::from_fn(|| handover.news()).any(|news| news.text.contains("not recorded"));
+            assert_eq!(told, now.erased != before, "what an erase loses is told");
+        }
+        flown = monitor.lifetime().totals.raw(UsageCounter::Flight);
+        erases = keeper.status.read().erased;
+    });
+    assert!((2..=6).contains(&erases), "{erases}");
+    session(&mut flash, |monitor, _, _| {
+        let life = monitor.lifetime().totals;
+        assert_eq!(life.raw(UsageCounter::Landings) as u32, 12);
+        assert!((life.raw(UsageCounter::Flight) - flown).abs() < 1.0 && flown > 7_000.0, "{flown}");
+    });
+}
+
+#[test]
+fn on_the_ground_nothing_is_erased_while_there_is_room_or_the_vehicle_was_just_disarmed() {
+    let mut flash = Flash::blank();
+    session(&mut flash, |monitor, handover, keeper| {
+        for second in 0..3_600 {
+            live(second, false, monitor, handover, second as u32);
+            while keeper.service(false) == Kept::Took {}
+        }
+        assert_eq!((keeper.status.read().erased, keeper.status.calm()), (0, Calm::Grounded));
+        for (second, calm) in [(3_600, Calm::None), (3_601, Calm::None), (3_620, Calm::Grounded)] {
+            live(second, second == 3_600, monitor, handover, second as u32);
+            assert_eq!(keeper.status.calm(), calm, "at {second} s");
+        }
+        live(3_626, false, monitor, handover, 3_620);
+        assert_eq!(keeper.status.calm(), Calm::Silent);
     });
 }
 
