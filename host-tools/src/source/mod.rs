@@ -1,4 +1,16 @@
-//! Where the bytes of the autopilot's UART come from: chunks of bytes with the times at which they arrive.
+//! What is read: recordings of every format as one stream of items ([`item`], [`recording`]), and, for `hums sim` and its
+//! like, the bytes of the autopilot's UART: chunks with the times at which they arrive.
+//!
+//! | format | read by |
+//! |---|---|
+//! | log of HUMS | `own` |
+//! | tlog, raw MAVLink | `mavlink` |
+//! | ArduPilot's DataFlash | `dataflash` |
+//! | PX4's ULog | `ulog` |
+//!
+//! A further format is one more [`item::Reader`], and a line of [`recording::Recording::new`].
+//!
+//! # Bytes
 //!
 //! | source | arrival times |
 //! |---|---|
@@ -9,13 +21,23 @@
 //! Times are microseconds since the first byte and never fall: see [`tlog`] for what happens to clocks that jumped.
 //! Everything streams: memory does not grow with the input.
 
+pub mod dataflash;
+pub mod input;
+pub mod item;
 pub mod live;
+pub mod mavlink;
 pub mod noise;
+pub mod own;
 pub mod paced;
 pub mod raw;
+pub mod recording;
+mod said;
 pub mod sniff;
 mod stream;
+pub mod timeline;
 pub mod tlog;
+pub mod told;
+pub mod ulog;
 
 pub use stream::{Chunk, Source};
 
@@ -29,8 +51,7 @@ use crate::endpoint::Endpoint;
 use crate::logs::{self, Content};
 use crate::outcome::usage;
 
-/// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
-pub const RAW_BAUD: u32 = 115_200;
+pub use recording::RAW_BAUD;
 
 /// The way back to a source that hears.
 pub type Way = Box<dyn Write + Send>;

@@ -55,13 +55,31 @@ pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
     Ok((kind, Cursor::new(window).chain(input)))
 }
 
+/// What these first bytes are, and whether a frame is among them whose checksum holds.
+pub fn sniff_bytes(bytes: &[u8]) -> (Kind, bool) {
+    let (votes, good) = count(bytes);
+    let kind = match votes {
+        _ if bytes.is_empty() => Kind::Empty,
+        1.. => Kind::Tlog,
+        ..=-1 => Kind::Raw,
+        0 => single_record(bytes),
+    };
+    (kind, good)
+}
+
 /// Frames followed by a time and a frame, less frames followed by a frame.
 fn count_votes(bytes: &[u8]) -> i32 {
-    let mut votes = 0;
+    count(bytes).0
+}
+
+/// The votes, and whether any frame's checksum holds.
+fn count(bytes: &[u8]) -> (i32, bool) {
+    let (mut votes, mut good) = (0, false);
     let mut at = 0;
     while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty()) {
         match peek(rest) {
             Peek::Frame(frame) if frame.check() == Check::Good => {
+                good = true;
                 let next = at + frame.bytes.len();
                 let begins =
                     |at: usize| bytes.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
@@ -75,7 +93,7 @@ fn count_votes(bytes: &[u8]) -> i32 {
             _ => at += 1,
         }
     }
-    votes
+    (votes, good)
 }
 
 /// Where no frame has a neighbour, one whole record at the beginning still is a tlog.

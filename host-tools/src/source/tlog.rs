@@ -12,7 +12,7 @@ use std::io::{self, Read};
 use super::stream::{Chunk, Source, read_some};
 use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
 
-const TIME_BYTES: usize = 8;
+pub(super) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
 /// Enough to see a record and the beginning of the one after it.
 const LOOKAHEAD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
@@ -155,7 +155,7 @@ pub struct Tlog<R> {
 }
 
 /// Recorded times before 2000 count from some power-on: they tell no UTC.
-const UTC_US_MIN: u64 = 946_684_800_000_000;
+pub(super) const UTC_US_MIN: u64 = 946_684_800_000_000;
 
 impl<R: Read> Tlog<R> {
     /// Reads from `input`.

@@ -1,0 +1,227 @@
+//! The bytes of a recording: a file or standard input, plain or compressed by gzip, with how far it has been read.
+//!
+//! Whether it is compressed is told by its content, never by its name. Compressed bytes that are damaged or end too
+//! soon end the input; [`Progress::damage`] then says where and why.
+
+use std::fs::File;
+use std::io::{self, BufReader, Cursor, Read};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use anyhow::{Context as _, Result};
+use flate2::bufread::MultiGzDecoder;
+
+use super::stream::read_some;
+
+/// The first bytes of a gzip file (RFC 1952), with the only compression method there is.
+const GZIP: [u8; 3] = [0x1f, 0x8b, 8];
+const BUFFER_BYTES: usize = 64 * 1024;
+
+/// How far an input has been read. Clones tell of the same input.
+#[derive(Clone, Debug, Default)]
+pub struct Progress(Arc<State>);
+
+#[derive(Debug, Default)]
+struct State {
+    /// Bytes taken from the file, as they lie there.
+    taken: AtomicU64,
+    /// The file's bytes; 0 where nobody knows.
+    total: AtomicU64,
+    damage: Mutex<Option<String>>,
+}
+
+impl Progress {
+    /// Bytes of the file that were read.
+    pub fn taken(&self) -> u64 {
+        self.0.taken.load(Ordering::Relaxed)
+    }
+
+    /// The bytes of the file, where that is known.
+    pub fn total(&self) -> Option<u64> {
+        Some(self.0.total.load(Ordering::Relaxed)).filter(|total| *total > 0)
+    }
+
+    /// The part that was read, 0 to 1; 0 where the size is not known.
+    pub fn part(&self) -> f64 {
+        self.total().map_or(0.0, |total| (self.taken() as f64 / total as f64).min(1.0))
+    }
+
+    /// What was wrong with the compressed bytes, if anything.
+    pub fn damage(&self) -> Option<String> {
+        self.0.damage.lock().ok()?.clone()
+    }
+
+    /// Sets how much there is.
+    pub fn set_total(&self, bytes: u64) {
+        self.0.total.store(bytes, Ordering::Relaxed);
+    }
+
+    /// Sets how far it has been read.
+    pub fn set_taken(&self, bytes: u64) {
+        self.0.taken.store(bytes, Ordering::Relaxed);
+    }
+
+    fn set_damage(&self, words: String) {
+        if let Ok(mut damage) = self.0.damage.lock() {
+            damage.get_or_insert(words);
+        }
+    }
+}
+
+/// An open input. It keeps no more than what is read at once.
+pub struct Input {
+    inner: Box<dyn Read + Send>,
+    progress: Progress,
+    compressed: bool,
+}
+
+impl Input {
+    /// Opens a file.
+    pub fn open(path: &Path) -> Result<Self> {
+        let context = || format!("{}: cannot be opened", path.display());
+        let file = File::open(path).with_context(context)?;
+        let bytes = file.metadata().with_context(context)?.len();
+        let input = Self::new(file).with_context(|| format!("{}: cannot be read", path.display()))?;
+        input.progress.set_total(bytes);
+        Ok(input)
+    }
+
+    /// The bytes of `inner`: standard input, memory.
+    pub fn new(inner: impl Read + Send + 'static) -> io::Result<Self> {
+        let progress = Progress::default();
+        let mut counted = Counted { inner, progress: progress.clone() };
+        let start = read_start(&mut counted, GZIP.len())?;
+        let compressed = start == GZIP;
+        let whole = Cursor::new(start).chain(counted);
+        let inner: Box<dyn Read + Send> = if compressed {
+            Box::new(MultiGzDecoder::new(BufReader::with_capacity(BUFFER_BYTES, whole)))
+        } else {
+            Box::new(whole)
+        };
+        Ok(Self { inner, progress, compressed })
+    }
+
+    /// How far it has been read.
+    pub fn progress(&self) -> Progress {
+        self.progress.clone()
+    }
+
+    /// Looks at the first `bytes` bytes, fewer where there are no more, and puts them back.
+    pub fn peek(&mut self, bytes: usize) -> io::Result<Vec<u8>> {
+        let start = read_start(self, bytes)?;
+        let rest = std::mem::replace(&mut self.inner, Box::new(io::empty()));
+        self.inner = Box::new(Cursor::new(start.clone()).chain(rest));
+        Ok(start)
+    }
+}
+
+impl Read for Input {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.inner.read(buffer) {
+            Err(error) if self.compressed && is_damage(&error) => {
+                let place = self.progress.taken();
+                self.progress.set_damage(match error.kind() {
+                    io::ErrorKind::UnexpectedEof => {
+                        format!("the compressed file ends too soon, after {place} bytes")
+                    }
+                    _ => format!("the compressed file is damaged before byte {place}: {error}"),
+                });
+                self.inner = Box::new(io::empty());
+                Ok(0)
+            }
+            result => result,
+        }
+    }
+}
+
+/// What the decoder says of its bytes, other than what the file system says of the file.
+fn is_damage(error: &io::Error) -> bool {
+    use io::ErrorKind::{InvalidData, InvalidInput, UnexpectedEof};
+    matches!(error.kind(), InvalidData | InvalidInput | UnexpectedEof)
+}
+
+/// The first bytes, fewer at the end.
+fn read_start(input: &mut impl Read, bytes: usize) -> io::Result<Vec<u8>> {
+    let (mut start, mut filled) = (vec![0; bytes], 0);
+    while filled < bytes {
+        match read_some(input, start.get_mut(filled..).unwrap_or_default())? {
+            0 => break,
+            got => filled += got,
+        }
+    }
+    start.truncate(filled);
+    Ok(start)
+}
+
+/// Counts what is taken.
+struct Counted<R> {
+    inner: R,
+    progress: Progress,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let got = self.inner.read(buffer)?;
+        self.progress.0.taken.fetch_add(got as u64, Ordering::Relaxed);
+        Ok(got)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+
+    fn packed(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(bytes).expect("memory");
+        encoder.finish().expect("memory")
+    }
+
+    fn read(bytes: Vec<u8>) -> (Vec<u8>, Option<String>) {
+        let mut input = Input::new(Cursor::new(bytes)).expect("memory");
+        let peeked = input.peek(1000).expect("memory");
+        let mut all = Vec::new();
+        input.read_to_end(&mut all).expect("damage is no error");
+        assert!(all.starts_with(&peeked), "what was looked at is put back");
+        (all, input.progress().damage())
+    }
+
+    fn sample() -> Vec<u8> {
+        (0..200_000_u32).flat_map(|number| (number.wrapping_mul(2_654_435_761) >> 9).to_le_bytes()).collect()
+    }
+
+    #[test]
+    fn compressed_or_not_the_bytes_are_the_same() {
+        let plain = sample();
+        assert_eq!(read(plain.clone()), (plain.clone(), None));
+        assert_eq!(read(packed(&plain)), (plain.clone(), None));
+        let two = [packed(&plain), packed(b"more")].concat();
+        assert_eq!(read(two), ([&plain[..], b"more"].concat(), None), "members follow each other");
+        assert_eq!(read(Vec::new()), (Vec::new(), None));
+        assert_eq!(read(vec![0x1f]), (vec![0x1f], None));
+    }
+
+    #[test]
+    fn a_cut_compressed_file_gives_what_it_has_and_says_where_it_ends() {
+        let (plain, whole) = (sample(), packed(&sample()));
+        let (got, damage) = read(whole[..whole.len() / 2].to_vec());
+        assert!(plain.starts_with(&got) && got.len() > plain.len() / 4, "{}", got.len());
+        let damage = damage.expect("it is said");
+        assert!(damage.contains(&format!("after {} bytes", whole.len() / 2)), "{damage}");
+    }
+
+    #[test]
+    fn a_damaged_compressed_file_is_no_error_either() {
+        let mut bytes = packed(&sample());
+        let middle = bytes.len() / 2;
+        bytes[middle..middle + 64].fill(0xff);
+        assert!(read(bytes).1.is_some());
+    }
+}

@@ -1,0 +1,298 @@
+//! The one stream that every recording is read as, whatever its format: a time, and what was recorded then.
+//!
+//! A format is one file (or folder) beside this one with a [`Reader`]; a command takes [`Item`]s and knows no format.
+//! A reader streams: its memory does not grow with its input, and nothing in an input may panic it.
+//!
+//! **Times** count from the beginning of the recording's own clock and never fall ([`super::timeline`] sees to that; a
+//! clock that falls is an [`Item::Restart`]). UTC of time zero is an [`Item::Epoch`] as soon as it is known, and again
+//! when it is known better.
+//!
+//! **Damage** is walked over. What is missing is an [`Item::Gap`] with its place and its reason; an error is for what
+//! cannot be read at all.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use hums_core::observation::{Observation, Source};
+use hums_core::time::Instant;
+use hums_link::Frame;
+
+use super::told::Told;
+
+/// What a recording holds.
+#[derive(Clone, Copy, Debug)]
+pub enum Item<'a> {
+    /// UTC at time zero, microseconds since 1970.
+    Epoch(u64),
+    /// A MAVLink frame as it came. What it says follows as items of its own.
+    Frame(&'a Frame<'a>),
+    /// What a vehicle said, in SI units.
+    Observation(Source, &'a Observation),
+    /// A parameter of the autopilot.
+    Parameter(Parameter<'a>),
+    /// Words, whole: long ones are put together. The time is that of their first part, so it may lie a second back.
+    Text(Text<'a>),
+    /// The flight mode, whenever it is told.
+    Mode(Mode<'a>),
+    /// An event that has a number.
+    Event(Event<'a>),
+    /// A fact about the vehicle or the recording.
+    Fact(Fact<'a>),
+    /// One message of a format other than MAVLink, with its own names and units.
+    Row(Row<'a>),
+    /// A record of the monitor's own: only logs of HUMS have them.
+    Record(&'a Told),
+    /// Something is missing or damaged here.
+    Gap(&'a Gap),
+    /// The recording's clock began again: another power-on of what recorded it. Time goes on from where it was.
+    Restart,
+}
+
+/// A parameter and its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its value.
+    pub value: f64,
+}
+
+/// What somebody said in words.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Text<'a> {
+    /// Who.
+    pub source: Source,
+    /// `MAV_SEVERITY`: 0 is an emergency, 7 is for debugging.
+    pub severity: u8,
+    /// Words of the world, never markup.
+    pub words: &'a str,
+}
+
+/// A flight mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode<'a> {
+    /// The autopilot's own number.
+    pub number: u32,
+    /// Its name, where that is known.
+    pub name: Option<&'a str>,
+}
+
+/// An event.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event<'a> {
+    /// Its number: `PX4`'s event id; of `ArduPilot`'s `EV` the number, of its `ERR` subsystem times 256 plus code.
+    pub number: u32,
+    /// `MAV_SEVERITY`.
+    pub severity: u8,
+    /// Its name or meaning; empty where nothing is known of it.
+    pub words: &'a str,
+}
+
+/// A fact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fact<'a> {
+    /// What it is about.
+    pub about: About,
+    /// Words of the world.
+    pub words: &'a str,
+}
+
+/// What facts are about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum About {
+    /// The autopilot's firmware with its version: `ArduCopter V4.6.0 (3fc7011a)`.
+    Firmware,
+    /// The autopilot's hardware: `PX4_FMU_V5`.
+    Hardware,
+    /// The airframe: `QUAD/X`.
+    Frame,
+    /// Who or what made the recording.
+    Recorder,
+}
+
+/// The columns of the rows of one name. In one recording a name has one table for ever: a definition that changes its
+/// columns gets a name of its own (`ATT_2`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    /// Its name, safe in a file's name: letters, digits, `_`, `-`.
+    pub name: String,
+    /// Its columns.
+    pub columns: Vec<Column>,
+}
+
+/// One column. An array is a column for each element: `q[0]`, `q[1]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Its name.
+    pub name: String,
+    /// The unit of its values as they stand here (multipliers are applied); empty where none is known.
+    pub unit: String,
+    /// The type of its values.
+    pub kind: Kind,
+}
+
+/// The type of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`Value::Unsigned`]
+    Unsigned,
+    /// [`Value::Signed`]
+    Signed,
+    /// [`Value::Single`]
+    Single,
+    /// [`Value::Double`]
+    Double,
+    /// [`Value::Flag`]
+    Flag,
+    /// [`Value::Text`]
+    Text,
+}
+
+/// One row: as many values as its table has columns, each of its column's kind or [`Value::Unknown`].
+#[derive(Clone, Copy, Debug)]
+pub struct Row<'a> {
+    /// Its table. The same table is the same `Arc`.
+    pub table: &'a Arc<Table>,
+    /// Its values.
+    pub values: &'a [Value<'a>],
+}
+
+/// One value of a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value<'a> {
+    /// Not there.
+    Unknown,
+    /// An unsigned integer.
+    Unsigned(u64),
+    /// An integer.
+    Signed(i64),
+    /// A number of single precision.
+    Single(f32),
+    /// A number of double precision.
+    Double(f64),
+    /// Yes or no.
+    Flag(bool),
+    /// Words.
+    Text(&'a str),
+}
+
+/// Something is missing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// The last time before it, where there is one.
+    pub from: Option<Instant>,
+    /// The first time after it, where that is known.
+    pub to: Option<Instant>,
+    /// Why.
+    pub cause: Cause,
+    /// Where in the file (uncompressed), in bytes from its beginning.
+    pub place: Option<u64>,
+    /// How many bytes of the file could not be read.
+    pub bytes: u64,
+    /// What was found there, as the end of a sentence: `a length of 3 bytes for FMT`.
+    pub words: String,
+}
+
+/// Why something is missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Cause {
+    /// The file is damaged here.
+    Damaged,
+    /// The file ends in the middle of something.
+    Cut,
+    /// The recorder lost something while it recorded, and says so.
+    Lost,
+    /// The recorder left it out on purpose.
+    NotKept,
+}
+
+impl Cause {
+    /// Whether the recording has less than it should: exit code 3.
+    pub const fn is_damage(self) -> bool {
+        matches!(self, Self::Damaged | Self::Cut)
+    }
+
+    /// In a word, for tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Damaged => "damaged",
+            Self::Cut => "cut",
+            Self::Lost => "lost",
+            Self::NotKept => "not_kept",
+        }
+    }
+}
+
+/// What a command needs. A reader may leave out what is not wanted, and is expected to where that saves time: messages
+/// that nobody needs are skipped by their length. Everything that has no switch here is always handed on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Want<'a> {
+    /// [`Item::Frame`]
+    pub frames: bool,
+    /// [`Item::Observation`]
+    pub observations: bool,
+    /// [`Item::Row`]: of which tables.
+    pub rows: Rows<'a>,
+}
+
+/// Which rows are wanted.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum Rows<'a> {
+    /// None.
+    #[default]
+    None,
+    /// Those of all tables.
+    All,
+    /// Those of tables with these names.
+    Named(&'a [String]),
+}
+
+impl Rows<'_> {
+    /// Whether the rows of this table are wanted.
+    pub fn has(self, name: &str) -> bool {
+        match self {
+            Self::None => false,
+            Self::All => true,
+            Self::Named(names) => names.iter().any(|known| known == name),
+        }
+    }
+}
+
+/// What gets each item with its time. An error of it ends the reading and is handed on; [`Stop`] is no failure.
+pub type Take<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
+
+/// The error of a [`Take`] that has had enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stop;
+
+impl std::fmt::Display for Stop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("nothing more is wanted")
+    }
+}
+
+impl std::error::Error for Stop {}
+
+/// Messages of one name.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MessageCount {
+    /// Its name.
+    pub name: String,
+    /// How many.
+    pub count: u64,
+    /// Their bytes in the file.
+    pub bytes: u64,
+}
+
+/// What was read, in all.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Messages by name, in order of their names, those that nobody wanted too.
+    pub messages: Vec<MessageCount>,
+}
+
+/// Reads one recording, once.
+pub trait Reader: Send {
+    /// Reads it from its beginning to its end.
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary>;
+}

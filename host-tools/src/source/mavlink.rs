@@ -1,0 +1,173 @@
+//! MAVLink recordings, a ground station's tlog and the raw bytes of a port, as the one stream.
+
+use anyhow::Result;
+use hums_core::time::Instant;
+use hums_link::framer::Framer;
+
+use super::input::Input;
+use super::item::{Cause, Gap, Item, MessageCount, Reader, Summary, Take, Want};
+use super::paced::Paced;
+use super::raw::Raw;
+use super::said::Said;
+use super::stream::Source as _;
+use super::timeline::Timeline;
+use super::tlog::{Record, Records, TIME_BYTES, UTC_US_MIN};
+use crate::names::message_name;
+
+/// Ids below this are counted in a table; above it lie few messages, and hostile ones are bounded by [`IDS_MAX`].
+const NEAR: usize = 1024;
+/// Further ids that are counted one by one.
+const IDS_MAX: usize = 4096;
+
+/// Frames by their id.
+struct Counts {
+    near: Vec<(u64, u64)>,
+    far: std::collections::BTreeMap<u32, (u64, u64)>,
+}
+
+impl Counts {
+    fn new() -> Self {
+        Self { near: vec![(0, 0); NEAR], far: std::collections::BTreeMap::new() }
+    }
+
+    fn add(&mut self, id: u32, bytes: usize) {
+        let room = self.far.len() < IDS_MAX;
+        let count = match self.near.get_mut(id as usize) {
+            Some(count) => count,
+            None if room => self.far.entry(id).or_default(),
+            None => return,
+        };
+        (count.0, count.1) = (count.0 + 1, count.1 + bytes as u64);
+    }
+
+    fn summary(&self) -> Summary {
+        let near = (0..).zip(&self.near).filter(|(_, count)| count.0 > 0);
+        let all = near.chain(self.far.iter().map(|(id, count)| (*id, count)));
+        let message =
+            |(id, &(count, bytes))| MessageCount { name: message_name(id).into_owned(), count, bytes };
+        let mut messages: Vec<_> = all.map(message).collect();
+        messages.sort_by(|a, b| a.name.cmp(&b.name));
+        Summary { messages }
+    }
+}
+
+/// A ground station's log.
+pub struct TlogReader {
+    records: Records<Input>,
+}
+
+impl TlogReader {
+    /// Reads from `input`.
+    pub fn new(input: Input) -> Self {
+        Self { records: Records::new(input) }
+    }
+}
+
+impl Reader for TlogReader {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+        let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
+        let mut timeline: Option<Timeline> = None;
+        let (mut place, mut now) = (0_u64, Instant::ZERO);
+        while let Some(record) = self.records.next_record()? {
+            let bytes = match record {
+                Record::Frame { time_us, bytes } => {
+                    let timeline = match &mut timeline {
+                        Some(timeline) => timeline,
+                        none => {
+                            if time_us >= UTC_US_MIN {
+                                take(now, Item::Epoch(time_us))?;
+                            }
+                            none.insert(Timeline::from_first(time_us))
+                        }
+                    };
+                    let moment = timeline.at(time_us);
+                    now = moment.at;
+                    if moment.restarted {
+                        take(now, Item::Restart)?;
+                    }
+                    place += TIME_BYTES as u64;
+                    bytes
+                }
+                Record::Noise(bytes) => {
+                    let words = format!("{} bytes belong to no record of the tlog", bytes.len());
+                    take(now, Item::Gap(&gap(now, Cause::Damaged, place, bytes.len(), words)))?;
+                    bytes
+                }
+            };
+            place += bytes.len() as u64;
+            push(&mut framer, &bytes, true, &mut |frame| {
+                counts.add(frame.id(), frame.bytes().len());
+                said.frame(now, &frame, want, take)
+            })?;
+        }
+        said.end(take)?;
+        Ok(counts.summary())
+    }
+}
+
+/// The raw bytes of a port, in the time that a line at this rate takes for them.
+pub struct RawReader {
+    bytes: Paced<Raw<Input>>,
+}
+
+impl RawReader {
+    /// Reads from `input`, at `baud`.
+    pub fn new(input: Input, baud: u32) -> Self {
+        Self { bytes: Paced::new(Raw::new(input), baud) }
+    }
+}
+
+impl Reader for RawReader {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+        let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
+        let mut now = Instant::ZERO;
+        let mut each = |at, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
+            counts.add(frame.id(), frame.bytes().len());
+            said.frame(at, &frame, want, take)
+        };
+        while let Some(chunk) = self.bytes.next()? {
+            now = Instant::from_micros(chunk.at_us);
+            push(&mut framer, &chunk.bytes, false, &mut |frame| each(now, frame, take))?;
+        }
+        push(&mut framer, &[], true, &mut |frame| each(now, frame, take))?;
+        said.end(take)?;
+        let noise = framer.counts().bytes_not_frames;
+        if noise > 0 {
+            // Noise on the line and damage of the file look alike here.
+            let words = format!("{noise} bytes belong to no frame: noise on the line");
+            let lost = Gap {
+                from: Some(Instant::ZERO),
+                to: Some(now),
+                place: None,
+                bytes: noise,
+                ..gap(now, Cause::Lost, 0, 0, words)
+            };
+            take(now, Item::Gap(&lost))?;
+        }
+        Ok(counts.summary())
+    }
+}
+
+fn gap(at: Instant, cause: Cause, place: u64, bytes: usize, words: String) -> Gap {
+    Gap { from: Some(at), to: None, cause, place: Some(place), bytes: bytes as u64, words }
+}
+
+/// Pushes bytes into a framer whose frames go to one that may fail. `idle` says that silence follows.
+fn push(
+    framer: &mut Framer,
+    bytes: &[u8],
+    idle: bool,
+    each: &mut dyn FnMut(hums_link::Frame<'_>) -> Result<()>,
+) -> Result<()> {
+    let mut result = Ok(());
+    let mut sink = |frame: hums_link::Frame<'_>| {
+        if result.is_ok() {
+            result = each(frame);
+        }
+    };
+    framer.push(bytes, &mut sink);
+    if idle {
+        framer.idle(&mut sink);
+    }
+    result
+}

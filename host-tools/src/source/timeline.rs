@@ -1,0 +1,113 @@
+//! Recorded times as times that never fall.
+//!
+//! A recording's clock may fall (another power-on in the same file, a clock that was set) and damage may make it say
+//! anything. A small step back is a reordering: what comes late counts as coming now. A larger one is a restart, after
+//! which time goes on from where it was. A step forward beyond a day is damage or a clock that was set: it counts for
+//! nothing, and if the clock stays there, time goes on from there.
+
+use hums_core::time::Instant;
+
+/// A step back beyond this is a clock that began again, not a reordering.
+pub const STEP_BACK_US_MAX: u64 = 1_000_000;
+/// A step forward beyond this is damage or a clock that was set; gaps of hours are real.
+pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
+
+/// What a recorded time became.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Moment {
+    /// When it is.
+    pub at: Instant,
+    /// The clock fell, or jumped, right before it.
+    pub restarted: bool,
+}
+
+/// Follows a recording's clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Timeline {
+    /// The latest recorded time of this power-on, and what it became.
+    last: Option<(u64, u64)>,
+    restarts: u64,
+}
+
+impl Timeline {
+    /// A clock whose first time is that of the stream: microseconds since a power-on. (One that counts from 1970 is
+    /// made by [`Timeline::from_first`].)
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A clock whose first time, whatever it says, is the stream's time zero.
+    pub fn from_first(first_us: u64) -> Self {
+        Self { last: Some((first_us, 0)), restarts: 0 }
+    }
+
+    /// The next recorded time, in microseconds.
+    pub fn at(&mut self, recorded_us: u64) -> Moment {
+        let Some((before, reached)) = self.last else {
+            // The first time of all may be damaged too: a day is enough.
+            let first = if recorded_us > STEP_FORWARD_US_MAX { 0 } else { recorded_us };
+            self.last = Some((recorded_us, first));
+            return Moment { at: Instant::from_micros(first), restarted: false };
+        };
+        let (at, restarted) = match recorded_us.checked_sub(before) {
+            Some(step) if step <= STEP_FORWARD_US_MAX => (reached.saturating_add(step), false),
+            // The later time stays the base, so that a reordered pair does not stretch time.
+            None if before - recorded_us <= STEP_BACK_US_MAX => {
+                return Moment { at: Instant::from_micros(reached), restarted: false };
+            }
+            _ => (reached, true),
+        };
+        self.restarts += u64::from(restarted);
+        self.last = Some((recorded_us, at));
+        Moment { at: Instant::from_micros(at), restarted }
+    }
+
+    /// The latest time; zero before the first.
+    pub fn now(&self) -> Instant {
+        Instant::from_micros(self.last.map_or(0, |(_, reached)| reached))
+    }
+
+    /// How often the clock fell or jumped.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: u64 = 1_000_000;
+
+    fn times(recorded: &[u64]) -> Vec<(u64, bool)> {
+        let mut timeline = Timeline::new();
+        let moment = |&us: &u64| {
+            let moment = timeline.at(us);
+            (moment.at.as_micros(), moment.restarted)
+        };
+        recorded.iter().map(moment).collect()
+    }
+
+    #[test]
+    fn a_reordered_pair_neither_falls_nor_stretches_time() {
+        let got = times(&[10 * SECOND, 10 * SECOND + 100, 10 * SECOND + 60, 10 * SECOND + 200]);
+        let times: Vec<u64> = got.iter().map(|(at, _)| at - 10 * SECOND).collect();
+        assert_eq!(times, [0, 100, 100, 200]);
+        assert!(got.iter().all(|(_, restarted)| !restarted));
+    }
+
+    #[test]
+    fn another_power_on_goes_on_from_where_time_was() {
+        let got = times(&[60 * SECOND, 61 * SECOND, 2 * SECOND, 3 * SECOND]);
+        assert_eq!(
+            got,
+            [(60 * SECOND, false), (61 * SECOND, false), (61 * SECOND, true), (62 * SECOND, false)]
+        );
+    }
+
+    #[test]
+    fn a_damaged_time_costs_no_years() {
+        let got = times(&[SECOND, u64::MAX, 2 * SECOND]);
+        assert!(got.iter().all(|(at, _)| *at <= 2 * SECOND), "{got:?}");
+    }
+}
