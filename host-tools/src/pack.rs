@@ -1,8 +1,7 @@
 //! `hums pack`: a recording becomes one log file, through the same framer and the same writer as on board, but without
 //! a card's file system, queues or checks. `hums decode` reads it back.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 
 use anyhow::{Context, Result};
 use hums_blackbox::record::{Clock, Loss, Lost, Note};
@@ -12,7 +11,7 @@ use hums_link::{Check, Framer};
 
 use crate::cli;
 use crate::endpoint::Endpoint;
-use crate::files::cannot_write;
+use crate::files::{Inputs, Output, cannot_write};
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::source::{self, Timing};
@@ -28,10 +27,11 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
             args.input
         )));
     }
+    let mut inputs = Inputs::none();
+    inputs.add_endpoint(&args.input);
     let mut source = source::open(&args.input, Timing { line_rate: None })?;
     let context = || cannot_write(&args.output);
-    let file = BufWriter::new(File::create(&args.output).with_context(context)?);
-    let mut packer = Packer::new(file);
+    let mut packer = Packer::new(Output::create(&args.output, &inputs)?);
     let mut last_us = 0;
     while let Some(chunk) = source.next().with_context(|| format!("{}: cannot be read", args.input))? {
         if packer.started.is_none() {
@@ -40,7 +40,8 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         packer.chunk(chunk.at_us, &chunk.bytes, source.has_records()).with_context(context)?;
         last_us = chunk.at_us;
     }
-    let done = packer.finish(last_us).with_context(context)?;
+    let (done, mut file) = packer.finish(last_us).with_context(context)?;
+    file.finish()?;
     if let Some(remark) = source.remark() {
         eprintln!("hums: {}: {remark}", args.input);
     }
@@ -134,7 +135,7 @@ impl<W: Write> Packer<W> {
         self.write_out()
     }
 
-    fn finish(mut self, last_us: u64) -> Result<Done> {
+    fn finish(mut self, last_us: u64) -> Result<(Done, W)> {
         self.chunk(last_us, &[], true)?;
         let counts = self.framer.counts();
         if counts.bytes_not_frames > 0 {
@@ -148,14 +149,14 @@ impl<W: Write> Packer<W> {
         }
         self.writer.finish(&mut self.finished);
         self.write_out()?;
-        self.file.flush()?;
         let counters = self.writer.counters();
-        Ok(Done {
+        let done = Done {
             frames: counters.frames,
             recording_bytes: counters.frame_bytes + 8 * counters.frames,
             log_bytes: self.log_bytes,
             bytes_not_frames: counts.bytes_not_frames,
-        })
+        };
+        Ok((done, self.file))
     }
 
     fn write_out(&mut self) -> Result<()> {

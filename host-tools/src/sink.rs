@@ -1,15 +1,15 @@
 //! Where the bytes of the ground-station UART go, and, where somebody is there to answer, where its own come from.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::{Context as _, Result};
 
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
-use crate::files::cannot_write;
+use crate::files::{Inputs, Output};
 use crate::output::Stdout;
 
 /// How long the reader waits before it looks whether anybody still listens.
@@ -25,6 +25,34 @@ pub struct Ground {
     pub writer: Box<dyn Write + Send>,
     /// What comes from it.
     pub heard: Heard,
+    /// The file that `writer` writes, where it is one.
+    pub file: Option<SinkFile>,
+}
+
+/// A file that a run writes, and whoever ends the run makes whole.
+#[derive(Clone, Debug)]
+pub struct SinkFile(Arc<Mutex<Output>>);
+
+impl SinkFile {
+    /// The run is over: the file gets its name.
+    pub fn finish(&self) -> Result<()> {
+        self.with(|file| Ok(file.finish())).context("--gs: cannot be written")?
+    }
+
+    fn with<T>(&self, act: impl FnOnce(&mut Output) -> io::Result<T>) -> io::Result<T> {
+        let mut file = self.0.lock().map_err(|_| io::Error::other("a thread that wrote it has failed"))?;
+        act(&mut file)
+    }
+}
+
+impl Write for SinkFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.with(|file| file.write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.with(Output::flush)
+    }
 }
 
 /// What the ground station sends.
@@ -49,19 +77,23 @@ impl Heard {
     }
 }
 
-/// Opens SINK.
-pub fn open(endpoint: &Endpoint) -> Result<Ground> {
-    let writer: Box<dyn Write + Send> = match endpoint {
+/// Opens SINK, which is none of the inputs.
+pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
+    let heard = Heard::nobody();
+    match endpoint {
         Endpoint::File(path) => {
-            Box::new(BufWriter::new(File::create(path).with_context(|| cannot_write(path))?))
+            let file = SinkFile(Arc::new(Mutex::new(Output::create(path, inputs)?)));
+            Ok(Ground { writer: Box::new(file.clone()), heard, file: Some(file) })
         }
-        Endpoint::Standard => Box::new(BufWriter::new(Stdout::new())),
+        Endpoint::Standard => {
+            inputs.refuse_standard_output()?;
+            Ok(Ground { writer: Box::new(BufWriter::new(Stdout::new())), heard, file: None })
+        }
         _ => {
             let duplex = duplex::open(endpoint, SILENCE)?;
-            return Ok(Ground { writer: duplex.writer, heard: listen(duplex.reader) });
+            Ok(Ground { writer: duplex.writer, heard: listen(duplex.reader), file: None })
         }
-    };
-    Ok(Ground { writer, heard: Heard::nobody() })
+    }
 }
 
 /// A thread reads, so that the pipeline never waits for a ground station.

@@ -4,6 +4,7 @@ use super::identity::Identity;
 use super::influx::Tags;
 use super::selection::Selection;
 use crate::cli::Format;
+use crate::files::Inputs;
 
 /// Which formats are asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,4 +58,6 @@ pub struct Context {
     pub identity: Identity,
     /// The same for the line protocol.
     pub tags: Tags,
+    /// What must not be written over.
+    pub inputs: Inputs,
 }

@@ -39,6 +39,7 @@ use std::sync::Mutex;
 use anyhow::Result;
 
 use crate::cli;
+use crate::files::Inputs;
 use crate::logs::reader::{self, Summary};
 use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage as usage_error};
@@ -84,7 +85,9 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     if found.logs.is_empty() {
         eprintln!("hums: no log is in there, so nothing was written");
     }
-    let task = Task { formats, selection, output: &args.output, standard_output, logs: found.logs.len() };
+    let inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
+    let logs = found.logs.len();
+    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
     let sessions = Mutex::new(Sessions::new());
     side_by_side(
         &found.logs,
@@ -103,6 +106,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
 struct Task<'a> {
     formats: Formats,
     selection: Selection,
+    inputs: Inputs,
     output: &'a Path,
     standard_output: bool,
     logs: usize,
@@ -121,8 +125,12 @@ impl Task<'_> {
     /// `sessions` are the sessions whose Parquet tables are taken.
     fn decode(&self, log: &Log, sessions: &Mutex<Sessions>) -> Result<Done> {
         let mut remarks = Vec::new();
-        let mut context =
-            Context { formats: self.formats, selection: self.selection.clone(), ..Context::default() };
+        let mut context = Context {
+            formats: self.formats,
+            selection: self.selection.clone(),
+            inputs: self.inputs.clone(),
+            ..Context::default()
+        };
         context.epoch_us = if self.formats.influx || self.formats.parquet {
             context.identity = Identity::of(log)?;
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);

@@ -7,9 +7,8 @@
 //! Seconds in which the vehicle was not heard, or that fell into a gap of the log, have no row: the flight time jumps,
 //! and `gaps.csv` names the gaps.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::Path;
 
 use anyhow::Result;
 use hums_blackbox::Gap;
@@ -18,7 +17,7 @@ use hums_core::time::{Instant, Span};
 
 use super::reference::{MOTORS, Quantity, Reference};
 use super::selection::Selection;
-use crate::files::{create, settle};
+use crate::files::{Inputs, Output, settle};
 use crate::mavlink::values::Scalar;
 
 /// A vehicle that was not heard for so long tells nothing about this second.
@@ -38,7 +37,7 @@ const GAPS: &str = "From [s]; To [s]; Cause; Frames missing";
 
 /// The tables of one log, open.
 pub struct Thesis {
-    tables: [(BufWriter<File>, PathBuf); 5],
+    tables: [Output; 5],
     reference: Reference,
     selection: Selection,
     epoch_us: Option<u64>,
@@ -50,12 +49,12 @@ pub struct Thesis {
 
 impl Thesis {
     /// Makes the tables in `dir`.
-    pub fn new(dir: &Path, selection: Selection, epoch_us: Option<u64>) -> Result<Self> {
-        let table = |name: &str, header: &str| -> Result<(BufWriter<File>, PathBuf)> {
+    pub fn new(dir: &Path, inputs: &Inputs, selection: Selection, epoch_us: Option<u64>) -> Result<Self> {
+        let table = |name: &str, header: &str| -> Result<Output> {
             let path = dir.join(name);
-            let mut file = create(&path)?;
+            let mut file = Output::create(&path, inputs)?;
             settle(writeln!(file, "{header}"), &path)?;
-            Ok((file, path))
+            Ok(file)
         };
         let tables = [
             table("flightvalues.csv", FLIGHT_VALUES)?,
@@ -127,13 +126,14 @@ impl Thesis {
     }
 
     fn line(&mut self, table: usize, cells: &[String]) -> Result<()> {
-        let Some((file, path)) = self.tables.get_mut(table) else { return Ok(()) };
-        settle(writeln!(file, "{}", cells.join("; ")), path)
+        let Some(file) = self.tables.get_mut(table) else { return Ok(()) };
+        let written = writeln!(file, "{}", cells.join("; "));
+        settle(written, file.path())
     }
 
     /// Writes what is still held.
     pub fn finish(&mut self) -> Result<()> {
-        self.tables.iter_mut().try_for_each(|(file, path)| settle(file.flush(), path))
+        self.tables.iter_mut().try_for_each(Output::finish)
     }
 }
 

@@ -17,7 +17,9 @@ use super::reference::Reference;
 use super::table::Table;
 use super::text::columns;
 use super::thesis::Thesis;
-use crate::files::{appended, cannot_write, create, inside, make_directory, says_directory, settle};
+use crate::files::{
+    Inputs, Output, appended, cannot_write, inside, make_directory, make_parent, says_directory, settle,
+};
 use crate::logs::Log;
 use crate::logs::reader::Deliver;
 use crate::output::Stdout;
@@ -64,29 +66,46 @@ impl Destination {
 }
 
 /// A single file, open.
-struct Single {
-    out: Box<dyn Write + Send>,
-    path: PathBuf,
+enum Single {
+    Standard(BufWriter<Stdout>),
+    File(Output),
 }
 
 impl Single {
-    fn open(destination: &Destination, extension: &str) -> Result<Self> {
+    fn open(destination: &Destination, extension: &str, inputs: &Inputs) -> Result<Self> {
         match destination.path(extension) {
-            None => Ok(Self {
-                out: Box::new(BufWriter::new(Stdout::new())),
-                path: PathBuf::from("standard output"),
-            }),
-            Some(path) => Ok(Self { out: Box::new(create(&path)?), path }),
+            None => {
+                inputs.refuse_standard_output()?;
+                Ok(Self::Standard(BufWriter::new(Stdout::new())))
+            }
+            Some(path) => Self::file(&path, inputs),
         }
     }
 
-    fn write(&mut self, bytes: &[u8]) -> Result<()> {
-        write(&mut self.out, bytes, &self.path)
+    fn file(path: &Path, inputs: &Inputs) -> Result<Self> {
+        make_parent(path)?;
+        Ok(Self::File(Output::create(path, inputs)?))
     }
 
-    fn finish(mut self) -> Result<PathBuf> {
-        settle(self.out.flush(), &self.path)?;
-        Ok(self.path)
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        match self {
+            Self::Standard(out) => settle(out.write_all(bytes), Path::new("standard output")),
+            Self::File(file) => settle(file.write_all(bytes), file.path()),
+        }
+    }
+
+    /// All of it is there; gives its name.
+    fn finish(self) -> Result<PathBuf> {
+        match self {
+            Self::Standard(mut out) => {
+                settle(out.flush(), Path::new("standard output"))?;
+                Ok(PathBuf::from("standard output"))
+            }
+            Self::File(mut file) => {
+                file.finish()?;
+                Ok(file.path().to_owned())
+            }
+        }
     }
 }
 
@@ -148,9 +167,10 @@ impl Influx {
 impl<'a> Writers<'a> {
     /// Opens what is sure to be written; tables are opened when they get their first row.
     pub fn new(context: &'a Context, destination: Destination, parquet: Option<PathBuf>) -> Result<Self> {
-        let formats = context.formats;
-        let open =
-            |wanted: bool, extension| wanted.then(|| Single::open(&destination, extension)).transpose();
+        let (formats, inputs) = (context.formats, &context.inputs);
+        let open = |wanted: bool, extension| {
+            wanted.then(|| Single::open(&destination, extension, inputs)).transpose()
+        };
         let (tlog, jsonl) = (open(formats.tlog, "tlog")?, open(formats.jsonl, "jsonl")?);
         let influx = open(formats.influx, "lp")?.map(|file| Influx {
             file,
@@ -166,7 +186,8 @@ impl<'a> Writers<'a> {
             }
             if formats.thesis {
                 let dir = dir.join("thesis");
-                thesis = Some(Thesis::new(&dir, context.selection.clone(), context.epoch_us)?);
+                make_directory(&dir)?;
+                thesis = Some(Thesis::new(&dir, inputs, context.selection.clone(), context.epoch_us)?);
             }
         }
         let about = [
@@ -231,7 +252,8 @@ impl<'a> Writers<'a> {
             let file = File::options().append(true).open(&path);
             BufWriter::new(file.with_context(|| cannot_write(&path))?)
         } else {
-            let mut file = create(&path)?;
+            let file = File::create(&path).with_context(|| cannot_write(&path))?;
+            let mut file = BufWriter::with_capacity(16 * 1024, file);
             let own = match table {
                 Table::Hums(name) => self.headers.get(name).map(Vec::as_slice).unwrap_or_default(),
                 _ => &[],
@@ -258,7 +280,7 @@ impl<'a> Writers<'a> {
         let path = appended(&path, "gaps.csv");
         let file = match &mut self.gaps {
             Some(file) => file,
-            none => none.insert(Single { out: Box::new(create(&path)?), path }),
+            none => none.insert(Single::file(&path, &self.context.inputs)?),
         };
         let mut line = Vec::new();
         if first {

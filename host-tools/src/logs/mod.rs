@@ -14,3 +14,11 @@ pub mod reader;
 
 pub use find::{Content, Found, find, on_card};
 pub use places::{Log, Piece};
+
+impl Found {
+    /// All files in which something was found.
+    pub fn paths(&self) -> impl Iterator<Item = &std::path::Path> {
+        let pieces = self.logs.iter().flat_map(|log| &log.pieces).map(|piece| piece.path.as_path());
+        pieces.chain(self.images.iter().map(|image| image.path.as_path()))
+    }
+}

@@ -17,14 +17,14 @@ pub mod replay;
 pub mod samples;
 pub mod trend;
 
-use std::fs;
+use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
-use crate::files::{appended, cannot_write, inside, make_directory, says_directory};
+use crate::files::{Inputs, Output, appended, inside, make_parent, says_directory, settle};
 use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage};
 use crate::output;
@@ -43,15 +43,16 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         Ok(())
     })?;
     let wanted = wanted(args, &found.logs)?;
+    let inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
     for &index in &wanted.sessions {
         let (Some(log), Some(overview)) = (found.logs.get(index), overviews.get(index)) else { continue };
         let earlier = overviews.get(..index).unwrap_or_default();
-        let html = page::html(overview, &replay::Replay::of(log)?, &trend::of(overview, earlier))?;
         let path = wanted.path(log);
-        if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-            make_directory(dir)?;
-        }
-        fs::write(&path, &html).with_context(|| cannot_write(&path))?;
+        make_parent(&path)?;
+        let mut file = Output::create(&path, &inputs)?;
+        let html = page::html(overview, &replay::Replay::of(log)?, &trend::of(overview, earlier))?;
+        settle(file.write_all(html.as_bytes()), &path)?;
+        file.finish()?;
         output::line(&format!("{}: session {}, {} bytes", path.display(), log.name, html.len()))?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
     }

@@ -1,14 +1,13 @@
 //! What arrives at the autopilot UART, and when: the source, noise and all, cut into pieces that every machine takes.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result};
 
 use crate::cli::Run;
-use crate::files::cannot_write;
+use crate::files::{Inputs, Output};
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
 
@@ -21,16 +20,20 @@ pub struct Arrivals {
     source: Noisy<Box<dyn Source>>,
     name: String,
     waiting: VecDeque<Chunk>,
-    tap: Option<BufWriter<File>>,
+    tap: Option<Output>,
     bytes: u64,
     /// To the autopilot, where there is a live one.
     autopilot: Option<Box<dyn Write + Send>>,
 }
 
 impl Arrivals {
-    /// As the command line says it; `tap` gets a copy of the bytes. `prepare` is what else must be ready: done after a
+    /// As the command line says it; `tap` gets a copy of the bytes, and is none of the inputs. `prepare` is what else must be ready: done after a
     /// stored input was found good, so that a slip leaves nothing behind, and before a live one, which waits for nobody.
-    pub fn open<T>(run: &Run, tap: Option<&Path>, prepare: impl FnOnce() -> Result<T>) -> Result<(Self, T)> {
+    pub fn open<T>(
+        run: &Run,
+        tap: Option<(&Path, &Inputs)>,
+        prepare: impl FnOnce() -> Result<T>,
+    ) -> Result<(Self, T)> {
         if run.input.is_live() {
             let prepared = prepare()?;
             return Ok((Self::new(run, tap)?, prepared));
@@ -39,14 +42,13 @@ impl Arrivals {
         Ok((arrivals, prepare()?))
     }
 
-    fn new(run: &Run, tap: Option<&Path>) -> Result<Self> {
+    fn new(run: &Run, tap: Option<(&Path, &Inputs)>) -> Result<Self> {
         let (source, autopilot) = source::open_both(&run.input, Timing { line_rate: run.faults.line_rate })?;
-        let create = |path: &Path| File::create(path).map(BufWriter::new).with_context(|| cannot_write(path));
         Ok(Self {
             source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
             name: run.input.to_string(),
             waiting: VecDeque::new(),
-            tap: tap.map(create).transpose()?,
+            tap: tap.map(|(path, inputs)| Output::create(path, inputs)).transpose()?,
             bytes: 0,
             autopilot,
         })
@@ -58,12 +60,7 @@ impl Arrivals {
             return Ok(Some(chunk));
         }
         let context = || format!("{}: cannot be read", self.name);
-        let Some(chunk) = self.source.next().with_context(context)? else {
-            if let Some(tap) = &mut self.tap {
-                tap.flush().context("--tap: cannot be written")?;
-            }
-            return Ok(None);
-        };
+        let Some(chunk) = self.source.next().with_context(context)? else { return Ok(None) };
         self.bytes += chunk.bytes.len() as u64;
         if let Some(tap) = &mut self.tap {
             tap.write_all(&chunk.bytes).context("--tap: cannot be written")?;
@@ -74,6 +71,11 @@ impl Arrivals {
         let piece = |bytes: &[u8]| Chunk { at_us: chunk.at_us, bytes: bytes.to_vec() };
         self.waiting.extend(chunk.bytes.chunks(CHUNK_BYTES_MAX).map(piece));
         Ok(self.waiting.pop_front())
+    }
+
+    /// The run is over: the copy of the bytes is whole.
+    pub fn finish(&mut self) -> Result<()> {
+        self.tap.as_mut().map_or(Ok(()), Output::finish).context("--tap")
     }
 
     /// The machine did not take this one: its power went before.

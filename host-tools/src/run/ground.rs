@@ -7,7 +7,8 @@ use anyhow::{Context, Result};
 
 use super::arrivals::CHUNK_BYTES_MAX;
 use crate::cli::Run;
-use crate::sink::{self, Heard};
+use crate::files::Inputs;
+use crate::sink::{self, Heard, SinkFile};
 use crate::source::{self, Chunk, Source, Timing};
 
 /// What the ground station sends.
@@ -15,23 +16,29 @@ pub struct Ground {
     heard: Heard,
     stored: Option<Box<dyn Source>>,
     next: Option<Chunk>,
+    file: Option<SinkFile>,
 }
 
-/// Opens both directions as the command line says it.
-pub fn open(run: &Run) -> Result<(Ground, Box<dyn Write + Send>)> {
-    let (writer, heard) = match &run.gs {
+/// Opens both directions as the command line says it. What is written is none of the inputs.
+pub fn open(run: &Run, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
+    let (writer, heard, file) = match &run.gs {
         Some(endpoint) => {
-            let ground = sink::open(endpoint)?;
-            (ground.writer, ground.heard)
+            let ground = sink::open(endpoint, inputs)?;
+            (ground.writer, ground.heard, ground.file)
         }
-        None => (sink::nowhere(), Heard::nobody()),
+        None => (sink::nowhere(), Heard::nobody(), None),
     };
     let timing = Timing { line_rate: None };
     let stored = run.gs_input.as_ref().map(|input| source::open(input, timing)).transpose()?;
-    Ok((Ground { heard, stored, next: None }, writer))
+    Ok((Ground { heard, stored, next: None, file }, writer))
 }
 
 impl Ground {
+    /// The run is over: a file of what it got is whole.
+    pub fn finish(&self) -> Result<()> {
+        self.file.as_ref().map_or(Ok(()), SinkFile::finish)
+    }
+
     /// What it sent by `now_us`, the oldest first; `None` when that is all.
     pub fn until(&mut self, now_us: u64) -> Result<Option<Chunk>> {
         if self.next.is_none()

@@ -7,6 +7,7 @@ pub mod arrivals;
 pub mod emulate;
 pub mod ground;
 pub(crate) mod params;
+mod paths;
 pub mod qemu;
 pub mod report;
 pub mod sim;

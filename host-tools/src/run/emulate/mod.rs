@@ -16,7 +16,9 @@ use serde::Deserialize;
 
 use super::qemu;
 use super::report::Report;
-use super::{arrivals::Arrivals, check_standard_output, drive, ground, pace, params, prepare_card, store};
+use super::{
+    arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card, store,
+};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::logs;
@@ -36,6 +38,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let (speed, live) = pace(run)?;
     qemu::check()?;
     let firmware = firmware(args.firmware.as_deref())?;
+    let inputs = paths::inputs(run, None, Some(&firmware))?;
     let params = params::read(run.params.as_deref())?;
     let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
     // The board's flash is a file in any case; without --store it ends with the run.
@@ -48,7 +51,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let earlier = logs::on_card(&run.sd).len();
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
-    let (mut ground, gs) = ground::open(run)?;
+    let (mut ground, gs) = ground::open(run, &inputs)?;
     let mut board = Board::start(Fixed {
         firmware,
         card: run.sd.clone(),
@@ -61,6 +64,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     })?;
     drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)?;
     let (json, before) = board.finish()?;
+    ground.finish()?;
     if let Some(remark) = arrivals.remark() {
         eprintln!("hums: {remark}");
     }

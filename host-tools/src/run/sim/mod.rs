@@ -26,7 +26,7 @@ use super::arrivals::Arrivals;
 use super::ground::{self, Ground};
 use super::report::Report;
 use super::store::{self, FileFlash};
-use super::{check_standard_output, drive, pace, params, prepare_card};
+use super::{check_standard_output, drive, pace, params, paths, prepare_card};
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -40,8 +40,10 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     let run = &args.run;
     check_standard_output(run)?;
     let (speed, live) = pace(run)?;
+    let inputs = paths::inputs(run, args.tap.as_deref(), None)?;
     let params = params::read(run.params.as_deref())?;
-    let (mut arrivals, (image, flash)) = Arrivals::open(run, args.tap.as_deref(), || {
+    let tap = args.tap.as_deref().map(|path| (path, &inputs));
+    let (mut arrivals, (image, flash)) = Arrivals::open(run, tap, || {
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(run.store.as_deref(), &params)?))
     })?;
@@ -50,7 +52,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     }
     let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
-    let (mut ground, gs) = ground::open(run)?;
+    let (mut ground, gs) = ground::open(run, &inputs)?;
     let mut world = World {
         card: &card,
         flash: &flash,
@@ -76,6 +78,8 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         bail!("--store: {error}");
     }
     world.gs.flush().context("--gs: cannot be written")?;
+    ground.finish()?;
+    arrivals.finish()?;
     if let Some(remark) = arrivals.remark() {
         eprintln!("hums: {remark}");
     }

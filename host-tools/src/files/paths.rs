@@ -1,22 +1,10 @@
-//! Files that results are written to.
+//! Names of output files, and what is said of one that cannot be written.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-
-/// Room for a group's lines of a busy message; there may be some hundred of these.
-const BUFFER_BYTES: usize = 16 * 1024;
-
-/// Makes a file, and its directory where there is none.
-pub fn create(path: &Path) -> Result<BufWriter<File>> {
-    if let Some(dir) = path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
-        make_directory(dir)?;
-    }
-    let file = File::create(path).with_context(|| cannot_write(path))?;
-    Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
-}
 
 /// Makes a directory, unless it is there.
 pub fn make_directory(dir: &Path) -> Result<()> {
@@ -26,7 +14,15 @@ pub fn make_directory(dir: &Path) -> Result<()> {
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
-/// That a file cannot be written, and where it is that, that its folder is missing.
+/// Makes the directory that a file is to lie in, unless it is there.
+pub fn make_parent(path: &Path) -> Result<()> {
+    match path.parent().filter(|dir| !dir.as_os_str().is_empty()) {
+        Some(dir) => make_directory(dir),
+        None => Ok(()),
+    }
+}
+
+/// Says that a file cannot be written, and names its folder where that is missing.
 pub fn cannot_write(path: &Path) -> String {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
     let why = folder.map_or_else(String::new, |folder| format!("; there is no folder {}", folder.display()));

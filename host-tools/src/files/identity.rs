@@ -1,0 +1,91 @@
+//! Which file a path means, whatever its spelling: links, hard links, `./` and `..` come out alike.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file's identity.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FileId {
+    /// A file that exists.
+    Existing(Node),
+    /// A place where there is no file yet: its folder without links, and its name.
+    Place(PathBuf),
+}
+
+/// Device and inode.
+#[cfg(unix)]
+type Node = (u64, u64);
+
+/// The path without links. Two hard links of one file differ by it: Windows has a file index, which the standard
+/// library does not give yet.
+#[cfg(not(unix))]
+type Node = PathBuf;
+
+#[cfg(unix)]
+fn node(_: &Path, about: &fs::Metadata) -> io::Result<Node> {
+    use std::os::unix::fs::MetadataExt as _;
+    Ok((about.dev(), about.ino()))
+}
+
+#[cfg(not(unix))]
+fn node(path: &Path, _: &fs::Metadata) -> io::Result<Node> {
+    path.canonicalize()
+}
+
+impl FileId {
+    /// The identity of what `path` means. Links are followed, also one to a file that is not there yet.
+    pub fn of(path: &Path) -> io::Result<Self> {
+        match fs::metadata(path) {
+            Ok(about) => node(path, &about).map(Self::Existing),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self::Place(place(path)?)),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The file that standard input is, where it is one.
+    pub fn of_standard_input() -> Option<Self> {
+        standard(io::stdin())
+    }
+
+    /// The file that standard output is, where it is one.
+    pub fn of_standard_output() -> Option<Self> {
+        standard(io::stdout())
+    }
+}
+
+#[cfg(unix)]
+fn standard(stream: impl std::os::fd::AsFd) -> Option<FileId> {
+    let file = fs::File::from(stream.as_fd().try_clone_to_owned().ok()?);
+    let about = file.metadata().ok().filter(fs::Metadata::is_file)?;
+    node(Path::new(""), &about).ok().map(FileId::Existing)
+}
+
+#[cfg(not(unix))]
+fn standard<T>(_: T) -> Option<FileId> {
+    None
+}
+
+/// A path whose last part is no link, and whose folder is without links. The folder must be there.
+fn place(path: &Path) -> io::Result<PathBuf> {
+    let path = without_links(path)?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+    // A folder that is made later has no links in it.
+    Ok(folder.canonicalize().or_else(|_| std::path::absolute(folder))?.join(name))
+}
+
+/// What a link leads to, through as many links as there are, also where nothing is there yet.
+pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
+    /// As many as Linux follows.
+    const LINKS_MAX: usize = 40;
+    let mut path = path.to_owned();
+    for _ in 0..LINKS_MAX {
+        if !path.is_symlink() {
+            return Ok(path);
+        }
+        let to = fs::read_link(&path)?;
+        path = path.parent().unwrap_or(Path::new("")).join(to);
+    }
+    Err(io::Error::other("too many links"))
+}

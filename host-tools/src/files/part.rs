@@ -1,0 +1,66 @@
+//! What is not whole yet: a file or a folder beside its target, `.NAME.hums-part`, renamed when it is whole.
+//!
+//! Whoever writes one holds a lock on it, so that a second run does not take it for what a killed one has left.
+
+use std::fs::{File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+
+use super::paths::cannot_write;
+
+/// How the name of a file ends that is not whole yet.
+pub const PART: &str = ".hums-part";
+
+/// Whether a name is that of a file or a folder that is not whole: readers pass it over.
+pub fn is_part(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(PART))
+}
+
+/// The part of a target.
+pub(super) fn part_of(target: &Path) -> Result<PathBuf> {
+    let Some(name) = target.file_name() else {
+        bail!("{}: is no name of a file", target.display());
+    };
+    let mut part = std::ffi::OsString::from(".");
+    part.push(name);
+    part.push(PART);
+    Ok(target.with_file_name(part))
+}
+
+/// Takes the lock, which its owner keeps for as long as the file is open; whoever writes already is told of.
+pub(super) fn lock(file: &File, target: &Path) -> Result<()> {
+    match file.try_lock() {
+        Ok(()) => Ok(()),
+        // A file system without locks: then nothing tells two runs apart.
+        Err(TryLockError::Error(_)) => Ok(()),
+        Err(TryLockError::WouldBlock) => {
+            bail!(
+                "{}: another run of hums is writing it; wait for its end, or name another output",
+                target.display()
+            )
+        }
+    }
+}
+
+/// Removes a file that a killed run has left, unless somebody writes it.
+pub(super) fn remove_stale(part: &Path, target: &Path) -> Result<()> {
+    if !part.is_symlink() {
+        match File::open(part) {
+            Ok(file) => lock(&file, target)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            Err(_) => {}
+        }
+    }
+    std::fs::remove_file(part).with_context(|| cannot_write(part))
+}
+
+/// Makes a rename outlive a power loss of this PC, where the file system can do that.
+pub(super) fn sync_folder_of(path: &Path) {
+    if cfg!(unix) {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        // Without it the file is the old one or the new one all the same.
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    }
+}
