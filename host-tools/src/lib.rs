@@ -1,6 +1,7 @@
 //! The `hums` command: the pipeline of the firmware on this PC, and everything that reads what it wrote.
 
 pub mod card;
+pub mod check;
 pub mod cli;
 pub mod decode;
 pub mod demo;
@@ -56,6 +57,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Decode(args) => decode::run(args),
         Command::Sim(args) => run::sim::run(args),
         Command::Emulate(args) => run::emulate::run(args),
+        Command::Check(args) => check::run(args),
         Command::Info(args) => info::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Report(args) => report::run(args),

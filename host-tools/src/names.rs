@@ -1,4 +1,4 @@
-//! Names of what a log stores as numbers: messages, usage counters, events, faults, sources of time.
+//! Names of what a log stores as numbers: messages, usage counters, events, faults, sources of time, vehicles.
 
 use std::borrow::Cow;
 
@@ -75,6 +75,37 @@ pub fn event_name(number: u8) -> &'static str {
         12 => "by_link",
         _ => "other",
     }
+}
+
+/// The names of `MAV_AUTOPILOT` that are met in the field.
+pub fn autopilot_name(number: u8) -> String {
+    match number {
+        0 => "generic".into(),
+        3 => "ArduPilot".into(),
+        12 => "PX4".into(),
+        other => format!("MAV_AUTOPILOT {other}"),
+    }
+}
+
+/// The names of `MAV_TYPE` that are met in the field.
+pub fn type_name(number: u8) -> String {
+    let name = match number {
+        0 => "generic",
+        1 => "fixed wing",
+        2 => "quadrotor",
+        3 => "coaxial helicopter",
+        4 => "helicopter",
+        10 => "ground rover",
+        11 => "surface boat",
+        12 => "submarine",
+        13 => "hexarotor",
+        14 => "octorotor",
+        15 => "tricopter",
+        19..=25 => "VTOL",
+        29 => "dodecarotor",
+        _ => return format!("MAV_TYPE {number}"),
+    };
+    name.into()
 }
 
 #[cfg(test)]

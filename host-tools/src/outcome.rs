@@ -6,15 +6,18 @@
 //! | 1 | failed: the message says what, and where it can what to do |
 //! | 2 | usage: the command line itself is wrong |
 //! | 3 | done, but the log has losses or damage: all that could be read was read |
+//! | 4 | done, the log is whole, and `hums check` found something wrong with the vehicle |
 
 use std::fmt;
 use std::process::ExitCode;
 
 /// The end of a run that did what it was asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     /// Everything, exactly.
     Done,
+    /// Everything, and a check of the vehicle found something wrong.
+    Findings,
     /// All that could be had; something was lost or damaged, and the results say what.
     Losses,
 }
@@ -28,7 +31,7 @@ impl Outcome {
     /// The worse of both.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
-        Self::lossy(self == Self::Losses || other == Self::Losses)
+        self.max(other)
     }
 }
 
@@ -75,6 +78,7 @@ pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Losses) => ExitCode::from(3),
+        Ok(Outcome::Findings) => ExitCode::from(4),
         Err(error) if is_reader_gone(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("hums: {error:#}");

@@ -15,6 +15,7 @@ use crate::loss::lost;
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::{counter_name, message_name};
 use crate::progress;
+use crate::source::told::Finding;
 
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
 pub const LISTED_MAX: usize = 10_000;
@@ -52,6 +53,22 @@ pub struct FindingLine {
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
+}
+
+impl From<Finding> for FindingLine {
+    fn from(finding: Finding) -> Self {
+        Self {
+            at: finding.at,
+            subsystem: finding.subsystem.name(),
+            check: finding.check,
+            instance: finding.instance,
+            level: finding.level.name(),
+            previous: finding.previous.name(),
+            value: finding.value,
+            limit: finding.limit,
+            unit: finding.unit,
+        }
+    }
 }
 
 /// How the monitor started.
@@ -118,6 +135,8 @@ pub struct Contents {
     pub findings: Vec<FindingLine>,
     /// How many there are.
     pub findings_count: u64,
+    /// They were found by this program when it read the log, because its recorder ran no checks.
+    pub checked_here: bool,
     /// The latest values of the usage counters.
     pub usage: BTreeMap<String, f64>,
     /// The airframe's life, as recorded last.
@@ -151,6 +170,20 @@ impl Contents {
     /// Frames of all messages.
     pub fn frames(&self) -> u64 {
         self.messages.values().map(|count| count.frames).sum()
+    }
+
+    /// Whether what recorded it checked the vehicle's health: only such a recorder writes these records.
+    pub fn is_checked(&self) -> bool {
+        self.boot.is_some() || !self.usage.is_empty() || self.findings_count > 0
+    }
+
+    /// Who checked it: `board`, `hums` (this program), `nobody`.
+    pub fn checked_by(&self) -> &'static str {
+        match (self.checked_here, self.is_checked()) {
+            (true, _) => "hums",
+            (false, true) => "board",
+            (false, false) => "nobody",
+        }
     }
 
     /// Bytes of all frames.
@@ -210,17 +243,7 @@ impl Contents {
             Record::Finding(finding) => {
                 self.findings_count += 1;
                 if self.findings.len() < LISTED_MAX {
-                    self.findings.push(FindingLine {
-                        at: finding.at,
-                        subsystem: finding.subsystem.name(),
-                        check: finding.check.to_owned(),
-                        instance: finding.instance,
-                        level: finding.level.name(),
-                        previous: finding.previous.name(),
-                        value: finding.value,
-                        limit: finding.limit,
-                        unit: finding.unit.to_owned(),
-                    });
+                    self.findings.push(Finding::from(finding).into());
                 }
             }
             // The counters at the start are those of the sessions before.

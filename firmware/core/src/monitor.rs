@@ -150,6 +150,27 @@ impl Monitor {
         self.step_happenings(now, event);
     }
 
+    /// What the checks read now.
+    pub const fn inputs<'a>(
+        &'a self,
+        now: Instant,
+        link: &'a LinkReading,
+        recorder: &'a RecorderStatus,
+    ) -> Inputs<'a> {
+        Inputs {
+            now,
+            vehicle: &self.vehicle,
+            flight: &self.flight,
+            derived: &self.derived,
+            link,
+            recorder,
+            trends: &self.trends,
+            baselines: &self.baselines,
+            wear: &self.wear,
+            params: &self.params,
+        }
+    }
+
     fn step_trends(&mut self, now: Instant, event: Option<FlightEvent>) {
         let Self { vehicle, flight, derived, params, baselines, trends, saving, .. } = self;
         if event == Some(FlightEvent::TakeOff) {

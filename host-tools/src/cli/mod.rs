@@ -1,5 +1,6 @@
 //! The command line, as clap reads it and `--help` teaches it.
 
+mod check;
 mod demo;
 mod live;
 mod read;
@@ -8,6 +9,7 @@ mod talk;
 
 use clap::{Parser, Subcommand};
 
+pub use check::Check;
 pub use demo::{Dashboard, Demo};
 pub use live::Live;
 pub use read::{Decode, Format, Info, Pack, Report, Verify};
@@ -29,12 +31,14 @@ const AFTER: &str = "Where bytes come from and go to (SRC, SINK):
 
 Examples:
   hums demo                                                  a recorded flight through all of it
+  hums check flight.tlog                                     what is wrong with a flight
   hums sim --input flight.tlog --sd card.img                 record a flight onto an SD card image
   hums info card.img                                         what is on a card
   hums decode card.img -o out --format tlog,csv              a card's logs for other tools
   hums live --input udpin:0.0.0.0:14550 --open               the vehicle as it flies, in the browser
 
-Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage (all that could be read was read).
+Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage (all that could be read was read);
+4 done, and `hums check` found something wrong with the vehicle.
 Results go to standard output, everything else to standard error.";
 
 /// The whole command line.
@@ -55,6 +59,8 @@ pub enum Command {
     Emulate(Emulate),
     /// Turn logs into files for other tools: tlog, CSV, JSON lines, line protocol, Parquet, the thesis's tables
     Decode(Decode),
+    /// Say what is wrong with a flight, from the log of any autopilot or ground station
+    Check(Check),
     /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
     /// Check everything that can be checked about a log or a card

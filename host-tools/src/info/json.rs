@@ -4,6 +4,7 @@ use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::logs::{self, Found};
+use crate::names::{autopilot_name, type_name};
 use crate::summary::{Contents, Overview};
 use crate::utc::iso8601;
 
@@ -60,6 +61,8 @@ pub struct LogJson {
     frames_missing: u64,
     gaps: Vec<GapJson>,
     losses: Vec<LossJson>,
+    /// Who checked the vehicle's health: `board`; `hums` (this program, when it read the log); `nobody`.
+    checked_by: &'static str,
     findings_count: u64,
     findings: Vec<FindingJson>,
     usage: serde_json::Map<String, serde_json::Value>,
@@ -244,6 +247,7 @@ impl LogJson {
             frames_missing: summary.frames_missing,
             gaps: gaps(contents),
             losses: losses(contents),
+            checked_by: contents.checked_by(),
             findings_count: contents.findings_count,
             findings: findings(log),
             usage: contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),
@@ -327,35 +331,4 @@ pub(super) fn vehicle(log: &Overview) -> Option<VehicleJson> {
         firmware: (vehicle.firmware != 0).then(|| format!("{major}.{minor}.{patch}")),
         uid: (vehicle.uid != 0).then(|| format!("{:016x}", vehicle.uid)),
     })
-}
-
-/// The names of `MAV_AUTOPILOT` that are met in the field.
-pub(crate) fn autopilot_name(number: u8) -> String {
-    match number {
-        0 => "generic".into(),
-        3 => "ArduPilot".into(),
-        12 => "PX4".into(),
-        other => format!("MAV_AUTOPILOT {other}"),
-    }
-}
-
-/// The names of `MAV_TYPE` that are met in the field.
-pub(crate) fn type_name(number: u8) -> String {
-    let name = match number {
-        0 => "generic",
-        1 => "fixed wing",
-        2 => "quadrotor",
-        3 => "coaxial helicopter",
-        4 => "helicopter",
-        10 => "ground rover",
-        11 => "surface boat",
-        12 => "submarine",
-        13 => "hexarotor",
-        14 => "octorotor",
-        15 => "tricopter",
-        19..=25 => "VTOL",
-        29 => "dodecarotor",
-        _ => return format!("MAV_TYPE {number}"),
-    };
-    name.into()
 }

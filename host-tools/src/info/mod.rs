@@ -6,12 +6,12 @@ mod wear;
 
 use anyhow::Result;
 
+use crate::check;
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output;
-use crate::summary::Overview;
 use json::{InfoJson, LogJson, images_json};
 use text::{image_text, text};
 
@@ -28,7 +28,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&image_text(image))?;
         }
     }
-    side_by_side(&found.logs, Overview::of, |overview| {
+    side_by_side(&found.logs, check::overview, |overview| {
         let overview = overview?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
         if args.json {

@@ -81,11 +81,17 @@ fn heading(text: &mut String, log: &Overview) {
 
 fn findings_text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
+    // A recorder that ran no checks found nothing, which says nothing.
+    let by = match contents.checked_by() {
+        "hums" => " (checked here: what recorded this ran no checks)",
+        "board" => "",
+        _ => " (not checked)",
+    };
     if contents.findings_count == 0 {
-        text.push_str("  findings none\n");
+        let _ = writeln!(text, "  findings none{by}");
         return;
     }
-    let _ = writeln!(text, "  findings {}", contents.findings_count);
+    let _ = writeln!(text, "  findings {}{by}", contents.findings_count);
     for finding in contents.findings.iter().take(SHOWN_MAX) {
         let _ = writeln!(
             text,

@@ -142,7 +142,9 @@ impl Collect for Collected {
                 self.frames.push((at, check, self.bytes.len()));
             }
             Entry::Record { at, record } => {
-                self.told.extend(Told::of(&record).map(|told| (at, told, self.frames.len())));
+                let told = Told::of(&record);
+                let told = told.filter(|told| matches!(told, Told::Parameter { .. } | Told::Part { .. }));
+                self.told.extend(told.map(|told| (at, told, self.frames.len())));
             }
         }
     }

@@ -13,7 +13,7 @@ use super::companion::CompanionJson;
 use super::craft::Craft;
 use super::values::{Motors, Values};
 use super::world::World;
-use crate::info::json::{autopilot_name, type_name};
+use crate::names::{autopilot_name, type_name};
 
 /// Where the bytes come from, and what they are doing.
 #[derive(Clone, Debug, Default, Serialize)]

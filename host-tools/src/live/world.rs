@@ -133,6 +133,8 @@ impl World {
                 }
             }
             Told::Part { place, component } => self.part(*place, *component),
+            // The monitor here finds its own.
+            Told::Finding(_) | Told::Checked => {}
         }
     }
 

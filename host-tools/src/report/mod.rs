@@ -22,13 +22,13 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 
+use crate::check;
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
 use crate::files::{Inputs, Output, appended, inside, make_parent, says_directory, settle};
 use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage};
 use crate::output;
-use crate::summary::Overview;
 
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
@@ -38,7 +38,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     }
     let mut outcome = Outcome::lossy(found.images.iter().any(|image| !image.damage.is_empty()));
     let mut overviews = Vec::new();
-    side_by_side(&found.logs, Overview::of, |overview| {
+    side_by_side(&found.logs, check::overview, |overview| {
         overviews.push(overview?);
         Ok(())
     })?;

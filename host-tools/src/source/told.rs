@@ -1,8 +1,10 @@
 //! What a log of ours tells besides frames, as far as a command that reads recordings takes it.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::Why;
+use hums_blackbox::record::{FindingRecord, Why};
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
+use hums_core::health::{self, Level, Subsystem};
+use hums_core::time::Instant;
 
 /// One of the monitor's own records.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +25,55 @@ pub enum Told {
         /// What it is.
         component: Component,
     },
+    /// A check changed its level.
+    Finding(Box<Finding>),
+    /// What only a monitor writes that checks the vehicle's health: its findings are all that there were.
+    Checked,
+}
+
+/// A check's change of level, whoever found it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// When, after the debounce.
+    pub at: Instant,
+    /// The part of the vehicle.
+    pub subsystem: Subsystem,
+    /// The check's stable name.
+    pub check: String,
+    /// Which one of several, from 0.
+    pub instance: u8,
+    /// The new level.
+    pub level: Level,
+    /// The level before.
+    pub previous: Level,
+    /// What decided; NaN where the input stopped.
+    pub value: f32,
+    /// What it crossed; NaN where there is none.
+    pub limit: f32,
+    /// The unit of both.
+    pub unit: String,
+}
+
+impl From<&health::Finding> for Finding {
+    fn from(finding: &health::Finding) -> Self {
+        Self::from(&FindingRecord::from(finding))
+    }
+}
+
+impl From<&FindingRecord<'_>> for Finding {
+    fn from(finding: &FindingRecord<'_>) -> Self {
+        Self {
+            at: finding.at,
+            subsystem: finding.subsystem,
+            check: finding.check.to_owned(),
+            instance: finding.instance,
+            level: finding.level,
+            previous: finding.previous,
+            value: finding.value,
+            limit: finding.limit,
+            unit: finding.unit.to_owned(),
+        }
+    }
 }
 
 impl Told {
@@ -48,6 +99,8 @@ impl Told {
                 }
                 (place < COMPONENTS_MAX).then_some(Self::Part { place, component })
             }
+            Record::Finding(finding) => Some(Self::Finding(Box::new(Finding::from(finding)))),
+            Record::Boot(_) | Record::Usage(_) => Some(Self::Checked),
             _ => None,
         }
     }

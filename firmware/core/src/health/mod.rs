@@ -18,11 +18,13 @@ mod propulsion;
 mod recorder;
 mod structure;
 mod tables;
+mod vocabulary;
 
 pub use check::{CLEAR, Check, Side, State, When};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
 pub use tables::{checks, instances, words};
+pub use vocabulary::{Scope, VOCABULARY, Words, vocabulary};
 
 use crate::params::Param;
 use exceedance::Exceedances;

@@ -1,0 +1,226 @@
+//! What each check means to people: one table for every text, page and document. The firmware links only what it uses.
+//!
+//! `meaning` says what is so while the check's level is a warning or critical, `action` what to do about it (on the
+//! ground, before the next flight, where nothing else is said). `needs` names what the check reads, so that whoever
+//! reads a log can say why a check had nothing to judge.
+
+/// What a check can be judged from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// What any vehicle says.
+    Vehicle,
+    /// What ArduPilot says.
+    ArduPilot,
+    /// What PX4 says.
+    Px4,
+    /// The monitor's own place on the autopilot's wire: another place on another link tells of that link.
+    Wire,
+    /// The monitor's own recorder.
+    Recorder,
+    /// What the monitor on board has stored of earlier flights, or of parts that wear.
+    Stored,
+}
+
+/// What is known of a check besides its limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// The check: [`super::Check::name`].
+    pub check: &'static str,
+    /// Its name for people: what is watched, not what is wrong.
+    pub name: &'static str,
+    /// What there may be several of, as the autopilot counts them from 1; empty where there is one.
+    pub part: &'static str,
+    /// What is so, as a sentence.
+    pub meaning: &'static str,
+    /// What to do, as a sentence.
+    pub action: &'static str,
+    /// What it reads, as the end of "no …".
+    pub needs: &'static str,
+    /// What it can be judged from.
+    pub scope: Scope,
+}
+
+/// The words of a check.
+pub fn vocabulary(check: &str) -> Option<&'static Words> {
+    VOCABULARY.iter().find(|words| words.check == check)
+}
+
+macro_rules! vocabulary {
+    ($($check:literal $scope:ident $name:literal, $part:literal, needs $needs:literal;
+       $meaning:literal; $action:literal;)*) => {
+        /// Every check, in the order of the subsystems' tables.
+        pub const VOCABULARY: &[Words] = &[$(Words {
+            check: $check,
+            name: $name,
+            part: $part,
+            meaning: $meaning,
+            action: $action,
+            needs: $needs,
+            scope: Scope::$scope,
+        },)*];
+    };
+}
+
+vocabulary! {
+    "batt_remaining" Vehicle "battery remaining", "battery", needs "battery level";
+    "The battery was nearly empty."; "Land earlier, or take a fuller or larger battery.";
+    "cell_voltage" Vehicle "cell voltage", "battery", needs "battery voltage of a known number of cells";
+    "The weakest cell was close to empty, or sagged under the load.";
+    "Check the pack under load; replace it if it was charged full before the flight.";
+    "cell_deviation" Vehicle "cell balance", "battery", needs "voltages of single cells";
+    "The cells of the battery differed in voltage."; "Balance the pack; replace it if it happens again.";
+    "cell_dev_lasting" Vehicle "cell balance, lasting", "battery", needs "voltages of single cells";
+    "The cells of the battery differed in voltage for more than a minute."; "Replace the pack.";
+    "batt_resistance" Stored "battery resistance", "battery", needs "resistance of earlier flights to compare with";
+    "The battery's internal resistance has risen since it was new."; "Replace the pack soon.";
+    "batt_fault" Vehicle "battery fault", "battery", needs "battery status";
+    "The battery reported a fault of its own."; "Do not use the battery until its fault is known.";
+    "batt_temperature" Vehicle "battery temperature", "battery", needs "battery temperature";
+    "The battery was too hot."; "Let it cool before charging; look for a high load or a damaged cell.";
+    "rail_5v_low" Vehicle "5 V supply, low", "", needs "voltage of the 5 V supply";
+    "The autopilot's 5 V supply was too low: it can restart in flight.";
+    "Check the power module and its wiring; take loads off the 5 V supply.";
+    "rail_5v_high" Vehicle "5 V supply, high", "", needs "voltage of the 5 V supply";
+    "The autopilot's 5 V supply was too high: it can be damaged."; "Check the power module before the next flight.";
+    "battery_due" Stored "battery life", "", needs "battery registered with the monitor on board";
+    "A battery has reached the end of its life."; "Replace it, and tell the monitor.";
+
+    "esc_silent" Vehicle "ESC telemetry", "motor", needs "ESC telemetry";
+    "The ESC of this motor stopped answering."; "Check the ESC, its wiring and its telemetry line.";
+    "esc_temperature" Vehicle "ESC temperature", "motor", needs "ESC temperature";
+    "The ESC of this motor was too hot."; "Check its cooling, the propeller and the motor for drag.";
+    "esc_failure" Vehicle "ESC failure", "motor", needs "failure flags of ESCs";
+    "The ESC of this motor reported a failure."; "Do not fly until the ESC and the motor are checked.";
+    "esc_errors" Vehicle "ESC errors", "motor", needs "error counts of ESCs";
+    "The ESC of this motor counted many errors."; "Check its signal and telemetry wiring.";
+    "motor_loss" Vehicle "motor current", "motor", needs "current of single motors";
+    "The motor took almost no current while the others worked: it or its propeller was lost.";
+    "Do not fly until motor, propeller and ESC are checked.";
+    "motor_imbalance" Vehicle "motor balance", "motor", needs "speeds of single motors in steady flight";
+    "The motor's speed differed from the others' in steady flight.";
+    "Check this arm: propeller, motor, its tilt, and the centre of gravity.";
+    "motor_trend" Stored "motor balance against earlier flights", "motor", needs "speeds of earlier flights to compare with";
+    "The motor's speed has changed against earlier flights."; "Check its propeller and bearings.";
+    "throttle_trend" Stored "hover throttle against earlier flights", "", needs "throttle of earlier flights to compare with";
+    "Hovering took more throttle than in earlier flights."; "Check weight, propellers, motors and the battery.";
+    "drive_due" Stored "life of motors, propellers, ESCs", "", needs "motor, propeller or ESC registered with the monitor on board";
+    "A motor, propeller or ESC has reached the end of its life."; "Replace it, and tell the monitor.";
+
+    "cylinder_head" Vehicle "cylinder head temperature", "", needs "engine data";
+    "The engine's cylinder head was too hot."; "Check cooling and mixture before the next flight.";
+    "exhaust_gas" Vehicle "exhaust gas temperature", "", needs "engine data";
+    "The engine's exhaust gas was too hot."; "Check the mixture before the next flight.";
+    "fuel_pressure" Vehicle "fuel pressure", "", needs "engine data";
+    "The fuel pressure was too low."; "Check pump, filter and lines before the next flight.";
+    "engine_due" Stored "engine life", "", needs "engine registered with the monitor on board";
+    "The engine is due for maintenance."; "Do the maintenance, and tell the monitor.";
+
+    "vibration" ArduPilot "vibration", "", needs "vibration levels";
+    "Vibration was strong enough to disturb the estimator.";
+    "Balance propellers and motors, and check the autopilot's mounting.";
+    "vibration_px4" Px4 "vibration", "", needs "vibration metrics";
+    "Vibration was strong enough to disturb the estimator.";
+    "Balance propellers and motors, and check the autopilot's mounting.";
+    "clipping" Vehicle "accelerometer clipping", "", needs "clipping counts";
+    "The accelerometers were at the end of their range: the estimator flew partly blind.";
+    "Find the source of vibration or shock, and check the mounting.";
+    "load_factor" Vehicle "load factor", "", needs "acceleration";
+    "The airframe carried a high load: a hard manoeuvre, a shock or a landing.";
+    "Inspect the airframe and the landing gear.";
+    "vibration_trend" Stored "vibration against earlier flights", "", needs "vibration of earlier flights to compare with";
+    "Vibration has risen against earlier flights."; "Check propellers, bearings and mounting.";
+    "airframe_due" Stored "airframe life", "", needs "airframe registered with the monitor on board";
+    "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
+
+    "ekf_variance" ArduPilot "estimator variance", "", needs "estimator variances";
+    "The estimator did not trust one of its sensors."; "Look at compass, GNSS and vibration at that time.";
+    "ekf_failsafe" ArduPilot "estimator, two sensors", "", needs "estimator variances";
+    "The estimator did not trust two of compass, velocity and position: it could lose its position.";
+    "Do not fly until compass and GNSS are checked.";
+    "ekf_test_ratio" Px4 "estimator test ratio", "", needs "estimator test ratios";
+    "The estimator rejected, or nearly rejected, a sensor."; "Look at compass, GNSS and vibration at that time.";
+    "gps_satellites" Vehicle "GPS satellites", "GPS", needs "GPS satellite count";
+    "Few satellites were in use: the position was not exact."; "Wait for more satellites; check the antenna's view.";
+    "gps_hdop" Vehicle "GPS dilution of precision", "GPS", needs "GPS dilution of precision";
+    "The satellites stood badly: the position was not exact."; "Wait for more satellites; check the antenna's view.";
+    "gps_accuracy" Vehicle "GPS accuracy", "GPS", needs "GPS accuracy";
+    "The receiver estimated its own position as not exact."; "Check the antenna's view and sources of interference.";
+    "gps_fix" Vehicle "GPS fix", "GPS", needs "GPS fix";
+    "The receiver lost its position in flight."; "Check antenna, wiring and sources of interference.";
+    "gps_jamming" Vehicle "GPS jamming", "GPS", needs "jamming or spoofing state of a GPS receiver";
+    "The receiver was jammed."; "Fly elsewhere, or without depending on GPS; look for transmitters on board.";
+    "gps_spoofing" Vehicle "GPS spoofing", "GPS", needs "jamming or spoofing state of a GPS receiver";
+    "The receiver detected false signals: its position could be wrong."; "Do not depend on GPS there.";
+
+    "heartbeat" Wire "autopilot's heartbeat", "", needs "monitor on the autopilot's wire";
+    "The autopilot fell silent."; "Check the wire between autopilot and monitor, and the autopilot's supply.";
+    "frames_lost" Wire "frames lost on the wire", "", needs "monitor on the autopilot's wire";
+    "Messages of the autopilot were lost on the way."; "Check the wire, and lower the message rates or raise the baud rate.";
+    "rc_rssi" Vehicle "remote control signal", "", needs "signal strength of the remote control";
+    "The remote control's signal was weak."; "Check antennas and range.";
+    "radio_rssi" Vehicle "telemetry signal", "", needs "telemetry radio status";
+    "The telemetry radio's signal was weak."; "Check antennas and range.";
+    "radio_margin" Vehicle "telemetry signal above noise", "", needs "telemetry radio status";
+    "The telemetry radio's signal was hardly above the noise."; "Check antennas, range and sources of interference.";
+
+    "load" Vehicle "processor load", "", needs "processor load";
+    "The autopilot's processor was nearly full."; "Switch off what is not needed; lower logging and stream rates.";
+    "mcu_temperature" Vehicle "processor temperature", "", needs "processor temperature";
+    "The autopilot's processor was too hot."; "Check cooling and placement.";
+    "autopilot_reboot" Vehicle "autopilot restart", "", needs "heartbeat";
+    "The autopilot restarted."; "In flight: do not fly until the supply and the firmware are checked.";
+    "autopilot_state" Vehicle "autopilot failsafe", "", needs "state of the autopilot";
+    "The autopilot declared a failsafe or an emergency."; "Read its messages of that time; mend the cause they name.";
+    "sensors" Vehicle "sensor health", "", needs "sensor health";
+    "The autopilot called a sensor that it uses unhealthy."; "Read its messages of that time; check that sensor.";
+
+    "roll" Vehicle "roll angle", "", needs "attitude";
+    "The vehicle banked further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
+    "pitch" Vehicle "pitch angle", "", needs "attitude";
+    "The vehicle pitched further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
+
+    "recording" Recorder "recording", "", needs "monitor's own recorder";
+    "The monitor did not record."; "Check its card.";
+    "record_queue" Recorder "recorder's queue", "", needs "monitor's own recorder";
+    "The card was too slow for a while."; "Take a faster card.";
+    "record_lost" Recorder "frames lost by the recorder", "", needs "monitor's own recorder";
+    "The recorder lost frames."; "Take a faster card.";
+    "card_stall" Recorder "card stall", "", needs "monitor's own recorder";
+    "The card kept the recorder waiting."; "Take a faster card.";
+    "card_errors" Recorder "card errors", "", needs "monitor's own recorder";
+    "The card refused blocks."; "Copy its logs, then replace it.";
+    "card_room" Recorder "room on the card", "", needs "monitor's own recorder";
+    "Other files take the card's room."; "Copy them elsewhere, then remove them.";
+    "card_due" Stored "card life", "", needs "card registered with the monitor on board";
+    "The card has reached the end of its life."; "Copy its logs, replace it, and tell the monitor.";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::health::checks;
+
+    #[test]
+    fn every_check_has_its_words_in_the_order_of_the_tables() {
+        let checks: Vec<&str> = checks().map(|check| check.name).collect();
+        let words: Vec<&str> = VOCABULARY.iter().map(|words| words.check).collect();
+        assert_eq!(words, checks);
+    }
+
+    #[test]
+    fn words_are_sentences_and_parts_are_named_where_there_are_several() {
+        for words in VOCABULARY {
+            for sentence in [words.meaning, words.action] {
+                let first = sentence.chars().next().is_some_and(char::is_uppercase);
+                assert!(
+                    first && sentence.ends_with('.') && sentence.len() <= 100,
+                    "{}: {sentence}",
+                    words.check
+                );
+            }
+            let several = crate::health::instances(words.check) > 1;
+            assert_eq!(several, !words.part.is_empty(), "{}", words.check);
+            assert!(!words.name.is_empty() && !words.needs.is_empty(), "{}", words.check);
+        }
+    }
+}

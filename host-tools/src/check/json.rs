@@ -1,0 +1,230 @@
+//! `hums check --json`: one object a line for each log. Its names are a contract: `docs/check.md`.
+
+use hums_core::health::{Level, vocabulary};
+use hums_core::time::Instant;
+use serde::Serialize;
+
+use super::Checked;
+use super::judge::{Judged, JudgedBy};
+use super::problem::Problem;
+use super::text::{firmware, flown};
+use crate::names::{autopilot_name, type_name};
+use crate::source::item::{About, Gap};
+use crate::source::told::Finding;
+use crate::utc::iso8601;
+
+/// The version of the object: it rises when a name goes or changes its meaning, not when one is added.
+const VERSION: u32 = 1;
+
+#[derive(Serialize)]
+struct LogJson<'a> {
+    schema: &'static str,
+    version: u32,
+    log: &'a str,
+    format: &'static str,
+    verdict: &'static str,
+    damaged: bool,
+    judged_by: &'static str,
+    vehicle: Option<VehicleJson>,
+    start_utc: Option<String>,
+    from_s: Option<f64>,
+    to_s: Option<f64>,
+    armed_s: f64,
+    flight_s: f64,
+    flights: Vec<FlightJson>,
+    clock_restarts: u64,
+    problems: Vec<ProblemJson<'a>>,
+    findings_count: u64,
+    findings: Vec<FindingJson<'a>>,
+    judged: &'a [&'static str],
+    not_judged: Vec<NotJudgedJson<'a>>,
+    damage_count: u64,
+    loss_count: u64,
+    gaps: Vec<GapJson<'a>>,
+}
+
+#[derive(Serialize)]
+struct VehicleJson {
+    system: u8,
+    component: u8,
+    autopilot: String,
+    r#type: String,
+    version: Option<String>,
+    firmware: Option<String>,
+    hardware: Option<String>,
+    uid: Option<String>,
+}
+
+#[derive(Serialize)]
+struct FlightJson {
+    from_s: f64,
+    to_s: f64,
+    landed: bool,
+}
+
+#[derive(Serialize)]
+struct ProblemJson<'a> {
+    subsystem: &'static str,
+    check: &'a str,
+    instance: u8,
+    level: &'static str,
+    time_s: f64,
+    time_utc: Option<String>,
+    seconds: f64,
+    times: u32,
+    to_the_end: bool,
+    value: Option<f64>,
+    limit: Option<f64>,
+    unit: &'a str,
+    meaning: &'static str,
+    action: &'static str,
+}
+
+#[derive(Serialize)]
+struct FindingJson<'a> {
+    subsystem: &'static str,
+    check: &'a str,
+    instance: u8,
+    level: &'static str,
+    time_s: f64,
+    value: Option<f64>,
+    unit: &'a str,
+}
+
+#[derive(Serialize)]
+struct NotJudgedJson<'a> {
+    check: &'static str,
+    why: &'a str,
+}
+
+#[derive(Serialize)]
+struct GapJson<'a> {
+    cause: &'static str,
+    from_s: Option<f64>,
+    to_s: Option<f64>,
+    place: Option<u64>,
+    bytes: u64,
+    why: &'a str,
+}
+
+#[derive(Serialize)]
+struct ErrorJson<'a> {
+    schema: &'static str,
+    version: u32,
+    log: &'a str,
+    error: String,
+}
+
+const SCHEMA: &str = "hums-check";
+
+/// A log's object.
+pub fn line(checked: &Checked) -> serde_json::Result<String> {
+    let judged = &checked.judged;
+    let utc = |at: Instant| judged.epoch_us.map(|epoch| iso8601(epoch.saturating_add(at.as_micros())));
+    serde_json::to_string(&LogJson {
+        schema: SCHEMA,
+        version: VERSION,
+        log: &checked.name,
+        format: checked.format.name(),
+        verdict: judged.worst().map_or("unknown", Level::name),
+        damaged: judged.damages > 0,
+        judged_by: match judged.by {
+            JudgedBy::Board => "board",
+            JudgedBy::Here => "hums",
+        },
+        vehicle: vehicle(judged),
+        start_utc: judged.span.and_then(|(first, _)| utc(first)),
+        from_s: judged.span.map(|(first, _)| first.as_secs_f64()),
+        to_s: judged.span.map(|(_, last)| last.as_secs_f64()),
+        armed_s: seconds(judged.armed),
+        flight_s: seconds(flown(judged)),
+        flights: judged.flights.iter().map(flight).collect(),
+        clock_restarts: judged.restarts,
+        problems: judged.problems.iter().map(|problem| self::problem(problem, utc(problem.at))).collect(),
+        findings_count: judged.findings_count,
+        findings: judged.findings.iter().map(finding).collect(),
+        judged: &judged.judged,
+        not_judged: judged.not_judged.iter().map(|(check, why)| NotJudgedJson { check, why }).collect(),
+        damage_count: judged.damages,
+        loss_count: judged.losses,
+        gaps: judged.gaps.iter().map(gap).collect(),
+    })
+}
+
+/// The object of a log that could not be read.
+pub fn error(log: &str, error: &anyhow::Error) -> String {
+    let object = ErrorJson { schema: SCHEMA, version: VERSION, log, error: format!("{error:#}") };
+    serde_json::to_string(&object).unwrap_or_default()
+}
+
+fn seconds(span: hums_core::time::Span) -> f64 {
+    span.as_micros() as f64 / 1e6
+}
+
+/// A number that JSON has.
+fn known(value: f32) -> Option<f64> {
+    value.is_finite().then_some(f64::from(value))
+}
+
+fn vehicle(judged: &Judged) -> Option<VehicleJson> {
+    let (source, heartbeat) = judged.vehicle.source.zip(judged.vehicle.heartbeat.get())?;
+    let identity = judged.vehicle.identity.get();
+    let fact = |about| judged.facts.get(&about).cloned();
+    Some(VehicleJson {
+        system: source.system,
+        component: source.component,
+        autopilot: autopilot_name(heartbeat.autopilot_number),
+        r#type: type_name(heartbeat.type_number),
+        version: identity.and_then(|identity| firmware(identity.firmware)),
+        firmware: fact(About::Firmware),
+        hardware: fact(About::Hardware),
+        uid: identity.filter(|identity| identity.uid != 0).map(|identity| format!("{:016x}", identity.uid)),
+    })
+}
+
+fn flight(flight: &super::judge::Flight) -> FlightJson {
+    FlightJson { from_s: flight.from.as_secs_f64(), to_s: flight.to.as_secs_f64(), landed: flight.landed }
+}
+
+fn problem(problem: &Problem, time_utc: Option<String>) -> ProblemJson<'_> {
+    let words = vocabulary(&problem.check);
+    ProblemJson {
+        subsystem: problem.subsystem.name(),
+        check: &problem.check,
+        instance: problem.instance,
+        level: problem.level.name(),
+        time_s: problem.at.as_secs_f64(),
+        time_utc,
+        seconds: seconds(problem.lasted),
+        times: problem.times,
+        to_the_end: problem.lasting,
+        value: known(problem.value),
+        limit: known(problem.limit),
+        unit: &problem.unit,
+        meaning: words.map_or("", |words| words.meaning),
+        action: words.map_or("", |words| words.action),
+    }
+}
+
+fn finding(finding: &Finding) -> FindingJson<'_> {
+    FindingJson {
+        subsystem: finding.subsystem.name(),
+        check: &finding.check,
+        instance: finding.instance,
+        level: finding.level.name(),
+        time_s: finding.at.as_secs_f64(),
+        value: known(finding.value),
+        unit: &finding.unit,
+    }
+}
+
+fn gap(gap: &Gap) -> GapJson<'_> {
+    GapJson {
+        cause: gap.cause.name(),
+        from_s: gap.from.map(Instant::as_secs_f64),
+        to_s: gap.to.map(Instant::as_secs_f64),
+        place: gap.place,
+        bytes: gap.bytes,
+        why: &gap.words,
+    }
+}

@@ -1,0 +1,430 @@
+//! The monitor of the board over a recording: the same checks, the same limits, the recording's own time.
+//!
+//! The monitor is stepped every 50 ms of the recording's time, whatever the rate of what it holds: debounce and staleness
+//! follow the clock, not the number of samples. Where nothing was recorded for longer than [`SILENCE_MAX`] everything
+//! has grown stale and every debounce has run out, so what follows is left out.
+
+use std::collections::BTreeMap;
+
+use hums_core::Monitor;
+use hums_core::happening::Happening;
+use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
+use hums_core::monitor::TICK;
+use hums_core::observation::{Autopilot, Heartbeat};
+use hums_core::params::{Param, Params};
+use hums_core::status::{LinkReading, RecorderStatus};
+use hums_core::time::{Instant, Span};
+use hums_core::vehicle::Vehicle;
+
+use super::problem::{Problem, Problems};
+use crate::source::item::{About, Gap, Item};
+use crate::source::recording::Format;
+use crate::source::told::{Finding, Told};
+
+/// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
+const SILENCE_MAX: Span = Span::from_secs(75);
+/// What is kept one by one of findings, flights, gaps; the rest is counted.
+pub const LISTED_MAX: usize = 10_000;
+/// How often it is noted which checks have something to judge.
+const NOTE_EVERY: Span = Span::from_millis(500);
+
+/// Who judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JudgedBy {
+    /// The monitor on board: its findings are in the log.
+    Board,
+    /// This program.
+    Here,
+}
+
+/// Whose limits count.
+#[derive(Clone, Debug, Default)]
+pub struct Limits {
+    params: Params,
+    /// Names that the user gave: what a log says of them does not count.
+    given: Vec<&'static str>,
+}
+
+impl Limits {
+    /// These are given; all others are the defaults, or what a log of ours says.
+    pub fn new(given: &[(&'static hums_core::params::ParamSpec, f32)]) -> Self {
+        let mut limits = Self::default();
+        for (spec, value) in given {
+            // Whoever read the file has checked name and range.
+            let _ = limits.params.set(spec.name, *value);
+            limits.given.push(spec.name);
+        }
+        limits
+    }
+}
+
+/// A flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flight {
+    /// Take-off.
+    pub from: Instant,
+    /// Landing, or the recording's end.
+    pub to: Instant,
+    /// It landed.
+    pub landed: bool,
+}
+
+/// What came of a recording.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// Who judged.
+    pub by: JudgedBy,
+    /// The vehicle, as it was known at the end.
+    pub vehicle: Box<Vehicle>,
+    /// Facts besides, the last of each kind.
+    pub facts: BTreeMap<About, String>,
+    /// UTC at time zero, microseconds since 1970.
+    pub epoch_us: Option<u64>,
+    /// The first and the last time.
+    pub span: Option<(Instant, Instant)>,
+    /// How long it was armed.
+    pub armed: Span,
+    /// Flights, in order.
+    pub flights: Vec<Flight>,
+    /// Changes of level, in order, up to [`LISTED_MAX`].
+    pub findings: Vec<Finding>,
+    /// How many there are.
+    pub findings_count: u64,
+    /// What was wrong, worst first.
+    pub problems: Vec<Problem>,
+    /// Checks that had something to judge.
+    pub judged: Vec<&'static str>,
+    /// Checks that had not, with the reason. Checks that are made for another autopilot are in neither list.
+    pub not_judged: Vec<(&'static str, String)>,
+    /// What is missing, in order, up to [`LISTED_MAX`].
+    pub gaps: Vec<Gap>,
+    /// How many gaps are damage.
+    pub damages: u64,
+    /// How many gaps are what the recorder lost while it recorded.
+    pub losses: u64,
+    /// How often the recording's clock began again.
+    pub restarts: u64,
+}
+
+impl Judged {
+    /// The worst level that was found; `None` where nothing could be judged.
+    pub fn worst(&self) -> Option<Level> {
+        match self.problems.first() {
+            Some(problem) => Some(problem.level),
+            None if self.vehicle.source.is_none() => None,
+            None => Some(Level::Ok),
+        }
+    }
+}
+
+/// What a check had to judge.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    /// It had a value.
+    value: bool,
+    /// It had a level.
+    level: bool,
+}
+
+/// Judges a recording, item by item.
+pub struct Judge {
+    monitor: Box<Monitor>,
+    limits: Limits,
+    format: Format,
+    next: Option<Instant>,
+    note: Instant,
+    first: Option<Instant>,
+    last: Instant,
+    seen: Vec<Seen>,
+    armed: Span,
+    was_armed: bool,
+    /// What the monitor here found, and what the one on board did.
+    here: Problems,
+    board: Problems,
+    checked_on_board: bool,
+    flights: Vec<Flight>,
+    facts: BTreeMap<About, String>,
+    epoch_us: Option<u64>,
+    gaps: Vec<Gap>,
+    damages: u64,
+    losses: u64,
+    restarts: u64,
+}
+
+impl Judge {
+    /// Before the first item.
+    pub fn new(limits: &Limits, format: Format) -> Self {
+        Self {
+            monitor: Box::new(Monitor::new(limits.params)),
+            limits: limits.clone(),
+            format,
+            next: None,
+            note: Instant::ZERO,
+            first: None,
+            last: Instant::ZERO,
+            seen: vec![Seen::default(); VOCABULARY.len()],
+            armed: Span::ZERO,
+            was_armed: false,
+            here: Problems::default(),
+            board: Problems::default(),
+            checked_on_board: false,
+            flights: Vec::new(),
+            facts: BTreeMap::new(),
+            epoch_us: None,
+            gaps: Vec::new(),
+            damages: 0,
+            losses: 0,
+            restarts: 0,
+        }
+    }
+
+    /// Takes the next item.
+    pub fn item(&mut self, at: Instant, item: Item<'_>) {
+        match item {
+            Item::Observation(source, observation) => {
+                self.advance(at);
+                self.monitor.observe(at, source, observation);
+            }
+            Item::Epoch(epoch_us) => self.epoch_us = Some(epoch_us),
+            Item::Fact(fact) => {
+                self.facts.insert(fact.about, fact.words.to_owned());
+            }
+            Item::Record(told) => self.told(told),
+            Item::Gap(gap) => self.gap(gap),
+            Item::Restart => self.restarts += 1,
+            Item::Frame(_)
+            | Item::Parameter(_)
+            | Item::Text(_)
+            | Item::Mode(_)
+            | Item::Event(_)
+            | Item::Row(_) => {}
+        }
+    }
+
+    fn told(&mut self, told: &Told) {
+        match told {
+            Told::Parameter { name, value, .. } if !self.limits.given.contains(&name.as_str()) => {
+                // What is out of range, or no parameter of ours, changes nothing.
+                let _ = self.monitor.params_mut().set(name, *value);
+            }
+            Told::Finding(finding) => {
+                self.checked_on_board = true;
+                self.board.take(finding);
+            }
+            Told::Checked => self.checked_on_board = true,
+            Told::Parameter { .. } | Told::Part { .. } => {}
+        }
+    }
+
+    fn gap(&mut self, gap: &Gap) {
+        self.damages += u64::from(gap.cause.is_damage());
+        self.losses += u64::from(gap.cause == crate::source::item::Cause::Lost);
+        if self.gaps.len() < LISTED_MAX {
+            self.gaps.push(gap.clone());
+        }
+    }
+
+    /// Steps the monitor up to a time.
+    fn advance(&mut self, to: Instant) {
+        self.first.get_or_insert(to);
+        self.last = self.last.max(to);
+        let mut next = self.next.unwrap_or(to);
+        let silence = to.since(next);
+        let pause = (silence > SILENCE_MAX).then(|| next + SILENCE_MAX);
+        while next <= to {
+            self.tick(next);
+            next = next + TICK;
+            if pause.is_some_and(|pause| next > pause && next < to) {
+                // The moment before what comes next.
+                next = to;
+            }
+        }
+        self.next = Some(next);
+    }
+
+    fn tick(&mut self, now: Instant) {
+        let (link, recorder) = (LinkReading::default(), RecorderStatus::default());
+        let Self { monitor, here, format, .. } = self;
+        monitor.tick(now, &link, &recorder, &mut |finding| {
+            if is_of(finding.check, *format) {
+                here.take(&Finding::from(finding));
+            }
+        });
+        let armed = monitor.vehicle().armed();
+        if armed && self.was_armed {
+            self.armed = self.armed + TICK;
+        }
+        self.was_armed = armed;
+        while let Some(happening) = self.monitor.take_happening() {
+            self.happening(now, happening);
+        }
+        if now >= self.note {
+            self.note = now + NOTE_EVERY;
+            self.note_seen(now, &link, &recorder);
+        }
+    }
+
+    fn happening(&mut self, now: Instant, happening: Happening) {
+        match happening {
+            Happening::TakeOff if self.flights.len() < LISTED_MAX => {
+                let from = self.monitor.flight().airborne_since().unwrap_or(now);
+                self.flights.push(Flight { from, to: now, landed: false });
+            }
+            Happening::Landing => self.end_flight(now, true),
+            _ => {}
+        }
+    }
+
+    fn end_flight(&mut self, at: Instant, landed: bool) {
+        if let Some(flight) = self.flights.last_mut().filter(|flight| !flight.landed) {
+            (flight.to, flight.landed) = (at, landed);
+        }
+    }
+
+    /// Notes which checks have a value, and which have a level.
+    fn note_seen(&mut self, now: Instant, link: &LinkReading, recorder: &RecorderStatus) {
+        if self.monitor.vehicle().source.is_none() {
+            return;
+        }
+        let inputs = self.monitor.inputs(now, link, recorder);
+        for (seen, check) in self.seen.iter_mut().zip(checks()).filter(|(seen, _)| !seen.value) {
+            seen.value = (0..check.instances).any(|instance| {
+                (check.read)(&inputs, instance).is_some_and(|reading| reading.value.is_finite())
+            });
+        }
+        if self.seen.iter().all(|seen| seen.level) {
+            return;
+        }
+        for (check, ..) in self.monitor.health().levels().filter(|(.., level)| *level != Level::Stale) {
+            let place = checks().position(|known| std::ptr::eq(known, check));
+            if let Some(seen) = place.and_then(|place| self.seen.get_mut(place)) {
+                seen.level = true;
+            }
+        }
+    }
+
+    /// The recording has ended.
+    pub fn end(mut self) -> Judged {
+        if self.first.is_some() {
+            self.advance(self.last);
+        }
+        if self.monitor.flight().airborne() {
+            self.end_flight(self.last, false);
+        }
+        let given = !self.limits.given.is_empty();
+        let by = if self.checked_on_board && !given { JudgedBy::Board } else { JudgedBy::Here };
+        let (judged, not_judged) = self.coverage(by);
+        let last = self.last;
+        let mut problems = match by {
+            JudgedBy::Board => self.board,
+            JudgedBy::Here => {
+                for exceedance in self.monitor.exceedances().iter(last) {
+                    self.here.peak(exceedance.check.name, exceedance.instance, exceedance.session.peak);
+                }
+                self.here
+            }
+        };
+        problems.end(last);
+        Judged {
+            by,
+            vehicle: Box::new(*self.monitor.vehicle()),
+            facts: self.facts,
+            epoch_us: self.epoch_us,
+            span: self.first.map(|first| (first, last)),
+            armed: self.armed,
+            flights: self.flights,
+            findings_count: problems.findings_count,
+            findings: std::mem::take(&mut problems.findings),
+            problems: problems.worst_first(),
+            judged,
+            not_judged,
+            gaps: self.gaps,
+            damages: self.damages,
+            losses: self.losses,
+            restarts: self.restarts,
+        }
+    }
+
+    /// Which checks had something to judge, and why the others had not.
+    fn coverage(&self, by: JudgedBy) -> (Vec<&'static str>, Vec<(&'static str, String)>) {
+        let (mut judged, mut not_judged) = (Vec::new(), Vec::new());
+        for (check, seen) in checks().zip(&self.seen) {
+            match self.why_not(check, *seen, by) {
+                Verdict::Judged => judged.push(check.name),
+                Verdict::NotJudged(why) => not_judged.push((check.name, why)),
+                Verdict::NotMeant => {}
+            }
+        }
+        (judged, not_judged)
+    }
+
+    fn why_not(&self, check: &Check, seen: Seen, by: JudgedBy) -> Verdict {
+        let Some(words) = vocabulary(check.name) else { return Verdict::NotMeant };
+        let autopilot = self.monitor.vehicle().heartbeat.get().map(|Heartbeat { autopilot, .. }| *autopilot);
+        let not = |why: &str| Verdict::NotJudged(why.to_owned());
+        if by == JudgedBy::Board && matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored) {
+            // The board had its own wire and card; what it had stored is not in the log.
+            return if words.scope == Scope::Stored && !seen.level {
+                Verdict::NotMeant
+            } else {
+                Verdict::Judged
+            };
+        }
+        match words.scope {
+            Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
+            Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
+            _ if autopilot.is_none() => return not("no heartbeat of an autopilot"),
+            Scope::Wire | Scope::Recorder => {
+                return not(match (words.scope, self.format.is_of_link()) {
+                    (Scope::Recorder, _) => "no monitor recorded this",
+                    (_, true) => {
+                        "this tells of the link to whoever recorded it, not of the autopilot's own wire"
+                    }
+                    (_, false) => "the autopilot recorded this itself, without a link",
+                });
+            }
+            _ => {}
+        }
+        if is_off(check, self.monitor.params()) {
+            return not("its limit is off");
+        }
+        if seen.level {
+            return Verdict::Judged;
+        }
+        if words.scope == Scope::Stored {
+            return not("only a monitor on board knows earlier flights and parts that wear");
+        }
+        match check.when {
+            When::Armed if self.armed == Span::ZERO => not("never armed"),
+            When::InFlight if self.flights.is_empty() => not("never in the air"),
+            _ if seen.value => not("only for a moment in this recording"),
+            _ => Verdict::NotJudged(format!("no {}", words.needs)),
+        }
+    }
+}
+
+enum Verdict {
+    Judged,
+    NotJudged(String),
+    /// It is made for another autopilot, or for parts that nobody registered.
+    NotMeant,
+}
+
+/// Whether a check says anything in a recording of this format.
+fn is_of(check: &str, format: Format) -> bool {
+    let scope = vocabulary(check).map(|words| words.scope);
+    !matches!(scope, Some(Scope::Recorder)) && (format == Format::Hums || scope != Some(Scope::Wire))
+}
+
+/// Whether no value can be beyond the limits: they stand at the end of their range.
+fn is_off(check: &Check, params: &Params) -> bool {
+    let off = |param: Param| {
+        let (limit, spec) = (params.get(param), param.spec());
+        limit.is_nan()
+            || match check.side {
+                Side::Above => limit >= spec.max,
+                Side::Below => limit <= spec.min,
+            }
+    };
+    [check.warn, check.critical].into_iter().flatten().all(off)
+}

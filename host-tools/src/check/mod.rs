@@ -1,0 +1,116 @@
+//! `hums check`: what is wrong with a flight, from any log.
+//!
+//! [`judge`] runs the monitor of the board over the stream of a recording; [`problem`] puts its findings together;
+//! [`text`] and [`json`] say what came of it.
+
+pub mod json;
+pub mod judge;
+mod own;
+pub mod problem;
+pub mod text;
+
+use anyhow::{Result, bail};
+
+pub use own::overview;
+
+use crate::cli;
+use crate::decode::side_by_side::side_by_side;
+use crate::outcome::Outcome;
+use crate::output;
+use crate::progress;
+use crate::run::params;
+use crate::source::item::Want;
+use crate::source::recording::{Format, Place, find};
+use judge::{Judge, Judged, Limits};
+use text::Table;
+
+/// Items between two looks at how far the reading is.
+const LOOK_EVERY: u32 = 4_096;
+
+/// A recording, judged.
+pub struct Checked {
+    /// What people call it.
+    pub name: String,
+    /// What it is.
+    pub format: Format,
+    /// What came of it.
+    pub judged: Judged,
+}
+
+impl Checked {
+    /// How the run ended for this one.
+    fn outcome(&self) -> Outcome {
+        let damaged = self.judged.damages > 0 || (self.format == Format::Hums && self.judged.losses > 0);
+        let wrong = !self.judged.problems.is_empty();
+        Outcome::lossy(damaged).and(if wrong { Outcome::Findings } else { Outcome::Done })
+    }
+}
+
+/// Runs `hums check`.
+pub fn run(args: &cli::Check) -> Result<Outcome> {
+    let limits = Limits::new(&params::read(args.params.as_deref())?);
+    let found = find(&args.inputs, args.salvage)?;
+    for remark in &found.remarks {
+        eprintln!("hums: {remark}");
+    }
+    let mut outcome = Outcome::lossy(found.damaged);
+    let many = found.places.len() > 1;
+    let (bar, mut table, mut failed) = (progress::logs(found.places.len()), Table::default(), 0_usize);
+    side_by_side(
+        &found.places,
+        |place| (place.name.clone(), check(place, &limits, !many)),
+        |(name, checked)| {
+            bar.inc(1);
+            match checked {
+                Ok(checked) => {
+                    outcome = outcome.and(checked.outcome());
+                    let text = if args.json {
+                        json::line(&checked)?
+                    } else if many {
+                        table.add(&checked);
+                        text::line(&checked)
+                    } else {
+                        text::screen(&checked)
+                    };
+                    bar.suspend(|| output::line(text.trim_end()))
+                }
+                Err(error) => {
+                    failed += 1;
+                    if args.json {
+                        bar.suspend(|| output::line(&json::error(&name, &error)))
+                    } else {
+                        bar.suspend(|| eprintln!("hums: {error:#}"));
+                        Ok(())
+                    }
+                }
+            }
+        },
+    )?;
+    bar.finish_and_clear();
+    if many && !args.json {
+        output::line(&table.text(failed))?;
+    }
+    match (failed, many) {
+        (0, _) => Ok(outcome),
+        (_, false) => bail!("it could not be read"),
+        (failed, true) => bail!("{failed} of {} logs could not be read", found.places.len()),
+    }
+}
+
+/// Judges one recording.
+fn check(place: &Place, limits: &Limits, shows: bool) -> Result<Checked> {
+    let recording = place.open()?;
+    let (format, progress) = (recording.format, recording.progress.clone());
+    let bar = progress::bytes(progress.total().filter(|_| shows), &place.name);
+    let (mut judge, mut items) = (Judge::new(limits, format), 0_u32);
+    recording.read(Want { observations: true, ..Want::default() }, &mut |at, item| {
+        judge.item(at, item);
+        items = items.wrapping_add(1);
+        if items.is_multiple_of(LOOK_EVERY) {
+            bar.set_position(progress.taken());
+        }
+        Ok(())
+    })?;
+    bar.finish_and_clear();
+    Ok(Checked { name: place.name.clone(), format, judged: judge.end() })
+}

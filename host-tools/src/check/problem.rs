@@ -1,0 +1,189 @@
+//! What was wrong: the changes of level of one check and one part put together.
+
+use std::collections::BTreeMap;
+
+use hums_core::health::{Level, Side, Subsystem, checks};
+use hums_core::time::{Instant, Span};
+
+use super::judge::LISTED_MAX;
+use crate::source::told::Finding;
+
+/// Parts that are followed at most: there are 140 of them, and a log may name what it likes.
+const FOLLOWED_MAX: usize = 1_000;
+
+/// One check of one part that was at a warning or worse.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// The part of the vehicle.
+    pub subsystem: Subsystem,
+    /// The check's stable name.
+    pub check: String,
+    /// Which one of several, from 0.
+    pub instance: u8,
+    /// The worst level.
+    pub level: Level,
+    /// When it had that level first.
+    pub at: Instant,
+    /// How often it went from good to a warning or worse.
+    pub times: u32,
+    /// How long it was at a warning or worse, in all.
+    pub lasted: Span,
+    /// It was still so at the end.
+    pub lasting: bool,
+    /// The worst value that is known.
+    pub value: f32,
+    /// The limit of the worst level.
+    pub limit: f32,
+    /// The unit of both.
+    pub unit: String,
+}
+
+/// How bad a level is as a problem; stale is not known, and so is none.
+const fn rank(level: Level) -> u8 {
+    match level {
+        Level::Critical => 2,
+        Level::Warning => 1,
+        Level::Ok | Level::Advisory | Level::Stale => 0,
+    }
+}
+
+/// The side of a check's limits that is bad.
+fn side(check: &str) -> Side {
+    checks().find(|known| known.name == check).map_or(Side::Above, |check| check.side)
+}
+
+/// The worse of two values; what is no number is none.
+fn worse(known: f32, value: f32, check: &str) -> f32 {
+    match side(check) {
+        Side::Above => known.max(value),
+        Side::Below => known.min(value),
+    }
+}
+
+/// Puts changes of level together.
+#[derive(Debug, Default)]
+pub(super) struct Problems {
+    /// The changes, up to [`LISTED_MAX`].
+    pub findings: Vec<Finding>,
+    /// How many there were.
+    pub findings_count: u64,
+    /// By check and part: what was wrong, and since when it is again.
+    open: BTreeMap<(String, u8), (Problem, Option<Instant>)>,
+}
+
+impl Problems {
+    /// Takes the next change.
+    pub(super) fn take(&mut self, finding: &Finding) {
+        self.findings_count += 1;
+        if self.findings.len() < LISTED_MAX {
+            self.findings.push(finding.clone());
+        }
+        let key = (finding.check.clone(), finding.instance);
+        let known = self.open.contains_key(&key);
+        let bad = rank(finding.level) > 0;
+        if !known && (!bad || self.open.len() >= FOLLOWED_MAX) {
+            return;
+        }
+        let new = || Problem {
+            subsystem: finding.subsystem,
+            check: finding.check.clone(),
+            instance: finding.instance,
+            level: finding.level,
+            at: finding.at,
+            times: 0,
+            lasted: Span::ZERO,
+            lasting: false,
+            value: f32::NAN,
+            limit: finding.limit,
+            unit: finding.unit.clone(),
+        };
+        let (problem, since) = self.open.entry(key).or_insert_with(|| (new(), None));
+        if rank(finding.level) > rank(problem.level) {
+            (problem.level, problem.at, problem.limit) = (finding.level, finding.at, finding.limit);
+        }
+        if bad {
+            problem.value = worse(problem.value, finding.value, &finding.check);
+            if since.is_none() {
+                problem.times += 1;
+                *since = Some(finding.at);
+            }
+        } else if let Some(from) = since.take() {
+            problem.lasted = problem.lasted + finding.at.since(from);
+        }
+    }
+
+    /// The worst value of a part, where more is known of it than its changes tell.
+    pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
+        if let Some((problem, _)) = self.open.get_mut(&(check.to_owned(), instance)) {
+            problem.value = worse(problem.value, value, check);
+        }
+    }
+
+    /// Nothing follows.
+    pub(super) fn end(&mut self, at: Instant) {
+        for (problem, since) in self.open.values_mut() {
+            if let Some(from) = since.take() {
+                problem.lasted = problem.lasted + at.since(from);
+                problem.lasting = true;
+            }
+        }
+    }
+
+    /// What was wrong, worst first, and of the same level what came first.
+    pub(super) fn worst_first(self) -> Vec<Problem> {
+        let mut problems: Vec<_> = self.open.into_values().map(|(problem, _)| problem).collect();
+        problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.at));
+        problems
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(at_s: u64, level: Level, value: f32) -> Finding {
+        Finding {
+            at: Instant::from_millis(at_s * 1000),
+            subsystem: Subsystem::Power,
+            check: "cell_voltage".to_owned(),
+            instance: 0,
+            level,
+            previous: Level::Ok,
+            value,
+            limit: if level == Level::Critical { 3.5 } else { 3.6 },
+            unit: "V".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_dip_that_came_back_twice_is_one_problem_with_its_worst() {
+        let mut problems = Problems::default();
+        for (at, level, value) in [
+            (10, Level::Warning, 3.55),
+            (15, Level::Critical, 3.4),
+            (20, Level::Ok, 3.8),
+            (30, Level::Warning, 3.58),
+            (34, Level::Stale, f32::NAN),
+        ] {
+            problems.take(&change(at, level, value));
+        }
+        problems.end(Instant::from_millis(90_000));
+        assert_eq!(problems.findings_count, 5);
+        let worst = problems.worst_first();
+        let [problem] = worst.as_slice() else { panic!("{worst:?}") };
+        assert_eq!((problem.level, problem.at), (Level::Critical, Instant::from_millis(15_000)));
+        assert_eq!((problem.times, problem.lasted, problem.lasting), (2, Span::from_secs(14), false));
+        assert_eq!((problem.value, problem.limit), (3.4, 3.5));
+    }
+
+    #[test]
+    fn critical_stands_before_what_came_earlier_and_good_news_is_no_problem() {
+        let mut problems = Problems::default();
+        problems.take(&Finding { instance: 1, ..change(1, Level::Warning, 3.55) });
+        problems.take(&change(9, Level::Critical, 3.4));
+        problems.take(&Finding { instance: 2, ..change(2, Level::Ok, 4.0) });
+        problems.end(Instant::from_millis(10_000));
+        let order: Vec<u8> = problems.worst_first().iter().map(|problem| problem.instance).collect();
+        assert_eq!(order, [0, 1]);
+    }
+}

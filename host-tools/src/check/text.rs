@@ -1,0 +1,353 @@
+//! What `hums check` prints for people: a screen for one log; a line for each of many, and a table of them all.
+//!
+//! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use hums_core::health::{Level, vocabulary};
+use hums_core::time::{Instant, Span};
+
+use super::Checked;
+use super::judge::{Judged, JudgedBy};
+use super::problem::Problem;
+use crate::names::{autopilot_name, type_name};
+use crate::source::item::{About, Cause};
+use crate::utc::iso8601;
+
+/// Problems that are shown with their words; the rest gets a line.
+const SHOWN_MAX: usize = 6;
+/// Reasons and places that are shown; `--json` has them all.
+const LINES_MAX: usize = 8;
+
+/// One log, as a screen.
+pub fn screen(checked: &Checked) -> String {
+    let judged = &checked.judged;
+    let mut text = format!("{}: {}\n", checked.name, checked.format.words());
+    let _ = writeln!(text, "  vehicle  {}", vehicle(judged));
+    let _ = writeln!(text, "  when     {}", when(judged));
+    let _ = writeln!(text, "  in air   {}", in_air(judged));
+    let _ = writeln!(text, "  verdict  {}\n", verdict(judged));
+    problems(&mut text, judged);
+    not_judged(&mut text, judged);
+    damage(&mut text, judged);
+    text
+}
+
+/// One log of many, as a line.
+pub fn line(checked: &Checked) -> String {
+    let judged = &checked.judged;
+    let level = match judged.worst() {
+        None => "unknown",
+        Some(Level::Ok) => "ok",
+        Some(level) => level.name(),
+    };
+    let mut names: Vec<&str> = Vec::new();
+    for problem in &judged.problems {
+        let name = name(&problem.check);
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let damaged = if checked.judged.damages > 0 { "; damaged" } else { "" };
+    let air = clock(flown(judged));
+    format!("{level:<8}  {air:>8}  {}  {}{damaged}", checked.name, names.join(", "))
+}
+
+/// Many logs, added up.
+#[derive(Debug, Default)]
+pub struct Table {
+    levels: BTreeMap<&'static str, u64>,
+    /// Logs by what was found in them.
+    checks: BTreeMap<String, (u64, u64)>,
+    logs: u64,
+    damaged: u64,
+    flown_us: u64,
+}
+
+impl Table {
+    /// Adds a log.
+    pub fn add(&mut self, checked: &Checked) {
+        let judged = &checked.judged;
+        self.logs += 1;
+        self.damaged += u64::from(judged.damages > 0);
+        self.flown_us = self.flown_us.saturating_add(flown(judged).as_micros());
+        let level = judged.worst().map_or("unknown", Level::name);
+        *self.levels.entry(level).or_default() += 1;
+        let mut worst: BTreeMap<&str, Level> = BTreeMap::new();
+        for problem in judged.problems.iter().rev() {
+            worst.insert(&problem.check, problem.level);
+        }
+        for (check, level) in worst {
+            let count = self.checks.entry(check.to_owned()).or_default();
+            let of = if level == Level::Critical { &mut count.0 } else { &mut count.1 };
+            *of += 1;
+        }
+    }
+
+    /// The table; so many logs besides could not be read.
+    pub fn text(&self, failed: usize) -> String {
+        let count = |level: &str| self.levels.get(level).copied().unwrap_or(0);
+        let mut text = format!(
+            "\n{} checked, {} in the air\n",
+            logs(self.logs),
+            clock(Span::from_micros(self.flown_us))
+        );
+        for (count, what) in [
+            (count("ok"), "nothing wrong"),
+            (count("warning"), "warnings"),
+            (count("critical"), "critical"),
+            (count("unknown"), "no vehicle in it"),
+            (self.damaged, "damaged (counted above too)"),
+            (failed as u64, "could not be read"),
+        ] {
+            if count > 0 {
+                let _ = writeln!(text, "  {count:>6}  {what}");
+            }
+        }
+        if !self.checks.is_empty() {
+            let _ = writeln!(text, "\n  logs with  critical  warning");
+        }
+        let mut checks: Vec<_> = self.checks.iter().collect();
+        checks.sort_by_key(|(_, (critical, warning))| std::cmp::Reverse((*critical, *warning)));
+        for (check, (critical, warning)) in checks {
+            let _ = writeln!(text, "             {critical:>8}  {warning:>7}  {} [{check}]", name(check));
+        }
+        text.trim_end().to_owned()
+    }
+}
+
+fn logs(count: u64) -> String {
+    if count == 1 { "1 log".to_owned() } else { format!("{count} logs") }
+}
+
+fn vehicle(judged: &Judged) -> String {
+    let Some((source, heartbeat)) = judged.vehicle.source.zip(judged.vehicle.heartbeat.get()) else {
+        return "none was heard".to_owned();
+    };
+    let told = judged.facts.get(&About::Firmware).cloned();
+    let firmware = told.unwrap_or_else(|| {
+        let version = judged.vehicle.identity.get().and_then(|identity| firmware(identity.firmware));
+        format!("{} {}", autopilot_name(heartbeat.autopilot_number), version.unwrap_or_default())
+    });
+    let mut text = format!("{}, {}", type_name(heartbeat.type_number), firmware.trim_end());
+    if let Some(hardware) = judged.facts.get(&About::Hardware) {
+        let _ = write!(text, ", {hardware}");
+    }
+    let _ = write!(text, ", system {}", source.system);
+    text
+}
+
+/// A version as people write it.
+pub(super) fn firmware(version: u32) -> Option<String> {
+    let [major, minor, patch, _] = version.to_be_bytes();
+    (version != 0).then(|| format!("{major}.{minor}.{patch}"))
+}
+
+fn when(judged: &Judged) -> String {
+    let Some((first, last)) = judged.span else { return "nothing of a vehicle is in it".to_owned() };
+    let utc = judged.epoch_us.map_or_else(
+        || "time of day unknown".to_owned(),
+        |epoch| {
+            iso8601(epoch.saturating_add(first.as_micros()) / 1_000_000 * 1_000_000).replace(".000000", "")
+        },
+    );
+    let restarts = match judged.restarts {
+        0 => String::new(),
+        1 => ", its clock began again once".to_owned(),
+        count => format!(", its clock began again {count} times"),
+    };
+    format!("{utc}, {} recorded{restarts}", clock(last.since(first)))
+}
+
+/// All flights together.
+pub(super) fn flown(judged: &Judged) -> Span {
+    judged.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.to.since(flight.from))
+}
+
+fn in_air(judged: &Judged) -> String {
+    let armed = clock(judged.armed);
+    match judged.flights.as_slice() {
+        [] if judged.armed == Span::ZERO => "never armed".to_owned(),
+        [] => format!("never; armed {armed}"),
+        [flight] if !flight.landed => {
+            format!("{} in 1 flight, which the log does not see land; armed {armed}", clock(flown(judged)))
+        }
+        [_] => format!("{} in 1 flight; armed {armed}", clock(flown(judged))),
+        flights => format!("{} in {} flights; armed {armed}", clock(flown(judged)), flights.len()),
+    }
+}
+
+/// The verdict, as a line.
+fn verdict(judged: &Judged) -> String {
+    let count = |level| judged.problems.iter().filter(|problem| problem.level == level).count();
+    let plural = |count: usize, one: &str| match count {
+        1 => format!("1 {one}"),
+        count => format!("{count} {one}s"),
+    };
+    let (critical, warnings) = (count(Level::Critical), count(Level::Warning));
+    let all = judged.judged.len() + judged.not_judged.len();
+    match judged.worst() {
+        None => "nothing can be said: no autopilot was heard".to_owned(),
+        Some(Level::Critical) if warnings > 0 => format!(
+            "not fit to fly before this is cleared up: {}, {}",
+            plural(critical, "critical finding"),
+            plural(warnings, "warning")
+        ),
+        Some(Level::Critical) => {
+            format!("not fit to fly before this is cleared up: {}", plural(critical, "critical finding"))
+        }
+        Some(Level::Warning) => {
+            format!("look at this before the next flight: {}", plural(warnings, "warning"))
+        }
+        Some(_) => format!(
+            "nothing wrong in {} of {all} checks; the others had nothing to judge",
+            judged.judged.len()
+        ),
+    }
+}
+
+fn problems(text: &mut String, judged: &Judged) {
+    let groups = groups(&judged.problems);
+    for (place, group) in groups.iter().enumerate() {
+        let Some(first) = group.first() else { continue };
+        let words = vocabulary(&first.check);
+        let level = if first.level == Level::Critical { "CRITICAL" } else { "warning" };
+        let _ = writeln!(text, "  {level:<8} {:>9}  {}", moment(first.at), sentence(group));
+        if let Some(words) = words.filter(|_| place < SHOWN_MAX) {
+            let _ = writeln!(text, "                      {}", words.meaning);
+            let _ = writeln!(text, "                      {}\n", words.action);
+        }
+    }
+    if groups.len() > SHOWN_MAX {
+        text.push('\n');
+    }
+    if judged.by == JudgedBy::Board && judged.findings_count > 0 {
+        text.push_str("  (found by the monitor on board)\n");
+    }
+}
+
+/// Problems of one check and level, which differ in the part alone, together; in the order of the first of each.
+fn groups(problems: &[Problem]) -> Vec<Vec<&Problem>> {
+    let mut groups: Vec<Vec<&Problem>> = Vec::new();
+    for problem in problems {
+        let same = |group: &&mut Vec<&Problem>| {
+            group.first().is_some_and(|first| first.check == problem.check && first.level == problem.level)
+        };
+        match groups.iter_mut().find(same) {
+            Some(group) => group.push(problem),
+            None => groups.push(vec![problem]),
+        }
+    }
+    groups
+}
+
+/// What it was: the check, the parts, the worst value, its limit, how long.
+fn sentence(group: &[&Problem]) -> String {
+    let Some(first) = group.first() else { return String::new() };
+    let part = vocabulary(&first.check).map_or("", |words| words.part);
+    let mut text = name(&first.check).to_owned();
+    if !part.is_empty() {
+        let numbers: Vec<String> =
+            group.iter().map(|problem| (u16::from(problem.instance) + 1).to_string()).collect();
+        let plural = if numbers.len() > 1 && part != "GPS" { "s" } else { "" };
+        let plural = if part == "battery" && numbers.len() > 1 { "ies" } else { plural };
+        let part = if plural == "ies" { "batter" } else { part };
+        let _ = write!(text, ", {part}{plural} {}", numbers.join(", "));
+    }
+    let unit = if first.unit.is_empty() { String::new() } else { format!(" {}", first.unit) };
+    if first.value.is_finite() {
+        let _ = write!(text, ": {}{unit}", short(first.value));
+    }
+    if first.limit.is_finite() {
+        let _ = write!(text, " (limit {}{unit})", short(first.limit));
+    }
+    let _ = write!(text, ", for {}", clock(first.lasted));
+    if first.times > 1 {
+        let _ = write!(text, " in {} times", first.times);
+    }
+    if first.lasting {
+        text.push_str(", to the end");
+    }
+    let _ = write!(text, " [{}]", first.check);
+    text
+}
+
+/// A check's name for people.
+fn name(check: &str) -> &str {
+    vocabulary(check).map_or(check, |words| words.name)
+}
+
+fn not_judged(text: &mut String, judged: &Judged) {
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (check, why) in &judged.not_judged {
+        match reasons.iter_mut().find(|(reason, _)| reason == why) {
+            Some((_, checks)) => checks.push(check),
+            None => reasons.push((why, vec![check])),
+        }
+    }
+    if reasons.is_empty() || judged.vehicle.source.is_none() {
+        return;
+    }
+    let all = judged.judged.len() + judged.not_judged.len();
+    let _ = writeln!(text, "  not judged: {} of {all} checks", judged.not_judged.len());
+    reasons.sort_by_key(|(_, checks)| std::cmp::Reverse(checks.len()));
+    for (reason, checks) in reasons.iter().take(LINES_MAX) {
+        let _ = writeln!(text, "    {reason}: {}", checks.join(", "));
+    }
+    let rest: Vec<&str> = reasons.iter().skip(LINES_MAX).map(|(reason, _)| *reason).collect();
+    if !rest.is_empty() {
+        let _ = writeln!(text, "    {}", rest.join("; "));
+    }
+}
+
+fn damage(text: &mut String, judged: &Judged) {
+    let shown = judged.gaps.iter().filter(|gap| gap.cause != Cause::NotKept);
+    for gap in shown.clone().take(LINES_MAX) {
+        let what = if gap.cause.is_damage() { "damaged" } else { "lost" };
+        let place = gap.place.map_or_else(String::new, |place| format!("byte {place}: "));
+        let at = gap.from.map_or_else(String::new, |from| format!(" {}", moment(from)));
+        let _ = writeln!(text, "  {what:<8}{at:>10}  {place}{}", gap.words);
+    }
+    let more = (judged.damages + judged.losses).saturating_sub(LINES_MAX as u64);
+    if more > 0 {
+        let _ = writeln!(text, "  and {more} more such places (--json)");
+    }
+}
+
+/// A time in the recording, to a tenth of a second: `4:20.8`.
+fn moment(at: Instant) -> String {
+    let tenths = at.as_micros() / 100_000;
+    let (hours, minutes, seconds) = (tenths / 36_000, tenths / 600 % 60, tenths / 10 % 60);
+    let hours = if hours > 0 { format!("{hours}:{minutes:02}") } else { minutes.to_string() };
+    format!("{hours}:{seconds:02}.{}", tenths % 10)
+}
+
+/// A length of time: `4:21`, `1:04:21`.
+fn clock(span: Span) -> String {
+    let seconds = (span.as_micros() + 500_000) / 1_000_000;
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, minutes, seconds) => format!("{minutes}:{seconds:02}"),
+        (hours, minutes, seconds) => format!("{hours}:{minutes:02}:{seconds:02}"),
+    }
+}
+
+/// With as many digits as a limit has.
+fn short(value: f32) -> String {
+    let text = format!("{value:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_at_a_glance() {
+        assert_eq!(moment(Instant::from_millis(260_849)), "4:20.8");
+        assert_eq!(moment(Instant::from_millis(3_860_000)), "1:04:20.0");
+        assert_eq!(clock(Span::from_millis(59_600)), "1:00");
+        assert_eq!(clock(Span::from_secs(3_861)), "1:04:21");
+        assert_eq!((short(3.4), short(10.0), short(0.256)), ("3.4".into(), "10".into(), "0.26".into()));
+    }
+}

@@ -1,0 +1,35 @@
+//! `hums check`: what is wrong with a flight.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+const EXAMPLES: &str = "Examples:
+  hums check flight.tlog
+  hums check --json flight.tlog
+  hums check cards/
+  hums check --params hums.param flight.tlog card.img
+
+Reads a ground station's tlog, raw MAVLink, ArduPilot's logs (.bin, .log), PX4's logs (.ulg), each also as .gz, logs of
+HUMS, cards and their images; told apart by what is in them. The checks and their limits are those of the monitor on
+board. A log of HUMS is shown with what the monitor on board found, unless --params asks for other limits.
+Exit codes: 0 nothing wrong; 4 something wrong (a warning or worse); 3 the log has losses or damage, whatever was found;
+1 failed; 2 usage.";
+
+/// `hums check`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Check {
+    /// Recordings, logs, cards, images, or directories with such; `-` is standard input
+    #[arg(required = true, value_name = "LOG")]
+    pub inputs: Vec<PathBuf>,
+    /// Limits other than the defaults: a parameter file, as a ground station writes it
+    #[arg(long, value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    #[arg(long)]
+    pub salvage: bool,
+    /// Print a JSON object a line for each log (docs/check.md)
+    #[arg(long)]
+    pub json: bool,
+}
