@@ -428,3 +428,142 @@ fn is_off(check: &Check, params: &Params) -> bool {
     };
     [check.warn, check.critical].into_iter().flatten().all(off)
 }
+
+#[cfg(test)]
+mod tests {
+    use hums_core::observation::{Battery, Observation, Source};
+    use hums_core::units::{Fraction, Volts};
+
+    use super::*;
+    use crate::source::item::Cause;
+
+    const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+    fn heartbeat(armed: bool) -> Observation {
+        let autopilot = Autopilot::ArduPilot;
+        Observation::Heartbeat(Heartbeat { autopilot, armed, state: 4, ..Heartbeat::default() })
+    }
+
+    fn battery(remaining: f32) -> Observation {
+        let (voltage, remaining) = (Some(Volts(12.0)), Some(Fraction(remaining)));
+        Observation::Battery(Battery { voltage, remaining, ..Battery::default() })
+    }
+
+    /// Heartbeats and battery levels, so many a second, from this second to that.
+    fn fly(judge: &mut Judge, from_s: u64, to_s: u64, per_s: u64, remaining: f32) {
+        for tick in from_s * per_s..to_s * per_s {
+            let at = Instant::from_micros(tick * 1_000_000 / per_s);
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
+            judge.item(at, Item::Observation(AUTOPILOT, &battery(remaining)));
+        }
+    }
+
+    fn found(judged: &Judged) -> Vec<(String, Level, f64)> {
+        let line = |finding: &Finding| (finding.check.clone(), finding.level, finding.at.as_secs_f64());
+        judged.findings.iter().map(line).collect()
+    }
+
+    #[test]
+    fn debounce_follows_the_recordings_time_and_not_the_number_of_samples() {
+        for per_s in [1, 10, 400] {
+            let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+            fly(&mut judge, 100, 110, per_s, 0.5);
+            fly(&mut judge, 110, 120, per_s, 0.1);
+            let found = found(&judge.end());
+            let [(check, Level::Warning, at)] = found.as_slice() else { panic!("{per_s}: {found:?}") };
+            assert_eq!(check, "batt_remaining");
+            assert!((at - 112.0).abs() < 0.11, "{per_s} samples a second: {at}");
+        }
+    }
+
+    #[test]
+    fn a_gap_of_hours_is_not_stepped_through_and_what_was_known_is_stale_after_it() {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        fly(&mut judge, 0, 20, 10, 0.1);
+        let years = 3 * 365 * 24 * 3_600;
+        let wall = std::time::Instant::now();
+        fly(&mut judge, years, years + 10, 10, 0.1);
+        assert!(wall.elapsed().as_secs() < 5, "three years are not stepped through");
+        let judged = judge.end();
+        let levels: Vec<Level> = judged
+            .findings
+            .iter()
+            .filter(|finding| finding.check == "batt_remaining")
+            .map(|finding| finding.level)
+            .collect();
+        assert_eq!(levels, [Level::Warning, Level::Stale, Level::Warning]);
+        let [problem] = judged.problems.as_slice() else { panic!("{:?}", judged.problems) };
+        assert_eq!((problem.times, problem.lasting), (2, true));
+        assert!(problem.lasted < Span::from_secs(50), "{:?}", problem.lasted);
+    }
+
+    #[test]
+    fn each_check_is_judged_or_says_why_not() {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        fly(&mut judge, 0, 20, 10, 0.9);
+        let judged = judge.end();
+        assert!(judged.judged.contains(&"batt_remaining"), "{:?}", judged.judged);
+        let why = |check: &str| {
+            let reason = judged.not_judged.iter().find(|(name, _)| *name == check);
+            reason.map_or("", |(_, why)| why.as_str())
+        };
+        assert_eq!(why("esc_silent"), "no ESC telemetry");
+        assert_eq!(why("ekf_variance"), "never in the air");
+        assert_eq!(why("frames_lost"), "the autopilot recorded this itself, without a link");
+        assert_eq!(why("record_lost"), "no monitor recorded this");
+        assert_eq!(why("rc_rssi"), "its limit is off");
+        // PX4's are not meant for ArduPilot.
+        assert_eq!(why("vibration_px4"), "");
+        let named = judged.judged.len() + judged.not_judged.len();
+        assert_eq!(named, VOCABULARY.iter().filter(|words| words.scope != Scope::Px4).count());
+    }
+
+    #[test]
+    fn nothing_of_a_vehicle_is_no_good_news() {
+        let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+        let gap = Gap {
+            from: None,
+            to: None,
+            cause: Cause::Cut,
+            place: Some(7),
+            bytes: 3,
+            words: "cut".to_owned(),
+        };
+        judge.item(Instant::ZERO, Item::Gap(&gap));
+        let judged = judge.end();
+        assert_eq!((judged.worst(), judged.damages), (None, 1));
+        assert!(judged.judged.is_empty(), "{:?}", judged.judged);
+    }
+
+    #[test]
+    fn what_the_board_found_counts_unless_other_limits_are_asked_for() {
+        let finding = Finding {
+            at: Instant::from_millis(7_000),
+            subsystem: hums_core::health::Subsystem::Recorder,
+            check: "card_stall".to_owned(),
+            instance: 0,
+            level: Level::Critical,
+            previous: Level::Ok,
+            value: 3000.0,
+            limit: 2500.0,
+            unit: "ms".to_owned(),
+        };
+        let spec = Param::BatRemWarn.spec();
+        for (given, by, check) in
+            [(vec![], JudgedBy::Board, "card_stall"), (vec![(spec, 95.0)], JudgedBy::Here, "batt_remaining")]
+        {
+            let mut judge = Judge::new(&Limits::new(&given), Format::Hums);
+            judge.item(Instant::ZERO, Item::Record(&Told::Checked));
+            let other = Told::Parameter { name: spec.name.to_owned(), value: 1.0, start: true };
+            judge.item(Instant::ZERO, Item::Record(&other));
+            fly(&mut judge, 0, 10, 10, 0.9);
+            judge.item(Instant::from_millis(7_000), Item::Record(&Told::Finding(Box::new(finding.clone()))));
+            let judged = judge.end();
+            assert_eq!(judged.by, by);
+            assert_eq!(
+                judged.problems.iter().map(|problem| problem.check.as_str()).collect::<Vec<_>>(),
+                [check]
+            );
+        }
+    }
+}

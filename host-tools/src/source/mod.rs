@@ -5,8 +5,8 @@
 //! |---|---|
 //! | log of HUMS | `own` |
 //! | tlog, raw MAVLink | `mavlink` |
-//! | ArduPilot's DataFlash | `dataflash` |
-//! | PX4's ULog | `ulog` |
+//! | ArduPilot's `DataFlash` | `dataflash` |
+//! | PX4's `ULog` | `ulog` |
 //!
 //! A further format is one more [`item::Reader`], and a line of [`recording::Recording::new`].
 //!

@@ -1,6 +1,7 @@
 //! The program as a user runs it.
 #![expect(clippy::panic, reason = "a test that cannot go on says why")]
 
+mod check;
 mod help;
 mod read;
 mod record;

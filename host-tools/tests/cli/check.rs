@@ -1,0 +1,163 @@
+//! `hums check`: one verdict from every kind of recording.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+
+use super::support::{flight, json, recorded, run, text};
+
+/// Checks that tell of the place on a link, which a recording of another place cannot.
+const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
+
+fn faults(dir: &Path) {
+    fs::copy(flight("ap_quad_faults.tlog"), dir.join("faults.tlog")).expect("a copy");
+}
+
+/// Check, instance, level and second of each finding.
+fn findings(object: &serde_json::Value) -> Vec<(String, u64, String, f64)> {
+    let findings = object["findings"].as_array().expect("an array");
+    let own = |finding: &serde_json::Value| {
+        let text = |name: &str| finding[name].as_str().expect("text").to_owned();
+        let instance = finding["instance"].as_u64().expect("a number");
+        (text("check"), instance, text("level"), finding["time_s"].as_f64().expect("a time"))
+    };
+    findings.iter().map(own).filter(|(check, ..)| !OF_THE_WIRE.contains(&check.as_str())).collect()
+}
+
+#[track_caller]
+fn assert_same(left: &serde_json::Value, right: &serde_json::Value) {
+    let (left, right) = (findings(left), findings(right));
+    assert!(!left.is_empty());
+    assert_eq!(left.len(), right.len(), "{left:#?}\n{right:#?}");
+    for (one, other) in left.iter().zip(&right) {
+        assert_eq!((&one.0, one.1, &one.2), (&other.0, other.1, &other.2));
+        assert!((one.3 - other.3).abs() < 0.25, "{one:?} {other:?}");
+    }
+}
+
+#[test]
+fn a_recording_its_compressed_form_its_pack_and_its_card_are_found_alike() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    let plain = fs::read(dir.path().join("faults.tlog")).expect("the recording");
+    let file = fs::File::create(dir.path().join("named_by_nobody")).expect("a file");
+    let mut packed = flate2::write::GzEncoder::new(file, flate2::Compression::fast());
+    packed.write_all(&plain).and_then(|()| packed.finish().map(drop)).expect("written");
+    let sim = json(&run(dir.path(), "sim --input faults.tlog --sd card.img --json", 0));
+    run(dir.path(), "pack faults.tlog -o packed.hum", 0);
+    for (input, format, by) in [
+        ("faults.tlog", "tlog", "hums"),
+        ("named_by_nobody", "tlog", "hums"),
+        ("packed.hum", "hums", "hums"),
+        ("card.img", "hums", "board"),
+    ] {
+        let checked = json(&run(dir.path(), &format!("check --json {input}"), 4));
+        let said = ["schema", "format", "judged_by", "verdict"].map(|name| checked[name].as_str());
+        assert_eq!(said, [Some("hums-check"), Some(format), Some(by), Some("critical")], "{input}");
+        assert_same(&checked, &sim);
+    }
+}
+
+#[test]
+fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judged() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    let screen = text(&run(dir.path(), "check faults.tlog", 4));
+    for words in [
+        "quadrotor, ArduPilot",
+        "in 1 flight",
+        "not fit to fly before this is cleared up: 2 critical findings, 2 warnings",
+        "CRITICAL    4:20.7  cell voltage, battery 1: 3.4 V (limit 3.5 V), for 1:36",
+        "The weakest cell was close to empty",
+        "Check the pack under load",
+        "no failure flags of ESCs: esc_failure",
+    ] {
+        assert!(screen.contains(words), "{words}\n{screen}");
+    }
+    let first =
+        screen.find("cell voltage").expect("the worst") < screen.find("GPS satellites").expect("a warning");
+    assert!(first, "worst first: {screen}");
+    assert!(screen.lines().count() < 45, "one screen: {screen}");
+}
+
+#[test]
+fn nothing_wrong_is_exit_code_0_and_counts_what_could_be_judged() {
+    let dir = recorded();
+    let screen = text(&run(dir.path(), "check PX4", 0));
+    assert!(screen.contains("nothing wrong in ") && screen.contains("not judged: "), "{screen}");
+    assert!(text(&run(dir.path(), "check card.img", 0)).contains("nothing wrong in "));
+}
+
+#[test]
+fn damage_is_said_with_its_place_and_wins_over_findings() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    let mut bytes = fs::read(dir.path().join("faults.tlog")).expect("the recording");
+    bytes[1_000_000..1_000_200].fill(0);
+    fs::write(dir.path().join("hit.tlog"), &bytes).expect("written");
+    let checked = json(&run(dir.path(), "check --json hit.tlog", 3));
+    assert_eq!((checked["verdict"].as_str(), checked["damaged"].as_bool()), (Some("critical"), Some(true)));
+    let place = checked["gaps"][0]["place"].as_u64().expect("a place");
+    assert!((999_600..1_000_200).contains(&place), "{place}");
+    assert!(text(&run(dir.path(), "check hit.tlog", 3)).contains("damaged"));
+}
+
+#[test]
+fn a_folder_gives_a_line_for_each_and_a_table_and_what_is_none_is_passed_over() {
+    let dir = recorded();
+    faults(dir.path());
+    fs::create_dir(dir.path().join("more")).expect("a directory");
+    fs::copy(flight("px4_hil_quad_low.tlog"), dir.path().join("more/calm.tlog")).expect("a copy");
+    fs::write(dir.path().join("notes.txt"), "no recording").expect("a file");
+    let lines = text(&run(dir.path(), "check .", 4));
+    let of = |name: &str| lines.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();
+    assert!(
+        of("faults.tlog").starts_with("critical") && of("faults.tlog").contains("cell voltage"),
+        "{lines}"
+    );
+    assert!(of("calm.tlog").starts_with("ok") && of("card").starts_with("ok"), "{lines}");
+    assert!(!lines.contains("notes.txt") && lines.contains("3 logs checked"), "{lines}");
+    let objects = text(&run(dir.path(), "check --json .", 4));
+    assert_eq!(objects.lines().count(), 3);
+}
+
+#[test]
+fn what_is_no_recording_is_refused_with_what_would_be_one() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("notes.txt"), "no recording").expect("a file");
+    fs::write(dir.path().join("empty.bin"), "").expect("a file");
+    for (input, why) in [("notes.txt", "is no recording that this program knows"), ("empty.bin", "is empty")]
+    {
+        let output = run(dir.path(), &format!("check {input}"), 1);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.contains(why), "{said}");
+    }
+    run(dir.path(), "check", 2);
+}
+
+#[test]
+fn other_limits_give_other_findings() {
+    let dir = recorded();
+    fs::write(dir.path().join("strict.param"), "BAT_REM_WARN 90\n").expect("a file");
+    for input in ["PX4", "card.img"] {
+        let checked = json(&run(dir.path(), &format!("check --json --params strict.param {input}"), 4));
+        assert_eq!(checked["problems"][0]["check"].as_str(), Some("batt_remaining"), "{input}");
+    }
+}
+
+#[test]
+fn a_packed_recording_is_checked_by_everything_that_shows_findings() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    run(dir.path(), "pack faults.tlog -o packed.hum", 0);
+    let info = json(&run(dir.path(), "info --json packed.hum", 0));
+    assert_eq!(info["logs"][0]["checked_by"].as_str(), Some("hums"));
+    assert!(info["logs"][0]["findings_count"].as_u64().expect("a number") > 3);
+    assert!(
+        text(&run(dir.path(), "info packed.hum", 0))
+            .contains("checked here: what recorded this ran no checks")
+    );
+    run(dir.path(), "report packed.hum -o page.html", 0);
+    let page = fs::read_to_string(dir.path().join("page.html")).expect("the page");
+    assert!(page.contains("\"checked_by\":\"hums\"") && page.contains("\"check\":\"cell_voltage\""));
+}
