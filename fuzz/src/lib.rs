@@ -1,7 +1,63 @@
-//! What the fuzz targets check of any bytes. The crates' own tests include these files, so that the same checks run
-//! on a few thousand made-up inputs with every test.
+//! Fuzz targets: what must hold for any bytes that somebody gives to a reader.
+//!
+//! A target is a function of bytes that panics where something does not hold. Three things run it:
+//!
+//! | what | when | inputs |
+//! |---|---|---|
+//! | `fuzz/tests/corpus.rs` | each `cargo xtask test` | the corpus, and some hundred mutations of it: the same ones each time |
+//! | the campaign `fuzz` | `cargo xtask prove fuzz` | the corpus, and as many mutations as fit into minutes |
+//! | libFuzzer (`fuzz/libfuzzer`) | `cargo xtask fuzz` | mutations that follow the code's branches; needs nightly Rust |
+//!
+//! # To add a target
+//! 1. Write `fuzz/src/NAME.rs` with `pub fn check(data: &[u8])`. The framework limits the length of `data`; the function
+//!    bounds everything else. It takes any bytes for what the reader would get, for instance a file's contents
+//!    ([`file::with_file`] makes a file of them), and asserts what must hold. That the reader does not panic needs no assertion.
+//! 2. Add `pub mod NAME;` and a row of [`TARGETS`] to this file.
+//! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are made by us,
+//!    never taken from somebody's recording. Without a corpus the mutations begin from noise and reach little.
+//!    Inputs that a writer of ours can make are made by `fuzz/src/corpus.rs`; `cargo run -p hums-fuzz` writes them.
+//!
+//! An input that breaks a target is written to `target/fuzz/NAME-HASH`; it goes into the corpus with the mend.
+#![allow(clippy::missing_panics_doc, reason = "a target panics where something does not hold")]
 
+pub mod card;
+pub mod corpus;
 pub mod decoder;
+pub mod file;
+pub mod find;
 pub mod framer;
+pub mod mutate;
+pub mod page;
 pub mod reader;
+pub mod recording;
 pub mod round_trip;
+
+/// A fuzz target.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// Its name: that of its module, and of its folder in the corpus.
+    pub name: &'static str,
+    /// The longest input, in bytes.
+    pub bytes_max: usize,
+    /// Mutations that each `cargo xtask test` tries: about half a second of them.
+    pub rounds: u64,
+    /// Panics where something does not hold.
+    pub check: fn(&[u8]),
+}
+
+/// All of them.
+pub const TARGETS: &[Target] = &[
+    Target { name: "card", bytes_max: 4_096, rounds: 1_000, check: card::check },
+    Target { name: "decoder", bytes_max: 8_192, rounds: 500, check: decoder::check },
+    Target { name: "find", bytes_max: 16_384, rounds: 200, check: find::check },
+    Target { name: "framer", bytes_max: 4_096, rounds: 1_000, check: framer::check },
+    Target { name: "page", bytes_max: 8_192, rounds: 100, check: page::check },
+    Target { name: "reader", bytes_max: 16_384, rounds: 500, check: reader::check },
+    Target { name: "recording", bytes_max: 16_384, rounds: 500, check: recording::check },
+    Target { name: "round_trip", bytes_max: 8_192, rounds: 500, check: round_trip::check },
+];
+
+/// The target of this name.
+pub fn target(name: &str) -> Option<&'static Target> {
+    TARGETS.iter().find(|target| target.name == name)
+}

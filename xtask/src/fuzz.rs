@@ -1,17 +1,19 @@
-//! `cargo xtask fuzz`: the fuzz targets, one after the other.
+//! `cargo xtask fuzz`: the fuzz targets under libFuzzer, one after the other. `fuzz/src/lib.rs` says what they are.
 
-use anyhow::{Result, bail};
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail};
 
 use crate::repo;
 use crate::shell::Shell;
 
-/// A target, the longest input it is given, and a folder with inputs to begin with.
-const TARGETS: [(&str, u32, Option<&str>); 4] = [
-    ("framer", 4_096, None),
-    ("round_trip", 8_192, None),
-    ("decoder", 8_192, None),
-    ("reader", 16_384, Some("firmware/blackbox/tests/golden")),
-];
+/// The targets are the folders of the corpus: a test of `hums-fuzz` holds the one against the other.
+const CORPUS: &str = "fuzz/corpus";
+/// What libFuzzer finds new is kept here, and not in the repository.
+const FOUND: &str = "target/fuzz/found";
+/// The longest input, in bytes; each target's own limit is for the mutations on stable Rust.
+const BYTES_MAX: u32 = 16_384;
 
 /// How long each target runs unless told.
 pub(crate) const SECONDS: u32 = 300;
@@ -24,25 +26,35 @@ pub(crate) fn parse(words: &[&str]) -> Result<u32> {
     }
 }
 
-/// Runs each target for so many seconds; what it finds lies in `fuzz/artifacts`.
+/// Runs each target for so many seconds; what breaks one lies in `fuzz/libfuzzer/artifacts`.
 pub(crate) fn run(seconds: u32) -> Result<()> {
     require(&["+nightly", "--version"], "a nightly compiler: rustup toolchain install nightly")?;
     require(&["fuzz", "--version"], "cargo-fuzz: cargo install cargo-fuzz")?;
-    for (target, bytes_max, seeds) in TARGETS {
-        let corpus = repo::root().join("fuzz/corpus").join(target);
-        std::fs::create_dir_all(&corpus)?;
-        let mut shell = cargo().args(["+nightly", "fuzz", "run", "--fuzz-dir", "fuzz", target]).arg(&corpus);
-        if let Some(seeds) = seeds {
-            shell = shell.arg(repo::root().join(seeds));
-        }
+    for target in targets(&repo::root().join(CORPUS))? {
+        let found = repo::root().join(FOUND).join(&target);
+        fs::create_dir_all(&found)?;
         // An input may take ten seconds and 2 GiB at most: nothing is unbounded.
-        shell
+        cargo()
+            .env("HUMS_FUZZ_TARGET", &target)
+            .args(["+nightly", "fuzz", "run", "--fuzz-dir", "fuzz/libfuzzer", "any"])
+            .arg(&found)
+            .arg(repo::root().join(CORPUS).join(&target))
             .args(["--", "-timeout=10", "-rss_limit_mb=2048", "-print_final_stats=1"])
             .arg(format!("-max_total_time={seconds}"))
-            .arg(format!("-max_len={bytes_max}"))
+            .arg(format!("-max_len={BYTES_MAX}"))
             .run()?;
     }
     Ok(())
+}
+
+/// The names of the folders in the corpus, in order.
+fn targets(corpus: &Path) -> Result<Vec<String>> {
+    let context = || format!("{}: cannot be read", corpus.display());
+    let entries = fs::read_dir(corpus).with_context(context)?;
+    let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+    let mut names = names.collect::<std::io::Result<Vec<_>>>().with_context(context)?;
+    names.sort();
+    Ok(names)
 }
 
 /// The `cargo` that understands `+nightly`: that of rustup, not the one that runs this program.
@@ -60,6 +72,14 @@ fn require(arguments: &[&str], what: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_folder_of_the_corpus_is_a_target() {
+        let targets = targets(&repo::root().join(CORPUS)).unwrap();
+        assert!(
+            ["card", "find", "page", "recording"].iter().all(|name| targets.contains(&(*name).to_owned()))
+        );
+    }
 
     #[test]
     fn the_time_is_five_minutes_or_what_is_said() {

@@ -17,9 +17,10 @@ const BACKUP_BLOCK: u32 = 6;
 const ROOT_CLUSTER: u32 = 2;
 /// FAT entries in a block.
 const ENTRIES: u32 = 128;
-/// The smallest card that FAT32 fits on, in blocks: 65,525 clusters of one block, their FAT and what is before them.
+/// The smallest card that FAT32 fits on, in blocks: 65,525 clusters of one block, their FAT and what is before them. The
+/// FAT has entries for the blocks that it takes itself, too (see `Plan::new`): a block of it for each 127 clusters.
 pub const BLOCKS_MIN: u32 =
-    PARTITION_START + RESERVED_BLOCKS + (FAT32_CLUSTERS_MIN + 2).div_ceil(ENTRIES) + FAT32_CLUSTERS_MIN;
+    PARTITION_START + RESERVED_BLOCKS + FAT32_CLUSTERS_MIN.div_ceil(ENTRIES - 1) + FAT32_CLUSTERS_MIN;
 
 /// Why a card was not formatted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,10 +4,15 @@
 //! Reading a whole card needs places (extents), not bytes, and needs the damage named; that is why this does not go
 //! through `embedded-sdmmc`, whose reader stops at the first doubt.
 //! Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
+//!
+//! Memory: a bit for each cluster (32 MiB for the largest volume of FAT32), 64 KiB of the FAT, and at most
+//! [`FILES_MAX`] files in [`EXTENTS_MAX`] extents: 10 MiB and 16 MiB. What is beyond is counted and told.
 
+use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
+use hums_recorder::LogName;
 use hums_recorder::layout::Layout;
 
 const BLOCK: u64 = 512;
@@ -16,6 +21,14 @@ const ENTRY_BYTES: usize = 32;
 const DEPTH_MAX: usize = 8;
 /// FAT32 allows no more entries in a directory.
 const ENTRIES_MAX: usize = 65_536;
+/// Segments that are kept: those of one full directory, and the recorder uses one.
+const FILES_MAX: usize = ENTRIES_MAX;
+/// Extents that are kept, of all segments together. The recorder allocates a segment in a few runs.
+const EXTENTS_MAX: usize = 1 << 20;
+/// Sentences about damage that are kept.
+const DAMAGE_MAX: usize = 20;
+/// Bytes of a directory that are read at once.
+const READ_BYTES: u64 = 64 * 1024;
 /// FAT entries that are read at once.
 const WINDOW_BLOCKS: u32 = 128;
 const ENTRIES_PER_BLOCK: u32 = 128;
@@ -35,15 +48,13 @@ pub struct Extent {
     pub length: u64,
 }
 
-/// A file on the card.
+/// A segment of a log on the card.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CardFile {
     /// Its directories and its short name, for instance `LOGS/00042_07.HUM`.
     pub path: String,
-    /// The short name's base, without its padding.
-    pub base: Vec<u8>,
-    /// The short name's extension, without its padding.
-    pub extension: Vec<u8>,
+    /// Which segment of which session its name says it is.
+    pub name: LogName,
     /// The size that the directory says, in bytes.
     pub size: u64,
     /// Where it lies; less than `size` where its chain is damaged.
@@ -53,40 +64,95 @@ pub struct CardFile {
 /// What a walk over the volume found.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
-    /// Every file, in directory order.
+    /// The logs' segments, in directory order, up to [`FILES_MAX`]. Other files are only checked.
     pub files: Vec<CardFile>,
-    /// What does not hold, as sentences.
+    /// What does not hold, as sentences: the first [`DAMAGE_MAX`], then one that counts the others.
     pub damage: Vec<String>,
     /// Clusters that are allocated and belong to no file: space that is lost, not data.
     pub lost_clusters: u64,
 }
 
+/// Something that blocks can be read from at any place: an image file, a raw device, memory.
+pub trait ReadAt {
+    /// Reads all of `buffer` from this place, in bytes; what lies beyond the end reads as zeros (a cut image).
+    fn read_at(&self, start: u64, buffer: &mut [u8]) -> io::Result<()>;
+}
+
+impl ReadAt for File {
+    fn read_at(&self, start: u64, buffer: &mut [u8]) -> io::Result<()> {
+        let mut file = self;
+        file.seek(SeekFrom::Start(start))?;
+        let mut filled = 0;
+        while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+            match file.read(rest) {
+                Ok(0) => {
+                    rest.fill(0);
+                    return Ok(());
+                }
+                Ok(got) => filled += got,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
 /// A FAT32 volume in an image.
-pub struct Volume<'a> {
-    image: &'a File,
+pub struct Volume<'a, I> {
+    image: &'a I,
     layout: Layout,
     root: u32,
     window: Option<(u32, Vec<u8>)>,
     /// One bit a cluster: already part of a file or directory.
     used: Vec<u64>,
     walk: Walk,
+    /// Extents kept so far.
+    extents: usize,
+    /// Segments beyond [`FILES_MAX`], and damage beyond [`DAMAGE_MAX`].
+    files_more: u64,
+    damage_more: u64,
 }
 
-impl<'a> Volume<'a> {
+impl<'a, I: ReadAt> Volume<'a, I> {
     /// A volume whose layout was checked.
-    pub fn new(image: &'a File, layout: Layout) -> io::Result<Self> {
+    pub fn new(image: &'a I, layout: Layout) -> io::Result<Self> {
         let mut root = [0; 4];
-        read_at(image, u64::from(layout.start) * BLOCK + 44, &mut root)?;
+        image.read_at(u64::from(layout.start) * BLOCK + 44, &mut root)?;
         let words = (layout.clusters as usize + 2).div_ceil(64);
         let root = u32::from_le_bytes(root) & ENTRY_MASK;
-        Ok(Self { image, layout, root, window: None, used: vec![0; words], walk: Walk::default() })
+        Ok(Self {
+            image,
+            layout,
+            root,
+            window: None,
+            used: vec![0; words],
+            walk: Walk::default(),
+            extents: 0,
+            files_more: 0,
+            damage_more: 0,
+        })
     }
 
     /// Walks over every directory.
     pub fn walk(mut self) -> io::Result<Walk> {
         self.directory(self.root, "", 0)?;
         self.count_lost()?;
+        if self.files_more > 0 {
+            self.damaged(format!("{} log segments beyond {FILES_MAX} are left out", self.files_more));
+        }
+        if self.damage_more > 0 {
+            self.walk.damage.push(format!("and {} more that do not hold", self.damage_more));
+        }
         Ok(self.walk)
+    }
+
+    fn damaged(&mut self, sentence: String) {
+        if self.walk.damage.len() < DAMAGE_MAX {
+            self.walk.damage.push(sentence);
+        } else {
+            self.damage_more += 1;
+        }
     }
 
     fn cluster_bytes(&self) -> u64 {
@@ -108,7 +174,7 @@ impl<'a> Volume<'a> {
         if self.window.as_ref().is_none_or(|(start, _)| *start != first) {
             let blocks = WINDOW_BLOCKS.min(self.layout.fat_blocks.saturating_sub(first));
             let mut bytes = vec![0; blocks as usize * BLOCK as usize];
-            read_at(self.image, u64::from(self.layout.fat_start + first) * BLOCK, &mut bytes)?;
+            self.image.read_at(u64::from(self.layout.fat_start + first) * BLOCK, &mut bytes)?;
             self.window = Some((first, bytes));
         }
         let at = (cluster - first * ENTRIES_PER_BLOCK) as usize * 4;
@@ -129,81 +195,105 @@ impl<'a> Volume<'a> {
         }
     }
 
-    /// The clusters from `first` on, joined to runs, `clusters_max` at most. Ends at the first doubt, which is told.
-    fn chain(&mut self, first: u32, clusters_max: u64, what: &str) -> io::Result<Vec<Extent>> {
-        let mut extents: Vec<Extent> = Vec::new();
+    /// Follows the clusters from `first` on, `clusters_max` at most. Ends at the first doubt, which is told.
+    fn chain(&mut self, first: u32, clusters_max: u64, what: &Name<'_>) -> io::Result<Chain> {
+        let mut chain = Chain::default();
         let mut cluster = first;
-        let mut count = 0;
         while cluster < END_OF_CHAIN {
             if !self.is_cluster(cluster) {
-                self.walk.damage.push(format!("{what}: its chain leads to cluster {cluster}, which is none"));
+                self.damaged(format!("{what}: its chain leads to cluster {cluster}, which is none"));
                 break;
             }
             if !self.claim(cluster) {
-                self.walk.damage.push(format!("{what}: cluster {cluster} belongs to something else as well"));
+                self.damaged(format!("{what}: cluster {cluster} belongs to something else as well"));
                 break;
             }
-            if count == clusters_max {
-                self.walk.damage.push(format!("{what}: its chain is longer than its size"));
+            if chain.clusters == clusters_max {
+                self.damaged(format!("{what}: its chain is longer than its size"));
                 break;
             }
-            count += 1;
             let (start, length) = (self.place(cluster), self.cluster_bytes());
-            match extents.last_mut() {
+            let held = self.extents + chain.extents.len();
+            match chain.extents.last_mut() {
                 Some(last) if last.start + last.length == start => last.length += length,
-                _ => extents.push(Extent { start, length }),
+                _ if !what.is_kept() => {}
+                _ if held < EXTENTS_MAX => chain.extents.push(Extent { start, length }),
+                _ => {
+                    self.damaged(format!("{what}: the segments lie in more than {EXTENTS_MAX} pieces"));
+                    break;
+                }
             }
+            chain.clusters += 1;
             cluster = self.entry(cluster)?;
         }
-        Ok(extents)
+        Ok(chain)
     }
 
     fn directory(&mut self, first: u32, path: &str, depth: usize) -> io::Result<()> {
-        let what = if path.is_empty() { "the root directory" } else { path };
         let bytes_max = (ENTRIES_MAX * ENTRY_BYTES) as u64;
-        let extents = self.chain(first, bytes_max.div_ceil(self.cluster_bytes()), what)?;
-        let mut children = Vec::new();
-        'extents: for extent in extents {
-            let mut bytes = vec![0; usize::try_from(extent.length.min(bytes_max)).unwrap_or(0)];
-            read_at(self.image, extent.start, &mut bytes)?;
-            for entry in bytes.chunks_exact(ENTRY_BYTES) {
-                match Entry::read(entry) {
-                    Some(Entry::End) => break 'extents,
-                    Some(Entry::Child(child)) => children.push(child),
-                    None => {}
-                }
-            }
-        }
-        for child in children {
-            self.child(child, path, depth)?;
+        let clusters_max = bytes_max.div_ceil(self.cluster_bytes());
+        let chain = self.chain(first, clusters_max, &Name::Directory(path))?;
+        for child in self.children(&chain.extents, bytes_max)? {
+            self.child(&child, path, depth)?;
         }
         Ok(())
     }
 
-    fn child(&mut self, child: Child, path: &str, depth: usize) -> io::Result<()> {
-        let name = child.name();
-        let path = if path.is_empty() { name } else { format!("{path}/{name}") };
+    /// The entries of a directory that lies here.
+    fn children(&self, extents: &[Extent], bytes_max: u64) -> io::Result<Vec<Child>> {
+        let mut children = Vec::new();
+        let mut bytes = Vec::new();
+        let mut left = bytes_max;
+        for extent in extents {
+            let (mut at, end) = (extent.start, extent.start + extent.length.min(left));
+            left -= extent.length.min(left);
+            while at < end {
+                bytes.resize(READ_BYTES.min(end - at) as usize, 0);
+                self.image.read_at(at, &mut bytes)?;
+                at += bytes.len() as u64;
+                for entry in bytes.chunks_exact(ENTRY_BYTES) {
+                    match Entry::read(entry) {
+                        Some(Entry::End) => return Ok(children),
+                        Some(Entry::Child(child)) => children.push(child),
+                        None => {}
+                    }
+                }
+            }
+        }
+        Ok(children)
+    }
+
+    fn child(&mut self, child: &Child, path: &str, depth: usize) -> io::Result<()> {
+        let name = Name::Child(path, child);
         if child.is_directory {
             if depth >= DEPTH_MAX {
-                self.walk.damage.push(format!("{path}: directories deeper than {DEPTH_MAX} are not read"));
+                self.damaged(format!("{name}: directories deeper than {DEPTH_MAX} are not read"));
                 return Ok(());
             }
-            return self.directory(child.first, &path, depth + 1);
+            return self.directory(child.first, &name.to_string(), depth + 1);
         }
         let size = u64::from(child.size);
-        let mut extents = match child.first {
-            0 => Vec::new(),
-            first => self.chain(first, size.div_ceil(self.cluster_bytes()), &path)?,
+        let Chain { mut extents, clusters } = match child.first {
+            0 => Chain::default(),
+            first => self.chain(first, size.div_ceil(self.cluster_bytes()), &name)?,
         };
+        let missing = size.saturating_sub(clusters * self.cluster_bytes());
+        if missing > 0 {
+            self.damaged(format!("{name}: the last {missing} of its {size} bytes have no cluster"));
+        }
+        let Some(segment) = child.segment() else { return Ok(()) };
+        if self.walk.files.len() >= FILES_MAX {
+            self.files_more += 1;
+            return Ok(());
+        }
         let mut left = size;
         for extent in &mut extents {
             extent.length = extent.length.min(left);
             left -= extent.length;
         }
-        if left > 0 {
-            self.walk.damage.push(format!("{path}: the last {left} of its {size} bytes have no cluster"));
-        }
-        self.walk.files.push(CardFile { path, base: child.base, extension: child.extension, size, extents });
+        extents.shrink_to_fit();
+        self.extents += extents.len();
+        self.walk.files.push(CardFile { path: name.to_string(), name: segment, size, extents });
         Ok(())
     }
 
@@ -220,14 +310,50 @@ impl<'a> Volume<'a> {
     }
 }
 
+/// A chain of clusters, as far as it holds.
+#[derive(Default)]
+struct Chain {
+    /// The clusters joined to runs, where they are kept.
+    extents: Vec<Extent>,
+    clusters: u64,
+}
+
+/// What a chain is of. Its name is only put together where it is told.
+enum Name<'a> {
+    Directory(&'a str),
+    Child(&'a str, &'a Child),
+}
+
+impl Name<'_> {
+    /// Whether its extents are needed: those of directories and of segments.
+    fn is_kept(&self) -> bool {
+        match self {
+            Self::Directory(_) => true,
+            Self::Child(_, child) => child.segment().is_some(),
+        }
+    }
+}
+
+impl fmt::Display for Name<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Directory("") => f.write_str("the root directory"),
+            Self::Directory(path) => f.write_str(path),
+            Self::Child("", child) => f.write_str(&child.name()),
+            Self::Child(path, child) => write!(f, "{path}/{}", child.name()),
+        }
+    }
+}
+
 enum Entry {
     End,
     Child(Child),
 }
 
+/// An entry of a directory. A directory has up to 65,536: it is small.
 struct Child {
-    base: Vec<u8>,
-    extension: Vec<u8>,
+    /// The short name, padded with spaces: eight bytes of base, three of extension.
+    short: [u8; 11],
     is_directory: bool,
     first: u32,
     size: u32,
@@ -248,10 +374,8 @@ impl Entry {
             }
             _ => {}
         }
-        let trimmed = |bytes: &[u8]| bytes.trim_ascii_end().to_vec();
         Some(Self::Child(Child {
-            base: trimmed(&entry[..8]),
-            extension: trimmed(&entry[8..11]),
+            short: *entry.first_chunk()?,
             is_directory: attributes & ATTRIBUTE_DIRECTORY != 0,
             first: u32::from_le_bytes([entry[26], entry[27], entry[20], entry[21]]) & ENTRY_MASK,
             size: u32::from_le_bytes([entry[28], entry[29], entry[30], entry[31]]),
@@ -260,33 +384,26 @@ impl Entry {
 }
 
 impl Child {
+    /// The short name's base and its extension, without their padding.
+    fn parts(&self) -> (&[u8], &[u8]) {
+        let (base, extension) = self.short.split_at(8);
+        (base.trim_ascii_end(), extension.trim_ascii_end())
+    }
+
+    fn segment(&self) -> Option<LogName> {
+        let (base, extension) = self.parts();
+        LogName::from_short(base, extension)
+    }
+
     fn name(&self) -> String {
         // Only what is safe in a path of this PC.
         let safe = |bytes: &[u8]| -> String {
             let keep = |byte: &u8| byte.is_ascii_alphanumeric() || b"_-~".contains(byte);
             bytes.iter().map(|byte| if keep(byte) { char::from(*byte) } else { '_' }).collect()
         };
-        match self.extension.as_slice() {
-            [] => safe(&self.base),
-            extension => format!("{}.{}", safe(&self.base), safe(extension)),
+        match self.parts() {
+            (base, []) => safe(base),
+            (base, extension) => format!("{}.{}", safe(base), safe(extension)),
         }
     }
-}
-
-/// Reads all of `buffer` from this place; what lies beyond the image's end reads as zeros (a cut image).
-pub fn read_at(mut image: &File, start: u64, buffer: &mut [u8]) -> io::Result<()> {
-    image.seek(SeekFrom::Start(start))?;
-    let mut filled = 0;
-    while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
-        match image.read(rest) {
-            Ok(0) => {
-                rest.fill(0);
-                return Ok(());
-            }
-            Ok(got) => filled += got,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
 }

@@ -285,16 +285,14 @@ fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
 }
 
 fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
-    let mut sessions: BTreeMap<u32, Vec<(LogName, &CardFile)>> = BTreeMap::new();
+    let mut sessions: BTreeMap<u32, Vec<&CardFile>> = BTreeMap::new();
     for file in files {
-        if let Some(name) = LogName::from_short(&file.base, &file.extension) {
-            sessions.entry(name.session).or_default().push((name, file));
-        }
+        sessions.entry(file.name.session).or_default().push(file);
     }
-    let log = |(session, mut segments): (u32, Vec<(LogName, &CardFile)>)| {
-        segments.sort_by_key(|(name, _)| *name);
-        let extents = segments.iter().flat_map(|(_, file)| file.extents.iter().copied()).collect();
-        let files = segments.iter().map(|(_, file)| file.path.clone()).collect();
+    let log = |(session, mut segments): (u32, Vec<&CardFile>)| {
+        segments.sort_by_key(|file| file.name);
+        let extents = segments.iter().flat_map(|file| file.extents.iter().copied()).collect();
+        let files = segments.iter().map(|file| file.path.clone()).collect();
         let pieces = vec![Piece { path: path.to_owned(), extents }];
         Log { name: format!("{session:05}"), files, pieces, session: None }
     };

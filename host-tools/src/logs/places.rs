@@ -1,12 +1,11 @@
 //! A log as a list of places, and the blocks that are there, streamed.
 
 use std::fs::File;
-use std::io;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
-use super::fat::{self, Extent};
+use super::fat::{Extent, ReadAt as _};
 
 /// Bytes of a block: a sector of the log.
 pub const BLOCK_BYTES: usize = 512;
@@ -100,14 +99,10 @@ impl Blocks<'_> {
             self.buffer.clear();
             self.buffer.resize((length as usize).next_multiple_of(BLOCK_BYTES), 0);
             let bytes = self.buffer.get_mut(..length as usize).unwrap_or_default();
-            read(file, extent.start + self.offset, bytes).with_context(context)?;
+            file.read_at(extent.start + self.offset, bytes).with_context(context)?;
             self.offset += length;
             self.at = 0;
             return Ok(true);
         }
     }
-}
-
-fn read(file: &File, start: u64, bytes: &mut [u8]) -> io::Result<()> {
-    fat::read_at(file, start, bytes)
 }

@@ -1,4 +1,4 @@
-//! A card that takes every sector: for the tests, the example `sizes` and the fuzz target `round_trip`.
+//! A card that takes every sector: for the tests and the example `sizes`.
 
 use hums_blackbox::{Sector, SectorSink};
 
