@@ -1,0 +1,99 @@
+//! The fields of messages that the mapping needs, found once for a subscription.
+
+use super::format::{Layout, Number};
+use super::message::words;
+
+/// Where a field that the mapping needs is in the data of a message.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slot {
+    number: Number,
+    offset: u32,
+    count: u32,
+}
+
+/// Where these fields are.
+pub(super) fn slots(layout: &Layout, fields: &[&str]) -> Vec<Option<Slot>> {
+    let slot = |name: &&str| {
+        let field = layout.fields.iter().find(|field| field.name == **name)?;
+        Some(Slot { number: field.number, offset: field.offset, count: field.array.unwrap_or(1) })
+    };
+    fields.iter().map(slot).collect()
+}
+
+/// The fields of a message that the mapping needs, by their places in [`Topic::fields`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fields<'a> {
+    slots: &'a [Option<Slot>],
+    data: &'a [u8],
+}
+
+impl<'a> Fields<'a> {
+    pub(super) fn new(slots: &'a [Option<Slot>], data: &'a [u8]) -> Self {
+        Self { slots, data }
+    }
+
+    /// An element of a field; `None` where this version of PX4 does not have it.
+    pub(super) fn element(&self, field: usize, element: usize) -> Option<f64> {
+        let slot = (*self.slots.get(field)?)?;
+        if element >= slot.count as usize {
+            return None;
+        }
+        let bytes = slot.number.bytes();
+        let at = slot.offset as usize + element * bytes;
+        let bytes = self.data.get(at..at + bytes)?;
+        Some(match slot.number {
+            Number::I8 => f64::from(i8::from_le_bytes(bytes.try_into().ok()?)),
+            Number::U8 | Number::Bool | Number::Char => f64::from(*bytes.first()?),
+            Number::I16 => f64::from(i16::from_le_bytes(bytes.try_into().ok()?)),
+            Number::U16 => f64::from(u16::from_le_bytes(bytes.try_into().ok()?)),
+            Number::I32 => f64::from(i32::from_le_bytes(bytes.try_into().ok()?)),
+            Number::U32 => f64::from(u32::from_le_bytes(bytes.try_into().ok()?)),
+            Number::I64 => i64::from_le_bytes(bytes.try_into().ok()?) as f64,
+            Number::U64 => u64::from_le_bytes(bytes.try_into().ok()?) as f64,
+            Number::F32 => f64::from(f32::from_le_bytes(bytes.try_into().ok()?)),
+            Number::F64 => f64::from_le_bytes(bytes.try_into().ok()?),
+        })
+    }
+
+    pub(super) fn get(&self, field: usize) -> Option<f64> {
+        self.element(field, 0)
+    }
+
+    /// A number that is one.
+    pub(super) fn finite(&self, field: usize) -> Option<f32> {
+        self.get(field).map(|value| value as f32).filter(|value| value.is_finite())
+    }
+
+    /// An integer that is not negative.
+    pub(super) fn count(&self, field: usize) -> Option<u64> {
+        self.get(field).filter(|value| *value >= 0.0).map(|value| value as u64)
+    }
+
+    /// A byte.
+    pub(super) fn byte(&self, field: usize) -> Option<u8> {
+        self.count(field).and_then(|value| u8::try_from(value).ok())
+    }
+
+    /// Whether a flag is set; `false` where there is none.
+    pub(super) fn flag(&self, field: usize) -> bool {
+        self.get(field).is_some_and(|value| value != 0.0)
+    }
+
+    /// All elements, if all are numbers.
+    pub(super) fn vector<const N: usize>(&self, field: usize) -> Option<[f32; N]> {
+        let mut vector = [0.0; N];
+        for (element, value) in vector.iter_mut().enumerate() {
+            *value =
+                self.element(field, element).map(|value| value as f32).filter(|value| value.is_finite())?;
+        }
+        Some(vector)
+    }
+
+    /// Words.
+    pub(super) fn words(&self, field: usize) -> Option<&'a str> {
+        let slot = (*self.slots.get(field)?)?;
+        let at = slot.offset as usize;
+        let bytes = self.data.get(at..at + slot.count as usize)?;
+        (slot.number == Number::Char).then(|| words(bytes))
+    }
+}

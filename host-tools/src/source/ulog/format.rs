@@ -1,0 +1,419 @@
+//! Format definitions, and what they make of the bytes of a message.
+//!
+//! A definition (`vehicle_attitude:uint64_t timestamp;float[4] q;`) may name other definitions as types of its fields,
+//! also such that come after it. [`Formats::layout`] resolves one to its numbers: a flat list of fields, each with its
+//! place. The limits are there because a file may say anything: a definition that names itself, a thousand that name
+//! each other, an array of four billion. What PX4 logs stays far below each.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+
+/// Definitions in one log at most. PX4 has some 250.
+const FORMATS_MAX: usize = 1_024;
+/// Bytes of all definitions at most: PX4's are some 60 KiB.
+const TEXT_BYTES_MAX: usize = 1 << 20;
+/// How deep definitions may name each other. PX4's deepest is 2.
+const DEPTH_MAX: usize = 8;
+/// Bytes of one message at most: its length is a `u16`, and two are the subscription's number.
+const MESSAGE_BYTES_MAX: usize = u16::MAX as usize - 2;
+/// Fields of all resolved definitions at most, each element of an array of definitions counted. PX4: some 6,000.
+const FIELDS_MAX: usize = 32_768;
+
+/// A type of number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Number {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+    Bool,
+    Char,
+}
+
+impl Number {
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "int8_t" => Self::I8,
+            "uint8_t" => Self::U8,
+            "int16_t" => Self::I16,
+            "uint16_t" => Self::U16,
+            "int32_t" => Self::I32,
+            "uint32_t" => Self::U32,
+            "int64_t" => Self::I64,
+            "uint64_t" => Self::U64,
+            "float" => Self::F32,
+            "double" => Self::F64,
+            "bool" => Self::Bool,
+            "char" => Self::Char,
+            _ => return None,
+        })
+    }
+
+    pub(super) const fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 | Self::Bool | Self::Char => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+}
+
+/// A number, or an array of them, in a message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Field {
+    /// Its name with those of the definitions around it: `esc[3].esc_rpm`.
+    pub(super) name: String,
+    pub(super) number: Number,
+    /// How many, where it is an array.
+    pub(super) array: Option<u32>,
+    /// Where it begins in the message's data.
+    pub(super) offset: u32,
+}
+
+/// A definition, resolved.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub(super) name: String,
+    /// Without padding, in order of their places.
+    pub(super) fields: Vec<Field>,
+    /// Bytes of its data.
+    pub(super) bytes: usize,
+    /// The same without the padding at its end, which a writer leaves out.
+    pub(super) least_bytes: usize,
+    /// Where its time is.
+    pub(super) timestamp: Option<u32>,
+}
+
+/// Why a definition is of no use.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum FormatError {
+    /// It does not read `name:type field;`.
+    Malformed,
+    /// There are too many already.
+    TooMany,
+    /// It is there already, and says something else.
+    Redefined(String),
+    /// There is none of this name.
+    Unknown(String),
+    /// Definitions that name each other deeper than [`DEPTH_MAX`], or in a circle.
+    TooDeep(String),
+    /// A message of it would be longer than any message.
+    TooLong(String),
+}
+
+impl fmt::Display for FormatError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Malformed => f.write_str("a format definition that does not read `name:type field;`"),
+            Self::TooMany => write!(f, "more than {FORMATS_MAX} format definitions or {FIELDS_MAX} fields"),
+            Self::Redefined(name) => write!(f, "another format definition of {name}"),
+            Self::Unknown(name) => write!(f, "no format definition of {name}"),
+            Self::TooDeep(name) => {
+                write!(f, "format definitions nested deeper than {DEPTH_MAX}, or in a circle, from {name} on")
+            }
+            Self::TooLong(name) => {
+                write!(f, "the format of {name} is longer than a message can be ({MESSAGE_BYTES_MAX} bytes)")
+            }
+        }
+    }
+}
+
+impl std::error::Error for FormatError {}
+
+/// A field as it is written down.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Written {
+    kind: String,
+    array: Option<u32>,
+    name: String,
+}
+
+/// The definitions of a log.
+#[derive(Debug)]
+pub(super) struct Formats {
+    written: HashMap<String, Vec<Written>>,
+    layouts: HashMap<String, Result<Arc<Layout>, FormatError>>,
+    text_bytes: usize,
+    /// Fields that there is room for.
+    left: usize,
+}
+
+impl Default for Formats {
+    fn default() -> Self {
+        Self { written: HashMap::new(), layouts: HashMap::new(), text_bytes: 0, left: FIELDS_MAX }
+    }
+}
+
+impl Formats {
+    /// Takes a definition. The same one again is no harm.
+    pub(super) fn define(&mut self, text: &[u8]) -> Result<(), FormatError> {
+        let (name, fields) = parse(text).ok_or(FormatError::Malformed)?;
+        if let Some(known) = self.written.get(name) {
+            return if *known == fields { Ok(()) } else { Err(FormatError::Redefined(name.to_owned())) };
+        }
+        self.text_bytes += text.len();
+        if self.written.len() >= FORMATS_MAX || self.text_bytes > TEXT_BYTES_MAX {
+            return Err(FormatError::TooMany);
+        }
+        self.written.insert(name.to_owned(), fields);
+        // What was not there may be there now.
+        self.layouts.retain(|_, layout| layout.is_ok());
+        Ok(())
+    }
+
+    /// The resolved definition of this name. Each is resolved once.
+    pub(super) fn layout(&mut self, name: &str) -> Result<Arc<Layout>, FormatError> {
+        if let Some(known) = self.layouts.get(name) {
+            return known.clone();
+        }
+        let layout = self.resolve(name);
+        // Names of the world that resolve to nothing are not kept: there may be 65,536 of them.
+        if self.written.contains_key(name) {
+            self.layouts.insert(name.to_owned(), layout.clone());
+        }
+        layout
+    }
+
+    fn resolve(&mut self, name: &str) -> Result<Arc<Layout>, FormatError> {
+        let mut walk = Walk { formats: self, fields: Vec::new(), bytes: 0, left: self.left };
+        let result = walk.definition(name, "", 0);
+        // What it took counts whether it came to something or not.
+        let Walk { fields, bytes, left, .. } = walk;
+        self.left = left;
+        result?;
+        let padding = self
+            .written
+            .get(name)
+            .and_then(|fields| fields.last())
+            .filter(|last| last.name.starts_with("_padding"))
+            .and_then(|last| Some(Number::named(&last.kind)?.bytes() * last.array.unwrap_or(1) as usize))
+            .unwrap_or(0);
+        let timestamp = fields
+            .iter()
+            .find(|field| field.name == "timestamp" && field.number == Number::U64 && field.array.is_none())
+            .map(|field| field.offset);
+        let least_bytes = bytes.saturating_sub(padding);
+        Ok(Arc::new(Layout { name: name.to_owned(), fields, bytes, least_bytes, timestamp }))
+    }
+}
+
+/// Goes through a definition and those that it names.
+struct Walk<'a> {
+    formats: &'a Formats,
+    fields: Vec<Field>,
+    bytes: usize,
+    /// Fields that there is room for.
+    left: usize,
+}
+
+impl Walk<'_> {
+    fn definition(&mut self, name: &str, prefix: &str, depth: usize) -> Result<(), FormatError> {
+        if depth >= DEPTH_MAX {
+            return Err(FormatError::TooDeep(name.to_owned()));
+        }
+        let formats = self.formats;
+        let written = formats.written.get(name).ok_or_else(|| FormatError::Unknown(name.to_owned()))?;
+        for field in written {
+            self.take(1)?;
+            let path = format!("{prefix}{}", field.name);
+            if let Some(number) = Number::named(&field.kind) {
+                self.number(name, field, path, number)?;
+                continue;
+            }
+            match field.array {
+                None => self.definition(&field.kind, &format!("{path}."), depth + 1)?,
+                // Each element has a byte at least, so this ends at the longest message.
+                Some(count) => (0..count).try_for_each(|element| {
+                    self.definition(&field.kind, &format!("{path}[{element}]."), depth + 1)
+                })?,
+            }
+        }
+        Ok(())
+    }
+
+    fn number(
+        &mut self,
+        within: &str,
+        field: &Written,
+        path: String,
+        number: Number,
+    ) -> Result<(), FormatError> {
+        let offset = self.bytes as u32;
+        let bytes = number.bytes().saturating_mul(field.array.unwrap_or(1) as usize);
+        self.bytes = self.bytes.saturating_add(bytes);
+        if self.bytes > MESSAGE_BYTES_MAX {
+            return Err(FormatError::TooLong(within.to_owned()));
+        }
+        if field.name.starts_with("_padding") {
+            return Ok(());
+        }
+        // An array has a column for each element.
+        self.take(if number == Number::Char { 0 } else { field.array.unwrap_or(1) as usize - 1 })?;
+        self.fields.push(Field { name: path, number, array: field.array, offset });
+        Ok(())
+    }
+
+    fn take(&mut self, fields: usize) -> Result<(), FormatError> {
+        self.left = self.left.checked_sub(fields).ok_or(FormatError::TooMany)?;
+        Ok(())
+    }
+}
+
+fn is_name(text: &str) -> bool {
+    !text.is_empty()
+        && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-' | b'/'))
+}
+
+fn parse(text: &[u8]) -> Option<(&str, Vec<Written>)> {
+    let (name, fields) = std::str::from_utf8(text).ok()?.split_once(':')?;
+    if !is_name(name) || Number::named(name).is_some() {
+        return None;
+    }
+    let written: Vec<Written> =
+        fields.split(';').filter(|field| !field.is_empty()).map(written).collect::<Option<_>>()?;
+    (!written.is_empty()).then_some((name, written))
+}
+
+/// An array has an element at least: one without would make a definition of nothing.
+fn written(field: &str) -> Option<Written> {
+    let (kind, name) = typed(field)?;
+    let (kind, array) = kind;
+    if array == Some(0) {
+        return None;
+    }
+    Some(Written { kind: kind.to_owned(), array, name: name.to_owned() })
+}
+
+/// `type name` or `type[count] name`, as fields and the keys of values are written. PX4 writes empty lines as `char[0]`.
+pub(super) fn typed(text: &str) -> Option<((&str, Option<u32>), &str)> {
+    let (kind, name) = text.split_once(' ')?;
+    if !is_name(name) {
+        return None;
+    }
+    let (kind, array) = match kind.split_once('[') {
+        None => (kind, None),
+        Some((kind, count)) => {
+            let count: u32 = count.strip_suffix(']')?.parse().ok()?;
+            (kind, Some(count))
+        }
+    };
+    is_name(kind).then_some(((kind, array), name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn formats(texts: &[&str]) -> Formats {
+        let mut formats = Formats::default();
+        for text in texts {
+            formats.define(text.as_bytes()).expect("a definition");
+        }
+        formats
+    }
+
+    fn fields(layout: &Layout) -> Vec<(&str, u32)> {
+        layout.fields.iter().map(|field| (field.name.as_str(), field.offset)).collect()
+    }
+
+    #[test]
+    fn a_definition_may_name_one_that_comes_after_it() {
+        let mut formats = formats(&[
+            "a:uint64_t timestamp;b[2] each;b one;uint8_t[3] _padding0;",
+            "b:float[2] x;uint8_t y;uint8_t[3] _padding0;",
+        ]);
+        let layout = formats.layout("a").expect("resolved");
+        assert_eq!(
+            fields(&layout),
+            [
+                ("timestamp", 0),
+                ("each[0].x", 8),
+                ("each[0].y", 16),
+                ("each[1].x", 20),
+                ("each[1].y", 28),
+                ("one.x", 32),
+                ("one.y", 40)
+            ]
+        );
+        // The padding within counts; that at the end may be left out.
+        assert_eq!((layout.bytes, layout.least_bytes, layout.timestamp), (47, 44, Some(0)));
+    }
+
+    #[test]
+    fn a_circle_and_a_thousand_levels_are_refused_with_a_name() {
+        let mut circle = formats(&["a:b x;", "b:a x;"]);
+        assert!(matches!(circle.layout("a"), Err(FormatError::TooDeep(_))));
+        let mut itself = formats(&["a:a[200] x;uint8_t y;"]);
+        assert!(matches!(itself.layout("a"), Err(FormatError::TooDeep(_))));
+        let texts: Vec<String> = (0..1_000).map(|level| format!("n{level}:n{} x;", level + 1)).collect();
+        let mut deep = formats(&texts.iter().map(String::as_str).collect::<Vec<_>>());
+        assert!(matches!(deep.layout("n0"), Err(FormatError::TooDeep(_))));
+        assert!(matches!(deep.layout("n999"), Err(FormatError::Unknown(name)) if name == "n1000"));
+    }
+
+    #[test]
+    fn lengths_of_gigabytes_take_neither_time_nor_memory() {
+        for text in ["a:uint8_t[4294967295] x;", "a:double[4294967295] x;", "a:b[4294967295] x;"] {
+            let mut formats = formats(&[text, "b:uint8_t y;"]);
+            assert!(
+                matches!(formats.layout("a"), Err(FormatError::TooLong(_) | FormatError::TooMany)),
+                "{text}"
+            );
+        }
+        // Ten to the eighth, level by level.
+        let texts: Vec<String> = (0..7).map(|level| format!("n{level}:n{}[15] x;", level + 1)).collect();
+        let mut wide = formats(&texts.iter().map(String::as_str).collect::<Vec<_>>());
+        wide.define(b"n7:uint8_t[255] _padding;").expect("a definition");
+        assert!(matches!(wide.layout("n0"), Err(FormatError::TooLong(_))));
+    }
+
+    #[test]
+    fn all_layouts_together_have_a_limit() {
+        let mut formats = Formats::default();
+        for number in 0..100 {
+            formats.define(format!("a{number}:uint8_t[1000] x;").as_bytes()).expect("a definition");
+        }
+        let resolved = (0..100).filter(|number| formats.layout(&format!("a{number}")).is_ok()).count();
+        assert_eq!(resolved, FIELDS_MAX / 1_000);
+    }
+
+    #[test]
+    fn what_is_no_definition_is_refused() {
+        for text in [
+            "",
+            "a",
+            ":",
+            "a:",
+            "a:float",
+            "a:float;",
+            "a:[3] x;",
+            "a:float[0] x;",
+            "a:float[x] y;",
+            "a:float[3 x;",
+            "float:float x;",
+            "a b:float x;",
+            "a:float[-1] x;",
+            "a:float x y;",
+            "a:float[99999999999] x;",
+            "\u{e9}:float x;",
+        ] {
+            assert_eq!(Formats::default().define(text.as_bytes()), Err(FormatError::Malformed), "{text:?}");
+        }
+        assert_eq!(Formats::default().define(&[0xff, b':']), Err(FormatError::Malformed));
+    }
+
+    #[test]
+    fn a_second_definition_of_a_name_does_not_replace_the_first() {
+        let mut formats = formats(&["a:float x;", "a:float x;"]);
+        assert_eq!(formats.define(b"a:double x;"), Err(FormatError::Redefined("a".to_owned())));
+        assert_eq!(formats.layout("a").expect("resolved").bytes, 4);
+    }
+}

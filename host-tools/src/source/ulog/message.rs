@@ -1,0 +1,323 @@
+//! Messages: three bytes of header (length, kind), and what follows.
+//!
+//! `ULog` has no checksum, so a message is believed by what it says: each kind has lengths and contents that it can have,
+//! and where those leave room for doubt, the header after it has to be one as well ([`Parser::look`]). Where nothing can be
+//! believed, the next place is searched at which a message can ([`Parser::find`]): the synchronisation message that the logger
+//! writes twice a second is one of them.
+
+use super::format::{Number, typed};
+
+/// Length and kind.
+pub(super) const HEADER_BYTES: usize = 3;
+/// The longest message.
+pub(super) const MESSAGE_BYTES_MAX: usize = HEADER_BYTES + u16::MAX as usize;
+/// The file's header: magic, version, and the time at which logging began.
+pub(super) const FILE_HEADER_BYTES: usize = 16;
+/// How a file begins.
+pub(super) const MAGIC: [u8; 7] = [b'U', b'L', b'o', b'g', 0x01, 0x12, 0x35];
+/// The longest message other than data that is looked for in damage: each byte may be the beginning of one, and to look
+/// through 65,536 bytes for each would take seconds a megabyte.
+const FOUND_BYTES_MAX: usize = 2_048;
+/// What a synchronisation message holds.
+const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
+
+/// A message, as it stands in the input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Message<'a> {
+    /// `B`: what a reader must know, and where more was appended.
+    Flags { incompatible: [u8; 8], appended: [u64; 3] },
+    /// `F`
+    Format(&'a [u8]),
+    /// `I`, and `M` where `multiple`.
+    Information { value: Keyed<'a>, multiple: bool },
+    /// `P`
+    Parameter(Keyed<'a>),
+    /// `Q`, with its groups: 1 system-wide, 2 of the configuration.
+    Default { groups: u8, value: Keyed<'a> },
+    /// `A`
+    Subscribe { id: u16, instance: u8, name: &'a str },
+    /// `R`
+    Unsubscribe(u16),
+    /// `D`
+    Data { id: u16, data: &'a [u8] },
+    /// `L` and `C`
+    Text { level: u8, time_us: u64, words: &'a [u8] },
+    /// `O`, milliseconds.
+    Dropout(u16),
+    /// `S`
+    Sync,
+    /// Another log begins: the header of a file in the middle of one.
+    Beginning { time_us: u64 },
+    /// A kind that is newer than this reader.
+    Unknown,
+}
+
+/// A value with its type and name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Keyed<'a> {
+    pub(super) name: &'a str,
+    pub(super) number: Option<Number>,
+    pub(super) array: Option<u32>,
+    pub(super) value: &'a [u8],
+}
+
+impl<'a> Keyed<'a> {
+    fn of(body: &'a [u8]) -> Option<Self> {
+        let (&key_bytes, rest) = body.split_first()?;
+        let (key, value) = rest.split_at_checked(usize::from(key_bytes))?;
+        let ((kind, array), name) = typed(std::str::from_utf8(key).ok()?)?;
+        Some(Self { name, number: Number::named(kind), array, value })
+    }
+
+    /// Whether the value is as long as its type says.
+    fn fits(&self) -> bool {
+        self.number
+            .is_some_and(|number| number.bytes() * self.array.unwrap_or(1) as usize == self.value.len())
+    }
+
+    /// A single number.
+    pub(super) fn number(&self) -> Option<f64> {
+        if self.array.is_some() {
+            return None;
+        }
+        let value = self.value;
+        Some(match self.number? {
+            Number::I8 => f64::from(i8::from_le_bytes(value.try_into().ok()?)),
+            Number::U8 | Number::Bool | Number::Char => f64::from(u8::from_le_bytes(value.try_into().ok()?)),
+            Number::I16 => f64::from(i16::from_le_bytes(value.try_into().ok()?)),
+            Number::U16 => f64::from(u16::from_le_bytes(value.try_into().ok()?)),
+            Number::I32 => f64::from(i32::from_le_bytes(value.try_into().ok()?)),
+            Number::U32 => f64::from(u32::from_le_bytes(value.try_into().ok()?)),
+            Number::I64 => i64::from_le_bytes(value.try_into().ok()?) as f64,
+            Number::U64 => u64::from_le_bytes(value.try_into().ok()?) as f64,
+            Number::F32 => f64::from(f32::from_le_bytes(value.try_into().ok()?)),
+            Number::F64 => f64::from_le_bytes(value.try_into().ok()?),
+        })
+    }
+
+    /// Words.
+    pub(super) fn words(&self) -> Option<&'a str> {
+        (self.number == Some(Number::Char)).then(|| words(self.value))
+    }
+}
+
+/// The text at the beginning of some bytes: up to the first NUL or the first byte that is no UTF-8.
+pub(super) fn words(bytes: &[u8]) -> &str {
+    let bytes = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
+    bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid())
+}
+
+/// What stands at the beginning of some bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Found<'a> {
+    /// A message, and its bytes with the header.
+    Message(Message<'a>, usize),
+    /// The input ends within a message.
+    Cut,
+    /// Nothing that can be believed.
+    Nothing,
+}
+
+/// Whether messages of data have the length that their subscription says: `Some(true)` or `Some(false)`; `None` where
+/// there is no such subscription.
+pub(super) type Fits<'a> = dyn Fn(u16, usize) -> Option<bool> + 'a;
+
+/// Tells messages from what is none.
+pub(super) struct Parser<'a> {
+    pub(super) fits: &'a Fits<'a>,
+}
+
+/// How far a message can be believed.
+enum Belief<'a> {
+    /// Its contents are such that chance does not make them.
+    Sure(Message<'a>),
+    /// It could be one, if the next one is.
+    Likely(Message<'a>),
+    /// It cannot be one.
+    Not,
+}
+
+impl Parser<'_> {
+    /// What stands at the beginning of `rest`, which is all there is if it is shorter than the longest message and the
+    /// header after it.
+    pub(super) fn look<'a>(&self, rest: &'a [u8]) -> Found<'a> {
+        if let Some(time_us) = beginning(rest) {
+            return Found::Message(Message::Beginning { time_us }, FILE_HEADER_BYTES);
+        }
+        let Some((kind, body_bytes)) = header(rest) else {
+            // Less than a header at the end is a message that was cut.
+            let cut = rest.len() < HEADER_BYTES && rest.iter().any(|&byte| byte != 0);
+            return if cut { Found::Cut } else { Found::Nothing };
+        };
+        let bytes = HEADER_BYTES + body_bytes;
+        let Some(body) = rest.get(HEADER_BYTES..bytes) else {
+            return if could_be(kind, body_bytes) { Found::Cut } else { Found::Nothing };
+        };
+        match self.believe(kind, body) {
+            Belief::Sure(message) => Found::Message(message, bytes),
+            Belief::Likely(message) if self.goes_on(rest.get(bytes..).unwrap_or_default()) => {
+                Found::Message(message, bytes)
+            }
+            _ => Found::Nothing,
+        }
+    }
+
+    /// Where in `rest`, from `from` on, the next message begins that can be believed. `Err` is how many bytes are certain
+    /// to begin none: all, if `rest` is the last there is, or else all but the longest message.
+    pub(super) fn find(&self, rest: &[u8], from: usize, last: bool) -> Result<usize, usize> {
+        let end = if last { rest.len() } else { rest.len().saturating_sub(MESSAGE_BYTES_MAX + HEADER_BYTES) };
+        (from..end).find(|&at| self.begins(rest.get(at..).unwrap_or_default())).ok_or(end)
+    }
+
+    fn begins(&self, rest: &[u8]) -> bool {
+        if beginning(rest).is_some() {
+            return true;
+        }
+        let Some((kind, body_bytes)) = header(rest).filter(|&(kind, bytes)| could_be(kind, bytes)) else {
+            return false;
+        };
+        if kind != b'D' && body_bytes > FOUND_BYTES_MAX {
+            return false;
+        }
+        let bytes = HEADER_BYTES + body_bytes;
+        let Some(body) = rest.get(HEADER_BYTES..bytes) else { return false };
+        match self.believe(kind, body) {
+            Belief::Sure(Message::Sync | Message::Data { .. }) => true,
+            Belief::Sure(_) => self.goes_on(rest.get(bytes..).unwrap_or_default()),
+            Belief::Likely(_) | Belief::Not => false,
+        }
+    }
+
+    /// Whether a message, the header of one, or nothing at all stands here.
+    fn goes_on(&self, rest: &[u8]) -> bool {
+        if rest.is_empty() || beginning(rest).is_some() {
+            return true;
+        }
+        header(rest).map_or(rest.len() < HEADER_BYTES, |(kind, bytes)| {
+            let known = rest
+                .get(HEADER_BYTES..HEADER_BYTES + 2)
+                .filter(|_| kind == b'D')
+                .and_then(|id| (self.fits)(u16::from_le_bytes(id.try_into().ok()?), bytes - 2));
+            could_be(kind, bytes) && known != Some(false)
+        })
+    }
+
+    fn believe<'a>(&self, kind: u8, body: &'a [u8]) -> Belief<'a> {
+        if !could_be(kind, body.len()) {
+            // Kinds that are newer than this reader are to be ignored, says the format: letters, by all that came.
+            let newer = kind.is_ascii_alphabetic() && !KINDS.contains(&kind) && !body.is_empty();
+            return if newer { Belief::Likely(Message::Unknown) } else { Belief::Not };
+        }
+        self.parse(kind, body).unwrap_or(Belief::Not)
+    }
+
+    fn parse<'a>(&self, kind: u8, body: &'a [u8]) -> Option<Belief<'a>> {
+        let fitting = |message, value: &Keyed<'a>| {
+            if value.fits() { Belief::Sure(message) } else { Belief::Likely(message) }
+        };
+        Some(match kind {
+            b'B' => Belief::Likely(flags(body)?),
+            b'F' => {
+                std::str::from_utf8(body).ok()?;
+                let message = Message::Format(body);
+                if body.contains(&b':') && body.ends_with(b";") {
+                    Belief::Sure(message)
+                } else {
+                    Belief::Likely(message)
+                }
+            }
+            b'I' => {
+                let value = Keyed::of(body)?;
+                fitting(Message::Information { value, multiple: false }, &value)
+            }
+            b'M' => {
+                let value = Keyed::of(body.get(1..)?)?;
+                fitting(Message::Information { value, multiple: true }, &value)
+            }
+            b'P' => {
+                let value = Keyed::of(body)?;
+                fitting(Message::Parameter(value), &value)
+            }
+            b'Q' => {
+                let (&groups, rest) = body.split_first()?;
+                let value = Keyed::of(rest)?;
+                fitting(Message::Default { groups, value }, &value)
+            }
+            b'A' => {
+                let (&[instance, low, high], name) = body.split_first_chunk::<3>()?;
+                let name = std::str::from_utf8(name).ok()?;
+                let message = Message::Subscribe { id: u16::from_le_bytes([low, high]), instance, name };
+                let letters = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_-/".contains(&byte));
+                if letters { Belief::Sure(message) } else { Belief::Not }
+            }
+            b'R' => Belief::Likely(Message::Unsubscribe(u16::from_le_bytes(body.try_into().ok()?))),
+            b'D' => {
+                let (&id, data) = body.split_first_chunk::<2>()?;
+                let id = u16::from_le_bytes(id);
+                match (self.fits)(id, data.len()) {
+                    Some(true) => Belief::Sure(Message::Data { id, data }),
+                    Some(false) => Belief::Not,
+                    None => Belief::Likely(Message::Data { id, data }),
+                }
+            }
+            b'L' | b'C' => text(kind, body)?,
+            b'O' => Belief::Likely(Message::Dropout(u16::from_le_bytes(body.try_into().ok()?))),
+            b'S' if body == SYNC => Belief::Sure(Message::Sync),
+            _ => Belief::Not,
+        })
+    }
+}
+
+/// The kinds of message that there are.
+const KINDS: [u8; 13] = *b"BFIMPQARDLCSO";
+
+/// Whether a message of this kind can be so long.
+fn could_be(kind: u8, bytes: usize) -> bool {
+    match kind {
+        b'B' => (40..=1_024).contains(&bytes),
+        b'F' | b'I' | b'P' => bytes >= 5,
+        b'M' | b'Q' => bytes >= 6,
+        // Names of topics.
+        b'A' => (4..=256).contains(&bytes),
+        b'R' | b'O' => bytes == 2,
+        b'D' => bytes >= 2,
+        b'L' => bytes >= 9,
+        b'C' => bytes >= 11,
+        b'S' => bytes == SYNC.len(),
+        _ => false,
+    }
+}
+
+/// Kind, and length of what follows.
+fn header(rest: &[u8]) -> Option<(u8, usize)> {
+    let &[low, high, kind] = rest.first_chunk::<HEADER_BYTES>()?;
+    Some((kind, usize::from(u16::from_le_bytes([low, high]))))
+}
+
+/// The time in the header of a file, where one stands.
+pub(super) fn beginning(rest: &[u8]) -> Option<u64> {
+    let header = rest.first_chunk::<FILE_HEADER_BYTES>()?;
+    header.starts_with(&MAGIC).then(|| word(header.get(8..)))
+}
+
+fn word(bytes: Option<&[u8]>) -> u64 {
+    bytes.and_then(|bytes| bytes.first_chunk()).map_or(0, |word| u64::from_le_bytes(*word))
+}
+
+fn flags<'a>(body: &[u8]) -> Option<Message<'a>> {
+    let incompatible = *body.get(8..)?.first_chunk()?;
+    let appended = [16, 24, 32].map(|at| word(body.get(at..)));
+    Some(Message::Flags { incompatible, appended })
+}
+
+/// A level is a digit; words are words.
+fn text(kind: u8, body: &[u8]) -> Option<Belief<'_>> {
+    let (&level, rest) = body.split_first()?;
+    let level = level.checked_sub(b'0').filter(|level| *level < 8)?;
+    let rest = if kind == b'C' { rest.get(2..)? } else { rest };
+    let (time, words) = rest.split_first_chunk()?;
+    let message = Message::Text { level, time_us: u64::from_le_bytes(*time), words };
+    let plain = std::str::from_utf8(words)
+        .is_ok_and(|words| !words.contains(|letter: char| letter < ' ' && !"\n\r\t\u{1b}".contains(letter)));
+    Some(if plain && !words.is_empty() { Belief::Sure(message) } else { Belief::Likely(message) })
+}

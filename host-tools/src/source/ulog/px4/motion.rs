@@ -1,0 +1,378 @@
+//! How the vehicle moves, and how well its estimator knows that.
+
+use hums_core::observation::{
+    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition, Observation,
+    Vibration, VibrationScale,
+};
+use hums_core::units::{
+    Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    RadiansPerSecond,
+};
+
+use super::{FAST_US, MEDIUM_US, Px4, Said, Topic};
+
+pub(super) const TOPICS: &[Topic] = &[
+    Topic {
+        name: "sensor_combined",
+        instances: 1,
+        every_us: FAST_US,
+        fields: &["accelerometer_m_s2", "gyro_rad"],
+        take: imu,
+    },
+    Topic {
+        name: "vehicle_acceleration",
+        instances: 1,
+        every_us: FAST_US,
+        fields: &["xyz"],
+        take: acceleration,
+    },
+    Topic {
+        name: "vehicle_angular_velocity",
+        instances: 1,
+        every_us: FAST_US,
+        fields: &["xyz"],
+        take: |px4, said| px4.motion.rate = said.fields.vector(0),
+    },
+    Topic {
+        name: "vehicle_air_data",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["baro_pressure_pa", "ambient_temperature", "baro_temp_celcius", "baro_alt_meter"],
+        take: air,
+    },
+    Topic { name: "vehicle_attitude", instances: 1, every_us: FAST_US, fields: &["q"], take: attitude },
+    Topic {
+        name: "vehicle_local_position",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &[
+            "x",
+            "y",
+            "z",
+            "vx",
+            "vy",
+            "vz",
+            "z_valid",
+            "z_global",
+            "v_z_valid",
+            "ref_alt",
+            "heading",
+            "yaw",
+        ],
+        take: local_position,
+    },
+    Topic {
+        name: "vehicle_global_position",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["lat", "lon", "alt"],
+        take: global_position,
+    },
+    Topic {
+        name: "home_position",
+        instances: 1,
+        every_us: 0,
+        fields: &["alt", "z", "valid_alt"],
+        take: home,
+    },
+    Topic {
+        name: "airspeed_validated",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["calibrated_airspeed_m_s", "equivalent_airspeed_m_s"],
+        take: airspeed_validated,
+    },
+    Topic {
+        name: "airspeed",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["indicated_airspeed_m_s"],
+        take: airspeed,
+    },
+    Topic {
+        name: "vehicle_thrust_setpoint",
+        instances: 2,
+        every_us: MEDIUM_US,
+        fields: &["xyz"],
+        take: |px4, said| {
+            let length = said.fields.vector::<3>(0).map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
+            px4.motion.set_thrust(said.instance, length);
+        },
+    },
+    // Until v1.13 the throttle is the fourth control of a group: of the rotors, and of a VTOL's plane.
+    Topic {
+        name: "actuator_controls_0",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["control"],
+        take: |px4, said| px4.motion.set_thrust(0, said.fields.element(0, 3).map(|thrust| thrust as f32)),
+    },
+    Topic {
+        name: "actuator_controls_1",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["control"],
+        take: |px4, said| px4.motion.set_thrust(1, said.fields.element(0, 3).map(|thrust| thrust as f32)),
+    },
+    Topic {
+        name: "estimator_selector_status",
+        instances: 1,
+        every_us: 0,
+        fields: &["primary_instance"],
+        take: |px4, said| px4.motion.estimator = said.fields.byte(0).unwrap_or(0),
+    },
+    Topic {
+        name: "estimator_status",
+        instances: 9,
+        every_us: MEDIUM_US,
+        fields: &[
+            "vel_test_ratio",
+            "pos_test_ratio",
+            "hgt_test_ratio",
+            "hdg_test_ratio",
+            "mag_test_ratio",
+            "solution_status_flags",
+            "vibe",
+        ],
+        take: estimator_status,
+    },
+    Topic {
+        name: "sensor_selection",
+        instances: 1,
+        every_us: 0,
+        fields: &["accel_device_id"],
+        take: |px4, said| px4.motion.accelerometer = said.fields.count(0).filter(|&id| id != 0),
+    },
+    Topic {
+        name: "vehicle_imu_status",
+        instances: 3,
+        every_us: 0,
+        fields: &[
+            "accel_device_id",
+            "delta_angle_coning_metric",
+            "gyro_coning_vibration",
+            "gyro_vibration_metric",
+            "accel_vibration_metric",
+            "accel_clipping",
+        ],
+        take: imu_status,
+    },
+];
+
+/// What topics said of motion.
+#[derive(Debug, Default)]
+pub(super) struct Motion {
+    combined: bool,
+    rate: Option<[f32; 3]>,
+    local: Option<Local>,
+    home: Option<Home>,
+    pressure_altitude: Option<f32>,
+    airspeed: Option<f32>,
+    airspeed_validated: bool,
+    thrust: [Option<f32>; 2],
+    /// The estimator that flies.
+    estimator: u8,
+    /// The accelerometer that flies.
+    accelerometer: Option<u64>,
+    clips: [u32; 3],
+    imu_status: bool,
+}
+
+impl Motion {
+    fn set_thrust(&mut self, group: u8, thrust: Option<f32>) {
+        if let Some(place) = self.thrust.get_mut(usize::from(group)) {
+            *place = thrust.filter(|thrust| thrust.is_finite());
+        }
+    }
+}
+
+/// `vehicle_local_position`.
+#[derive(Clone, Copy, Debug)]
+struct Local {
+    z: Option<f32>,
+    velocity: [f32; 3],
+    /// Above mean sea level.
+    altitude: Option<f32>,
+}
+
+/// `home_position`.
+#[derive(Clone, Copy, Debug)]
+struct Home {
+    altitude: Option<f32>,
+    z: Option<f32>,
+}
+
+fn inertial(acceleration: Option<[f32; 3]>, rate: Option<[f32; 3]>) -> Observation {
+    Observation::Imu(Imu {
+        instance: 0,
+        acceleration: acceleration.map(|values| values.map(MetresPerSecond2)),
+        rate: rate.map(|values| values.map(RadiansPerSecond)),
+        temperature: None,
+    })
+}
+
+fn imu(px4: &mut Px4, said: &Said<'_>) {
+    px4.motion.combined = true;
+    px4.observe(inertial(said.fields.vector(0), said.fields.vector(1)));
+}
+
+/// Where a log has no `sensor_combined`.
+fn acceleration(px4: &mut Px4, said: &Said<'_>) {
+    if !px4.motion.combined {
+        px4.observe(inertial(said.fields.vector(0), px4.motion.rate));
+    }
+}
+
+fn air(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    px4.motion.pressure_altitude = fields.finite(3);
+    px4.observe(Observation::Air(Air {
+        pressure: fields
+            .finite(0)
+            .filter(|pascals| *pascals > 0.0)
+            .map(|pascals| Hectopascals(pascals / 100.0)),
+        temperature: fields.finite(1).or_else(|| fields.finite(2)).map(Celsius),
+    }));
+}
+
+/// Quaternion of the rotation from north, east, down to the body; the first element is its real part.
+fn attitude(px4: &mut Px4, said: &Said<'_>) {
+    let Some([w, x, y, z]) = said.fields.vector::<4>(0) else { return };
+    let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
+    let pitch = (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin();
+    let yaw = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
+    px4.observe(Observation::Attitude(Attitude {
+        roll: Radians(roll),
+        pitch: Radians(pitch),
+        yaw: Radians(yaw),
+        boot_ms: Some((said.recorded_us / 1_000) as u32),
+    }));
+}
+
+fn local_position(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    let [x, y, z, vx, vy, vz] = [0, 1, 2, 3, 4, 5].map(|field| fields.finite(field));
+    let altitude = match (fields.flag(6) && fields.flag(7), z, fields.finite(9)) {
+        (true, Some(z), Some(reference)) => Some(reference - z),
+        _ => px4.motion.pressure_altitude,
+    };
+    let velocity = [vx, vy, vz].map(|speed| speed.unwrap_or(0.0));
+    px4.motion.local = Some(Local { z: z.filter(|_| fields.flag(6)), velocity, altitude });
+    if let (Some(x), Some(y), Some(z), Some(vx), Some(vy), Some(vz)) = (x, y, z, vx, vy, vz) {
+        px4.observe(Observation::LocalPosition(LocalPosition {
+            position: [x, y, z].map(Metres),
+            velocity: [vx, vy, vz].map(MetresPerSecond),
+        }));
+    }
+    let heading = fields.finite(10).or_else(|| fields.finite(11));
+    let [thrust, plane] = px4.motion.thrust;
+    let throttle = thrust.into_iter().chain(plane).reduce(f32::max);
+    let armed = px4.system.armed();
+    px4.observe(Observation::Hud(Hud {
+        airspeed: px4.motion.airspeed.map(MetresPerSecond),
+        groundspeed: vx.zip(vy).map(|(x, y)| MetresPerSecond(x.hypot(y))),
+        heading_deg: heading.map(|radians| radians.to_degrees().rem_euclid(360.0)),
+        throttle: if armed {
+            throttle.map(|part| Fraction(part.clamp(0.0, 1.0)))
+        } else {
+            Some(Fraction(0.0))
+        },
+        altitude: altitude.map(Metres),
+        climb: Some(MetresPerSecond(vz.filter(|_| fields.flag(8)).map_or(0.0, |down| -down))),
+    }));
+}
+
+/// `GLOBAL_POSITION_INT`, as PX4's stream works it out: heights are those of the local position where it has any.
+fn global_position(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    let Some(altitude) = fields.finite(2) else { return };
+    let local = px4.motion.local.unwrap_or(Local { z: None, velocity: [0.0; 3], altitude: None });
+    let altitude = local.altitude.unwrap_or(altitude);
+    let relative = match (px4.motion.home, local.z) {
+        (Some(Home { z: Some(home), .. }), Some(z)) => home - z,
+        (Some(Home { altitude: Some(home), .. }), None) => altitude - home,
+        (_, Some(z)) => -z,
+        (_, None) => 0.0,
+    };
+    px4.observe(Observation::GlobalPosition(GlobalPosition {
+        position: place(fields.get(0), fields.get(1)),
+        altitude: Metres(altitude),
+        relative_altitude: Metres(relative),
+        velocity: local.velocity.map(MetresPerSecond),
+    }));
+}
+
+/// Degrees. 0, 0 is what those send that do not know.
+pub(super) fn place(latitude: Option<f64>, longitude: Option<f64>) -> Option<Position> {
+    let (latitude_deg, longitude_deg) = (latitude?, longitude?);
+    let valid = (-90.0..=90.0).contains(&latitude_deg) && (-180.0..=180.0).contains(&longitude_deg);
+    // The resolution of MAVLink's 1e-7 degrees.
+    let nowhere = latitude_deg.abs() < 1e-7 && longitude_deg.abs() < 1e-7;
+    (valid && !nowhere).then_some(Position { latitude_deg, longitude_deg })
+}
+
+/// Versions before the flag have a home as soon as there is one.
+fn home(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    let valid = fields.get(2).is_none_or(|flag| flag != 0.0);
+    px4.motion.home = valid.then(|| Home { altitude: fields.finite(0), z: fields.finite(1) });
+}
+
+fn airspeed_validated(px4: &mut Px4, said: &Said<'_>) {
+    px4.motion.airspeed_validated = true;
+    px4.motion.airspeed = said.fields.finite(0).or_else(|| said.fields.finite(1));
+}
+
+/// Before v1.10.
+fn airspeed(px4: &mut Px4, said: &Said<'_>) {
+    if !px4.motion.airspeed_validated {
+        px4.motion.airspeed = said.fields.finite(0);
+    }
+}
+
+/// `ESTIMATOR_STATUS` of the estimator that flies. The compass has the test ratio of the heading since it has no own
+/// (v1.16).
+fn estimator_status(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    if said.instance != px4.motion.estimator {
+        return;
+    }
+    let ratio = |field| fields.finite(field).filter(|ratio| *ratio >= 0.0);
+    px4.observe(Observation::Estimator(Estimator {
+        scale: EstimatorScale::TestRatio,
+        velocity: ratio(0),
+        position_horizontal: ratio(1),
+        position_vertical: ratio(2),
+        compass: if fields.get(4).is_some() { ratio(4) } else { ratio(3) },
+        flags: fields.count(5).unwrap_or(0) as u16,
+    }));
+    // Before v1.11 the estimator says how strong vibration is; nobody counts clipped samples.
+    if !px4.motion.imu_status
+        && let Some(levels) = fields.vector::<3>(6)
+    {
+        px4.observe(vibration(levels.map(Some), [0; 3]));
+    }
+}
+
+fn vibration(levels: [Option<f32>; 3], clips: [u32; 3]) -> Observation {
+    Observation::Vibration(Vibration { scale: VibrationScale::Px4Metrics, levels, clips })
+}
+
+/// `VIBRATION`: the metrics of the accelerometer that flies, and the clipped samples of each.
+fn imu_status(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    px4.motion.imu_status = true;
+    if let Some(clips) = px4.motion.clips.get_mut(usize::from(said.instance)) {
+        let sum: f64 = (0..3).filter_map(|axis| fields.element(5, axis)).sum();
+        *clips = sum as u32;
+    }
+    let id = fields.count(0);
+    // A log that does not say which one flies has one, or the first one flies.
+    let flies =
+        px4.motion.accelerometer.map_or(said.instance == 0, |accelerometer| id == Some(accelerometer));
+    if flies {
+        let level = |field| fields.finite(field).filter(|level| *level >= 0.0);
+        let levels = [level(1).or_else(|| level(2)), level(3), level(4)];
+        px4.observe(vibration(levels, px4.motion.clips));
+    }
+}

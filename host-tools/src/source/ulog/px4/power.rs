@@ -1,0 +1,195 @@
+//! Batteries, rails, the processor's load, motors.
+
+use hums_core::observation::{
+    Battery, CELLS_MAX, ESC_GROUP, Esc, EscGroup, MOTORS_MAX, Observation, Rails, SystemStatus,
+};
+use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
+
+use super::{MEDIUM_US, Px4, Said, Topic};
+
+/// Batteries that serve: as many as PX4 has instances.
+const BATTERIES_MAX: usize = 4;
+
+/// The names of one ESC's fields.
+macro_rules! esc_fields {
+    ($($number:literal),*) => {
+        &["esc_count", $(
+            concat!("esc[", $number, "].esc_rpm"),
+            concat!("esc[", $number, "].esc_voltage"),
+            concat!("esc[", $number, "].esc_current"),
+            concat!("esc[", $number, "].esc_temperature"),
+            concat!("esc[", $number, "].esc_errorcount"),
+            concat!("esc[", $number, "].failures"),
+        )*]
+    };
+}
+
+/// Fields of one ESC above.
+const ESC_FIELDS: usize = 6;
+
+pub(super) const TOPICS: &[Topic] = &[
+    Topic {
+        name: "battery_status",
+        instances: BATTERIES_MAX as u8,
+        every_us: MEDIUM_US,
+        fields: &[
+            "connected",
+            "voltage_v",
+            "voltage_filtered_v",
+            "current_a",
+            "current_filtered_a",
+            "remaining",
+            "discharged_mah",
+            "temperature",
+            "faults",
+            "cell_count",
+            "voltage_cell_v",
+            "id",
+        ],
+        take: battery,
+    },
+    Topic { name: "cpuload", instances: 1, every_us: 0, fields: &["load"], take: load },
+    Topic {
+        name: "system_power",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["voltage5v_v", "voltage5V_v"],
+        take: rails,
+    },
+    Topic {
+        name: "esc_status",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: esc_fields!(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11),
+        take: escs,
+    },
+];
+
+/// What topics said of power.
+#[derive(Debug, Default)]
+pub(super) struct Power {
+    batteries: [Option<Pack>; BATTERIES_MAX],
+    load: Option<f32>,
+    /// Whether the log has the processor's load, at whose rate `SYS_STATUS` is made.
+    has_load: bool,
+}
+
+/// What `SYS_STATUS` repeats of a battery.
+#[derive(Clone, Copy, Debug)]
+struct Pack {
+    voltage: Option<Volts>,
+    current: Option<Amperes>,
+    remaining: Option<Fraction>,
+}
+
+fn battery(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    // Logs before the field existed have a battery where its voltage is one.
+    let connected = fields.get(0).map_or(fields.finite(1) > Some(0.1), |flag| flag != 0.0);
+    let when = |value: Option<f32>| value.filter(|_| connected);
+    // Filtered ones are what MAVLink sends; they are gone since v1.16. -1 is unknown.
+    let current =
+        when(fields.finite(4).or_else(|| fields.finite(3))).filter(|amperes| (*amperes + 1.0).abs() > 1e-6);
+    let remaining = when(fields.finite(5)).filter(|part| (0.0..=1.0).contains(part));
+    let whole = when(fields.finite(1).or_else(|| fields.finite(2))).filter(|volts| *volts > 0.0);
+    let cells = cells(said).filter(|_| connected);
+    let voltage = cells.map_or(whole, |cells| Some(cells.iter().flatten().map(|cell| cell.0).sum()));
+    let battery = Battery {
+        // PX4 counts from 1; versions without a number, and those that leave it at 0, have instances.
+        id: fields.byte(11).and_then(|id| id.checked_sub(1)).unwrap_or(said.instance),
+        cells: cells.unwrap_or([None; CELLS_MAX]),
+        voltage: voltage.map(Volts),
+        current: current.map(Amperes),
+        consumed: when(fields.finite(6)).filter(|mah| *mah >= 0.0).map(|mah| AmpereHours(mah / 1e3)),
+        energy: None,
+        remaining: remaining.map(|part| Fraction((part * 100.0).round() / 100.0)),
+        temperature: when(fields.finite(7)).map(Celsius),
+        faults: fields.count(8).unwrap_or(0) as u32,
+        // PX4 calls every battery lithium polymer.
+        lithium: true,
+    };
+    let voltage = when(fields.finite(2).or_else(|| fields.finite(1))).filter(|volts| *volts > 0.0).map(Volts);
+    if let Some(pack) = px4.power.batteries.get_mut(usize::from(said.instance)) {
+        let (current, remaining) =
+            (battery.current, remaining.map(|part| Fraction((part * 100.0).ceil() / 100.0)));
+        *pack = connected.then_some(Pack { voltage, current, remaining });
+    }
+    px4.observe(Observation::Battery(battery));
+    if !px4.power.has_load {
+        system_status(px4);
+    }
+}
+
+/// The cells' voltages, where the battery measures them.
+fn cells(said: &Said<'_>) -> Option<[Option<Volts>; CELLS_MAX]> {
+    let fields = &said.fields;
+    let count = fields.count(9).filter(|&count| count > 0)?;
+    fields.element(10, 0).filter(|volts| *volts >= 0.0001)?;
+    let mut cells = [None; CELLS_MAX];
+    for (number, cell) in cells.iter_mut().enumerate().take(count as usize) {
+        *cell = fields.element(10, number).map(|volts| Volts(volts as f32)).and_then(Volts::finite);
+    }
+    Some(cells)
+}
+
+fn load(px4: &mut Px4, said: &Said<'_>) {
+    px4.power.has_load = true;
+    px4.power.load = said.fields.finite(0).filter(|load| (0.0..=1.0).contains(load));
+    system_status(px4);
+}
+
+/// `SYS_STATUS`: the battery with the least left.
+fn system_status(px4: &mut Px4) {
+    let left = |pack: &Pack| pack.remaining.map_or(1.0, |part| part.0);
+    let lowest = px4.power.batteries.iter().flatten().min_by(|a, b| left(a).total_cmp(&left(b)));
+    let status = SystemStatus {
+        load: px4.power.load.map(Fraction),
+        voltage: lowest.and_then(|pack| pack.voltage),
+        current: lowest.and_then(|pack| pack.current),
+        remaining: lowest.and_then(|pack| pack.remaining),
+        unhealthy: px4.system.unhealthy(),
+    };
+    px4.observe(Observation::SystemStatus(status));
+}
+
+/// The name of the rail has a capital letter before v1.12.
+fn rails(px4: &mut Px4, said: &Said<'_>) {
+    let vcc = said.fields.finite(0).or_else(|| said.fields.finite(1)).filter(|volts| *volts > 0.0);
+    // MAVLink has a servo rail; PX4's topic has none.
+    px4.observe(Observation::Rails(Rails { vcc: vcc.map(Volts), servo: None }));
+}
+
+/// `ESC_STATUS` and `ESC_INFO` at once, in groups of four.
+fn escs(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    let count = (fields.count(0).unwrap_or(0) as usize).min(MOTORS_MAX);
+    for first in (0..count).step_by(ESC_GROUP) {
+        let mut group = EscGroup { first: first as u8, escs: [None; ESC_GROUP] };
+        for (place, esc) in group.escs.iter_mut().enumerate().take(count - first) {
+            *esc = Some(one_esc(said, 1 + (first + place) * ESC_FIELDS));
+        }
+        px4.observe(Observation::Escs(group));
+    }
+}
+
+/// Until v1.11 PX4 hands on what CAN ESCs send, which is kelvin; no ESC works above 200 degrees Celsius, nor below 200 kelvin.
+fn celsius(temperature: f32) -> Celsius {
+    const ZERO_CELSIUS: f32 = 273.15;
+    Celsius(if temperature > 200.0 { temperature - ZERO_CELSIUS } else { temperature })
+}
+
+/// A place where speed, voltage and current are zero or no number has no ESC, or one without power.
+fn one_esc(said: &Said<'_>, at: usize) -> Esc {
+    let fields = &said.fields;
+    let nothing = |value: Option<f32>| value.is_none_or(|value| value == 0.0);
+    let (rpm, volts, amperes) = (fields.finite(at), fields.finite(at + 1), fields.finite(at + 2));
+    let silent = nothing(rpm) && nothing(volts) && nothing(amperes);
+    Esc {
+        rpm: rpm.filter(|_| !silent).map(Rpm),
+        voltage: volts.filter(|_| !silent).map(Volts),
+        current: amperes.filter(|_| !silent).map(Amperes),
+        temperature: fields.finite(at + 3).map(celsius),
+        failures: Some(fields.count(at + 5).unwrap_or(0) as u16),
+        errors: fields.count(at + 4).map(|errors| errors as u32),
+    }
+}

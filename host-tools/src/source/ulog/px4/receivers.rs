@@ -1,0 +1,137 @@
+//! GNSS receivers.
+//!
+//! Since v1.12 each receiver is an instance of `sensor_gps`, and `vehicle_gps_position` is what the estimator uses; before,
+//! each is an instance of the latter. MAVLink sends the receivers, and says "no receiver" when one falls silent for a
+//! second; in a log, where receivers have one message a second, it takes [`SILENCE`].
+
+use hums_core::observation::{Gnss, GnssIntegrity, Observation};
+use hums_core::time::{Instant, Span};
+use hums_core::units::{Metres, MetresPerSecond};
+
+use super::motion::place;
+use super::{MEDIUM_US, Px4, Said, Told, Topic};
+
+/// Receivers that serve.
+const RECEIVERS_MAX: usize = 2;
+/// A receiver that says nothing for longer is gone.
+const SILENCE: Span = Span::from_millis(2_500);
+/// A fix with a position: `FIX_TYPE_2D`.
+const FIX_2D: u8 = 2;
+
+const FIELDS: &[&str] = &[
+    "fix_type",
+    "satellites_used",
+    "hdop",
+    "eph",
+    "latitude_deg",
+    "longitude_deg",
+    "altitude_msl_m",
+    "lat",
+    "lon",
+    "alt",
+    "vel_m_s",
+    "time_utc_usec",
+    "jamming_state",
+    "spoofing_state",
+];
+
+pub(super) const TOPICS: &[Topic] = &[
+    Topic {
+        name: "sensor_gps",
+        instances: RECEIVERS_MAX as u8,
+        every_us: MEDIUM_US,
+        fields: FIELDS,
+        take: sensor,
+    },
+    Topic {
+        name: "vehicle_gps_position",
+        instances: RECEIVERS_MAX as u8,
+        every_us: MEDIUM_US,
+        fields: FIELDS,
+        take: used,
+    },
+];
+
+/// What is known of the receivers.
+#[derive(Debug, Default)]
+pub(super) struct Receivers {
+    /// There are messages of the receivers themselves.
+    sensors: bool,
+    /// When each was heard last.
+    heard: [Option<Instant>; RECEIVERS_MAX],
+    told_utc: bool,
+}
+
+impl Receivers {
+    pub(super) fn dropout(&mut self) {
+        // Heard again before anything is said of silence.
+        self.heard = [None; RECEIVERS_MAX];
+    }
+
+    /// What MAVLink says of receivers that fell silent.
+    pub(super) fn silence(&self, now: Instant, observe: &mut dyn FnMut(Observation)) {
+        for (instance, heard) in self.heard.iter().enumerate() {
+            if heard.is_some_and(|heard| now.since(heard) > SILENCE) {
+                observe(Observation::Gnss(Gnss { instance: instance as u8, ..Gnss::default() }));
+            }
+        }
+    }
+}
+
+fn sensor(px4: &mut Px4, said: &Said<'_>) {
+    px4.receivers.sensors = true;
+    receiver(px4, said);
+}
+
+/// What the estimator uses: a receiver of its own before v1.12, and a sign of life of the first one since.
+fn used(px4: &mut Px4, said: &Said<'_>) {
+    if !px4.receivers.sensors {
+        receiver(px4, said);
+    } else if said.instance == 0 && px4.receivers.heard[1].is_none() {
+        px4.receivers.heard[0] = Some(said.at);
+    }
+}
+
+fn receiver(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    let fix = fields.byte(0).unwrap_or(0);
+    let has_position = fix >= FIX_2D;
+    // Until v1.14 degrees times 1e7 and millimetres.
+    let degrees = |new, old: usize| fields.get(new).or_else(|| fields.get(old).map(|value| value / 1e7));
+    let position = place(degrees(4, 7), degrees(5, 8));
+    let altitude = fields.finite(6).or_else(|| fields.get(9).map(|millimetres| (millimetres / 1e3) as f32));
+    px4.observe(Observation::Gnss(Gnss {
+        instance: said.instance,
+        fix,
+        satellites: fields.byte(1).filter(|&count| count < u8::MAX),
+        // As MAVLink holds them: hundredths in 16 bits, millimetres; 0 is unknown.
+        hdop: fields.finite(2).filter(|hdop| (0.01..655.35).contains(hdop)),
+        accuracy: fields.finite(3).filter(|metres| (0.001..4_294_967.0).contains(metres)).map(Metres),
+        position: position.filter(|_| has_position),
+        altitude: altitude.filter(|_| has_position).map(Metres),
+        speed: fields.finite(10).filter(|speed| (0.0..655.35).contains(speed)).map(MetresPerSecond),
+    }));
+    if let Some(heard) = px4.receivers.heard.get_mut(usize::from(said.instance)) {
+        *heard = Some(said.at);
+    }
+    // A state that is newer than our list is unknown.
+    let state = |field| fields.byte(field).filter(|&state| state <= 3).unwrap_or(0);
+    if fields.get(12).is_some() {
+        let (jamming, spoofing) = (state(12), state(13));
+        px4.observe(Observation::GnssIntegrity(GnssIntegrity { instance: said.instance, jamming, spoofing }));
+    }
+    utc(px4, said);
+}
+
+/// UTC of the first receiver that has a fix, once.
+fn utc(px4: &mut Px4, said: &Said<'_>) {
+    /// 2000 and 2200.
+    const UTC_US: std::ops::Range<u64> = 946_684_800_000_000..7_258_118_400_000_000;
+    let (fix, utc_us) = (said.fields.byte(0).unwrap_or(0), said.fields.count(11).unwrap_or(0));
+    if px4.receivers.told_utc || fix <= FIX_2D || !UTC_US.contains(&utc_us) {
+        return;
+    }
+    px4.receivers.told_utc = true;
+    px4.system.utc(utc_us, said.recorded_us);
+    px4.told.push(Told::Utc { utc_us, recorded_us: said.recorded_us });
+}

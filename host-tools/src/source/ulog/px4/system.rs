@@ -1,0 +1,434 @@
+//! The autopilot itself: what it is, whether it is armed, its mode, where it stands, its words.
+
+use hums_core::observation::{
+    Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, RadioControl, SpeedSensor,
+    SystemTime, TelemetryRadio, VehicleKind,
+};
+use hums_core::units::Rpm;
+
+use super::{Px4, Said, Told, Topic};
+
+pub(super) const TOPICS: &[Topic] = &[
+    Topic {
+        name: "vehicle_status",
+        instances: 1,
+        every_us: 0,
+        fields: &[
+            "arming_state",
+            "nav_state",
+            "failsafe",
+            "system_type",
+            "hil_state",
+            "takeoff_time",
+            "onboard_control_sensors_present",
+            "onboard_control_sensors_enabled",
+            "onboard_control_sensors_health",
+            "calibration_enabled",
+        ],
+        take: status,
+    },
+    Topic {
+        name: "actuator_armed",
+        instances: 1,
+        every_us: 0,
+        fields: &["armed", "lockdown", "kill", "termination", "manual_lockdown", "force_failsafe"],
+        take: armed,
+    },
+    Topic {
+        name: "vehicle_control_mode",
+        instances: 1,
+        every_us: 0,
+        fields: &["flag_control_auto_enabled"],
+        take: |px4, said| px4.system.auto = said.fields.flag(0),
+    },
+    Topic {
+        name: "position_setpoint_triplet",
+        instances: 1,
+        every_us: 0,
+        fields: &["current.valid", "current.type"],
+        take: |px4, said| px4.system.setpoint = said.fields.byte(1).filter(|_| said.fields.flag(0)),
+    },
+    Topic {
+        name: "vehicle_land_detected",
+        instances: 1,
+        every_us: 0,
+        fields: &["landed"],
+        take: land_detected,
+    },
+    Topic {
+        name: "input_rc",
+        instances: 1,
+        every_us: super::MEDIUM_US,
+        fields: &["rssi", "channel_count"],
+        take: rc,
+    },
+    Topic {
+        name: "radio_status",
+        instances: 1,
+        every_us: 0,
+        fields: &["rssi", "remote_rssi", "noise", "remote_noise", "rxerrors"],
+        take: radio,
+    },
+    Topic {
+        name: "telemetry_status",
+        instances: 4,
+        every_us: 0,
+        fields: &["rssi", "remote_rssi", "noise", "remote_noise", "rxerrors", "type"],
+        take: telemetry,
+    },
+    Topic {
+        name: "mission_result",
+        instances: 1,
+        every_us: 0,
+        fields: &["seq_current", "seq_reached"],
+        take: mission,
+    },
+    Topic {
+        name: "vehicle_command_ack",
+        instances: 4,
+        every_us: 0,
+        fields: &["command", "result"],
+        take: ack,
+    },
+    Topic { name: "event", instances: 1, every_us: 0, fields: &["id", "log_levels"], take: event },
+    Topic {
+        name: "log_message",
+        instances: 1,
+        every_us: 0,
+        fields: &["severity", "text"],
+        take: log_message,
+    },
+    Topic {
+        name: "rpm",
+        instances: 2,
+        every_us: super::MEDIUM_US,
+        fields: &["rpm_estimate", "indicated_frequency_rpm"],
+        take: rpm,
+    },
+];
+
+/// `ARMING_STATE_ARMED`: the same number in all versions; 1 is standby, later called disarmed.
+const ARMED: u8 = 2;
+/// `MAV_STATE`.
+const STANDBY: u8 = 3;
+const ACTIVE: u8 = 4;
+const CRITICAL: u8 = 5;
+const EMERGENCY: u8 = 6;
+const POWEROFF: u8 = 7;
+const TERMINATION: u8 = 8;
+const CALIBRATING: u8 = 2;
+
+/// What topics said of the autopilot itself.
+#[derive(Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of several topics, none a state of the others")]
+pub(super) struct System {
+    /// `MAV_SYS_ID`.
+    number: Option<u8>,
+    /// `MAV_TYPE`, for logs whose `vehicle_status` has no type.
+    type_number: Option<u8>,
+    /// `COM_FLIGHT_UUID`
+    flight: Option<u64>,
+    /// The firmware's version, 0 not known.
+    pub(super) release: u32,
+    status: Option<Status>,
+    /// `actuator_armed`: the motors are forced off.
+    stopped: bool,
+    terminated: bool,
+    auto: bool,
+    setpoint: Option<u8>,
+    landed: Option<bool>,
+    told_mode: Option<u32>,
+    told_identity: bool,
+    reached: Option<i64>,
+    /// UTC less the time since boot, from a receiver.
+    utc_offset_us: Option<u64>,
+}
+
+/// `vehicle_status`.
+#[derive(Clone, Copy, Debug)]
+struct Status {
+    arming: u8,
+    nav: u8,
+    failsafe: bool,
+    type_number: u8,
+    hil: bool,
+    calibrating: bool,
+    takeoff_us: Option<u64>,
+    unhealthy: u32,
+}
+
+impl System {
+    pub(super) fn number(&self) -> u8 {
+        self.number.unwrap_or(1)
+    }
+
+    /// Whether there is a vehicle to speak of.
+    pub(super) fn known(&self) -> bool {
+        self.status.is_some()
+    }
+
+    /// Whether it is armed.
+    pub(super) fn armed(&self) -> bool {
+        self.status.is_some_and(|status| status.arming == ARMED)
+    }
+
+    /// Sensors that are present and enabled and not healthy, where the log says so (until v1.13).
+    pub(super) fn unhealthy(&self) -> u32 {
+        self.status.map_or(0, |status| status.unhealthy)
+    }
+
+    pub(super) fn utc(&mut self, utc_us: u64, recorded_us: u64) {
+        self.utc_offset_us = utc_us.checked_sub(recorded_us);
+    }
+
+    pub(super) fn parameter(&mut self, name: &str, value: f64) {
+        match name {
+            "MAV_SYS_ID" => self.number = Some(value as u8).filter(|number| *number > 0),
+            "MAV_TYPE" => self.type_number = Some(value as u8),
+            "COM_FLIGHT_UUID" => self.flight = Some(value.max(0.0) as u64),
+            _ => {}
+        }
+    }
+
+    fn heartbeat(&self) -> Option<Heartbeat> {
+        let status = self.status?;
+        let type_number =
+            Some(status.type_number).filter(|&number| number > 0).or(self.type_number).unwrap_or(0);
+        Some(Heartbeat {
+            autopilot: Autopilot::Px4,
+            autopilot_number: 12,
+            kind: kind(type_number),
+            type_number,
+            armed: status.arming == ARMED,
+            state: self.state(status),
+            mode: custom_mode(status.nav),
+        })
+    }
+
+    /// `HEARTBEAT`'s state, as PX4's stream works it out.
+    fn state(&self, status: Status) -> u8 {
+        if self.terminated || (self.stopped && !status.hil) || status.nav == 13 {
+            return TERMINATION;
+        }
+        if status.nav == 8 {
+            return EMERGENCY;
+        }
+        if status.calibrating {
+            return CALIBRATING;
+        }
+        match status.arming {
+            ARMED if status.failsafe => CRITICAL,
+            ARMED => ACTIVE,
+            1 => STANDBY,
+            4 => POWEROFF,
+            _ => 0,
+        }
+    }
+
+    /// `EXTENDED_SYS_STATE`, as PX4's stream works it out.
+    fn landed(&self) -> Option<LandedState> {
+        Some(match (self.landed?, self.setpoint.filter(|_| self.auto)) {
+            (true, _) => LandedState::OnGround,
+            // `SETPOINT_TYPE_TAKEOFF`, `SETPOINT_TYPE_LAND`.
+            (false, Some(3)) => LandedState::TakingOff,
+            (false, Some(4)) => LandedState::Landing,
+            (false, _) => LandedState::InAir,
+        })
+    }
+}
+
+/// The kinds that `hums_link` makes of `MAV_TYPE`.
+fn kind(type_number: u8) -> VehicleKind {
+    match type_number {
+        2 | 3 | 4 | 13 | 14 | 15 | 29 | 35 => VehicleKind::Rotorcraft,
+        1 | 16 | 17 | 28 => VehicleKind::Plane,
+        19..=25 => VehicleKind::Vtol,
+        10..=12 => VehicleKind::Surface,
+        _ => VehicleKind::Other,
+    }
+}
+
+/// `nav_state` with the main and the sub mode that PX4 sends for it (`px4_custom_mode.h`) and its name. Numbers 6 to 9
+/// and 16 are of versions before v1.13 (6 is used again since v1.15).
+const MODES: [(u8, u8, u8, &str); 31] = [
+    (0, 1, 0, "Manual"),
+    (1, 2, 0, "Altitude"),
+    (2, 3, 0, "Position"),
+    (3, 4, 4, "Mission"),
+    (4, 4, 3, "Hold"),
+    (5, 4, 5, "Return"),
+    (6, 3, 2, "Position Slow"),
+    (7, 4, 7, "Return to ground station"),
+    (8, 4, 6, "Land (engine failure)"),
+    (9, 4, 6, "Land (no GPS)"),
+    (10, 5, 0, "Acro"),
+    (12, 4, 6, "Descend"),
+    (13, 1, 0, "Termination"),
+    (14, 6, 0, "Offboard"),
+    (15, 7, 0, "Stabilized"),
+    (16, 8, 0, "Rattitude"),
+    (17, 4, 2, "Takeoff"),
+    (18, 4, 6, "Land"),
+    (19, 4, 8, "Follow"),
+    (20, 4, 9, "Precision Land"),
+    (21, 3, 1, "Orbit"),
+    (22, 4, 10, "VTOL Takeoff"),
+    (23, 4, 11, "External 1"),
+    (24, 4, 12, "External 2"),
+    (25, 4, 13, "External 3"),
+    (26, 4, 14, "External 4"),
+    (27, 4, 15, "External 5"),
+    (28, 4, 16, "External 6"),
+    (29, 4, 17, "External 7"),
+    (30, 4, 18, "External 8"),
+    (11, 0, 0, "Unused"),
+];
+
+fn custom_mode(nav: u8) -> u32 {
+    let mode = MODES.iter().find(|(number, ..)| *number == nav);
+    mode.map_or(0, |&(_, main, sub, _)| u32::from(main) << 16 | u32::from(sub) << 24)
+}
+
+fn status(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    let bits = |field| fields.count(field).unwrap_or(0) as u32;
+    let before = px4.system.status;
+    let status = Status {
+        arming: fields.byte(0).unwrap_or(0),
+        nav: fields.byte(1).unwrap_or(0),
+        failsafe: fields.flag(2),
+        type_number: fields.byte(3).unwrap_or(0),
+        hil: fields.flag(4),
+        takeoff_us: fields.count(5),
+        unhealthy: bits(6) & bits(7) & !bits(8),
+        calibrating: fields.flag(9),
+    };
+    px4.system.status = Some(status);
+    // What changes is told at once; the rest waits for its turn.
+    let now = |status: Status| (status.arming, status.nav, status.failsafe);
+    if before.is_none_or(|before| now(before) != now(status)) {
+        px4.heartbeat();
+    }
+}
+
+fn armed(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    // Lockdown is also how a simulation with hardware keeps its motors off.
+    px4.system.stopped = fields.flag(1);
+    px4.system.terminated = (2..=5).any(|field| fields.flag(field));
+}
+
+fn land_detected(px4: &mut Px4, said: &Said<'_>) {
+    let before = px4.system.landed;
+    px4.system.landed = Some(said.fields.flag(0));
+    if before != px4.system.landed {
+        px4.landed();
+    }
+}
+
+fn rc(px4: &mut Px4, said: &Said<'_>) {
+    let none = said.fields.count(1) == Some(0);
+    let rssi = if none { Some(0) } else { said.fields.byte(0).filter(|&rssi| rssi < u8::MAX) };
+    px4.observe(Observation::RadioControl(RadioControl { rssi }));
+}
+
+/// A telemetry radio, from v1.9 on.
+fn radio(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    let byte = |field| fields.byte(field).filter(|&value| value < u8::MAX);
+    px4.observe(Observation::TelemetryRadio(TelemetryRadio {
+        rssi: byte(0),
+        remote_rssi: byte(1),
+        noise: byte(2),
+        remote_noise: byte(3),
+        errors: fields.count(4).unwrap_or(0) as u16,
+    }));
+}
+
+/// Until v1.8 the radio is in `telemetry_status`, which every link has, also such without a radio.
+fn telemetry(px4: &mut Px4, said: &Said<'_>) {
+    if said.fields.byte(0).is_some_and(|rssi| rssi > 0) {
+        radio(px4, said);
+    }
+}
+
+fn mission(px4: &mut Px4, said: &Said<'_>) {
+    let fields = &said.fields;
+    if let Some(current) = fields.count(0) {
+        px4.observe(Observation::MissionCurrent(current as u16));
+    }
+    let reached = fields.get(1).map(|number| number as i64);
+    if reached != px4.system.reached {
+        px4.system.reached = reached;
+        if let Some(reached) = reached.and_then(|reached| u16::try_from(reached).ok()) {
+            px4.observe(Observation::MissionReached(reached));
+        }
+    }
+}
+
+fn ack(px4: &mut Px4, said: &Said<'_>) {
+    let (command, result) = (said.fields.count(0).unwrap_or(0) as u16, said.fields.byte(1).unwrap_or(0));
+    px4.observe(Observation::CommandAck(CommandAck { command, result }));
+}
+
+/// The lower half of the levels is for those outside, as `MAV_SEVERITY`; 8 and more are not for people.
+fn event(px4: &mut Px4, said: &Said<'_>) {
+    let severity = said.fields.byte(1).unwrap_or(0) & 0x0f;
+    if let Some(number) = said.fields.count(0)
+        && severity < 8
+    {
+        px4.told.push(Told::Event { number: number as u32, severity });
+    }
+}
+
+fn log_message(px4: &mut Px4, said: &Said<'_>) {
+    if let Some(words) = said.fields.words(1) {
+        let severity = said.fields.byte(0).unwrap_or(6).min(7);
+        px4.told.push(Told::Text { severity, words: words.trim_end().to_owned() });
+    }
+}
+
+fn rpm(px4: &mut Px4, said: &Said<'_>) {
+    let Some(rpm) = said.fields.finite(0).or_else(|| said.fields.finite(1)) else { return };
+    let sensor = SpeedSensor { index: said.instance, rpm: Rpm(rpm) };
+    px4.observe(Observation::SpeedSensors([Some(sensor), None]));
+}
+
+impl Px4 {
+    fn heartbeat(&mut self) {
+        let Some(heartbeat) = self.system.heartbeat() else { return };
+        self.observe(Observation::Heartbeat(heartbeat));
+        if self.system.told_mode != Some(heartbeat.mode) {
+            self.system.told_mode = Some(heartbeat.mode);
+            let nav = self.system.status.map(|status| status.nav);
+            let name = MODES.iter().find(|(number, ..)| Some(*number) == nav).map(|&(.., name)| name);
+            self.told.push(Told::Mode { number: heartbeat.mode, name });
+        }
+        if !self.system.told_identity && self.system.release != 0 {
+            self.system.told_identity = true;
+            // The unique id that MAVLink sends is not in the log.
+            let identity = AutopilotIdentity { firmware: self.system.release, uid: 0 };
+            self.observe(Observation::Identity(identity));
+        }
+    }
+
+    fn landed(&mut self) {
+        if let Some(landed) = self.system.landed() {
+            self.observe(Observation::Landed(landed));
+        }
+    }
+
+    /// What MAVLink repeats whether or not it was published.
+    pub(super) fn repeat(&mut self, recorded_us: u64) {
+        self.heartbeat();
+        self.landed();
+        let boot_ms = (recorded_us / 1_000) as u32;
+        let utc_micros = self.system.utc_offset_us.map(|offset| offset + recorded_us);
+        self.observe(Observation::SystemTime(SystemTime { utc_micros, boot_ms }));
+        if let Some(takeoff_us) = self.system.status.and_then(|status| status.takeoff_us) {
+            let takeoff_boot_ms = (takeoff_us / 1_000).min(u64::from(u32::MAX)) as u32;
+            let flight = self.system.flight.unwrap_or(0);
+            self.observe(Observation::FlightInformation { flight, takeoff_boot_ms });
+        }
+    }
+}

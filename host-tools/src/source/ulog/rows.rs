@@ -1,0 +1,186 @@
+//! The log's own rows: every field of every message under its own name, with the unit where it is known.
+//!
+//! `ULog` says no units. PX4's names end in them (`voltage_v`, `vel_m_s`), which is what [`unit`] goes by.
+
+use super::format::{Field, Layout, Number};
+use super::message::words;
+use crate::source::item::{Column, Kind, Table, Value};
+
+/// The column that tells the instances of a topic apart: the first one, as there may be two batteries.
+pub(super) const INSTANCE: &str = "multi_id";
+
+/// The table of a topic's rows.
+pub(super) fn table(layout: &Layout) -> Table {
+    let column = |name: String, unit: &str, kind| Column { name, unit: unit.to_owned(), kind };
+    let mut columns = vec![column(INSTANCE.to_owned(), "", Kind::Unsigned)];
+    for field in &layout.fields {
+        let (unit, kind) = (unit(&field.name), kind(field.number));
+        match elements(field) {
+            None => columns.push(column(field.name.clone(), unit, kind)),
+            Some(count) => columns
+                .extend((0..count).map(|element| column(format!("{}[{element}]", field.name), unit, kind))),
+        }
+    }
+    Table { name: table_name(layout), columns }
+}
+
+/// Its name: the topic's, without what a file's name cannot have.
+pub(super) fn table_name(layout: &Layout) -> String {
+    layout.name.replace('/', "_")
+}
+
+/// The values of a message, as many as its table has columns.
+pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<Value<'a>> {
+    let mut values = Vec::with_capacity(layout.fields.len() + 1);
+    values.push(Value::Unsigned(u64::from(instance)));
+    for field in &layout.fields {
+        let (at, bytes) = (field.offset as usize, field.number.bytes());
+        if field.number == Number::Char {
+            let text = data.get(at..at + field.array.unwrap_or(1) as usize);
+            values.push(text.map_or(Value::Unknown, |text| Value::Text(words(text))));
+            continue;
+        }
+        for element in 0..field.array.unwrap_or(1) as usize {
+            let at = at + element * bytes;
+            let number = data.get(at..at + bytes);
+            values.push(number.and_then(|bytes| value(field.number, bytes)).unwrap_or(Value::Unknown));
+        }
+    }
+    values
+}
+
+/// How many columns an array has; `None` for what is none, or is a text.
+fn elements(field: &Field) -> Option<u32> {
+    field.array.filter(|_| field.number != Number::Char)
+}
+
+fn kind(number: Number) -> Kind {
+    match number {
+        Number::U8 | Number::U16 | Number::U32 | Number::U64 => Kind::Unsigned,
+        Number::I8 | Number::I16 | Number::I32 | Number::I64 => Kind::Signed,
+        Number::F32 => Kind::Single,
+        Number::F64 => Kind::Double,
+        Number::Bool => Kind::Flag,
+        Number::Char => Kind::Text,
+    }
+}
+
+fn value(number: Number, bytes: &[u8]) -> Option<Value<'static>> {
+    Some(match number {
+        Number::U8 => Value::Unsigned(u64::from(*bytes.first()?)),
+        Number::I8 => Value::Signed(i64::from(i8::from_le_bytes(bytes.try_into().ok()?))),
+        Number::U16 => Value::Unsigned(u64::from(u16::from_le_bytes(bytes.try_into().ok()?))),
+        Number::I16 => Value::Signed(i64::from(i16::from_le_bytes(bytes.try_into().ok()?))),
+        Number::U32 => Value::Unsigned(u64::from(u32::from_le_bytes(bytes.try_into().ok()?))),
+        Number::I32 => Value::Signed(i64::from(i32::from_le_bytes(bytes.try_into().ok()?))),
+        Number::U64 => Value::Unsigned(u64::from_le_bytes(bytes.try_into().ok()?)),
+        Number::I64 => Value::Signed(i64::from_le_bytes(bytes.try_into().ok()?)),
+        Number::F32 => Value::Single(f32::from_le_bytes(bytes.try_into().ok()?)),
+        Number::F64 => Value::Double(f64::from_le_bytes(bytes.try_into().ok()?)),
+        Number::Bool => Value::Flag(*bytes.first()? != 0),
+        Number::Char => return None,
+    })
+}
+
+/// Ends of names and their units, the longest first. From the message definitions of PX4 v1.8 to v1.16.
+const UNITS: [(&str, &str); 31] = [
+    ("_m_s_s", "m/s2"),
+    ("_m_s2", "m/s2"),
+    ("_m_s", "m/s"),
+    ("_rad_s", "rad/s"),
+    ("_deg_s", "deg/s"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_msl_m", "m"),
+    ("_alt_meter", "m"),
+    ("_ellipsoid_m", "m"),
+    ("_celcius", "degC"),
+    ("_celsius", "degC"),
+    ("_usec", "us"),
+    ("_us", "us"),
+    ("_ms", "ms"),
+    ("_hz", "Hz"),
+    ("_pa", "Pa"),
+    ("_mah", "mAh"),
+    ("_wh", "Wh"),
+    ("_ga", "G"),
+    ("_gs", "G"),
+    ("_rpm", "rpm"),
+    ("_percent", "%"),
+    ("_cell_v", "V"),
+    ("_filtered_v", "V"),
+    ("voltage_v", "V"),
+    ("5v_v", "V"),
+    ("3v3_v", "V"),
+    ("current_a", "A"),
+    ("_average_a", "A"),
+    ("_filtered_a", "A"),
+];
+
+/// Names whose unit their end does not say.
+const NAMED: [(&str, &str); 14] = [
+    ("timestamp", "us"),
+    ("timestamp_sample", "us"),
+    ("esc_voltage", "V"),
+    ("esc_current", "A"),
+    ("esc_temperature", "degC"),
+    ("vx", "m/s"),
+    ("vy", "m/s"),
+    ("vz", "m/s"),
+    ("ref_alt", "m"),
+    ("dist_bottom", "m"),
+    ("eph", "m"),
+    ("epv", "m"),
+    ("time_remaining_s", "s"),
+    ("voltage5V_v", "V"),
+];
+
+/// The unit of a field; empty where none is known.
+pub(super) fn unit(name: &str) -> &'static str {
+    let name = name.rsplit_once('.').map_or(name, |(_, last)| last);
+    let named = NAMED.iter().find(|(known, _)| *known == name);
+    let ending = || UNITS.iter().find(|(ending, _)| name.ends_with(ending));
+    named.or_else(ending).map_or("", |(_, unit)| unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::ulog::format::Formats;
+
+    #[test]
+    fn units_are_those_of_the_names() {
+        let units = [
+            "voltage_cell_v",
+            "vel_m_s",
+            "accelerometer_m_s2",
+            "esc[2].esc_rpm",
+            "q",
+            "vel_m_s_not",
+            "timestamp",
+        ];
+        assert_eq!(units.map(unit), ["V", "m/s", "m/s2", "rpm", "", "", "us"]);
+    }
+
+    #[test]
+    fn a_row_has_a_value_for_each_column_even_where_the_padding_at_the_end_is_left_out() {
+        let mut formats = Formats::default();
+        formats
+            .define(b"t/x:uint64_t timestamp;float[2] v;char[4] s;bool b;int8_t i;uint8_t[2] _padding0;")
+            .expect("a definition");
+        let layout = formats.layout("t/x").expect("resolved");
+        let table = table(&layout);
+        let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
+        assert_eq!(
+            (table.name.as_str(), names),
+            ("t_x", vec![INSTANCE, "timestamp", "v[0]", "v[1]", "s", "b", "i"])
+        );
+        let data =
+            [&7_u64.to_le_bytes()[..], &1.5_f32.to_le_bytes(), &f32::NAN.to_le_bytes(), b"ab\0c", &[1, 0xff]]
+                .concat();
+        let values = values(&layout, 2, &data);
+        assert_eq!(values.len(), table.columns.len());
+        assert_eq!(values[..3], [Value::Unsigned(2), Value::Unsigned(7), Value::Single(1.5)]);
+        assert_eq!(values[4..], [Value::Text("ab"), Value::Flag(true), Value::Signed(-1)]);
+    }
+}

@@ -1,0 +1,477 @@
+//! One pass over a log: message by message, from the header to the last of what was appended.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use hums_core::time::Span;
+
+use super::clock::Clock;
+use super::fields::Fields;
+use super::format::Formats;
+use super::message::{
+    FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, beginning, words as text_of,
+};
+use super::px4::{Px4, Said, Told};
+use super::rows;
+use super::topics::Subscriptions;
+use super::window::Window;
+use crate::source::item::{
+    About, Cause, Column, Event, Fact, Gap, Item, Kind, Mode, Parameter, Row, Rows, Summary, Table, Take,
+    Text, Value, Want,
+};
+
+/// What a look needs to see: the longest message and the header after it.
+const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + FILE_HEADER_BYTES;
+/// What a search for the next message needs to see.
+const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
+/// The incompatible flag that is known: data was appended.
+const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];
+/// Words of one piece of information at most.
+const WORDS_BYTES_MAX: usize = 256;
+
+/// Reads a log from its beginning to its end.
+pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    window.fill(LOOK_BYTES);
+    let Some(time_us) = beginning(window.rest()) else {
+        bail!("is no PX4 log: a ULog begins with 16 bytes of header, and this does not");
+    };
+    window.consume(FILE_HEADER_BYTES);
+    let mut session = Session::new(want, take);
+    session.clock.begin(time_us);
+    loop {
+        window.fill(LOOK_BYTES);
+        let place = window.place();
+        let rest = session.part(window.rest(), place);
+        if rest.is_empty() {
+            if !session.next_part(window.rest().is_empty()) {
+                break;
+            }
+            continue;
+        }
+        match session.look(rest) {
+            Found::Message(message, bytes) => {
+                session.message(place, &message, bytes)?;
+                window.consume(bytes);
+            }
+            found => damage(window, &mut session, found == Found::Cut)?,
+        }
+    }
+    if let Some(error) = window.take_trouble() {
+        let words = format!("an input that cannot be read further: {error}");
+        session.gap(Cause::Cut, Some(window.place()), 0, words)?;
+    }
+    session.end()
+}
+
+/// Goes on to the next message that can be believed.
+fn damage<R: Read>(window: &mut Window<R>, session: &mut Session<'_, '_>, cut: bool) -> Result<()> {
+    let place = window.place();
+    let (mut from, mut bytes, mut zeros, mut found) = (1, 0, true, false);
+    while !found {
+        window.fill(FIND_BYTES);
+        let rest = session.part(window.rest(), window.place());
+        let last = window.ended() || rest.len() < window.rest().len();
+        let next = session.find(rest, from, last);
+        found = next.is_ok();
+        let skipped = next.unwrap_or_else(|none| none);
+        zeros &= rest.get(..skipped).unwrap_or_default().iter().all(|&byte| byte == 0);
+        bytes += skipped as u64;
+        window.consume(skipped);
+        if last {
+            break;
+        }
+        from = 0;
+    }
+    let (cause, words) = match (found, cut, zeros) {
+        (false, _, true) => (Cause::Cut, format!("{bytes} zero bytes to the end, where messages should be")),
+        (false, true, _) => (Cause::Cut, "a message that the end cuts off".to_owned()),
+        _ => (Cause::Damaged, format!("{bytes} bytes that are no messages")),
+    };
+    session.gap(cause, Some(place), bytes, words)
+}
+
+/// What is known while a log is read.
+struct Session<'a, 'b> {
+    want: Want<'a>,
+    take: &'a mut Take<'b>,
+    formats: Formats,
+    subscriptions: Subscriptions,
+    clock: Clock,
+    px4: Px4,
+    own: OwnTables,
+    information: BTreeMap<&'static str, String>,
+    told_facts: bool,
+    /// Where data was appended and not yet reached, the first one first.
+    appended: Vec<u64>,
+    /// Messages of data whose subscription is not known, and where the first one is.
+    strays: (u64, u64),
+    /// The words that were told last: a topic and a logged string may have the same.
+    last_words: String,
+}
+
+/// Information that is more than rows.
+const KEPT: [&str; 8] = [
+    "sys_name",
+    "ver_sw",
+    "ver_sw_release",
+    "ver_hw",
+    "ver_hw_subtype",
+    "log_type",
+    "replay",
+    "boot_time_utc_us",
+];
+
+impl<'a, 'b> Session<'a, 'b> {
+    fn new(want: Want<'a>, take: &'a mut Take<'b>) -> Self {
+        Self {
+            want,
+            take,
+            formats: Formats::default(),
+            subscriptions: Subscriptions::default(),
+            clock: Clock::default(),
+            px4: Px4::default(),
+            own: OwnTables::new(want.rows),
+            information: BTreeMap::new(),
+            told_facts: false,
+            appended: Vec::new(),
+            strays: (0, 0),
+            last_words: String::new(),
+        }
+    }
+
+    /// The rest up to where data was appended: a message does not go on behind that.
+    fn part<'r>(&self, rest: &'r [u8], place: u64) -> &'r [u8] {
+        let bytes = self
+            .appended
+            .first()
+            .map_or(usize::MAX, |&next| usize::try_from(next.saturating_sub(place)).unwrap_or(usize::MAX));
+        rest.get(..bytes).unwrap_or(rest)
+    }
+
+    /// Goes on to what was appended; `false` where nothing was, or the input ends.
+    fn next_part(&mut self, ended: bool) -> bool {
+        if ended || self.appended.is_empty() {
+            return false;
+        }
+        self.appended.remove(0);
+        true
+    }
+
+    fn look<'r>(&self, rest: &'r [u8]) -> Found<'r> {
+        let fits = |id: u16, bytes: usize| self.subscriptions.fits(id, bytes);
+        Parser { fits: &fits }.look(rest)
+    }
+
+    fn find(&self, rest: &[u8], from: usize, last: bool) -> Result<usize, usize> {
+        let fits = |id: u16, bytes: usize| self.subscriptions.fits(id, bytes);
+        Parser { fits: &fits }.find(rest, from, last)
+    }
+
+    fn end(mut self) -> Result<Summary> {
+        let (strays, first) = self.strays;
+        if strays > 0 {
+            let words = format!("{strays} messages of data without a subscription");
+            self.gap(Cause::Damaged, Some(first), 0, words)?;
+        }
+        if let Some(&place) = self.appended.first() {
+            let words =
+                format!("no appended data at {place}, which the header names: the file ends before it");
+            self.gap(Cause::Cut, Some(place), 0, words)?;
+        }
+        self.tell_facts()?;
+        Ok(Summary { messages: self.subscriptions.counts() })
+    }
+
+    fn tell(&mut self, item: Item<'_>) -> Result<()> {
+        (self.take)(self.clock.now(), item)
+    }
+
+    fn gap(&mut self, cause: Cause, place: Option<u64>, bytes: u64, words: String) -> Result<()> {
+        let gap = Gap { from: Some(self.clock.now()), to: None, cause, place, bytes, words };
+        self.tell(Item::Gap(&gap))
+    }
+
+    fn message(&mut self, place: u64, message: &Message<'_>, bytes: usize) -> Result<()> {
+        match *message {
+            Message::Data { id, data } => self.data(place, id, data, bytes),
+            Message::Flags { incompatible, appended } => self.flags(place, incompatible, appended),
+            Message::Format(text) => match self.formats.define(text) {
+                Ok(()) => Ok(()),
+                Err(error) => self.gap(Cause::Damaged, Some(place), bytes as u64, error.to_string()),
+            },
+            Message::Information { value, multiple } => self.information(&value, multiple),
+            Message::Parameter(value) => self.parameter(&value),
+            Message::Default { groups, value } => self.default(groups, &value),
+            Message::Subscribe { id, instance, name } => self.subscribe(place, id, instance, name),
+            Message::Unsubscribe(id) => {
+                self.subscriptions.remove(id);
+                Ok(())
+            }
+            Message::Text { level, time_us, words } => self.text(level, time_us, words),
+            Message::Dropout(milliseconds) => self.dropout(place, milliseconds),
+            Message::Beginning { time_us } => self.another(time_us),
+            Message::Sync | Message::Unknown => Ok(()),
+        }
+    }
+
+    /// Flags that nobody knows change what follows: the format says that a reader must refuse them.
+    fn flags(&mut self, place: u64, incompatible: [u8; 8], appended: [u64; 3]) -> Result<()> {
+        let unknown: Vec<String> = incompatible
+            .iter()
+            .zip(APPENDED)
+            .map(|(flags, known)| format!("{:02x}", flags & !known))
+            .collect();
+        if unknown.iter().any(|flags| flags != "00") {
+            bail!(
+                "is a ULog of a kind that this version cannot read: its header has the incompatible flags {} at byte {place}",
+                unknown.concat()
+            );
+        }
+        if incompatible != APPENDED {
+            return Ok(());
+        }
+        for offset in appended.into_iter().filter(|&offset| offset != 0) {
+            if offset > place && self.appended.last().is_none_or(|&last| offset > last) {
+                self.appended.push(offset);
+            } else {
+                let words = format!("an offset of appended data that leads back, to {offset}");
+                self.gap(Cause::Damaged, Some(place), 0, words)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn information(&mut self, value: &Keyed<'_>, multiple: bool) -> Result<()> {
+        let text = value.words();
+        if let Some(key) = KEPT.iter().find(|key| **key == value.name && !multiple) {
+            let mut words = text.map_or_else(
+                || value.number().map_or_else(String::new, |number| format!("{number:.0}")),
+                str::to_owned,
+            );
+            words.truncate(words.floor_char_boundary(WORDS_BYTES_MAX));
+            self.information.insert(*key, words);
+            self.epoch_from_boot()?;
+        }
+        let Some(table) = self.own.information.clone() else { return Ok(()) };
+        let number = value.number().map_or(Value::Unknown, Value::Double);
+        let text = text.map_or(Value::Unknown, Value::Text);
+        self.tell(Item::Row(Row { table: &table, values: &[Value::Text(value.name), text, number] }))
+    }
+
+    fn parameter(&mut self, value: &Keyed<'_>) -> Result<()> {
+        let Some(number) = value.number() else { return Ok(()) };
+        self.px4.parameter(value.name, number);
+        self.tell(Item::Parameter(Parameter { name: value.name, value: number }))
+    }
+
+    fn default(&mut self, groups: u8, value: &Keyed<'_>) -> Result<()> {
+        let (Some(table), Some(number)) = (self.own.defaults.clone(), value.number()) else { return Ok(()) };
+        let group = |bit: u8| Value::Flag(groups & bit != 0);
+        let values = [Value::Text(value.name), Value::Double(number), group(1), group(2)];
+        self.tell(Item::Row(Row { table: &table, values: &values }))
+    }
+
+    fn subscribe(&mut self, place: u64, id: u16, instance: u8, name: &str) -> Result<()> {
+        self.tell_facts()?;
+        let layout = match self.formats.layout(name) {
+            Ok(layout) => layout,
+            Err(error) => {
+                self.subscriptions.remove(id);
+                return self.gap(
+                    Cause::Damaged,
+                    Some(place),
+                    0,
+                    format!("a subscription to {name}: {error}"),
+                );
+            }
+        };
+        if self.subscriptions.add(id, instance, &layout, self.want.rows) {
+            return Ok(());
+        }
+        self.gap(Cause::Damaged, Some(place), 0, format!("a subscription to {name}, one of too many"))
+    }
+
+    fn data(&mut self, place: u64, id: u16, data: &[u8], bytes: usize) -> Result<()> {
+        let Some(subscription) = self.subscriptions.get_mut(id) else {
+            if self.strays.0 == 0 {
+                self.strays.1 = place;
+            }
+            self.strays.0 += 1;
+            return Ok(());
+        };
+        let recorded = subscription.take(data, bytes);
+        if recorded.is_some_and(|recorded| self.clock.take(recorded)) {
+            (self.take)(self.clock.now(), Item::Restart)?;
+        }
+        let now = self.clock.now();
+        if let Some(table) = &subscription.table {
+            let values = rows::values(&subscription.layout, subscription.instance, data);
+            (self.take)(now, Item::Row(Row { table, values: &values }))?;
+        }
+        let recorded = recorded.unwrap_or_else(|| self.clock.recorded());
+        if let Some((topic, slots)) = &subscription.topic
+            && subscription
+                .observed_us
+                .is_none_or(|last| recorded < last || recorded - last >= topic.every_us)
+        {
+            subscription.observed_us = Some(recorded);
+            let fields = Fields::new(slots, data);
+            self.px4.take(
+                topic,
+                &Said { at: now, recorded_us: recorded, instance: subscription.instance, fields },
+            );
+        }
+        self.px4.step(now, self.clock.recorded());
+        self.hand_on()
+    }
+
+    /// What the mapping has made.
+    fn hand_on(&mut self) -> Result<()> {
+        if self.px4.told.is_empty() {
+            return Ok(());
+        }
+        let mut told = std::mem::take(&mut self.px4.told);
+        for one in told.drain(..) {
+            self.told(one)?;
+        }
+        // Its room serves again.
+        self.px4.told = told;
+        Ok(())
+    }
+
+    fn told(&mut self, told: Told) -> Result<()> {
+        let source = self.px4.source();
+        match told {
+            Told::Observation(_) if !self.want.observations => Ok(()),
+            Told::Observation(observation) => self.tell(Item::Observation(source, &observation)),
+            Told::Text { severity, words } => self.say(severity, &words),
+            Told::Event { number, severity } => self.tell(Item::Event(Event { number, severity, words: "" })),
+            Told::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
+            Told::Utc { utc_us, recorded_us } => self.epoch(i128::from(utc_us) - i128::from(recorded_us)),
+        }
+    }
+
+    /// UTC at the autopilot's boot becomes UTC at time zero.
+    fn epoch(&mut self, boot_us: i128) -> Result<()> {
+        match u64::try_from(boot_us + self.clock.zero()) {
+            Ok(epoch) => self.tell(Item::Epoch(epoch)),
+            Err(_) => Ok(()),
+        }
+    }
+
+    fn epoch_from_boot(&mut self) -> Result<()> {
+        match self.information.remove("boot_time_utc_us").and_then(|text| text.parse::<u64>().ok()) {
+            Some(boot_us) if boot_us > 0 => self.epoch(i128::from(boot_us)),
+            _ => Ok(()),
+        }
+    }
+
+    fn text(&mut self, level: u8, time_us: u64, words: &[u8]) -> Result<()> {
+        self.tell_facts()?;
+        if self.clock.take(time_us) {
+            self.tell(Item::Restart)?;
+        }
+        self.say(level, text_of(words).trim_end())
+    }
+
+    fn say(&mut self, severity: u8, words: &str) -> Result<()> {
+        if words.is_empty() || words == self.last_words {
+            return Ok(());
+        }
+        words.clone_into(&mut self.last_words);
+        let source = self.px4.source();
+        self.tell(Item::Text(Text { source, severity, words }))
+    }
+
+    fn dropout(&mut self, place: u64, milliseconds: u16) -> Result<()> {
+        let now = self.clock.now();
+        self.px4.dropout();
+        let gap = Gap {
+            from: Some(now),
+            to: Some(now + Span::from_millis(u64::from(milliseconds))),
+            cause: Cause::Lost,
+            place: Some(place),
+            bytes: 0,
+            words: format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
+        };
+        self.tell(Item::Gap(&gap))
+    }
+
+    /// Another log was joined on: nothing of the first one holds.
+    fn another(&mut self, time_us: u64) -> Result<()> {
+        self.formats = Formats::default();
+        self.subscriptions.clear();
+        self.px4 = Px4::default();
+        self.told_facts = false;
+        self.clock.begin(time_us);
+        self.tell(Item::Restart)
+    }
+
+    /// Who made the log, once all of it has been told.
+    fn tell_facts(&mut self) -> Result<()> {
+        if std::mem::replace(&mut self.told_facts, true) {
+            return Ok(());
+        }
+        let release = self.information.get("ver_sw_release").and_then(|text| text.parse().ok()).unwrap_or(0);
+        self.px4.identity(release);
+        let known = |key: &str| self.information.get(key).filter(|words| !words.is_empty());
+        let mut facts = Vec::new();
+        let name = known("sys_name").map_or("PX4", String::as_str);
+        let commit = known("ver_sw").and_then(|commit| commit.get(..8)).map(|commit| format!(" ({commit})"));
+        if release != 0 || commit.is_some() {
+            let version = if release == 0 { String::new() } else { format!(" v{}", version(release)) };
+            facts.push((About::Firmware, format!("{name}{version}{}", commit.unwrap_or_default())));
+        }
+        if let Some(hardware) = known("ver_hw") {
+            let kind = known("ver_hw_subtype").map_or_else(String::new, |kind| format!(" {kind}"));
+            facts.push((About::Hardware, format!("{hardware}{kind}")));
+        }
+        if let Some(kind) = known("log_type") {
+            facts.push((About::Recorder, format!("PX4's logger, a log of kind {kind}")));
+        }
+        if let Some(replayed) = known("replay") {
+            facts.push((About::Recorder, format!("PX4's replay of {replayed}")));
+        }
+        facts.iter().try_for_each(|(about, words)| self.tell(Item::Fact(Fact { about: *about, words })))
+    }
+}
+
+/// `0xAABBCCTT`: major, minor, patch, type (255 a release, 192 a candidate, 128 beta, 64 alpha).
+fn version(release: u32) -> String {
+    let [major, minor, patch, kind] = release.to_be_bytes();
+    let kind = match kind {
+        255 => "",
+        192.. => "-rc",
+        128.. => "-beta",
+        64.. => "-alpha",
+        _ => "-dev",
+    };
+    format!("{major}.{minor}.{patch}{kind}")
+}
+
+/// What is in a log besides topics, as rows.
+struct OwnTables {
+    defaults: Option<Arc<Table>>,
+    information: Option<Arc<Table>>,
+}
+
+impl OwnTables {
+    fn new(rows: Rows<'_>) -> Self {
+        let table = |name: &str, columns: &[(&str, Kind)]| {
+            let column =
+                |&(name, kind): &(&str, Kind)| Column { name: name.to_owned(), unit: String::new(), kind };
+            let table = Table { name: name.to_owned(), columns: columns.iter().map(column).collect() };
+            rows.has(name).then(|| Arc::new(table))
+        };
+        let (text, flag, number) = (Kind::Text, Kind::Flag, Kind::Double);
+        Self {
+            defaults: table(
+                "default_parameters",
+                &[("name", text), ("value", number), ("system", flag), ("configuration", flag)],
+            ),
+            information: table("information", &[("key", text), ("text", text), ("number", number)]),
+        }
+    }
+}

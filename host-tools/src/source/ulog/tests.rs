@@ -1,0 +1,259 @@
+//! Logs as they should be, and as they should not.
+
+use super::message::MESSAGE_BYTES_MAX;
+use super::testing::{Writer, read, try_read};
+use crate::source::item::Cause;
+
+const SECOND: u64 = 1_000_000;
+const POSITION: &str = "position:uint64_t timestamp;float x;uint8_t n;uint8_t[3] _padding0;";
+
+fn position(x: f32, n: u8) -> Vec<u8> {
+    [&x.to_le_bytes()[..], &[n]].concat()
+}
+
+/// A log with a topic in two instances, and ten messages of each.
+fn small() -> Writer {
+    let mut writer = Writer::new(SECOND)
+        .flags(0, [0; 3])
+        .information("char[3] sys_name", b"PX4")
+        .information("uint32_t ver_sw_release", &0x010e_03ff_u32.to_le_bytes())
+        .format(POSITION)
+        .parameter("A_GAIN", 0.5)
+        .integer_parameter("MAV_SYS_ID", 7)
+        .default_parameter(1, "A_GAIN", 0.25)
+        .subscribe(0, 0, "position")
+        .subscribe(1, 1, "position");
+    for number in 0..10 {
+        let time = 2 * SECOND + u64::from(number) * 100_000;
+        writer =
+            writer.data(0, time, &position(f32::from(number), number)).data(1, time, &position(-1.0, number));
+        if number % 4 == 0 {
+            writer = writer.sync();
+        }
+    }
+    writer
+}
+
+#[test]
+fn a_log_gives_its_definitions_its_data_and_no_damage() {
+    let read =
+        read(&small().text(b'4', 3 * SECOND, "low battery\n").tagged(b'6', 3, 3 * SECOND, "tagged").bytes);
+    assert_eq!(read.of("fact"), ["Firmware PX4 v1.14.3"]);
+    assert_eq!(read.of("parameter"), ["A_GAIN 0.5", "MAV_SYS_ID 7"]);
+    assert_eq!(read.of("row default_parameters"), ["A_GAIN,0.25,true,false"]);
+    assert_eq!(read.of("row information"), ["sys_name,PX4,", "ver_sw_release,,17695743"]);
+    let rows = read.of("row position");
+    assert_eq!(rows.len(), 20);
+    assert_eq!(rows[..2], ["0,2000000,0,0", "1,2000000,-1,0"]);
+    assert_eq!(read.of("text"), ["4 low battery", "6 tagged"]);
+    assert_eq!(read.of("gap"), [""; 0]);
+    let counts: Vec<(&str, u64)> =
+        read.summary.messages.iter().map(|message| (message.name.as_str(), message.count)).collect();
+    assert_eq!(counts, [("position", 20)]);
+}
+
+#[test]
+fn a_parameter_that_changes_in_flight_is_told_when_it_changes() {
+    let read = read(&small().parameter("A_GAIN", 0.75).data(0, 4 * SECOND, &position(0.0, 0)).bytes);
+    let changed: Vec<&(u64, String)> =
+        read.items.iter().filter(|(_, item)| item.starts_with("parameter A_GAIN")).collect();
+    assert_eq!(changed.len(), 2);
+    assert_eq!(*changed[1], (2 * SECOND + 900_000, "parameter A_GAIN 0.75".to_owned()));
+}
+
+#[test]
+fn a_dropout_is_a_gap_with_its_length_and_no_damage() {
+    let read = read(&small().dropout(73).data(0, 4 * SECOND, &position(0.0, 0)).bytes);
+    assert_eq!(read.gaps.len(), 1);
+    let gap = &read.gaps[0];
+    assert_eq!(
+        (gap.cause, gap.to.zip(gap.from).map(|(to, from)| to.since(from).as_millis())),
+        (Cause::Lost, Some(73))
+    );
+    assert!(!gap.cause.is_damage());
+}
+
+#[test]
+fn data_that_was_appended_to_a_log_that_ends_in_the_middle_of_a_message_is_read() {
+    let mut log = small().bytes;
+    log.extend([40, 0, b'D', 0, 0, 1, 2, 3]);
+    let offset = log.len() as u64;
+    let head = Writer::new(SECOND).flags(1, [offset, 0, 0]).bytes;
+    log[..head.len()].copy_from_slice(&head);
+    let more =
+        Writer { bytes: log }.text(b'2', 4 * SECOND, "crash dump").data(0, 4 * SECOND, &position(9.0, 9));
+    let read = read(&more.bytes);
+    assert_eq!(read.of("text"), ["2 crash dump"]);
+    assert_eq!(read.of("row position").len(), 21);
+    assert_eq!(read.of("gap"), ["Cut a message that the end cuts off"]);
+}
+
+#[test]
+fn offsets_of_appended_data_behind_the_end_or_backwards_are_said_and_do_no_harm() {
+    for (offsets, words) in [
+        ([u64::MAX, 0, 0], "Cut no appended data at 18446744073709551615"),
+        ([3, 0, 0], "Damaged an offset of appended data that leads back, to 3"),
+    ] {
+        let mut log = small().bytes;
+        let head = Writer::new(SECOND).flags(1, offsets).bytes;
+        log[..head.len()].copy_from_slice(&head);
+        let read = read(&log);
+        assert_eq!(read.of("row position").len(), 20, "{offsets:?}");
+        assert!(read.of("gap").iter().any(|gap| gap.starts_with(words)), "{:?}", read.of("gap"));
+    }
+}
+
+#[test]
+fn flags_that_nobody_knows_are_refused_with_their_number() {
+    let error = try_read(&Writer::new(0).flags(0x82, [0; 3]).bytes).expect_err("refused").to_string();
+    assert!(error.contains("8200000000000000"), "{error}");
+}
+
+#[test]
+fn what_is_no_ulog_is_refused() {
+    assert!(try_read(b"").is_err());
+    assert!(try_read(&Writer::new(0).bytes[..15]).is_err());
+    assert!(try_read(&[0xfd; 4_000]).is_err());
+}
+
+#[test]
+fn an_empty_line_of_a_console_is_no_damage() {
+    let empty = |log: Writer| log.message(b'M', &[&[1, 17], b"char[0] perf_top_"]);
+    let read = read(&empty(small()).data(0, 4 * SECOND, &position(0.0, 0)).bytes);
+    assert_eq!((read.of("row position").len(), read.gaps.len()), (21, 0), "{:?}", read.gaps);
+}
+
+#[test]
+fn kinds_of_messages_that_are_newer_than_this_reader_are_skipped() {
+    let read = read(&small().message(b'Z', &[b"something new"]).data(0, 4 * SECOND, &position(0.0, 0)).bytes);
+    assert_eq!((read.of("row position").len(), read.gaps.len()), (21, 0));
+}
+
+#[test]
+fn a_subscription_that_is_removed_frees_its_number() {
+    let log = small().message(b'R', &[&0_u16.to_le_bytes()]).subscribe(0, 2, "position");
+    let read = read(&log.data(0, 4 * SECOND, &position(5.0, 5)).bytes);
+    assert_eq!(read.of("row position").last(), Some(&"2,4000000,5,5"));
+    assert_eq!(read.gaps.len(), 0);
+}
+
+#[test]
+fn a_subscription_to_what_was_never_defined_is_said_and_the_rest_is_read() {
+    let log = small().subscribe(5, 0, "nothing").data(5, 4 * SECOND, &[1; 30]).data(
+        0,
+        4 * SECOND,
+        &position(0.0, 0),
+    );
+    let read = read(&log.bytes);
+    assert_eq!(read.of("row position").len(), 21);
+    assert_eq!(
+        read.of("gap"),
+        [
+            "Damaged a subscription to nothing: no format definition of nothing",
+            "Damaged 1 messages of data without a subscription"
+        ]
+    );
+}
+
+#[test]
+fn zeros_at_the_end_are_a_cut_and_no_search() {
+    let mut log = small().bytes;
+    log.extend([0; 3_000]);
+    let read = read(&log);
+    assert_eq!(read.of("row position").len(), 20);
+    assert_eq!(read.of("gap"), ["Cut 3000 zero bytes to the end, where messages should be"]);
+}
+
+#[test]
+fn damage_costs_what_it_hit_and_says_where() {
+    let mut log = small().bytes;
+    let middle = log.len() - 200;
+    let noise: Vec<u8> =
+        (0..100_000_u32).map(|number| (number.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    log.splice(middle..middle, noise);
+    let read = read(&log);
+    assert!(read.of("row position").len() >= 18, "{:?}", read.of("row position"));
+    let gap = &read.gaps[0];
+    assert_eq!(gap.cause, Cause::Damaged);
+    let place = gap.place.expect("a place");
+    assert!(place.abs_diff(middle as u64) < 30, "{gap:?}");
+    assert!((99_900..100_100).contains(&gap.bytes), "{gap:?}");
+}
+
+#[test]
+fn a_log_that_was_joined_to_another_is_a_restart_with_its_own_definitions() {
+    let mut log = small().bytes;
+    let other = Writer::new(SECOND)
+        .format("position:uint64_t timestamp;double x;")
+        .subscribe(0, 0, "position")
+        .data(0, 2 * SECOND, &1.25_f64.to_le_bytes());
+    log.extend(other.bytes);
+    let read = read(&log);
+    assert_eq!((read.of("restart").len(), read.gaps.len()), (1, 0), "{:?}", read.gaps);
+    assert_eq!(read.of("row position_2"), ["0,2000000,1.25"]);
+    // A second and a bit after the last of the first one.
+    assert_eq!(read.items.last().map(|(at, _)| *at), Some(3 * SECOND + 900_000));
+}
+
+#[test]
+fn truncation_at_every_byte_gives_what_came_before() {
+    let log = small().bytes;
+    let mut ends = Vec::new();
+    let mut at = 16;
+    while at < log.len() {
+        let bytes = 3 + usize::from(u16::from_le_bytes([log[at], log[at + 1]]));
+        if log[at + 2] == b'D' {
+            ends.push(at + bytes);
+        }
+        at += bytes;
+    }
+    assert_eq!(ends.len(), 20);
+    for end in 16..log.len() {
+        let read = read(&log[..end]);
+        let rows = read.of("row position").len();
+        assert_eq!(rows, ends.iter().filter(|whole| **whole <= end).count(), "{end}");
+        assert!(
+            read.gaps.len() <= 1 && read.gaps.iter().all(|gap| gap.cause == Cause::Cut),
+            "{end}: {:?}",
+            read.gaps
+        );
+    }
+}
+
+#[test]
+fn no_flipped_bit_costs_more_than_its_neighbours() {
+    let log = small().bytes;
+    // From the first message of data on.
+    let data = log.len() - 20 * 18 - 3 * 11;
+    for bit in data * 8..log.len() * 8 {
+        let mut flipped = log.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        let rows = read(&flipped).of("row position").len();
+        assert!(rows >= 18, "bit {bit}: {rows} rows");
+    }
+}
+
+#[test]
+fn lies_of_any_kind_take_neither_a_panic_nor_memory() {
+    // Each byte of the definitions, set to what hurts.
+    let log = small().bytes;
+    for at in 0..log.len().min(420) {
+        for value in [0, 1, 0x20, 0x3a, 0x5b, 0x7f, 0x80, 0xff] {
+            let mut lying = log.clone();
+            lying[at] = value;
+            let _ = try_read(&lying);
+        }
+    }
+}
+
+#[test]
+fn what_looks_like_a_message_at_every_byte_is_searched_in_time() {
+    for pattern in
+        [&b"F"[..], b"L0", b"D", b"P\0", b"I1", b"Q", &[0x2f, 0x73, 0x13, 0x20], b"ULog\x01\x12\x35"]
+    {
+        let mut log = small().bytes;
+        log.extend(pattern.iter().cycle().take(6 * MESSAGE_BYTES_MAX));
+        let read = read(&log);
+        assert_eq!(read.of("row position").len(), 20, "{pattern:?}");
+    }
+}

@@ -1,0 +1,143 @@
+//! Subscriptions: which topic a message of data is of, and what is to be done with it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::fields::{Slot, slots};
+use super::format::Layout;
+use super::px4::{self, Topic};
+use super::rows;
+use crate::source::item::{MessageCount, Rows, Table};
+
+/// Subscriptions at a time at most. PX4 has some 200.
+const SUBSCRIPTIONS_MAX: usize = 4_096;
+/// Columns of all tables at most, those of logs that were joined on too. A log of PX4 with all of its topics has 8,000.
+const COLUMNS_MAX: usize = 65_536;
+/// Names of topics that are counted at most; the rest is counted together.
+const NAMES_MAX: usize = 4_096;
+/// The name of the rest.
+const OTHERS: &str = "others";
+
+/// A topic's instance.
+#[derive(Debug)]
+pub(super) struct Subscription {
+    pub(super) layout: Arc<Layout>,
+    pub(super) instance: u8,
+    /// What becomes observations, and where its fields are.
+    pub(super) topic: Option<(&'static Topic, Vec<Option<Slot>>)>,
+    /// Where rows are wanted.
+    pub(super) table: Option<Arc<Table>>,
+    /// The recorded time of the message that was observed last.
+    pub(super) observed_us: Option<u64>,
+    count: u64,
+    bytes: u64,
+}
+
+impl Subscription {
+    /// Counts a message; its time, where it has one.
+    pub(super) fn take(&mut self, data: &[u8], message_bytes: usize) -> Option<u64> {
+        self.count += 1;
+        self.bytes += message_bytes as u64;
+        let at = self.layout.timestamp? as usize;
+        Some(u64::from_le_bytes(*data.get(at..)?.first_chunk()?))
+    }
+}
+
+/// All of them, by number.
+#[derive(Debug, Default)]
+pub(super) struct Subscriptions {
+    numbered: Vec<Option<Box<Subscription>>>,
+    living: usize,
+    /// Tables by topic: the instances of a topic share one. In a log that was joined on it may have other columns.
+    tables: BTreeMap<String, Vec<Arc<Table>>>,
+    columns: usize,
+    counted: BTreeMap<String, (u64, u64)>,
+}
+
+impl Subscriptions {
+    /// Whether data of this length can be of this subscription: its padding at the end may be left out.
+    pub(super) fn fits(&self, id: u16, bytes: usize) -> Option<bool> {
+        let layout = &self.numbered.get(usize::from(id))?.as_ref()?.layout;
+        Some((layout.least_bytes..=layout.bytes).contains(&bytes))
+    }
+
+    pub(super) fn get_mut(&mut self, id: u16) -> Option<&mut Subscription> {
+        self.numbered.get_mut(usize::from(id))?.as_deref_mut()
+    }
+
+    /// `false` where there are too many.
+    pub(super) fn add(&mut self, id: u16, instance: u8, layout: &Arc<Layout>, rows: Rows<'_>) -> bool {
+        self.remove(id);
+        if self.living >= SUBSCRIPTIONS_MAX {
+            return false;
+        }
+        self.living += 1;
+        let topic = px4::topic(&layout.name).filter(|topic| instance < topic.instances);
+        let table = rows.has(&rows::table_name(layout)).then(|| self.table(layout)).flatten();
+        let subscription = Subscription {
+            layout: Arc::clone(layout),
+            instance,
+            topic: topic.map(|topic| (topic, slots(layout, topic.fields))),
+            table,
+            observed_us: None,
+            count: 0,
+            bytes: 0,
+        };
+        let place = usize::from(id);
+        if self.numbered.len() <= place {
+            self.numbered.resize_with(place + 1, || None);
+        }
+        if let Some(slot) = self.numbered.get_mut(place) {
+            *slot = Some(Box::new(subscription));
+        }
+        true
+    }
+
+    /// The table of these fields: one that is there, or another.
+    fn table(&mut self, layout: &Layout) -> Option<Arc<Table>> {
+        let mut table = rows::table(layout);
+        let tables = self.tables.entry(table.name.clone()).or_default();
+        if let Some(known) = tables.iter().find(|known| known.columns == table.columns) {
+            return Some(Arc::clone(known));
+        }
+        self.columns += table.columns.len();
+        if self.columns > COLUMNS_MAX {
+            return None;
+        }
+        if !tables.is_empty() {
+            table.name = format!("{}_{}", table.name, tables.len() + 1);
+        }
+        let table = Arc::new(table);
+        tables.push(Arc::clone(&table));
+        Some(table)
+    }
+
+    pub(super) fn remove(&mut self, id: u16) {
+        let Some(gone) = self.numbered.get_mut(usize::from(id)).and_then(Option::take) else { return };
+        self.living -= 1;
+        self.count(&gone);
+    }
+
+    fn count(&mut self, gone: &Subscription) {
+        let name = &gone.layout.name;
+        let room = self.counted.len() < NAMES_MAX || self.counted.contains_key(name);
+        let counted = self.counted.entry(if room { name.as_str() } else { OTHERS }.to_owned()).or_default();
+        counted.0 += gone.count;
+        counted.1 += gone.bytes;
+    }
+
+    /// Another log begins.
+    pub(super) fn clear(&mut self) {
+        for gone in std::mem::take(&mut self.numbered).into_iter().flatten() {
+            self.count(&gone);
+        }
+        self.living = 0;
+    }
+
+    /// What there was, by name.
+    pub(super) fn counts(mut self) -> Vec<MessageCount> {
+        self.clear();
+        let of = |(name, (count, bytes))| MessageCount { name, count, bytes };
+        self.counted.into_iter().map(of).collect()
+    }
+}

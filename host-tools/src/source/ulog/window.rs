@@ -1,0 +1,76 @@
+//! A window that moves over the input: what is parsed lies in one piece, and memory does not grow with the input.
+
+use std::io::{self, Read};
+
+use super::super::stream::read_some;
+
+/// How much is read at once: many times the longest message (65,538 bytes), so that little is moved.
+const READ_BYTES: usize = 512 * 1024;
+
+/// Part of the input, and where it lies.
+pub(super) struct Window<R> {
+    input: R,
+    buffer: Vec<u8>,
+    /// Where the rest begins in the buffer.
+    at: usize,
+    /// Where the rest begins in the input.
+    place: u64,
+    ended: bool,
+    /// Why the input ended too early: a compressed stream that is damaged, a disk that fails.
+    trouble: Option<io::Error>,
+}
+
+impl<R: Read> Window<R> {
+    pub(super) fn new(input: R) -> Self {
+        Self { input, buffer: Vec::new(), at: 0, place: 0, ended: false, trouble: None }
+    }
+
+    /// What has been read and not yet consumed.
+    pub(super) fn rest(&self) -> &[u8] {
+        self.buffer.get(self.at..).unwrap_or_default()
+    }
+
+    /// Where the rest begins in the input.
+    pub(super) fn place(&self) -> u64 {
+        self.place
+    }
+
+    /// Whether the rest is all that comes.
+    pub(super) fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// What ended the input before its end, once.
+    pub(super) fn take_trouble(&mut self) -> Option<io::Error> {
+        self.trouble.take()
+    }
+
+    /// Makes the rest at least so long, or reads to the end.
+    pub(super) fn fill(&mut self, bytes: usize) {
+        if self.rest().len() >= bytes || self.ended {
+            return;
+        }
+        self.buffer.drain(..self.at);
+        self.at = 0;
+        while self.buffer.len() < bytes && !self.ended {
+            let old = self.buffer.len();
+            self.buffer.resize(old + READ_BYTES, 0);
+            let got = match read_some(&mut self.input, self.buffer.get_mut(old..).unwrap_or_default()) {
+                Ok(got) => got,
+                Err(error) => {
+                    self.trouble = Some(error);
+                    0
+                }
+            };
+            self.buffer.truncate(old + got);
+            self.ended = got == 0;
+        }
+    }
+
+    /// Moves on.
+    pub(super) fn consume(&mut self, bytes: usize) {
+        let bytes = bytes.min(self.rest().len());
+        self.at += bytes;
+        self.place += bytes as u64;
+    }
+}
