@@ -9,7 +9,7 @@ use hums_core::units::{
     RadiansPerSecond,
 };
 
-use super::{FAST_US, MEDIUM_US, Px4, Said, Topic};
+use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Said, Topic};
 
 pub(super) const TOPICS: &[Topic] = &[
     Topic {
@@ -158,49 +158,6 @@ pub(super) const TOPICS: &[Topic] = &[
         take: imu_status,
     },
 ];
-
-/// What topics said of motion.
-#[derive(Debug, Default)]
-pub(super) struct Motion {
-    combined: bool,
-    rate: Option<[f32; 3]>,
-    local: Option<Local>,
-    home: Option<Home>,
-    pressure_altitude: Option<f32>,
-    airspeed: Option<f32>,
-    airspeed_validated: bool,
-    thrust: [Option<f32>; 2],
-    /// The estimator that flies.
-    estimator: u8,
-    /// The accelerometer that flies.
-    accelerometer: Option<u64>,
-    clips: [u32; 3],
-    imu_status: bool,
-}
-
-impl Motion {
-    fn set_thrust(&mut self, group: u8, thrust: Option<f32>) {
-        if let Some(place) = self.thrust.get_mut(usize::from(group)) {
-            *place = thrust.filter(|thrust| thrust.is_finite());
-        }
-    }
-}
-
-/// `vehicle_local_position`.
-#[derive(Clone, Copy, Debug)]
-struct Local {
-    z: Option<f32>,
-    velocity: [f32; 3],
-    /// Above mean sea level.
-    altitude: Option<f32>,
-}
-
-/// `home_position`.
-#[derive(Clone, Copy, Debug)]
-struct Home {
-    altitude: Option<f32>,
-    z: Option<f32>,
-}
 
 fn inertial(acceleration: Option<[f32; 3]>, rate: Option<[f32; 3]>) -> Observation {
     Observation::Imu(Imu {

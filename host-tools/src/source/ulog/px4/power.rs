@@ -5,10 +5,7 @@ use hums_core::observation::{
 };
 use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
 
-use super::{MEDIUM_US, Px4, Said, Topic};
-
-/// Batteries that serve: as many as PX4 has instances.
-const BATTERIES_MAX: usize = 4;
+use super::state::{BATTERIES_MAX, MEDIUM_US, Pack, Px4, Said, Topic};
 
 /// The names of one ESC's fields.
 macro_rules! esc_fields {
@@ -64,23 +61,6 @@ pub(super) const TOPICS: &[Topic] = &[
         take: escs,
     },
 ];
-
-/// What topics said of power.
-#[derive(Debug, Default)]
-pub(super) struct Power {
-    batteries: [Option<Pack>; BATTERIES_MAX],
-    load: Option<f32>,
-    /// Whether the log has the processor's load, at whose rate `SYS_STATUS` is made.
-    has_load: bool,
-}
-
-/// What `SYS_STATUS` repeats of a battery.
-#[derive(Clone, Copy, Debug)]
-struct Pack {
-    voltage: Option<Volts>,
-    current: Option<Amperes>,
-    remaining: Option<Fraction>,
-}
 
 fn battery(px4: &mut Px4, said: &Said<'_>) {
     let fields = &said.fields;

@@ -9,10 +9,8 @@ use hums_core::time::{Instant, Span};
 use hums_core::units::{Metres, MetresPerSecond};
 
 use super::motion::place;
-use super::{MEDIUM_US, Px4, Said, Told, Topic};
+use super::state::{MEDIUM_US, Px4, RECEIVERS_MAX, Receivers, Said, Told, Topic};
 
-/// Receivers that serve.
-const RECEIVERS_MAX: usize = 2;
 /// A receiver that says nothing for longer is gone.
 const SILENCE: Span = Span::from_millis(2_500);
 /// A fix with a position: `FIX_TYPE_2D`.
@@ -52,28 +50,16 @@ pub(super) const TOPICS: &[Topic] = &[
     },
 ];
 
-/// What is known of the receivers.
-#[derive(Debug, Default)]
-pub(super) struct Receivers {
-    /// There are messages of the receivers themselves.
-    sensors: bool,
-    /// When each was heard last.
-    heard: [Option<Instant>; RECEIVERS_MAX],
-    told_utc: bool,
+/// Heard again before anything is said of silence.
+pub(super) fn dropout(receivers: &mut Receivers) {
+    receivers.heard = [None; RECEIVERS_MAX];
 }
 
-impl Receivers {
-    pub(super) fn dropout(&mut self) {
-        // Heard again before anything is said of silence.
-        self.heard = [None; RECEIVERS_MAX];
-    }
-
-    /// What MAVLink says of receivers that fell silent.
-    pub(super) fn silence(&self, now: Instant, observe: &mut dyn FnMut(Observation)) {
-        for (instance, heard) in self.heard.iter().enumerate() {
-            if heard.is_some_and(|heard| now.since(heard) > SILENCE) {
-                observe(Observation::Gnss(Gnss { instance: instance as u8, ..Gnss::default() }));
-            }
+/// What MAVLink says of receivers that fell silent.
+pub(super) fn silence(receivers: &Receivers, now: Instant, observe: &mut dyn FnMut(Observation)) {
+    for (instance, heard) in receivers.heard.iter().enumerate() {
+        if heard.is_some_and(|heard| now.since(heard) > SILENCE) {
+            observe(Observation::Gnss(Gnss { instance: instance as u8, ..Gnss::default() }));
         }
     }
 }

@@ -6,7 +6,7 @@ use hums_core::observation::{
 };
 use hums_core::units::Rpm;
 
-use super::{Px4, Said, Told, Topic};
+use super::state::{MEDIUM_US, Px4, Said, Status, System, Told, Topic};
 
 pub(super) const TOPICS: &[Topic] = &[
     Topic {
@@ -58,7 +58,7 @@ pub(super) const TOPICS: &[Topic] = &[
     Topic {
         name: "input_rc",
         instances: 1,
-        every_us: super::MEDIUM_US,
+        every_us: MEDIUM_US,
         fields: &["rssi", "channel_count"],
         take: rc,
     },
@@ -101,7 +101,7 @@ pub(super) const TOPICS: &[Topic] = &[
     Topic {
         name: "rpm",
         instances: 2,
-        every_us: super::MEDIUM_US,
+        every_us: MEDIUM_US,
         fields: &["rpm_estimate", "indicated_frequency_rpm"],
         take: rpm,
     },
@@ -118,55 +118,7 @@ const POWEROFF: u8 = 7;
 const TERMINATION: u8 = 8;
 const CALIBRATING: u8 = 2;
 
-/// What topics said of the autopilot itself.
-#[derive(Debug, Default)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of several topics, none a state of the others")]
-pub(super) struct System {
-    /// `MAV_SYS_ID`.
-    number: Option<u8>,
-    /// `MAV_TYPE`, for logs whose `vehicle_status` has no type.
-    type_number: Option<u8>,
-    /// `COM_FLIGHT_UUID`
-    flight: Option<u64>,
-    /// The firmware's version, 0 not known.
-    pub(super) release: u32,
-    status: Option<Status>,
-    /// `actuator_armed`: the motors are forced off.
-    stopped: bool,
-    terminated: bool,
-    auto: bool,
-    setpoint: Option<u8>,
-    landed: Option<bool>,
-    told_mode: Option<u32>,
-    told_identity: bool,
-    reached: Option<i64>,
-    /// UTC less the time since boot, from a receiver.
-    utc_offset_us: Option<u64>,
-}
-
-/// `vehicle_status`.
-#[derive(Clone, Copy, Debug)]
-struct Status {
-    arming: u8,
-    nav: u8,
-    failsafe: bool,
-    type_number: u8,
-    hil: bool,
-    calibrating: bool,
-    takeoff_us: Option<u64>,
-    unhealthy: u32,
-}
-
 impl System {
-    pub(super) fn number(&self) -> u8 {
-        self.number.unwrap_or(1)
-    }
-
-    /// Whether there is a vehicle to speak of.
-    pub(super) fn known(&self) -> bool {
-        self.status.is_some()
-    }
-
     /// Whether it is armed.
     pub(super) fn armed(&self) -> bool {
         self.status.is_some_and(|status| status.arming == ARMED)
