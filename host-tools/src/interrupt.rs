@@ -1,28 +1,37 @@
-//! Ctrl-C ends a run that would go on for ever in good order: the log is closed and the results are printed.
-//! A second one ends the program at once.
+//! Ctrl-C and SIGTERM end a run that would go on for ever in good order: what waits is written, the log is closed and
+//! the results are printed. A second one ends the program at once. SIGTERM is what `systemctl stop` and `docker stop` send.
+//!
+//! SIGHUP keeps its default, so that `nohup` works.
 
-use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
-static REQUESTED: AtomicBool = AtomicBool::new(false);
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
-/// From now on Ctrl-C (or SIGTERM's equivalent on the platform) is only noted, once.
+/// What a shell reports of a program that Ctrl-C ended.
+const EXIT_CODE: i32 = 130;
+
+static REQUESTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// From now on the first Ctrl-C or SIGTERM is only noted.
 pub fn watch() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let handler = || {
-            if REQUESTED.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
+    REQUESTED.get_or_init(|| {
+        let requested = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            // In this order: the first one must not find the flag set.
+            let second = flag::register_conditional_shutdown(signal, EXIT_CODE, Arc::clone(&requested));
+            let first = second.and_then(|_| flag::register(signal, Arc::clone(&requested)));
+            // Without a handler the signal simply ends the program, as before.
+            if let Err(error) = first {
+                eprintln!("hums: Ctrl-C will end the program without closing the log: {error}");
             }
-        };
-        // Without a handler Ctrl-C simply ends the program, as before.
-        if let Err(error) = ctrlc::set_handler(handler) {
-            eprintln!("hums: Ctrl-C will end the program without closing the log: {error}");
         }
+        requested
     });
 }
 
-/// Whether the user asked to end.
+/// Whether the user, or the system, asked to end.
 pub fn requested() -> bool {
-    REQUESTED.load(Ordering::SeqCst)
+    REQUESTED.get().is_some_and(|requested| requested.load(Ordering::SeqCst))
 }

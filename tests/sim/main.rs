@@ -10,6 +10,7 @@ mod card_trouble;
 mod companion;
 mod downlink;
 mod hostile_input;
+mod live_server;
 mod noise;
 mod persistence;
 mod power_cut;

@@ -93,8 +93,19 @@ impl Live {
 
     /// Ends it as Ctrl-C does: its exit code, and what it said.
     #[track_caller]
-    pub fn interrupt(mut self, limit: Duration) -> (Option<i32>, String) {
-        self.program.signal("INT");
+    pub fn interrupt(self, limit: Duration) -> (Option<i32>, String) {
+        self.end_by("INT", limit)
+    }
+
+    /// Ends it as a service is ended; as [`Self::interrupt`].
+    #[track_caller]
+    pub fn terminate(self, limit: Duration) -> (Option<i32>, String) {
+        self.end_by("TERM", limit)
+    }
+
+    #[track_caller]
+    fn end_by(mut self, signal: &str, limit: Duration) -> (Option<i32>, String) {
+        self.program.signal(signal);
         let code = self.program.end(limit);
         let mut words = String::new();
         self.stderr.read_to_string(&mut words).unwrap();

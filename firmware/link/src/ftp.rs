@@ -1,12 +1,40 @@
 //! MAVLink FTP: what a client asks, and the answers, byte for byte as they lie in `FILE_TRANSFER_PROTOCOL`
 //! (<https://mavlink.io/en/services/ftp.html>). Reading only.
 
+use crc::{Algorithm, Crc};
+
 use crate::packet::Fields;
 
 /// Bytes before the data.
 pub const HEAD: usize = 12;
 /// Bytes of data in one message.
 pub const DATA_MAX: usize = 239;
+
+/// The number of `CalcFileCRC32` (`MAV_FTP_OPCODE_CALCFILECRC`).
+pub const CHECKSUM: u8 = 14;
+/// The number of `BurstReadFile` (`MAV_FTP_OPCODE_BURSTREADFILE`).
+pub const BURST: u8 = 15;
+
+/// The CRC-32 that MAVLink FTP means by `CalcFileCRC32`: the polynomial of Ethernet, reflected, but from 0 and without a
+/// final inversion, as PX4 (`crc32part` with 0) and `ArduPilot` (`crc_crc32` with 0) compute it.
+static CRC: Crc<u32> = Crc::<u32>::new(&Algorithm {
+    width: 32,
+    poly: 0x04c1_1db7,
+    init: 0,
+    refin: true,
+    refout: true,
+    xorout: 0,
+    check: 0x2dfd_2d88,
+    residue: 0,
+});
+
+/// The checksum of a file of which `before` is that of what comes before `bytes`; 0 where nothing does.
+pub fn checksum(before: u32, bytes: &[u8]) -> u32 {
+    // The library takes its first value as the polynomial is written, and gives the result as it is reflected.
+    let mut digest = CRC.digest_with_initial(before.reverse_bits());
+    digest.update(bytes);
+    digest.finalize()
+}
 
 /// What went wrong (`MAV_FTP_ERR`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +69,9 @@ pub enum Operation<'a> {
     Read(u32, u8),
     /// Bytes from an offset to the end, so many a message.
     Burst(u32, u8),
+    /// The checksum of a file's first so many bytes; 0 is all of it, as the protocol has it. That a part may be asked
+    /// for is our own addition: `offset`, which means nothing else here, says how much.
+    Checksum(&'a str, u32),
     /// Writing of any kind.
     Write,
     /// Anything else.
@@ -65,14 +96,16 @@ pub fn read(payload: &[u8]) -> Asked<'_> {
     let fields = Fields(payload);
     let (size, offset) = (fields.u8(4), fields.u32(8));
     let text = || fields.text(HEAD, usize::from(size)).unwrap_or_default();
-    let bytes = size.min(DATA_MAX as u8);
+    // 0 leaves it to us.
+    let bytes = if size == 0 { DATA_MAX as u8 } else { size.min(DATA_MAX as u8) };
     let operation = match fields.u8(3) {
         0 => Operation::None,
         1 | 2 => Operation::End,
         3 => Operation::List(text(), offset),
         4 => Operation::Open(text()),
         5 => Operation::Read(offset, bytes),
-        15 => Operation::Burst(offset, bytes),
+        CHECKSUM => Operation::Checksum(text(), offset),
+        BURST => Operation::Burst(offset, bytes),
         6..=13 => Operation::Write,
         _ => Operation::Unknown,
     };
@@ -88,7 +121,7 @@ pub struct Reply {
     pub session: u8,
     /// The operation that is answered.
     pub opcode: u8,
-    /// Where the data lies.
+    /// Where the data lies; with a checksum, how many bytes it is of.
     pub offset: u32,
     /// The last one of a burst.
     pub complete: bool,
@@ -143,10 +176,22 @@ mod tests {
     }
 
     #[test]
+    fn a_checksum_is_the_one_that_autopilots_compute_in_one_piece_or_in_many() {
+        // The check value of this CRC, by its definition bit by bit.
+        let bitwise = b"123456789".iter().fold(0_u32, |crc, byte| {
+            (0..8).fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 })
+        });
+        assert_eq!((checksum(0, b"123456789"), bitwise), (0x2dfd_2d88, 0x2dfd_2d88));
+        assert_eq!(checksum(checksum(checksum(0, b"1234"), b""), b"56789"), 0x2dfd_2d88);
+    }
+
+    #[test]
     fn whatever_comes_is_read() {
         assert_eq!(read(&[]).operation, Operation::None);
         assert_eq!(read(&[0, 0, 0, 4, 255]).operation, Operation::Open(""));
         assert_eq!(read(&[0, 0, 0, 9]).operation, Operation::Write);
+        assert_eq!(read(&[0, 0, 0, 15]).operation, Operation::Burst(0, DATA_MAX as u8));
+        assert_eq!(read(&[0, 0, 0, 14, 2, 0, 0, 0, 3, 0, 0, 0, b'a', b'b']).operation, Operation::Checksum("ab", 3));
         assert_eq!(read(&[0, 0, 0, 200]).operation, Operation::Unknown);
     }
 }

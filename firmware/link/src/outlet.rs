@@ -249,10 +249,12 @@ impl Outlet {
         Span::from_micros(bytes as u64 * 10_200_000 / u64::from(self.baud.max(1)))
     }
 
-    /// The longest frame of bulk that finds its way in time: half of the line's backlog, and of a second's share.
+    /// The longest frame of bulk that finds its way, and that a finding need not wait for longer than [`BACKLOG`]: as
+    /// much as the line sends in that time, and half of a second's share. From 57,600 baud and a budget of 1,130 bytes a
+    /// second up it is the longest that there is.
     pub fn bulk_frame_max(&self) -> usize {
-        let line = self.baud / 10 * BACKLOG_FORWARD.as_millis() as u32 / 1_000;
-        line.min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize
+        let line = u64::from(self.baud) * BACKLOG.as_micros() / 10_200_000;
+        (line as u32).min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize
     }
 
     /// Sends a frame as it is, if it may go now.

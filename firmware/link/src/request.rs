@@ -105,6 +105,10 @@ pub enum Reply {
     Stopped,
     /// Logs are being erased, as a text.
     Erased,
+    /// The log that was being downloaded is no longer on the card, as a text.
+    LogGone,
+    /// A log is asked for by its place in a list that is no longer so, as a text.
+    LogsChanged,
     /// A signing key was set (or, `false`, removed), as a text.
     Keyed(bool),
 }

@@ -209,6 +209,12 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.segments.log.filter(|_| self.slot.is_mounted()).map(|log| log.name)
     }
 
+    /// The session that seals the sectors of the segment in work: what its block 0 holds until the first of them is
+    /// written there is left over from an earlier session.
+    pub fn log_session(&self) -> Option<u32> {
+        self.segments.log.filter(|_| self.slot.is_mounted()).map(|log| log.session)
+    }
+
     /// The card, for serving stored logs; `None` while there is none.
     pub const fn card(&mut self) -> Option<&mut Card<'a, D>> {
         self.slot.card()

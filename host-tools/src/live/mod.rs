@@ -15,6 +15,7 @@ pub mod companion;
 pub mod craft;
 pub mod feed;
 pub mod guard;
+pub mod harmless;
 pub mod history;
 pub mod hub;
 pub mod influx;
@@ -31,7 +32,7 @@ pub mod told;
 pub mod values;
 pub mod world;
 
-use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
+use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -63,14 +64,16 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     let (hub, commands) = Hub::new();
     interrupt::watch();
     let follower = follow(args, &limits, &hub, commands, influx)?;
-    let page = page_address(address, token.as_deref());
-    output::line(&page)?;
-    if args.open {
-        open(&page);
+    let pages = page_addresses(address, token.as_deref(), others());
+    for page in &pages {
+        output::line(page)?;
+    }
+    if let Some(page) = pages.first().filter(|_| args.open) {
+        open(page);
     }
     let server = std::thread::Builder::new().name("pages".to_owned());
     let server = server.spawn(move || server::serve(listener, hub, guard)).context("no thread")?;
-    // Whichever fails ends the program; both end with Ctrl-C.
+    // Whichever fails ends the program; both end with Ctrl-C and SIGTERM.
     while !server.is_finished() && !follower.is_finished() {
         std::thread::sleep(PUBLISH);
     }
@@ -149,14 +152,35 @@ fn listen(text: &str) -> Result<(TcpListener, SocketAddr)> {
     Ok((listener, address))
 }
 
-/// What to type into a browser. The token stands behind the `#`, which a browser sends to nobody.
-fn page_address(address: SocketAddr, token: Option<&str>) -> String {
+/// What to type into a browser: here first, then on other machines. The token stands behind the `#`, which a browser
+/// sends to nobody.
+fn page_addresses(
+    listen: SocketAddr,
+    token: Option<&str>,
+    others: impl IntoIterator<Item = IpAddr>,
+) -> Vec<String> {
     let token = token.map_or_else(String::new, |token| format!("#token={token}"));
-    if address.ip().is_unspecified() {
-        // Every address of this PC; the one that others reach it by is not ours to guess.
-        return format!("http://localhost:{}/{token}", address.port());
+    if !listen.ip().is_unspecified() {
+        return vec![format!("http://{listen}/{token}")];
     }
-    format!("http://{address}/{token}")
+    // `[::]` takes both kinds, `0.0.0.0` only its own.
+    let reached = others.into_iter().filter(|ip| listen.is_ipv6() || ip.is_ipv4());
+    let elsewhere = reached.map(|ip| format!("http://{}/{token}", SocketAddr::new(ip, listen.port())));
+    [format!("http://localhost:{}/{token}", listen.port())].into_iter().chain(elsewhere).collect()
+}
+
+/// Addresses of this PC by which other machines may reach it, IPv4 first: without those that are good on one cable only
+/// (`fe80::`, 169.254.0.0/16). None where the system does not tell them.
+fn others() -> Vec<IpAddr> {
+    let interfaces = if_addrs::get_if_addrs().unwrap_or_default();
+    let mut addresses: Vec<IpAddr> = interfaces
+        .iter()
+        .filter(|interface| !interface.is_loopback() && !interface.is_link_local())
+        .map(if_addrs::Interface::ip)
+        .collect();
+    addresses.sort();
+    addresses.dedup();
+    addresses
 }
 
 /// Shows the page in the user's browser; without one the address stands there anyway.
@@ -172,5 +196,22 @@ fn open(page: &str) {
     command.args(first).arg(page).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     if command.spawn().is_err() {
         eprintln!("no browser was found: open the address above");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phone_is_given_an_address_that_it_can_reach() {
+        let others: [IpAddr; 2] =
+            ["192.168.1.5".parse().expect("good"), "2001:db8::5".parse().expect("good")];
+        let pages = |listen: &str| {
+            page_addresses(listen.parse().expect("an address"), Some("t0"), others)
+        };
+        assert_eq!(pages("0.0.0.0:80"), ["http://localhost:80/#token=t0", "http://192.168.1.5:80/#token=t0"]);
+        assert_eq!(pages("[::]:80").last().map(String::as_str), Some("http://[2001:db8::5]:80/#token=t0"));
+        assert_eq!(pages("127.0.0.1:80"), ["http://127.0.0.1:80/#token=t0"]);
     }
 }

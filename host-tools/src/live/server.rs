@@ -20,6 +20,7 @@ use tokio::net::TcpListener;
 
 use super::assets;
 use super::guard::Guard;
+use super::harmless;
 use super::history::Cursor;
 use super::hub::{Command, Hub, Published};
 use crate::interrupt;
@@ -30,7 +31,7 @@ const PAGES_MAX: usize = 16;
 const COMMAND_BYTES_MAX: usize = 1_024;
 /// A page that takes nothing for so long is gone.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// How soon Ctrl-C is noticed.
+/// How soon the end of the program is noticed.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Only what is our own, nothing written into the page, no foreign frame around it.
@@ -42,6 +43,24 @@ struct Shared {
     hub: Arc<Hub>,
     guard: Guard,
     pages: Arc<AtomicUsize>,
+}
+
+/// One page's place. It is free again when this is dropped: also when the connection breaks before it is a WebSocket,
+/// because then the closure that holds it is dropped without a call.
+struct Place(Arc<AtomicUsize>);
+
+impl Place {
+    /// `None` where [`PAGES_MAX`] pages are open.
+    fn take(pages: &Arc<AtomicUsize>) -> Option<Self> {
+        let place = Self(Arc::clone(pages));
+        (pages.fetch_add(1, Ordering::SeqCst) < PAGES_MAX).then_some(place)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
 }
 
 /// Serves pages until Ctrl-C.
@@ -118,14 +137,13 @@ async fn connect(
     if !shared.guard.knows_token(query.as_deref()) {
         return (StatusCode::UNAUTHORIZED, "The token is missing or wrong.\n").into_response();
     }
-    if shared.pages.fetch_add(1, Ordering::SeqCst) >= PAGES_MAX {
-        shared.pages.fetch_sub(1, Ordering::SeqCst);
+    let Some(place) = Place::take(&shared.pages) else {
         return (StatusCode::SERVICE_UNAVAILABLE, "Too many pages are open.\n").into_response();
-    }
+    };
     upgrade.max_message_size(COMMAND_BYTES_MAX).max_frame_size(COMMAND_BYTES_MAX).on_upgrade(
         async move |socket| {
+            let _place = place;
             Page::new(&shared.hub).run(socket, &shared.hub).await;
-            shared.pages.fetch_sub(1, Ordering::SeqCst);
         },
     )
 }
@@ -225,7 +243,7 @@ impl Page {
                 self.cursor = Cursor::default();
             }
             let part = hub.since(*system, &mut self.cursor, published.now);
-            messages.extend(part.and_then(|part| serde_json::to_string(&part).ok()));
+            messages.extend(part.map(|part| harmless::json(&part)));
             messages.push(state.clone());
         }
         messages.retain(|message| !message.is_empty());

@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::board;
 use super::companion::CompanionJson;
 use super::craft::Craft;
+use super::harmless;
 use super::values::{Motors, Values};
 use super::world::World;
 use crate::names::{autopilot_name, type_name};
@@ -80,7 +81,7 @@ pub fn head(world: &World, now: Instant, around: &Around<'_>) -> String {
         overall: board::overall(craft, now),
         heard_ms: now.since(craft.heard).as_millis(),
     });
-    text(&Head {
+    harmless::json(&Head {
         t: "head",
         source: around.source,
         now_s: now.as_secs_f64(),
@@ -151,7 +152,7 @@ fn state(system: u8, craft: &Craft, now: Instant) -> String {
     let px4 = heartbeat.autopilot == hums_core::observation::Autopilot::Px4;
     let identity = vehicle.identity.get().filter(|identity| identity.firmware != 0);
     let [major, minor, patch, _] = identity.map_or(0, |identity| identity.firmware).to_be_bytes();
-    text(&State {
+    harmless::json(&State {
         t: "state",
         vehicle: system,
         now_s: now.as_secs_f64(),
@@ -223,9 +224,4 @@ fn limits(craft: &Craft, px4: bool) -> BTreeMap<&'static str, [f32; 2]> {
         ("cell_volts", of(Param::CellVoltWarn, Param::CellVoltCrit)),
         ("vibration", vibration),
     ])
-}
-
-/// Structures of strings and numbers always become JSON.
-fn text(value: &impl Serialize) -> String {
-    serde_json::to_string(value).unwrap_or_default()
 }

@@ -206,6 +206,8 @@ pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Pa
         Reply::Keyed(true) => messages::status_text(Severity::Notice, "HUMS: signing key set"),
         Reply::Keyed(false) => messages::status_text(Severity::Notice, "HUMS: signing key removed"),
         Reply::Erased => messages::status_text(Severity::Notice, "HUMS: earlier logs are erased"),
+        Reply::LogGone => messages::status_text(Severity::Warning, "HUMS: this log is gone: download ended"),
+        Reply::LogsChanged => messages::status_text(Severity::Notice, "HUMS: logs have changed: list them again"),
         Reply::Stopped => messages::status_text(Severity::Warning, "HUMS: recording stopped by command"),
     }
 }

@@ -397,7 +397,9 @@ impl Companion {
         }
         // What the card answers meanwhile is not for those who download.
         if !self.settings.is_reading() {
-            self.library.lend(now, &mut ways);
+            if let Some((port, told)) = self.library.lend(now, &mut ways) {
+                self.commands.replies.push(port, told);
+            }
         }
     }
 }

@@ -101,9 +101,9 @@ const drawHead = () => {
   }
   [...vehicles.children].forEach((button, i) => {
     const one = head.vehicles[i];
-    say(button, `${one.system} \u00b7 ${one.name} \u00b7 ${one.heard_ms > 5000 ? "silent" : one.overall}`);
+    say(button, `${one.system} \u00b7 ${one.name} \u00b7 ${!connected ? "not known" : one.heard_ms > 5000 ? "silent" : one.overall}`);
     attribute(button, "aria-pressed", String(one.system === state?.vehicle));
-    attribute(button, "class", one.overall);
+    attribute(button, "class", connected ? one.overall : "stale");
   });
   time.update(head);
   toggle(root, "playing-back", time.recording);
@@ -117,13 +117,18 @@ const drawHead = () => {
     : silent ? `The autopilot has been silent for ${age(state.heard_ms)}: values are its last ones.` : "";
   notice.hidden = !words;
   say(notice, words);
+  // What was last heard of the vehicle is not known to be so any longer.
+  if (!connected) {
+    overall.set("stale", "not known");
+    document.title = "NO CONNECTION \u00b7 HUMS live";
+  }
   toggle(root, "cut", !connected || Boolean(silent) || source.phase === "lost");
 };
 
 const drawState = () => {
   say(name, `${state.name}${state.firmware ? " " + state.firmware : ""}`);
-  document.title = `${state.overall === "ok" ? "" : state.overall.toUpperCase() + " \u00b7 "}${state.name} \u00b7 HUMS live`;
-  overall.set(state.overall);
+  if (connected) document.title = `${state.overall === "ok" ? "" : state.overall.toUpperCase() + " \u00b7 "}${state.name} \u00b7 HUMS live`;
+  if (connected) overall.set(state.overall);
   say(armed, state.armed ? "armed" : "disarmed");
   toggle(armed, "hot", state.armed);
   say(phase, state.airborne ? words(state.phase) : "on the ground");

@@ -25,12 +25,17 @@ use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 const FRAME_EVERY: Span = Span::from_millis(40);
 const TICK: Span = Span::from_millis(50);
 const NOISE_ID: u32 = 0xC0DE;
+pub const FILE_TRANSFER_PROTOCOL: u32 = 110;
+pub const LOG_ENTRY: u32 = 118;
+pub const LOG_DATA: u32 = 120;
 
 pub struct Rig {
     pub slot: Slot,
     pub status: &'static CardStatus,
     pub texts: Vec<(Instant, String)>,
     pub acks: Vec<(u16, u8)>,
+    /// What of logs and files came: message and payload.
+    pub logs: Vec<(u32, Vec<u8>)>,
     pub findings: Vec<(Instant, &'static str, Level)>,
     pub armed: bool,
     /// The longest that one service of the card took.
@@ -72,6 +77,7 @@ impl Rig {
             port,
             texts: Vec::new(),
             acks: Vec::new(),
+            logs: Vec::new(),
             findings: Vec::new(),
             armed: false,
             longest: Span::ZERO,
@@ -174,11 +180,15 @@ impl Rig {
         while let Some(length) = self.ends.gs_out.take(&mut bytes) {
             let Some(frame) = Frame::again(&bytes[..length], Check::Verified) else { continue };
             let mut payload = frame.payload().to_vec();
-            payload.resize(60, 0);
+            payload.resize(payload.len().max(60), 0);
             match frame.id() {
                 253 => {
                     let text = payload[1..51].iter().take_while(|byte| **byte != 0).copied().collect();
                     self.texts.push((self.tick_at, String::from_utf8(text).expect("our texts are ASCII")));
+                }
+                FILE_TRANSFER_PROTOCOL | LOG_ENTRY | LOG_DATA => {
+                    payload.resize(254, 0);
+                    self.logs.push((frame.id(), payload));
                 }
                 77 => self.acks.push((u16::from_le_bytes([payload[0], payload[1]]), payload[2])),
                 _ => {}
@@ -193,14 +203,19 @@ impl Rig {
         payload.resize(28, 0);
         payload.extend(command.to_le_bytes());
         payload.extend([1, 191, 0]);
-        let bytes = frame(255, 190, 76, &payload);
+        let before = self.acks.len();
+        self.ask(76, &payload);
+        self.run_to(self.slot.now_ns() / MS + 1_000);
+        self.acks[before..].iter().find(|(number, _)| *number == command).map(|(_, result)| *result)
+    }
+
+    /// A ground station sends a message.
+    pub fn ask(&mut self, id: u32, payload: &[u8]) {
+        let bytes = frame(255, 190, id, payload);
         let now = self.slot.now();
         assert!(self.ends.uplink_in.put(now.as_micros(), true, &bytes));
         let Ends { uplink_out, sectors_in, gs_in, .. } = &mut self.ends;
         while self.monitoring.uplink(now, uplink_out, sectors_in, gs_in) {}
-        let before = self.acks.len();
-        self.run_to(self.slot.now_ns() / MS + 1_000);
-        self.acks[before..].iter().find(|(number, _)| *number == command).map(|(_, result)| *result)
     }
 
     pub fn state(&self) -> CardState {

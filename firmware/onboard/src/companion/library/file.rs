@@ -1,0 +1,230 @@
+//! Logs as files, as MAVLink FTP asks for them (<https://mavlink.io/en/services/ftp.html>): list, open, read, burst,
+//! checksum.
+//!
+//! An open file is a log and not a name: once it is overwritten, or the card is another one, what is asked of it is
+//! answered with an error.
+
+use core::fmt::Write as _;
+
+use hums_link::ftp::{self, Error, Operation};
+use hums_link::request::Reply;
+use hums_recorder::LogName;
+
+use super::step::{Out, Step};
+use crate::shelf::{Answer, LogId, What, Which};
+
+/// Bytes of one burst, in messages of the longest data; the client then asks on, and so one that has gone is not sent a
+/// whole log.
+const BURST_BYTES: u32 = 64 * ftp::DATA_MAX as u32;
+
+/// What is being answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Job {
+    reply: ftp::Reply,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// An answer that needs nothing from the card.
+    Say(Option<Error>),
+    /// One entry of the directory, by place.
+    List(u16),
+    /// The file is to be opened.
+    Open(LogName),
+    /// Bytes of the file that is open, so many a message, from the reply's offset on.
+    Read { log: LogId, size: u8 },
+    /// The same, message after message; so many bytes are left of the burst.
+    Burst { log: LogId, size: u8, left: u32 },
+    /// The checksum of the file's first so many bytes; 0 is all.
+    Checksum { name: LogName, bytes: u32, sum: Option<u32> },
+}
+
+impl Job {
+    /// What a client asks, where this log is open.
+    pub(super) fn new(asked: &ftp::Asked<'_>, open: &mut Option<LogId>) -> Self {
+        let mut reply = ftp::Reply::to(asked);
+        let kind = match asked.operation {
+            Operation::None => Kind::Say(None),
+            Operation::End => {
+                *open = None;
+                Kind::Say(None)
+            }
+            Operation::List("" | "/" | "." | "/." | "/logs" | "@MAV_LOG" | "@MAV_LOG/", offset) => {
+                Kind::List(offset.min(u32::from(u16::MAX)) as u16)
+            }
+            Operation::List(..) => Kind::Say(Some(Error::FileNotFound)),
+            Operation::Open(path) => {
+                *open = None;
+                name(path).map_or(Kind::Say(Some(Error::FileNotFound)), Kind::Open)
+            }
+            Operation::Checksum(path, bytes) => match name(path) {
+                Some(name) => Kind::Checksum { name, bytes, sum: None },
+                None => Kind::Say(Some(Error::FileNotFound)),
+            },
+            Operation::Read(offset, size) | Operation::Burst(offset, size) => {
+                reply.offset = offset;
+                match *open {
+                    Some(log) if asked.opcode == ftp::BURST => Kind::Burst { log, size, left: BURST_BYTES },
+                    Some(log) => Kind::Read { log, size },
+                    None => Kind::Say(Some(Error::InvalidSession)),
+                }
+            }
+            Operation::Write => Kind::Say(Some(Error::FileProtected)),
+            Operation::Unknown => Kind::Say(Some(Error::UnknownCommand)),
+        };
+        Self { reply, kind }
+    }
+
+    /// Asks for the same checksum as `other`, which may take seconds: the one that is under way is for this question.
+    pub(super) fn takes_over(&mut self, other: &Self) -> bool {
+        let wanted = |kind: Kind| match kind {
+            Kind::Checksum { name, bytes, .. } => Some((name, bytes)),
+            _ => None,
+        };
+        let same = wanted(self.kind).is_some() && wanted(self.kind) == wanted(other.kind);
+        if same {
+            self.reply = other.reply;
+        }
+        same
+    }
+
+    pub(super) const fn want(&self) -> Option<(Which, What)> {
+        match self.kind {
+            Kind::Say(_) | Kind::Checksum { sum: Some(_), .. } => None,
+            Kind::List(entry) => Some((Which::At(entry), What::Length)),
+            Kind::Open(name) => Some((Which::Named(name), What::Length)),
+            Kind::Checksum { name, bytes, sum: None } => {
+                Some((Which::Named(name), What::Checksum(bytes)))
+            }
+            Kind::Read { log, .. } | Kind::Burst { log, .. } => {
+                Some((Which::Same(log), What::Data(self.reply.offset)))
+            }
+        }
+    }
+
+    /// `FILE_TRANSFER_PROTOCOL`
+    pub(super) fn step(
+        &mut self,
+        answer: Option<(&Answer, &[u8])>,
+        open: &mut Option<LogId>,
+        out: &mut Out<'_, '_, '_>,
+    ) -> Step {
+        let mut buffer = [0; ftp::HEAD + ftp::DATA_MAX];
+        let Self { reply, kind } = self;
+        match (*kind, answer) {
+            (Kind::Say(None), _) => out.file(reply.ack(&[], &mut buffer), Step::Done),
+            (Kind::Say(Some(error)), _) => out.file(reply.nak(error, &mut buffer), Step::Done),
+            (Kind::List(_), Some((answer, _))) if answer.found.is_none() => {
+                out.file(reply.nak(Error::EndOfFile, &mut buffer), Step::Done)
+            }
+            (Kind::List(_), Some((answer, _))) => {
+                let mut text = heapless::String::<40>::new();
+                // Fits: 12 characters of a name and at most 10 digits.
+                let _ = write!(text, "F{}\t{}\0", answer.log.name, answer.bytes);
+                out.file(reply.ack(text.as_bytes(), &mut buffer), Step::Done)
+            }
+            (Kind::Open(_) | Kind::Checksum { .. }, Some((answer, _))) if answer.found.is_none() => {
+                out.file(reply.nak(Error::FileNotFound, &mut buffer), Step::Done)
+            }
+            (Kind::Open(_), Some((answer, _))) => {
+                *open = Some(answer.log);
+                out.file(reply.ack(&answer.bytes.to_le_bytes(), &mut buffer), Step::Done)
+            }
+            (Kind::Checksum { name, bytes, sum: None }, Some((answer, data))) => {
+                reply.offset = answer.offset;
+                let sum = data.first_chunk().map_or(0, |sum| u32::from_le_bytes(*sum));
+                // It is not computed again where the port is full now.
+                *kind = Kind::Checksum { name, bytes, sum: Some(sum) };
+                out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), Step::Done)
+            }
+            (Kind::Checksum { sum: Some(sum), .. }, _) => {
+                out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), Step::Done)
+            }
+            (Kind::Read { log, .. } | Kind::Burst { log, .. }, Some((answer, _))) if answer.found.is_none() => {
+                let step = out.file(reply.nak(Error::FileNotFound, &mut buffer), Step::End(Reply::LogGone));
+                if step != Step::Wait && *open == Some(log) {
+                    *open = None;
+                }
+                step
+            }
+            (Kind::Read { .. } | Kind::Burst { .. }, Some((answer, data))) => {
+                self.read(answer, data, &mut buffer, out)
+            }
+            // What is asked of the card and was not answered.
+            (_, None) => Step::Done,
+        }
+    }
+
+    /// Sends what an answer holds, in messages of the size that was asked for, as far as the port's line allows.
+    ///
+    /// "Burst complete" stands only in a message of the whole size: `MAVProxy` (`mavproxy_ftp.py`, 1.8.75) takes a
+    /// shorter one for the file's end. Where the line is too slow for that size, a burst ends without it, and the client
+    /// asks on when nothing more comes. The file's end is always said by itself.
+    fn read(
+        &mut self,
+        answer: &Answer,
+        data: &[u8],
+        buffer: &mut [u8; ftp::HEAD + ftp::DATA_MAX],
+        out: &mut Out<'_, '_, '_>,
+    ) -> Step {
+        let Self { reply, kind } = self;
+        let (asked, mut left) = match *kind {
+            Kind::Burst { size, left, .. } => (usize::from(size), left),
+            Kind::Read { size, .. } => (usize::from(size), 0),
+            _ => return Step::Done,
+        };
+        let size = asked.min(out.file_data_max());
+        let mut rest = data;
+        loop {
+            if reply.offset >= answer.bytes {
+                return out.file(reply.nak(Error::EndOfFile, buffer), Step::Done);
+            }
+            let piece = rest.get(..size).unwrap_or(rest);
+            let end = reply.offset.saturating_add(piece.len() as u32);
+            if data.is_empty() {
+                return out.file(reply.nak(Error::Fail, buffer), Step::Done);
+            }
+            if piece.len() < size && end < answer.bytes {
+                return Step::Next;
+            }
+            let is_last = left <= piece.len() as u32;
+            let is_burst = reply.opcode == ftp::BURST;
+            reply.complete = is_burst && is_last && piece.len() == asked;
+            match out.file(reply.ack(piece, buffer), if is_last { Step::Done } else { Step::Next }) {
+                Step::Next => {
+                    left -= piece.len() as u32;
+                    if let Kind::Burst { left: kept, .. } = kind {
+                        *kept = left;
+                    }
+                    reply.sequence = reply.sequence.wrapping_add(1);
+                    reply.offset = end;
+                    rest = rest.get(piece.len()..).unwrap_or_default();
+                }
+                step => return step,
+            }
+        }
+    }
+}
+
+/// `/00042_07.HUM`, with or without a directory before it.
+fn name(path: &str) -> Option<LogName> {
+    let (base, extension) = path.rsplit('/').next()?.split_once('.')?;
+    LogName::from_short(base.as_bytes(), extension.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_a_logs_name_with_or_without_its_directory() {
+        let expected = Some(LogName { session: 42, segment: 7 });
+        for path in ["00042_07.HUM", "/00042_07.HUM", "@MAV_LOG/00042_07.HUM"] {
+            assert_eq!(name(path), expected, "{path}");
+        }
+        for path in ["", "/", "42.HUM", "../etc/passwd", "00042_07.TXT"] {
+            assert_eq!(name(path), None, "{path}");
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Logs as `LOG_REQUEST_LIST` and `LOG_REQUEST_DATA` ask for them: by a number, which is a place in the directory.
+//!
+//! A place means another log once the directory has changed, and a full card gives a segment to a later log while it is
+//! downloaded. So a download is bound to its log when it begins (at offset 0), and goes on with that log or not at all.
+//! What is asked for by place, in a list that is no longer so, is refused with a text. Refused is silence: a `LOG_DATA`
+//! without bytes would mean that the log ends there.
+
+use hums_link::messages;
+use hums_link::request::Reply;
+
+use super::step::{Out, Step};
+use crate::shelf::{Answer, LogId, What, Which};
+
+/// Bytes in one `LOG_DATA`.
+const DATA_BYTES: usize = 90;
+
+/// What is remembered of lists and downloads, so that a number goes on meaning the same log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Places {
+    /// The directory when the list was begun.
+    listed: Option<u32>,
+    download: Option<Download>,
+    /// That a number means nothing any longer was told since.
+    told: bool,
+}
+
+/// The download that was begun last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Download {
+    id: u16,
+    /// `None` once the log is gone.
+    log: Option<LogId>,
+    /// The list that the number is of.
+    listed: Option<u32>,
+}
+
+impl Places {
+    pub(super) const fn new() -> Self {
+        Self { listed: None, download: None, told: false }
+    }
+
+    /// Nobody downloads any longer.
+    pub(super) const fn end(&mut self) {
+        self.download = None;
+    }
+
+    /// What to look for where this many bytes of a log were had before; `None`: nothing, it is gone.
+    fn wanted(&self, id: u16, offset: u32) -> Option<Which> {
+        let place = Which::At(id.saturating_sub(1));
+        match self.download.filter(|download| download.id == id) {
+            Some(download) if offset > 0 => download.log.map(Which::Same),
+            Some(Download { log: Some(log), listed, .. }) if listed == self.listed => Some(Which::Same(log)),
+            _ => Some(place),
+        }
+    }
+
+    /// Whether a place still is what the list says. Without a list only a beginning may be asked for.
+    fn is_listed(&self, offset: u32, directory: u32) -> bool {
+        self.listed.map_or(offset == 0, |listed| listed == directory)
+    }
+
+    fn bind(&mut self, id: u16, log: LogId) {
+        self.download = Some(Download { id, log: Some(log), listed: self.listed });
+        self.told = false;
+    }
+
+    fn lose(&mut self, id: u16) {
+        self.download = Some(Download { id, log: None, listed: self.listed });
+    }
+
+    /// Once, until there is a list or a download again: who asks may ask for ever.
+    fn refuse(&mut self) -> Step {
+        if core::mem::replace(&mut self.told, true) { Step::Done } else { Step::End(Reply::LogsChanged) }
+    }
+}
+
+/// A list under way: entries by place, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct List {
+    next: u16,
+    last: u16,
+}
+
+impl List {
+    /// Of the numbers from `first` to `last`.
+    pub(super) fn new(first: u16, last: u16) -> Self {
+        Self { next: first.saturating_sub(1), last: last.saturating_sub(1) }
+    }
+
+    pub(super) const fn want(&self) -> (Which, What) {
+        (Which::At(self.next), What::Length)
+    }
+
+    /// `LOG_ENTRY`
+    pub(super) fn step(&mut self, answer: &Answer, places: &mut Places, out: &mut Out<'_, '_, '_>) -> Step {
+        if self.next == 0 || places.listed.is_none() {
+            // The rest is of the same directory, or no longer right.
+            (places.listed, places.told) = (Some(answer.directory), false);
+        }
+        let count = answer.count;
+        if answer.found.is_none() {
+            // "There are none" is an answer; past the last one there is nothing to say.
+            let none = messages::log_entry(0, 0, 0, 0, 0);
+            return if count == 0 { out.say(&none, Step::Done) } else { Step::Done };
+        }
+        let is_last = self.next >= self.last || self.next + 1 >= count;
+        let entry = messages::log_entry(self.next + 1, count, count, answer.bytes, 0);
+        let step = out.say(&entry, if is_last { Step::Done } else { Step::Next });
+        if step == Step::Next {
+            self.next += 1;
+        }
+        step
+    }
+}
+
+/// Bytes of a log that are asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Data {
+    id: u16,
+    which: Which,
+    offset: u32,
+    end: u32,
+}
+
+impl Data {
+    /// `None` where there is nothing to look for.
+    pub(super) fn new(id: u16, offset: u32, count: u32, places: &Places) -> Option<Self> {
+        let which = places.wanted(id, offset)?;
+        Some(Self { id, which, offset, end: offset.saturating_add(count) })
+    }
+
+    pub(super) const fn want(&self) -> (Which, What) {
+        (self.which, What::Data(self.offset))
+    }
+
+    /// `LOG_DATA`
+    pub(super) fn step(
+        &mut self,
+        (answer, data): (&Answer, &[u8]),
+        places: &mut Places,
+        out: &mut Out<'_, '_, '_>,
+    ) -> Step {
+        match self.which {
+            Which::Same(_) if answer.found.is_none() => {
+                places.lose(self.id);
+                return Step::End(Reply::LogGone);
+            }
+            Which::Same(_) => {}
+            _ if !places.is_listed(self.offset, answer.directory) => return places.refuse(),
+            // There never was such a log: it ends before it begins.
+            _ if answer.found.is_none() => {
+                return out.say(&messages::log_data(self.id, self.offset, &[]), Step::Done);
+            }
+            _ => {
+                places.bind(self.id, answer.log);
+                self.which = Which::Same(answer.log);
+            }
+        }
+        if data.is_empty() && self.offset < answer.bytes {
+            // The card does not give it now. Who wants it asks again.
+            return Step::Done;
+        }
+        self.send(answer, data, out)
+    }
+
+    fn send(&mut self, answer: &Answer, data: &[u8], out: &mut Out<'_, '_, '_>) -> Step {
+        let mut rest = data;
+        loop {
+            let wanted = (self.end.saturating_sub(self.offset) as usize).min(DATA_BYTES);
+            let piece = rest.get(..wanted).unwrap_or(rest);
+            // Short, and the log goes on: the next answer has the rest.
+            if piece.len() < wanted && self.offset.saturating_add(piece.len() as u32) < answer.bytes {
+                return Step::Next;
+            }
+            let is_last =
+                piece.len() < DATA_BYTES || self.offset.saturating_add(DATA_BYTES as u32) >= self.end;
+            let packet = messages::log_data(self.id, self.offset, piece);
+            match out.say(&packet, if is_last { Step::Done } else { Step::Next }) {
+                Step::Next => {
+                    self.offset = self.offset.saturating_add(piece.len() as u32);
+                    rest = rest.get(piece.len()..).unwrap_or_default();
+                }
+                step => return step,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_recorder::LogName;
+
+    use super::*;
+
+    const fn log(session: u32) -> LogId {
+        LogId { name: LogName { session: 1, segment: 0 }, session, first: 0 }
+    }
+
+    #[test]
+    fn a_download_goes_on_with_its_log_whatever_stands_at_its_place() {
+        let mut places = Places::new();
+        places.listed = Some(7);
+        assert_eq!(places.wanted(3, 0), Some(Which::At(2)), "a beginning is looked up");
+        assert!(places.is_listed(0, 7) && !places.is_listed(0, 8));
+        places.bind(3, log(42));
+        assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
+        assert_eq!(places.wanted(3, 0), Some(Which::Same(log(42))), "the first piece was lost");
+        // Another list: the number means another log from its beginning on, but what was begun goes on.
+        places.listed = Some(9);
+        assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
+        assert_eq!(places.wanted(3, 0), Some(Which::At(2)));
+        // Once it is gone nothing is added to what was had of it.
+        places.lose(3);
+        assert_eq!(places.wanted(3, 90), None);
+        assert_eq!(places.wanted(3, 0), Some(Which::At(2)));
+    }
+
+    #[test]
+    fn what_was_never_listed_may_be_begun_but_not_gone_on_with() {
+        let mut places = Places::new();
+        assert!(places.is_listed(0, 7) && !places.is_listed(90, 7));
+        assert_eq!(places.refuse(), Step::End(Reply::LogsChanged));
+        assert_eq!(places.refuse(), Step::Done, "it is told once");
+    }
+}

@@ -1,0 +1,185 @@
+//! Logs for download: `LOG_REQUEST_LIST`, `LOG_REQUEST_DATA` as ground stations speak them ([`log`]), and MAVLink FTP
+//! ([`file`]).
+//!
+//! One conversation at a time: who asks anew ends the one before. Nothing is remembered that a client could fill: a
+//! question that is lost, or its answer, is asked again by the client, from wherever it likes. Everything goes out in
+//! the class `Bulk`, in what the port's budget leaves to it.
+//!
+//! ```text
+//! question -> job -> what it wants of the card -> storage's answer -> messages -> what it wants next, or the end
+//! ```
+
+mod file;
+mod log;
+mod step;
+
+use hums_core::time::Instant;
+use hums_link::ftp;
+use hums_link::request::{Port, Reply, Request};
+
+use self::log::Places;
+use self::step::{Out, Step};
+use super::limiter::Asker;
+use super::ways::Ways;
+use crate::shelf::{Answer, DATA_MAX, LogId, Want, What, Which};
+
+/// Answers looked at in one call. The port's budget is the limit; this is one all the same.
+const LOOKS_MAX: usize = 64;
+
+/// The conversation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Library {
+    job: Option<Job>,
+    ticket: u16,
+    /// What is wanted next has been asked for.
+    asked: bool,
+    /// Earlier logs are to be erased.
+    pub(crate) erases: bool,
+    /// What the numbers of logs mean.
+    places: Places,
+    /// The log that is open over FTP.
+    open: Option<LogId>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Job {
+    asker: Asker,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    List(log::List),
+    Data(log::Data),
+    File(file::Job),
+}
+
+impl Kind {
+    fn want(&self) -> Option<(Which, What)> {
+        match self {
+            Self::List(list) => Some(list.want()),
+            Self::Data(data) => Some(data.want()),
+            Self::File(file) => file.want(),
+        }
+    }
+}
+
+/// An answer of the card's. A copy, because to send needs everything else.
+type Answered = (Answer, heapless::Vec<u8, DATA_MAX>);
+
+impl Library {
+    pub(crate) const fn new() -> Self {
+        Self { job: None, ticket: 0, asked: false, erases: false, places: Places::new(), open: None }
+    }
+
+    /// For somebody else's question.
+    pub(crate) const fn next_ticket(&mut self) -> u16 {
+        self.ticket = self.ticket.wrapping_add(1);
+        self.ticket
+    }
+
+    fn begin(&mut self, asker: Asker, kind: Kind) {
+        self.job = Some(Job { asker, kind });
+        self.ticket = self.ticket.wrapping_add(1);
+        self.asked = false;
+    }
+
+    /// Takes a question; `false` when it is none about logs.
+    pub(crate) fn asked(&mut self, asker: Asker, request: &Request<'_>) -> bool {
+        match *request {
+            Request::LogList(first, last) => self.begin(asker, Kind::List(log::List::new(first, last))),
+            Request::LogData(id, offset, count) => match log::Data::new(id, offset, count, &self.places) {
+                Some(data) => self.begin(asker, Kind::Data(data)),
+                None => self.job = None,
+            },
+            Request::LogEnd => {
+                self.places.end();
+                self.job = None;
+            }
+            Request::File(payload) => self.asked_for_file(asker, payload),
+            _ => return false,
+        }
+        true
+    }
+
+    fn asked_for_file(&mut self, asker: Asker, payload: &[u8]) {
+        let file = file::Job::new(&ftp::read(payload), &mut self.open);
+        if let Some(Job { asker: by, kind: Kind::File(under_way) }) = &mut self.job
+            && under_way.takes_over(&file)
+        {
+            *by = asker;
+            return;
+        }
+        self.begin(asker, Kind::File(file));
+    }
+
+    /// Goes on with the conversation as far as the card's answers and the port's budget allow; what is to be told of how
+    /// it ended.
+    pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
+        if self.erases {
+            let ticket = self.next_ticket();
+            self.erases = !ways.queues.shelf.want(Want { ticket, which: Which::At(0), what: What::Erase });
+            self.asked = false;
+        }
+        for _ in 0..LOOKS_MAX {
+            let Some(mut job) = self.job else {
+                while ways.queues.shelf.answer(|_, _| true) {}
+                return None;
+            };
+            let answered = match job.kind.want() {
+                Some(want) => Some(self.answered(want, ways)?),
+                None => None,
+            };
+            let mut out = Out { now, asker: job.asker, ways };
+            let step = self.step(&mut job, answered.as_ref(), &mut out);
+            match step {
+                Step::Done | Step::End(_) => self.job = None,
+                Step::Wait | Step::Next => {
+                    self.job = Some(job);
+                    self.asked = false;
+                }
+            }
+            match step {
+                Step::Wait => return None,
+                Step::End(reply) => return Some((job.asker.port, reply)),
+                Step::Next | Step::Done => {}
+            }
+        }
+        None
+    }
+
+    /// The answer to what is wanted, if it has come; asks for it, if nobody has.
+    fn answered(&mut self, (which, what): (Which, What), ways: &mut Ways) -> Option<Answered> {
+        let ticket = self.ticket;
+        let mut seen = None;
+        // Those to earlier questions are dropped.
+        while seen.is_none()
+            && ways.queues.shelf.answer(|answer, data| {
+                if answer.ticket == ticket {
+                    // Fits: an answer is never longer.
+                    let mut copy = heapless::Vec::new();
+                    let _ = copy.extend_from_slice(data);
+                    seen = Some((*answer, copy));
+                }
+                true
+            })
+        {}
+        if seen.is_none() && !self.asked {
+            let ticket = self.next_ticket();
+            self.asked = ways.queues.shelf.want(Want { ticket, which, what });
+        }
+        seen
+    }
+
+    /// Says what an answer holds.
+    fn step(&mut self, job: &mut Job, answered: Option<&Answered>, out: &mut Out<'_, '_, '_>) -> Step {
+        let answer = answered.map(|(answer, data)| (answer, data.as_slice()));
+        match (&mut job.kind, answer) {
+            (Kind::List(list), Some((answer, _))) => list.step(answer, &mut self.places, out),
+            (Kind::Data(data), Some(answer)) => data.step(answer, &mut self.places, out),
+            (Kind::File(file), answer) => file.step(answer, &mut self.open, out),
+            // Both want something of the card.
+            (Kind::List(_) | Kind::Data(_), None) => Step::Done,
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! What one look at an answer of the card's did, and the way to whoever asked.
+
+use hums_core::time::Instant;
+use hums_link::messages;
+use hums_link::outlet::Class;
+use hums_link::packet::Packet;
+use hums_link::request::Reply;
+
+use super::super::limiter::Asker;
+use super::super::ways::Ways;
+
+/// What one look at an answer did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// The port is full: the same again later.
+    Wait,
+    /// The answer has no more to give: the next one.
+    Next,
+    /// All is said.
+    Done,
+    /// It ends here, and the ground station is told why.
+    End(Reply),
+}
+
+/// What an FTP message adds to its data, signed: frame, target, head.
+const FTP_FRAME: usize = 12 + 3 + hums_link::ftp::HEAD + 13;
+/// The least data that is worth such a message.
+const FTP_DATA_MIN: usize = 20;
+
+/// The way to whoever asked.
+pub(super) struct Out<'o, 'w, 'q> {
+    pub(super) now: Instant,
+    pub(super) asker: Asker,
+    pub(super) ways: &'o mut Ways<'w, 'q>,
+}
+
+impl Out<'_, '_, '_> {
+    /// Sends a message; `then` where it went.
+    pub(super) fn say(&mut self, packet: &Packet, then: Step) -> Step {
+        if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { Step::Wait }
+    }
+
+    /// Sends what an FTP message holds; `then` where it went.
+    pub(super) fn file(&mut self, payload: &[u8], then: Step) -> Step {
+        let (system, component) = self.asker.by;
+        self.say(&messages::file_transfer(system, component, payload), then)
+    }
+
+    /// The most data that an FTP message may have at this port.
+    pub(super) fn file_data_max(&self) -> usize {
+        self.ways.bulk_frame_max(self.asker.port).saturating_sub(FTP_FRAME).max(FTP_DATA_MIN)
+    }
+}

@@ -1,0 +1,302 @@
+//! The logs that are on the card already, for those who download them: the monitor asks, storage answers when it has
+//! nothing to write. So reading never keeps a sector waiting, but for the time of one answer.
+//!
+//! | queue | from | to | capacity | when it is full |
+//! |---|---|---|---|---|
+//! | wants | monitor | storage | 2 | the monitor asks again |
+//! | answers | storage | monitor | [`ANSWER_BYTES`] | storage waits with the next one |
+//!
+//! A log's length is what was recorded, not what its file has: storage looks for the last sector that has the first
+//! one's session (14 blocks of an 8 MiB segment). Of the log in work it is what no longer changes: without the copies of
+//! a sector in progress.
+//!
+//! A full card gives a segment's place to a later log. So a download asks for a log by its [`LogId`], and each answer
+//! looks at the log's first sector again: a log that was overwritten, or lies on another card, is not found any longer.
+//!
+//! A checksum is computed [`SUM_BLOCKS`] blocks at a call, between which storage writes what waits.
+
+mod asked;
+mod on_card;
+
+use bbqueue::nicknames::Churrasco;
+use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
+use embedded_sdmmc::{Block, BlockDevice};
+use heapless::spsc;
+use hums_link::ftp;
+use hums_recorder::card::Segment;
+use hums_recorder::{Card, CardDevice, Recorder};
+
+use asked::HEAD;
+pub use asked::{Answer, DATA_MAX, LogId, Want, What, Which};
+use on_card::{Read, for_each_part, is_same, measure};
+
+/// The longest answer in one piece, with the queue's own two bytes, wherever the last one ended: twice its length.
+pub const ANSWER_BYTES: usize = 2 * (HEAD + DATA_MAX + 2) + 8;
+/// Blocks of a checksum at a call: some 5 ms of a card on SPI, as a small answer takes.
+const SUM_BLOCKS: u32 = 4;
+
+/// Both queues; part of the firmware's one static.
+pub struct Shelf {
+    wants: spsc::Queue<Want, 3>,
+    answers: Churrasco<ANSWER_BYTES>,
+}
+
+impl Shelf {
+    /// Empty.
+    pub(crate) const fn new() -> Self {
+        Self { wants: spsc::Queue::new(), answers: Churrasco::new() }
+    }
+
+    pub(crate) fn split(&mut self) -> (Reader<'_>, Server<'_>) {
+        let (wants_in, wants_out) = self.wants.split();
+        let reader = Reader { wants: wants_in, answers: self.answers.framed_consumer() };
+        (
+            reader,
+            Server {
+                wants: wants_out,
+                answers: self.answers.framed_producer(),
+                last: None,
+                sum: None,
+                erases: false,
+            },
+        )
+    }
+}
+
+/// The monitor's ends.
+pub struct Reader<'a> {
+    wants: spsc::Producer<'a, Want>,
+    answers: FramedConsumer<&'a Churrasco<ANSWER_BYTES>>,
+}
+
+impl Reader<'_> {
+    /// Asks; `false` while there is no room.
+    pub fn want(&mut self, want: Want) -> bool {
+        self.wants.enqueue(want).is_ok()
+    }
+
+    /// Shows the oldest answer, if there is one; it is gone afterwards when `look` says so.
+    pub fn answer(&mut self, look: impl FnOnce(&Answer, &[u8]) -> bool) -> bool {
+        let Ok(grant) = self.answers.read() else { return false };
+        let done = match grant.split_first_chunk::<HEAD>() {
+            Some((head, data)) => look(&Answer::read(head), data),
+            None => true,
+        };
+        if done {
+            grant.release();
+        }
+        true
+    }
+}
+
+/// Storage's ends.
+pub struct Server<'a> {
+    wants: spsc::Consumer<'a, Want>,
+    answers: FramedProducer<&'a Churrasco<ANSWER_BYTES>>,
+    /// The log that was read last.
+    last: Option<Found>,
+    /// A checksum in the making.
+    sum: Option<Sum>,
+    /// Logs are being erased, one at a call.
+    erases: bool,
+}
+
+/// A log, and where it lies.
+#[derive(Clone, Copy)]
+struct Found {
+    answer: Answer,
+    segment: Segment,
+}
+
+/// A checksum in the making: of `done` bytes of the log's first `answer.offset` ones.
+#[derive(Clone, Copy)]
+struct Sum {
+    log: Found,
+    done: u32,
+    sum: u32,
+}
+
+impl Server<'_> {
+    /// Whether somebody waits for an answer.
+    pub fn is_wanted(&self) -> bool {
+        self.erases || self.sum.is_some() || self.wants.ready()
+    }
+
+    /// Does a little of what is wanted, if there is something and room for its answer; whether there was.
+    pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
+        if self.erases {
+            self.last = None;
+            self.erases = erase_next(recorder);
+            return true;
+        }
+        match self.wants.peek().copied() {
+            Some(Want { what: What::Erase, .. }) => {
+                let _ = self.wants.dequeue();
+                self.erases = true;
+                true
+            }
+            Some(want) => self.answer(recorder, &want),
+            None => self.add(recorder),
+        }
+    }
+
+    /// Answers one want, or begins the checksum that is wanted.
+    fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &Want) -> bool {
+        let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
+        let _ = self.wants.dequeue();
+        if want.which != Which::Settings {
+            // One conversation at a time: who asks for something else no longer waits for a checksum.
+            self.sum = None;
+        }
+        let log = find(recorder, want, self.last.take());
+        let mut answer = Answer { ticket: want.ticket, ..log.answer };
+        let mut data = 0;
+        if let (Some(card), Some(mut segment)) = (recorder.card(), log.segment) {
+            match want.what {
+                What::Data(offset) => {
+                    answer.offset = offset;
+                    let to = grant.get_mut(HEAD..).unwrap_or_default();
+                    match copy(card, &mut segment, &answer, to) {
+                        Some(count) => data = count,
+                        None => answer = Answer { ticket: want.ticket, ..log.answer.without() },
+                    }
+                }
+                What::Checksum(bytes) => {
+                    let bytes = if bytes == 0 { answer.bytes } else { bytes.min(answer.bytes) };
+                    let log = Found { answer: Answer { offset: bytes, ..answer }, segment };
+                    self.sum = Some(Sum { log, done: 0, sum: 0 });
+                }
+                What::Length | What::Erase => {}
+            }
+            self.last = Some(Found { answer, segment })
+                .filter(|found| want.which != Which::Settings && found.answer.found.is_some());
+        }
+        if self.sum.is_some() && matches!(want.what, What::Checksum(_)) {
+            // Its answer comes when it is done; what is not committed is given back.
+            return true;
+        }
+        if let Some(head) = grant.get_mut(..HEAD) {
+            head.copy_from_slice(&answer.write());
+        }
+        grant.commit((HEAD + data) as u16);
+        true
+    }
+
+    /// Goes on with a checksum, if there is one; its answer at the end.
+    fn add<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
+        let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut sum }) = self.sum else {
+            return false;
+        };
+        let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
+        let end = answer.offset.min(done.saturating_add(SUM_BLOCKS * Block::LEN_U32));
+        let is_read = recorder.card().is_some_and(|card| {
+            let add = |part: &[u8]| sum = ftp::checksum(sum, part);
+            is_same(card, &mut segment, &answer.log)
+                && for_each_part(card, &mut segment, &answer.log, done..end, add) == Read::All
+        });
+        done = end;
+        if is_read && done < answer.offset {
+            self.sum = Some(Sum { log: Found { answer, segment }, done, sum });
+            return true;
+        }
+        self.sum = None;
+        if !is_read {
+            answer = answer.without();
+        }
+        if let Some((head, to)) = grant.split_first_chunk_mut::<HEAD>() {
+            *head = answer.write();
+            to[..4].copy_from_slice(&sum.to_le_bytes());
+        }
+        grant.commit((HEAD + 4) as u16);
+        true
+    }
+}
+
+/// Hides one log of an earlier session; `false` when there is none, or the card does not take it.
+fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>) -> bool {
+    let session = recorder.log_name().map(|name| name.session);
+    let Some(card) = recorder.card() else { return false };
+    let mut next = None;
+    let looked = card.logs(|entry| {
+        if !entry.hidden && Some(entry.name.session) != session {
+            next = Some(entry);
+        }
+    });
+    looked.is_ok() && next.is_some_and(|entry| card.hide(&entry).is_ok())
+}
+
+/// What was looked for: the answer, and where it lies if it is there.
+struct Looked {
+    answer: Answer,
+    segment: Option<Segment>,
+}
+
+/// The log that is wanted, from the directory unless it is the one that was read last.
+fn find<D: CardDevice>(recorder: &mut Recorder<'_, D>, want: &Want, last: Option<Found>) -> Looked {
+    let none = Looked { answer: Answer::none(want.ticket), segment: None };
+    let in_work = recorder.log_name().zip(recorder.log_session());
+    let Some(card) = recorder.card() else { return none };
+    let name = match want.which {
+        Which::Settings => {
+            let Ok((segment, bytes)) = card.text(b"PARAMS", b"TXT") else { return none };
+            let answer = Answer { found: Some(0), bytes, ..none.answer };
+            return Looked { answer, segment: Some(segment) };
+        }
+        Which::Same(log) => {
+            if let Some(Found { answer, mut segment }) = last.filter(|last| last.answer.log == log)
+                && is_same(card, &mut segment, &log)
+            {
+                return Looked { answer, segment: Some(segment) };
+            }
+            Some(log.name)
+        }
+        Which::Named(name) => Some(name),
+        Which::At(_) => None,
+    };
+    let mut answer = none.answer;
+    // FNV-1a (Fowler, Noll, Vo) over the names.
+    answer.directory = 0x811c_9dc5;
+    let mut found = None;
+    let listed = card.logs(|entry| {
+        if entry.hidden {
+            return;
+        }
+        for word in [entry.name.session, entry.name.segment] {
+            answer.directory = (answer.directory ^ word).wrapping_mul(0x0100_0193);
+        }
+        if want.which == Which::At(answer.count) || name == Some(entry.name) {
+            found = Some((answer.count, entry.name));
+        }
+        answer.count = answer.count.saturating_add(1);
+    });
+    let place = found.and_then(|(place, name)| Some((place, name, card.segment(name).ok()?)));
+    let Some((place, name, mut segment)) = place.filter(|_| listed.is_ok()) else {
+        return Looked { answer, segment: None };
+    };
+    let in_work = in_work.filter(|(in_work, _)| *in_work == name).map(|(_, session)| session);
+    let (log, blocks) = measure(card, &mut segment, name, in_work);
+    (answer.log, answer.bytes) = (log, blocks * Block::LEN_U32);
+    if matches!(want.which, Which::Same(wanted) if wanted != log) {
+        return Looked { answer: answer.without(), segment: None };
+    }
+    answer.found = Some(place);
+    Looked { answer, segment: Some(segment) }
+}
+
+/// Copies what there is from the answer's offset on; how many bytes, or `None` where it is another log's by now.
+fn copy<D: BlockDevice>(
+    card: &Card<'_, D>,
+    segment: &mut Segment,
+    answer: &Answer,
+    to: &mut [u8],
+) -> Option<usize> {
+    let end = answer.offset.saturating_add(to.len().min(DATA_MAX) as u32).min(answer.bytes);
+    let mut done = 0;
+    let read = for_each_part(card, segment, &answer.log, answer.offset..end, |part| {
+        if let Some(to) = to.get_mut(done..done + part.len()) {
+            to.copy_from_slice(part);
+            done += part.len();
+        }
+    });
+    (read != Read::Gone).then_some(done)
+}

@@ -1,0 +1,49 @@
+//! JSON for the pages, in which no text can change how the text around it reads.
+//!
+//! A vehicle's texts may hold Unicode's bidirectional controls: U+202E shows what follows from right to left, so that
+//! `evil` looks like `live`. In JSON they can stand only inside of strings; there they are replaced by their name, as
+//! `<U+202E>`. The record keeps them as they came.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+/// Bidirectional controls (Unicode 16, property `Bidi_Control`), and the two separators that end a line.
+const fn is_control(c: char) -> bool {
+    matches!(
+        c,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
+    )
+}
+
+/// A value as JSON; empty where it has no form in JSON, which no type of the pages lacks.
+pub fn json(value: &impl Serialize) -> String {
+    let text = serde_json::to_string(value).unwrap_or_default();
+    if text.contains(is_control) { named(&text) } else { text }
+}
+
+fn named(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 64);
+    for c in text.chars() {
+        if is_control(c) {
+            // Writing to a `String` cannot fail.
+            let _ = write!(out, "<U+{:04X}>", u32::from(c));
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn controls_of_the_writing_direction_are_named_and_all_else_stays() {
+        assert_eq!(json(&"rtl\u{202e}evil\u{2069}\u{61c}"), "\"rtl<U+202E>evil<U+2069><U+061C>\"");
+        for plain in ["Grüße \u{5d0}\u{644} <b> \\ 👩‍✈️", ""] {
+            assert_eq!(json(&plain), serde_json::to_string(plain).expect("text"));
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! Downloads from a card that changes meanwhile: what was begun goes on with the same log, or ends with an error.
+
+mod rig;
+
+use hums_recorder::{Card, CardState, CardStatus, HeldBlocks, LogName};
+use hums_sdcard::{Event, Kind, MS, Medium, Model};
+use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
+
+const MIB: u32 = 2_048;
+const S: u64 = 1_000;
+/// What is downloaded: the second of the full card's logs, which is the next to make room.
+const VICTIM: LogName = LogName { session: 2, segment: 0 };
+
+const OPEN: u8 = 4;
+const READ: u8 = 5;
+const CHECKSUM: u8 = 14;
+const BURST: u8 = 15;
+const ACK: u8 = 128;
+const NAK: u8 = 129;
+const END_OF_FILE: u8 = 6;
+const FILE_NOT_FOUND: u8 = 10;
+
+fn model(medium: &Medium) -> Model {
+    Model::new(Kind::Sdhc, medium.clone())
+}
+
+/// A card with a session of so many seconds on it, and one more; both end as power goes.
+fn with_two_sessions(mib: u32, seconds: u64) -> Medium {
+    // The file system's number comes from the size, and what tells sessions of equal names apart from that.
+    let medium = Medium::formatted(mib * MIB);
+    for _ in 0..2 {
+        let mut rig = Rig::new(model(&medium));
+        rig.run_to(seconds * S);
+    }
+    medium
+}
+
+/// The same, and the rest full of later segments: the next one takes the place of the oldest.
+fn full() -> Medium {
+    let medium = with_two_sessions(40, 20);
+    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let mounted = Card::mount(medium.clone(), &status, &held);
+    let mut card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
+    for segment in 0.. {
+        if card.create(LogName { session: 3, segment }, 2 * 1024 * 1024).is_err() {
+            break;
+        }
+    }
+    medium
+}
+
+/// A power-on with this card, once it records.
+fn recording(medium: &Medium) -> Rig {
+    let mut rig = Rig::new(model(medium));
+    rig.run_to(12 * S);
+    rig.assert_state(CardState::Recording);
+    rig
+}
+
+/// The card is taken out and put in again, or another one: the session goes on in another segment.
+fn insert(rig: &mut Rig, medium: &Medium) {
+    rig.slot.event(Event::Pull);
+    let now_ms = rig.slot.now_ns() / MS;
+    rig.run_to(now_ms + 3 * S);
+    rig.slot.event(Event::Insert(model(medium)));
+    rig.run_to(now_ms + 12 * S);
+    rig.assert_state(CardState::Recording);
+}
+
+fn wait(rig: &mut Rig, ms: u64) {
+    let now_ms = rig.slot.now_ns() / MS;
+    rig.run_to(now_ms + ms);
+}
+
+/// An answer over FTP: operation, of which one, complete, offset, data.
+type Answer = (u8, u8, bool, u32, Vec<u8>);
+
+/// Asks over FTP; what comes within so many milliseconds.
+fn ftp(rig: &mut Rig, opcode: u8, offset: u32, size: u8, data: &[u8], ms: u64) -> Vec<Answer> {
+    let size = if data.is_empty() { size } else { data.len() as u8 };
+    let mut payload = vec![0, 1, 191, 7, 0, 0, opcode, size, 0, 0, 0];
+    payload.extend(offset.to_le_bytes());
+    payload.extend(data);
+    rig.logs.clear();
+    rig.ask(FILE_TRANSFER_PROTOCOL, &payload);
+    wait(rig, ms);
+    let files = rig.logs.iter().filter(|(id, _)| *id == FILE_TRANSFER_PROTOCOL);
+    files
+        .map(|(_, payload)| {
+            let payload = &payload[3..];
+            let offset = u32::from_le_bytes(payload[8..12].try_into().expect("four bytes"));
+            let data = payload[12..12 + usize::from(payload[4])].to_vec();
+            (payload[3], payload[5], payload[6] != 0, offset, data)
+        })
+        .collect()
+}
+
+fn path(name: LogName) -> Vec<u8> {
+    format!("/{name}").into_bytes()
+}
+
+/// Opens a file; how long it is.
+fn open(rig: &mut Rig, name: LogName) -> u32 {
+    let opened = ftp(rig, OPEN, 0, 0, &path(name), 2_000);
+    assert_eq!((opened[0].0, opened[0].1), (ACK, OPEN), "{opened:?}");
+    u32::from_le_bytes(opened[0].4[..4].try_into().expect("a length"))
+}
+
+/// Bytes of the open file, read piece by piece.
+fn read(rig: &mut Rig, bytes: u32) -> Vec<u8> {
+    let mut data = Vec::new();
+    while data.len() < bytes as usize {
+        let (kind, _, _, offset, piece) =
+            ftp(rig, READ, data.len() as u32, 239, &[], 1_000).pop().expect("an answer");
+        assert_eq!((kind, offset as usize), (ACK, data.len()));
+        data.extend(piece);
+    }
+    data
+}
+
+/// The checksum as the protocol has it, from its definition.
+fn crc32(bytes: &[u8]) -> u32 {
+    bytes.iter().fold(0, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 })
+    })
+}
+
+/// `LOG_REQUEST_LIST`: how many logs there are.
+fn list(rig: &mut Rig) -> usize {
+    rig.logs.clear();
+    rig.ask(117, &[0, 0, 255, 255, 1, 191]);
+    wait(rig, 5_000);
+    rig.logs.iter().filter(|(id, _)| *id == LOG_ENTRY).count()
+}
+
+/// `LOG_REQUEST_DATA`: what comes, by offset.
+fn data(rig: &mut Rig, id: u16, offset: u32, count: u32) -> Vec<(u32, Vec<u8>)> {
+    rig.logs.clear();
+    let mut payload = offset.to_le_bytes().to_vec();
+    payload.extend(count.to_le_bytes());
+    payload.extend(id.to_le_bytes());
+    payload.extend([1, 191]);
+    rig.ask(119, &payload);
+    wait(rig, 3_000);
+    let pieces = rig.logs.iter().filter(|(id, _)| *id == LOG_DATA);
+    pieces
+        .map(|(_, payload)| {
+            let offset = u32::from_le_bytes(payload[..4].try_into().expect("four bytes"));
+            (offset, payload[7..7 + usize::from(payload[6])].to_vec())
+        })
+        .collect()
+}
+
+#[test]
+fn a_file_that_makes_room_while_it_is_read_ends_with_an_error() {
+    let medium = full();
+    let mut rig = recording(&medium);
+    let length = open(&mut rig, VICTIM);
+    assert!(length > 20_000 && length.is_multiple_of(512), "{length}");
+    let before = read(&mut rig, 2_390);
+    let since_ms = rig.slot.now_ns() / MS;
+    insert(&mut rig, &medium);
+    for opcode in [READ, BURST] {
+        if opcode == BURST {
+            // It is still open for whoever did not see the answer to the first question.
+            assert_eq!(ftp(&mut rig, OPEN, 0, 0, &path(VICTIM), 2_000)[0].4, [FILE_NOT_FOUND]);
+        }
+        let answers = ftp(&mut rig, opcode, before.len() as u32, 239, &[], 2_000);
+        assert!(answers.iter().all(|answer| answer.0 == NAK), "{opcode}: {answers:?}");
+        assert!(!answers.is_empty());
+    }
+    rig.assert_told("HUMS: this log is gone: download ended", since_ms);
+    // The one in its place is there, by its own name.
+    let newest = open(&mut rig, LogName { session: 4, segment: 1 });
+    assert!(newest > 0);
+}
+
+#[test]
+fn a_burst_that_is_under_way_when_its_file_makes_room_ends_with_an_error() {
+    let medium = full();
+    let mut rig = recording(&medium);
+    let whole = {
+        let length = open(&mut rig, VICTIM);
+        read(&mut rig, length.min(20_000))
+    };
+    let since_ms = rig.slot.now_ns() / MS;
+    // The burst goes on for ten seconds and more; the card changes after two.
+    let mut answers = ftp(&mut rig, BURST, 0, 239, &[], 2_000);
+    insert(&mut rig, &medium);
+    answers.extend(rig.logs.iter().filter(|(id, _)| *id == FILE_TRANSFER_PROTOCOL).map(|(_, payload)| {
+        let payload = &payload[3..];
+        let offset = u32::from_le_bytes(payload[8..12].try_into().expect("four bytes"));
+        let data = payload[12..12 + usize::from(payload[4])].to_vec();
+        (payload[3], payload[5], payload[6] != 0, offset, data)
+    }));
+    assert_eq!(answers.last().map(|answer| (answer.0, answer.1)), Some((NAK, BURST)), "{answers:?}");
+    for (_, _, _, offset, data) in answers.iter().filter(|answer| answer.0 == ACK) {
+        assert_eq!(data, &whole[*offset as usize..][..data.len()], "at {offset}");
+    }
+    rig.assert_told("HUMS: this log is gone: download ended", since_ms);
+}
+
+#[test]
+fn a_log_that_makes_room_while_it_is_downloaded_by_number_is_not_gone_on_with() {
+    let medium = full();
+    let mut rig = recording(&medium);
+    assert!(list(&mut rig) > 10);
+    let before = data(&mut rig, 2, 0, 900);
+    assert_eq!(before.len(), 10);
+    let again = data(&mut rig, 2, 450, 900);
+    assert_eq!(again[0], before[5], "it goes on");
+    let since_ms = rig.slot.now_ns() / MS;
+    insert(&mut rig, &medium);
+    assert_eq!(data(&mut rig, 2, 900, 900), [], "what lies there now is another log");
+    rig.assert_told("HUMS: this log is gone: download ended", since_ms);
+    // Also where the client lists again meanwhile.
+    assert!(list(&mut rig) > 10);
+    assert_eq!(data(&mut rig, 2, 900, 900), []);
+    // From its beginning on it is the new one.
+    let fresh = data(&mut rig, 2, 0, 900);
+    assert_eq!(fresh.len(), 10);
+    assert_ne!(fresh[0], before[0]);
+}
+
+#[test]
+fn a_number_of_a_list_that_is_no_longer_so_is_refused_and_told_once() {
+    let medium = full();
+    let mut rig = recording(&medium);
+    assert!(list(&mut rig) > 10);
+    insert(&mut rig, &medium);
+    let since_ms = rig.slot.now_ns() / MS;
+    for _ in 0..3 {
+        assert_eq!(data(&mut rig, 5, 0, 900), [], "an answer would be of whatever lies there");
+    }
+    let told = rig.texts.iter().filter(|(at, text)| at.as_millis() >= since_ms && text.contains("list them again"));
+    assert_eq!(told.count(), 1, "{:?}", rig.texts);
+}
+
+#[test]
+fn another_card_with_logs_of_the_same_names_is_not_gone_on_with() {
+    let (one, other) = (with_two_sessions(40, 20), with_two_sessions(41, 25));
+    let mut rig = recording(&one);
+    let length = open(&mut rig, VICTIM);
+    read(&mut rig, 2_390);
+    let asked = data(&mut rig, 2, 0, 900);
+    assert_eq!(asked.len(), 10);
+    insert(&mut rig, &other);
+    let answers = ftp(&mut rig, READ, 2_390, 239, &[], 2_000);
+    assert_eq!(answers[0].0, NAK, "{answers:?}");
+    assert_eq!(data(&mut rig, 2, 900, 900), []);
+    assert_ne!(open(&mut rig, VICTIM), length, "the other card's own can be read");
+}
+
+#[test]
+fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed() {
+    let medium = with_two_sessions(40, 40);
+    let mut rig = recording(&medium);
+    let length = open(&mut rig, VICTIM);
+    let whole = read(&mut rig, length);
+    assert_eq!(ftp(&mut rig, READ, length, 239, &[], 2_000)[0].4, [END_OF_FILE]);
+    for (asked, covered) in [(0, length), (700, 700), (length, length), (u32::MAX, length)] {
+        // Asked twice, as by a client that is not patient: it is computed once and answered for the last.
+        let mut answers = ftp(&mut rig, CHECKSUM, asked, 0, &path(VICTIM), 5);
+        let again = ftp(&mut rig, CHECKSUM, asked, 0, &path(VICTIM), 10_000);
+        answers.extend(again);
+        let last = answers.last().expect("an answer");
+        let expected = crc32(&whole[..covered as usize]).to_le_bytes().to_vec();
+        assert_eq!(last, &(ACK, CHECKSUM, false, covered, expected), "{answers:?}");
+    }
+    let missing = ftp(&mut rig, CHECKSUM, 0, 0, b"/00099_00.HUM", 2_000);
+    assert_eq!((missing[0].0, &missing[0].4[..]), (NAK, &[FILE_NOT_FOUND][..]));
+    assert_eq!(rig.status.read().frames_lost, 0);
+    drop(rig);
+    assert_eq!(read_card(&medium).gaps, []);
+}
+
+#[test]
+fn the_log_in_work_is_downloaded_as_far_as_it_no_longer_changes() {
+    let medium = with_two_sessions(40, 12);
+    let mut rig = recording(&medium);
+    let name = LogName { session: 3, segment: 0 };
+    let length = open(&mut rig, name);
+    assert!(length > 5_000, "{length}");
+    let whole = read(&mut rig, length);
+    wait(&mut rig, 10_000);
+    let sum = ftp(&mut rig, CHECKSUM, length, 0, &path(name), 10_000);
+    assert_eq!(sum[0].4, crc32(&whole).to_le_bytes(), "what was read stays as it was: {sum:?}");
+    assert!(open(&mut rig, name) > length, "and it grows");
+}
+
+#[test]
+fn a_burst_has_the_size_that_was_asked_for_and_is_complete_before_the_end_only_with_a_whole_message() {
+    let medium = with_two_sessions(40, 20);
+    let mut rig = recording(&medium);
+    let length = open(&mut rig, VICTIM);
+    let (mut had, mut bursts) = (0, 0);
+    while had < length {
+        bursts += 1;
+        let answers = ftp(&mut rig, BURST, had, 239, &[], 30_000);
+        for (kind, _, complete, offset, data) in &answers {
+            if *kind == NAK {
+                assert_eq!((data[0], had), (END_OF_FILE, length));
+                continue;
+            }
+            assert_eq!(*offset, had);
+            assert!(data.len() == 239 || had + data.len() as u32 == length, "{} at {had}", data.len());
+            // What MAVProxy takes for the end of the file.
+            assert!(!*complete || data.len() == 239, "{} bytes at {had} are not the end", data.len());
+            had += data.len() as u32;
+        }
+    }
+    assert!(bursts > 1, "one burst shows nothing");
+}

@@ -1,0 +1,131 @@
+//! `hums live` as a server and as a service: pages that break off, addresses, and how it ends.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use hums_tests::flights::own;
+use hums_tests::live::{Live, Running, free_port};
+use hums_tests::program::{self, command};
+use rustix::net::sockopt::set_socket_linger;
+
+/// Connects and asks for the page's WebSocket.
+fn handshake(host: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(host).unwrap();
+    let request = format!(
+        "GET /ws HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    );
+    stream.write_all(request.as_bytes()).unwrap();
+    stream
+}
+
+/// The first line of the answer.
+fn answer(stream: TcpStream) -> String {
+    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    let mut line = String::new();
+    BufReader::new(stream.take(4_096)).read_line(&mut line).unwrap();
+    line.trim().to_owned()
+}
+
+#[test]
+fn two_hundred_broken_off_handshakes_take_no_pages_place() {
+    let recording = own("px4_hil_quad_low.tlog");
+    let live = Live::start(&["--input", recording.to_str().unwrap()]);
+    let host = live.address.trim_start_matches("http://").trim_end_matches('/');
+    for number in 0..200_u64 {
+        let stream = handshake(host);
+        // As a tablet on a bad radio: the connection is reset, at once or a moment later.
+        set_socket_linger(&stream, Some(Duration::ZERO)).unwrap();
+        std::thread::sleep(Duration::from_micros(number % 5 * 250));
+    }
+    let end = Instant::now() + Duration::from_secs(5);
+    loop {
+        let line = answer(handshake(host));
+        if line.contains("101") {
+            break;
+        }
+        // The last ones may still be on their way.
+        assert!(Instant::now() < end, "no page opens any longer: {line}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn a_phone_is_given_an_address_and_the_token() {
+    let mut live = command(["live", "--listen", "0.0.0.0:0", "--input"]);
+    live.arg(own("px4_hil_quad_low.tlog")).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut child = live.spawn().unwrap();
+    let stdout = child.stdout.take().unwrap();
+    let mut live = Running(child);
+    let mut lines = BufReader::new(stdout).lines().map_while(Result::ok);
+    let here = lines.next().unwrap();
+    let (_, token) = here.split_once("/#token=").expect("the token is in the address");
+    let port: u16 = here.trim_start_matches("http://localhost:").split('/').next().unwrap().parse().unwrap();
+    live.signal("TERM");
+    assert_eq!(live.end(Duration::from_secs(20)), Some(0), "SIGTERM is Ctrl-C");
+    // As many as this PC has; one without a network has none.
+    for line in lines {
+        let (address, rest) = line.trim_start_matches("http://").split_once('/').unwrap();
+        let address: std::net::SocketAddr = address.parse().unwrap();
+        assert!(!address.ip().is_loopback() && !address.ip().is_unspecified(), "{line}");
+        assert_eq!((address.port(), rest), (port, format!("#token={token}").as_str()));
+    }
+}
+
+#[test]
+fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
+    let dir = tempfile::tempdir().unwrap();
+    let image = dir.path().join("card.img");
+    let port = free_port();
+    let mut sim = command(["sim", "--json", "--input", &format!("udpin:127.0.0.1:{port}"), "--sd"]);
+    let child = sim.arg(&image).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let mut sim = Running(child);
+    let start = Instant::now();
+    while !image.exists() {
+        assert!(start.elapsed() < Duration::from_secs(20), "it does not begin");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_secs(1));
+    sim.signal("TERM");
+    assert_eq!(sim.end(Duration::from_secs(20)), Some(0));
+    let json = program::hums(["verify".as_ref(), "--json".as_ref(), image.as_os_str()]).text();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["logs"][0]["closed"], true, "{json}");
+}
+
+#[test]
+fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_ends_at_once() {
+    // Nobody listens there.
+    let url = format!("http://127.0.0.1:{}", free_port());
+    let recording = own("px4_hil_quad_low.tlog");
+    let input = ["--input", recording.to_str().unwrap(), "--influx", &url];
+    let mut live = Live::start(&input);
+    live.program.signal("TERM");
+    std::thread::sleep(Duration::from_millis(500));
+    live.program.signal("TERM");
+    assert_eq!(live.program.end(Duration::from_secs(5)), Some(130), "the second one");
+
+    let live = Live::start(&input);
+    let (code, words) = live.terminate(Duration::from_secs(40));
+    assert_eq!(code, Some(3), "{words}");
+    assert!(words.contains("points are not in the database"), "{words}");
+}
+
+#[test]
+fn sigterm_ends_what_waits_for_a_board() {
+    let link = format!("udpin:127.0.0.1:{}", free_port());
+    let mut pull = Command::new(program::path());
+    let dir = tempfile::tempdir().unwrap();
+    pull.args(["pull", "--link", &link, "-o"]).arg(dir.path()).stderr(Stdio::piped());
+    let mut child = pull.spawn().unwrap();
+    let mut stderr = child.stderr.take().unwrap();
+    let mut pull = Running(child);
+    std::thread::sleep(Duration::from_millis(500));
+    pull.signal("TERM");
+    assert_eq!(pull.end(Duration::from_secs(5)), Some(1));
+    let mut words = String::new();
+    stderr.read_to_string(&mut words).unwrap();
+    assert!(words.contains("interrupted"), "{words}");
+}
