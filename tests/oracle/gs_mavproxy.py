@@ -2,7 +2,7 @@
 
 usage: gs_mavproxy.py PORT FOLDER        prints JSON
   PORT    the UDP port at which `hums sim --gs udpin:127.0.0.1:PORT` listens; its SIGN_PORT is 1 and its GS_SIGN 2
-  FOLDER  gets MAVProxy's own files and the oldest log, log.bin
+  FOLDER  gets MAVProxy's own files and the oldest log: log.bin by LOG_REQUEST_DATA, ftp.hum by FTP
 
 Each step is what MAVProxy said, or null where it did not say it in time.
 """
@@ -22,7 +22,7 @@ class Prompt:
         program = os.path.join(os.path.dirname(sys.executable), "mavproxy.py")
         command = [sys.executable, program, f"--master=udpout:127.0.0.1:{port}", "--target-system=1",
                    "--target-component=191", "--source-system=255", f"--state-basedir={folder}",
-                   "--default-modules=log,param,signing,cmdlong"]
+                   "--default-modules=log,param,signing,cmdlong,ftp"]
         self.process = subprocess.Popen(command, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, text=True, bufsize=1)
         self.lines = queue.Queue()
@@ -91,6 +91,9 @@ def main():
     out["logs"] = prompt.ask("log list", r"Log 1 +numLogs (\d+)", 6, 3)
     log = os.path.join(folder, "log.bin")
     out["downloaded"] = prompt.ask(f"log download 1 {log}", r"Finished downloading .*\((\d+) bytes", 60)
+    log = os.path.join(folder, "ftp.hum")
+    out["got"] = prompt.ask(f"ftp get /00001_00.HUM {log}", r"Wrote (\d+)", 60)
+    out["crc"] = prompt.ask("ftp crc /00001_00.HUM", r"(0x[0-9a-fA-F]{8}) in", 20)
     prompt.type("signing setup passphrase-of-this-flight")
     out["key"] = prompt.expect(r"HUMS: signing key set", 6)
     prompt.type("param set BAT_REM_WARN 34")

@@ -1,82 +1,21 @@
 //! The box as a companion, against a ground station of pymavlink's.
 #![cfg(feature = "oracle")]
 
-use std::ffi::OsStr;
 use std::fs;
 use std::io::ErrorKind;
 use std::net::UdpSocket;
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hums_tests::flights::own;
 use hums_tests::oracle;
-use hums_tests::program::{self, hums};
+use hums_tests::program::hums;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// `hums sim` in real time, with a ground station's port.
-struct Board {
-    dir: Option<TempDir>,
-    child: Child,
-    port: u16,
-}
-
-/// Free a moment ago: the next one to ask gets another.
-fn free_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
-}
-
-impl Board {
-    fn start(flags: &[&str]) -> Self {
-        Self::start_in(tempfile::tempdir().unwrap(), flags)
-    }
-
-    /// On the card that lies in `dir`, if one does.
-    fn start_in(dir: TempDir, flags: &[&str]) -> Self {
-        Self::start_with(own("ap_quad_guided.tlog").as_os_str(), dir, flags)
-    }
-
-    /// With another input.
-    fn start_with(input: &OsStr, dir: TempDir, flags: &[&str]) -> Self {
-        let port = free_port();
-        let mut command: Command = program::command(["sim", "--json", "--speed", "real", "--input"]);
-        command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
-        command.args(["--gs", &format!("udpin:127.0.0.1:{port}")]).args(flags);
-        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-        Self { dir: Some(dir), child, port }
-    }
-
-    /// Ends it in order, as Ctrl-C does, and gives everything that its log holds, a line each.
-    fn end(self) -> String {
-        let dir = self.switch_off();
-        let image = dir.path().join("card.img");
-        let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()];
-        hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0]).text()
-    }
-
-    /// Ends it, and leaves the folder with its card and its store.
-    fn switch_off(mut self) -> TempDir {
-        let kill = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
-        assert!(kill.success());
-        let start = Instant::now();
-        while self.child.try_wait().unwrap().is_none() {
-            assert!(start.elapsed() < Duration::from_secs(30), "it does not end");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        self.dir.take().expect("it is switched off once")
-    }
-}
-
-impl Drop for Board {
-    fn drop(&mut self) {
-        // Only one that is still running, after a failure, takes notice.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
+use crate::board::{Board, assert_on_card};
 
 #[test]
 fn a_ground_station_lists_reads_sets_and_commands() {
@@ -187,7 +126,7 @@ fn between_autopilot_and_ground_station(kind: &str) -> (Value, TempDir) {
     let (dir, _) = card_with_a_log();
     let params = dir.path().join("params.txt");
     fs::write(&params, "GS_BUDGET 5000\nGS_PASS 1\n").unwrap();
-    let autopilot = free_port();
+    let autopilot = hums_tests::live::free_port();
     let input = format!("udpin:127.0.0.1:{autopilot}");
     let board = Board::start_with(input.as_ref(), dir, &["--params", params.to_str().unwrap()]);
     let said = oracle::vehicle(autopilot, board.port, kind);
@@ -252,6 +191,10 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     assert_eq!(said["refused"], "33.0", "{said}");
     assert_eq!(said["logs"], "2", "{said}");
     assert_on_card(&folder.join("log.bin"), &card);
+    assert_on_card(&folder.join("ftp.hum"), &card);
+    let whole = fs::read(folder.join("ftp.hum")).unwrap();
+    let crc = said["crc"].as_str().and_then(|crc| u32::from_str_radix(&crc[2..], 16).ok());
+    assert_eq!(crc, Some(hums_link::ftp::checksum(0, &whole)), "{said}");
     assert_eq!((&said["key"], &said["signed"]), (&"HUMS: signing key set".into(), &"34.0".into()), "{said}");
 
     // Unsigned nothing is told any longer; with the passphrase our own tool may.
@@ -385,15 +328,6 @@ fn card_with_a_log() -> (TempDir, Vec<u8>) {
     // What is downloaded is the part of the file that was recorded.
     let card = fs::read(&image).unwrap();
     (dir, card)
-}
-
-/// The log is on the card as it was downloaded, whole and in one row.
-#[track_caller]
-fn assert_on_card(log: &Path, card: &[u8]) {
-    let log = fs::read(log).unwrap();
-    assert!(log.len() > 8_000 && log.len().is_multiple_of(512), "{} bytes", log.len());
-    let first = card.chunks_exact(512).position(|block| block == &log[..512]).expect("its first sector");
-    assert!(card[first * 512..].starts_with(&log), "the download differs from the card");
 }
 
 #[test]

@@ -179,7 +179,8 @@ mod tests {
     fn a_checksum_is_the_one_that_autopilots_compute_in_one_piece_or_in_many() {
         // The check value of this CRC, by its definition bit by bit.
         let bitwise = b"123456789".iter().fold(0_u32, |crc, byte| {
-            (0..8).fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 })
+            (0..8)
+                .fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 })
         });
         assert_eq!((checksum(0, b"123456789"), bitwise), (0x2dfd_2d88, 0x2dfd_2d88));
         assert_eq!(checksum(checksum(checksum(0, b"1234"), b""), b"56789"), 0x2dfd_2d88);
@@ -191,7 +192,10 @@ mod tests {
         assert_eq!(read(&[0, 0, 0, 4, 255]).operation, Operation::Open(""));
         assert_eq!(read(&[0, 0, 0, 9]).operation, Operation::Write);
         assert_eq!(read(&[0, 0, 0, 15]).operation, Operation::Burst(0, DATA_MAX as u8));
-        assert_eq!(read(&[0, 0, 0, 14, 2, 0, 0, 0, 3, 0, 0, 0, b'a', b'b']).operation, Operation::Checksum("ab", 3));
+        assert_eq!(
+            read(&[0, 0, 0, 14, 2, 0, 0, 0, 3, 0, 0, 0, b'a', b'b']).operation,
+            Operation::Checksum("ab", 3)
+        );
         assert_eq!(read(&[0, 0, 0, 200]).operation, Operation::Unknown);
     }
 }

@@ -254,7 +254,7 @@ impl Outlet {
     /// second up it is the longest that there is.
     pub fn bulk_frame_max(&self) -> usize {
         let line = u64::from(self.baud) * BACKLOG.as_micros() / 10_200_000;
-        (line as u32).min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize
+        ((line as u32).min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize).min(FRAME_BYTES_MAX)
     }
 
     /// Sends a frame as it is, if it may go now.

@@ -207,9 +207,7 @@ mod tests {
     fn a_phone_is_given_an_address_that_it_can_reach() {
         let others: [IpAddr; 2] =
             ["192.168.1.5".parse().expect("good"), "2001:db8::5".parse().expect("good")];
-        let pages = |listen: &str| {
-            page_addresses(listen.parse().expect("an address"), Some("t0"), others)
-        };
+        let pages = |listen: &str| page_addresses(listen.parse().expect("an address"), Some("t0"), others);
         assert_eq!(pages("0.0.0.0:80"), ["http://localhost:80/#token=t0", "http://192.168.1.5:80/#token=t0"]);
         assert_eq!(pages("[::]:80").last().map(String::as_str), Some("http://[2001:db8::5]:80/#token=t0"));
         assert_eq!(pages("127.0.0.1:80"), ["http://127.0.0.1:80/#token=t0"]);

@@ -232,7 +232,8 @@ fn a_number_of_a_list_that_is_no_longer_so_is_refused_and_told_once() {
     for _ in 0..3 {
         assert_eq!(data(&mut rig, 5, 0, 900), [], "an answer would be of whatever lies there");
     }
-    let told = rig.texts.iter().filter(|(at, text)| at.as_millis() >= since_ms && text.contains("list them again"));
+    let told =
+        rig.texts.iter().filter(|(at, text)| at.as_millis() >= since_ms && text.contains("list them again"));
     assert_eq!(told.count(), 1, "{:?}", rig.texts);
 }
 

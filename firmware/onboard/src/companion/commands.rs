@@ -207,7 +207,9 @@ pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Pa
         Reply::Keyed(false) => messages::status_text(Severity::Notice, "HUMS: signing key removed"),
         Reply::Erased => messages::status_text(Severity::Notice, "HUMS: earlier logs are erased"),
         Reply::LogGone => messages::status_text(Severity::Warning, "HUMS: this log is gone: download ended"),
-        Reply::LogsChanged => messages::status_text(Severity::Notice, "HUMS: logs have changed: list them again"),
+        Reply::LogsChanged => {
+            messages::status_text(Severity::Notice, "HUMS: logs have changed: list them again")
+        }
         Reply::Stopped => messages::status_text(Severity::Warning, "HUMS: recording stopped by command"),
     }
 }

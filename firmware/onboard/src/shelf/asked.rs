@@ -95,8 +95,14 @@ impl Answer {
         head[2..4].copy_from_slice(&self.count.to_le_bytes());
         head[4..6].copy_from_slice(&self.found.unwrap_or(u16::MAX).to_le_bytes());
         head[6] = self.log.name.segment as u8;
-        let words =
-            [self.log.name.session, self.bytes, self.offset, self.log.session, self.log.first, self.directory];
+        let words = [
+            self.log.name.session,
+            self.bytes,
+            self.offset,
+            self.log.session,
+            self.log.first,
+            self.directory,
+        ];
         for (to, word) in head[8..].chunks_exact_mut(4).zip(words) {
             to.copy_from_slice(&word.to_le_bytes());
         }

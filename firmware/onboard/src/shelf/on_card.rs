@@ -37,7 +37,8 @@ pub(super) fn measure<D: BlockDevice>(
     }
     let mut blocks = recorded_blocks(card, segment, log.session);
     // The log in work: copies of a sector in progress, at its place and at the next one, are still written over.
-    while in_work.is_some() && blocks > 0 && header(card, segment, blocks - 1).is_none_or(|last| last.partial) {
+    while in_work.is_some() && blocks > 0 && header(card, segment, blocks - 1).is_none_or(|last| last.partial)
+    {
         blocks -= 1;
     }
     (log, blocks)

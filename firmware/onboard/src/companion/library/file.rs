@@ -94,9 +94,7 @@ impl Job {
             Kind::Say(_) | Kind::Checksum { sum: Some(_), .. } => None,
             Kind::List(entry) => Some((Which::At(entry), What::Length)),
             Kind::Open(name) => Some((Which::Named(name), What::Length)),
-            Kind::Checksum { name, bytes, sum: None } => {
-                Some((Which::Named(name), What::Checksum(bytes)))
-            }
+            Kind::Checksum { name, bytes, sum: None } => Some((Which::Named(name), What::Checksum(bytes))),
             Kind::Read { log, .. } | Kind::Burst { log, .. } => {
                 Some((Which::Same(log), What::Data(self.reply.offset)))
             }
@@ -141,7 +139,9 @@ impl Job {
             (Kind::Checksum { sum: Some(sum), .. }, _) => {
                 out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), Step::Done)
             }
-            (Kind::Read { log, .. } | Kind::Burst { log, .. }, Some((answer, _))) if answer.found.is_none() => {
+            (Kind::Read { log, .. } | Kind::Burst { log, .. }, Some((answer, _)))
+                if answer.found.is_none() =>
+            {
                 let step = out.file(reply.nak(Error::FileNotFound, &mut buffer), Step::End(Reply::LogGone));
                 if step != Step::Wait && *open == Some(log) {
                     *open = None;

@@ -1,0 +1,77 @@
+//! A simulated board in real time, for those who talk with it.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use hums_tests::flights::own;
+use hums_tests::live::free_port;
+use hums_tests::program::{self, hums};
+use tempfile::TempDir;
+
+/// `hums sim` in real time, with a ground station's port.
+pub(crate) struct Board {
+    dir: Option<TempDir>,
+    child: Child,
+    pub(crate) port: u16,
+}
+
+impl Board {
+    pub(crate) fn start(flags: &[&str]) -> Self {
+        Self::start_in(tempfile::tempdir().unwrap(), flags)
+    }
+
+    /// On the card that lies in `dir`, if one does.
+    pub(crate) fn start_in(dir: TempDir, flags: &[&str]) -> Self {
+        Self::start_with(own("ap_quad_guided.tlog").as_os_str(), dir, flags)
+    }
+
+    /// With another input.
+    pub(crate) fn start_with(input: &OsStr, dir: TempDir, flags: &[&str]) -> Self {
+        let port = free_port();
+        let mut command: Command = program::command(["sim", "--json", "--speed", "real", "--input"]);
+        command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
+        command.args(["--gs", &format!("udpin:127.0.0.1:{port}")]).args(flags);
+        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+        Self { dir: Some(dir), child, port }
+    }
+
+    /// Ends it in order, as Ctrl-C does, and gives everything that its log holds, a line each.
+    pub(crate) fn end(self) -> String {
+        let dir = self.switch_off();
+        let image = dir.path().join("card.img");
+        let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()];
+        hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0]).text()
+    }
+
+    /// Ends it, and leaves the folder with its card and its store.
+    pub(crate) fn switch_off(mut self) -> TempDir {
+        let kill = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
+        assert!(kill.success());
+        let start = Instant::now();
+        while self.child.try_wait().unwrap().is_none() {
+            assert!(start.elapsed() < Duration::from_secs(30), "it does not end");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        self.dir.take().expect("it is switched off once")
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        // Only one that is still running, after a failure, takes notice.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The log is on the card as it was downloaded, whole and in one row.
+#[track_caller]
+pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
+    let log = fs::read(log).unwrap();
+    assert!(log.len() > 8_000 && log.len().is_multiple_of(512), "{} bytes", log.len());
+    let first = card.chunks_exact(512).position(|block| block == &log[..512]).expect("its first sector");
+    assert!(card[first * 512..].starts_with(&log), "the download differs from the card");
+}
