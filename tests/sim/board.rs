@@ -1,4 +1,5 @@
 //! A simulated board in real time, for those who talk with it.
+#![cfg_attr(not(feature = "oracle"), allow(dead_code, reason = "comparisons use the rest of it"))]
 
 use std::ffi::OsStr;
 use std::fs;
