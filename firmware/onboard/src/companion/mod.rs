@@ -396,10 +396,10 @@ impl Companion {
             }
         }
         // What the card answers meanwhile is not for those who download.
-        if !self.settings.is_reading() {
-            if let Some((port, told)) = self.library.lend(now, &mut ways) {
-                self.commands.replies.push(port, told);
-            }
+        if !self.settings.is_reading()
+            && let Some((port, told)) = self.library.lend(now, &mut ways)
+        {
+            self.commands.replies.push(port, told);
         }
     }
 }

@@ -113,7 +113,7 @@ struct Found {
 struct Sum {
     log: Found,
     done: u32,
-    sum: u32,
+    so_far: u32,
 }
 
 impl Server<'_> {
@@ -164,7 +164,7 @@ impl Server<'_> {
                 What::Checksum(bytes) => {
                     let bytes = if bytes == 0 { answer.bytes } else { bytes.min(answer.bytes) };
                     let log = Found { answer: Answer { offset: bytes, ..answer }, segment };
-                    self.sum = Some(Sum { log, done: 0, sum: 0 });
+                    self.sum = Some(Sum { log, done: 0, so_far: 0 });
                 }
                 What::Length | What::Erase => {}
             }
@@ -184,19 +184,19 @@ impl Server<'_> {
 
     /// Goes on with a checksum, if there is one; its answer at the end.
     fn add<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
-        let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut sum }) = self.sum else {
+        let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut so_far }) = self.sum else {
             return false;
         };
         let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
         let end = answer.offset.min(done.saturating_add(SUM_BLOCKS * Block::LEN_U32));
         let is_read = recorder.card().is_some_and(|card| {
-            let add = |part: &[u8]| sum = ftp::checksum(sum, part);
+            let add = |part: &[u8]| so_far = ftp::checksum(so_far, part);
             is_same(card, &mut segment, &answer.log)
                 && for_each_part(card, &mut segment, &answer.log, done..end, add) == Read::All
         });
         done = end;
         if is_read && done < answer.offset {
-            self.sum = Some(Sum { log: Found { answer, segment }, done, sum });
+            self.sum = Some(Sum { log: Found { answer, segment }, done, so_far });
             return true;
         }
         self.sum = None;
@@ -205,7 +205,7 @@ impl Server<'_> {
         }
         if let Some((head, to)) = grant.split_first_chunk_mut::<HEAD>() {
             *head = answer.write();
-            to[..4].copy_from_slice(&sum.to_le_bytes());
+            to[..4].copy_from_slice(&so_far.to_le_bytes());
         }
         grant.commit((HEAD + 4) as u16);
         true
