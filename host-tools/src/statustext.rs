@@ -31,15 +31,9 @@ pub struct Text {
 }
 
 impl Text {
-    /// The level of a finding as grave as this, as the pages colour it. `MAV_SEVERITY` says what is a failure of a
-    /// primary system (critical and above) and what of a secondary one (error).
+    /// The level of a finding as grave as this.
     pub fn level(&self) -> &'static str {
-        match self.severity {
-            0..=2 => "critical",
-            3 | 4 => "warning",
-            5 => "advisory",
-            _ => "ok",
-        }
+        level(self.severity)
     }
 
     /// From the payload of a frame whose checksum holds.
@@ -53,6 +47,17 @@ impl Text {
         let severity = payload.number("severity").unwrap_or(0.0) as u8;
         let words = String::from_utf8_lossy(bytes).into_owned();
         Some(Self { at, source, severity, words, id, ends: id == 0 || bytes.len() < PART_BYTES })
+    }
+}
+
+/// The level of a finding as grave as this, as the pages colour it. `MAV_SEVERITY` says what is a failure of a primary
+/// system (critical and above) and what of a secondary one (error).
+pub fn level(severity: u8) -> &'static str {
+    match severity {
+        0..=2 => "critical",
+        3 | 4 => "warning",
+        5 => "advisory",
+        _ => "ok",
     }
 }
 

@@ -15,6 +15,8 @@ use crate::loss::lost;
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::{counter_name, message_name};
 use crate::progress;
+use crate::source::item;
+use crate::source::recording::Format;
 use crate::source::told::Finding;
 
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
@@ -123,6 +125,8 @@ pub struct ComponentLine {
 pub struct Contents {
     /// By message id, and whether the checksum is that of the definition known on board.
     pub messages: BTreeMap<(u32, bool), MessageCount>,
+    /// Messages that have a name and no id: those of recordings other than MAVLink's.
+    pub named: Vec<item::MessageCount>,
     /// Records of the monitor's own.
     pub records: u64,
     /// The first boot record.
@@ -367,10 +371,12 @@ impl Deliver<Self> for Contents {
 }
 
 /// A log, read through.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Overview {
     /// Its name.
     pub name: String,
+    /// What it is, where it is no log of ours.
+    pub format: Option<Format>,
     /// The files that hold it.
     pub files: Vec<String>,
     /// Bytes of these files that are set aside for it.
@@ -401,7 +407,14 @@ impl Overview {
         bar.finish_and_clear();
         contents.epoch_us = summary.epoch_us;
         let files = log.files.clone();
-        Ok(Self { name: log.name.clone(), files, bytes_on_card: log.bytes(), summary, contents })
+        Ok(Self {
+            name: log.name.clone(),
+            format: None,
+            files,
+            bytes_on_card: log.bytes(),
+            summary,
+            contents,
+        })
     }
 
     /// Whether anything was lost or damaged.

@@ -167,8 +167,8 @@ fn known(value: f32) -> Option<f64> {
 }
 
 fn vehicle(judged: &Judged) -> Option<VehicleJson> {
-    let (source, heartbeat) = judged.vehicle.source.zip(judged.vehicle.heartbeat.get())?;
-    let identity = judged.vehicle.identity.get();
+    let (source, heartbeat) = judged.vehicle().source.zip(judged.vehicle().heartbeat.get())?;
+    let identity = judged.vehicle().identity.get();
     let fact = |about| judged.facts.get(&about).cloned();
     Some(VehicleJson {
         system: source.system,

@@ -74,8 +74,8 @@ pub struct Flight {
 pub struct Judged {
     /// Who judged.
     pub by: JudgedBy,
-    /// The vehicle, as it was known at the end.
-    pub vehicle: Box<Vehicle>,
+    /// The monitor as it was at the end: the vehicle, its usage, what it exceeded.
+    pub monitor: Box<Monitor>,
     /// Facts besides, the last of each kind.
     pub facts: BTreeMap<About, String>,
     /// UTC at time zero, microseconds since 1970.
@@ -107,11 +107,16 @@ pub struct Judged {
 }
 
 impl Judged {
+    /// The vehicle, as it was known at the end.
+    pub fn vehicle(&self) -> &Vehicle {
+        self.monitor.vehicle()
+    }
+
     /// The worst level that was found; `None` where nothing could be judged.
     pub fn worst(&self) -> Option<Level> {
         match self.problems.first() {
             Some(problem) => Some(problem.level),
-            None if self.vehicle.source.is_none() => None,
+            None if self.vehicle().source.is_none() => None,
             None => Some(Level::Ok),
         }
     }
@@ -327,7 +332,7 @@ impl Judge {
         problems.end(last);
         Judged {
             by,
-            vehicle: Box::new(*self.monitor.vehicle()),
+            monitor: self.monitor,
             facts: self.facts,
             epoch_us: self.epoch_us,
             span: self.first.map(|first| (first, last)),

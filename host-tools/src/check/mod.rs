@@ -5,13 +5,13 @@
 
 pub mod json;
 pub mod judge;
-mod own;
+mod overview;
 pub mod problem;
 pub mod text;
 
 use anyhow::{Result, bail};
 
-pub use own::overview;
+pub use overview::overview;
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
@@ -19,13 +19,9 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::progress;
 use crate::run::params;
-use crate::source::item::Want;
 use crate::source::recording::{Format, Place, find};
-use judge::{Judge, Judged, Limits};
+use judge::{Judged, Limits};
 use text::Table;
-
-/// Items between two looks at how far the reading is.
-const LOOK_EVERY: u32 = 4_096;
 
 /// A recording, judged.
 pub struct Checked {
@@ -53,12 +49,15 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut outcome = Outcome::lossy(found.damaged);
+    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
+        eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
+    }
+    let mut outcome = Outcome::lossy(found.damaged());
     let many = found.places.len() > 1;
     let (bar, mut table, mut failed) = (progress::logs(found.places.len()), Table::default(), 0_usize);
     side_by_side(
         &found.places,
-        |place| (place.name.clone(), check(place, &limits, !many)),
+        |place| (place.title.clone(), check(place, &limits, !many)),
         |(name, checked)| {
             bar.inc(1);
             match checked {
@@ -99,18 +98,6 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
 
 /// Judges one recording.
 fn check(place: &Place, limits: &Limits, shows: bool) -> Result<Checked> {
-    let recording = place.open()?;
-    let (format, progress) = (recording.format, recording.progress.clone());
-    let bar = progress::bytes(progress.total().filter(|_| shows), &place.name);
-    let (mut judge, mut items) = (Judge::new(limits, format), 0_u32);
-    recording.read(Want { observations: true, ..Want::default() }, &mut |at, item| {
-        judge.item(at, item);
-        items = items.wrapping_add(1);
-        if items.is_multiple_of(LOOK_EVERY) {
-            bar.set_position(progress.taken());
-        }
-        Ok(())
-    })?;
-    bar.finish_and_clear();
-    Ok(Checked { name: place.name.clone(), format, judged: judge.end() })
+    let (format, judged, _) = overview::judge(place, limits, shows)?;
+    Ok(Checked { name: place.title.clone(), format, judged })
 }

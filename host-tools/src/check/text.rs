@@ -122,12 +122,12 @@ fn logs(count: u64) -> String {
 }
 
 fn vehicle(judged: &Judged) -> String {
-    let Some((source, heartbeat)) = judged.vehicle.source.zip(judged.vehicle.heartbeat.get()) else {
+    let Some((source, heartbeat)) = judged.vehicle().source.zip(judged.vehicle().heartbeat.get()) else {
         return "none was heard".to_owned();
     };
     let told = judged.facts.get(&About::Firmware).cloned();
     let firmware = told.unwrap_or_else(|| {
-        let version = judged.vehicle.identity.get().and_then(|identity| firmware(identity.firmware));
+        let version = judged.vehicle().identity.get().and_then(|identity| firmware(identity.firmware));
         format!("{} {}", autopilot_name(heartbeat.autopilot_number), version.unwrap_or_default())
     });
     let mut text = format!("{}, {}", type_name(heartbeat.type_number), firmware.trim_end());
@@ -286,7 +286,7 @@ fn not_judged(text: &mut String, judged: &Judged) {
             None => reasons.push((why, vec![check])),
         }
     }
-    if reasons.is_empty() || judged.vehicle.source.is_none() {
+    if reasons.is_empty() || judged.vehicle().source.is_none() {
         return;
     }
     let all = judged.judged.len() + judged.not_judged.len();

@@ -67,13 +67,14 @@ pub enum Format {
 
 const INFO_EXAMPLES: &str = "Examples:
   hums info card.img
+  hums info flight.tlog
   hums info --json 00001_00.HUM";
 
 /// `hums info`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = INFO_EXAMPLES)]
 pub struct Info {
-    /// Logs, card images, or directories with such
+    /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
@@ -110,6 +111,7 @@ const REPORT_EXAMPLES: &str = "Examples:
   hums report card.img -o report.html
   hums report card.img -o pages/
   hums report card.img --session 00001 -o report.html
+  hums report flight.tlog -o report.html
 
 With a directory for -o each session gets a page, named after it; otherwise the newest gets one. The page compares with
 the sessions before on the same card.";
@@ -118,7 +120,7 @@ the sessions before on the same card.";
 #[derive(Args, Clone, Debug)]
 #[command(after_help = REPORT_EXAMPLES)]
 pub struct Report {
-    /// Logs, card images, or directories with such
+    /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
     /// The page to write, or a directory for a page a session

@@ -7,8 +7,8 @@ use arrow_array::types::{
     UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{
-    Array, ArrayRef, BooleanArray, Float32Array, Float64Array, ListArray, PrimitiveArray, StringArray,
-    UInt64Array,
+    Array, ArrayRef, BooleanArray, Float32Array, Float64Array, Int64Array, ListArray, PrimitiveArray,
+    StringArray, UInt64Array,
 };
 use arrow_buffer::OffsetBuffer;
 use arrow_schema::{DataType, Field};
@@ -167,6 +167,7 @@ pub fn cell_data_type(name: &str, cell: CellType) -> DataType {
     match cell {
         CellType::Count if name == "value" => DataType::Float64,
         CellType::Count => DataType::UInt64,
+        CellType::Signed => DataType::Int64,
         CellType::Single => DataType::Float32,
         CellType::Double | CellType::Time => DataType::Float64,
         CellType::Flag => DataType::Boolean,
@@ -184,6 +185,14 @@ pub fn cell_array<'a>(data_type: &DataType, cells: impl Iterator<Item = Option<&
                     _ => None,
                 })
                 .collect::<UInt64Array>(),
+        ),
+        DataType::Int64 => Arc::new(
+            cells
+                .map(|cell| match cell {
+                    Some(Cell::Signed(value)) => Some(*value),
+                    _ => None,
+                })
+                .collect::<Int64Array>(),
         ),
         DataType::Float32 => Arc::new(
             cells

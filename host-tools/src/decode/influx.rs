@@ -279,6 +279,7 @@ impl<'a> Fields<'a> {
         match cell {
             Cell::Count(value) if name == "value" => self.float(name, Scalar::Double(*value as f64)),
             Cell::Count(value) => self.name(name).integer(i64::try_from(*value).unwrap_or(i64::MAX)),
+            Cell::Signed(value) => self.name(name).integer(*value),
             Cell::Single(value) => self.float(name, Scalar::Single(*value)),
             Cell::Double(value) => self.float(name, Scalar::Double(*value)),
             Cell::Time(at) => self.float(name, Scalar::Double(at.as_secs_f64())),

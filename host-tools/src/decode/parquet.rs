@@ -224,7 +224,9 @@ impl RowColumns {
             let data_type = cell_data_type(name, cell.cell_type());
             // `at[s]` as a name would need quoting in every query.
             let (plain, units) =
-                name.strip_suffix(']').and_then(|name| name.split_once('[')).unwrap_or((name, ""));
+                name.strip_suffix(']').and_then(|name| name.rsplit_once('[')).unwrap_or((name, ""));
+            // An element of an array: `q[0]`.
+            let (plain, units) = if units.parse::<u32>().is_ok() { (*name, "") } else { (plain, units) };
             let plain = if units.is_empty() { plain.to_owned() } else { format!("{plain}_{units}") };
             let plain = plain.replace('%', "percent");
             let cells = self.rows.iter().map(|row| row.cells.get(place).map(|(_, cell)| cell));

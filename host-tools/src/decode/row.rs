@@ -11,6 +11,8 @@ use crate::utc::push_seconds;
 pub enum Cell {
     /// A count or a number that names something.
     Count(u64),
+    /// An integer that may be negative.
+    Signed(i64),
     /// A quantity of single precision.
     Single(f32),
     /// A quantity of double precision.
@@ -32,6 +34,8 @@ pub enum Cell {
 pub enum CellType {
     /// [`Cell::Count`]
     Count,
+    /// [`Cell::Signed`]
+    Signed,
     /// [`Cell::Single`]
     Single,
     /// [`Cell::Double`]
@@ -67,6 +71,7 @@ impl Cell {
     pub fn cell_type(&self) -> CellType {
         match self {
             Self::Count(_) => CellType::Count,
+            Self::Signed(_) => CellType::Signed,
             Self::Single(_) => CellType::Single,
             Self::Double(_) => CellType::Double,
             Self::Time(_) => CellType::Time,
@@ -81,6 +86,7 @@ impl Cell {
     pub fn push_csv(&self, out: &mut Vec<u8>) {
         match self {
             Self::Count(value) => push_integer(out, *value),
+            Self::Signed(value) => push_csv_number(out, Scalar::Signed(*value)),
             Self::Single(value) => push_csv_number(out, Scalar::Single(*value)),
             Self::Double(value) => push_csv_number(out, Scalar::Double(*value)),
             Self::Time(at) => push_seconds(out, at.as_micros()),

@@ -3,8 +3,9 @@
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use crate::logs::{self, Found};
+use crate::logs;
 use crate::names::{autopilot_name, type_name};
+use crate::source::recording::Format;
 use crate::summary::{Contents, Overview};
 use crate::utc::iso8601;
 
@@ -27,20 +28,22 @@ pub struct ImageJson {
 }
 
 /// The images of a run as JSON.
-pub fn images_json(found: &Found) -> Vec<ImageJson> {
+pub fn images_json(images: &[logs::find::Image]) -> Vec<ImageJson> {
     let json = |image: &logs::find::Image| ImageJson {
         path: image.path.display().to_string(),
         damage: image.damage.clone(),
         lost_clusters: image.lost_clusters,
         found_by_scan: image.scanned,
     };
-    found.images.iter().map(json).collect()
+    images.iter().map(json).collect()
 }
 
 /// One log.
 #[derive(Debug, Serialize)]
 pub struct LogJson {
     name: String,
+    /// `hums`, `tlog`, `raw`, `dataflash`, `ulog`.
+    format: &'static str,
     files: Vec<String>,
     /// As its sectors name it, hexadecimal.
     session: Option<String>,
@@ -98,7 +101,8 @@ pub(super) struct VehicleJson {
 
 #[derive(Debug, Serialize)]
 struct MessageJson {
-    id: u32,
+    /// Of MAVLink messages.
+    id: Option<u32>,
     name: String,
     verified: bool,
     frames: u64,
@@ -223,6 +227,7 @@ impl LogJson {
         let seconds = |at: Instant| at.as_secs_f64();
         Self {
             name: log.name.clone(),
+            format: log.format.map_or("hums", Format::name),
             files: log.files.clone(),
             session: summary.session.map(|session| format!("{session:08x}")),
             closed: summary.closed,
@@ -266,13 +271,20 @@ impl LogJson {
 
 fn messages(contents: &Contents) -> Vec<MessageJson> {
     let json = |(&(id, verified), count): (&(u32, bool), &crate::summary::MessageCount)| MessageJson {
-        id,
+        id: Some(id),
         name: Contents::message_name(id, true),
         verified,
         frames: count.frames,
         bytes: count.bytes,
     };
-    contents.messages.iter().map(json).collect()
+    let named = contents.named.iter().map(|message| MessageJson {
+        id: None,
+        name: message.name.clone(),
+        verified: true,
+        frames: message.count,
+        bytes: message.bytes,
+    });
+    contents.messages.iter().map(json).chain(named).collect()
 }
 
 fn gaps(contents: &Contents) -> Vec<GapJson> {

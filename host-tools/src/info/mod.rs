@@ -1,4 +1,4 @@
-//! `hums info`: what is in a log, for people and as JSON.
+//! `hums info`: what is in a log or a recording, for people and as JSON.
 
 pub mod json;
 pub mod text;
@@ -9,26 +9,26 @@ use anyhow::Result;
 use crate::check;
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
-use crate::logs;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::source::recording::find;
 use json::{InfoJson, LogJson, images_json};
 use text::{image_text, text};
 
 /// Runs `hums info`.
 pub fn run(args: &cli::Info) -> Result<Outcome> {
-    let found = logs::find(&args.inputs, args.salvage)?;
+    let found = find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
     let mut logs = Vec::new();
-    let mut outcome = Outcome::lossy(found.images.iter().any(|image| !image.damage.is_empty()));
+    let mut outcome = Outcome::lossy(found.damaged());
     if !args.json {
         for image in &found.images {
             output::line(&image_text(image))?;
         }
     }
-    side_by_side(&found.logs, check::overview, |overview| {
+    side_by_side(&found.places, check::overview, |overview| {
         let overview = overview?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
         if args.json {
@@ -39,8 +39,8 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         output::line("")
     })?;
     if args.json {
-        output::json(&InfoJson { images: images_json(&found), logs })?;
-    } else if found.logs.is_empty() {
+        output::json(&InfoJson { images: images_json(&found.images), logs })?;
+    } else if found.places.is_empty() {
         output::line("no log is on it")?;
     }
     Ok(outcome)

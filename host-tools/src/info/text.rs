@@ -47,7 +47,10 @@ pub fn text(log: &Overview) -> String {
 
 fn heading(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.summary, &log.contents);
-    let _ = writeln!(text, "Session {} ({}), {}", log.name, log.files.join(", "), log.ending());
+    let _ = match log.format {
+        Some(format) => writeln!(text, "{}: {}", log.files.join(", "), format.words()),
+        None => writeln!(text, "Session {} ({}), {}", log.name, log.files.join(", "), log.ending()),
+    };
     match (summary.first, summary.last) {
         (Some(first), Some(last)) => {
             let utc = |at| {
@@ -72,6 +75,11 @@ fn heading(text: &mut String, log: &Overview) {
         );
     }
     let (frames, records) = (contents.frames(), contents.records);
+    if log.format.is_some() {
+        let messages = frames + contents.named.iter().map(|message| message.count).sum::<u64>();
+        let _ = writeln!(text, "  messages {messages} in {} bytes", log.bytes_on_card);
+        return;
+    }
     let _ = write!(text, "  frames   {frames} in {} bytes, {records} records", log.log_bytes());
     if frames > 0 {
         let _ = write!(text, "; as a tlog {} bytes: {:.2} times smaller", contents.tlog_bytes(), log.ratio());
@@ -215,9 +223,14 @@ fn messages_text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
     let seconds = duration_s(log);
     text.push_str("  messages                                   frames     per s      bytes\n");
+    let mut line = |name: &str, frames: u64, bytes: u64| {
+        let rate = if seconds > 0.0 { frames as f64 / seconds } else { 0.0 };
+        let _ = writeln!(text, "    {name:<36} {frames:>10} {rate:>9.2} {bytes:>10}");
+    };
     for (&(id, verified), count) in &contents.messages {
-        let rate = if seconds > 0.0 { count.frames as f64 / seconds } else { 0.0 };
-        let name = Contents::message_name(id, verified);
-        let _ = writeln!(text, "    {name:<36} {:>10} {rate:>9.2} {:>10}", count.frames, count.bytes);
+        line(&Contents::message_name(id, verified), count.frames, count.bytes);
+    }
+    for message in &contents.named {
+        line(&message.name, message.count, message.bytes);
     }
 }

@@ -26,40 +26,44 @@ use crate::check;
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
 use crate::files::{Inputs, Output, appended, inside, make_parent, says_directory, settle};
-use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage};
 use crate::output;
+use crate::source::recording::{Place, find};
 
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
-    let found = logs::find(&args.inputs, false)?;
+    let found = find(&args.inputs, false)?;
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut outcome = Outcome::lossy(found.images.iter().any(|image| !image.damage.is_empty()));
+    let mut outcome = Outcome::lossy(found.damaged());
     let mut overviews = Vec::new();
-    side_by_side(&found.logs, check::overview, |overview| {
+    if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
+        bail!("{}: is read twice for a page; give a file", place.title)
+    }
+    side_by_side(&found.places, check::overview, |overview| {
         overviews.push(overview?);
         Ok(())
     })?;
-    let wanted = wanted(args, &found.logs)?;
+    let wanted = wanted(args, &found.places)?;
     let inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
     for &index in &wanted.sessions {
-        let (Some(log), Some(overview)) = (found.logs.get(index), overviews.get(index)) else { continue };
-        let earlier = overviews.get(..index).unwrap_or_default();
-        let path = wanted.path(log);
+        let (Some(place), Some(overview)) = (found.places.get(index), overviews.get(index)) else { continue };
+        // A card's sessions are one box's; what lies in a folder beside a recording may be anybody's.
+        let earlier = overviews.get(..index).filter(|_| place.own().is_some()).unwrap_or_default();
+        let path = wanted.path(place);
         make_parent(&path)?;
         let mut file = Output::create(&path, &inputs)?;
-        let html = page::html(overview, &replay::Replay::of(log)?, &trend::of(overview, earlier))?;
+        let html = page::html(overview, &replay::Replay::of(place)?, &trend::of(overview, earlier))?;
         settle(file.write_all(html.as_bytes()), &path)?;
         file.finish()?;
-        output::line(&format!("{}: session {}, {} bytes", path.display(), log.name, html.len()))?;
+        output::line(&format!("{}: session {}, {} bytes", path.display(), place.name, html.len()))?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
     }
-    if wanted.sessions.len() < found.logs.len() && args.session.is_none() {
+    if wanted.sessions.len() < found.places.len() && args.session.is_none() {
         eprintln!(
             "hums: this is the newest of {} sessions; -o DIR/ writes a page for each, --session NAME one of them",
-            found.logs.len()
+            found.places.len()
         );
     }
     Ok(outcome)
@@ -72,7 +76,7 @@ struct Wanted {
     directory: bool,
 }
 
-fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
+fn wanted(args: &cli::Report, logs: &[Place]) -> Result<Wanted> {
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
     };
@@ -95,10 +99,10 @@ fn wanted(args: &cli::Report, logs: &[Log]) -> Result<Wanted> {
 }
 
 impl Wanted {
-    fn path(&self, log: &Log) -> PathBuf {
+    fn path(&self, place: &Place) -> PathBuf {
         if !self.directory {
             return self.output.clone();
         }
-        appended(&inside(&self.output, &log.name), "html")
+        appended(&inside(&self.output, &place.name), "html")
     }
 }

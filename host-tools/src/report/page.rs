@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 use super::flights::{Flight, PhaseSpan};
 use super::plots::{About, Plot, about};
 use super::program::program;
-use super::replay::{Place, Replay, Said};
+use super::replay::{Point, Replay, Said};
 use super::trend::Trend;
 use crate::info::json::LogJson;
 use crate::series::{GridJson, SeriesJson};
@@ -34,7 +34,7 @@ struct Data<'a> {
     plots: Vec<PlotJson>,
     flights: &'a [Flight],
     phases: &'a [PhaseSpan],
-    track: Vec<Place>,
+    track: Vec<Point>,
     texts: &'a [Said],
     texts_count: u64,
     stats: Option<StatsJson>,

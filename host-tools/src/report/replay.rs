@@ -1,20 +1,18 @@
-//! A log read in order: what the vehicle told becomes series, flights, phases and a track.
+//! A recording read in order: what the vehicle told becomes series, flights, phases and a track.
 
 use anyhow::Result;
-use hums_blackbox::{Entry, Gap};
-use hums_core::observation::{Autopilot, Observation};
-use hums_link::{Check, Frame, observe};
+use hums_core::observation::{Autopilot, Observation, Source};
+use hums_core::time::Instant;
 use serde::Serialize;
 
 use super::flights::Flights;
 use super::frames::{Frames, Sign};
 use super::samples::Samples;
-use crate::decode::reference::{Observed, Reference};
-use crate::logs::Log;
-use crate::logs::reader::{Collect, Deliver, read};
-use crate::mavlink::ids::STATUSTEXT;
-use crate::statustext::{Text, Texts};
-use crate::track::Point;
+use crate::decode::reference::Reference;
+use crate::source::item::{Item, Text, Want};
+use crate::source::recording::Place;
+use crate::statustext;
+use crate::track;
 
 /// Texts kept at most; beyond this they are only counted.
 const TEXTS_MAX: usize = 1_000;
@@ -34,12 +32,11 @@ pub struct Replay {
     pub texts_count: u64,
     reference: Reference,
     frames: Frames,
-    open: Texts,
 }
 
 /// A place on the track, as the page takes it.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Place {
+pub struct Point {
     at_s: f64,
     latitude: f64,
     longitude: f64,
@@ -56,21 +53,39 @@ pub struct Said {
 }
 
 impl Replay {
-    /// Reads a log.
-    pub fn of(log: &Log) -> Result<Self> {
+    /// Reads a recording.
+    pub fn of(place: &Place) -> Result<Self> {
         let mut replay = Self::default();
-        read(log, Told::default, &mut replay, |_| ())?;
-        let Self { open, texts, texts_count, .. } = &mut replay;
-        open.end(&mut |text| keep(texts, texts_count, text));
+        let want = Want { frames: true, observations: true, ..Want::default() };
+        place.open()?.read(want, &mut |at, item| {
+            replay.item(at, item);
+            Ok(())
+        })?;
         if let Some(end) = replay.reference.heard() {
             replay.flights.end(end, &replay.reference);
         }
         Ok(replay)
     }
 
+    fn item(&mut self, at: Instant, item: Item<'_>) {
+        match item {
+            Item::Frame(frame) => {
+                let sign = Sign { at, source: frame.source(), sequence: frame.sequence() };
+                let vehicle = self.reference.vehicle().source;
+                if frame.check() == hums_link::Check::Verified {
+                    self.frames.take(&sign, vehicle, &mut self.samples.store);
+                }
+            }
+            Item::Observation(source, observation) => self.observe(at, source, observation),
+            Item::Text(text) => self.keep(at, text),
+            Item::Gap(_) => self.frames.gap(),
+            _ => {}
+        }
+    }
+
     /// Where it was, in order.
-    pub fn track(&self) -> Vec<Place> {
-        let place = |point: &Point| Place {
+    pub fn track(&self) -> Vec<Point> {
+        let place = |point: &track::Point| Point {
             at_s: point.at.as_secs_f64(),
             latitude: point.latitude_deg,
             longitude: point.longitude_deg,
@@ -79,62 +94,27 @@ impl Replay {
         self.samples.track.points().iter().map(place).collect()
     }
 
-    fn observe(&mut self, observed: &Observed) {
-        let Observed { at, source, observation } = *observed;
+    fn observe(&mut self, at: Instant, source: Source, observation: &Observation) {
         let airborne = self.reference.flight().airborne();
-        if !self.reference.observe(at, source, &observation) {
+        if !self.reference.observe(at, source, observation) {
             return;
         }
         if let Observation::Heartbeat(heartbeat) = observation {
             self.autopilot = heartbeat.autopilot;
         }
-        self.samples.take(at, &self.reference, &observation);
+        self.samples.take(at, &self.reference, observation);
         self.flights.follow(at, airborne, &self.reference);
     }
-}
 
-fn keep(texts: &mut Vec<Said>, count: &mut u64, text: Text) {
-    *count += 1;
-    if texts.len() < TEXTS_MAX {
-        let (at_s, severity, level) = (text.at.as_secs_f64(), text.severity, text.level());
-        texts.push(Said { at_s, severity, level, text: text.words });
-    }
-}
-
-/// What one group told.
-#[derive(Debug, Default)]
-struct Told {
-    observed: Vec<Observed>,
-    signs: Vec<Sign>,
-    texts: Vec<Text>,
-}
-
-impl Collect for Told {
-    fn entry(&mut self, entry: &Entry<'_>) {
-        let Entry::Frame { at, bytes, verified: true, .. } = *entry else { return };
-        let Some(frame) = Frame::again(bytes, Check::Verified) else { return };
-        let source = frame.source();
-        self.signs.push(Sign { at, source, sequence: frame.sequence() });
-        if frame.id() == STATUSTEXT {
-            self.texts.extend(Text::of(at, source, frame.payload()));
-        } else if let Some((source, observation)) = observe(&frame) {
-            self.observed.push(Observed { at, source, observation });
+    fn keep(&mut self, at: Instant, text: Text<'_>) {
+        self.texts_count += 1;
+        if self.texts.len() < TEXTS_MAX {
+            self.texts.push(Said {
+                at_s: at.as_secs_f64(),
+                severity: text.severity,
+                level: statustext::level(text.severity),
+                text: text.words.to_owned(),
+            });
         }
-    }
-}
-
-impl Deliver<Told> for Replay {
-    fn gap(&mut self, _: &Gap) -> Result<()> {
-        self.frames.gap();
-        Ok(())
-    }
-
-    fn group(&mut self, told: Told) -> Result<()> {
-        told.observed.iter().for_each(|observed| self.observe(observed));
-        let vehicle = self.reference.vehicle().source;
-        told.signs.iter().for_each(|sign| self.frames.take(sign, vehicle, &mut self.samples.store));
-        let Self { open, texts, texts_count, .. } = self;
-        told.texts.into_iter().for_each(|text| open.take(text, &mut |text| keep(texts, texts_count, text)));
-        Ok(())
     }
 }

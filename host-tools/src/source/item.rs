@@ -193,6 +193,25 @@ pub struct Gap {
     pub words: String,
 }
 
+impl Gap {
+    /// As logs of ours have it, which know neither place nor words.
+    pub fn to_own(&self) -> hums_blackbox::Gap {
+        let cause = match self.cause {
+            Cause::Damaged | Cause::Cut => hums_blackbox::Cause::Damaged,
+            Cause::Lost => hums_blackbox::Cause::Missing,
+            Cause::NotKept => hums_blackbox::Cause::Disarmed,
+        };
+        hums_blackbox::Gap {
+            from: self.from,
+            to: self.to,
+            cause,
+            sectors_lost: 0,
+            sectors_skipped: 0,
+            frames: None,
+        }
+    }
+}
+
 /// Why something is missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {

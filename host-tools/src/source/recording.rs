@@ -1,5 +1,6 @@
 //! Recordings: what they are, by their content, and where they are.
 
+use std::collections::BTreeMap;
 use std::fs::{self, DirEntry};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
+use crate::logs::find::Image;
 use crate::logs::{self, Content, Log};
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
@@ -70,7 +72,9 @@ impl Format {
 /// A recording that was found, not yet open.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// What people call it: its path, or path and session.
+    /// Where it is, for people: its path, or path and session.
+    pub title: String,
+    /// A name for files made of it, unique within one call: the file's own, or a session's as `hums info` gives it.
     pub name: String,
     source: From,
 }
@@ -86,17 +90,22 @@ enum From {
 impl Place {
     /// Standard input.
     pub fn standard() -> Self {
-        Self { name: "-".to_owned(), source: From::Standard }
+        Self { title: "standard input".to_owned(), name: "standard_input".to_owned(), source: From::Standard }
     }
 
     /// A file that is no log of ours.
     pub fn file(path: &Path) -> Self {
-        Self { name: path.display().to_string(), source: From::File(path.to_owned()) }
+        let name = path.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy());
+        Self {
+            title: path.display().to_string(),
+            name: name.into_owned(),
+            source: From::File(path.to_owned()),
+        }
     }
 
     /// A session of a log of ours.
-    pub fn log(name: String, log: Log) -> Self {
-        Self { name, source: From::Log(Box::new(log)) }
+    pub fn log(title: String, log: Log) -> Self {
+        Self { title, name: log.name.clone(), source: From::Log(Box::new(log)) }
     }
 
     /// The log of ours that it is, if it is one.
@@ -107,11 +116,33 @@ impl Place {
         }
     }
 
+    /// Its file, where it is one of its own.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.source {
+            From::File(path) => Some(path),
+            From::Standard | From::Log(_) => None,
+        }
+    }
+
+    /// Whether it can be read but once.
+    pub const fn is_standard(&self) -> bool {
+        matches!(self.source, From::Standard)
+    }
+
+    /// The bytes that it takes, as far as that is known.
+    pub fn bytes(&self) -> u64 {
+        match &self.source {
+            From::Standard => 0,
+            From::File(path) => fs::metadata(path).map_or(0, |about| about.len()),
+            From::Log(log) => log.bytes(),
+        }
+    }
+
     /// Opens it.
     pub fn open(&self) -> Result<Recording> {
         match &self.source {
-            From::Standard => Recording::new(Input::new(io::stdin())?, "standard input"),
-            From::File(path) => Recording::new(Input::open(path)?, &self.name),
+            From::Standard => Recording::new(Input::new(io::stdin())?, &self.title),
+            From::File(path) => Recording::new(Input::open(path)?, &self.title),
             From::Log(log) => {
                 let reader = OwnReader::new(log.as_ref().clone());
                 let progress = reader.progress();
@@ -214,10 +245,24 @@ fn detect(start: &[u8]) -> Option<Detected> {
 pub struct Found {
     /// Recordings, in the order in which they were named, those of a folder by name.
     pub places: Vec<Place>,
-    /// What was passed over, and damage of file systems, as sentences.
+    /// What the file systems of cards and images say of themselves.
+    pub images: Vec<Image>,
+    /// What was passed over, as sentences.
     pub remarks: Vec<String>,
-    /// A card's file system is damaged.
-    pub damaged: bool,
+}
+
+impl Found {
+    /// Whether a card's file system is damaged.
+    pub fn damaged(&self) -> bool {
+        self.images.iter().any(|image| !image.damage.is_empty())
+    }
+
+    /// Every file that any of it is in.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        let pieces = self.places.iter().filter_map(Place::own).flat_map(|log| &log.pieces);
+        let files = self.places.iter().filter_map(Place::path);
+        pieces.map(|piece| piece.path.as_path()).chain(files)
+    }
 }
 
 /// Finds all recordings in `inputs`: files, folders, cards, images, `-`. What the user named must be a recording; what
@@ -246,8 +291,32 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         } else {
             found.places.push(Place::file(input));
         }
+        if inputs.len() > 1 {
+            name_after(input, found.places.iter_mut().skip(before).filter(|place| place.own().is_some()));
+        }
     }
+    make_names_unique(&mut found.places);
     Ok(found)
+}
+
+/// The sessions of one of several inputs get its name before theirs: each card has a session 1.
+fn name_after<'a>(input: &Path, places: impl Iterator<Item = &'a mut Place>) {
+    let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
+    for place in places.filter(|place| place.name != stem) {
+        place.name = format!("{stem}/{}", place.name);
+    }
+}
+
+/// Names are those of files: the later ones of a name get a number.
+fn make_names_unique(places: &mut [Place]) {
+    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
+    for place in places {
+        let count = seen.entry(place.name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            place.name = format!("{}-{count}", place.name);
+        }
+    }
 }
 
 /// Whether a file is a log of ours or a card's image.
@@ -272,10 +341,7 @@ fn holds_own(dir: &Path) -> bool {
 /// Adds the sessions of our own in a path.
 fn own(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let own = logs::find(std::slice::from_ref(&path.to_owned()), salvage)?;
-    for image in own.images.iter().filter(|image| !image.damage.is_empty()) {
-        found.remarks.push(format!("{}: {}", image.path.display(), image.damage.join("; ")));
-        found.damaged = true;
-    }
+    found.images.extend(own.images);
     found.remarks.extend(own.remarks);
     let single = own.logs.len() == 1 && path.is_file();
     for log in own.logs {

@@ -161,3 +161,22 @@ fn a_packed_recording_is_checked_by_everything_that_shows_findings() {
     let page = fs::read_to_string(dir.path().join("page.html")).expect("the page");
     assert!(page.contains("\"checked_by\":\"hums\"") && page.contains("\"check\":\"cell_voltage\""));
 }
+
+#[test]
+fn an_old_recording_is_a_page_and_a_summary_without_a_card_between() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    let info = json(&run(dir.path(), "info --json faults.tlog", 0));
+    let log = &info["logs"][0];
+    assert_eq!((log["format"].as_str(), log["frames"].as_u64()), (Some("tlog"), Some(77_633)));
+    assert!(log["usage"]["flight_time_s"].as_f64().is_some_and(|seconds| (300.0..310.0).contains(&seconds)));
+    assert_eq!(log["messages"][0]["name"].as_str(), Some("HEARTBEAT"));
+    assert!(text(&run(dir.path(), "info faults.tlog", 0)).contains("ground station's log (tlog)"));
+    run(dir.path(), "report faults.tlog -o page.html", 0);
+    let page = fs::read_to_string(dir.path().join("page.html")).expect("the page");
+    for words in ["\"format\":\"tlog\"", "\"check\":\"cell_voltage\"", "Battery 1 is low"] {
+        assert!(page.contains(words), "{words}");
+    }
+    run(dir.path(), "report faults.tlog -o pages/", 0);
+    assert!(dir.path().join("pages/faults.tlog.html").is_file());
+}

@@ -12,10 +12,12 @@ export const head = () => {
     : ["critical", "warning", "stale", "advisory"].filter(count).map((level) => `${count(level)} ${level}`).join(", ");
   const host = document.getElementById("head");
   const when = log.start_utc ? `${log.start_utc.slice(0, 10)} ${log.start_utc.slice(11, 19)} UTC` : "time of day unknown";
-  document.title = `${name}, session ${log.name}, ${when}`;
+  document.title = `${name}, ${log.format === "hums" ? "session " : ""}${log.name}, ${when}`;
   host.append(
     el("h1", {}, name),
-    el("p", { class: "dim" }, `Session ${log.name} \u00b7 ${when} \u00b7 ${span(log.duration_s)} \u00b7 ${log.closed ? "ended in order" : "ended by power-off"}`),
+    el("p", { class: "dim" }, log.format === "hums"
+      ? `Session ${log.name} \u00b7 ${when} \u00b7 ${span(log.duration_s)} \u00b7 ${log.closed ? "ended in order" : "ended by power-off"}`
+      : `${log.name} \u00b7 ${when} \u00b7 ${span(log.duration_s)}`),
     el("p", { class: `verdict ${worst}`, id: "verdict" }, verdict),
   );
 

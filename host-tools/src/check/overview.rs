@@ -1,0 +1,124 @@
+//! What is in a recording, with what a monitor says of it: for `info`, `report` and what else shows findings.
+//!
+//! A log of ours tells what the monitor on board found. Where no monitor ran (a packed recording, the log of an autopilot
+//! or a ground station) the one here checks it when it is read: "not checked" is not "good".
+
+use anyhow::Result;
+use hums_blackbox::record::Vehicle;
+use hums_core::Monitor;
+
+use super::judge::{Judge, Judged, Limits};
+use crate::names::counter_name;
+use crate::progress;
+use crate::source::item::{Gap, Summary, Want};
+use crate::source::recording::{Format, Place};
+use crate::summary::{Contents, ExceedanceLine, FindingLine, MessageCount, Overview};
+
+/// Items between two looks at how far the reading is.
+const LOOK_EVERY: u32 = 4_096;
+
+/// Judges a recording; `shows` how far it is.
+pub(super) fn judge(place: &Place, limits: &Limits, shows: bool) -> Result<(Format, Judged, Summary)> {
+    let recording = place.open()?;
+    let (format, progress) = (recording.format, recording.progress.clone());
+    let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
+    let (mut judge, mut items) = (Judge::new(limits, format), 0_u32);
+    let summary = recording.read(Want { observations: true, ..Want::default() }, &mut |at, item| {
+        judge.item(at, item);
+        items = items.wrapping_add(1);
+        if items.is_multiple_of(LOOK_EVERY) {
+            bar.set_position(progress.taken());
+        }
+        Ok(())
+    })?;
+    bar.finish_and_clear();
+    Ok((format, judge.end(), summary))
+}
+
+/// Reads a recording through; where nobody has checked it, the monitor here does.
+pub fn overview(place: &Place) -> Result<Overview> {
+    let limits = Limits::default();
+    if let Some(log) = place.own() {
+        let mut overview = Overview::of(log)?;
+        if !overview.contents.is_checked() && overview.contents.frames() > 0 {
+            let (_, judged, _) = judge(place, &limits, true)?;
+            fill(&mut overview.contents, judged);
+        }
+        return Ok(overview);
+    }
+    let (format, judged, summary) = judge(place, &limits, true)?;
+    let mut contents = Contents::default();
+    contents.epoch_us = judged.epoch_us;
+    count(&mut contents, format, summary);
+    contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
+    let mut overview = Overview {
+        name: place.name.clone(),
+        files: vec![place.title.clone()],
+        bytes_on_card: place.bytes(),
+        format: Some(format),
+        ..Overview::default()
+    };
+    overview.summary.epoch_us = judged.epoch_us;
+    overview.summary.frames = contents.frames();
+    overview.summary.gaps = judged.damages + judged.losses;
+    (overview.summary.first, overview.summary.last) = judged.span.unzip();
+    fill(&mut contents, judged);
+    overview.contents = contents;
+    Ok(overview)
+}
+
+/// Messages by their ids where they are MAVLink's, otherwise by their names.
+fn count(contents: &mut Contents, format: Format, summary: Summary) {
+    for message in summary.messages {
+        let known = || hums_dialect::messages().iter().find(|known| known.name == message.name);
+        let id = if format.is_of_link() {
+            let unknown = || message.name.strip_prefix("UNKNOWN_").and_then(|id| id.parse().ok());
+            known().map(|known| known.id).or_else(unknown)
+        } else {
+            None
+        };
+        match id {
+            Some(id) => {
+                let count = MessageCount { frames: message.count, bytes: message.bytes };
+                contents.messages.insert((id, hums_dialect::message(id).is_some()), count);
+            }
+            None => contents.named.push(message),
+        }
+    }
+}
+
+/// What the monitor here makes of a recording.
+fn fill(contents: &mut Contents, judged: Judged) {
+    let Judged { monitor, findings, findings_count, span, .. } = judged;
+    contents.findings_count = findings_count;
+    contents.findings = findings.into_iter().map(FindingLine::from).collect();
+    contents.vehicle = vehicle(&monitor);
+    monitor.for_each_counter(|number, value| {
+        contents.usage.insert(counter_name(number), value);
+    });
+    if let Some((_, last)) = span {
+        for exceedance in monitor.exceedances().iter(last) {
+            let line = ExceedanceLine {
+                session: exceedance.session,
+                lifetime: exceedance.lifetime,
+                unit: exceedance.check.unit.to_owned(),
+            };
+            contents.exceedances.insert((exceedance.check.name.to_owned(), exceedance.instance), line);
+        }
+    }
+    contents.checked_here = contents.vehicle.is_some();
+}
+
+fn vehicle(monitor: &Monitor) -> Option<Vehicle> {
+    let vehicle = monitor.vehicle();
+    let (source, heartbeat) = vehicle.source.zip(vehicle.heartbeat.get())?;
+    let identity = vehicle.identity.get().copied().unwrap_or_default();
+    Some(Vehicle {
+        system: source.system,
+        component: source.component,
+        autopilot: heartbeat.autopilot_number,
+        vehicle_type: heartbeat.type_number,
+        firmware: identity.firmware,
+        uid: identity.uid,
+    })
+}
