@@ -3,6 +3,8 @@
 //! Recordings are those of `tests/flights` and below the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes and
 //! costs repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
 
+mod logs;
+
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -48,10 +50,11 @@ pub(crate) enum Bench {
     Sizes,
     Speed,
     Cost,
+    Logs,
 }
 
 impl Bench {
-    pub(crate) const ALL: [Self; 3] = [Self::Sizes, Self::Speed, Self::Cost];
+    pub(crate) const ALL: [Self; 4] = [Self::Sizes, Self::Speed, Self::Cost, Self::Logs];
 
     pub(crate) fn parse(words: &[&str]) -> Result<Vec<Self>> {
         if words.is_empty() {
@@ -61,7 +64,8 @@ impl Bench {
             "sizes" => Ok(Self::Sizes),
             "speed" => Ok(Self::Speed),
             "cost" => Ok(Self::Cost),
-            other => bail!("bench measures sizes, speed or cost, not {other}"),
+            "logs" => Ok(Self::Logs),
+            other => bail!("bench measures sizes, speed, cost or logs, not {other}"),
         };
         words.iter().map(parse).collect()
     }
@@ -77,6 +81,7 @@ pub(crate) fn run(what: &[Bench]) -> Result<()> {
             Bench::Sizes => sizes(&flights),
             Bench::Speed => speed(&flights),
             Bench::Cost => cost(&flights),
+            Bench::Logs => logs::run(),
         };
         if let Err(error) = done {
             missed.push(format!("{bench:?}: {error:#}").to_lowercase());

@@ -42,7 +42,7 @@ cargo xtask COMMAND
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
                                  and docs/proof.md
   firmware [--board BOARD]       build the firmware: f405 (the default) or f429, which are real, or emulated
-  bench [sizes|speed|cost]...    what the record takes: bytes, decoding time, instructions; against what is asked
+  bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, instructions; how fast logs are checked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   dist [--check]                 the files of a release, in target/dist; --check builds them twice and compares
   flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own

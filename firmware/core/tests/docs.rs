@@ -1,6 +1,6 @@
-//! The documents that the tables make: `docs/parameters.md` and the table of checks in `docs/health.md` are what the
-//! code says, and `docs/usage.md` knows every counter. `HUMS_WRITE_DOCS=1 cargo test -p hums-core --test docs` writes
-//! the first two.
+//! The documents that the tables make: `docs/parameters.md`, the table of checks in `docs/health.md` and that of their
+//! words in `docs/check.md` are what the code says, and `docs/usage.md` knows every counter.
+//! `HUMS_WRITE_DOCS=1 cargo test -p hums-core --test docs` writes the first three.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use std::fmt::Write as _;
@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use hums_core::exposure;
-use hums_core::health::{Check, Side, When, checks};
+use hums_core::health::{Check, Side, VOCABULARY, When, checks};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Span;
 use hums_core::usage::UsageCounter;
@@ -168,6 +168,25 @@ fn every_check_is_documented_as_it_is() {
     for (name, _) in INPUTS {
         assert!(checks().any(|check| check.name == *name), "there is no check {name}");
     }
+}
+
+#[test]
+fn every_check_is_explained_as_people_are_told() {
+    const BEGIN: &str = "<!-- words: made by firmware/core/tests/docs.rs -->\n";
+    const END: &str = "<!-- end of words -->\n";
+    let mut table = "| check | name | means | do | needs |\n|---|---|---|---|---|\n".to_owned();
+    for words in VOCABULARY {
+        let part = if words.part.is_empty() { String::new() } else { format!(", by {}", words.part) };
+        let _ = writeln!(
+            table,
+            "| {} | {}{part} | {} | {} | {} |",
+            words.check, words.name, words.meaning, words.action, words.needs
+        );
+    }
+    let found = fs::read_to_string(path("check.md")).unwrap();
+    let (before, rest) = found.split_once(BEGIN).expect("docs/check.md has a place for the words");
+    let (_, after) = rest.split_once(END).expect("and it ends");
+    assert_is("check.md", &format!("{before}{BEGIN}{table}{END}{after}"));
 }
 
 #[test]

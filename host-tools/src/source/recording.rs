@@ -171,8 +171,8 @@ impl Recording {
                 bail!("{name}: is empty");
             }
             bail!(
-                "{name}: is no recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a \
-                 PX4 log (.ulg), each also as .gz, or a log of HUMS"
+                "{name}: is neither a log of HUMS, a card or its image, nor a recording that this program knows: a tlog, raw \
+                 MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), each also as .gz"
             );
         };
         let progress = input.progress();
@@ -284,7 +284,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             walk(input, 0, &mut paths)?;
             found.places.extend(paths.iter().map(|path| Place::file(path)));
             if found.places.len() == before {
-                bail!("{}: no recording is in there", input.display());
+                bail!("{}: no log and no recording is in there", input.display());
             }
         } else if is_own(input)? {
             own(input, salvage, &mut found)?;

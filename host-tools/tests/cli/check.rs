@@ -126,7 +126,7 @@ fn what_is_no_recording_is_refused_with_what_would_be_one() {
     let dir = tempfile::tempdir().expect("directory");
     fs::write(dir.path().join("notes.txt"), "no recording").expect("a file");
     fs::write(dir.path().join("empty.bin"), "").expect("a file");
-    for (input, why) in [("notes.txt", "is no recording that this program knows"), ("empty.bin", "is empty")]
+    for (input, why) in [("notes.txt", "nor a recording that this program knows"), ("empty.bin", "is empty")]
     {
         let output = run(dir.path(), &format!("check {input}"), 1);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();

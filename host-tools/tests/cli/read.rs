@@ -210,6 +210,11 @@ fn what_is_no_log_is_told_apart() {
         ("PX4", "hums pack"),
     ] {
         for command in ["info", "verify", "decode -o out --format csv"] {
+            if (command, input) == ("info", "PX4") {
+                // Recordings of every kind have a summary.
+                run(at, "info PX4", 0);
+                continue;
+            }
             let output = run(at, &format!("{command} {input}"), 1);
             let error = String::from_utf8_lossy(&output.stderr).into_owned();
             assert!(error.contains(said), "{command} {input}: {error}");
