@@ -80,13 +80,15 @@ fn logs() -> Result<Vec<(PathBuf, &'static str)>> {
                 let entry = entry?;
                 (entry.path(), entry.file_type()?)
             };
-            let name = path.to_string_lossy().to_ascii_lowercase();
-            let name = name.strip_suffix(".gz").unwrap_or(&name);
+            let is = |path: &Path, wanted: &str| {
+                path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted))
+            };
+            let unpacked = if is(&path, "gz") { path.with_extension("") } else { path.clone() };
             if kind.is_dir() {
                 waiting.push(path);
-            } else if name.ends_with(".bin") {
+            } else if is(&unpacked, "bin") {
                 logs.push((path, DATAFLASH));
-            } else if name.ends_with(".ulg") {
+            } else if is(&unpacked, "ulg") {
                 logs.push((path, ULOG));
             }
         }
