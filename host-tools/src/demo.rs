@@ -102,6 +102,8 @@ fn dashboard(card: &Path) -> Result<Outcome> {
         token: None,
         org: None,
         bucket: "hums".to_owned(),
+        spool: None,
+        spool_limit: 1,
     })
 }
 

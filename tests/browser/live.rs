@@ -332,11 +332,31 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
 }
 
 #[test]
+fn a_page_that_has_lost_hums_says_at_once_that_the_vehicles_state_is_not_known() {
+    let recording = own("px4_hil_quad_low.tlog");
+    let live = Live::start(&["--input", recording.to_str().unwrap()]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "light", 1440, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 60);
+    let overall = "document.getElementById('overall')";
+    let before = page.run(&format!("return {overall}.textContent"));
+    assert_ne!(before, "not known");
+    live.program.signal("KILL");
+    page.wait("return document.getElementById('source').textContent === 'no connection'", 10);
+    // With the same look as the source's badge, and not seconds later.
+    page.wait(&format!("return {overall}.textContent === 'not known'"), 1);
+    assert_eq!(page.run(&format!("return {overall}.classList.contains('stale')")), true);
+    shoot(&mut page, "no-connection");
+}
+
+#[test]
 fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
-    const HOSTILE: [&str; 3] = [
+    const HOSTILE: [&str; 4] = [
         "<img src=x onerror=\"document.title='owned'\">",
         "</script><script>document.title='owned'</script>",
         "{{now}} & \"quotes\" 'n' \\u003c <b>",
+        // Shown from right to left from here on: "live".
+        "rtl \u{202e}evil\u{2066}",
     ];
     let seeds = &Manifest::own().seeds;
     let port = free_port();
@@ -347,7 +367,7 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
     for sequence in 0..60_u8 {
         let heartbeat = build_v2(sequence.wrapping_mul(2), 0, &[4, 0, 0, 0, 2, 3, 0x51, 4, 3], seeds[&0]);
         let mut payload = vec![4];
-        payload.extend(HOSTILE[usize::from(sequence) % 3].bytes());
+        payload.extend(HOSTILE[usize::from(sequence) % HOSTILE.len()].bytes());
         payload.resize(51, 0);
         let text = build_v2(sequence.wrapping_mul(2).wrapping_add(1), 253, &payload, seeds[&253]);
         for frame in [heartbeat, text] {
@@ -355,14 +375,15 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
         }
         std::thread::sleep(Duration::from_millis(20));
     }
-    page.wait("return document.querySelectorAll('.notes li').length >= 3", 20);
+    page.wait("return document.querySelectorAll('.notes li').length >= 4", 20);
     let seen = page.read();
     assert!(!seen["title"].as_str().unwrap().contains("owned"), "{}", seen["title"]);
     let words: Vec<&str> =
         seen["notes"].as_array().unwrap().iter().map(|note| note[2].as_str().unwrap()).collect();
     for hostile in HOSTILE {
-        let said = &hostile[..hostile.len().min(50)];
-        assert!(words.contains(&said), "{said:?} is not among {words:?}");
+        let said =
+            hostile[..hostile.len().min(50)].replace('\u{202e}', "<U+202E>").replace('\u{2066}', "<U+2066>");
+        assert!(words.contains(&said.as_str()), "{said:?} is not among {words:?}");
     }
     assert_eq!(page.run("return document.querySelectorAll('main img, main script').length"), 0);
     assert_sound(&mut page);

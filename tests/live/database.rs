@@ -97,6 +97,23 @@ impl Database {
         Ok((code, body.to_owned()))
     }
 
+    /// `InfluxDB`: writes a line into the database `hums`, which is made.
+    pub(crate) fn write(&self, line: &str) {
+        for (path, body) in [("/query?q=CREATE%20DATABASE%20hums", ""), ("/write?db=hums&precision=ns", line)]
+        {
+            let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+            let length = body.len();
+            write!(
+                stream,
+                "POST {path} HTTP/1.0\r\nHost: 127.0.0.1\r\nContent-Length: {length}\r\n\r\n{body}"
+            )
+            .unwrap();
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).unwrap();
+            assert!(answer.starts_with("HTTP/1.0 20"), "{answer}");
+        }
+    }
+
     /// `InfluxDB`: the answer to a question.
     pub(crate) fn ask(&self, question: &str) -> Vec<Value> {
         let bytes: Vec<String> = question.bytes().map(|byte| format!("%{byte:02X}")).collect();

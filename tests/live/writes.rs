@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write as _;
 use std::net::TcpListener;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::of_tlog;
@@ -96,6 +96,71 @@ fn victoriametrics_is_restarted_in_flight_and_has_every_sample_in_the_end() {
             counts[&id]
         );
     }
+}
+
+#[test]
+fn what_waits_outlives_a_kill_and_is_written_by_the_next_run() {
+    let mut database = Database::start(Kind::Influx);
+    database.end();
+    let dir = tempfile::tempdir().unwrap();
+    let spool = dir.path().join("points.spool");
+    let url = format!("http://127.0.0.1:{}", database.port);
+    let to = ["--influx", &url, "--spool", spool.to_str().unwrap()];
+    // A recording is read whole at the start: all of its points wait.
+    let recording = own("px4_hil_quad_low.tlog");
+    let mut live = Live::start(&[&["--input", recording.to_str().unwrap()][..], &to].concat());
+    let (mut bytes, mut since) = (0, Instant::now());
+    while bytes < 100_000 || since.elapsed() < Duration::from_secs(3) {
+        let now = spool.metadata().map_or(0, |about| about.len());
+        if now != bytes {
+            (bytes, since) = (now, Instant::now());
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    live.program.signal("KILL");
+    live.program.end(Duration::from_secs(5));
+
+    database.again();
+    let port = hums_tests::live::free_port();
+    let live = Live::start(&[&["--input", &format!("udpin:127.0.0.1:{port}")][..], &to].concat());
+    let (code, words) = live.terminate(Duration::from_mins(1));
+    assert_eq!(code, Some(0), "{words}");
+    let number = |line: &str| line.split_whitespace().find_map(|word| word.parse::<u64>().ok()).unwrap();
+    let waited = number(words.lines().find(|line| line.contains("of an earlier run")).expect("it says so"));
+    let written = number(words.lines().find(|line| line.contains("points written")).expect("it says so"));
+    assert_eq!(waited, written, "{words}");
+    let points: u64 = database.measurements().iter().map(|measurement| database.points(measurement)).sum();
+    assert!(written > 10_000, "{words}");
+    assert_eq!(points, written, "points that are there");
+    assert!(spool.metadata().unwrap().len() < 100, "its room is given back");
+}
+
+#[test]
+fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refused() {
+    let mut database = Database::start(Kind::Influx);
+    let flight = |database: &mut Database| {
+        let url = format!("http://127.0.0.1:{}", database.port);
+        let recording = own("px4_hil_quad_low.tlog");
+        let live = Live::start(&["--input", recording.to_str().unwrap(), "--influx", &url]);
+        std::thread::sleep(Duration::from_secs(3));
+        live.terminate(Duration::from_mins(1))
+    };
+    // One field of ATTITUDE is text there from now on: each point of that message is refused, and no other.
+    database.write("ATTITUDE,vehicle=x,session=x roll=\"text\" 1");
+    let (code, words) = flight(&mut database);
+    assert_eq!(code, Some(3), "{words}");
+    let count = |what: &str| -> u64 {
+        let line =
+            words.lines().find(|line| line.contains(what)).unwrap_or_else(|| panic!("no {what}: {words}"));
+        line.split_whitespace().next().unwrap().parse().unwrap()
+    };
+    let (written, refused) = (count("points written"), count("refused by the database"));
+    let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
+    let frames = of_tlog(&data, &Manifest::own().seeds, false);
+    let attitudes = frames.iter().filter(|frame| frame.verified && frame.id == 30).count() as u64;
+    assert_eq!(refused, attitudes, "{words}");
+    let points: u64 = database.measurements().iter().map(|measurement| database.points(measurement)).sum();
+    assert_eq!(points, written + 1, "and the one that was there before");
 }
 
 /// The names of messages by id, from `hums decode`'s own tables.

@@ -16,6 +16,7 @@ mod noise;
 mod persistence;
 mod power_cut;
 mod protection;
+mod pull;
 mod round_trip;
 mod salvage;
 mod second_decoder;

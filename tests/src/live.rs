@@ -61,6 +61,8 @@ pub struct Live {
     /// The page's address.
     pub address: String,
     stderr: ChildStderr,
+    /// Where what waits for a database is kept, unless the test says where.
+    _state: tempfile::TempDir,
 }
 
 impl Live {
@@ -73,8 +75,11 @@ impl Live {
     /// As [`Self::start`], with the program at this path.
     #[track_caller]
     pub fn start_at(program: &Path, arguments: &[&str]) -> Self {
+        let state = tempfile::tempdir().unwrap();
         let mut command = Command::new(program);
         command
+            .env("XDG_STATE_HOME", state.path())
+            .env_remove("STATE_DIRECTORY")
             .args(["live", "--listen", "127.0.0.1:0"])
             .args(arguments)
             .stdout(Stdio::piped())
@@ -88,7 +93,7 @@ impl Live {
             let _ = stderr.read_to_string(&mut words);
             panic!("no address: {address:?} {words}");
         }
-        Self { program: Running(child), address: address.trim().to_owned(), stderr }
+        Self { program: Running(child), address: address.trim().to_owned(), stderr, _state: state }
     }
 
     /// Ends it as Ctrl-C does: its exit code, and what it said.

@@ -33,6 +33,7 @@ pub mod values;
 pub mod world;
 
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -50,6 +51,7 @@ use self::playback::Player;
 use self::rate::PUBLISH;
 use self::told::Limits;
 use crate::cli;
+use crate::files::Inputs;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
 use crate::output;
@@ -57,7 +59,7 @@ use crate::output;
 /// Runs `hums live`.
 pub fn run(args: &cli::Live) -> Result<Outcome> {
     let limits = Limits::new(&crate::run::params::read(args.params.as_deref())?);
-    let influx = database(args)?;
+    let (influx, spool) = database(args)?.unzip();
     let (listener, address) = listen(&args.listen)?;
     let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);
     let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
@@ -80,7 +82,7 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     if follower.is_finished() || interrupt::requested() {
         let influx =
             follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
-        return Ok(influx.map_or(Outcome::Done, finish));
+        return Ok(influx.zip(spool).map_or(Outcome::Done, |(influx, spool)| finish(influx, &spool)));
     }
     server.join().map_err(|_| anyhow!("the server has failed"))??;
     Ok(Outcome::Done)
@@ -116,27 +118,57 @@ fn follow(
     started.context("no thread")
 }
 
-fn database(args: &cli::Live) -> Result<Option<Influx>> {
+/// The database, and the file of what waits for it.
+fn database(args: &cli::Live) -> Result<Option<(Influx, PathBuf)>> {
     let Some(url) = &args.influx else {
-        if args.token.is_some() || args.org.is_some() {
-            return Err(usage("--token and --org are for --influx; the page's own token is --listen-token"));
+        if args.token.is_some() || args.org.is_some() || args.spool.is_some() {
+            return Err(usage(
+                "--token, --org and --spool are for --influx; the page's own token is --listen-token",
+            ));
         }
         return Ok(None);
     };
     let token = args.token.clone().or_else(|| std::env::var("HUMS_INFLUX_TOKEN").ok());
     let target = Target::new(url, token.as_deref(), args.org.as_deref(), &args.bucket)?;
+    let mut inputs = Inputs::of(&args.params);
+    inputs.add_endpoint(&args.input);
+    let limit = args.spool_limit.saturating_mul(1024 * 1024);
+    let spool = influx::place::open(args.spool.as_deref(), &target, limit, &inputs)?;
+    let path = spool.path().to_owned();
+    if spool.points() > 0 {
+        eprintln!(
+            "hums: {} points of an earlier run wait in {}: they go first",
+            spool.points(),
+            path.display()
+        );
+    }
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     // As good as unique among the sessions of one vehicle, and in their order.
     let session = format!("s{:08x}", now.as_secs() as u32);
-    Ok(Some(Influx::start(target, session)?))
+    let influx = Influx::start(target, session, spool, !args.input.is_live())?;
+    Ok(Some((influx, path)))
 }
 
-fn finish(influx: Influx) -> Outcome {
+fn finish(influx: Influx, spool: &Path) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
     eprintln!("{} points written", figures.written);
     if missing > 0 {
         eprintln!("{missing} points are not in the database: {}", figures.trouble);
+        for (count, what) in
+            [(figures.rejected, "refused by the database"), (figures.lost, "lost for want of room")]
+        {
+            if count > 0 {
+                eprintln!("  {count} {what}");
+            }
+        }
+        if figures.stored > 0 {
+            eprintln!(
+                "  {} wait in {}: the next `hums live` with this database writes them",
+                figures.stored,
+                spool.display()
+            );
+        }
     }
     Outcome::lossy(missing > 0)
 }

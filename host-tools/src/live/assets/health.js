@@ -102,7 +102,7 @@ export const link = () => {
       stored.hidden = !head.influx;
       if (head.influx) {
         say(points[0], whole(head.influx.written));
-        say(points[1], head.influx.spilled_bytes ? `${whole(head.influx.waiting)} (${fixed(head.influx.spilled_bytes / 1e6, 1)} MB on disk)` : whole(head.influx.waiting));
+        say(points[1], head.influx.spilled_bytes > 1e6 ? `${whole(head.influx.waiting)} (${fixed(head.influx.spilled_bytes / 1e6, 1)} MB on disk)` : whole(head.influx.waiting));
         const lost = head.influx.lost + head.influx.rejected;
         say(trouble, [lost ? `${whole(lost)} points lost or refused.` : "", head.influx.trouble].filter(Boolean).join(" "));
         toggle(trouble, "critical", lost > 0);

@@ -7,13 +7,15 @@ use serde::Serialize;
 pub struct Figures {
     /// The database has them.
     pub written: u64,
-    /// They wait, in memory or in the file.
+    /// They wait, in the file or in memory.
     pub waiting: u64,
-    /// Bytes of them that are in the file.
+    /// Of them, those that are in the file, for the next program too.
+    pub stored: u64,
+    /// Bytes of those.
     pub spilled_bytes: u64,
     /// The database refuses them for what they are.
     pub rejected: u64,
-    /// Neither memory nor the file took them.
+    /// They made room in a full file, or neither it nor memory took them.
     pub lost: u64,
     /// What the database said last when it did not take a batch; empty while all is well.
     pub trouble: String,

@@ -1,12 +1,14 @@
 //! `--influx`: points to a database as they come, named and tagged as `hums decode --format influx` does.
 //!
 //! The thread that follows the vehicle makes the lines and puts them into batches; another one writes these
-//! ([`writer`]). A database that is away costs nothing: batches wait in memory, beyond a limit in a file
-//! ([`queue`]), and are written when it is back.
+//! ([`writer`]). A database that is away costs nothing: batches wait in a file that outlives the program ([`queue`],
+//! [`spool`], [`place`]), and are written when it is back.
 
 mod figures;
 pub mod names;
+pub mod place;
 pub mod queue;
+pub mod spool;
 pub mod target;
 pub mod writer;
 
@@ -23,6 +25,7 @@ use hums_link::{Frame, observe};
 pub use self::figures::Figures;
 use self::names::Names;
 use self::queue::{Batch, Queue};
+use self::spool::Spool;
 use self::target::Target;
 use super::world::World;
 use crate::decode::influx::{Clock, Lines};
@@ -52,9 +55,10 @@ pub struct Influx {
 }
 
 impl Influx {
-    /// Starts writing to a database; `session` tags every point.
-    pub fn start(target: Target, session: String) -> Result<Self> {
-        let queue = Arc::new(Queue::new()?);
+    /// Starts writing to a database what waits in the file and what comes; `session` tags every point that comes. Where
+    /// `patient`, making points waits for a database that takes them more slowly.
+    pub fn start(target: Target, session: String, spool: Spool, patient: bool) -> Result<Self> {
+        let queue = Arc::new(Queue::new(spool, patient));
         let writer = writer::start(target, Arc::clone(&queue))?;
         Self::new(queue, Some(writer), session)
     }
@@ -228,7 +232,10 @@ mod tests {
 
     /// Flies these packets past; gives the lines that the database would get, the last ones by the end.
     fn fly(packets: &[Packet], know: bool) -> Vec<String> {
-        let queue = Arc::new(Queue::new().expect("a file"));
+        let dir = tempfile::tempdir().expect("a folder");
+        let spool =
+            Spool::open(&dir.path().join("spool"), 1 << 20).expect("a file").expect("nobody else has it");
+        let queue = Arc::new(Queue::new(spool, false));
         let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");
         let mut encoder = Encoder::of(1, 1);
         let frames: Vec<Vec<u8>> =
@@ -253,6 +260,7 @@ mod tests {
             let text = String::from_utf8(batch.text).expect("text");
             assert_eq!(text.lines().count() as u64, batch.points);
             lines.extend(text.lines().map(str::to_owned));
+            queue.done(queue::Delivered { written: batch.points, ..queue::Delivered::default() });
         }
         lines
     }

@@ -1,22 +1,20 @@
-//! Batches on their way to the database, in order: some in memory, the rest in a file without a name.
+//! Batches on their way to the database, in order, in a file that outlives this program ([`Spool`]).
 //!
-//! Memory takes the first [`MEMORY_BYTES`]; while there is anything in the file, what comes later goes there too, so that
-//! the order holds. The file grows as long as the disk has room. What not even the file takes is lost, and counted.
+//! What does not fit into the file makes the oldest ones go, which are counted: who looks at a database wants to see what
+//! is now, and the flight's record on the card has the rest. Where the disk is full or fails, [`MEMORY_BYTES`] wait in
+//! memory.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant as Wall};
 
 use super::figures::Figures;
+use super::spool::Spool;
 
 /// Half a minute of a fast link, a quarter of an hour of a usual one.
 pub const MEMORY_BYTES: usize = 16 * 1024 * 1024;
-/// Points and length before each batch in the file.
-const HEADER_BYTES: usize = 8 + 4;
-/// A batch that says it is longer was never written by us.
-const BATCH_BYTES_MAX: usize = 64 * 1024 * 1024;
+/// How often it is looked whether there is room by now.
+const LOOK: Duration = Duration::from_millis(200);
 
 /// Lines, and how many they are.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -27,78 +25,86 @@ pub struct Batch {
     pub points: u64,
 }
 
+/// What became of a batch.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Delivered {
+    /// The database has so many of its points.
+    pub written: u64,
+    /// It refuses so many for what they are.
+    pub refused: u64,
+    /// What it says of those.
+    pub why: String,
+}
+
 /// What waits.
 #[derive(Debug)]
 pub struct Queue {
     inner: Mutex<Inner>,
     changed: Condvar,
     memory_bytes_max: usize,
+    /// Who puts waits while the database takes what is there: for a recording, which can.
+    patient: bool,
 }
 
 #[derive(Debug)]
 struct Inner {
+    spool: Spool,
+    /// What the file did not take; younger than all that is in it.
     memory: VecDeque<Batch>,
     memory_bytes: usize,
-    file: File,
-    /// The next batch of the file, and its end.
-    read_at: u64,
-    write_at: u64,
-    file_points: u64,
     /// What the writer has in its hands.
-    in_hand: u64,
+    in_hand: Option<InHand>,
     figures: Figures,
     /// No more comes; nobody waits longer than this.
     closed: Option<Wall>,
 }
 
-impl Queue {
-    /// Nothing waits.
-    pub fn new() -> io::Result<Self> {
-        Self::with_memory(MEMORY_BYTES)
-    }
+#[derive(Clone, Copy, Debug)]
+struct InHand {
+    points: u64,
+    /// Its number in the file, where it still counts as waiting.
+    number: Option<u64>,
+}
 
-    /// Memory for so many bytes.
-    pub fn with_memory(memory_bytes_max: usize) -> io::Result<Self> {
+impl Queue {
+    /// With what waits in the file already.
+    pub fn new(spool: Spool, patient: bool) -> Self {
         let inner = Inner {
+            spool,
             memory: VecDeque::new(),
             memory_bytes: 0,
-            file: tempfile::tempfile()?,
-            read_at: 0,
-            write_at: 0,
-            file_points: 0,
-            in_hand: 0,
+            in_hand: None,
             figures: Figures::default(),
             closed: None,
         };
-        Ok(Self { inner: Mutex::new(inner), changed: Condvar::new(), memory_bytes_max })
+        Self { inner: Mutex::new(inner), changed: Condvar::new(), memory_bytes_max: MEMORY_BYTES, patient }
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a batch; never waits for the database.
+    fn wait<'a>(&self, inner: MutexGuard<'a, Inner>, time: Duration) -> MutexGuard<'a, Inner> {
+        self.changed.wait_timeout(inner, time).unwrap_or_else(PoisonError::into_inner).0
+    }
+
+    /// Takes a batch. It never waits for a database that is away.
     pub fn put(&self, batch: Batch) {
         let mut inner = self.lock();
-        let fits = inner.memory_bytes + batch.text.len() <= self.memory_bytes_max;
-        if inner.read_at == inner.write_at && fits {
-            inner.memory_bytes += batch.text.len();
-            inner.memory.push_back(batch);
-        } else if let Err(error) = inner.spill(&batch) {
-            inner.figures.lost += batch.points;
-            inner.figures.trouble = format!("points do not fit on the disk: {error}");
+        while self.patient && !inner.spool.has_room(&batch) && !inner.spool.is_empty() && !inner.is_away() {
+            inner = self.wait(inner, LOOK);
         }
+        inner.put(batch, self.memory_bytes_max);
         drop(inner);
         self.changed.notify_all();
     }
 
     /// The oldest batch, once there is one; `None` when no more comes. It is then in the writer's hand until
-    /// [`Self::done`].
+    /// [`Self::done`], and stays in the file until then.
     pub fn take(&self) -> Option<Batch> {
         let mut inner = self.lock();
         loop {
             if let Some(batch) = inner.oldest() {
-                inner.in_hand = batch.points;
                 return Some(batch);
             }
             if inner.closed.is_some() {
@@ -108,20 +114,12 @@ impl Queue {
         }
     }
 
-    /// The database has the batch, or (`Err`) refuses it for what it is.
-    pub fn done(&self, batch: &Batch, refused: Option<String>) {
+    /// The batch in hand was delivered.
+    pub fn done(&self, delivered: Delivered) {
         let mut inner = self.lock();
-        inner.in_hand = 0;
-        match refused {
-            None => {
-                inner.figures.written += batch.points;
-                inner.figures.trouble.clear();
-            }
-            Some(why) => {
-                inner.figures.rejected += batch.points;
-                inner.figures.trouble = why;
-            }
-        }
+        inner.done(delivered);
+        drop(inner);
+        self.changed.notify_all();
     }
 
     /// The database does not take anything now. Waits so long; `false` when the time at the end is up.
@@ -135,11 +133,11 @@ impl Queue {
             if left.is_zero() {
                 return inner.closed.is_none_or(|closed| Wall::now() < closed);
             }
-            inner = self.changed.wait_timeout(inner, left).unwrap_or_else(PoisonError::into_inner).0;
+            inner = self.wait(inner, left);
         }
     }
 
-    /// No more comes; what is not written by `until` stays.
+    /// No more comes; what is not written by `until` stays in the file.
     pub fn close(&self, until: Wall) {
         self.lock().closed = Some(until);
         self.changed.notify_all();
@@ -149,69 +147,82 @@ impl Queue {
     pub fn figures(&self) -> Figures {
         let inner = self.lock();
         let in_memory: u64 = inner.memory.iter().map(|batch| batch.points).sum();
+        // What is in hand and is not in the file: out of memory, or made room there.
+        let in_hand = inner.in_hand.filter(|hand| hand.number.is_none()).map_or(0, |hand| hand.points);
         Figures {
-            waiting: in_memory + inner.file_points + inner.in_hand,
-            spilled_bytes: inner.write_at - inner.read_at,
+            waiting: inner.spool.points() + in_memory + in_hand,
+            stored: inner.spool.points(),
+            spilled_bytes: inner.spool.bytes(),
             ..inner.figures.clone()
         }
     }
 }
 
 impl Inner {
-    fn spill(&mut self, batch: &Batch) -> io::Result<()> {
-        let length = u32::try_from(batch.text.len()).map_err(|_| io::ErrorKind::InvalidInput)?;
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + batch.text.len());
-        bytes.extend(batch.points.to_le_bytes());
-        bytes.extend(length.to_le_bytes());
-        bytes.extend(&batch.text);
-        self.file.seek(SeekFrom::Start(self.write_at))?;
-        // Half a batch at the end of a full disk is written over by the next one.
-        self.file.write_all(&bytes)?;
-        self.write_at += bytes.len() as u64;
-        self.file_points += batch.points;
-        Ok(())
+    /// Whether the database does not take anything: then nobody waits for room.
+    fn is_away(&self) -> bool {
+        !self.figures.trouble.is_empty() || self.closed.is_some()
+    }
+
+    fn put(&mut self, batch: Batch, memory_bytes_max: usize) {
+        // In order: what is in memory is younger than what is in the file.
+        if self.memory.is_empty() {
+            match self.spool.put(&batch) {
+                Ok(lost) => return self.lose_oldest(lost),
+                Err(error) => self.figures.trouble = format!("points do not fit on the disk: {error}"),
+            }
+        }
+        if self.memory_bytes + batch.text.len() <= memory_bytes_max {
+            self.memory_bytes += batch.text.len();
+            self.memory.push_back(batch);
+        } else {
+            self.figures.lost += batch.points;
+        }
+    }
+
+    /// The file has made room. What the writer has in its hands at that moment is not lost yet.
+    fn lose_oldest(&mut self, points: u64) {
+        let oldest = self.spool.number();
+        let mut lost = points;
+        if let Some(hand) =
+            self.in_hand.as_mut().filter(|hand| hand.number.is_some_and(|number| number < oldest))
+        {
+            hand.number = None;
+            lost = lost.saturating_sub(hand.points);
+        }
+        self.figures.lost += lost;
     }
 
     fn oldest(&mut self) -> Option<Batch> {
-        if let Some(batch) = self.memory.pop_front() {
-            self.memory_bytes -= batch.text.len();
-            return Some(batch);
-        }
-        if self.read_at == self.write_at {
-            return None;
-        }
-        match self.unspill() {
-            Ok(batch) => {
-                self.file_points -= batch.points.min(self.file_points);
-                if self.read_at == self.write_at {
-                    (self.read_at, self.write_at) = (0, 0);
-                    // The room is given back; where that fails, it is used again.
-                    let _ = self.file.set_len(0);
-                }
-                Some(batch)
+        match self.spool.oldest() {
+            Ok(Some(batch)) => {
+                self.in_hand = Some(InHand { points: batch.points, number: Some(self.spool.number()) });
+                return Some(batch);
             }
+            Ok(None) => {}
             Err(error) => {
-                self.figures.lost += self.file_points;
+                self.figures.lost += self.spool.forget();
                 self.figures.trouble = format!("the file of waiting points cannot be read: {error}");
-                (self.read_at, self.write_at, self.file_points) = (0, 0, 0);
-                None
             }
         }
+        let batch = self.memory.pop_front()?;
+        self.memory_bytes -= batch.text.len();
+        self.in_hand = Some(InHand { points: batch.points, number: None });
+        Some(batch)
     }
 
-    fn unspill(&mut self) -> io::Result<Batch> {
-        self.file.seek(SeekFrom::Start(self.read_at))?;
-        let (mut points, mut length) = ([0; 8], [0; 4]);
-        self.file.read_exact(&mut points)?;
-        self.file.read_exact(&mut length)?;
-        let length = u32::from_le_bytes(length) as usize;
-        if length > BATCH_BYTES_MAX {
-            return Err(io::ErrorKind::InvalidData.into());
+    fn done(&mut self, delivered: Delivered) {
+        if let Some(InHand { number: Some(number), .. }) = self.in_hand.take()
+            && number == self.spool.number()
+            && let Err(error) = self.spool.drop_oldest()
+        {
+            self.figures.lost += self.spool.forget();
+            self.figures.trouble = format!("the file of waiting points cannot be used: {error}");
         }
-        let mut text = vec![0; length];
-        self.file.read_exact(&mut text)?;
-        self.read_at += (HEADER_BYTES + length) as u64;
-        Ok(Batch { text, points: u64::from_le_bytes(points) })
+        self.figures.written += delivered.written;
+        self.figures.rejected += delivered.refused;
+        // A word on what was refused stays until the next trouble, or until all is well.
+        self.figures.trouble = delivered.why;
     }
 }
 
@@ -223,48 +234,89 @@ mod tests {
         Batch { text: format!("m value={number} {number}\n").repeat(100).into_bytes(), points: 100 }
     }
 
+    fn all() -> Delivered {
+        Delivered { written: 100, ..Delivered::default() }
+    }
+
+    fn queue(dir: &tempfile::TempDir, limit: u64) -> Queue {
+        let spool =
+            Spool::open(&dir.path().join("spool"), limit).expect("a file").expect("nobody else has it");
+        Queue::new(spool, false)
+    }
+
     #[test]
-    fn order_and_count_hold_through_memory_and_file() {
-        let queue = Queue::with_memory(5_000).expect("a file");
+    fn order_and_count_hold_and_what_a_kill_leaves_is_written_by_the_next_program() {
+        let dir = tempfile::tempdir().expect("a folder");
         let mut taken = Vec::new();
+        let first = queue(&dir, 1 << 20);
         for number in 0..50 {
-            queue.put(batch(number));
+            first.put(batch(number));
             // The database comes back for a moment now and then.
             if number % 10 == 9 {
                 for _ in 0..4 {
-                    let batch = queue.take().expect("it waits");
-                    queue.done(&batch, None);
-                    taken.push(batch);
+                    taken.push(first.take().expect("it waits"));
+                    first.done(all());
                 }
             }
         }
-        let figures = queue.figures();
+        // In the writer's hand when it is killed.
+        first.take().expect("it waits");
+        let figures = first.figures();
         assert_eq!((figures.written, figures.waiting, figures.lost), (2_000, 3_000, 0));
-        assert!(figures.spilled_bytes > 10_000);
-        queue.close(Wall::now());
-        while let Some(batch) = queue.take() {
-            queue.done(&batch, None);
+        drop(first);
+
+        let next = queue(&dir, 1 << 20);
+        assert_eq!((next.figures().waiting, next.figures().stored), (3_000, 3_000));
+        next.close(Wall::now());
+        while let Some(batch) = next.take() {
+            next.done(all());
             taken.push(batch);
         }
         assert_eq!(taken, (0..50).map(batch).collect::<Vec<_>>());
-        assert_eq!((queue.figures().waiting, queue.figures().spilled_bytes), (0, 0));
+        assert_eq!((next.figures().waiting, next.figures().spilled_bytes), (0, 0));
+    }
+
+    #[test]
+    fn a_full_file_loses_the_oldest_and_counts_each_point_once() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let queue = queue(&dir, 10_000);
+        queue.put(batch(0));
+        let in_hand = queue.take().expect("it waits");
+        for number in 1..20 {
+            queue.put(batch(number));
+        }
+        let figures = queue.figures();
+        assert!(figures.lost > 500 && figures.spilled_bytes <= 10_000, "{figures:?}");
+        assert_eq!(figures.lost + figures.waiting, 2_000, "what is in hand still waits: {figures:?}");
+        queue.done(Delivered { written: in_hand.points, ..Delivered::default() });
+        queue.close(Wall::now());
+        let mut last = None;
+        while let Some(batch) = queue.take() {
+            queue.done(all());
+            last = Some(batch);
+        }
+        let figures = queue.figures();
+        assert_eq!((figures.written + figures.lost, figures.waiting), (2_000, 0), "{figures:?}");
+        assert_eq!(last, Some(batch(19)), "the newest is there");
     }
 
     #[test]
     fn what_the_database_refuses_is_counted_with_its_reason() {
-        let queue = Queue::new().expect("a file");
+        let dir = tempfile::tempdir().expect("a folder");
+        let queue = queue(&dir, 10_000);
         queue.put(batch(1));
-        let taken = queue.take().expect("it waits");
+        queue.take().expect("it waits");
         assert_eq!(queue.figures().waiting, 100, "it is in the writer's hand");
-        queue.done(&taken, Some("field type conflict".to_owned()));
+        queue.done(Delivered { written: 97, refused: 3, why: "field type conflict".to_owned() });
         let figures = queue.figures();
-        assert_eq!((figures.written, figures.rejected, figures.waiting), (0, 100, 0));
+        assert_eq!((figures.written, figures.rejected, figures.waiting), (97, 3, 0));
         assert_eq!(figures.trouble, "field type conflict");
     }
 
     #[test]
     fn at_the_end_nobody_waits_for_ever() {
-        let queue = Queue::new().expect("a file");
+        let dir = tempfile::tempdir().expect("a folder");
+        let queue = queue(&dir, 10_000);
         queue.close(Wall::now() + Duration::from_millis(50));
         let start = Wall::now();
         assert!(!queue.trouble("away".to_owned(), Duration::from_mins(1)));

@@ -1,4 +1,8 @@
 //! The thread that writes batches: each until the database has it, or refuses it for what it is.
+//!
+//! A batch that is refused is tried again in halves, and these in halves: so a bad point costs itself and no other. A
+//! point that is written twice is the same point. `InfluxDB` 1.x and 2 write what is good of a batch themselves, answer
+//! 400 or 422 all the same, and say how many points they dropped; then nothing is tried again.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -7,7 +11,7 @@ use std::time::Duration;
 use anyhow::{Context as _, Result};
 use ureq::Agent;
 
-use super::queue::{Batch, Queue};
+use super::queue::{Batch, Delivered, Queue};
 use super::target::Target;
 
 /// A database that has not answered by then will not.
@@ -16,15 +20,19 @@ const LIMIT: Duration = Duration::from_secs(10);
 const WAIT_MIN: Duration = Duration::from_millis(200);
 const WAIT_MAX: Duration = Duration::from_secs(5);
 /// What is read of an answer.
-const ANSWER_BYTES_MAX: u64 = 2_048;
+const ANSWER_BYTES_MAX: u64 = 64 * 1024;
 /// What is told of it.
 const WORDS_MAX: usize = 200;
+/// Requests for one batch. A bad point among 2,048 takes 23; where there are more bad ones than these find, the good
+/// ones beside them go with them.
+const REQUESTS_MAX: usize = 64;
 
-/// How a batch went.
+/// How a request went.
+#[derive(Debug)]
 enum Answer {
     Taken,
-    /// For what it is: another try would end alike.
-    Refused(String),
+    /// For what it is: another try would end alike. Where the rest was written, how many were not.
+    Refused(String, Option<u64>),
     /// There is no such database.
     Missing(String),
     /// The server is away, busy, or wants another token.
@@ -41,33 +49,83 @@ pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
 
 fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
     while let Some(batch) = queue.take() {
-        let mut wait = WAIT_MIN;
-        let refused = loop {
-            let why = match write(agent, target, &batch) {
-                Answer::Taken => break None,
-                Answer::Refused(why) => break Some(why),
-                Answer::Missing(why) => {
-                    create(agent, target);
-                    why
-                }
-                Answer::Away(why) => why,
-            };
-            if !queue.trouble(why, wait) {
-                // What is in hand stays counted as waiting.
-                return;
-            }
-            wait = (wait * 2).min(WAIT_MAX);
-        };
-        queue.done(&batch, refused);
+        let deliver = |lines: &[u8]| persist(agent, target, queue, lines);
+        // Without an answer it stays counted as waiting, and in the file.
+        let Some(delivered) = in_halves(&batch, deliver) else { return };
+        queue.done(delivered);
     }
 }
 
-fn write(agent: &Agent, target: &Target, batch: &Batch) -> Answer {
+/// Writes these lines, again and again while the database is away; `None` when the time at the end is up.
+fn persist(agent: &Agent, target: &Target, queue: &Queue, lines: &[u8]) -> Option<Answer> {
+    let mut wait = WAIT_MIN;
+    loop {
+        let why = match write(agent, target, lines) {
+            answer @ (Answer::Taken | Answer::Refused(..)) => return Some(answer),
+            Answer::Missing(why) => {
+                create(agent, target);
+                why
+            }
+            Answer::Away(why) => why,
+        };
+        if !queue.trouble(why, wait) {
+            return None;
+        }
+        wait = (wait * 2).min(WAIT_MAX);
+    }
+}
+
+/// Delivers a batch, what is refused in halves, with a bounded number of requests.
+fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) -> Option<Delivered> {
+    let mut delivered = Delivered::default();
+    // The parts that are still to be written, the first of them last.
+    let mut parts: Vec<(&[u8], u64)> = vec![(&batch.text, batch.points)];
+    let mut requests = 0;
+    while let Some((lines, points)) = parts.pop() {
+        requests += 1;
+        let (why, dropped) = match deliver(lines)? {
+            Answer::Refused(why, dropped) => (why, dropped),
+            _ => {
+                delivered.written += points;
+                continue;
+            }
+        };
+        delivered.why = why;
+        if let Some(dropped) = dropped {
+            delivered.refused += dropped.min(points);
+            delivered.written += points.saturating_sub(dropped);
+            continue;
+        }
+        match halves(lines).filter(|_| requests + parts.len() + 2 <= REQUESTS_MAX) {
+            Some((first, second)) => {
+                let of_first = points_of(first);
+                parts.push((second, points.saturating_sub(of_first)));
+                parts.push((first, of_first));
+            }
+            None => delivered.refused += points,
+        }
+    }
+    Some(delivered)
+}
+
+/// Cuts lines into two parts of about equal length; `None` where it is one line.
+fn halves(lines: &[u8]) -> Option<(&[u8], &[u8])> {
+    let end = |from: usize| lines.get(from..)?.iter().position(|byte| *byte == b'\n').map(|at| from + at + 1);
+    let start = lines.get(..lines.len() / 2)?.iter().rposition(|byte| *byte == b'\n').map(|at| at + 1);
+    let cut = end(lines.len() / 2).filter(|cut| *cut < lines.len()).or(start)?;
+    Some(lines.split_at(cut))
+}
+
+fn points_of(lines: &[u8]) -> u64 {
+    lines.iter().filter(|byte| **byte == b'\n').count() as u64
+}
+
+fn write(agent: &Agent, target: &Target, lines: &[u8]) -> Answer {
     let mut request = agent.post(&target.write).content_type("text/plain; charset=utf-8");
     if let Some(authorization) = &target.authorization {
         request = request.header("Authorization", authorization);
     }
-    let mut response = match request.send(&batch.text[..]) {
+    let mut response = match request.send(lines) {
         Ok(response) => response,
         Err(error) => return Answer::Away(error.to_string()),
     };
@@ -76,13 +134,27 @@ fn write(agent: &Agent, target: &Target, batch: &Batch) -> Answer {
         return Answer::Taken;
     }
     let body = response.body_mut().with_config().limit(ANSWER_BYTES_MAX).read_to_string();
-    let words: String = body.unwrap_or_default().chars().take(WORDS_MAX).collect();
+    answer(status, &body.unwrap_or_default())
+}
+
+/// What an answer that is no success means.
+fn answer(status: u16, body: &str) -> Answer {
+    let words: String = body.chars().take(WORDS_MAX).collect();
     let why = format!("the database answers {status}: {}", words.trim());
     match status {
         404 => Answer::Missing(why),
-        400 | 413 | 422 => Answer::Refused(why),
+        400 | 413 | 422 => Answer::Refused(why, dropped(body)),
         _ => Answer::Away(why),
     }
+}
+
+/// How many points were dropped where the rest was written: "partial write: ... dropped=3". 0 stands there where lines
+/// could not be read (`InfluxDB` 1.x), which says nothing of their number.
+fn dropped(body: &str) -> Option<u64> {
+    let (_, partial) = body.split_once("partial write")?;
+    let (_, after) = partial.rsplit_once("dropped=")?;
+    let digits = after.split(|c: char| !c.is_ascii_digit()).next()?;
+    digits.parse().ok().filter(|dropped| *dropped > 0)
 }
 
 /// Makes the database; whether that worked shows at the next batch.
@@ -93,5 +165,89 @@ fn create(agent: &Agent, target: &Target) {
             request = request.header("Authorization", authorization);
         }
         let _ = request.send_empty();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A batch of so many lines, of which some are bad.
+    fn batch(lines: u64, bad: &[u64]) -> Batch {
+        let line =
+            |number| if bad.contains(&number) { "BAD\n".to_owned() } else { format!("m v={number}\n") };
+        Batch { text: (0..lines).map(line).collect::<String>().into_bytes(), points: lines }
+    }
+
+    /// Delivers to a database that refuses a request with a bad line in it; what it has, and the requests.
+    fn deliver(batch: &Batch) -> (Delivered, Vec<String>, usize) {
+        let (mut has, mut requests) = (Vec::new(), 0);
+        let delivered = in_halves(batch, |lines| {
+            requests += 1;
+            let text = std::str::from_utf8(lines).expect("text");
+            assert!(text.ends_with('\n'), "whole lines");
+            if text.contains("BAD") {
+                return Some(answer(400, "unable to parse"));
+            }
+            has.extend(text.lines().map(str::to_owned));
+            Some(Answer::Taken)
+        });
+        (delivered.expect("it answers"), has, requests)
+    }
+
+    #[test]
+    fn a_bad_point_costs_itself_wherever_it_stands() {
+        for bad in [0, 1, 1_023, 1_024, 2_046, 2_047] {
+            let (delivered, has, requests) = deliver(&batch(2_048, &[bad]));
+            assert_eq!((delivered.written, delivered.refused), (2_047, 1), "{bad}");
+            assert!(delivered.why.contains("unable to parse"));
+            assert_eq!(has.len(), 2_047);
+            assert!(requests <= 26, "{requests} requests");
+        }
+        let (delivered, _, requests) = deliver(&batch(1, &[0]));
+        assert_eq!((delivered.written, delivered.refused, requests), (0, 1, 1));
+        assert_eq!(deliver(&batch(2_048, &[])).0, Delivered { written: 2_048, ..Delivered::default() });
+    }
+
+    #[test]
+    fn a_batch_of_bad_points_takes_a_bounded_number_of_requests_and_each_point_is_counted() {
+        for step in [1, 2, 7, 100] {
+            let bad: Vec<u64> = (0..2_048).step_by(step).collect();
+            let (delivered, has, requests) = deliver(&batch(2_048, &bad));
+            assert!(requests <= REQUESTS_MAX, "{requests}");
+            assert_eq!(delivered.written, has.len() as u64);
+            assert_eq!(delivered.written + delivered.refused, 2_048);
+        }
+    }
+
+    #[test]
+    fn what_the_database_wrote_of_a_refused_batch_is_not_counted_as_refused() {
+        let partial = "{\"error\":\"partial write: field type conflict: input field \\\"v\\\" dropped=3\"}";
+        for (status, body, expected) in [
+            (400, partial, Some(3)),
+            (422, "failure writing points to database: partial write: ... dropped=12", Some(12)),
+            (400, "{\"error\":\"partial write: unable to parse 'x': missing fields dropped=0\"}", None),
+            (400, "unable to parse 'x': dropped=3", None),
+        ] {
+            let Answer::Refused(_, dropped) = answer(status, body) else { panic!("{status} refuses") };
+            assert_eq!(dropped, expected, "{body}");
+        }
+        let mut requests = 0;
+        let delivered = in_halves(&batch(100, &[]), |_| {
+            requests += 1;
+            Some(answer(400, partial))
+        });
+        let delivered = delivered.expect("it answers");
+        assert_eq!((delivered.written, delivered.refused, requests), (97, 3, 1));
+    }
+
+    #[test]
+    fn a_database_that_goes_away_between_the_halves_leaves_the_whole_batch_waiting() {
+        let mut requests = 0;
+        let delivered = in_halves(&batch(100, &[7]), |_| {
+            requests += 1;
+            (requests < 3).then(|| answer(400, "unable to parse"))
+        });
+        assert_eq!(delivered, None);
     }
 }

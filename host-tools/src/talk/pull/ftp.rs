@@ -1,28 +1,23 @@
-//! `hums pull`: the board's logs over MAVLink FTP, burst by burst; what a burst lost is read piece by piece.
+//! A client of MAVLink FTP (<https://mavlink.io/en/services/ftp.html>), as far as downloads need it.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
-use std::io::Write as _;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context as _, Result, bail};
 use hums_link::Frame;
 use hums_link::messages;
 use hums_link::packet::Fields;
 
-use super::Client;
-use crate::cli;
-use crate::files::{appended, cannot_write, make_directory};
 use crate::mavlink::ids::FILE_TRANSFER_PROTOCOL;
-use crate::outcome::Outcome;
-use crate::output::Stdout;
+use crate::talk::Client;
 
 const HEAD: usize = 12;
 const DATA_MAX: u8 = 239;
 /// At the slowest budget that can carry a piece, one comes in about two seconds.
 const ANSWER: Duration = Duration::from_secs(3);
 const TRIES: usize = 10;
+/// A board reads a log of 8 MiB in some 20 s while it has little to record, and in as many minutes at worst.
+const CHECKSUM_TRIES: usize = 100;
 /// A burst is over when nothing came for so long.
 const GAP: Duration = Duration::from_millis(2_500);
 
@@ -31,10 +26,13 @@ const RESET: u8 = 2;
 const LIST: u8 = 3;
 const OPEN: u8 = 4;
 const READ: u8 = 5;
+const CHECKSUM: u8 = 14;
 const BURST: u8 = 15;
 const ACK: u8 = 128;
 const NAK: u8 = 129;
+/// `MAV_FTP_ERR`
 const END_OF_FILE: u8 = 6;
+const UNKNOWN_COMMAND: u8 = 7;
 
 /// An answer.
 struct Answer {
@@ -61,44 +59,38 @@ impl Answer {
         })
     }
 
-    fn is_end(&self) -> bool {
-        self.opcode == NAK && self.data.first() == Some(&END_OF_FILE)
+    fn is_nak(&self, error: u8) -> bool {
+        self.opcode == NAK && self.data.first() == Some(&error)
+    }
+
+    /// The first four bytes of its data.
+    fn word(&self) -> u32 {
+        self.data.iter().take(4).rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
     }
 }
 
-struct Ftp {
+/// The log that was open is no longer there.
+fn gone<T>() -> Result<T> {
+    bail!(
+        "the board no longer has this log: its card made room for later flights, or is another one; what came is good \
+         as far as it goes"
+    )
+}
+
+/// A conversation with a board's file server.
+pub(super) struct Ftp {
     client: Client,
     sequence: u16,
 }
 
-/// Runs `hums pull`.
-pub fn run(args: &cli::Pull) -> Result<Outcome> {
-    make_directory(&args.output)?;
-    let mut ftp = Ftp { client: Client::connect(&args.at)?, sequence: 0 };
-    ftp.ask(RESET, 0, 0, b"")?;
-    let mut logs = ftp.list()?;
-    logs.sort();
-    if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
-        let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
-        bail!("{missing}: the board has no such log; it has {}", names.join(", "));
-    }
-    logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
-    let newest = args.last.unwrap_or(logs.len()).min(logs.len());
-    let mut out = Stdout::new();
-    for (name, bytes) in logs.split_off(logs.len() - newest) {
-        let path = args.output.join(&name);
-        if path.metadata().is_ok_and(|metadata| metadata.len() == u64::from(bytes)) {
-            eprintln!("hums: {name}: is there already");
-            continue;
-        }
-        ftp.pull(&name, &path)?;
-        writeln!(out, "{}", path.display())?;
-        out.flush()?;
-    }
-    Ok(Outcome::Done)
-}
-
 impl Ftp {
+    /// Ends whatever was open.
+    pub(super) fn new(client: Client) -> Result<Self> {
+        let mut ftp = Self { client, sequence: 0 };
+        ftp.ask(RESET, 0, 0, b"", TRIES)?;
+        Ok(ftp)
+    }
+
     fn say(&mut self, opcode: u8, offset: u32, size: u8, data: &[u8]) -> Result<u16> {
         self.sequence = self.sequence.wrapping_add(1);
         let [s0, s1] = self.sequence.to_le_bytes();
@@ -111,8 +103,8 @@ impl Ftp {
         Ok(self.sequence)
     }
 
-    fn ask(&mut self, opcode: u8, offset: u32, size: u8, data: &[u8]) -> Result<Answer> {
-        for _ in 0..TRIES {
+    fn ask(&mut self, opcode: u8, offset: u32, size: u8, data: &[u8], tries: usize) -> Result<Answer> {
+        for _ in 0..tries {
             let sequence = self.say(opcode, offset, size, data)?;
             let answer = self.client.until(Instant::now() + ANSWER, |frame| {
                 Answer::read(frame)
@@ -126,11 +118,11 @@ impl Ftp {
     }
 
     /// Names and lengths of all logs.
-    fn list(&mut self) -> Result<Vec<(String, u32)>> {
+    pub(super) fn list(&mut self) -> Result<Vec<(String, u32)>> {
         let mut logs = Vec::new();
         loop {
-            let answer = self.ask(LIST, logs.len() as u32, 0, b"/")?;
-            if answer.is_end() {
+            let answer = self.ask(LIST, logs.len() as u32, 0, b"/", TRIES)?;
+            if answer.is_nak(END_OF_FILE) {
                 return Ok(logs);
             }
             let text = String::from_utf8_lossy(&answer.data).into_owned();
@@ -149,54 +141,30 @@ impl Ftp {
         }
     }
 
-    fn pull(&mut self, name: &str, path: &Path) -> Result<()> {
-        let part = appended(path, "part");
-        let context = || cannot_write(&part);
-        let mut file = OpenOptions::new().create(true).append(true).open(&part).with_context(context)?;
-        let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes())?;
+    /// Opens a log; how many bytes it has.
+    pub(super) fn open(&mut self, name: &str) -> Result<u32> {
+        let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes(), TRIES)?;
         if opened.opcode != ACK {
-            bail!("{name}: the board cannot open it");
+            bail!("the board cannot open it");
         }
-        let mut length = [0; 4];
-        length.iter_mut().zip(&opened.data).for_each(|(to, from)| *to = *from);
-        let length = u32::from_le_bytes(length);
-        let mut have = u32::try_from(file.metadata()?.len()).unwrap_or(u32::MAX);
-        if have > length {
-            // Of another log of this name.
-            file = File::create(&part).with_context(context)?;
-            have = 0;
+        Ok(opened.word())
+    }
+
+    /// The checksum of a log's first so many bytes (at least one), as [`hums_link::ftp::checksum`] computes it; `None`
+    /// where the board's firmware is too old to tell.
+    pub(super) fn checksum(&mut self, name: &str, bytes: u32) -> Result<Option<u32>> {
+        let answer = self.ask(CHECKSUM, bytes, 0, format!("/{name}").as_bytes(), CHECKSUM_TRIES)?;
+        match answer.opcode {
+            ACK if answer.offset == bytes => Ok(Some(answer.word())),
+            // Another server: of the whole file, whatever was asked for.
+            ACK => Ok(None),
+            _ if answer.is_nak(UNKNOWN_COMMAND) => Ok(None),
+            _ => gone(),
         }
-        let mut silent = 0;
-        while have < length {
-            let pieces = self.burst(have, length)?;
-            silent = if pieces.is_empty() { silent + 1 } else { 0 };
-            if silent >= TRIES {
-                bail!("{name}: nothing more comes after {have} of {length} bytes; to go on, call again");
-            }
-            let before = have;
-            let end = pieces.iter().map(|(at, data)| *at + data.len() as u32).max().unwrap_or(have);
-            while have < end {
-                let data = if let Some(data) = pieces.get(&have) {
-                    data.clone()
-                } else {
-                    // Up to the next piece that came.
-                    let next = pieces.range(have..).next().map_or(end, |(at, _)| *at);
-                    self.piece(have, next - have)?
-                };
-                file.write_all(&data).with_context(context)?;
-                have += data.len() as u32;
-            }
-            eprintln!("hums: {name}: {have} of {length} bytes");
-            if have == before && silent == 0 {
-                bail!("{name}: the board sends nothing new after {have} of {length} bytes");
-            }
-        }
-        file.flush().with_context(context)?;
-        fs::rename(&part, path).with_context(|| format!("{}: cannot be named", path.display()))
     }
 
     /// What a burst from `offset` brings, by offset, as much of it as came.
-    fn burst(&mut self, offset: u32, length: u32) -> Result<BTreeMap<u32, Vec<u8>>> {
+    pub(super) fn burst(&mut self, offset: u32, length: u32) -> Result<BTreeMap<u32, Vec<u8>>> {
         self.say(BURST, offset, DATA_MAX, b"")?;
         let mut pieces = BTreeMap::new();
         loop {
@@ -204,20 +172,26 @@ impl Ftp {
                 Answer::read(frame).filter(|answer| answer.of == BURST)
             })?;
             let Some(answer) = answer else { return Ok(pieces) };
-            let over = answer.opcode != ACK || answer.complete;
+            if answer.opcode == NAK && !answer.is_nak(END_OF_FILE) {
+                return gone();
+            }
             let end = answer.offset.saturating_add(answer.data.len() as u32);
             if answer.opcode == ACK && answer.offset >= offset && !answer.data.is_empty() && end <= length {
                 pieces.insert(answer.offset, answer.data);
             }
-            if over {
+            if answer.opcode != ACK || answer.complete || end >= length {
                 return Ok(pieces);
             }
         }
     }
 
-    fn piece(&mut self, offset: u32, bytes: u32) -> Result<Vec<u8>> {
+    /// At least one and at most so many bytes of the open log from `offset` on.
+    pub(super) fn piece(&mut self, offset: u32, bytes: u32) -> Result<Vec<u8>> {
         let size = bytes.min(u32::from(DATA_MAX)) as u8;
-        let mut answer = self.ask(READ, offset, size, b"")?;
+        let mut answer = self.ask(READ, offset, size, b"", TRIES)?;
+        if answer.opcode == NAK && !answer.is_nak(END_OF_FILE) {
+            return gone();
+        }
         if answer.opcode != ACK || answer.offset != offset || answer.data.is_empty() {
             bail!("the board gives no bytes at {offset}");
         }

@@ -1,0 +1,128 @@
+//! Where the file of waiting points is, so that the next program finds it.
+//!
+//! One file a database: points never go to another one than they were made for. A second program that writes to the
+//! same database meanwhile has a file of its own (`-2`, `-3`, ...); what a killed one has left in such a file is taken
+//! over by the next that starts.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use sha2::{Digest as _, Sha256};
+
+use super::spool::Spool;
+use super::target::Target;
+use crate::files::{Inputs, make_directory};
+use crate::outcome::usage;
+
+/// Programs that write to one database from one PC at a time.
+const FILES_MAX: usize = 8;
+
+/// Opens the file that the user named, or the database's own.
+pub fn open(named: Option<&Path>, target: &Target, limit: u64, inputs: &Inputs) -> Result<Spool> {
+    if let Some(path) = named {
+        inputs.refuse(path)?;
+        return Spool::open(path, limit)?
+            .with_context(|| format!("--spool {}: another hums uses it; name another file", path.display()));
+    }
+    let folder =
+        folder(|name| std::env::var_os(name).filter(|value| !value.is_empty())).ok_or_else(|| {
+            usage("--influx: there is no folder for points that wait; name a file with --spool")
+        })?;
+    make_directory(&folder)?;
+    let mut own: Option<Spool> = None;
+    for number in 1..=FILES_MAX {
+        let path = folder.join(name(target, number));
+        match &mut own {
+            None => own = Spool::open(&path, limit)?,
+            Some(own) if path.exists() => adopt(own, &path, limit)?,
+            Some(_) => {}
+        }
+    }
+    own.with_context(|| {
+        format!("--influx: {FILES_MAX} programs write to this database already; name a file with --spool")
+    })
+}
+
+/// Takes over what a program has left that no longer runs.
+fn adopt(own: &mut Spool, path: &Path, limit: u64) -> Result<()> {
+    let Some(mut left) = Spool::open(path, limit)? else { return Ok(()) };
+    let context = || format!("{}: cannot be read", path.display());
+    while let Some(batch) = left.oldest().with_context(context)? {
+        if !own.has_room(&batch) {
+            // It waits for a start with more room.
+            break;
+        }
+        own.put(&batch).with_context(context)?;
+        left.drop_oldest().with_context(context)?;
+    }
+    Ok(())
+}
+
+/// The service's own folder where systemd has made one, or the user's (XDG Base Directory Specification 0.8), or on
+/// Windows the user's for this PC.
+fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
+    if let Some(folders) = variable("STATE_DIRECTORY") {
+        return std::env::split_paths(&folders).next();
+    }
+    let state = variable("XDG_STATE_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
+    let home = || Some(PathBuf::from(variable("HOME")?).join(".local/state"));
+    let local = || variable("LOCALAPPDATA").map(PathBuf::from);
+    Some(state.or_else(home).or_else(local)?.join("hums"))
+}
+
+fn name(target: &Target, number: usize) -> String {
+    let hash = Sha256::digest(target.write.as_bytes());
+    let database: String = hash.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let suffix = if number == 1 { String::new() } else { format!("-{number}") };
+    format!("influx-{database}{suffix}.spool")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::live::influx::queue::Batch;
+
+    #[test]
+    fn the_folder_is_the_services_or_the_users() {
+        let of = |variables: &[(&str, &str)]| {
+            folder(|name| Some(variables.iter().find(|(known, _)| *known == name)?.1.into()))
+        };
+        let service = [("STATE_DIRECTORY", "/var/lib/hums:/var/lib/other"), ("HOME", "/home/a")];
+        assert_eq!(of(&service), Some("/var/lib/hums".into()));
+        assert_eq!(of(&[("XDG_STATE_HOME", "/x"), ("HOME", "/home/a")]), Some("/x/hums".into()));
+        assert_eq!(
+            of(&[("XDG_STATE_HOME", "x"), ("HOME", "/home/a")]),
+            Some("/home/a/.local/state/hums".into())
+        );
+        assert_eq!(of(&[]), None);
+    }
+
+    #[test]
+    fn what_a_killed_second_program_has_left_is_taken_over() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (first, second) = (dir.path().join("a"), dir.path().join("b"));
+        let batch = |number: u64| Batch { text: format!("m v={number}\n").into_bytes(), points: 1 };
+        let mut own = Spool::open(&first, 10_000).expect("a file").expect("free");
+        let mut left = Spool::open(&second, 10_000).expect("a file").expect("free");
+        own.put(&batch(1)).expect("room");
+        left.put(&batch(2)).expect("room");
+        adopt(&mut own, &second, 10_000).expect("it is left alone");
+        assert_eq!(own.points(), 1, "it is in use");
+        drop(left);
+        adopt(&mut own, &second, 10_000).expect("it is read");
+        assert_eq!(own.points(), 2);
+        let left = Spool::open(&second, 10_000).expect("a file").expect("free");
+        assert!(left.is_empty());
+    }
+
+    #[test]
+    fn each_database_has_its_own_file() {
+        let of = |url: &str, bucket: &str| {
+            name(&Target::new(url, Some("secret"), None, bucket).expect("an address"), 1)
+        };
+        assert_ne!(of("http://h:8086", "hums"), of("http://h:8086", "other"));
+        assert_ne!(of("http://h:8086", "hums"), of("http://i:8086", "hums"));
+        assert!(!of("http://h:8086", "hums").contains("secret"));
+    }
+}

@@ -1,0 +1,388 @@
+//! Points that wait for the database, in a file with a name: what a program that was ended, or killed, has left there is
+//! written by the next one.
+//!
+//! The file is a header and a ring of records. A position counts all bytes that were ever put into the ring; a byte of
+//! position `p` lies at `p` modulo the ring's size. The header has the position of the oldest record; how many follow
+//! shows when the file is opened, because a record has its own position and a checksum. An empty ring is cut off, so the
+//! file is as long as what waited at most at a time.
+//!
+//! ```text
+//! header  "HUMSPOOL"  version u32  0 u32  ring's size u64  position of the oldest u64
+//! record  length u32  points u32  position u64  CRC-32 u32  0 u32  lines
+//! ```
+//! Numbers are little-endian. Nothing is synced to the disk: a kill loses nothing, a PC that loses its power what its
+//! system had not written yet.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use crc::{CRC_32_ISCSI, Crc};
+
+use super::queue::Batch;
+
+const MAGIC: &[u8; 8] = b"HUMSPOOL";
+const VERSION: u32 = 1;
+const HEADER_BYTES: u64 = 32;
+const RECORD_BYTES: usize = 24;
+/// Of all records of all files that we write.
+const BATCH_BYTES_MAX: usize = 64 * 1024 * 1024;
+
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
+
+/// The file, which nobody else opens meanwhile.
+#[derive(Debug)]
+pub struct Spool {
+    file: File,
+    path: PathBuf,
+    /// The ring's size, and the one that it gets when it is empty.
+    size: u64,
+    limit: u64,
+    oldest: u64,
+    end: u64,
+    points: u64,
+    /// Batches that are no longer there.
+    removed: u64,
+}
+
+/// A record's head.
+#[derive(Clone, Copy, Debug)]
+struct Head {
+    length: usize,
+    points: u32,
+}
+
+impl Head {
+    const fn bytes(self) -> u64 {
+        (RECORD_BYTES + self.length) as u64
+    }
+}
+
+impl Spool {
+    /// Opens or makes the file, with room for `limit` bytes; `None` while another program has it.
+    pub fn open(path: &Path, limit: u64) -> Result<Option<Self>> {
+        let context = || format!("{}: cannot be used for points that wait", path.display());
+        let mut options = OpenOptions::new();
+        let file = options.read(true).write(true).create(true).truncate(false).open(path);
+        let file = file.with_context(context)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            Err(TryLockError::Error(error)) => return Err(error).with_context(context),
+        }
+        let path = path.to_owned();
+        let mut spool = Self { file, path, size: limit, limit, oldest: 0, end: 0, points: 0, removed: 0 };
+        spool.begin().with_context(context)?;
+        Ok(Some(spool))
+    }
+
+    /// Finds what an earlier program has left.
+    fn begin(&mut self) -> Result<()> {
+        let bytes = self.file.metadata()?.len();
+        if bytes == 0 {
+            return Ok(self.reset()?);
+        }
+        let mut header = [0; HEADER_BYTES as usize];
+        let read = self.file.seek(SeekFrom::Start(0)).and_then(|_| self.file.read_exact(&mut header));
+        if read.is_err() || !header.starts_with(MAGIC) {
+            bail!("it is another file; name one that is not there yet");
+        }
+        if u32_at(&header, 8) != VERSION {
+            bail!("it is of another version of this program");
+        }
+        (self.size, self.oldest) = (u64_at(&header, 16), u64_at(&header, 24));
+        self.end = self.oldest;
+        if self.size < RECORD_BYTES as u64 {
+            bail!("its header is damaged; remove it, or name another one");
+        }
+        // As far as records are sound: a kill may have cut off the last one.
+        while let Some((head, _)) = self.record(self.end)? {
+            self.end += head.bytes();
+            self.points += u64::from(head.points);
+        }
+        if self.is_empty() { Ok(self.reset()?) } else { Ok(()) }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether nothing waits in it.
+    pub const fn is_empty(&self) -> bool {
+        self.oldest == self.end
+    }
+
+    /// How many points wait in it.
+    pub const fn points(&self) -> u64 {
+        self.points
+    }
+
+    /// How many bytes wait in it.
+    pub const fn bytes(&self) -> u64 {
+        self.end - self.oldest
+    }
+
+    /// Whether a batch fits without the loss of an older one.
+    pub const fn has_room(&self, batch: &Batch) -> bool {
+        self.bytes() + (RECORD_BYTES + batch.text.len()) as u64 <= self.size
+    }
+
+    /// The number of the oldest batch, by which it is told from all others that were ever there.
+    pub const fn number(&self) -> u64 {
+        self.removed
+    }
+
+    /// Adds a batch; where it does not fit, the oldest ones go. How many points went.
+    pub fn put(&mut self, batch: &Batch) -> io::Result<u64> {
+        let head = Head {
+            length: batch.text.len(),
+            points: u32::try_from(batch.points).map_err(|_| io::ErrorKind::InvalidInput)?,
+        };
+        if head.bytes() > self.size || head.length > BATCH_BYTES_MAX {
+            return Err(io::Error::other("a batch is larger than the whole file may be"));
+        }
+        let mut lost = 0;
+        while self.bytes() + head.bytes() > self.size {
+            let before = self.points;
+            self.drop_oldest()?;
+            lost += before - self.points;
+        }
+        let mut bytes = Vec::with_capacity(head.bytes() as usize);
+        bytes.extend((head.length as u32).to_le_bytes());
+        bytes.extend(head.points.to_le_bytes());
+        bytes.extend(self.end.to_le_bytes());
+        bytes.extend(CRC.checksum(&batch.text).to_le_bytes());
+        bytes.extend([0; 4]);
+        bytes.extend(&batch.text);
+        self.write_ring(self.end, &bytes)?;
+        self.end += head.bytes();
+        self.points += batch.points;
+        Ok(lost)
+    }
+
+    /// The oldest batch.
+    pub fn oldest(&mut self) -> io::Result<Option<Batch>> {
+        if self.is_empty() {
+            return Ok(None);
+        }
+        match self.record(self.oldest)? {
+            Some((head, text)) => Ok(Some(Batch { text, points: u64::from(head.points) })),
+            None => Err(io::ErrorKind::InvalidData.into()),
+        }
+    }
+
+    /// The oldest batch is no longer needed.
+    pub fn drop_oldest(&mut self) -> io::Result<()> {
+        let Some(head) = self.head(self.oldest)? else { return Err(io::ErrorKind::InvalidData.into()) };
+        self.removed += 1;
+        self.oldest += head.bytes();
+        self.points = self.points.saturating_sub(u64::from(head.points));
+        if self.is_empty() { self.reset() } else { self.write_header() }
+    }
+
+    /// Forgets all of it, where it cannot be read; how many points are lost.
+    pub fn forget(&mut self) -> u64 {
+        let lost = std::mem::take(&mut self.points);
+        self.oldest = self.end;
+        self.removed += 1;
+        // What stays there does not follow a record any longer, and is written over.
+        let _ = self.reset();
+        lost
+    }
+
+    /// Empty: the disk gets its room back. In this order, so that a kill in between leaves an empty one too.
+    fn reset(&mut self) -> io::Result<()> {
+        self.file.set_len(HEADER_BYTES)?;
+        (self.size, self.oldest, self.end, self.points) = (self.limit, 0, 0, 0);
+        self.write_header()
+    }
+
+    fn write_header(&mut self) -> io::Result<()> {
+        let mut header = [0; HEADER_BYTES as usize];
+        header[..8].copy_from_slice(MAGIC);
+        header[8..12].copy_from_slice(&VERSION.to_le_bytes());
+        header[16..24].copy_from_slice(&self.size.to_le_bytes());
+        header[24..].copy_from_slice(&self.oldest.to_le_bytes());
+        self.file.seek(SeekFrom::Start(0))?;
+        self.file.write_all(&header)
+    }
+
+    /// The head of the record at a position, if one can be there.
+    fn head(&mut self, position: u64) -> io::Result<Option<Head>> {
+        let mut bytes = [0; RECORD_BYTES];
+        if !self.read_ring(position, &mut bytes)? || u64_at(&bytes, 8) != position {
+            return Ok(None);
+        }
+        let head = Head { length: u32_at(&bytes, 0) as usize, points: u32_at(&bytes, 4) };
+        let fits = head.length <= BATCH_BYTES_MAX && position - self.oldest + head.bytes() <= self.size;
+        Ok(Some(head).filter(|_| fits))
+    }
+
+    /// The record at a position, if a sound one is there.
+    fn record(&mut self, position: u64) -> io::Result<Option<(Head, Vec<u8>)>> {
+        let Some(head) = self.head(position)? else { return Ok(None) };
+        let mut bytes = vec![0; RECORD_BYTES + head.length];
+        if !self.read_ring(position, &mut bytes)? {
+            return Ok(None);
+        }
+        let text = bytes.split_off(RECORD_BYTES);
+        let sound = CRC.checksum(&text) == u32_at(&bytes, 16);
+        Ok(sound.then_some((head, text)))
+    }
+
+    /// Where a position lies, and how many bytes follow it in a row.
+    const fn place(&self, position: u64) -> (u64, u64) {
+        let at = position % self.size;
+        (HEADER_BYTES + at, self.size - at)
+    }
+
+    fn write_ring(&mut self, position: u64, bytes: &[u8]) -> io::Result<()> {
+        let (at, row) = self.place(position);
+        let (first, rest) = bytes.split_at(bytes.len().min(usize::try_from(row).unwrap_or(usize::MAX)));
+        self.file.seek(SeekFrom::Start(at))?;
+        self.file.write_all(first)?;
+        if !rest.is_empty() {
+            self.file.seek(SeekFrom::Start(HEADER_BYTES))?;
+            self.file.write_all(rest)?;
+        }
+        Ok(())
+    }
+
+    /// `false` where the file ends before.
+    fn read_ring(&mut self, position: u64, bytes: &mut [u8]) -> io::Result<bool> {
+        let (at, row) = self.place(position);
+        let first = bytes.len().min(usize::try_from(row).unwrap_or(usize::MAX));
+        let (first, rest) = bytes.split_at_mut(first);
+        for (at, part) in [(at, first), (HEADER_BYTES, rest)] {
+            self.file.seek(SeekFrom::Start(at))?;
+            match self.file.read_exact(part) {
+                Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
+                result => result?,
+            }
+        }
+        Ok(true)
+    }
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    bytes.get(at..at + 4).and_then(|word| word.first_chunk()).map_or(0, |word| u32::from_le_bytes(*word))
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    bytes.get(at..at + 8).and_then(|word| word.first_chunk()).map_or(0, |word| u64::from_le_bytes(*word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn batch(number: u64) -> Batch {
+        let lines = 20 + number as usize % 7;
+        Batch {
+            text: format!("m value={number} {number}\n").repeat(lines).into_bytes(),
+            points: lines as u64,
+        }
+    }
+
+    fn open(path: &Path, limit: u64) -> Spool {
+        Spool::open(path, limit).expect("a file").expect("nobody else has it")
+    }
+
+    fn drain(spool: &mut Spool) -> Vec<Batch> {
+        let mut taken = Vec::new();
+        while let Some(batch) = spool.oldest().expect("it reads") {
+            taken.push(batch);
+            spool.drop_oldest().expect("it is there");
+        }
+        taken
+    }
+
+    #[test]
+    fn what_waits_is_found_again_in_order_wherever_the_ring_begins() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("spool");
+        let mut spool = open(&path, 3_000);
+        let mut number = 0;
+        let mut expected = std::collections::VecDeque::new();
+        for round in 0..200 {
+            for _ in 0..round % 4 {
+                expected.push_back(batch(number));
+                let lost = spool.put(&batch(number)).expect("room");
+                number += 1;
+                let mut gone = 0;
+                while gone < lost {
+                    gone += expected.pop_front().expect("it was there").points;
+                }
+                assert_eq!(gone, lost, "whole batches, the oldest first");
+            }
+            if round % 3 == 0 && !spool.is_empty() {
+                assert_eq!(spool.oldest().expect("it reads"), expected.pop_front());
+                spool.drop_oldest().expect("it is there");
+            }
+            if round % 5 == 0 {
+                // As a kill leaves it.
+                drop(spool);
+                spool = open(&path, 3_000);
+            }
+            let points: u64 = expected.iter().map(|batch| batch.points).sum();
+            assert_eq!((spool.points(), spool.is_empty()), (points, expected.is_empty()), "round {round}");
+            assert!(path.metadata().expect("a file").len() <= 3_000 + HEADER_BYTES);
+        }
+        assert_eq!(drain(&mut spool), Vec::from(expected));
+        assert_eq!(path.metadata().expect("a file").len(), HEADER_BYTES, "the room is given back");
+    }
+
+    #[test]
+    fn a_record_that_was_cut_off_ends_it_and_those_before_are_there() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("spool");
+        let mut spool = open(&path, 100_000);
+        for number in 0..5 {
+            spool.put(&batch(number)).expect("room");
+        }
+        drop(spool);
+        let whole = std::fs::read(&path).expect("a file");
+        let last = RECORD_BYTES + batch(4).text.len();
+        for cut in [1, 30, last - RECORD_BYTES + 3, last - 1] {
+            std::fs::write(&path, &whole[..whole.len() - cut]).expect("room");
+            let mut spool = open(&path, 100_000);
+            assert_eq!(drain(&mut spool), (0..4).map(batch).collect::<Vec<_>>(), "{cut} bytes less");
+        }
+        let mut spoiled = whole.clone();
+        let at = whole.len() - 10;
+        spoiled[at] ^= 1;
+        std::fs::write(&path, spoiled).expect("room");
+        assert_eq!(drain(&mut open(&path, 100_000)).len(), 4);
+    }
+
+    #[test]
+    fn a_foreign_file_is_left_alone_and_one_in_use_is_not_shared() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("thesis.txt");
+        for text in ["months of work, and much longer than a header is", "short"] {
+            std::fs::write(&path, text).expect("room");
+            assert!(Spool::open(&path, 3_000).is_err());
+            assert_eq!(std::fs::read_to_string(&path).expect("a file"), text);
+        }
+        let path = dir.path().join("spool");
+        let first = open(&path, 3_000);
+        assert!(Spool::open(&path, 3_000).expect("a file").is_none());
+        drop(first);
+        open(&path, 3_000);
+    }
+
+    #[test]
+    fn another_limit_counts_once_it_is_empty() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("spool");
+        let mut spool = open(&path, 10_000);
+        (0..10).for_each(|number| assert_eq!(spool.put(&batch(number)).expect("room"), 0));
+        drop(spool);
+        let mut spool = open(&path, 1_000);
+        assert_eq!(drain(&mut spool).len(), 10);
+        spool.put(&batch(0)).expect("room");
+        assert!(spool.put(&batch(1)).expect("room") + spool.put(&batch(2)).expect("room") > 0);
+    }
+}

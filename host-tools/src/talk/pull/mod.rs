@@ -1,0 +1,204 @@
+//! `hums pull`: the board's logs over MAVLink FTP, burst by burst; what a burst lost is read piece by piece.
+//!
+//! A download that was interrupted is gone on with, once the board has confirmed that what is there is the beginning of
+//! its log; at the end the whole is compared, and read through as `hums verify` does. A file that is there already is
+//! left only if it is the same log.
+
+mod compare;
+mod ftp;
+
+use std::fs::File;
+use std::io::{self, Read as _, Write as _};
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail};
+
+use self::compare::{Likeness, compare};
+use self::ftp::Ftp;
+use super::Client;
+use crate::cli;
+use crate::files::{Inputs, Output, make_directory, settle};
+use crate::logs;
+use crate::outcome::Outcome;
+use crate::output::Stdout;
+use crate::summary::Overview;
+
+/// Bursts without an answer after which the board is taken for gone.
+const TRIES: usize = 10;
+
+/// Runs `hums pull`.
+pub fn run(args: &cli::Pull) -> Result<Outcome> {
+    make_directory(&args.output)?;
+    let mut ftp = Ftp::new(Client::connect(&args.at)?)?;
+    let mut logs = ftp.list()?;
+    logs.sort();
+    if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
+        let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
+        bail!("{missing}: the board has no such log; it has {}", names.join(", "));
+    }
+    logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
+    let newest = args.last.unwrap_or(logs.len()).min(logs.len());
+    let mut out = Stdout::new();
+    let mut outcome = Outcome::Done;
+    for (name, _) in logs.split_off(logs.len() - newest) {
+        let path = args.output.join(&name);
+        if !pull(&mut ftp, &name, &path).with_context(|| name.clone())? {
+            continue;
+        }
+        outcome = outcome.and(verify(&name, &path)?);
+        writeln!(out, "{}", path.display())?;
+        out.flush()?;
+    }
+    Ok(outcome)
+}
+
+/// Brings a log; `false` where it is there already.
+fn pull(ftp: &mut Ftp, name: &str, path: &Path) -> Result<bool> {
+    let length = ftp.open(name)?;
+    if length == 0 {
+        eprintln!("hums: {name}: nothing is recorded in it yet");
+        return Ok(false);
+    }
+    let there = there(ftp, name, path, length)?;
+    if there == There::Whole {
+        eprintln!("hums: {name}: is there already");
+        return Ok(false);
+    }
+    let (mut file, _) = Output::resume(path, &Inputs::none())?;
+    let mut have = begun(ftp, name, &mut file, length)?;
+    if let There::Beginning(bytes) = there
+        && have < bytes
+    {
+        file.begin_anew()?;
+        let mut shorter = File::open(path)?.take(u64::from(bytes));
+        settle(io::copy(&mut shorter, &mut file).map(|_| ()), path)?;
+        have = bytes;
+    }
+    if have > 0 {
+        eprintln!("hums: {name}: goes on after {have} bytes, which the board confirms");
+    }
+    fetch(ftp, name, &mut file, have, length)?;
+    if !is_whole(ftp, name, &mut file, length)? {
+        eprintln!("hums: {name}: what came differs from the board's log; once more from its beginning");
+        file.begin_anew()?;
+        fetch(ftp, name, &mut file, 0, length)?;
+        if !is_whole(ftp, name, &mut file, length)? {
+            bail!(
+                "what came differs from the board's log twice; does its card give the same bytes each time? {} has what came",
+                file.part().display()
+            );
+        }
+    }
+    file.finish()?;
+    Ok(true)
+}
+
+/// What is on this PC already under the log's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum There {
+    Nothing,
+    /// So many bytes of it: the log has grown since.
+    Beginning(u32),
+    /// All of it.
+    Whole,
+}
+
+fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
+    let Ok(about) = path.metadata() else { return Ok(There::Nothing) };
+    let bytes = u32::try_from(about.len()).unwrap_or(u32::MAX);
+    if bytes == 0 {
+        return Ok(There::Nothing);
+    }
+    match compare(ftp, name, path, bytes.min(length))? {
+        Likeness::Same if bytes < length => Ok(There::Beginning(bytes)),
+        Likeness::Same => Ok(There::Whole),
+        // Not proved: it comes once more, and takes the place of what is there when it is whole.
+        Likeness::SameEnds => Ok(There::Nothing),
+        Likeness::Other => bail!(
+            "{} is another log of the same name, of another card or another board; name another directory with -o",
+            path.display()
+        ),
+    }
+}
+
+/// How much of the log an earlier run has left that can be gone on with; what is of another log is thrown away.
+fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<u32> {
+    let part = file.part().to_owned();
+    let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
+    if bytes <= length && compare(ftp, name, &part, bytes)? != Likeness::Other {
+        return Ok(bytes);
+    }
+    eprintln!("hums: {name}: what was begun is of another log of this name; it begins anew");
+    file.begin_anew()?;
+    Ok(0)
+}
+
+/// Brings what is missing.
+fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, from: u32, length: u32) -> Result<()> {
+    let mut have = from;
+    let mut silent = 0;
+    while have < length {
+        let pieces = ftp.burst(have, length)?;
+        silent = if pieces.is_empty() { silent + 1 } else { 0 };
+        if silent >= TRIES {
+            bail!("nothing more comes after {have} of {length} bytes; to go on, call again");
+        }
+        let before = have;
+        let end = pieces.iter().map(|(at, data)| *at + data.len() as u32).max().unwrap_or(have);
+        while have < end {
+            let data = if let Some(data) = pieces.get(&have) {
+                data.clone()
+            } else {
+                // Up to the next piece that came.
+                let next = pieces.range(have..).next().map_or(end, |(at, _)| *at);
+                ftp.piece(have, next - have)?
+            };
+            let written = file.write_all(&data);
+            settle(written, file.path())?;
+            have += data.len() as u32;
+        }
+        // A kill loses no more than a burst.
+        let flushed = file.flush();
+        settle(flushed, file.path())?;
+        eprintln!("hums: {name}: {have} of {length} bytes");
+        if have == before && silent == 0 {
+            bail!("the board sends nothing new after {have} of {length} bytes");
+        }
+    }
+    Ok(())
+}
+
+/// Whether what came is the board's log.
+fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<bool> {
+    let flushed = file.flush();
+    settle(flushed, file.path())?;
+    let likeness = compare(ftp, name, file.part(), length)?;
+    if likeness == Likeness::SameEnds {
+        eprintln!(
+            "hums: {name}: the board's firmware computes no checksum: only its sectors' own checks say that it is whole"
+        );
+    }
+    Ok(likeness != Likeness::Other)
+}
+
+/// Reads a log through, and says what is wrong with it.
+fn verify(name: &str, path: &Path) -> Result<Outcome> {
+    let found = logs::find(&[path.to_owned()], false)?;
+    let mut outcome = Outcome::Done;
+    for log in &found.logs {
+        let overview = Overview::verified(log)?;
+        let blocks = overview.summary.blocks;
+        let wrong = [
+            (blocks.damaged, "damaged sectors"),
+            (blocks.stale, "sectors of another session"),
+            (blocks.foreign, "blocks that are no sectors"),
+            (u64::from(overview.summary.gaps), "gaps"),
+            (overview.contents.bad_frames, "frames that fail their checksum"),
+        ];
+        for (count, what) in wrong.into_iter().filter(|(count, _)| *count > 0) {
+            eprintln!("hums: {name}: {what}: {count}; `hums verify` says more");
+            outcome = Outcome::Losses;
+        }
+    }
+    Ok(outcome)
+}
