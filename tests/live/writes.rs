@@ -137,17 +137,20 @@ fn what_waits_outlives_a_kill_and_is_written_by_the_next_run() {
 
 #[test]
 fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refused() {
-    let mut database = Database::start(Kind::Influx);
-    let flight = |database: &mut Database| {
+    let database = Database::start(Kind::Influx);
+    let flight = |database: &Database| {
         let url = format!("http://127.0.0.1:{}", database.port);
         let recording = own("px4_hil_quad_low.tlog");
         let live = Live::start(&["--input", recording.to_str().unwrap(), "--influx", &url]);
         std::thread::sleep(Duration::from_secs(3));
         live.terminate(Duration::from_mins(1))
     };
-    // One field of ATTITUDE is text there from now on: each point of that message is refused, and no other.
-    database.write("ATTITUDE,vehicle=x,session=x roll=\"text\" 1");
-    let (code, words) = flight(&mut database);
+    let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
+    let frames = of_tlog(&data, &Manifest::own().seeds, false);
+    // One field of ATTITUDE is text there that week: each point of that message is refused, and no other.
+    let at_us = frames[0].time_us.expect("a tlog's frames have times");
+    database.write(&format!("ATTITUDE,vehicle=x,session=x roll=\"text\" {at_us}000"));
+    let (code, words) = flight(&database);
     assert_eq!(code, Some(3), "{words}");
     let count = |what: &str| -> u64 {
         let line =
@@ -155,8 +158,6 @@ fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refuse
         line.split_whitespace().next().unwrap().parse().unwrap()
     };
     let (written, refused) = (count("points written"), count("refused by the database"));
-    let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
-    let frames = of_tlog(&data, &Manifest::own().seeds, false);
     let attitudes = frames.iter().filter(|frame| frame.verified && frame.id == 30).count() as u64;
     assert_eq!(refused, attitudes, "{words}");
     let points: u64 = database.measurements().iter().map(|measurement| database.points(measurement)).sum();

@@ -154,13 +154,13 @@ fn finish(influx: Influx, spool: &Path) -> Outcome {
     let missing = figures.waiting + figures.lost + figures.rejected;
     eprintln!("{} points written", figures.written);
     if missing > 0 {
-        eprintln!("{missing} points are not in the database: {}", figures.trouble);
-        for (count, what) in
-            [(figures.rejected, "refused by the database"), (figures.lost, "lost for want of room")]
-        {
-            if count > 0 {
-                eprintln!("  {count} {what}");
-            }
+        let why = if figures.trouble.is_empty() { String::new() } else { format!(": {}", figures.trouble) };
+        eprintln!("{missing} points are not in the database{why}");
+        if figures.rejected > 0 {
+            eprintln!("  {} refused by the database: {}", figures.rejected, figures.refusal);
+        }
+        if figures.lost > 0 {
+            eprintln!("  {} lost for want of room", figures.lost);
         }
         if figures.stored > 0 {
             eprintln!(

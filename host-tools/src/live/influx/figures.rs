@@ -15,6 +15,8 @@ pub struct Figures {
     pub spilled_bytes: u64,
     /// The database refuses them for what they are.
     pub rejected: u64,
+    /// What it said of those last.
+    pub refusal: String,
     /// They made room in a full file, or neither it nor memory took them.
     pub lost: u64,
     /// What the database said last when it did not take a batch; empty while all is well.

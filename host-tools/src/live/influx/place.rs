@@ -73,9 +73,9 @@ fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
 
 fn name(target: &Target, number: usize) -> String {
     let hash = Sha256::digest(target.write.as_bytes());
-    let database: String = hash.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let database = hash.first_chunk().map_or(0, |first| u64::from_be_bytes(*first));
     let suffix = if number == 1 { String::new() } else { format!("-{number}") };
-    format!("influx-{database}{suffix}.spool")
+    format!("influx-{database:016x}{suffix}.spool")
 }
 
 #[cfg(test)]

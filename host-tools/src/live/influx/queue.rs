@@ -221,7 +221,10 @@ impl Inner {
         }
         self.figures.written += delivered.written;
         self.figures.rejected += delivered.refused;
-        // A word on what was refused stays until the next trouble, or until all is well.
+        if delivered.refused > 0 {
+            self.figures.refusal.clone_from(&delivered.why);
+        }
+        // On the page a word on what was refused stays until all is well.
         self.figures.trouble = delivered.why;
     }
 }
@@ -310,7 +313,15 @@ mod tests {
         queue.done(Delivered { written: 97, refused: 3, why: "field type conflict".to_owned() });
         let figures = queue.figures();
         assert_eq!((figures.written, figures.rejected, figures.waiting), (97, 3, 0));
-        assert_eq!(figures.trouble, "field type conflict");
+        assert_eq!(
+            (figures.trouble.as_str(), figures.refusal.as_str()),
+            ("field type conflict", "field type conflict")
+        );
+        queue.put(batch(2));
+        queue.take().expect("it waits");
+        queue.done(all());
+        let figures = queue.figures();
+        assert_eq!((figures.trouble.as_str(), figures.refusal.as_str()), ("", "field type conflict"));
     }
 
     #[test]

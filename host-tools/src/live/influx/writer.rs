@@ -83,12 +83,9 @@ fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) ->
     let mut requests = 0;
     while let Some((lines, points)) = parts.pop() {
         requests += 1;
-        let (why, dropped) = match deliver(lines)? {
-            Answer::Refused(why, dropped) => (why, dropped),
-            _ => {
-                delivered.written += points;
-                continue;
-            }
+        let Answer::Refused(why, dropped) = deliver(lines)? else {
+            delivered.written += points;
+            continue;
         };
         delivered.why = why;
         if let Some(dropped) = dropped {
@@ -117,7 +114,7 @@ fn halves(lines: &[u8]) -> Option<(&[u8], &[u8])> {
 }
 
 fn points_of(lines: &[u8]) -> u64 {
-    lines.iter().filter(|byte| **byte == b'\n').count() as u64
+    lines.split_inclusive(|byte| *byte == b'\n').count() as u64
 }
 
 fn write(agent: &Agent, target: &Target, lines: &[u8]) -> Answer {

@@ -192,7 +192,7 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
             (blocks.damaged, "damaged sectors"),
             (blocks.stale, "sectors of another session"),
             (blocks.foreign, "blocks that are no sectors"),
-            (u64::from(overview.summary.gaps), "gaps"),
+            (overview.summary.gaps, "gaps"),
             (overview.contents.bad_frames, "frames that fail their checksum"),
         ];
         for (count, what) in wrong.into_iter().filter(|(count, _)| *count > 0) {
