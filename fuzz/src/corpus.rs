@@ -3,7 +3,7 @@
 use hums_blackbox::SECTOR_BYTES;
 use hums_recorder::LogName;
 
-use crate::page;
+use crate::{dataflash, page};
 
 /// Each with its target and its name.
 pub fn inputs() -> Vec<(&'static str, &'static str, Vec<u8>)> {
@@ -17,6 +17,8 @@ pub fn inputs() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         ("card", "segments", segments()),
         ("card", "deep", deep()),
         ("card", "entries", vec![8, 0, 0, 255].into_iter().chain([0x41; 255]).collect()),
+        ("dataflash", "binary", with(0, &dataflash::log())),
+        ("dataflash", "text", with(1, &dataflash::text())),
         ("decoder", "log", with(200, &with(0, stream))),
         ("find", "log", with(0, &log)),
         ("find", "salvaged", with(3, &log)),

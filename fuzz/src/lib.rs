@@ -22,6 +22,7 @@
 
 pub mod card;
 pub mod corpus;
+pub mod dataflash;
 pub mod decoder;
 pub mod file;
 pub mod find;
@@ -48,6 +49,7 @@ pub struct Target {
 /// All of them.
 pub const TARGETS: &[Target] = &[
     Target { name: "card", bytes_max: 4_096, rounds: 1_000, check: card::check },
+    Target { name: "dataflash", bytes_max: 8_192, rounds: 500, check: dataflash::check },
     Target { name: "decoder", bytes_max: 8_192, rounds: 500, check: decoder::check },
     Target { name: "find", bytes_max: 16_384, rounds: 200, check: find::check },
     Target { name: "framer", bytes_max: 4_096, rounds: 1_000, check: framer::check },

@@ -4,6 +4,8 @@
 #[cfg(feature = "oracle")]
 mod damaged;
 #[cfg(feature = "oracle")]
+mod dataflash;
+#[cfg(feature = "oracle")]
 mod fleet;
 #[cfg(feature = "oracle")]
 mod readback;

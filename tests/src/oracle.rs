@@ -56,6 +56,11 @@ pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
     outcome("hums_log", &[PathBuf::from("--format"), PathBuf::from(format), log.to_owned()]).stdout
 }
 
+/// Every message of an autopilot's own log, a line of JSON each: see `tests/oracle/dataflash.py`.
+pub fn dataflash(log: &Path) -> String {
+    run("dataflash.py", &[log.to_owned()])
+}
+
 /// Runs a document's queries in a folder: see `tests/oracle/fleet.py`.
 pub fn fleet(document: &Path, folder: &Path) -> Value {
     json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))

@@ -1,9 +1,41 @@
-//! ArduPilot's onboard logs (DataFlash): binary `.bin` and text `.log`.
+//! `ArduPilot`'s onboard logs (`DataFlash`), binary (`.bin`) and text (`.log`), of 2012 until today.
+//!
+//! A log describes itself: FMT messages define the others, and FMTU, UNIT and MULT tell their units. [`format`] keeps the
+//! definitions, [`binary`] and [`text`] find the messages, [`message`] reads their values, [`clock`] their times, and
+//! [`observe`] makes of them what the same autopilot says by MAVLink. The reading streams: it keeps one buffer, the
+//! definitions (256 at most at a time) and what a vehicle's state needs, whatever the file says.
+//!
+//! The first part of a file is looked through before it is read: the units of a message may be told after its first
+//! rows, and what vehicle it is after its first observations.
 
-use anyhow::{Result, bail};
+mod binary;
+mod clock;
+mod format;
+mod message;
+mod observe;
+mod session;
+mod table;
+#[cfg(test)]
+mod tests;
+mod text;
 
+use std::collections::HashMap;
+
+use anyhow::{Context as _, Result, bail};
+
+use self::binary::{Binary, Damage, Piece};
+use self::format::{FMT_TYPE, HEADER_BYTES};
+use self::message::Body;
+use self::session::{First, Session};
+use self::text::{Line, Lines};
 use super::input::Input;
-use super::item::Reader;
+use super::item::{Cause, Reader, Summary, Take, Want};
+
+/// The first part of a file, which is looked through before it is read: a log of today writes its definitions and
+/// parameters, 100 KiB, within its first second, among up to 1 MiB of other messages.
+const FIRST_BYTES: usize = 2 * 1024 * 1024;
+/// A file of which nothing is known to be wrong is read; what cannot be told apart in so many bytes is none.
+const SEARCHED_BYTES: usize = 64 * 1024;
 
 /// How such a log is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +49,8 @@ pub enum Form {
 /// Whether these first bytes of a file (64 KiB of a longer one) are those of such a log.
 pub fn detect(start: &[u8]) -> Option<Form> {
     /// The header of a message that defines one: `FMT` is type 128 and 89 bytes long.
-    const FMT: &[u8] = &[0xa3, 0x95, 0x80];
+    const FMT: &[u8] = &[0xa3, 0x95, FMT_TYPE];
+    let start = start.get(..SEARCHED_BYTES).unwrap_or(start);
     let text =
         |start: &[u8]| start.starts_with(b"FMT,") || start.windows(5).any(|window| window == b"\nFMT,");
     if start.windows(FMT.len()).any(|window| window == FMT) {
@@ -28,6 +61,150 @@ pub fn detect(start: &[u8]) -> Option<Form> {
 }
 
 /// The reader of such a log.
-pub fn open(_input: Input, _form: Form) -> Result<Box<dyn Reader>> {
-    bail!("is a DataFlash log, which this version cannot read yet")
+pub fn open(input: Input, form: Form) -> Result<Box<dyn Reader>> {
+    Ok(Box::new(DataFlash { input: Some(input), form }))
+}
+
+struct DataFlash {
+    input: Option<Input>,
+    form: Form,
+}
+
+impl Reader for DataFlash {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+        let Some(input) = self.input.take() else { bail!("a recording is read once") };
+        match self.form {
+            Form::Binary => binary(input, want, take),
+            Form::Text => text(input, want, take),
+        }
+    }
+}
+
+/// Names of a text log at most: a file may define them for ever.
+const NAMES_MAX: usize = 4_096;
+const CONTEXT: &str = "the log cannot be read on";
+
+fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    let mut bytes = Binary::new(input);
+    let mut first = First::default();
+    let mut window = Binary::new(bytes.window(FIRST_BYTES).context(CONTEXT)?);
+    while let Some(piece) = window.next(first.lengths())? {
+        if let Piece::Message { kind, payload, .. } = piece {
+            first.learn(kind, Body::Bytes(payload));
+        }
+    }
+    let mut session = Session::new(first, want);
+    while let Some(piece) = bytes.next(session.lengths()).context(CONTEXT)? {
+        match piece {
+            Piece::Message { kind, payload, place } => {
+                let length = (HEADER_BYTES + payload.len()) as u64;
+                session.message(kind, Body::Bytes(payload), place, length, take)?;
+            }
+            Piece::Damage(Damage { place, bytes, at_end, words }) => {
+                let cause = if at_end { Cause::Cut } else { Cause::Damaged };
+                session.gap(cause, Some(place), bytes, words, take)?;
+            }
+        }
+    }
+    Ok(session.end())
+}
+
+fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    let mut lines = Lines::new(input);
+    let (mut first, mut kinds) = (First::default(), Kinds::default());
+    let mut window = Lines::new(lines.window(FIRST_BYTES).context(CONTEXT)?);
+    while let Some(line) = window.next()? {
+        if !kinds.begun {
+            first.banner(&line.words);
+        }
+        if let Ok(Some(kind)) = kinds.of(&line, first.formats()) {
+            first.learn(kind, Body::Words(&kinds.values(&line.words, kind, first.formats())));
+            kinds.learn(kind, first.formats());
+        }
+    }
+    let (mut session, mut kinds) = (Session::new(first, want), Kinds::default());
+    session.tell_banner(take)?;
+    let mut skipped: Option<Skipped> = None;
+    while let Some(line) = lines.next().context(CONTEXT)? {
+        let kind = match kinds.of(&line, session.formats()) {
+            Ok(Some(kind)) => kind,
+            Ok(None) => continue,
+            Err(words) => {
+                let skipped =
+                    skipped.get_or_insert(Skipped { place: line.place, bytes: 0, words, whole: true });
+                skipped.bytes += line.bytes;
+                skipped.whole = line.whole;
+                continue;
+            }
+        };
+        if let Some(Skipped { place, bytes, words, .. }) = skipped.take() {
+            session.gap(Cause::Damaged, Some(place), bytes, words, take)?;
+        }
+        let values = kinds.values(&line.words, kind, session.formats());
+        session.message(kind, Body::Words(&values), line.place, line.bytes, take)?;
+        kinds.learn(kind, session.formats());
+    }
+    if let Some(Skipped { place, bytes, words, whole }) = skipped {
+        let cause = if whole { Cause::Damaged } else { Cause::Cut };
+        session.gap(cause, Some(place), bytes, words, take)?;
+    }
+    Ok(session.end())
+}
+
+/// Lines that could not be read.
+struct Skipped {
+    place: u64,
+    bytes: u64,
+    words: String,
+    whole: bool,
+}
+
+/// The types of the names that lines begin with.
+#[derive(Default)]
+struct Kinds {
+    by_name: HashMap<String, u8>,
+    /// Definitions have begun: what stands before them is a banner.
+    begun: bool,
+}
+
+impl Kinds {
+    /// The type of a line; `None` for an empty one and for a banner, an error where it is none.
+    fn of(&mut self, line: &Line<'_>, formats: &format::Formats) -> Result<Option<u8>, String> {
+        let name = text::name(&line.words);
+        if name == "FMT" {
+            self.begun = true;
+            return Ok(Some(FMT_TYPE));
+        }
+        if !self.begun || line.words.trim().is_empty() {
+            return Ok(None);
+        }
+        // A type that has got another name since is another message.
+        let is_named = |kind: &&u8| formats.get(**kind).is_some_and(|format| format.name == name);
+        let Some(&kind) = self.by_name.get(name).filter(is_named) else {
+            let name: String = name.chars().take(20).collect();
+            return Err(format!("a line that begins with {name:?}, which no FMT has defined before it"));
+        };
+        let columns = formats.get(kind).map_or(0, |format| format.fields.len());
+        let found = line.words.matches(',').count();
+        if found < columns {
+            return Err(format!("a line of {name} with {found} of {columns} values"));
+        }
+        Ok(Some(kind))
+    }
+
+    /// The values of a line.
+    #[expect(clippy::unused_self, reason = "it belongs here")]
+    fn values<'a>(&self, line: &'a str, kind: u8, formats: &format::Formats) -> Vec<&'a str> {
+        text::values(line, formats.get(kind).map_or(0, |format| format.fields.len()))
+    }
+
+    /// After a definition: its name.
+    fn learn(&mut self, kind: u8, formats: &format::Formats) {
+        if kind == FMT_TYPE
+            && let Some(format) = formats.newest()
+            && self.by_name.len() < NAMES_MAX
+        {
+            self.by_name.insert(format.name.clone(), format.kind);
+        }
+    }
 }

@@ -1,0 +1,250 @@
+//! The bytes of a binary log as messages: two bytes of head, the type, and as many bytes as FMT said of it.
+//!
+//! A message counts where the next one's head, or the end, stands right behind it. Where it does not, bytes were lost
+//! or changed: when a chain of messages begins inside of what should be this message, the message is damaged and the
+//! reading goes on there; otherwise it is whole and what follows it is skipped up to the next chain. What was skipped
+//! is told once, with its place and its size, when a message stands there again.
+//!
+//! Memory: one buffer. Time: each byte is looked at a bounded number of times (a message has at most 255).
+
+use std::io::{self, Read};
+
+use super::format::{HEADER_BYTES, Lengths};
+
+const HEAD: [u8; 2] = [0xA3, 0x95];
+/// The longest message, and the head of the one after it.
+const LOOKAHEAD_BYTES: usize = 2 * 258;
+const CHUNK_BYTES: usize = 256 * 1024;
+
+/// What comes next.
+#[derive(Debug)]
+pub(super) enum Piece<'a> {
+    /// A message: its type, what stands after its header, and where in the file it begins.
+    Message {
+        /// Its type.
+        kind: u8,
+        /// What stands after the header.
+        payload: &'a [u8],
+        /// Where it begins.
+        place: u64,
+    },
+    /// Bytes that could not be read.
+    Damage(Damage),
+}
+
+/// Bytes that could not be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Damage {
+    /// Where they begin.
+    pub(super) place: u64,
+    /// How many.
+    pub(super) bytes: u64,
+    /// Whether the file ends with them.
+    pub(super) at_end: bool,
+    /// What they are.
+    pub(super) words: String,
+}
+
+/// Bytes that are being skipped.
+#[derive(Clone, Copy, Debug)]
+struct Skipped {
+    place: u64,
+    bytes: u64,
+    /// All of them are this one.
+    only: Option<u8>,
+    /// The type of a message that nothing defines, where one began it.
+    undefined: Option<u8>,
+    /// The type of a message that is shorter than it should be, where one began it.
+    cut: Option<u8>,
+}
+
+/// A reader of messages.
+pub(super) struct Binary<R> {
+    input: R,
+    buffer: Vec<u8>,
+    /// Where in the buffer the reading stands.
+    at: usize,
+    /// Where in the file the buffer begins.
+    base: u64,
+    ended: bool,
+    skipped: Option<Skipped>,
+}
+
+impl<R: Read> Binary<R> {
+    /// Reads from `input`.
+    pub(super) fn new(input: R) -> Self {
+        Self { input, buffer: Vec::new(), at: 0, base: 0, ended: false, skipped: None }
+    }
+
+    /// The first bytes, without reading on.
+    pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
+        self.fill(bytes)?;
+        Ok(&self.buffer)
+    }
+
+    /// How far the reading is, in bytes.
+    pub(super) fn place(&self) -> u64 {
+        self.base + self.at as u64
+    }
+
+    fn rest(&self) -> &[u8] {
+        self.buffer.get(self.at..).unwrap_or_default()
+    }
+
+    /// Sees to it that so many bytes are there, or all that there are.
+    fn fill(&mut self, wanted: usize) -> io::Result<()> {
+        if self.ended || self.rest().len() >= wanted {
+            return Ok(());
+        }
+        self.buffer.drain(..self.at);
+        self.base += self.at as u64;
+        self.at = 0;
+        while self.buffer.len() < wanted && !self.ended {
+            let old = self.buffer.len();
+            self.buffer.resize(old + CHUNK_BYTES, 0);
+            let got = crate::source::stream::read_some(
+                &mut self.input,
+                self.buffer.get_mut(old..).unwrap_or_default(),
+            );
+            self.buffer.truncate(old + *got.as_ref().unwrap_or(&0));
+            self.ended = got? == 0;
+        }
+        Ok(())
+    }
+
+    /// The next message, or what was skipped before it; `None` at the end. `lengths` learns which of two lengths of a
+    /// type is the right one.
+    pub(super) fn next(&mut self, lengths: &mut Lengths) -> io::Result<Option<Piece<'_>>> {
+        loop {
+            self.fill(LOOKAHEAD_BYTES)?;
+            let rest = self.rest();
+            if rest.is_empty() {
+                let end = self.skipped.take().map(|skipped| Piece::Damage(skipped.told(true)));
+                return Ok(end);
+            }
+            match look(rest, self.ended, lengths) {
+                Look::Message(length) => {
+                    if let Some(skipped) = self.skipped.take() {
+                        return Ok(Some(Piece::Damage(skipped.told(false))));
+                    }
+                    let (start, place) = (self.at, self.place());
+                    self.at += length;
+                    let bytes = self.buffer.get(start..self.at).unwrap_or_default();
+                    let kind = bytes.get(2).copied().unwrap_or_default();
+                    let payload = bytes.get(HEADER_BYTES..).unwrap_or_default();
+                    return Ok(Some(Piece::Message { kind, payload, place }));
+                }
+                Look::Skip { bytes, undefined, cut } => self.skip(bytes, undefined, cut),
+            }
+        }
+    }
+
+    fn skip(&mut self, bytes: usize, undefined: Option<u8>, cut: Option<u8>) {
+        let place = self.place();
+        let gone = self.buffer.get(self.at..self.at + bytes).unwrap_or_default();
+        let first = gone.first().copied();
+        let only = first.filter(|first| gone.iter().all(|byte| byte == first));
+        let new = Skipped { place, bytes: bytes as u64, only, undefined, cut };
+        self.skipped = Some(match self.skipped {
+            None => new,
+            Some(before) => Skipped {
+                bytes: before.bytes + bytes as u64,
+                only: only.filter(|_| only == before.only),
+                ..before
+            },
+        });
+        self.at += bytes;
+    }
+}
+
+impl Skipped {
+    fn told(self, at_end: bool) -> Damage {
+        let Self { place, bytes, only, undefined, cut } = self;
+        let words = match (only, undefined, cut) {
+            (Some(0), ..) if bytes > 1 => "nothing but zeros".to_owned(),
+            (Some(0xFF), ..) if bytes > 1 => "nothing but erased memory (0xFF)".to_owned(),
+            (_, Some(kind), _) => format!("a message of type {kind}, which no FMT has defined before it"),
+            (_, _, Some(kind)) => format!("a message of type {kind} that is not whole"),
+            _ => "no message begins here".to_owned(),
+        };
+        Damage { place, bytes, at_end, words }
+    }
+}
+
+enum Look {
+    /// A message of this length begins here.
+    Message(usize),
+    /// So many bytes are none.
+    Skip { bytes: usize, undefined: Option<u8>, cut: Option<u8> },
+}
+
+/// What begins here.
+fn look(rest: &[u8], ended: bool, lengths: &mut Lengths) -> Look {
+    let kind = match rest {
+        [a, b, kind, ..] if [*a, *b] == HEAD => *kind,
+        _ => {
+            return Look::Skip {
+                bytes: none(searched(rest, ended), rest, ended, lengths),
+                undefined: None,
+                cut: None,
+            };
+        }
+    };
+    let length = usize::from(lengths.told[usize::from(kind)]);
+    if length == 0 {
+        let bytes = none(searched(rest, ended), rest, ended, lengths);
+        return Look::Skip { bytes, undefined: Some(kind), cut: None };
+    }
+    if length <= rest.len() && followed(rest, length, ended) {
+        return Look::Message(length);
+    }
+    let other = usize::from(lengths.fields[usize::from(kind)]);
+    if other > HEADER_BYTES && other <= rest.len() && followed(rest, other, ended) {
+        // The columns were right and the length was not: from here on they count.
+        lengths.told[usize::from(kind)] = other as u8;
+        lengths.fields[usize::from(kind)] = 0;
+        return Look::Message(other);
+    }
+    let inside = none(rest.get(..length).unwrap_or(rest), rest, ended, lengths);
+    if length > rest.len() || inside < length {
+        return Look::Skip { bytes: inside, undefined: None, cut: Some(kind) };
+    }
+    Look::Message(length)
+}
+
+/// Whether a head, or the end, stands behind so many bytes.
+fn followed(rest: &[u8], length: usize, ended: bool) -> bool {
+    match rest.get(length..) {
+        Some([a, b, ..]) => [*a, *b] == HEAD,
+        Some([a]) => *a == HEAD[0],
+        Some([]) => ended,
+        None => false,
+    }
+}
+
+/// How far a search may go: where a message that begins before can be seen whole.
+fn searched(rest: &[u8], ended: bool) -> &[u8] {
+    let limit = if ended { rest.len() } else { rest.len().saturating_sub(LOOKAHEAD_BYTES / 2).max(1) };
+    rest.get(..limit).unwrap_or(rest)
+}
+
+/// How many bytes, at least one and at most those of `within`, begin no message that another one follows.
+fn none(within: &[u8], rest: &[u8], ended: bool, lengths: &Lengths) -> usize {
+    let mut at = 1;
+    while let Some(found) = within.get(at..).and_then(|rest| rest.iter().position(|byte| *byte == HEAD[0])) {
+        at += found;
+        if let Some([a, b, kind]) = rest.get(at..at + HEADER_BYTES)
+            && [*a, *b] == HEAD
+        {
+            let lengths = [lengths.told[usize::from(*kind)], lengths.fields[usize::from(*kind)]];
+            let begins = |length: u8| {
+                length > 0 && rest.get(at..).is_some_and(|rest| followed(rest, usize::from(length), ended))
+            };
+            if lengths.into_iter().any(begins) {
+                return at;
+            }
+        }
+        at += 1;
+    }
+    within.len()
+}

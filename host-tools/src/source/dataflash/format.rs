@@ -1,0 +1,482 @@
+//! What a message looks like: FMT defines a type's name, length, columns and their format characters; UNIT, MULT and
+//! FMTU say in which units its numbers are. `LogStructure.h` of `ArduPilot` is the description of both.
+
+use std::sync::Arc;
+
+use crate::source::item::Table;
+
+/// Bytes before a message's first field: two of head, one of type.
+pub(super) const HEADER_BYTES: usize = 3;
+/// The type of FMT itself, whose layout no file changes.
+pub(super) const FMT_TYPE: u8 = 128;
+/// Length of FMT with its header.
+pub(super) const FMT_BYTES: u8 = 89;
+/// Columns of one message at most: the format string has 16 characters.
+const FIELDS_MAX: usize = 16;
+
+/// How a field's bytes are to be read: one for each format character.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FieldKind {
+    /// `b`
+    I8,
+    /// `B`, `M` (a flight mode)
+    U8,
+    /// `h`
+    I16,
+    /// `H`
+    U16,
+    /// `i`
+    I32,
+    /// `I`
+    U32,
+    /// `q`
+    I64,
+    /// `Q`
+    U64,
+    /// `g`
+    Half,
+    /// `f`
+    Single,
+    /// `d`
+    Double,
+    /// `c`: hundredths
+    CentiI16,
+    /// `C`: hundredths
+    CentiU16,
+    /// `e`: hundredths
+    CentiI32,
+    /// `E`: hundredths
+    CentiU32,
+    /// `L`: 1e-7 degrees
+    Degrees,
+    /// `n`, `N`, `Z`: text of so many bytes, ended by a NUL where it is shorter
+    Text(u8),
+    /// `a`: 32 numbers of 16 bits
+    Array,
+}
+
+/// Numbers in an `a` field.
+pub(super) const ARRAY_LENGTH: usize = 32;
+
+impl FieldKind {
+    /// Of a format character.
+    fn of(character: u8) -> Option<Self> {
+        Some(match character {
+            b'b' => Self::I8,
+            b'B' | b'M' => Self::U8,
+            b'h' => Self::I16,
+            b'H' => Self::U16,
+            b'i' => Self::I32,
+            b'I' => Self::U32,
+            b'q' => Self::I64,
+            b'Q' => Self::U64,
+            b'g' => Self::Half,
+            b'f' => Self::Single,
+            b'd' => Self::Double,
+            b'c' => Self::CentiI16,
+            b'C' => Self::CentiU16,
+            b'e' => Self::CentiI32,
+            b'E' => Self::CentiU32,
+            b'L' => Self::Degrees,
+            b'n' => Self::Text(4),
+            b'N' => Self::Text(16),
+            b'Z' => Self::Text(64),
+            b'a' => Self::Array,
+            _ => return None,
+        })
+    }
+
+    /// Bytes that it takes.
+    pub(super) const fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 | Self::CentiI16 | Self::CentiU16 | Self::Half => 2,
+            Self::I32 | Self::U32 | Self::CentiI32 | Self::CentiU32 | Self::Degrees | Self::Single => 4,
+            Self::I64 | Self::U64 | Self::Double => 8,
+            Self::Text(bytes) => bytes as usize,
+            Self::Array => 2 * ARRAY_LENGTH,
+        }
+    }
+
+    /// Whether the format character itself scales the number, so that FMTU's multiplier is already in it.
+    const fn scales(self) -> bool {
+        matches!(self, Self::CentiI16 | Self::CentiU16 | Self::CentiI32 | Self::CentiU32 | Self::Degrees)
+    }
+
+    /// Whether it is a number of whole steps that the format character does not scale.
+    pub(super) const fn is_integer(self) -> bool {
+        matches!(
+            self,
+            Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::I32 | Self::U32 | Self::I64 | Self::U64
+        )
+    }
+}
+
+/// One column of a message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Field {
+    /// Its label.
+    pub(super) name: String,
+    /// How it is read.
+    pub(super) kind: FieldKind,
+    /// Where it stands after the header.
+    pub(super) offset: usize,
+}
+
+/// The definition of a message.
+#[derive(Clone, Debug)]
+pub(super) struct Format {
+    /// Its type: the third byte of a message.
+    pub(super) kind: u8,
+    /// Its name: `ATT`.
+    pub(super) name: String,
+    /// Its length with its header, as FMT says.
+    pub(super) length: u8,
+    /// Its columns.
+    pub(super) fields: Vec<Field>,
+    /// The length that the fields make, with the header, where that is another one.
+    pub(super) fields_length: Option<u8>,
+    /// What of it cannot be read, and why, until it was told.
+    odd: Option<String>,
+    /// Which column tells the time, and how.
+    pub(super) time: Option<TimeField>,
+    /// Its rows' table, once a row was made.
+    pub(super) table: Option<Arc<Table>>,
+    /// Whether it defines something.
+    pub(super) role: Role,
+}
+
+/// What a message is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// It defines a message.
+    Fmt,
+    /// It defines the units of a message.
+    Fmtu,
+    /// It defines a unit.
+    Unit,
+    /// It defines a multiplier.
+    Mult,
+    /// It defines nothing.
+    Other,
+}
+
+impl Role {
+    fn of(kind: u8, name: &str) -> Self {
+        match name {
+            _ if kind == FMT_TYPE => Self::Fmt,
+            "FMTU" => Self::Fmtu,
+            "UNIT" => Self::Unit,
+            "MULT" => Self::Mult,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// How a message tells its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TimeField {
+    /// Microseconds since power-on in this column: since 2015.
+    Micros(u8),
+    /// Milliseconds since power-on in this column: before.
+    Millis(u8),
+}
+
+impl Format {
+    /// FMT itself.
+    fn of_formats() -> Self {
+        let columns = "Type,Length,Name,Format,Columns";
+        Self::new(FMT_TYPE, FMT_BYTES, "FMT", b"BBnNZ", columns)
+    }
+
+    /// A definition.
+    pub(super) fn new(kind: u8, length: u8, name: &str, characters: &[u8], columns: &str) -> Self {
+        let (mut fields, mut offset, mut unknown) = (Vec::new(), 0, None);
+        let mut labels = columns.split(',').map(str::trim);
+        for &character in characters.iter().take(FIELDS_MAX).take_while(|character| **character != 0) {
+            let Some(kind) = FieldKind::of(character) else {
+                unknown = Some(char::from(character));
+                break;
+            };
+            let label = labels.next().unwrap_or_default();
+            let fits = HEADER_BYTES + offset + kind.size() <= usize::from(length);
+            if !label.is_empty() && (fits || length == 0) {
+                fields.push(Field { name: label.to_owned(), kind, offset });
+            }
+            offset += kind.size();
+        }
+        let fields_length = u8::try_from(HEADER_BYTES + offset).ok();
+        let fields_length = fields_length.filter(|fields| unknown.is_none() && *fields != length);
+        let time = time_field(name, &fields);
+        let role = Role::of(kind, name);
+        let odd = odd(name, length, unknown, fields_length);
+        let name = name.to_owned();
+        Self { kind, name, length, fields, fields_length, odd, time, table: None, role }
+    }
+
+    /// Whether the other one defines the same.
+    fn same(&self, other: &Self) -> bool {
+        self.name == other.name && self.length == other.length && self.fields == other.fields
+    }
+
+    /// The column of this label.
+    pub(super) fn field(&self, name: &str) -> Option<usize> {
+        self.fields.iter().position(|field| field.name == name)
+    }
+}
+
+/// In GPS messages of before 2015 `TimeMS` is the time of the week, and the time since power-on is `T`.
+fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
+    let at = |label: &str, kinds: &[FieldKind]| {
+        let found = fields.iter().position(|field| field.name == label && kinds.contains(&field.kind))?;
+        u8::try_from(found).ok()
+    };
+    let micros = [FieldKind::U64, FieldKind::I64];
+    let millis = [FieldKind::U32, FieldKind::I32];
+    if let Some(column) = at("TimeUS", &micros) {
+        return Some(TimeField::Micros(column));
+    }
+    if name.starts_with("GPS") { at("T", &millis) } else { at("TimeMS", &millis) }.map(TimeField::Millis)
+}
+
+/// What FMTU says of one type.
+#[derive(Clone, Debug, Default)]
+struct Units {
+    units: Vec<u8>,
+    multipliers: Vec<u8>,
+}
+
+/// Everything that a file has defined so far.
+pub(super) struct Formats {
+    by_kind: Vec<Option<Box<Format>>>,
+    /// Lengths with the header by type; 0 where there is no definition.
+    pub(super) lengths: Lengths,
+    units: Vec<Option<Units>>,
+    unit_names: Vec<Option<String>>,
+    multipliers: Vec<Option<f64>>,
+    /// Whether any message tells the time since power-on: the oldest logs have only that of the GPS receiver.
+    pub(super) has_boot_clock: bool,
+    /// The type that was defined last.
+    newest: Option<u8>,
+}
+
+/// Lengths of the types, as a scanner needs them.
+#[derive(Clone, Debug)]
+pub(super) struct Lengths {
+    /// As FMT says; 0 where there is no definition that can be followed.
+    pub(super) told: [u8; 256],
+    /// As the fields say, where that differs; 0 otherwise.
+    pub(super) fields: [u8; 256],
+}
+
+/// What became of a definition.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Defined {
+    /// It is new, or a change.
+    New,
+    /// It was known.
+    Known,
+    /// It is not followed.
+    Refused(String),
+}
+
+impl Formats {
+    /// Nothing is defined but FMT.
+    pub(super) fn new() -> Self {
+        let mut by_kind: Vec<Option<Box<Format>>> = Vec::new();
+        by_kind.resize_with(256, || None);
+        let mut lengths = Lengths { told: [0; 256], fields: [0; 256] };
+        lengths.told[usize::from(FMT_TYPE)] = FMT_BYTES;
+        by_kind[usize::from(FMT_TYPE)] = Some(Box::new(Format::of_formats()));
+        Self {
+            by_kind,
+            lengths,
+            units: vec![None; 256],
+            unit_names: vec![None; 256],
+            multipliers: vec![None; 256],
+            has_boot_clock: false,
+            newest: None,
+        }
+    }
+
+    /// The definition of a type.
+    pub(super) fn get(&self, kind: u8) -> Option<&Format> {
+        self.by_kind.get(usize::from(kind))?.as_deref()
+    }
+
+    /// What was defined last.
+    pub(super) fn newest(&self) -> Option<&Format> {
+        self.get(self.newest?)
+    }
+
+    /// For a file that is read again from its beginning: the units are known, the messages are not.
+    pub(super) fn begun_again(self) -> Self {
+        let Self { units, unit_names, multipliers, .. } = self;
+        Self { units, unit_names, multipliers, ..Self::new() }
+    }
+
+    /// Takes a definition. That of FMT itself stands.
+    pub(super) fn define(&mut self, format: Format) -> Defined {
+        let place = usize::from(format.kind);
+        if format.kind == FMT_TYPE {
+            let (told, name) = (format.length, &format.name);
+            let known = told == FMT_BYTES && name == "FMT";
+            return if known { Defined::Known } else { Defined::Refused(odd_fmt(name, told)) };
+        }
+        let Some(slot) = self.by_kind.get_mut(place) else { return Defined::Known };
+        if slot.as_ref().is_some_and(|known| known.same(&format)) {
+            return Defined::Known;
+        }
+        let follows = usize::from(format.length) > HEADER_BYTES;
+        self.lengths.told[place] = if follows { format.length } else { format.fields_length.unwrap_or(0) };
+        self.lengths.fields[place] = if follows { format.fields_length.unwrap_or(0) } else { 0 };
+        self.has_boot_clock |= format.time.is_some() && !format.name.starts_with("GPS");
+        self.newest = Some(format.kind);
+        *slot = Some(Box::new(format));
+        Defined::New
+    }
+
+    /// What is wrong with a definition, once.
+    pub(super) fn take_odd(&mut self, kind: u8) -> Option<String> {
+        self.by_kind.get_mut(usize::from(kind))?.as_deref_mut()?.odd.take()
+    }
+
+    /// Takes a unit: FMTU names it by this character.
+    pub(super) fn define_unit(&mut self, id: u8, name: &str) {
+        if let Some(slot) = self.unit_names.get_mut(usize::from(id)) {
+            *slot = Some(name.to_owned());
+        }
+    }
+
+    /// Takes a multiplier: FMTU names it by this character.
+    pub(super) fn define_multiplier(&mut self, id: u8, factor: f64) {
+        if let Some(slot) = self.multipliers.get_mut(usize::from(id)) {
+            *slot = Some(factor);
+        }
+    }
+
+    /// Takes a type's units and multipliers, a character a column.
+    pub(super) fn define_units(&mut self, kind: u8, units: &str, multipliers: &str) {
+        if let Some(slot) = self.units.get_mut(usize::from(kind)) {
+            *slot = Some(Units { units: units.into(), multipliers: multipliers.into() });
+        }
+    }
+
+    /// The unit of a column's values as they are read; empty where the file says nothing.
+    fn unit(&self, kind: u8, column: usize, field: FieldKind) -> String {
+        let known = || {
+            let units = self.units.get(usize::from(kind))?.as_ref()?;
+            let id = *units.units.get(column)?;
+            let name = self.unit_names.get(usize::from(id))?.as_deref()?;
+            let multiplier = units.multipliers.get(column).copied();
+            let factor = multiplier.and_then(|id| *self.multipliers.get(usize::from(id))?);
+            Some(unit_of(name, if field.scales() { None } else { factor }))
+        };
+        known().unwrap_or_default()
+    }
+
+    /// The units of a type's columns.
+    pub(super) fn units(&self, kind: u8) -> Vec<String> {
+        let fields = self.get(kind).map_or(&[][..], |format| &format.fields);
+        fields.iter().enumerate().map(|(column, field)| self.unit(kind, column, field.kind)).collect()
+    }
+
+    /// Remembers the table of a type's rows.
+    pub(super) fn set_table(&mut self, kind: u8, table: &Arc<Table>) {
+        if let Some(format) = self.by_kind.get_mut(usize::from(kind)).and_then(Option::as_deref_mut) {
+            format.table = Some(Arc::clone(table));
+        }
+    }
+}
+
+fn odd_fmt(name: &str, length: u8) -> String {
+    format!("a definition of FMT itself, with the name {name:?} and {length} bytes, which is not followed")
+}
+
+/// What of a message cannot be read. Columns that leave bytes of it over are no harm.
+fn odd(name: &str, length: u8, unknown: Option<char>, fields: Option<u8>) -> Option<String> {
+    if let Some(character) = unknown {
+        return Some(format!(
+            "{name} has the format character {character:?}, which is not known: its columns from there on are not read"
+        ));
+    }
+    let fields = fields.filter(|fields| *fields > length && usize::from(length) > HEADER_BYTES)?;
+    Some(format!(
+        "FMT says that {name} has {length} bytes, and its columns have {fields}: those that do not fit are not read"
+    ))
+}
+
+/// A unit's name with its multiplier as a prefix. `!` and `/` are what hours have been made of.
+fn unit_of(name: &str, factor: Option<f64>) -> String {
+    if matches!(name, "" | "UNKNOWN" | "instance") {
+        return String::new();
+    }
+    let Some(factor) = factor.filter(|factor| factor.is_finite() && *factor != 0.0) else {
+        return name.to_owned();
+    };
+    let is = |other: f64| (factor / other - 1.0).abs() < 1e-9;
+    let prefix = [(1.0, ""), (0.1, "d"), (0.01, "c"), (1e-3, "m"), (1e-6, "u"), (1e-9, "n")];
+    if let Some((_, prefix)) = prefix.iter().find(|(value, _)| is(*value)) {
+        return format!("{prefix}{name}");
+    }
+    match name {
+        "A.s" if is(3.6) => "mAh".to_owned(),
+        "A.s" if is(3_600.0) => "Ah".to_owned(),
+        _ => format!("{factor} {name}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_have_their_multipliers_as_prefixes() {
+        assert_eq!(unit_of("s", Some(1e-6)), "us");
+        assert_eq!(unit_of("A.s", Some(3.6)), "mAh");
+        assert_eq!(unit_of("m", Some(100.0)), "100 m");
+        assert_eq!(unit_of("deg", None), "deg");
+        assert_eq!(unit_of("instance", Some(1.0)), "");
+    }
+
+    #[test]
+    fn a_definition_that_repeats_changes_nothing_and_one_that_differs_replaces() {
+        let mut formats = Formats::new();
+        let att = |columns| Format::new(130, 13, "ATT", b"Qc", columns);
+        assert_eq!(formats.define(att("TimeUS,Roll")), Defined::New);
+        assert_eq!(formats.define(att("TimeUS,Roll")), Defined::Known);
+        assert_eq!(formats.define(att("TimeUS,Pitch")), Defined::New);
+        assert_eq!(formats.get(130).and_then(|format| format.field("Pitch")), Some(1));
+    }
+
+    #[test]
+    fn a_length_that_the_columns_do_not_make_is_odd_and_both_are_kept() {
+        let mut formats = Formats::new();
+        formats.define(Format::new(130, 12, "ATT", b"Qc", "TimeUS,Roll"));
+        let odd = formats.take_odd(130).expect("too short");
+        assert!(odd.contains("12 bytes") && odd.contains("13"), "{odd}");
+        assert_eq!((formats.lengths.told[130], formats.lengths.fields[130]), (12, 13));
+        assert_eq!(formats.take_odd(130), None, "once");
+        // Lengths that cannot hold a header are not followed.
+        formats.define(Format::new(131, 0, "IMU", b"Qf", "TimeUS,GyrX"));
+        assert_eq!((formats.lengths.told[131], formats.lengths.fields[131]), (15, 0));
+    }
+
+    #[test]
+    fn nobody_redefines_what_defines() {
+        let mut formats = Formats::new();
+        let odd = formats.define(Format::new(FMT_TYPE, 12, "FMT", b"Q", "TimeUS"));
+        assert!(matches!(odd, Defined::Refused(_)));
+        assert_eq!(formats.lengths.told[usize::from(FMT_TYPE)], FMT_BYTES);
+    }
+
+    #[test]
+    fn gps_time_of_the_week_is_not_the_time_since_power_on() {
+        let gps = Format::new(130, 0, "GPS", b"BIHI", "Status,TimeMS,Week,T");
+        assert_eq!(gps.time, Some(TimeField::Millis(3)));
+        let without = Format::new(130, 0, "GPS", b"BIH", "Status,TimeMS,Week");
+        assert_eq!(without.time, None);
+        let att = Format::new(130, 0, "ATT", b"Ic", "TimeMS,Roll");
+        assert_eq!(att.time, Some(TimeField::Millis(0)));
+    }
+}

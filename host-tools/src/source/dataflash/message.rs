@@ -1,0 +1,144 @@
+//! One message and its values: bytes of a binary log, words of a text log.
+
+use std::borrow::Cow;
+
+use hums_core::half;
+
+use super::format::{Field, FieldKind, Format};
+
+/// A message.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Message<'a> {
+    format: &'a Format,
+    body: Body<'a>,
+}
+
+/// What a message says.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Body<'a> {
+    /// What stands after the header.
+    Bytes(&'a [u8]),
+    /// What stands between the commas, as many as there are.
+    Words(&'a [&'a str]),
+}
+
+impl<'a> Message<'a> {
+    /// A message that says this.
+    pub(super) const fn new(format: &'a Format, body: Body<'a>) -> Self {
+        Self { format, body }
+    }
+
+    /// What it looks like.
+    pub(super) const fn format(&self) -> &'a Format {
+        self.format
+    }
+
+    fn field(&self, column: usize) -> Option<&'a Field> {
+        self.format.fields.get(column)
+    }
+
+    /// A number, scaled as its format character says; `None` for what is no finite number.
+    pub(super) fn number(&self, column: usize) -> Option<f64> {
+        let field = self.field(column)?;
+        let number = match self.body {
+            Body::Bytes(payload) => number(field.kind, payload.get(field.offset..)?)?,
+            Body::Words(words) => words.get(column)?.trim().parse().ok()?,
+        };
+        number.is_finite().then_some(number)
+    }
+
+    /// A number without a sign; `None` where it has one.
+    pub(super) fn unsigned(&self, column: usize) -> Option<u64> {
+        let field = self.field(column)?;
+        match self.body {
+            Body::Bytes(payload) => {
+                let bytes = payload.get(field.offset..)?;
+                match field.kind {
+                    FieldKind::U64 => Some(u64::from_le_bytes(*bytes.first_chunk()?)),
+                    FieldKind::I64 => u64::try_from(i64::from_le_bytes(*bytes.first_chunk()?)).ok(),
+                    _ => whole(self.number(column)?).and_then(|number| u64::try_from(number).ok()),
+                }
+            }
+            Body::Words(words) => {
+                let word = words.get(column)?.trim();
+                word.parse()
+                    .ok()
+                    .or_else(|| whole(word.parse().ok()?).and_then(|whole| whole.try_into().ok()))
+            }
+        }
+    }
+
+    /// A whole number.
+    pub(super) fn signed(&self, column: usize) -> Option<i64> {
+        let field = self.field(column)?;
+        match self.body {
+            Body::Bytes(payload) if field.kind == FieldKind::I64 => {
+                Some(i64::from_le_bytes(*payload.get(field.offset..)?.first_chunk()?))
+            }
+            Body::Bytes(_) => whole(self.number(column)?),
+            Body::Words(words) => {
+                let word = words.get(column)?.trim();
+                word.parse().ok().or_else(|| whole(word.parse().ok()?))
+            }
+        }
+    }
+
+    /// Words. What is no UTF-8 is read as ISO 8859-1, as `pymavlink` does.
+    pub(super) fn text(&self, column: usize) -> Option<Cow<'a, str>> {
+        let field = self.field(column)?;
+        match self.body {
+            Body::Bytes(payload) => {
+                let FieldKind::Text(size) = field.kind else { return None };
+                Some(words(payload.get(field.offset..)?.get(..usize::from(size))?))
+            }
+            Body::Words(words) => Some(Cow::Borrowed(words.get(column)?.trim())),
+        }
+    }
+
+    /// One number of an array.
+    pub(super) fn element(&self, column: usize, element: usize) -> Option<i16> {
+        let field = self.field(column)?;
+        match self.body {
+            Body::Bytes(payload) if field.kind == FieldKind::Array => {
+                let at = field.offset + 2 * element;
+                Some(i16::from_le_bytes(*payload.get(at..)?.first_chunk()?))
+            }
+            _ => None,
+        }
+    }
+}
+
+fn whole(number: f64) -> Option<i64> {
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    (number.abs() <= EXACT && number.fract() == 0.0).then_some(number as i64)
+}
+
+fn words(bytes: &[u8]) -> Cow<'_, str> {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    let bytes = bytes.get(..end).unwrap_or_default();
+    std::str::from_utf8(bytes)
+        .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect::<String>().into(), Cow::Borrowed)
+}
+
+/// Dividing is exact where multiplying by 0.01 is not.
+fn number(kind: FieldKind, bytes: &[u8]) -> Option<f64> {
+    Some(match kind {
+        FieldKind::I8 => f64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
+        FieldKind::U8 => f64::from(*bytes.first()?),
+        FieldKind::I16 => f64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
+        FieldKind::U16 => f64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
+        FieldKind::I32 => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
+        FieldKind::U32 => f64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
+        FieldKind::I64 => i64::from_le_bytes(*bytes.first_chunk()?) as f64,
+        FieldKind::U64 => u64::from_le_bytes(*bytes.first_chunk()?) as f64,
+        FieldKind::Half => f64::from(half::from_bits(u16::from_le_bytes(*bytes.first_chunk()?))),
+        FieldKind::Single => f64::from(f32::from_le_bytes(*bytes.first_chunk()?)),
+        FieldKind::Double => f64::from_le_bytes(*bytes.first_chunk()?),
+        FieldKind::CentiI16 => f64::from(i16::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
+        FieldKind::CentiU16 => f64::from(u16::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
+        FieldKind::CentiI32 => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
+        FieldKind::CentiU32 => f64::from(u32::from_le_bytes(*bytes.first_chunk()?)) / 100.0,
+        FieldKind::Degrees => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)) / 1e7,
+        FieldKind::Text(_) | FieldKind::Array => return None,
+    })
+}

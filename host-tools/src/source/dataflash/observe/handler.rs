@@ -1,0 +1,107 @@
+//! One message's way to what it says: which columns it has, and their values.
+
+use hums_core::time::Instant;
+
+use super::say::Out;
+use super::state::State;
+use crate::source::dataflash::format::{Field, FieldKind};
+use crate::source::dataflash::message::Message;
+
+/// Columns that one handler reads at most.
+const SLOTS_MAX: usize = 16;
+
+/// The column of each slot; `None` where the file does not have it.
+pub(in crate::source::dataflash) type Slots = [Option<u8>; SLOTS_MAX];
+
+/// What is to be done with a message.
+pub(in crate::source::dataflash) struct Handler {
+    /// The names of the message, each with the number of the sensor that it is of: `IMU2` is the second.
+    pub(super) names: &'static [(&'static str, u8)],
+    /// The columns: for each slot the labels that it has had.
+    pub(super) columns: &'static [&'static [&'static str]],
+    /// Whether it tells what the log is of: the first part of a file is looked through for these.
+    pub(in crate::source::dataflash) is_fact: bool,
+    /// Whether it is needed also where no observations are wanted.
+    pub(in crate::source::dataflash) is_said: bool,
+    /// Does it.
+    pub(super) take: fn(&mut State, &Given<'_>, &mut Out<'_>),
+}
+
+impl std::fmt::Debug for Handler {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", self.names)
+    }
+}
+
+impl Handler {
+    /// Which columns of a message are which slot.
+    pub(in crate::source::dataflash) fn resolve(&self, fields: &[Field]) -> Slots {
+        let mut slots = [None; SLOTS_MAX];
+        for (slot, labels) in slots.iter_mut().zip(self.columns) {
+            let known = |label: &&str| fields.iter().position(|field| field.name == *label);
+            *slot = labels.iter().find_map(known).and_then(|column| u8::try_from(column).ok());
+        }
+        slots
+    }
+}
+
+/// A message for its handler.
+pub(super) struct Given<'a> {
+    pub(super) message: &'a Message<'a>,
+    pub(super) slots: &'a Slots,
+    /// The sensor that the message's name tells.
+    pub(super) base: u8,
+    /// When it was written.
+    pub(super) at: Instant,
+    /// Microseconds since power-on, where the log tells them.
+    pub(super) boot_us: Option<u64>,
+}
+
+impl Given<'_> {
+    pub(super) fn column(&self, slot: usize) -> Option<usize> {
+        self.slots.get(slot).copied().flatten().map(usize::from)
+    }
+
+    /// A finite number.
+    pub(super) fn number(&self, slot: usize) -> Option<f64> {
+        self.message.number(self.column(slot)?)
+    }
+
+    /// A finite number in single precision.
+    pub(super) fn single(&self, slot: usize) -> Option<f32> {
+        self.number(slot).map(|number| number as f32).filter(|number| number.is_finite())
+    }
+
+    /// Numbers of slots that follow each other, all or none.
+    pub(super) fn singles<const N: usize>(&self, first: usize) -> Option<[f32; N]> {
+        let mut numbers = [0.0; N];
+        for (offset, number) in numbers.iter_mut().enumerate() {
+            *number = self.single(first + offset)?;
+        }
+        Some(numbers)
+    }
+
+    pub(super) fn unsigned(&self, slot: usize) -> Option<u64> {
+        self.message.unsigned(self.column(slot)?)
+    }
+
+    pub(super) fn byte(&self, slot: usize) -> Option<u8> {
+        self.unsigned(slot)?.try_into().ok()
+    }
+
+    pub(super) fn text(&self, slot: usize) -> Option<String> {
+        self.message.text(self.column(slot)?).map(std::borrow::Cow::into_owned)
+    }
+
+    /// Whether the column holds whole steps, which older versions used for hundredths and thousandths.
+    pub(super) fn is_integer(&self, slot: usize) -> bool {
+        let column = self.column(slot);
+        let kind = column.and_then(|column| self.message.format().fields.get(column)).map(|field| field.kind);
+        kind.is_some_and(FieldKind::is_integer)
+    }
+
+    /// The sensor: by the column where there is one, by the message's name otherwise.
+    pub(super) fn instance(&self, slot: usize) -> u8 {
+        self.byte(slot).unwrap_or(self.base)
+    }
+}

@@ -1,0 +1,100 @@
+//! From `ArduPilot`'s messages to observations in SI units: what the same autopilot would have said by MAVLink.
+//!
+//! Each message that says something has a [`Handler`]: its names, the columns that it reads (with the labels that they
+//! had in other versions), and one function. Which columns a file has is found out once, when FMT defines the message.
+//! Sources: `LogStructure.h` of `ArduPilot`'s libraries and vehicles for the messages, `GCS_Common.cpp` and
+//! `AP_NavEKF3_Outputs.cpp` for what MAVLink makes of the same figures.
+
+mod handler;
+mod motion;
+mod power;
+mod said;
+mod say;
+mod state;
+mod system;
+mod words;
+
+use hums_core::time::Instant;
+
+use self::handler::{Given, Handler, Slots};
+pub(super) use self::say::{Out, Say};
+pub(super) use self::state::State;
+pub(super) use self::words::Craft;
+use super::format::Format;
+use super::message::Message;
+
+/// The handler of a message of this name.
+fn handler(name: &str) -> Option<&'static Handler> {
+    let lists = [motion::HANDLERS, power::HANDLERS, system::HANDLERS, said::HANDLERS];
+    let named = |handler: &&Handler| handler.names.iter().any(|(known, _)| *known == name);
+    lists.into_iter().flatten().find(named)
+}
+
+/// A handler with the columns of the message that it is for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Resolved {
+    /// The handler.
+    pub(super) handler: &'static Handler,
+    slots: Slots,
+    base: u8,
+}
+
+/// The handlers of a file's messages, found once for each definition.
+#[derive(Debug)]
+pub(super) struct Handlers {
+    by_kind: Vec<Looked>,
+}
+
+/// What was found for a type.
+#[derive(Clone, Copy, Debug)]
+enum Looked {
+    /// Nothing was looked for since its definition.
+    NotYet,
+    /// It has none.
+    Nothing,
+    /// It has this one.
+    Found(Resolved),
+}
+
+impl Default for Handlers {
+    fn default() -> Self {
+        Self { by_kind: vec![Looked::NotYet; 256] }
+    }
+}
+
+impl Handlers {
+    /// The handler of a message.
+    pub(super) fn of(&mut self, format: &Format) -> Option<Resolved> {
+        let slot = self.by_kind.get_mut(usize::from(format.kind))?;
+        if matches!(slot, Looked::NotYet) {
+            *slot = handler(&format.name).map_or(Looked::Nothing, |handler| {
+                let base = handler.names.iter().find(|(known, _)| *known == format.name);
+                let base = base.map_or(0, |(_, base)| *base);
+                Looked::Found(Resolved { handler, slots: handler.resolve(&format.fields), base })
+            });
+        }
+        match slot {
+            Looked::Found(resolved) => Some(*resolved),
+            Looked::NotYet | Looked::Nothing => None,
+        }
+    }
+
+    /// A type is another one from here on.
+    pub(super) fn forget(&mut self, kind: u8) {
+        if let Some(slot) = self.by_kind.get_mut(usize::from(kind)) {
+            *slot = Looked::NotYet;
+        }
+    }
+}
+
+/// Gives a message to its handler.
+pub(super) fn take(
+    state: &mut State,
+    resolved: Resolved,
+    message: &Message<'_>,
+    (at, boot_us): (Instant, Option<u64>),
+    out: &mut Out<'_>,
+) {
+    let Resolved { handler, slots, base } = resolved;
+    (handler.take)(state, &Given { message, slots: &slots, base, at, boot_us }, out);
+}

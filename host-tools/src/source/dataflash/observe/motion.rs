@@ -1,0 +1,416 @@
+//! Where the vehicle is, how it moves and how well it knows.
+
+use hums_core::observation::{
+    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, Observation,
+    SystemTime, Vibration, VibrationScale,
+};
+use hums_core::time::Span;
+use hums_core::units::{
+    Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    RadiansPerSecond,
+};
+
+use super::handler::{Given, Handler};
+use super::say::{Out, Say};
+use super::state::State;
+use super::words::Craft;
+
+/// Bits of `MAV_SYS_STATUS_SENSOR`.
+const GYRO: u32 = 1;
+const ACCELEROMETER: u32 = 1 << 1;
+const MAGNETOMETER: u32 = 1 << 2;
+const PRESSURE: u32 = 1 << 3;
+
+/// A fix with a position: `GPS_FIX_TYPE_2D_FIX`.
+const FIX_2D: u8 = 2;
+/// `GPS_FIX_TYPE_3D_FIX`
+const FIX_3D: u8 = 3;
+/// What belongs together in one of MAVLink's messages was logged within this.
+const TOGETHER: Span = Span::from_secs(2);
+
+const MOTION: Handler =
+    Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
+
+pub(super) const HANDLERS: &[Handler] = &[
+    Handler { names: &[("ATT", 0)], columns: &[&["Roll"], &["Pitch"], &["Yaw"]], take: attitude, ..MOTION },
+    Handler {
+        names: &[("IMU", 0), ("IMU2", 1), ("IMU3", 2)],
+        columns: &[
+            &["I"],
+            &["GyrX"],
+            &["GyrY"],
+            &["GyrZ"],
+            &["AccX"],
+            &["AccY"],
+            &["AccZ"],
+            &["T", "Temp"],
+            &["GH", "GyHlt"],
+            &["AH", "AcHlt"],
+        ],
+        take: imu,
+        ..MOTION
+    },
+    Handler {
+        names: &[("GPS", 0), ("GPS2", 1), ("GPSB", 2)],
+        columns: &[
+            &["I"],
+            &["Status"],
+            &["NSats"],
+            &["HDop"],
+            &["Lat"],
+            &["Lng"],
+            &["Alt"],
+            &["Spd"],
+            &["GCrs"],
+            &["VZ"],
+            &["GWk", "Week"],
+            &["GMS", "TimeMS"],
+            &["RelAlt", "RAlt"],
+        ],
+        take: gnss,
+        ..MOTION
+    },
+    Handler {
+        names: &[("GPA", 0), ("GPA2", 1), ("GPAB", 2)],
+        columns: &[&["I"], &["HAcc"]],
+        take: accuracy,
+        ..MOTION
+    },
+    Handler {
+        names: &[("BARO", 0), ("BAR2", 1), ("BAR3", 2)],
+        columns: &[&["I"], &["Press"], &["Temp"], &["Health", "H"], &["CRt"], &["Alt"]],
+        take: air,
+        ..MOTION
+    },
+    Handler {
+        names: &[("MAG", 0), ("MAG2", 1), ("MAG3", 2)],
+        columns: &[&["I"], &["Health"]],
+        take: compass,
+        ..MOTION
+    },
+    Handler {
+        names: &[("POS", 0)],
+        columns: &[&["Lat"], &["Lng"], &["Alt"], &["RelHomeAlt", "RelAlt"]],
+        is_fact: true,
+        take: position,
+        ..MOTION
+    },
+    Handler {
+        names: &[("XKF1", 0), ("XKF6", 1), ("NKF1", 0), ("NKF6", 1), ("EKF1", 0)],
+        columns: &[&["C"], &["VN"], &["VE"], &["VD"], &["PN"], &["PE"], &["PD"]],
+        take: local,
+        ..MOTION
+    },
+    Handler {
+        names: &[("XKF4", 0), ("XKF9", 1), ("NKF4", 0), ("NKF9", 1), ("EKF4", 0)],
+        columns: &[&["C"], &["SV"], &["SP"], &["SH"], &["SM"], &["SS"], &["PI"]],
+        take: estimator,
+        ..MOTION
+    },
+    Handler {
+        names: &[("VIBE", 0)],
+        columns: &[
+            &["IMU"],
+            &["VibeX"],
+            &["VibeY"],
+            &["VibeZ"],
+            &["Clip"],
+            &["Clip0"],
+            &["Clip1"],
+            &["Clip2"],
+        ],
+        take: vibration,
+        ..MOTION
+    },
+    Handler {
+        names: &[("CTUN", 0), ("THR", 0)],
+        columns: &[&["ThO", "ThrOut"], &["CRt", "CRate"], &["As", "Aspd"]],
+        take: hud,
+        ..MOTION
+    },
+    Handler {
+        names: &[("ARSP", 0), ("ASP2", 1)],
+        columns: &[&["I"], &["Airspeed"]],
+        take: airspeed,
+        ..MOTION
+    },
+];
+
+fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let Some([roll, pitch, yaw]) = given.singles(0) else { return };
+    state.heading_deg.set(given.at, yaw.rem_euclid(360.0));
+    // 0 to 360 degrees in the log, -180 to 180 in ATTITUDE.
+    let yaw = (yaw + 180.0).rem_euclid(360.0) - 180.0;
+    let [roll, pitch, yaw] = [roll, pitch, yaw].map(|degrees| Radians(degrees.to_radians()));
+    out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, boot_ms: boot_ms(given) }));
+}
+
+fn boot_ms(given: &Given<'_>) -> Option<u32> {
+    // 32 bits, as in MAVLink: they end after 49.7 days.
+    given.boot_us.map(|us| (us / 1_000) as u32)
+}
+
+fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let instance = given.instance(0);
+    state.health(instance, GYRO, given.single(8));
+    state.health(instance, ACCELEROMETER, given.single(9));
+    let rate = given.singles(1).map(|rate: [f32; 3]| rate.map(RadiansPerSecond));
+    let acceleration = given.singles(4).map(|acceleration: [f32; 3]| acceleration.map(MetresPerSecond2));
+    if rate.is_none() && acceleration.is_none() {
+        return;
+    }
+    // A sensor without a thermometer says 0.
+    let temperature = given.single(7).filter(|celsius| *celsius != 0.0).map(Celsius);
+    out.observe(&Observation::Imu(Imu { instance, acceleration, rate, temperature }));
+}
+
+fn place(latitude_deg: f64, longitude_deg: f64) -> Option<Position> {
+    let valid = latitude_deg.abs() <= 90.0 && longitude_deg.abs() <= 180.0;
+    let somewhere = latitude_deg != 0.0 || longitude_deg != 0.0;
+    (valid && somewhere).then_some(Position { latitude_deg, longitude_deg })
+}
+
+fn gnss(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let Some(fix) = given.byte(1) else { return };
+    let instance = given.instance(0);
+    let has_position = fix >= FIX_2D;
+    let position = given.number(4).zip(given.number(5)).and_then(|(north, east)| place(north, east));
+    let accuracy =
+        state.accuracy.get(usize::from(instance)).and_then(|known| known.within(given.at, TOGETHER));
+    let speed = given.single(7);
+    let gnss = Gnss {
+        instance,
+        fix,
+        satellites: given.byte(2),
+        // 99.99 is what a receiver says that does not know.
+        hdop: given.single(3).filter(|hdop| *hdop > 0.0 && *hdop < 99.0),
+        accuracy,
+        position: position.filter(|_| has_position),
+        altitude: given.single(6).filter(|_| has_position).map(Metres),
+        speed: speed.map(MetresPerSecond),
+    };
+    out.observe(&Observation::Gnss(gnss));
+    if instance == 0 {
+        time(state, given, fix, out);
+        if let Some(speed) = speed {
+            state.ground_speed.set(given.at, speed);
+        }
+        if fix >= FIX_3D && !state.facts.has_positions {
+            position_of_gnss(state, given, &gnss, out);
+        }
+    }
+}
+
+/// UTC by the receiver's time of the week.
+fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
+    /// 1980-01-06 in seconds since 1970.
+    const GPS_EPOCH_S: u64 = 315_964_800;
+    const WEEK_S: u64 = 7 * 86_400;
+    /// A week before 2010 or after 2100 is not known, but made up.
+    const WEEKS: std::ops::Range<u64> = 1_564..6_260;
+    const SAID_EVERY: Span = Span::from_secs(1);
+    let (Some(week), Some(ms)) = (given.unsigned(10), given.unsigned(11)) else { return };
+    if fix < FIX_3D || !WEEKS.contains(&week) || ms > WEEK_S * 1_000 {
+        return;
+    }
+    // Leap seconds came at the ends of June 2012, June 2015 and December 2016 (IERS Bulletin C).
+    let leap_s = match week {
+        0..1_695 => 15,
+        1_695..1_851 => 16,
+        1_851..1_930 => 17,
+        _ => 18,
+    };
+    let utc_us = (GPS_EPOCH_S + week * WEEK_S - leap_s) * 1_000_000 + ms * 1_000;
+    if state.utc_said.is_some_and(|at| given.at.since(at) < SAID_EVERY) {
+        return;
+    }
+    state.utc_said = Some(given.at);
+    out.say(&Say::Utc(utc_us));
+    if let Some(boot_ms) = boot_ms(given) {
+        out.observe(&Observation::SystemTime(SystemTime { utc_micros: Some(utc_us), boot_ms }));
+    }
+}
+
+/// A log of before 2015 has no POS: the receiver's position, and the barometer's height.
+fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut Out<'_>) {
+    let Some(Metres(altitude)) = gnss.altitude else { return };
+    let first = *state.first_altitude.get_or_insert(altitude);
+    let height = state.baro_height.within(given.at, TOGETHER);
+    let relative = given.single(12).or(height).unwrap_or(altitude - first);
+    state.height(relative);
+    state.altitude.set(given.at, altitude);
+    out.observe(&Observation::GlobalPosition(GlobalPosition {
+        position: gnss.position,
+        altitude: Metres(altitude),
+        relative_altitude: Metres(relative),
+        velocity: velocity(state, given).map(MetresPerSecond),
+    }));
+    // The receiver's own course, where no estimator tells better.
+    if let Some([speed, course]) = given.singles(7) {
+        let (east, north) = course.to_radians().sin_cos();
+        let down = given.single(9).unwrap_or(0.0);
+        if state.velocity.within(given.at, TOGETHER).is_none() {
+            state.velocity.set(given.at, [speed * north, speed * east, down]);
+        }
+    }
+}
+
+fn velocity(state: &State, given: &Given<'_>) -> [f32; 3] {
+    state.velocity.within(given.at, TOGETHER).unwrap_or_default()
+}
+
+fn accuracy(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    /// 16 bits of centimetres that are full.
+    const FULL_M: f32 = 655.0;
+    let known = given.single(1).filter(|metres| *metres > 0.0 && *metres < FULL_M);
+    if let (Some(metres), Some(slot)) = (known, state.accuracy.get_mut(usize::from(given.instance(0)))) {
+        slot.set(given.at, Metres(metres));
+    }
+}
+
+fn air(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let instance = given.instance(0);
+    state.health(instance, PRESSURE, given.single(3));
+    if instance > 0 {
+        return;
+    }
+    if let Some(climb) = given.single(4) {
+        state.climb.set(given.at, climb);
+    }
+    if let Some(height) = given.single(5) {
+        state.baro_height.set(given.at, height);
+    }
+    let pressure =
+        given.single(1).filter(|pascals| *pascals > 0.0).map(|pascals| Hectopascals(pascals / 100.0));
+    let temperature = given.single(2).map(Celsius);
+    out.observe(&Observation::Air(Air { pressure, temperature }));
+}
+
+fn compass(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    // SYS_STATUS tells of the first one.
+    if given.instance(0) == 0 {
+        state.health(0, MAGNETOMETER, given.single(1));
+    }
+}
+
+fn position(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let (Some(altitude), Some(relative)) = (given.single(2), given.single(3)) else { return };
+    state.facts.has_positions = true;
+    state.height(relative);
+    state.altitude.set(given.at, altitude);
+    let position = given.number(0).zip(given.number(1)).and_then(|(north, east)| place(north, east));
+    out.observe(&Observation::GlobalPosition(GlobalPosition {
+        position,
+        altitude: Metres(altitude),
+        relative_altitude: Metres(relative),
+        velocity: velocity(state, given).map(MetresPerSecond),
+    }));
+}
+
+/// Whether the message is of the estimator that flies: EKF3's begin with an X, EKF2's with an N.
+fn is_flying(state: &State, given: &Given<'_>) -> bool {
+    let family = given.message.format().name.as_bytes().first();
+    !matches!((state.facts.estimator, family), (Some(2), Some(b'X')) | (Some(3), Some(b'N')))
+}
+
+fn local(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    if given.instance(0) != state.primary_core || !is_flying(state, given) {
+        return;
+    }
+    let Some([north, east, down]) = given.singles(1) else { return };
+    state.velocity.set(given.at, [north, east, down]);
+    if let Some(position) = given.singles(4) {
+        let position = position.map(Metres);
+        let velocity = [north, east, down].map(MetresPerSecond);
+        out.observe(&Observation::LocalPosition(LocalPosition { position, velocity }));
+    }
+}
+
+/// The figures are the same as in `EKF_STATUS_REPORT`, rounded to hundredths: roots of innovation test ratios, which
+/// `ArduPilot` calls variances. The lower ten bits of the filter's status are those of `EKF_STATUS_FLAGS`.
+fn estimator(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    const SAME_BITS: u64 = 0x3FF;
+    const STATUS_GPS_GLITCHING: u64 = 1 << 14;
+    const GPS_GLITCHING: u16 = 1 << 15;
+    if !is_flying(state, given) {
+        return;
+    }
+    if let Some(primary) = given.byte(6) {
+        state.primary_core = primary;
+    }
+    if given.instance(0) != state.primary_core {
+        return;
+    }
+    let status = given.unsigned(5);
+    let flags = status.map_or(0, |status| {
+        let glitching = if status & STATUS_GPS_GLITCHING == 0 { 0 } else { GPS_GLITCHING };
+        (status & SAME_BITS) as u16 | glitching
+    });
+    // Before the filter runs it says zeros, which are no variances.
+    let runs = status.is_none_or(|status| status & SAME_BITS != 0);
+    let known = |slot: usize| given.single(slot).filter(|value| *value >= 0.0 && runs);
+    out.observe(&Observation::Estimator(Estimator {
+        scale: EstimatorScale::Variance,
+        velocity: known(1),
+        position_horizontal: known(2),
+        position_vertical: known(3),
+        compass: known(4),
+        flags,
+    }));
+}
+
+/// Since 4.1 one message for each sensor; `VIBRATION` has the levels of the first and the clips of all.
+fn vibration(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let count = |slot: usize| given.unsigned(slot).and_then(|count| u32::try_from(count).ok());
+    let instance = usize::from(given.byte(0).unwrap_or(0));
+    if let (Some(clips), Some(slot)) = (count(4), state.clips.get_mut(instance)) {
+        *slot = clips;
+    }
+    for (slot, clips) in (5..8).zip(&mut state.clips) {
+        *clips = count(slot).unwrap_or(*clips);
+    }
+    if instance == 0 {
+        let levels = [1, 2, 3].map(|slot| given.single(slot).filter(|level| *level >= 0.0));
+        out.observe(&Observation::Vibration(Vibration {
+            scale: VibrationScale::PerAxis,
+            levels,
+            clips: state.clips,
+        }));
+    }
+}
+
+fn hud(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    // A copter's climb rate is in cm/s in CTUN; a plane's CTUN has none.
+    let climb = given.single(1).map(|climb| if given.is_integer(1) { climb / 100.0 } else { climb });
+    let throttle = given.single(0).map(|throttle| match state.facts.craft {
+        Craft::Plane | Craft::Rover => throttle / 100.0,
+        // A part of one since 3.4, thousandths before.
+        _ if given.is_integer(0) => throttle / 1_000.0,
+        _ => throttle,
+    });
+    if let Some(throttle) = throttle {
+        state.throttle(throttle);
+    }
+    let airspeed = state.airspeed.within(given.at, TOGETHER).or_else(|| given.single(2));
+    out.observe(&Observation::Hud(Hud {
+        airspeed: airspeed.map(MetresPerSecond),
+        groundspeed: ground_speed(state, given).map(MetresPerSecond),
+        heading_deg: state.heading_deg.within(given.at, TOGETHER),
+        throttle: throttle
+            .filter(|throttle| (-1.0..=1.0).contains(throttle))
+            .map(|part| Fraction(part.max(0.0))),
+        altitude: state.altitude.within(given.at, TOGETHER).map(Metres),
+        climb: climb.or_else(|| state.climb.within(given.at, TOGETHER)).map(MetresPerSecond),
+    }));
+}
+
+fn ground_speed(state: &State, given: &Given<'_>) -> Option<f32> {
+    let estimated = state.velocity.within(given.at, TOGETHER).map(|[north, east, _]| north.hypot(east));
+    estimated.or_else(|| state.ground_speed.within(given.at, TOGETHER))
+}
+
+fn airspeed(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    if let Some(airspeed) = given.single(1).filter(|_| given.instance(0) == 0) {
+        state.airspeed.set(given.at, airspeed);
+    }
+}

@@ -1,0 +1,183 @@
+//! What a log says in words and numbers of its own: parameters, texts, modes, events, errors, arming.
+
+use hums_core::observation::{AutopilotIdentity, LandedState, Observation};
+
+use super::handler::{Given, Handler};
+use super::say::{Out, Say};
+use super::state::State;
+use super::words::{self, Craft};
+
+/// `MAV_SEVERITY_INFO`: MSG does not tell how grave its words are.
+const INFO: u8 = 6;
+/// `MAV_SEVERITY_NOTICE`
+const NOTICE: u8 = 5;
+/// `MAV_SEVERITY_ERROR`
+const ERROR: u8 = 3;
+
+const SAID: Handler = Handler { names: &[], columns: &[], is_fact: false, is_said: true, take: |_, _, _| () };
+
+pub(super) const HANDLERS: &[Handler] = &[
+    Handler {
+        names: &[("PARM", 0)],
+        columns: &[&["Name"], &["Value"]],
+        is_fact: true,
+        take: parameter,
+        ..SAID
+    },
+    Handler { names: &[("MSG", 0)], columns: &[&["Message", "Msg"]], is_fact: true, take: message, ..SAID },
+    Handler {
+        names: &[("VER", 0)],
+        columns: &[&["FWS"], &["Maj"], &["Min"], &["Pat"], &["FWT"], &["BU"]],
+        is_fact: true,
+        take: version,
+        ..SAID
+    },
+    Handler { names: &[("MODE", 0)], columns: &[&["ModeNum"], &["Mode"]], take: mode, ..SAID },
+    Handler { names: &[("ARM", 0)], columns: &[&["ArmState"]], take: arm, ..SAID },
+    Handler { names: &[("EV", 0)], columns: &[&["Id"]], take: event, ..SAID },
+    Handler { names: &[("ERR", 0)], columns: &[&["Subsys"], &["ECode"]], take: error, ..SAID },
+    Handler { names: &[("DSF", 0)], columns: &[&["Dp"]], take: dropped, ..SAID },
+];
+
+fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let (Some(name), Some(value)) = (given.text(0), given.number(1)) else { return };
+    let facts = &mut state.facts;
+    let number = value.clamp(0.0, 255.0) as u8;
+    match name.as_str() {
+        "FRAME_CLASS" => facts.frame_class = Some(number),
+        "Q_ENABLE" => facts.quadplane = number > 0,
+        "Q_MAV_TYPE" => facts.quadplane_type = number,
+        "LOG_DISARMED" => facts.logs_disarmed = Some(value != 0.0),
+        "RSSI_TYPE" => facts.has_rssi = number > 0,
+        "AHRS_EKF_TYPE" => facts.estimator = Some(number),
+        _ => {
+            if let Some(battery) = capacity_of(&name)
+                && let Some(capacity) = facts.capacity_mah.get_mut(battery)
+            {
+                *capacity = Some(value as f32).filter(|capacity| *capacity > 0.0);
+            }
+        }
+    }
+    out.say(&Say::Parameter(&name, value));
+}
+
+/// The battery whose capacity a parameter is.
+fn capacity_of(name: &str) -> Option<usize> {
+    let number = name.strip_prefix("BATT")?.strip_suffix("_CAPACITY")?;
+    if number.is_empty() { Some(0) } else { number.parse::<usize>().ok()?.checked_sub(1) }
+}
+
+fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let Some(words) = given.text(0).filter(|words| !words.is_empty()) else { return };
+    if let Some(craft) = Craft::of_firmware(&words) {
+        firmware(state, craft, &words, out);
+        if let Some(version) = version_of(&words).filter(|_| state.facts.version == 0) {
+            identify(state, version, out);
+        }
+    } else if let Some(frame) = words.strip_prefix("Frame: ") {
+        out.say(&Say::Frame(frame));
+    } else {
+        match words.as_str() {
+            "Arming motors" | "ARMING MOTORS" | "Throttle armed" => state.arm(true),
+            "Disarming motors" | "DISARMING MOTORS" | "Throttle disarmed" => state.arm(false),
+            _ => {}
+        }
+    }
+    out.say(&Say::Text(INFO, &words));
+}
+
+fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
+    // VER tells helicopters apart; the name of the firmware does not.
+    if !(state.facts.craft == Craft::Heli && craft == Craft::Copter) {
+        state.facts.craft = craft;
+    }
+    out.say(&Say::Firmware(words));
+}
+
+/// `ArduCopter V4.6.3 (92b0cd78)` is 4.6.3; an official release where nothing follows the numbers.
+fn version_of(words: &str) -> Option<u32> {
+    /// `FIRMWARE_VERSION_TYPE_OFFICIAL`
+    const OFFICIAL: u32 = 255;
+    let (_, version) = words::name_and_version(words)?;
+    let number = version.split(' ').next()?;
+    let (numbers, official) =
+        match number.find(|character: char| !(character.is_ascii_digit() || character == '.')) {
+            Some(at) => (number.get(..at)?, 0),
+            None => (number, OFFICIAL),
+        };
+    let mut parts = numbers.split('.').map(|part| part.parse::<u8>().unwrap_or(0));
+    let mut next = || u32::from(parts.next().unwrap_or(0));
+    Some(next() << 24 | next() << 16 | next() << 8 | official)
+}
+
+fn identify(state: &mut State, firmware: u32, out: &mut Out<'_>) {
+    state.facts.version = firmware;
+    out.observe(&Observation::Identity(AutopilotIdentity { firmware, uid: 0 }));
+}
+
+fn version(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    if let Some(craft) = given.byte(5).and_then(Craft::of_build) {
+        state.facts.craft = craft;
+    }
+    if let Some(words) = given.text(0).filter(|words| !words.is_empty()) {
+        if let Some(craft) = Craft::of_firmware(&words) {
+            firmware(state, craft, &words, out);
+        } else {
+            out.say(&Say::Firmware(&words));
+        }
+    }
+    if let (Some(major), Some(minor), Some(patch)) = (given.byte(1), given.byte(2), given.byte(3)) {
+        let kind = given.byte(4).unwrap_or(0);
+        identify(state, u32::from_be_bytes([major, minor, patch, kind]), out);
+    }
+}
+
+fn mode(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let numbered = [0, 1].into_iter().find_map(|slot| given.unsigned(slot));
+    let named = || given.text(1).and_then(|name| state.facts.craft.mode_number(&name));
+    let Some(number) = numbered.and_then(|number| u32::try_from(number).ok()).or_else(named) else { return };
+    state.mode = number;
+    out.say(&Say::Mode(number));
+}
+
+fn arm(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    if let Some(armed) = given.unsigned(0) {
+        state.arm(armed != 0);
+    }
+}
+
+fn event(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let Some(number) = given.byte(0) else { return };
+    match number {
+        10 => state.arm(true),
+        11 => state.arm(false),
+        15 => state.armed = Some(true),
+        18 => state.landed = LandedState::OnGround,
+        28 => state.leave_ground(),
+        _ => {}
+    }
+    out.say(&Say::Event(number.into(), NOTICE, words::event(number)));
+}
+
+fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let (Some(subsystem), Some(code)) = (given.byte(0), given.byte(1)) else { return };
+    if words::is_failsafe(subsystem) {
+        let bit = 1 << subsystem;
+        state.failsafes = if code == 0 { state.failsafes & !bit } else { state.failsafes | bit };
+    }
+    let severity = if code == 0 { NOTICE } else { ERROR };
+    let number = u32::from(subsystem) << 8 | u32::from(code);
+    out.say(&Say::Event(number, severity, &words::error(subsystem, code)));
+}
+
+/// The autopilot counts the messages that its logger had no room for.
+fn dropped(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let Some(lost) = given.unsigned(0) else { return };
+    // What was lost before the first word of it is not known to be of this log.
+    if let Some(more) =
+        state.messages_lost.and_then(|before| lost.checked_sub(before)).filter(|more| *more > 0)
+    {
+        out.say(&Say::Lost(more));
+    }
+    state.messages_lost = Some(lost);
+}

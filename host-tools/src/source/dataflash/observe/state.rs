@@ -1,0 +1,291 @@
+//! What a log has told so far, as far as later messages need it: MAVLink's messages are put together of several of the
+//! log's, and some of them are told by nothing but events.
+
+use hums_core::observation::{
+    Autopilot, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus, VehicleKind,
+};
+use hums_core::time::{Instant, Span};
+use hums_core::units::{Amperes, Fraction, Metres, Volts};
+
+use super::say::Out;
+use super::words::Craft;
+
+/// How often the autopilot's state is said, which the log tells by its changes only: `HEARTBEAT` and `SYS_STATUS` come
+/// at 1 Hz or faster.
+const SAID_EVERY: Span = Span::from_millis(500);
+/// What is older than this is not repeated.
+const AGE: Span = Span::from_secs(12);
+/// Receivers, batteries and sensors that are put together.
+pub(super) const INSTANCES: usize = 4;
+
+/// A value and when it came.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dated<T>(Option<(Instant, T)>);
+
+impl<T> Default for Dated<T> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<T: Copy> Dated<T> {
+    /// Sets it.
+    pub(super) fn set(&mut self, at: Instant, value: T) {
+        self.0 = Some((at, value));
+    }
+
+    /// The value, while it is not older than `age`.
+    pub(super) fn within(&self, now: Instant, age: Span) -> Option<T> {
+        self.0.filter(|(at, _)| now.since(*at) <= age).map(|(_, value)| value)
+    }
+}
+
+/// What the log has told of the vehicle itself; the first part of a file is looked through for it, so that it is known
+/// from the first message on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::source::dataflash) struct Facts {
+    /// What kind of firmware.
+    pub(super) craft: Craft,
+    /// `FRAME_CLASS`
+    pub(super) frame_class: Option<u8>,
+    /// `Q_ENABLE` or `Q_AVAILABLE`: a plane that hovers.
+    pub(super) quadplane: bool,
+    /// `Q_MAV_TYPE`
+    pub(super) quadplane_type: u8,
+    /// `LOG_DISARMED`: whether it logs while disarmed.
+    pub(super) logs_disarmed: Option<bool>,
+    /// `RSSI_TYPE`: whether there is anything to measure.
+    pub(super) has_rssi: bool,
+    /// `BATTn_CAPACITY`, mAh.
+    pub(super) capacity_mah: [Option<f32>; INSTANCES],
+    /// `AHRS_EKF_TYPE`: 2 or 3.
+    pub(super) estimator: Option<u8>,
+    /// Version of the firmware, from the top byte down.
+    pub(super) version: u32,
+    /// POS is logged: the estimator's own position.
+    pub(super) has_positions: bool,
+}
+
+/// What a log has told so far.
+#[derive(Debug, Default)]
+pub(in crate::source::dataflash) struct State {
+    /// What the vehicle is.
+    pub(super) facts: Facts,
+    /// Motors may turn, once that was told.
+    pub(super) armed: Option<bool>,
+    pub(super) landed: LandedState,
+    pub(super) mode: u32,
+    /// Failsafes in force, a bit for each subsystem of ERR.
+    pub(super) failsafes: u64,
+    pub(super) load: Dated<f32>,
+    pub(super) voltage: Dated<f32>,
+    pub(super) current: Dated<f32>,
+    pub(super) remaining: Dated<f32>,
+    /// Sensors that say that they are not healthy: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
+    pub(super) unhealthy: [u32; INSTANCES],
+    /// Accuracy by receiver.
+    pub(super) accuracy: [Dated<Metres>; INSTANCES],
+    /// Velocity of the estimator, north, east, down.
+    pub(super) velocity: Dated<[f32; 3]>,
+    pub(super) primary_core: u8,
+    pub(super) altitude: Dated<f32>,
+    pub(super) baro_height: Dated<f32>,
+    pub(super) climb: Dated<f32>,
+    pub(super) airspeed: Dated<f32>,
+    pub(super) ground_speed: Dated<f32>,
+    pub(super) heading_deg: Dated<f32>,
+    /// Height of the first GPS fix, where nothing better tells the height above it.
+    pub(super) first_altitude: Option<f32>,
+    pub(super) clips: [u32; 3],
+    pub(super) cells: [Dated<[Option<Volts>; CELLS_MAX]>; INSTANCES],
+    pub(super) messages_lost: Option<u64>,
+    /// When UTC was said last.
+    pub(super) utc_said: Option<Instant>,
+    said_at: Option<Instant>,
+    said: Option<Heartbeat>,
+}
+
+impl State {
+    /// Of a vehicle of which this much is known.
+    pub(in crate::source::dataflash) fn new(facts: Facts) -> Self {
+        let mut state = Self { facts, ..Self::default() };
+        state.begin();
+        state
+    }
+
+    /// What is known of the vehicle.
+    pub(in crate::source::dataflash) fn facts(&self) -> Facts {
+        self.facts
+    }
+
+    /// What firmware wrote it.
+    pub(in crate::source::dataflash) fn craft(&self) -> Craft {
+        self.facts.craft
+    }
+
+    /// Whether these words name a firmware, which is then known.
+    pub(in crate::source::dataflash) fn is_firmware(&mut self, words: &str) -> bool {
+        let craft = Craft::of_firmware(words);
+        self.facts.craft = craft.unwrap_or(self.facts.craft);
+        craft.is_some()
+    }
+
+    /// Whether motors may turn, as far as is known.
+    pub(in crate::source::dataflash) fn is_armed(&self) -> bool {
+        self.armed == Some(true)
+    }
+
+    /// Another power-on: what was so before tells nothing, but the vehicle is the same.
+    pub(in crate::source::dataflash) fn restart(&mut self) {
+        *self = Self::new(self.facts);
+    }
+
+    /// A log that is only written while armed begins armed.
+    fn begin(&mut self) {
+        self.armed = self.facts.logs_disarmed.filter(|logs| !logs).map(|_| true);
+    }
+
+    /// The vehicle is armed or disarmed. A copter tells by an event when it leaves the ground, so it stands until then.
+    pub(super) fn arm(&mut self, armed: bool) {
+        let changes = self.armed != Some(armed);
+        self.armed = Some(armed);
+        if changes && self.facts.craft.tells_landing() && self.landed != LandedState::InAir {
+            self.landed = LandedState::OnGround;
+        }
+        if !armed {
+            // A battery's failsafe lasts until then.
+            self.failsafes = 0;
+        }
+    }
+
+    /// The event comes when the motors spool up for a take-off. In the modes that climb by themselves the autopilot then
+    /// says `MAV_LANDED_STATE_TAKEOFF`, as long as it climbs; the log does not tell when that ends.
+    pub(super) fn leave_ground(&mut self) {
+        const AUTO: u32 = 3;
+        const GUIDED: u32 = 4;
+        let climbs = matches!(self.mode, AUTO | GUIDED);
+        self.landed = if climbs { LandedState::TakingOff } else { LandedState::InAir };
+    }
+
+    /// Its height above home.
+    pub(super) fn height(&mut self, metres: f32) {
+        /// Well above where a take-off is told by the height.
+        const TAKEN_OFF_M: f32 = 3.0;
+        if self.landed == LandedState::TakingOff && metres > TAKEN_OFF_M {
+            self.landed = LandedState::InAir;
+        }
+    }
+
+    /// Motors turn: a log of before arming was told.
+    pub(super) fn throttle(&mut self, throttle: f32) {
+        if self.armed.is_none() && throttle > 0.0 && !self.facts.craft.tells_arming() {
+            self.armed = Some(true);
+        }
+    }
+
+    /// Says what the autopilot says again and again: its heartbeat, its status, whether it stands.
+    pub(in crate::source::dataflash) fn repeat(&mut self, now: Instant, out: &mut Out<'_>) {
+        let Some(heartbeat) = self.heartbeat() else { return };
+        let due = self.said_at.is_none_or(|at| now.since(at) >= SAID_EVERY);
+        if !due && self.said == Some(heartbeat) {
+            return;
+        }
+        self.said_at = Some(now);
+        self.said = Some(heartbeat);
+        out.observe(&Observation::Heartbeat(heartbeat));
+        if self.landed != LandedState::Unknown {
+            out.observe(&Observation::Landed(self.landed));
+        }
+        if let Some(status) = self.status(now) {
+            out.observe(&Observation::SystemStatus(status));
+        }
+    }
+
+    fn heartbeat(&self) -> Option<Heartbeat> {
+        /// `MAV_AUTOPILOT_ARDUPILOTMEGA`
+        const ARDUPILOT: u8 = 3;
+        const STANDBY: u8 = 3;
+        const ACTIVE: u8 = 4;
+        const CRITICAL: u8 = 5;
+        let (kind, type_number) = self.kind()?;
+        let armed = self.armed.unwrap_or(false);
+        let stands = self.landed == LandedState::OnGround || !armed;
+        let state = match (self.failsafes, stands) {
+            (1.., _) => CRITICAL,
+            (_, true) => STANDBY,
+            (_, false) => ACTIVE,
+        };
+        Some(Heartbeat {
+            autopilot: Autopilot::ArduPilot,
+            autopilot_number: ARDUPILOT,
+            kind,
+            type_number,
+            armed,
+            state,
+            mode: self.mode,
+        })
+    }
+
+    /// What flies, with its `MAV_TYPE`; `None` for what is no vehicle.
+    fn kind(&self) -> Option<(VehicleKind, u8)> {
+        let Facts { craft, frame_class, quadplane, quadplane_type, .. } = self.facts;
+        Some(match craft {
+            Craft::Unknown => (VehicleKind::Other, 0),
+            Craft::Copter => (VehicleKind::Rotorcraft, copter_type(frame_class.unwrap_or(1))),
+            Craft::Heli => (VehicleKind::Rotorcraft, 4),
+            Craft::Plane if quadplane && quadplane_type > 1 => (VehicleKind::Vtol, quadplane_type),
+            Craft::Plane => (if quadplane { VehicleKind::Vtol } else { VehicleKind::Plane }, 1),
+            Craft::Rover if frame_class == Some(2) => (VehicleKind::Surface, 11),
+            Craft::Rover => (VehicleKind::Surface, 10),
+            Craft::Sub => (VehicleKind::Surface, 12),
+            Craft::Blimp => (VehicleKind::Other, 7),
+            Craft::Tracker => return None,
+        })
+    }
+
+    fn status(&self, now: Instant) -> Option<SystemStatus> {
+        let load = self.load.within(now, AGE).map(Fraction);
+        let voltage = self.voltage.within(now, AGE).map(Volts);
+        let unhealthy = self.unhealthy.iter().fold(0, |all, bits| all | bits);
+        if load.is_none() && voltage.is_none() && unhealthy == 0 {
+            return None;
+        }
+        Some(SystemStatus {
+            load,
+            voltage,
+            current: self.current.within(now, AGE).map(Amperes),
+            remaining: self.remaining.within(now, AGE).map(Fraction),
+            unhealthy,
+        })
+    }
+
+    /// A sensor says whether it is healthy. `bit` is its bit in `MAV_SYS_STATUS_SENSOR`.
+    pub(super) fn health(&mut self, instance: u8, bit: u32, healthy: Option<f32>) {
+        if let (Some(bits), Some(healthy)) = (self.unhealthy.get_mut(usize::from(instance)), healthy) {
+            *bits = if healthy == 0.0 { *bits | bit } else { *bits & !bit };
+        }
+    }
+
+    /// A battery's cells that were told lately.
+    pub(super) fn cells_of(&self, now: Instant, id: u8) -> [Option<Volts>; CELLS_MAX] {
+        let known = self.cells.get(usize::from(id)).and_then(|cells| cells.within(now, Span::from_secs(3)));
+        known.unwrap_or(Battery::default().cells)
+    }
+}
+
+/// `MAV_TYPE` of a copter's `FRAME_CLASS` (`AP_Motors_Class.h`).
+const fn copter_type(frame_class: u8) -> u8 {
+    match frame_class {
+        // Hexa and Y6.
+        2 | 5 => 13,
+        3 | 4 => 14,
+        // The single, dual and quad helicopters.
+        6 | 11 | 13 => 4,
+        7 => 15,
+        // Single and coaxial copter.
+        8 | 9 => 3,
+        12 => 29,
+        14 => 35,
+        _ => 2,
+    }
+}

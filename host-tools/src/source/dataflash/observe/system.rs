@@ -1,0 +1,60 @@
+//! The autopilot's processor, its radios, and what a plane says of its state.
+
+use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};
+
+use super::handler::{Given, Handler};
+use super::say::Out;
+use super::state::State;
+
+const SYSTEM: Handler =
+    Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
+
+pub(super) const HANDLERS: &[Handler] = &[
+    Handler { names: &[("PM", 0)], columns: &[&["Load"]], take: performance, ..SYSTEM },
+    Handler {
+        names: &[("RAD", 0)],
+        columns: &[&["RSSI"], &["RemRSSI"], &["Noise"], &["RemNoise"], &["RxErrors"]],
+        take: radio,
+        ..SYSTEM
+    },
+    Handler { names: &[("RSSI", 0)], columns: &[&["RXRSSI"]], take: rc, ..SYSTEM },
+    Handler { names: &[("STAT", 0)], columns: &[&["isFlying"], &["Armed"]], take: status, ..SYSTEM },
+];
+
+/// Load in thousandths, as in `SYS_STATUS`.
+fn performance(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    if let Some(permille) = given.single(0).filter(|permille| (0.0..=1_000.0).contains(permille)) {
+        state.load.set(given.at, permille / 1e3);
+    }
+}
+
+fn radio(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let known = |slot: usize| given.byte(slot).filter(|value| *value != u8::MAX);
+    out.observe(&Observation::TelemetryRadio(TelemetryRadio {
+        rssi: known(0),
+        remote_rssi: known(1),
+        noise: known(2),
+        remote_noise: known(3),
+        errors: given.unsigned(4).and_then(|errors| errors.try_into().ok()).unwrap_or_default(),
+    }));
+}
+
+/// A part of one, which `RC_CHANNELS` has as 0 to 254. Without a sensor it is 0 for ever.
+fn rc(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    if !state.facts.has_rssi {
+        return;
+    }
+    let rssi =
+        given.single(0).filter(|part| (0.0..=1.0).contains(part)).map(|part| (part * 254.0).round() as u8);
+    out.observe(&Observation::RadioControl(RadioControl { rssi }));
+}
+
+/// A plane's own idea of flying.
+fn status(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    if let Some(armed) = given.unsigned(1) {
+        state.arm(armed != 0);
+    }
+    if let Some(flying) = given.unsigned(0) {
+        state.landed = if flying == 0 { LandedState::OnGround } else { LandedState::InAir };
+    }
+}

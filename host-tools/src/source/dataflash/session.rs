@@ -1,0 +1,449 @@
+//! One reading of a log, message by message: definitions are kept, times made, and what is wanted handed on.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use anyhow::Result;
+use hums_core::observation::Source;
+use hums_core::time::Instant;
+
+use super::clock::Clock;
+use super::format::{Defined, Format, Formats, Lengths, Role};
+use super::message::{Body, Message};
+use super::observe::{self, Craft, Handlers, Out, Say, State};
+use super::table::{self, Tables};
+use crate::source::item::{
+    About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
+    Text, Want,
+};
+
+/// The autopilot: every log is of one.
+const SOURCE: Source = Source { system: 1, component: 1 };
+/// UTC is said again where it differs by more than the receiver's delay.
+const EPOCH_DIFFERS_US: u64 = 1_500_000;
+
+/// The columns of a message have 64 characters at most in a binary log; a text log may have been made of several.
+const DEFINITION_CHARACTERS_MAX: usize = 256;
+
+/// What the first part of a file tells of all of it.
+pub(super) struct First {
+    formats: Formats,
+    state: State,
+    clock: Clock,
+    handlers: Handlers,
+    /// The first time that a message tells.
+    begins_us: Option<u64>,
+    /// The firmware, where a text log names it before its first message.
+    banner: Option<String>,
+}
+
+impl Default for First {
+    fn default() -> Self {
+        let (formats, state, clock) = (Formats::new(), State::default(), Clock::default());
+        Self { formats, state, clock, handlers: Handlers::default(), begins_us: None, banner: None }
+    }
+}
+
+impl First {
+    /// The definitions so far.
+    pub(super) fn formats(&self) -> &Formats {
+        &self.formats
+    }
+
+    /// The lengths so far, for a scanner.
+    pub(super) fn lengths(&mut self) -> &mut Lengths {
+        &mut self.formats.lengths
+    }
+
+    /// Takes a line that stands before the first message.
+    pub(super) fn banner(&mut self, words: &str) {
+        let words = words.trim();
+        if self.banner.is_none() && self.state.is_firmware(words) {
+            self.banner = Some(words.to_owned());
+        }
+    }
+
+    /// Takes a message.
+    pub(super) fn learn(&mut self, kind: u8, body: Body<'_>) {
+        if let Some((defined, _)) = defined_by(&self.formats, kind, body) {
+            self.handlers.forget(defined);
+        }
+        define(&mut self.formats, kind, body);
+        let Self { formats, state, clock, handlers, begins_us, .. } = self;
+        let Some(format) = formats.get(kind) else { return };
+        let message = Message::new(format, body);
+        if begins_us.is_none() {
+            let when = clock.at(&message, None);
+            *begins_us = when.boot_us.filter(|_| !when.doubted);
+        }
+        if let Some(resolved) = handlers.of(format).filter(|resolved| resolved.handler.is_fact) {
+            observe::take(state, resolved, &message, (Instant::ZERO, None), &mut Out::new(&mut |_| ()));
+        }
+    }
+}
+
+/// The type that a definition is of, and its name until now.
+fn defined_by(formats: &Formats, kind: u8, body: Body<'_>) -> Option<(u8, String)> {
+    let format = formats.get(kind).filter(|format| format.role == Role::Fmt)?;
+    let of = u8::try_from(Message::new(format, body).unsigned(0)?).ok()?;
+    Some((of, formats.get(of).map(|format| format.name.clone()).unwrap_or_default()))
+}
+
+/// Takes a definition, and tells what is odd with it.
+fn define(formats: &mut Formats, kind: u8, body: Body<'_>) -> Option<Defined> {
+    let format = formats.get(kind)?;
+    let message = Message::new(format, body);
+    let byte = |name: &str| {
+        let number = message.signed(format.field(name)?)?;
+        // A character: signed in the file.
+        u8::try_from(number).or_else(|_| i8::try_from(number).map(|number| number as u8)).ok()
+    };
+    let words = |name: &str| message.text(format.field(name)?).map(|words| shortened(&words));
+    match format.role {
+        Role::Other => None,
+        Role::Fmt => {
+            // An old FMT lacks the name of its last column.
+            let columns = words("Columns")
+                .or_else(|| message.text(4).map(|words| shortened(&words)))
+                .unwrap_or_default();
+            let (kind, length) = (byte("Type")?, byte("Length")?);
+            let (name, characters) = (words("Name")?, words("Format")?);
+            Some(formats.define(Format::new(kind, length, &name, characters.as_bytes(), &columns)))
+        }
+        Role::Unit => {
+            let (id, name) = (byte("Id")?, words("Label")?);
+            formats.define_unit(id, &name);
+            None
+        }
+        Role::Mult => {
+            let (id, factor) = (byte("Id")?, message.number(format.field("Mult")?)?);
+            formats.define_multiplier(id, factor);
+            None
+        }
+        Role::Fmtu => {
+            let (kind, units) = (byte("FmtType")?, words("UnitIds")?);
+            let multipliers = words("MultIds").unwrap_or_default();
+            formats.define_units(kind, &units, &multipliers);
+            None
+        }
+    }
+}
+
+/// No longer than in a binary log's definitions: a text log's lines may be of any length.
+fn shortened(words: &str) -> String {
+    words.chars().take(DEFINITION_CHARACTERS_MAX).collect()
+}
+
+/// One reading of a log.
+pub(super) struct Session<'w> {
+    want: Want<'w>,
+    formats: Formats,
+    state: State,
+    clock: Clock,
+    handlers: Handlers,
+    tables: Tables,
+    /// Of each type, whether anything is to be done with its messages; not yet known after a definition.
+    needed: Vec<Option<bool>>,
+    /// Messages and their bytes by type, those of a name that a type had before.
+    counts: Vec<(u64, u64)>,
+    counts_before: BTreeMap<String, (u64, u64)>,
+    epoch_us: Option<u64>,
+    firmware: String,
+    rows_refused: bool,
+}
+
+impl<'w> Session<'w> {
+    /// Begins, knowing this much.
+    pub(super) fn new(first: First, want: Want<'w>) -> Self {
+        let mut clock = Clock::default();
+        if let Some(begins_us) = first.begins_us {
+            clock.begin(begins_us);
+        }
+        Self {
+            want,
+            formats: first.formats.begun_again(),
+            state: State::new(first.state.facts()),
+            clock,
+            handlers: Handlers::default(),
+            tables: Tables::default(),
+            needed: vec![None; 256],
+            counts: vec![(0, 0); 256],
+            counts_before: BTreeMap::new(),
+            epoch_us: None,
+            firmware: first.banner.unwrap_or_default(),
+            rows_refused: false,
+        }
+    }
+
+    /// Hands on the firmware that is named before the first message.
+    pub(super) fn tell_banner(&mut self, take: &mut Take<'_>) -> Result<()> {
+        if self.firmware.is_empty() {
+            return Ok(());
+        }
+        take(self.clock.now(), Item::Fact(Fact { about: About::Firmware, words: &self.firmware }))
+    }
+
+    /// The definitions so far.
+    pub(super) fn formats(&self) -> &Formats {
+        &self.formats
+    }
+
+    /// The lengths so far, for a scanner.
+    pub(super) fn lengths(&mut self) -> &mut Lengths {
+        &mut self.formats.lengths
+    }
+
+    /// Takes a message.
+    pub(super) fn message(
+        &mut self,
+        kind: u8,
+        body: Body<'_>,
+        place: u64,
+        bytes: u64,
+        take: &mut Take<'_>,
+    ) -> Result<()> {
+        let index = usize::from(kind);
+        if let Some((count, all)) = self.counts.get_mut(index) {
+            *count += 1;
+            *all += bytes;
+        }
+        match self.needed.get(index).copied().flatten() {
+            Some(false) => return Ok(()),
+            Some(true) => {}
+            None => {
+                self.tell_odd(kind, place, take)?;
+                let needed = self.needs(kind);
+                if let Some(slot) = self.needed.get_mut(index) {
+                    *slot = Some(needed);
+                }
+                if !needed {
+                    return Ok(());
+                }
+            }
+        }
+        self.define(kind, body, place, take)?;
+        self.say(kind, body, take)?;
+        self.row(kind, body, take)
+    }
+
+    /// Whether anything is to be done with the messages of a type.
+    fn needs(&mut self, kind: u8) -> bool {
+        let Self { want, formats, handlers, .. } = self;
+        let Some(format) = formats.get(kind) else { return false };
+        let observed =
+            handlers.of(format).is_some_and(|resolved| want.observations || resolved.handler.is_said);
+        let rows = match want.rows {
+            Rows::None => false,
+            Rows::All => true,
+            // A name that changes its columns gets a number.
+            Rows::Named(names) => {
+                let mine = |name: &String| name.starts_with(&table::safe(&format.name));
+                names.iter().any(mine)
+            }
+        };
+        format.role != Role::Other || observed || rows
+    }
+
+    fn define(&mut self, kind: u8, body: Body<'_>, place: u64, take: &mut Take<'_>) -> Result<()> {
+        if self.formats.get(kind).is_none_or(|format| format.role == Role::Other) {
+            return Ok(());
+        }
+        let before = defined_by(&self.formats, kind, body);
+        let defined = define(&mut self.formats, kind, body);
+        if defined == Some(Defined::New)
+            && let Some((kind, name)) = before
+        {
+            self.forget(kind, name);
+        }
+        match defined {
+            Some(Defined::Refused(words)) => self.gap(Cause::Damaged, Some(place), 0, words, take),
+            _ => Ok(()),
+        }
+    }
+
+    /// What cannot be read of the messages of a type is told when the first of them comes: autopilots define messages
+    /// wrongly that they never write.
+    fn tell_odd(&mut self, kind: u8, place: u64, take: &mut Take<'_>) -> Result<()> {
+        match self.formats.take_odd(kind) {
+            Some(words) => self.gap(Cause::Damaged, Some(place), 0, words, take),
+            None => Ok(()),
+        }
+    }
+
+    /// A type is another one from here on.
+    fn forget(&mut self, kind: u8, name: String) {
+        if let Some(needed) = self.needed.get_mut(usize::from(kind)) {
+            *needed = None;
+        }
+        self.handlers.forget(kind);
+        let same = self.formats.get(kind).is_some_and(|format| format.name == name);
+        if let Some(count) = self.counts.get_mut(usize::from(kind)).filter(|_| !same) {
+            add(&mut self.counts_before, name, std::mem::take(count));
+        }
+    }
+
+    /// Hands on what a message says, and what the autopilot says again and again.
+    fn say(&mut self, kind: u8, body: Body<'_>, take: &mut Take<'_>) -> Result<()> {
+        let Self { want, formats, state, clock, handlers, epoch_us, firmware, .. } = self;
+        let Some(format) = formats.get(kind) else { return Ok(()) };
+        let message = Message::new(format, body);
+        let week = || message.unsigned(format.field("TimeMS").or_else(|| format.field("Time"))?);
+        let week = if formats.has_boot_clock || format.name != "GPS" { None } else { week() };
+        let when = clock.at(&message, week);
+        if when.restarted {
+            take(when.at, Item::Restart)?;
+            state.restart();
+            *epoch_us = None;
+        }
+        if let Some(from) = clock.silence() {
+            let (cause, words) = if state.is_armed() {
+                (Cause::Lost, "nothing was written, though the vehicle was armed")
+            } else {
+                (Cause::NotKept, "nothing was written")
+            };
+            let (from, to, words) = (Some(from), Some(when.at), words.to_owned());
+            take(when.at, Item::Gap(&Gap { from, to, cause, place: None, bytes: 0, words }))?;
+        }
+        let craft = state.craft();
+        let mut result = Ok(());
+        let mut said = Said { at: when.at, observations: want.observations, craft, epoch_us, firmware, take };
+        let mut hand = |say: &Say<'_>| {
+            if result.is_ok() {
+                result = said.hand(say);
+            }
+        };
+        let mut out = Out::new(&mut hand);
+        let is_timed = clock.has_begun();
+        if is_timed && want.observations {
+            state.repeat(when.at, &mut out);
+        }
+        if let Some(resolved) = handlers.of(format) {
+            // A message with a time that cannot be is likely damaged; its words are kept.
+            let is_said = resolved.handler.is_said;
+            if is_said || !when.doubted {
+                observe::take(state, resolved, &message, (when.at, when.boot_us), &mut out);
+            }
+            if is_timed && is_said && want.observations {
+                state.repeat(when.at, &mut out);
+            }
+        }
+        result
+    }
+
+    fn row(&mut self, kind: u8, body: Body<'_>, take: &mut Take<'_>) -> Result<()> {
+        if matches!(self.want.rows, Rows::None) {
+            return Ok(());
+        }
+        let Some(table) = self.table(kind) else { return self.refuse_rows(kind, take) };
+        if !self.want.rows.has(&table.name) {
+            return Ok(());
+        }
+        let Some(format) = self.formats.get(kind) else { return Ok(()) };
+        let at = self.clock.now();
+        table::with_values(&Message::new(format, body), |values| {
+            take(at, Item::Row(Row { table: &table, values }))
+        })
+    }
+
+    /// The table of a type's rows; `None` where the file has defined too many.
+    fn table(&mut self, kind: u8) -> Option<Arc<Table>> {
+        let format = self.formats.get(kind)?;
+        if let Some(table) = &format.table {
+            return Some(Arc::clone(table));
+        }
+        let table = self.tables.of(format, self.formats.units(kind))?;
+        self.formats.set_table(kind, &table);
+        Some(table)
+    }
+
+    /// Rows of a name that is defined anew again and again are told to be missing, once.
+    fn refuse_rows(&mut self, kind: u8, take: &mut Take<'_>) -> Result<()> {
+        if std::mem::replace(&mut self.rows_refused, true) {
+            return Ok(());
+        }
+        let name = self.formats.get(kind).map_or("", |format| &format.name);
+        let words = format!("{name} changes its columns again and again: its rows are not read from here on");
+        self.gap(Cause::Damaged, None, 0, words, take)
+    }
+
+    /// Something is missing.
+    pub(super) fn gap(
+        &mut self,
+        cause: Cause,
+        place: Option<u64>,
+        bytes: u64,
+        words: String,
+        take: &mut Take<'_>,
+    ) -> Result<()> {
+        let now = self.clock.now();
+        let from = Some(now).filter(|_| self.clock.has_begun());
+        take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words }))
+    }
+
+    /// What was read.
+    pub(super) fn end(mut self) -> Summary {
+        for (kind, count) in (0..=u8::MAX).zip(std::mem::take(&mut self.counts)) {
+            if let Some(format) = self.formats.get(kind).filter(|_| count.0 > 0) {
+                add(&mut self.counts_before, format.name.clone(), count);
+            }
+        }
+        let told = |(name, (count, bytes))| MessageCount { name, count, bytes };
+        Summary { messages: self.counts_before.into_iter().map(told).collect() }
+    }
+}
+
+/// Names of a file that are counted at most: a file may define names for ever.
+const NAMES_MAX: usize = 4_096;
+
+fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): (u64, u64)) {
+    if count == 0 || (counts.len() >= NAMES_MAX && !counts.contains_key(&name)) {
+        return;
+    }
+    let sum = counts.entry(name).or_default();
+    sum.0 += count;
+    sum.1 += bytes;
+}
+
+/// Hands on what handlers say, as items.
+struct Said<'a, 't> {
+    at: Instant,
+    observations: bool,
+    craft: Craft,
+    epoch_us: &'a mut Option<u64>,
+    firmware: &'a mut String,
+    take: &'a mut Take<'t>,
+}
+
+impl Said<'_, '_> {
+    fn hand(&mut self, say: &Say<'_>) -> Result<()> {
+        let item = match *say {
+            Say::Observation(observation) if self.observations => Item::Observation(SOURCE, observation),
+            Say::Observation(_) => return Ok(()),
+            Say::Parameter(name, value) => Item::Parameter(Parameter { name, value }),
+            Say::Text(severity, words) => Item::Text(Text { source: SOURCE, severity, words }),
+            Say::Mode(number) => Item::Mode(Mode { number, name: self.craft.mode_name(number) }),
+            Say::Event(number, severity, words) => Item::Event(Event { number, severity, words }),
+            Say::Frame(words) => Item::Fact(Fact { about: About::Frame, words }),
+            Say::Firmware(words) if words == self.firmware => return Ok(()),
+            Say::Firmware(words) => {
+                words.clone_into(self.firmware);
+                Item::Fact(Fact { about: About::Firmware, words })
+            }
+            Say::Utc(utc_us) => {
+                let epoch_us = utc_us.saturating_sub(self.at.as_micros());
+                if self.epoch_us.is_some_and(|known| known.abs_diff(epoch_us) < EPOCH_DIFFERS_US) {
+                    return Ok(());
+                }
+                *self.epoch_us = Some(epoch_us);
+                Item::Epoch(epoch_us)
+            }
+            Say::Lost(messages) => {
+                let words = format!("{messages} messages that the autopilot's logger had no room for");
+                let gap =
+                    Gap { from: Some(self.at), to: None, cause: Cause::Lost, place: None, bytes: 0, words };
+                return (self.take)(self.at, Item::Gap(&gap));
+            }
+        };
+        (self.take)(self.at, item)
+    }
+}

@@ -1,0 +1,140 @@
+//! The tables of rows: a name for each definition, and the same name for the same columns only.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::format::{ARRAY_LENGTH, FieldKind, Format};
+use super::message::Message;
+use crate::source::item::{Column, Kind, Table, Value};
+
+/// Tables of one name at most: a file that redefines a name for ever does not fill the memory.
+const VERSIONS_MAX: usize = 16;
+/// Names of tables at most: types have 256 numbers, and a definition may change.
+const TABLES_MAX: usize = 4_096;
+
+/// The tables made so far, by the name of their messages.
+#[derive(Debug, Default)]
+pub(super) struct Tables {
+    by_name: BTreeMap<String, Vec<Arc<Table>>>,
+    count: usize,
+}
+
+impl Tables {
+    /// The table of a definition whose columns have these units; `None` where there are too many already.
+    pub(super) fn of(&mut self, format: &Format, units: Vec<String>) -> Option<Arc<Table>> {
+        let name = safe(&format.name);
+        let columns = columns(format, units);
+        let versions = self.by_name.entry(name.clone()).or_default();
+        if let Some(table) = versions.iter().find(|table| table.columns == columns) {
+            return Some(Arc::clone(table));
+        }
+        let number = versions.len() + 1;
+        if number > VERSIONS_MAX || self.count >= TABLES_MAX {
+            return None;
+        }
+        let name = if number == 1 { name } else { format!("{name}_{number}") };
+        let table = Arc::new(Table { name, columns });
+        versions.push(Arc::clone(&table));
+        self.count += 1;
+        Some(table)
+    }
+}
+
+/// What is safe in a file's name.
+pub(super) fn safe(name: &str) -> String {
+    let safe = |character: char| {
+        let keeps = character.is_ascii_alphanumeric() || matches!(character, '_' | '-');
+        if keeps { character } else { '_' }
+    };
+    let name: String = name.chars().map(safe).collect();
+    if name.is_empty() { "_".to_owned() } else { name }
+}
+
+fn columns(format: &Format, units: Vec<String>) -> Vec<Column> {
+    let mut columns: Vec<Column> = Vec::new();
+    let mut push = |name: String, unit: String, kind: Kind| {
+        // A label that comes twice gets its number: a table's columns differ.
+        let twice = columns.iter().any(|column| column.name == name);
+        let name = if twice { format!("{name}_{}", columns.len() + 1) } else { name };
+        columns.push(Column { name, unit, kind });
+    };
+    for (field, unit) in format.fields.iter().zip(units) {
+        if field.kind == FieldKind::Array {
+            for element in 0..ARRAY_LENGTH {
+                push(format!("{}[{element}]", field.name), unit.clone(), Kind::Signed);
+            }
+        } else {
+            push(field.name.clone(), unit, kind(field.kind));
+        }
+    }
+    columns
+}
+
+const fn kind(field: FieldKind) -> Kind {
+    match field {
+        FieldKind::U8 | FieldKind::U16 | FieldKind::U32 | FieldKind::U64 => Kind::Unsigned,
+        FieldKind::I8 | FieldKind::I16 | FieldKind::I32 | FieldKind::I64 | FieldKind::Array => Kind::Signed,
+        FieldKind::Half | FieldKind::Single => Kind::Single,
+        FieldKind::Double
+        | FieldKind::CentiI16
+        | FieldKind::CentiU16
+        | FieldKind::CentiI32
+        | FieldKind::CentiU32
+        | FieldKind::Degrees => Kind::Double,
+        FieldKind::Text(_) => Kind::Text,
+    }
+}
+
+/// Makes the values of a row and hands them on. A number that is none (`ArduPilot` writes NaN for what it does not
+/// know) is unknown.
+pub(super) fn with_values<T>(message: &Message<'_>, take: impl FnOnce(&[Value<'_>]) -> T) -> T {
+    let fields = &message.format().fields;
+    let texts: Vec<_> = (0..fields.len())
+        .map(|column| match fields.get(column).map(|field| field.kind) {
+            Some(FieldKind::Text(_)) => message.text(column),
+            _ => None,
+        })
+        .collect();
+    let mut values = Vec::with_capacity(fields.len());
+    for (column, (field, text)) in fields.iter().zip(&texts).enumerate() {
+        if field.kind == FieldKind::Array {
+            values.extend((0..ARRAY_LENGTH).map(|element| {
+                message.element(column, element).map_or(Value::Unknown, |number| Value::Signed(number.into()))
+            }));
+            continue;
+        }
+        let value = match kind(field.kind) {
+            Kind::Text => text.as_deref().map(Value::Text),
+            Kind::Unsigned => message.unsigned(column).map(Value::Unsigned),
+            Kind::Signed => message.signed(column).map(Value::Signed),
+            Kind::Single => message.number(column).map(|number| Value::Single(number as f32)),
+            _ => message.number(column).map(Value::Double),
+        };
+        values.push(value.unwrap_or(Value::Unknown));
+    }
+    take(&values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_has_one_table_for_each_set_of_columns() {
+        let mut tables = Tables::default();
+        let format = |columns| Format::new(130, 0, "A/B", b"Qc", columns);
+        let units = || vec![String::new(); 2];
+        let first = tables.of(&format("TimeUS,Roll"), units()).expect("a table");
+        let second = tables.of(&format("TimeUS,Pitch"), units()).expect("a table");
+        let again = tables.of(&format("TimeUS,Roll"), units()).expect("a table");
+        assert_eq!((first.name.as_str(), second.name.as_str()), ("A_B", "A_B_2"));
+        assert!(Arc::ptr_eq(&first, &again));
+    }
+
+    #[test]
+    fn a_label_that_comes_twice_gets_a_number() {
+        let format = Format::new(130, 0, "X", b"BB", "A,A");
+        let table = Tables::default().of(&format, vec![String::new(); 2]).expect("a table");
+        assert_eq!(table.columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>(), ["A", "A_2"]);
+    }
+}

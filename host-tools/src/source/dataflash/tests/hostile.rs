@@ -1,0 +1,116 @@
+//! Bytes that nobody meant well: no panic, no memory, and time that never falls (which [`Seen`](super::Seen) asserts).
+
+use proptest::prelude::*;
+
+use super::writer::Writer;
+use super::{detect, read};
+
+/// A small log with something of everything.
+fn small() -> Vec<u8> {
+    let mut log = Writer::new();
+    log.format(160, "MSG", "QZ", "TimeUS,Message");
+    log.format(161, "GPS", "QBIHBcLLeffff", "TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw");
+    log.format(162, "PARM", "QNf", "TimeUS,Name,Value");
+    log.attitudes(1..3);
+    log.units(150, "sddd", "FBBB");
+    log.message(2.5, "ArduCopter V4.6.3 (92b0cd78)");
+    log.raw(162, &[&2_600_000_u64.to_le_bytes(), b"LOG_DISARMED\0\0\0\0", &0_f32.to_le_bytes()]);
+    log.raw(161, &[&[9; 50]]);
+    log.attitudes(3..6);
+    log.bytes
+}
+
+#[test]
+fn a_log_that_is_cut_anywhere_is_read_up_to_there() {
+    let whole = small();
+    for length in 0..whole.len() {
+        let part = whole.get(..length).unwrap_or_default();
+        let (seen, _) = read(part).expect("damage is no failure");
+        let damaged: u64 = seen.gaps.iter().map(|gap| gap.2).sum();
+        assert!(damaged < 258, "cut at {length}: {:?}", seen.gaps);
+    }
+}
+
+#[test]
+fn a_definition_of_every_length_is_survived() {
+    for length in 0..=u8::MAX {
+        for characters in ["", "Q", "QZZZZZZZ", "?", "QQQQQQQQQQQQQQQQ"] {
+            let mut log = Writer::new();
+            log.attitudes(0..1);
+            log.format_of(160, length, "ODD", characters, "TimeUS,A,B,C");
+            log.bytes.extend([0xA3, 0x95, 160].repeat(200));
+            log.attitudes(1..40);
+            let (seen, _) = read(&log.bytes).expect("damage is no failure");
+            let last = seen.rows.last().is_some_and(|row| row.starts_with("ATT 39000000"));
+            assert!(last, "{length} {characters}: {:?}", seen.gaps);
+        }
+    }
+}
+
+#[test]
+fn a_file_that_redefines_for_ever_takes_no_memory() {
+    let mut log = Writer::new();
+    for round in 0..20_000_u32 {
+        let columns = format!("TimeUS,A{round}");
+        log.format(160, "X", "QB", &columns);
+        log.raw(160, &[&u64::from(round).to_le_bytes(), &[1]]);
+    }
+    let want = super::Want { rows: super::Rows::All, ..super::Want::default() };
+    let mut names = std::collections::BTreeSet::new();
+    let mut rows = 0;
+    let summary = super::binary(&log.bytes[..], want, &mut |_, item| {
+        if let super::Item::Row(row) = item {
+            rows += 1;
+            names.insert(row.table.name.clone());
+        }
+        Ok(())
+    });
+    assert!(summary.is_ok() && rows > 20_000);
+    assert!(names.len() < 30, "{}", names.len());
+}
+
+#[test]
+fn bytes_that_look_like_heads_for_ever_take_no_time() {
+    let mut log = Writer::new();
+    log.attitudes(1..2);
+    log.bytes.extend([0xA3, 0x95, 150].repeat(400_000));
+    let started = std::time::Instant::now();
+    assert!(read(&log.bytes).is_ok());
+    assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn flipped_bits_are_survived(flips in prop::collection::vec((any::<prop::sample::Index>(), 0..8_u8), 1..40)) {
+        let mut log = small();
+        for (place, bit) in flips {
+            let length = log.len();
+            log[place.index(length)] ^= 1 << bit;
+        }
+        prop_assert!(read(&log).is_ok());
+    }
+
+    #[test]
+    fn spliced_and_random_bytes_are_survived(
+        noise in prop::collection::vec(any::<u8>(), 0..600),
+        at in any::<prop::sample::Index>(),
+    ) {
+        let mut log = small();
+        let tail = log.split_off(at.index(log.len()));
+        log.extend(noise);
+        log.extend(tail);
+        prop_assert!(read(&log).is_ok());
+    }
+
+    #[test]
+    fn text_of_any_kind_is_survived(lines in prop::collection::vec("[ -~é]{0,60}", 0..40)) {
+        let log = format!(
+            "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 150, 0, ATT, Qccc, TimeUS,Roll,Pitch,Yaw\n\
+             {}\nATT, {}", lines.join("\nATT, "), lines.concat()
+        );
+        detect(log.as_bytes());
+        prop_assert!(read(log.as_bytes()).is_ok());
+    }
+}

@@ -1,0 +1,370 @@
+//! Logs as they should be, as old autopilots wrote them, and as no autopilot would.
+
+mod equality;
+mod hostile;
+mod writer;
+
+use anyhow::Result;
+use hums_core::observation::{LandedState, Observation, VehicleKind};
+use hums_core::time::Instant;
+
+use self::writer::Writer;
+use super::*;
+use crate::source::item::{Item, Rows, Value};
+
+/// What a log gives, in a form that is easily compared.
+#[derive(Debug, Default)]
+struct Seen {
+    observations: Vec<(u64, Observation)>,
+    rows: Vec<String>,
+    said: Vec<String>,
+    gaps: Vec<(Cause, u64, u64, String)>,
+    restarts: usize,
+    tables: Vec<(String, Vec<(String, String)>)>,
+    last: Instant,
+}
+
+impl Seen {
+    fn take(&mut self, at: Instant, item: Item<'_>) {
+        assert!(at >= self.last, "time falls");
+        self.last = at;
+        match item {
+            Item::Observation(_, observation) => self.observations.push((at.as_millis(), *observation)),
+            Item::Row(row) => {
+                let columns = row.table.columns.iter();
+                let columns = columns.map(|column| (column.name.clone(), column.unit.clone())).collect();
+                let table = (row.table.name.clone(), columns);
+                if !self.tables.contains(&table) {
+                    self.tables.push(table);
+                }
+                let values = row.values.iter().map(|value| match value {
+                    Value::Unknown => "?".to_owned(),
+                    Value::Unsigned(value) => value.to_string(),
+                    Value::Signed(value) => value.to_string(),
+                    Value::Single(value) => value.to_string(),
+                    Value::Double(value) => value.to_string(),
+                    Value::Flag(value) => value.to_string(),
+                    Value::Text(value) => (*value).to_owned(),
+                });
+                assert_eq!(row.values.len(), row.table.columns.len());
+                self.rows.push(format!("{} {}", row.table.name, values.collect::<Vec<_>>().join(" ")));
+            }
+            Item::Gap(gap) => {
+                self.gaps.push((gap.cause, gap.place.unwrap_or(u64::MAX), gap.bytes, gap.words.clone()));
+            }
+            Item::Restart => self.restarts += 1,
+            Item::Parameter(parameter) => self.said.push(format!("{}={}", parameter.name, parameter.value)),
+            Item::Text(text) => self.said.push(text.words.to_owned()),
+            Item::Mode(mode) => self.said.push(mode.name.unwrap_or("?").to_owned()),
+            Item::Event(event) => self.said.push(event.words.to_owned()),
+            Item::Fact(fact) => self.said.push(format!("{:?}: {}", fact.about, fact.words)),
+            Item::Epoch(utc_us) => self.said.push(format!("epoch {utc_us}")),
+            Item::Frame(_) | Item::Record(_) => {}
+        }
+    }
+
+    /// Gaps that have a place in the file.
+    fn damage(&self) -> Vec<&(Cause, u64, u64, String)> {
+        self.gaps.iter().filter(|gap| gap.1 != u64::MAX).collect()
+    }
+
+    fn find<T>(&self, pick: impl Fn(&Observation) -> Option<T>) -> Vec<T> {
+        self.observations.iter().filter_map(|(_, observation)| pick(observation)).collect()
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<(Seen, Summary)> {
+    let form = detect(bytes).unwrap_or(Form::Binary);
+    let want = Want { observations: true, rows: Rows::All, ..Want::default() };
+    let mut seen = Seen::default();
+    let mut take = |at: Instant, item: Item<'_>| {
+        seen.take(at, item);
+        Ok(())
+    };
+    let summary = match form {
+        Form::Binary => binary(bytes, want, &mut take),
+        Form::Text => text(bytes, want, &mut take),
+    }?;
+    Ok((seen, summary))
+}
+
+fn seen(bytes: &[u8]) -> Seen {
+    read(bytes).expect("a log").0
+}
+
+#[test]
+fn every_format_character_is_read_with_its_scale() {
+    let mut log = Writer::new();
+    log.format(150, "ALL1", "bBhHiIfd", "b,B,h,H,i,I,f,d");
+    log.format(151, "ALL2", "nNcCeELMqQga", "n,N,c,C,e,E,L,M,q,Q,g,a");
+    log.raw(
+        150,
+        &[
+            &(-5_i8).to_le_bytes()[..],
+            &[250],
+            &(-300_i16).to_le_bytes(),
+            &60_000_u16.to_le_bytes(),
+            &(-70_000_i32).to_le_bytes(),
+            &4_000_000_000_u32.to_le_bytes(),
+            &1.5_f32.to_le_bytes(),
+            &(-2.25_f64).to_le_bytes(),
+        ],
+    );
+    let array: Vec<u8> = (0..32_i16).flat_map(|number| (number - 16).to_le_bytes()).collect();
+    log.raw(
+        151,
+        &[
+            b"ab\0\0",
+            b"sixteen letters!",
+            &(-1_234_i16).to_le_bytes(),
+            &65_535_u16.to_le_bytes(),
+            &(-123_456_i32).to_le_bytes(),
+            &4_294_967_295_u32.to_le_bytes(),
+            &(-353_632_610_i32).to_le_bytes(),
+            &[19],
+            &i64::MIN.to_le_bytes(),
+            &u64::MAX.to_le_bytes(),
+            &0xC100_u16.to_le_bytes(),
+            &array,
+        ],
+    );
+    let seen = seen(&log.bytes);
+    assert_eq!(seen.rows[3], "ALL1 -5 250 -300 60000 -70000 4000000000 1.5 -2.25");
+    let numbers: Vec<String> = (-16..16).map(|number: i16| number.to_string()).collect();
+    let expected = format!(
+        "ALL2 ab sixteen letters! -12.34 655.35 -1234.56 42949672.95 -35.363261 19 -9223372036854775808 \
+         18446744073709551615 -2.5 {}",
+        numbers.join(" ")
+    );
+    assert_eq!(seen.rows[4], expected);
+    assert_eq!(seen.gaps, []);
+}
+
+#[test]
+fn units_come_with_their_multipliers_though_they_are_told_after_the_first_rows() {
+    let mut log = Writer::new();
+    log.format(150, "BAT", "Qfc", "TimeUS,CurrTot,Temp");
+    log.raw(150, &[&1_000_000_u64.to_le_bytes(), &10_f32.to_le_bytes(), &2_500_i16.to_le_bytes()]);
+    log.units(150, "siO", "F!B");
+    let seen = seen(&log.bytes);
+    let columns = &seen.tables.iter().find(|(name, _)| name == "BAT").expect("rows").1;
+    let units: Vec<&str> = columns.iter().map(|(_, unit)| unit.as_str()).collect();
+    // The hundredths of the temperature are in its format character.
+    assert_eq!(units, ["us", "mAh", "degC"]);
+}
+
+#[test]
+fn a_definition_that_changes_gets_a_table_of_its_own() {
+    let mut log = Writer::new();
+    log.format(150, "X", "QB", "TimeUS,A");
+    log.raw(150, &[&1_u64.to_le_bytes(), &[1]]);
+    log.format(150, "X", "QH", "TimeUS,B");
+    log.raw(150, &[&2_u64.to_le_bytes(), &[2, 0]]);
+    let (seen, summary) = read(&log.bytes).expect("a log");
+    assert_eq!(seen.rows.iter().filter(|row| row.starts_with('X')).collect::<Vec<_>>(), ["X 1 1", "X_2 2 2"]);
+    let count = summary.messages.iter().find(|message| message.name == "X").expect("counted");
+    assert_eq!((count.count, count.bytes), (2, 12 + 13));
+}
+
+#[test]
+fn lost_bytes_cost_the_message_that_they_were_of_and_no_other() {
+    let mut log = Writer::new();
+    log.attitudes(0..3);
+    let start = log.bytes.len();
+    log.attitudes(3..4);
+    log.bytes.truncate(start + 9);
+    log.attitudes(4..6);
+    let (seen, _) = read(&log.bytes).expect("a log");
+    let rolls: Vec<&String> = seen.rows.iter().filter(|row| row.starts_with("ATT")).collect();
+    assert_eq!(rolls.len(), 5, "{rolls:?}");
+    let words = "a message of type 150 that is not whole".to_owned();
+    assert_eq!(seen.damage(), [&(Cause::Damaged, start as u64, 9, words)]);
+}
+
+#[test]
+fn changed_bytes_between_messages_are_told_with_their_place() {
+    let mut log = Writer::new();
+    log.attitudes(0..2);
+    let start = log.bytes.len();
+    log.bytes.extend([7; 40]);
+    log.attitudes(2..4);
+    let seen = seen(&log.bytes);
+    assert_eq!(seen.rows.iter().filter(|row| row.starts_with("ATT")).count(), 4);
+    assert_eq!(seen.gaps, [(Cause::Damaged, start as u64, 40, "no message begins here".into())]);
+}
+
+#[test]
+fn zeros_and_half_a_message_at_the_end_are_a_log_that_was_cut() {
+    for (tail, bytes, words) in
+        [(vec![0; 3_000], 3_000, "nothing but zeros"), (vec![0xff; 500], 500, "erased")]
+    {
+        let mut log = Writer::new();
+        log.attitudes(0..2);
+        log.bytes.extend(&tail);
+        let seen = seen(&log.bytes);
+        let (cause, _, count, told) = &seen.gaps[0];
+        assert_eq!((*cause, *count, seen.gaps.len()), (Cause::Cut, bytes, 1));
+        assert!(told.contains(words), "{told}");
+    }
+    let mut log = Writer::new();
+    log.attitudes(0..2);
+    log.bytes.pop();
+    let seen = seen(&log.bytes);
+    assert_eq!(
+        (seen.gaps[0].0, seen.rows.iter().filter(|row| row.starts_with("ATT")).count()),
+        (Cause::Cut, 1)
+    );
+}
+
+#[test]
+fn a_message_that_is_defined_late_is_told_and_read_from_then_on() {
+    let mut log = Writer::new();
+    log.attitudes(0..1);
+    let start = log.bytes.len() as u64;
+    log.raw(160, &[&9_u64.to_le_bytes(), &[1]]);
+    log.attitudes(1..2);
+    log.format(160, "LATE", "QB", "TimeUS,A");
+    log.raw(160, &[&2_100_000_u64.to_le_bytes(), &[2]]);
+    let seen = seen(&log.bytes);
+    assert!(seen.rows.contains(&"LATE 2100000 2".to_owned()), "{:?}", seen.rows);
+    let words = "a message of type 160, which no FMT has defined before it".to_owned();
+    assert_eq!(seen.damage(), [&(Cause::Damaged, start, 12, words)]);
+}
+
+#[test]
+fn a_length_that_lies_is_corrected_by_the_columns() {
+    let mut log = Writer::new();
+    log.format_of(160, 30, "LIES", "QB", "TimeUS,A");
+    for number in 0..4 {
+        log.raw(160, &[&u64::from(number).to_le_bytes(), &[number]]);
+    }
+    let seen = seen(&log.bytes);
+    let rows: Vec<&String> = seen.rows.iter().filter(|row| row.starts_with("LIES")).collect();
+    assert_eq!(rows, ["LIES 0 0", "LIES 1 1", "LIES 2 2", "LIES 3 3"]);
+}
+
+#[test]
+fn another_power_on_in_one_file_is_a_restart_and_time_goes_on() {
+    let mut log = Writer::new();
+    log.attitudes(100..103);
+    log.attitudes(1..4);
+    let seen = seen(&log.bytes);
+    assert_eq!(seen.restarts, 1);
+    // The first message of the new clock is doubted until the second agrees.
+    assert_eq!(seen.last.as_millis(), 103_000);
+}
+
+#[test]
+fn one_damaged_time_moves_nothing() {
+    let mut log = Writer::new();
+    log.attitudes(1..3);
+    log.attitudes(500_000..500_001);
+    log.attitudes(3..5);
+    let seen = seen(&log.bytes);
+    assert_eq!((seen.last.as_millis(), seen.restarts), (4_000, 0));
+    assert_eq!(seen.find(|seen| matches!(seen, Observation::Attitude(_)).then_some(())).len(), 4);
+    assert_eq!(seen.rows.iter().filter(|row| row.starts_with("ATT")).count(), 5, "rows are as they stand");
+}
+
+#[test]
+fn a_pause_of_the_logger_is_a_gap_from_its_beginning_to_its_end() {
+    let mut log = Writer::new();
+    log.attitudes(1..3);
+    log.attitudes(3_000..3_002);
+    let seen = seen(&log.bytes);
+    assert_eq!(seen.last.as_millis(), 3_001_000);
+    assert_eq!(
+        seen.gaps.last().map(|gap| (gap.0, gap.3.as_str())),
+        Some((Cause::NotKept, "nothing was written"))
+    );
+}
+
+#[test]
+fn a_copter_of_today_arms_leaves_the_ground_and_lands() {
+    let mut log = Writer::new();
+    log.format(160, "MSG", "QZ", "TimeUS,Message");
+    log.format(161, "EV", "QB", "TimeUS,Id");
+    log.format(162, "ERR", "QBB", "TimeUS,Subsys,ECode");
+    log.format(163, "MODE", "QMBB", "TimeUS,Mode,ModeNum,Rsn");
+    log.message(1.0, "ArduCopter V4.6.3 (92b0cd78)");
+    log.raw(163, &[&1_000_000_u64.to_le_bytes(), &[4, 4, 1]]);
+    for (second, event) in [(2_u64, 10), (5, 28), (9, 18), (10, 11)] {
+        log.attitudes(second..second + 1);
+        log.raw(161, &[&(second * 1_000_000 + 1).to_le_bytes(), &[event]]);
+    }
+    log.raw(162, &[&10_500_000_u64.to_le_bytes(), &[5, 1]]);
+    log.attitudes(11..12);
+    let seen = seen(&log.bytes);
+    let armed = seen.find(|seen| match seen {
+        Observation::Heartbeat(heartbeat) => Some((heartbeat.kind, heartbeat.armed, heartbeat.mode)),
+        _ => None,
+    });
+    let kind = VehicleKind::Rotorcraft;
+    let mut changes = armed.clone();
+    changes.dedup();
+    assert_eq!(changes, [(kind, false, 0), (kind, false, 4), (kind, true, 4), (kind, false, 4)]);
+    let mut landed = seen.find(|seen| match seen {
+        Observation::Landed(landed) => Some(*landed),
+        _ => None,
+    });
+    landed.dedup();
+    // GUIDED climbs by itself.
+    assert_eq!(landed, [LandedState::OnGround, LandedState::TakingOff, LandedState::OnGround]);
+    let states = seen.find(|seen| match seen {
+        Observation::Heartbeat(heartbeat) => Some(heartbeat.state),
+        _ => None,
+    });
+    assert_eq!(states.last(), Some(&5), "a radio failsafe is a critical state");
+    for words in ["GUIDED", "armed", "left the ground", "radio failsafe: occurred"] {
+        assert!(seen.said.iter().any(|said| said == words), "{words}: {:?}", seen.said);
+    }
+}
+
+#[test]
+fn a_text_log_of_2013_without_any_clock_but_the_receivers_is_read() {
+    let log = "\n1\n\nArduCopter V3.0.1\nFree RAM: 1696\n\
+        FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\n\
+        FMT, 129, 23, PARM, Nf, Name,Value\n\
+        FMT, 130, 35, GPS, BIBcLLeeEe, Status,Time,NSats,HDop,Lat,Lng,RelAlt,Alt,Spd,GCrs\n\
+        FMT, 1, 17, ATT, cccccCC, RollIn,Roll,PitchIn,Pitch,YawIn,Yaw,NavYaw\n\
+        FMT, 3, 6, MODE, Mh, Mode,ThrCrs\n\
+        PARM, RC1_MIN, 1100.000000\n\
+        MODE, STABILIZE, 350\n\
+        GPS, 3, 594438200, 9, 1.68, 44.0290459, -77.7367640, 3.13, 91.56, 0.00, 0.00\n\
+        ATT, 0.00, 0.47, 0.00, -8.53, 0.00, 111.24, 111.24\n\
+        NOPE, 1\n\
+        GPS, 3, 594439400, 9, 1.68, 44.0290459, -77.7367640, 5.13, 93.56, 0.00, 0.00\n\
+        ATT, 0.00, 90.00";
+    let seen = seen(log.as_bytes());
+    assert_eq!(seen.last.as_millis(), 1_200);
+    assert!(seen.said.contains(&"Firmware: ArduCopter V3.0.1".to_owned()), "{:?}", seen.said);
+    assert!(seen.said.contains(&"STABILIZE".to_owned()) && seen.said.contains(&"RC1_MIN=1100".to_owned()));
+    let heights = seen.find(|seen| match seen {
+        Observation::GlobalPosition(position) => Some(position.relative_altitude.0),
+        _ => None,
+    });
+    assert_eq!(heights, [3.13, 5.13]);
+    let attitude = seen.find(|seen| match seen {
+        Observation::Attitude(attitude) => Some((attitude.roll.0.to_degrees(), attitude.boot_ms)),
+        _ => None,
+    });
+    assert!(matches!(attitude[..], [(roll, None)] if (roll - 0.47).abs() < 1e-4), "{attitude:?}");
+    let gaps: Vec<_> = seen.gaps.iter().map(|(cause, .., words)| (*cause, words.as_str())).collect();
+    assert_eq!(
+        gaps,
+        [
+            (Cause::Damaged, "a line that begins with \"NOPE\", which no FMT has defined before it"),
+            (Cause::NotKept, "nothing was written"),
+            (Cause::Cut, "a line of ATT with 2 of 7 values"),
+        ]
+    );
+}
+
+#[test]
+fn a_log_is_detected_by_what_stands_in_it() {
+    let mut log = Writer::new();
+    log.attitudes(0..1);
+    assert_eq!(detect(&log.bytes), Some(Form::Binary));
+    assert_eq!(detect(b"ArduCopter V3.1\r\n\nFMT, 128, 89, FMT"), Some(Form::Text));
+    assert_eq!(detect(b"\x00\x00"), None);
+}

@@ -1,0 +1,132 @@
+//! The lines of a text log: `NAME, value, value`. FMT lines define the others as in a binary log.
+//!
+//! What stands before the first FMT (a banner, the menu of an old console) is no damage. A line is at most 64 KiB.
+
+use std::borrow::Cow;
+use std::io::{self, Read};
+
+const LINE_BYTES_MAX: usize = 64 * 1024;
+const CHUNK_BYTES: usize = 256 * 1024;
+
+/// One line, without its end.
+#[derive(Debug)]
+pub(super) struct Line<'a> {
+    /// Where in the file it begins.
+    pub(super) place: u64,
+    /// Its bytes in the file, with its end.
+    pub(super) bytes: u64,
+    /// What stands in it. What is no UTF-8 is read as ISO 8859-1.
+    pub(super) words: Cow<'a, str>,
+    /// It has an end; only the last one may have none.
+    pub(super) whole: bool,
+}
+
+/// A reader of lines.
+pub(super) struct Lines<R> {
+    input: R,
+    buffer: Vec<u8>,
+    at: usize,
+    base: u64,
+    ended: bool,
+}
+
+impl<R: Read> Lines<R> {
+    /// Reads from `input`.
+    pub(super) fn new(input: R) -> Self {
+        Self { input, buffer: Vec::new(), at: 0, base: 0, ended: false }
+    }
+
+    /// The first bytes, without reading on.
+    pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
+        self.fill(bytes)?;
+        Ok(&self.buffer)
+    }
+
+    fn fill(&mut self, wanted: usize) -> io::Result<()> {
+        let have = self.buffer.len() - self.at;
+        if self.ended || have >= wanted {
+            return Ok(());
+        }
+        self.buffer.drain(..self.at);
+        self.base += self.at as u64;
+        self.at = 0;
+        while self.buffer.len() < wanted && !self.ended {
+            let old = self.buffer.len();
+            self.buffer.resize(old + CHUNK_BYTES, 0);
+            let got = crate::source::stream::read_some(
+                &mut self.input,
+                self.buffer.get_mut(old..).unwrap_or_default(),
+            );
+            self.buffer.truncate(old + *got.as_ref().unwrap_or(&0));
+            self.ended = got? == 0;
+        }
+        Ok(())
+    }
+
+    /// The next line; `None` at the end.
+    pub(super) fn next(&mut self) -> io::Result<Option<Line<'_>>> {
+        self.fill(LINE_BYTES_MAX)?;
+        let rest = self.buffer.get(self.at..).unwrap_or_default();
+        if rest.is_empty() {
+            return Ok(None);
+        }
+        let searched = rest.get(..LINE_BYTES_MAX).unwrap_or(rest);
+        let end = searched.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+        let length = end.unwrap_or(searched.len());
+        let next = length + usize::from(end.is_some());
+        let place = self.base + self.at as u64;
+        self.at += next;
+        let line = rest.get(..length).unwrap_or_default();
+        let words = std::str::from_utf8(line).map_or_else(
+            |_| line.iter().map(|byte| char::from(*byte)).collect::<String>().into(),
+            Cow::Borrowed,
+        );
+        Ok(Some(Line { place, bytes: next as u64, words, whole: end.is_some() }))
+    }
+}
+
+/// The values of a line behind its name: as many as there are columns. What is in the last column may have commas.
+pub(super) fn values(line: &str, columns: usize) -> Vec<&str> {
+    match line.split_once(',') {
+        Some((_, rest)) if columns > 0 => rest.splitn(columns, ',').collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The name of a line.
+pub(super) fn name(line: &str) -> &str {
+    line.split(',').next().unwrap_or_default().trim()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_in_any_way_and_the_last_may_have_no_end() {
+        let mut lines = Lines::new(&b"FMT, 1\r\nMSG, a, b\nATT, 3"[..]);
+        let mut seen = Vec::new();
+        while let Some(line) = lines.next().expect("memory") {
+            seen.push((line.words.into_owned(), line.place, line.whole));
+        }
+        let expected = [("FMT, 1", 0, true), ("", 7, true), ("MSG, a, b", 8, true), ("ATT, 3", 18, false)];
+        assert_eq!(seen, expected.map(|(words, place, whole)| (words.to_owned(), place, whole)));
+    }
+
+    #[test]
+    fn the_last_column_keeps_its_commas() {
+        assert_eq!(values("MSG, 12, one, two", 2), [" 12", " one, two"]);
+        assert_eq!(values("MSG", 2), Vec::<&str>::new());
+    }
+
+    #[test]
+    fn a_line_without_an_end_for_ever_takes_no_memory() {
+        let mut lines = Lines::new(io::repeat(b'a').take(1 << 22));
+        let mut count = 0;
+        while let Some(line) = lines.next().expect("memory") {
+            assert!(line.words.len() <= LINE_BYTES_MAX);
+            count += 1;
+        }
+        assert_eq!((count, lines.buffer.capacity() < 4 * CHUNK_BYTES), (64, true));
+    }
+}

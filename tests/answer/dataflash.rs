@@ -1,0 +1,60 @@
+//! Every field of every message of an autopilot's own log, as pymavlink reads it.
+
+use std::io::Write as _;
+
+use hums::source::item::{Item, Row, Rows, Value, Want};
+use hums::source::recording::Place;
+use hums_tests::{flights, oracle};
+use serde_json::Value as Json;
+
+/// Whether a value is the one that pymavlink has.
+fn same(ours: &Value<'_>, theirs: &Json) -> bool {
+    match ours {
+        Value::Unknown => theirs.is_null(),
+        Value::Unsigned(value) => theirs.as_u64() == Some(*value),
+        Value::Signed(value) => theirs.as_i64() == Some(*value),
+        Value::Single(value) => theirs.as_f64().map(|theirs| theirs as f32) == Some(*value),
+        // `serde_json` reads a number to its last bit but one.
+        Value::Double(value) => {
+            theirs.as_f64().is_some_and(|theirs| (theirs - value).abs() <= 2.0 * f64::EPSILON * value.abs())
+        }
+        Value::Flag(value) => theirs.as_bool() == Some(*value),
+        Value::Text(value) => theirs.as_str() == Some(value),
+    }
+}
+
+#[test]
+fn every_field_of_every_message_of_an_autopilots_own_log_is_read_as_pymavlink_reads_it() {
+    let compressed = flights::root().join("tests/labelled/bin/f12_gps_jump.bin.gz");
+    let recording = Place::file(&compressed).open().unwrap();
+    // pymavlink maps the file into its memory: it wants it without the compression.
+    let mut plain = tempfile::Builder::new().suffix(".bin").tempfile().unwrap();
+    let mut input = hums::source::input::Input::open(&compressed).unwrap();
+    std::io::copy(&mut input, &mut plain).unwrap();
+    plain.flush().unwrap();
+    let theirs = oracle::dataflash(plain.path());
+    let mut theirs = theirs.lines().map(|line| serde_json::from_str::<(String, Vec<Json>)>(line).unwrap());
+    let (mut messages, mut values) = (0_u64, 0);
+    let mut compare = |row: Row<'_>| {
+        let (name, expected) = theirs.next().expect("pymavlink has fewer messages");
+        assert_eq!(row.table.name, name, "message {messages}");
+        assert_eq!(row.values.len(), expected.len(), "{name}");
+        for ((column, ours), theirs) in row.table.columns.iter().zip(row.values).zip(&expected) {
+            assert!(same(ours, theirs), "{name}.{} of message {messages}: {ours:?}, {theirs}", column.name);
+        }
+        messages += 1;
+        values += expected.len();
+    };
+    let want = Want { rows: Rows::All, ..Want::default() };
+    recording
+        .read(want, &mut |_, item| {
+            if let Item::Row(row) = item {
+                compare(row);
+            }
+            Ok(())
+        })
+        .unwrap();
+    assert!(theirs.next().is_none(), "pymavlink has more messages");
+    // A comparison of nothing would find no differences either.
+    assert!(messages > 20_000 && values > 200_000, "{messages} messages, {values} values");
+}

@@ -1,0 +1,46 @@
+"""Every message of an ArduPilot log as pymavlink's DFReader reads it.
+
+usage: dataflash.py LOG        prints a line of JSON for each message: [name, [value, ...]]
+
+An array is a value for each element. What is no number (NaN) is null.
+"""
+
+import json
+import math
+import sys
+
+from pymavlink import DFReader
+
+
+def value_of(message, column, character):
+    """A list: an array has many."""
+    if character == "a":
+        return list(message._elements[message.fmt.colhash[column]])
+    value = getattr(message, column)
+    if isinstance(value, bytes):
+        # The contents of files are left as bytes.
+        try:
+            value = value.decode("utf-8")
+        except UnicodeDecodeError:
+            value = value.decode("ISO-8859-1")
+        value = value.split("\0")[0]
+    if isinstance(value, float) and not math.isfinite(value):
+        value = None
+    if character == "M" and isinstance(value, int):
+        value &= 0xFF  # a mode is unsigned in the autopilot's own definition
+    return [value]
+
+
+def main(path):
+    log = DFReader.DFReader_binary(path, zero_time_base=True)
+    while True:
+        message = log.recv_msg()
+        if message is None:
+            return
+        values = []
+        for column, character in zip(message.fmt.columns, message.fmt.msg_fmts):
+            values += value_of(message, column, character)
+        print(json.dumps([message.get_type(), values]))
+
+
+main(sys.argv[1])
