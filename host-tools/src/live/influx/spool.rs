@@ -380,7 +380,7 @@ mod tests {
         let mut spool = open(&path, 10_000);
         (0..10).for_each(|number| assert_eq!(spool.put(&batch(number)).expect("room"), 0));
         drop(spool);
-        let mut spool = open(&path, 1_000);
+        let mut spool = open(&path, 600);
         assert_eq!(drain(&mut spool).len(), 10);
         spool.put(&batch(0)).expect("room");
         assert!(spool.put(&batch(1)).expect("room") + spool.put(&batch(2)).expect("room") > 0);
