@@ -34,7 +34,7 @@ use super::item::{Cause, Reader, Summary, Take, Want};
 /// The first part of a file, which is looked through before it is read: a log of today writes its definitions and
 /// parameters, 100 KiB, within its first second, among up to 1 MiB of other messages.
 const FIRST_BYTES: usize = 2 * 1024 * 1024;
-/// A file of which nothing is known to be wrong is read; what cannot be told apart in so many bytes is none.
+/// How much of a file is searched for its first definition.
 const SEARCHED_BYTES: usize = 64 * 1024;
 
 /// How such a log is written.
@@ -118,7 +118,7 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
             first.banner(&line.words);
         }
         if let Ok(Some(kind)) = kinds.of(&line, first.formats()) {
-            first.learn(kind, Body::Words(&kinds.values(&line.words, kind, first.formats())));
+            first.learn(kind, Body::Words(&values_of(&line, kind, first.formats())));
             kinds.learn(kind, first.formats());
         }
     }
@@ -140,7 +140,7 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         if let Some(Skipped { place, bytes, words, .. }) = skipped.take() {
             session.gap(Cause::Damaged, Some(place), bytes, words, take)?;
         }
-        let values = kinds.values(&line.words, kind, session.formats());
+        let values = values_of(&line, kind, session.formats());
         session.message(kind, Body::Words(&values), line.place, line.bytes, take)?;
         kinds.learn(kind, session.formats());
     }
@@ -149,6 +149,11 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         session.gap(cause, Some(place), bytes, words, take)?;
     }
     Ok(session.end())
+}
+
+/// The values of a line of this type.
+fn values_of<'a>(line: &'a Line<'_>, kind: u8, formats: &format::Formats) -> Vec<&'a str> {
+    text::values(&line.words, formats.get(kind).map_or(0, |format| format.fields.len()))
 }
 
 /// Lines that could not be read.
@@ -190,12 +195,6 @@ impl Kinds {
             return Err(format!("a line of {name} with {found} of {columns} values"));
         }
         Ok(Some(kind))
-    }
-
-    /// The values of a line.
-    #[expect(clippy::unused_self, reason = "it belongs here")]
-    fn values<'a>(&self, line: &'a str, kind: u8, formats: &format::Formats) -> Vec<&'a str> {
-        text::values(line, formats.get(kind).map_or(0, |format| format.fields.len()))
     }
 
     /// After a definition: its name.
