@@ -18,6 +18,7 @@ pub mod names;
 pub mod outcome;
 pub mod output;
 pub mod pack;
+pub mod plural;
 pub mod progress;
 pub mod report;
 pub mod rng;

@@ -14,6 +14,7 @@ use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write};
 use crate::outcome::{Outcome, usage};
 use crate::output;
+use crate::plural::count;
 use crate::source::{self, Timing};
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
@@ -47,15 +48,16 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     }
     let ratio = done.recording_bytes as f64 / done.log_bytes.max(1) as f64;
     output::line(&format!(
-        "{}: {} frames, {} bytes, {ratio:.2} times smaller than as a tlog",
+        "{}: {}, {}, {ratio:.2} times smaller than as a tlog",
         args.output.display(),
-        done.frames,
-        done.log_bytes
+        count(done.frames, "frame"),
+        count(done.log_bytes, "byte")
     ))?;
     if let Endpoint::File(_) | Endpoint::Standard = args.input
         && done.bytes_not_frames > 0
     {
-        eprintln!("hums: {} bytes of the recording are no frame and are only counted", done.bytes_not_frames);
+        let bytes = count(done.bytes_not_frames, "byte");
+        eprintln!("hums: of no frame, and only counted: {bytes} of the recording");
     }
     Ok(Outcome::Done)
 }

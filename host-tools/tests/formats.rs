@@ -49,6 +49,21 @@ fn files(dir: &Path, ending: &str) -> BTreeMap<String, PathBuf> {
     found
 }
 
+/// What the files of a packed log are called in a directory: its own name and its session's.
+fn named(dir: &Path, stem: &str) -> String {
+    let entries = fs::read_dir(dir).expect("a directory").map(|entry| entry.expect("an entry").file_name());
+    let mut names: Vec<String> = entries
+        .filter_map(|name| {
+            let name = name.into_string().expect("UTF-8");
+            let length = stem.len() + "-s1a2b3c4d".len();
+            name.starts_with(&format!("{stem}-s")).then(|| name[..length].to_owned())
+        })
+        .collect();
+    names.dedup();
+    assert_eq!(names.len(), 1, "{stem}: {names:?}");
+    names.remove(0)
+}
+
 /// Each number as `N` and its decimals: `-1.13 m/s2; 5s` becomes `N.2 m/sN; Ns`.
 fn shape(line: &str) -> String {
     let mut out = String::new();
@@ -227,8 +242,11 @@ fn parquet_keeps_types_units_and_every_value() {
     let tables = files(&dir.path().join("out"), ".parquet");
     let path = tables["ATTITUDE"].to_string_lossy().into_owned();
     assert!(path.contains("/vehicle=system-1/date=2026-11-20/session=s"), "{path}");
-    let csv =
-        fs::read_to_string(dir.path().join("out/px4_hil_quad_low/ATTITUDE.csv")).expect("the same as CSV");
+    let csv = {
+        let out = dir.path().join("out");
+        let name = named(&out, "px4_hil_quad_low");
+        fs::read_to_string(out.join(name).join("ATTITUDE.csv")).expect("the same as CSV")
+    };
     let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
     let builder =
         ParquetRecordBatchReaderBuilder::try_new(File::open(&path).expect("a file")).expect("Parquet");
@@ -263,17 +281,17 @@ fn a_gap_is_in_every_format() {
     log[150 * 512 + 100] ^= 0x04;
     fs::write(&path, log).expect("written");
     hums(dir.path(), "decode px4_hil_quad_low.hum -o out --format tlog,csv,jsonl,influx,parquet,thesis", 3);
-    let read = |name: &str| fs::read_to_string(dir.path().join("out").join(name)).expect(name);
-    let gap = "corrupt,1,";
-    let line = read("px4_hil_quad_low/HUMS_GAP.csv");
-    assert!(line.contains("damaged,1,"), "{gap}: {line}");
-    assert_eq!(read("px4_hil_quad_low.tlog.gaps.csv").lines().count(), 2);
-    assert!(read("px4_hil_quad_low.jsonl").contains("\"HUMS_GAP\""));
-    assert!(read("px4_hil_quad_low.lp").lines().any(|line| line.starts_with("HUMS_GAP,")));
-    assert_eq!(read("px4_hil_quad_low/thesis/gaps.csv").lines().count(), 2);
+    let name = dir.path().join("out").join(named(&dir.path().join("out"), "px4_hil_quad_low"));
+    let read = |ending: &str| fs::read_to_string(format!("{}{ending}", name.display())).expect(ending);
+    let line = read("/HUMS_GAP.csv");
+    assert!(line.contains("damaged,1,"), "{line}");
+    assert_eq!(read(".tlog.gaps.csv").lines().count(), 2);
+    assert!(read(".jsonl").contains("\"HUMS_GAP\""));
+    assert!(read(".lp").lines().any(|line| line.starts_with("HUMS_GAP,")));
+    assert_eq!(read(".thesis/gaps.csv").lines().count(), 2);
     assert!(files(&dir.path().join("out"), ".parquet").contains_key("HUMS_GAP"));
     // The seconds of the gap have no row.
-    let values = read("px4_hil_quad_low/thesis/flightvalues.csv");
+    let values = read(".thesis/flightvalues.csv");
     let seconds: Vec<u64> =
         values.lines().skip(1).filter_map(|row| row.split_once('s')?.0.parse().ok()).collect();
     assert!(seconds.windows(2).any(|pair| pair[1] > pair[0] + 1), "{seconds:?}");
@@ -282,25 +300,26 @@ fn a_gap_is_in_every_format() {
 #[test]
 fn several_logs_side_by_side_are_what_each_is_alone() {
     let dir = packed(&["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]);
-    fs::copy(dir.path().join("px4_hil_quad_low.hum"), dir.path().join("again.hum")).expect("copied");
+    fs::copy(dir.path().join("px4_hil_quad_low.hum"), dir.path().join("zz_again.hum")).expect("copied");
     let said = hums(dir.path(), "decode . -o all --format csv,influx,parquet", 0);
-    assert!(said.contains("is the same session as another log here"), "{said}");
+    assert!(said.contains("zz_again: is a copy of px4_hil_quad_low, which is written once"), "{said}");
+    let all_in = dir.path().join("all");
     for stem in ["px4_hil_quad_low", "ap_quad_guided"] {
         hums(dir.path(), &format!("decode {stem}.hum -o alone/{stem} --format csv,influx"), 0);
-        let one = |folder: &str, ending: &str| files(&dir.path().join(folder), ending);
-        let (all, alone) = (one(&format!("all/{stem}"), ".csv"), one(&format!("alone/{stem}"), ".csv"));
+        let alone_in = dir.path().join("alone").join(stem);
+        let name = named(&all_in, stem);
+        assert_eq!(name, named(&alone_in, stem));
+        let (all, alone) = (files(&all_in.join(&name), ".csv"), files(&alone_in.join(&name), ".csv"));
         assert!(alone.len() > 30, "{stem}");
         assert_eq!(all.keys().collect::<Vec<_>>(), alone.keys().collect::<Vec<_>>(), "{stem}");
         for (name, path) in alone {
             assert!(fs::read(path).expect("text") == fs::read(&all[&name]).expect("text"), "{stem}/{name}");
         }
-        let lines = |path: String| fs::read(dir.path().join(path)).expect("points");
-        assert!(lines(format!("all/{stem}.lp")) == lines(format!("alone/{stem}/{stem}.lp")), "{stem}");
+        let lines = |dir: &Path| fs::read(dir.join(format!("{name}.lp"))).expect("points");
+        assert!(lines(&all_in) == lines(&alone_in), "{stem}");
     }
-    let sessions: BTreeSet<_> = files(&dir.path().join("all"), ".parquet")
-        .values()
-        .map(|path| path.parent().map(Path::to_owned))
-        .collect();
+    let sessions: BTreeSet<_> =
+        files(&all_in, ".parquet").values().map(|path| path.parent().map(Path::to_owned)).collect();
     assert!(!sessions.is_empty());
 }
 

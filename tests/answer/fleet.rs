@@ -80,6 +80,25 @@ fn the_documents_queries_answer_what_the_cards_say() {
     let expected: usize = logs.iter().map(|log| worrying(&log)).sum();
     assert!(expected > 0 && attention.len() == expected, "{expected}: {attention:?}");
 
+    // What the other document shows in Python reads the same rows.
+    let printed = oracle::snippets(&root().join("docs/decode.md"), dir.path());
+    let printed: Vec<&str> = printed.as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    let attitude = |log: &Value| {
+        let messages = log["messages"].as_array().unwrap().iter();
+        messages
+            .filter(|message| message["name"] == "ATTITUDE")
+            .filter_map(|message| message["frames"].as_u64())
+            .sum()
+    };
+    let expected: u64 = logs.iter().map(attitude).sum();
+    assert_eq!(printed.len(), 2, "{printed:?}");
+    assert!(
+        expected > 10_000 && printed[0].starts_with(&format!("{expected} ")),
+        "{expected}: {}",
+        printed[0]
+    );
+    assert_eq!(printed[1].matches("'s").count(), 3, "a row for each session: {}", printed[1]);
+
     let recorders = rows(&results, "How the recorders did");
     let frames: u64 = recorders.iter().map(|row| row["frames_in"].as_u64().unwrap()).sum();
     let expected: u64 = logs.iter().map(|log| log["frames"].as_u64().unwrap()).sum();

@@ -107,6 +107,11 @@ class Comparison:
             self.differences.append(f"{what}: {expected!r} became {found!r}")
 
 
+def text_of(cell):
+    """A cell of text as it was sent: one that a spreadsheet would run has an apostrophe before it (docs/decode.md)."""
+    return cell[1:] if cell.startswith("'") else cell
+
+
 def number(kind, text):
     return float(text) if kind in ("float", "double") else int(text)
 
@@ -132,7 +137,7 @@ def compare_csv(out, expected, comparison):
                 for field, (kind, value) in message["fields"].items():
                     def get(index, field=field, kind=kind, row=row):
                         text = row[columns[field, index]]
-                        return text if kind == "char" else number(kind, text)
+                        return text_of(text) if kind == "char" else number(kind, text)
                     comparison.field("csv", f"{name}.{field}", kind, value, get)
             comparison.equal(f"csv {name} rows", len(messages), count + sum(1 for _ in rows))
 

@@ -164,7 +164,10 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     let out = dir.path().join("out");
     let decode = ["decode".as_ref(), image.as_os_str(), "--salvage".as_ref(), "-o".as_ref(), out.as_os_str()];
     hums(decode.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_code(&[3]);
-    let rest = out.join(format!("{}.tlog", with_gaps[0]["name"].as_str().unwrap()));
+    let session = with_gaps[0]["name"].as_str().unwrap().strip_prefix("session-").unwrap();
+    let files = fs::read_dir(&out).unwrap().map(|file| file.unwrap().path());
+    let ending = format!("-s{session}.tlog");
+    let rest = files.filter(|path| path.to_string_lossy().ends_with(&ending)).last().unwrap();
     let rest = fs::read(rest).unwrap();
     let rest: Vec<Frame<'_>> = frames::of_tlog(&rest, &manifest.seeds, true);
     let from = input.len() - rest.len();

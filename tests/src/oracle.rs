@@ -66,6 +66,11 @@ pub fn fleet(document: &Path, folder: &Path) -> Value {
     json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
 }
 
+/// Runs a document's Python in a folder and gives what each block printed: see `tests/oracle/snippets.py`.
+pub fn snippets(document: &Path, folder: &Path) -> Value {
+    json(&run("snippets.py", &[document.to_owned(), folder.to_owned()]))
+}
+
 /// What Grafana's own model of dashboards says to these: see `tests/oracle/grafana.py`.
 pub fn grafana(dashboards: &[PathBuf]) -> Value {
     json(&run("grafana.py", dashboards))

@@ -30,9 +30,9 @@ impl<E: fmt::Debug> fmt::Display for CardError<E> {
             Self::Device(error) => write!(f, "the card failed: {error:?}"),
             Self::Foreign(why) => write!(f, "{why}"),
             Self::Damaged => {
-                write!(f, "the card's file system is damaged: copy its files, then format it as FAT32")
+                write!(f, "the card's file system is damaged")
             }
-            Self::Full => write!(f, "the card is full and holds no log to overwrite: delete other files"),
+            Self::Full => write!(f, "the card is full and holds no log to overwrite"),
             Self::NotFound => write!(f, "there is no such log"),
             Self::NotOpen => write!(f, "no log is open"),
         }

@@ -54,21 +54,19 @@ pub enum LayoutError<E> {
     BadVolume(&'static str),
 }
 
+// What is wrong, and no advice: there may be logs on such a card, and who reads this text may be about to lose them.
 impl<E> fmt::Display for LayoutError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(_) => write!(f, "the card does not answer"),
             Self::NoPartitionTable => {
-                write!(f, "the card has no partition table (MBR): format it as FAT32 with a partition table")
+                write!(f, "the card has no partition table (MBR)")
             }
             Self::NotFat32(kind) => {
-                write!(f, "the card's first partition is of type {kind:#04x}, not FAT32: format it as FAT32")
+                write!(f, "the card's first partition is of type {kind:#04x}, not FAT32")
             }
             Self::BadVolume(what) => {
-                write!(
-                    f,
-                    "the card's FAT32 volume is damaged ({what}): copy its files, then format it as FAT32"
-                )
+                write!(f, "the card's FAT32 volume is damaged ({what})")
             }
         }
     }

@@ -13,12 +13,13 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
   hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
   hums decode cards/ -o fleet --format parquet
-  hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8086/write?db=hums
+  hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8428/write
 
 Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
 it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
-OUT/LOG/ATTITUDE.csv, OUT/LOG/thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
-`-o -` is standard output.
+OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
+LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
+No input is ever written over, and an output is the old one until the new one is whole.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
 /// `hums decode`
@@ -113,7 +114,7 @@ const REPORT_EXAMPLES: &str = "Examples:
   hums report card.img --session 00001 -o report.html
   hums report flight.tlog -o report.html
 
-With a directory for -o each session gets a page, named after it; otherwise the newest gets one. The page compares with
+With a directory for -o each session gets a page, named after log, box and session; otherwise the newest gets one. The page compares with
 the sessions before on the same card.";
 
 /// `hums report`

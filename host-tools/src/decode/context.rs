@@ -58,6 +58,8 @@ pub struct Context {
     pub identity: Identity,
     /// The same for the line protocol.
     pub tags: Tags,
+    /// What the log was known by, for the stamp of its folders.
+    pub stamp: String,
     /// What must not be written over.
     pub inputs: Inputs,
 }

@@ -5,7 +5,6 @@ use anyhow::Result;
 use hums_blackbox::record::Vehicle;
 use hums_blackbox::{Entry, Gap, Record};
 use hums_core::observation::Observation;
-use hums_core::time::Instant;
 use hums_link::{Check, Frame, observe};
 
 use crate::logs::Log;
@@ -16,20 +15,16 @@ use crate::utc::iso8601;
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
-    /// `uid-0031002a3035510a` where the autopilot told its unique id, otherwise `system-1`, or `unknown`.
+    /// `uid-0031002a3035510a` where the autopilot told its unique id, otherwise the board's own,
+    /// `box-3f0042000d51373435363338`; where there is neither, `system-1` or `unknown`.
     pub vehicle: String,
     /// The day of its first entry, UTC: `2026-11-21`; `None` where nobody told it.
     pub date: Option<String>,
     /// `s1a2b3c4d`: the session that the sectors name, which is as good as unique.
     pub session: String,
-    /// What tells two logs of equal names apart.
-    pub extent: Extent,
     /// UTC at power-on, microseconds since 1970.
     pub epoch_us: Option<u64>,
 }
-
-/// Frames, and the times of the first and the last entry.
-pub type Extent = (u64, Option<Instant>, Option<Instant>);
 
 impl Identity {
     /// Reads a log through for it.
@@ -38,18 +33,19 @@ impl Identity {
         let summary = read(log, Known::default, &mut known, |_| ())?;
         let system = known.recorded.map(|vehicle| vehicle.system).or(known.heard);
         let uid = known.recorded.map(|vehicle| vehicle.uid).filter(|uid| *uid != 0).or(known.uid);
-        let vehicle = match (uid, system) {
-            (Some(uid), _) => format!("uid-{uid:016x}"),
-            (None, Some(system)) => format!("system-{system}"),
-            (None, None) => "unknown".to_owned(),
+        let board = known.board.map(|uid| uid.map(|byte| format!("{byte:02x}")).concat());
+        let vehicle = match (uid, board, system) {
+            (Some(uid), _, _) => format!("uid-{uid:016x}"),
+            (None, Some(board), _) => format!("box-{board}"),
+            (None, None, Some(system)) => format!("system-{system}"),
+            (None, None, None) => "unknown".to_owned(),
         };
         let utc_us =
             summary.epoch_us.zip(summary.first).map(|(epoch, first)| epoch.saturating_add(first.as_micros()));
         let session =
             summary.session.map_or_else(|| "unknown".to_owned(), |session| format!("s{session:08x}"));
         let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
-        let extent = (summary.frames, summary.first, summary.last);
-        Ok(Self { vehicle, date, session, extent, epoch_us: summary.epoch_us })
+        Ok(Self { vehicle, date, session, epoch_us: summary.epoch_us })
     }
 }
 
@@ -57,6 +53,8 @@ impl Identity {
 #[derive(Default)]
 struct Known {
     recorded: Option<Vehicle>,
+    /// The board's unique id.
+    board: Option<[u8; 12]>,
     /// The first system whose autopilot sends a heartbeat.
     heard: Option<u8>,
     uid: Option<u64>,
@@ -69,6 +67,9 @@ impl Collect for Known {
     fn entry(&mut self, entry: &Entry<'_>) {
         match entry {
             Entry::Record { record: Record::Vehicle(vehicle), .. } => self.recorded = Some(*vehicle),
+            Entry::Record { record: Record::Boot(boot), .. } if boot.uid != [0; 12] => {
+                self.board = Some(boot.uid);
+            }
             Entry::Frame { bytes, verified: true, .. } => {
                 let frame =
                     Frame::again(bytes, Check::Verified).filter(|frame| TELLING.contains(&frame.id()));
@@ -94,6 +95,7 @@ impl Deliver<Self> for Known {
 
     fn group(&mut self, next: Self) -> Result<()> {
         self.recorded = next.recorded.or(self.recorded);
+        self.board = self.board.or(next.board);
         self.heard = self.heard.or(next.heard);
         self.uid = self.uid.or(next.uid);
         Ok(())

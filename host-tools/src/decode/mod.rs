@@ -12,14 +12,19 @@
 //! A log is read once (twice where its vehicle must be known first); its groups are turned to text and columns in
 //! parallel and written in order. Several logs go side by side, few enough that memory stays bounded.
 //!
+//! A log's files are named after its session ([`naming`]), and no other session's files are ever written over. Folders of
+//! tables are replaced whole or not at all ([`crate::files::Folder`]).
+//!
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
 
 pub mod collect;
 pub mod columns;
 pub mod context;
+pub mod destination;
 pub mod field_names;
 pub mod identity;
 pub mod influx;
+pub mod naming;
 pub mod parquet;
 pub mod record;
 pub mod reference;
@@ -27,30 +32,34 @@ pub mod row;
 pub mod selection;
 pub mod side_by_side;
 pub mod table;
+pub mod tables;
 pub mod text;
 pub mod thesis;
 mod wear;
 pub mod write;
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 
 use crate::cli;
-use crate::files::Inputs;
+use crate::files::{Folder, Held, Inputs, says_directory};
 use crate::logs::reader::{self, Summary};
 use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage as usage_error};
+use crate::plural::count;
 use crate::{output, progress};
 use collect::Collected;
 use context::{Context, Formats};
-use identity::{Extent, Identity};
+use destination::Destination;
+use identity::Identity;
 use influx::Tags;
+use naming::{Named, Traits};
 use selection::Selection;
 use side_by_side::side_by_side;
-use write::{Destination, Writers, Written};
+use write::{Writers, Written};
 
 /// Runs `hums decode`.
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
@@ -85,21 +94,54 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     if found.logs.is_empty() {
         eprintln!("hums: no log is in there, so nothing was written");
     }
-    let inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
+    let mut inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
+    if !one_file || says_directory(&args.output) {
+        inputs = inputs.without_folders();
+    }
     let logs = found.logs.len();
     let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
-    let sessions = Mutex::new(Sessions::new());
+    let works = works(&found.logs)?;
+    let taken = Mutex::new(BTreeSet::new());
+    let mut written = works.is_empty();
     side_by_side(
-        &found.logs,
-        |log| task.decode(log, &sessions),
+        &works,
+        |work| task.decode(work, &works, &taken),
         |done| {
             let done = done?;
             done.remarks.iter().for_each(|remark| eprintln!("hums: {remark}"));
             outcome = outcome.and(done.outcome);
+            written |= done.written;
             done.lines.iter().try_for_each(|line| output::line(line))
         },
     )?;
+    if !written {
+        bail!("nothing is within --from and --to, so nothing was written");
+    }
     Ok(outcome)
+}
+
+/// A log, and what its files are called.
+struct Work<'a> {
+    log: &'a Log,
+    traits: Traits,
+    named: Named,
+}
+
+/// The logs with their names.
+fn works(logs: &[Log]) -> Result<Vec<Work<'_>>> {
+    let mut traits = Vec::new();
+    // A log that cannot be read is named all the same: reading it says why.
+    side_by_side(
+        logs,
+        |log| Traits::of(log).unwrap_or_default(),
+        |found| {
+            traits.push(found);
+            Ok(())
+        },
+    )?;
+    let logs: Vec<(&Log, Traits)> = logs.iter().zip(traits).collect();
+    let names = naming::names(&logs);
+    Ok(logs.into_iter().zip(names).map(|((log, traits), named)| Work { log, traits, named }).collect())
 }
 
 /// What to do with each log.
@@ -115,6 +157,8 @@ struct Task<'a> {
 /// A log's outcome, to be told in the logs' order.
 struct Done {
     outcome: Outcome,
+    /// Whether there was anything to write.
+    written: bool,
     /// What was written.
     lines: Vec<String>,
     /// What there is to say of it.
@@ -122,24 +166,24 @@ struct Done {
 }
 
 impl Task<'_> {
-    /// `sessions` are the sessions whose Parquet tables are taken.
-    fn decode(&self, log: &Log, sessions: &Mutex<Sessions>) -> Result<Done> {
+    /// `taken` are the directories of Parquet tables that other logs of this command have.
+    fn decode(&self, work: &Work<'_>, all: &[Work<'_>], taken: &Mutex<BTreeSet<PathBuf>>) -> Result<Done> {
+        let log = work.log;
+        let (name, nth) = match &work.named {
+            Named::As(name, nth) => (name, *nth),
+            Named::Copy(of) => {
+                let of = all.get(*of).map_or("another log", |work| work.log.name.as_str());
+                let remark = format!("{}: is a copy of {of}, which is written once", log.name);
+                return Ok(Done {
+                    outcome: Outcome::Done,
+                    written: true,
+                    lines: Vec::new(),
+                    remarks: vec![remark],
+                });
+            }
+        };
         let mut remarks = Vec::new();
-        let mut context = Context {
-            formats: self.formats,
-            selection: self.selection.clone(),
-            inputs: self.inputs.clone(),
-            ..Context::default()
-        };
-        context.epoch_us = if self.formats.influx || self.formats.parquet {
-            context.identity = Identity::of(log)?;
-            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
-            context.identity.epoch_us
-        } else if self.standard_output {
-            reader::epoch(log)?
-        } else {
-            reader::likely_epoch(log)?
-        };
+        let mut context = self.context(work)?;
         if context.epoch_us.is_none() {
             context.selection.check_without_utc(&log.name)?;
             remarks.push(format!(
@@ -148,73 +192,124 @@ impl Task<'_> {
             ));
         }
         let mut parquet = None;
-        if self.formats.parquet {
-            parquet = sessions.lock().ok().and_then(|mut sessions| {
-                claim(&mut sessions, &partition(self.output, &context.identity), context.identity.extent)
-            });
-            if parquet.is_none() {
-                context.formats.parquet = false;
+        if self.formats.parquet
+            && let Ok(mut taken) = taken.lock()
+        {
+            let first = partition(self.output, &context.identity);
+            let dir = claim(&mut taken, &first, nth, &context.stamp);
+            if dir != first {
                 remarks.push(format!(
-                    "{}: is the same session as another log here; its Parquet tables are written once",
-                    log.name
+                    "{}: {} has other tables of a session of this number; these go to {}",
+                    log.name,
+                    first.display(),
+                    dir.display()
                 ));
             }
+            parquet = Some(dir);
         }
-        let (mut summary, mut written) = self.write(log, &context, parquet.as_deref())?;
+        let (mut summary, mut written) = self.write(log, name, &context, parquet.as_deref())?;
         if summary.epoch_us != context.epoch_us && !self.standard_output {
             // Only its last group knew better: all of it again, with that.
             context.epoch_us = summary.epoch_us;
-            (summary, written) = self.write(log, &context, parquet.as_deref())?;
+            (summary, written) = self.write(log, name, &context, parquet.as_deref())?;
         }
+        let Some(written) = written else {
+            remarks.push(nothing_of(log, &summary));
+            return Ok(Done { outcome: Outcome::Done, written: false, lines: Vec::new(), remarks });
+        };
         let lossy = summary.gaps > 0 || summary.blocks.damaged > 0 || written.losses > 0;
         if lossy {
             remarks.push(format!(
-                "{}: {} gaps, {} frames missing, {} damaged sectors, {} frames or records lost while recording",
-                log.name, summary.gaps, summary.frames_missing, summary.blocks.damaged, written.losses
+                "{}: {}, {} missing, {}, {} lost while recording",
+                log.name,
+                count(summary.gaps, "gap"),
+                count(summary.frames_missing, "frame"),
+                count(summary.blocks.damaged, "damaged sector"),
+                if written.losses == 1 {
+                    "1 frame or record".to_owned()
+                } else {
+                    format!("{} frames or records", written.losses)
+                }
             ));
         }
         let lines = if self.standard_output { Vec::new() } else { written.lines };
-        Ok(Done { outcome: Outcome::lossy(lossy), lines, remarks })
+        Ok(Done { outcome: Outcome::lossy(lossy), written: true, lines, remarks })
     }
 
-    /// Reads a log and writes its files.
-    fn write(&self, log: &Log, context: &Context, parquet: Option<&Path>) -> Result<(Summary, Written)> {
+    /// What must be known of a log before its first byte is written.
+    fn context(&self, work: &Work<'_>) -> Result<Context> {
+        let mut context = Context {
+            formats: self.formats,
+            selection: self.selection.clone(),
+            inputs: self.inputs.clone(),
+            stamp: work.traits.stamp(),
+            ..Context::default()
+        };
+        context.epoch_us = if self.formats.influx || self.formats.parquet {
+            context.identity = Identity::of(work.log)?;
+            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+            context.identity.epoch_us
+        } else if self.standard_output {
+            reader::epoch(work.log)?
+        } else {
+            reader::likely_epoch(work.log)?
+        };
+        Ok(context)
+    }
+
+    /// Reads a log and writes its files; none where nothing of it is in the time that was asked for.
+    fn write(
+        &self,
+        log: &Log,
+        name: &str,
+        context: &Context,
+        parquet: Option<&Path>,
+    ) -> Result<(Summary, Option<Written>)> {
         let destination = if self.standard_output {
             Destination::Standard
         } else {
-            Destination::new(self.output, log, self.logs, self.formats)
+            Destination::new(self.output, name, self.logs, self.formats)
         };
         let mut writers = Writers::new(context, destination, parquet.map(Path::to_owned))?;
         let bar = progress::bar(log);
         let new = || Collected::new(context);
         let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
         bar.finish_and_clear();
-        Ok((summary, writers.finish()?))
+        if writers.is_empty() && context.selection.has_limits() {
+            return Ok((summary, None));
+        }
+        Ok((summary, Some(writers.finish()?)))
     }
 }
 
-/// Sessions by the directory of their Parquet tables.
-type Sessions = BTreeMap<PathBuf, Extent>;
+/// Says that nothing of a log is in the time that was asked for, and what time it has.
+fn nothing_of(log: &Log, summary: &Summary) -> String {
+    let seconds = |at: Option<hums_core::time::Instant>| at.map_or(0.0, |at| at.as_secs_f64());
+    format!(
+        "{}: nothing of it is within --from and --to: it goes from {:.3} s to {:.3} s",
+        log.name,
+        seconds(summary.first),
+        seconds(summary.last)
+    )
+}
 
-/// A directory for a session, unless it is there already: a card and a copy of it are one session. Another session of
-/// the same name (of a board without a source of randomness) gets a number.
-fn claim(sessions: &mut Sessions, dir: &Path, extent: Extent) -> Option<PathBuf> {
-    let names = std::iter::once(dir.to_owned()).chain((2..).map(|number| {
+/// A directory for a session's tables: that of its own earlier tables, otherwise a free one. Another session of the
+/// same name (of a board without a source of randomness) gets a number; so does another part of the same session.
+fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32, stamp: &str) -> PathBuf {
+    let numbered = |number: u32| {
         let mut name = dir.to_owned().into_os_string();
-        name.push(format!("-{number}"));
-        PathBuf::from(name)
-    }));
-    for name in names {
-        match sessions.get(&name) {
-            Some(known) if *known == extent => return None,
-            Some(_) => {}
-            None => {
-                sessions.insert(name.clone(), extent);
-                return Some(name);
-            }
+        if number > 1 {
+            name.push(format!("-{number}"));
         }
-    }
-    None
+        PathBuf::from(name)
+    };
+    let held = |path: &PathBuf| Folder::held(path, stamp);
+    let own = (1..).map(numbered).take_while(|path| held(path) != Held::Nothing);
+    let mut own = own.filter(|path| held(path) == Held::TheSame);
+    let free = (nth..).map(numbered).find(|path| held(path) == Held::Nothing && !taken.contains(path));
+    let claimed = own.next().or(free).unwrap_or_else(|| dir.to_owned());
+    taken.insert(claimed.clone());
+    claimed
 }
 
 /// The directory of a session's Parquet tables, named as the tools that read them expect.
@@ -232,12 +327,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_copy_of_a_session_is_told_from_another_session_of_its_name() {
-        let mut sessions = Sessions::new();
-        let mut claim = |frames| claim(&mut sessions, Path::new("session=s1"), (frames, None, None));
-        assert_eq!(claim(5), Some(PathBuf::from("session=s1")));
-        assert_eq!(claim(5), None, "a copy");
-        assert_eq!(claim(6), Some(PathBuf::from("session=s1-2")), "another");
-        assert_eq!(claim(6), None, "its copy");
+    fn tables_of_a_session_replace_their_own_and_no_others() {
+        let root = tempfile::tempdir().expect("a directory");
+        let dir = root.path().join("session=s1");
+        let mut taken = BTreeSet::new();
+        let mut claim = |nth, stamp| claim(&mut taken, &dir, nth, stamp);
+        assert_eq!(claim(1, "one"), dir);
+        let second = root.path().join("session=s1-2");
+        assert_eq!(claim(2, "two"), second, "another of the same command");
+        for (path, stamp) in [(&dir, "one"), (&second, "two")] {
+            let folder = Folder::create(path, &Inputs::none(), stamp).expect("made");
+            folder.finish().expect("whole");
+        }
+        assert_eq!(claim(2, "one"), dir, "a later run, in another order");
+        assert_eq!(claim(1, "two"), second);
+        assert_eq!(claim(1, "three"), root.path().join("session=s1-3"));
+        assert_eq!(
+            claim(1, "four"),
+            root.path().join("session=s1-4"),
+            "also while the third is being written"
+        );
     }
 }

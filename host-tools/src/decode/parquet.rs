@@ -16,8 +16,8 @@
 use std::cmp::Reverse;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
-use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
@@ -35,7 +35,7 @@ use super::columns::{Column, TextColumn, cell_array, cell_data_type};
 use super::field_names::free_name;
 use super::row::Row;
 use super::table::Table;
-use crate::files::{cannot_write, make_directory};
+use crate::files::{Folder, cannot_write};
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
@@ -248,7 +248,7 @@ struct Limits {
 
 /// The tables of one session, open.
 pub struct ParquetTables {
-    dir: PathBuf,
+    folder: Folder,
     limits: Limits,
     properties: WriterPropertiesBuilder,
     /// The file of each table that is open.
@@ -267,9 +267,8 @@ struct TableFile {
 }
 
 impl ParquetTables {
-    /// Tables in `dir`; `about` goes into each file's metadata.
-    pub fn new(dir: PathBuf, about: &[(&str, String)]) -> Result<Self> {
-        make_directory(&dir)?;
+    /// Tables in a folder; `about` goes into each file's metadata.
+    pub fn new(folder: Folder, about: &[(&str, String)]) -> Self {
         // Makes the threads that encode: while a log is read they would inherit the one core that its reader keeps to.
         rayon::current_num_threads();
         let about =
@@ -285,7 +284,7 @@ impl ParquetTables {
             .set_offset_index_disabled(true)
             .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_key_value_metadata(Some(about));
-        Ok(Self { dir, limits: LIMITS, properties, tables: BTreeMap::new(), parts: BTreeMap::new() })
+        Self { folder, limits: LIMITS, properties, tables: BTreeMap::new(), parts: BTreeMap::new() }
     }
 
     /// Takes a group's columns.
@@ -297,7 +296,8 @@ impl ParquetTables {
                 Entry::Vacant(place) => {
                     let part = self.parts.entry(table).or_default();
                     *part += 1;
-                    let file = TableFile::create(&self.dir, table, *part, &batch.schema(), &self.properties);
+                    let name = file_name(table, *part);
+                    let file = TableFile::begin(&self.folder, &name, &batch.schema(), &self.properties);
                     place.insert(file?)
                 }
             };
@@ -335,11 +335,13 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// Writes what is still held, and each file's end; gives the directory and how many tables there are.
+    /// Writes what is still held, and each file's end: the folder gets its name. Gives it and how many tables there are.
     pub fn finish(mut self) -> Result<(PathBuf, usize)> {
         let tables = self.parts.len();
         std::mem::take(&mut self.tables).into_par_iter().try_for_each(|(_, file)| file.close())?;
-        Ok((self.dir, tables))
+        let path = self.folder.path().to_owned();
+        self.folder.finish()?;
+        Ok((path, tables))
     }
 }
 
@@ -352,24 +354,19 @@ fn file_name(table: Table, part: u32) -> String {
 }
 
 impl TableFile {
-    fn create(
-        dir: &Path,
-        table: Table,
-        part: u32,
+    fn begin(
+        folder: &Folder,
+        name: &str,
         schema: &SchemaRef,
         properties: &WriterPropertiesBuilder,
     ) -> Result<Self> {
-        let path = dir.join(file_name(table, part));
-        // What an earlier decoding, perhaps of more, has left would be read with this table.
-        let further = (part + 1..).map(|part| dir.join(file_name(table, part)));
-        further.take_while(|path| fs::remove_file(path).is_ok()).count();
+        let path = folder.path().join(name);
         // A dictionary takes 73 kB of each column, and files of numbers are a sixth smaller without; texts gain by it.
         let texts = schema.fields().iter().filter(|field| *field.data_type() == DataType::Utf8);
         let properties = texts.fold(properties.clone(), |properties, field| {
             properties.set_column_dictionary_enabled(vec![field.name().clone()].into(), true)
         });
-        let file = File::create(&path).with_context(|| cannot_write(&path))?;
-        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties.build()))
+        let writer = ArrowWriter::try_new(folder.file(name)?, schema.clone(), Some(properties.build()))
             .with_context(|| cannot_write(&path))?;
         Ok(Self { path, writer, pending: Vec::new(), pending_bytes: 0, chunks: 0 })
     }
@@ -411,6 +408,7 @@ mod tests {
     use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
     use super::*;
+    use crate::files::Inputs;
 
     #[test]
     fn no_message_has_two_columns_of_one_name() {
@@ -433,7 +431,9 @@ mod tests {
     fn a_session_of_many_row_groups_goes_on_in_further_files_and_no_row_is_lost() {
         let dir = tempfile::tempdir().expect("a directory");
         let decode = |limits| {
-            let mut tables = ParquetTables::new(dir.path().to_owned(), &[]).expect("tables");
+            let path = dir.path().join("session=s1");
+            let folder = Folder::create(&path, &Inputs::none(), "a session").expect("a folder");
+            let mut tables = ParquetTables::new(folder, &[]);
             tables.limits = limits;
             for second in 0..2000_u32 {
                 let mut batches = Batches::default();
@@ -451,7 +451,7 @@ mod tests {
             }
             assert_eq!(tables.finish().expect("finish").1, 2);
             let mut seconds = Vec::new();
-            let files = (1..).map(|part| dir.path().join(file_name(Table::Message(30), part)));
+            let files = (1..).map(|part| path.join(file_name(Table::Message(30), part)));
             let files: Vec<PathBuf> = files.take_while(|path| path.exists()).collect();
             for path in &files {
                 let file = File::open(path).expect("a file");

@@ -26,6 +26,11 @@ impl Selection {
         Ok(Self { from: args.from, to: args.to, ids })
     }
 
+    /// Whether a time was asked for.
+    pub fn has_limits(&self) -> bool {
+        self.from.is_some() || self.to.is_some()
+    }
+
     /// A time in UTC selects nothing in a log that has none: that is told, not guessed.
     pub fn check_without_utc(&self, log: &str) -> Result<()> {
         if [self.from, self.to].iter().any(|when| matches!(when, Some(When::Utc(_)))) {

@@ -27,9 +27,17 @@ fn is_text(field: &Field) -> bool {
     field.kind == Kind::Char
 }
 
-/// One cell of text, quoted where CSV (RFC 4180) needs it.
+/// What a spreadsheet takes for the beginning of a formula, which it would run: a vehicle's text must not be one. The
+/// full-width forms count too where the system writes Japanese or Chinese (OWASP, "CSV Injection").
+const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
+
+/// One cell of text, quoted where CSV (RFC 4180) needs it. One that would be a formula gets an apostrophe before it, and
+/// so does one that begins with an apostrophe: without the first apostrophe it is the text again, in any case.
 pub fn push_csv_text(out: &mut Vec<u8>, text: &[u8]) {
-    let text = String::from_utf8_lossy(text);
+    let mut text = String::from_utf8_lossy(text);
+    if text.starts_with('\'') || text.starts_with(FORMULA) {
+        text.to_mut().insert(0, '\'');
+    }
     if !text.bytes().any(|byte| matches!(byte, b',' | b'"' | b'\r' | b'\n')) {
         out.extend_from_slice(text.as_bytes());
         return;
@@ -200,6 +208,23 @@ mod tests {
         assert_eq!(quoted(b"EKF3 IMU0"), "EKF3 IMU0");
         assert_eq!(quoted(b"a,\"b\"\n"), "\"a,\"\"b\"\"\n\"");
         assert_eq!(quoted(b"\xff"), "\u{fffd}");
+    }
+
+    #[test]
+    fn no_text_is_a_formula_to_a_spreadsheet_and_each_is_read_back() {
+        for text in
+            ["=HYPERLINK(\"http://x\",\"y\")", "+1", "-1", "@SUM(A1)", "\tx", "\rx", "'quoted", "''", "＝1"]
+        {
+            let mut out = Vec::new();
+            push_csv_text(&mut out, text.as_bytes());
+            let cell = String::from_utf8(out).expect("UTF-8");
+            let inner = cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"'));
+            let cell = inner.map_or(cell.clone(), |inner| inner.replace("\"\"", "\""));
+            assert_eq!(cell.strip_prefix('\''), Some(text), "{cell}");
+        }
+        let mut out = Vec::new();
+        push_csv_text(&mut out, b"a=b");
+        assert_eq!(out, b"a=b");
     }
 
     #[test]

@@ -7,8 +7,9 @@
 //! Seconds in which the vehicle was not heard, or that fell into a gap of the log, have no row: the flight time jumps,
 //! and `gaps.csv` names the gaps.
 
-use std::io::Write;
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use hums_blackbox::Gap;
@@ -17,7 +18,7 @@ use hums_core::time::{Instant, Span};
 
 use super::reference::{MOTORS, Quantity, Reference};
 use super::selection::Selection;
-use crate::files::{Inputs, Output, settle};
+use crate::files::{Folder, buffered, settle};
 use crate::mavlink::values::Scalar;
 
 /// A vehicle that was not heard for so long tells nothing about this second.
@@ -37,24 +38,25 @@ const GAPS: &str = "From [s]; To [s]; Cause; Frames missing";
 
 /// The tables of one log, open.
 pub struct Thesis {
-    tables: [Output; 5],
+    folder: Folder,
+    tables: [(BufWriter<File>, PathBuf); 5],
     reference: Reference,
     selection: Selection,
     epoch_us: Option<u64>,
     /// The next whole second, where the first frame has set it.
     next: Option<u64>,
     /// Rows written to each table.
-    pub rows: u64,
+    rows: u64,
 }
 
 impl Thesis {
-    /// Makes the tables in `dir`.
-    pub fn new(dir: &Path, inputs: &Inputs, selection: Selection, epoch_us: Option<u64>) -> Result<Self> {
-        let table = |name: &str, header: &str| -> Result<Output> {
-            let path = dir.join(name);
-            let mut file = Output::create(&path, inputs)?;
+    /// Makes the tables in a folder.
+    pub fn new(folder: Folder, selection: Selection, epoch_us: Option<u64>) -> Result<Self> {
+        let table = |name: &str, header: &str| -> Result<(BufWriter<File>, PathBuf)> {
+            let path = folder.path().join(name);
+            let mut file = buffered(folder.file(name)?);
             settle(writeln!(file, "{header}"), &path)?;
-            Ok(file)
+            Ok((file, path))
         };
         let tables = [
             table("flightvalues.csv", FLIGHT_VALUES)?,
@@ -63,7 +65,7 @@ impl Thesis {
             table("vfr_hud.csv", VFR_HUD)?,
             table("gaps.csv", GAPS)?,
         ];
-        Ok(Self { tables, reference: Reference::new(), selection, epoch_us, next: None, rows: 0 })
+        Ok(Self { folder, tables, reference: Reference::new(), selection, epoch_us, next: None, rows: 0 })
     }
 
     /// Takes an observation: first come the rows of the seconds that have passed.
@@ -126,14 +128,17 @@ impl Thesis {
     }
 
     fn line(&mut self, table: usize, cells: &[String]) -> Result<()> {
-        let Some(file) = self.tables.get_mut(table) else { return Ok(()) };
-        let written = writeln!(file, "{}", cells.join("; "));
-        settle(written, file.path())
+        let Some((file, path)) = self.tables.get_mut(table) else { return Ok(()) };
+        settle(writeln!(file, "{}", cells.join("; ")), path)
     }
 
-    /// Writes what is still held.
-    pub fn finish(&mut self) -> Result<()> {
-        self.tables.iter_mut().try_for_each(Output::finish)
+    /// All rows are there: the folder gets its name. Gives it and the number of rows.
+    pub fn finish(mut self) -> Result<(PathBuf, u64)> {
+        self.tables.iter_mut().try_for_each(|(file, path)| settle(file.flush(), path))?;
+        drop(self.tables);
+        let path = self.folder.path().to_owned();
+        self.folder.finish()?;
+        Ok((path, self.rows))
     }
 }
 

@@ -1,69 +1,24 @@
 //! The files of the output formats.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufRead as _, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
-use hums_blackbox::Gap;
+use anyhow::Result;
+use hums_blackbox::{Cause, Gap};
 
 use super::collect::Collected;
-use super::context::{Context, Formats};
+use super::context::Context;
+use super::destination::Destination;
 use super::influx::{Clock, Lines};
 use super::parquet::ParquetTables;
 use super::record::gap_row;
 use super::reference::Reference;
-use super::table::Table;
-use super::text::columns;
+use super::tables::Tables;
 use super::thesis::Thesis;
-use crate::files::{
-    Inputs, Output, appended, cannot_write, inside, make_directory, make_parent, says_directory, settle,
-};
-use crate::logs::Log;
+use crate::files::{Folder, Inputs, Output, appended, make_parent, settle};
 use crate::logs::reader::Deliver;
 use crate::output::Stdout;
-
-/// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
-const OPEN_MAX: usize = 256;
-
-/// Where a log's files go.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Destination {
-    /// The one file goes to standard output.
-    Standard,
-    /// The one file has this name.
-    File(PathBuf),
-    /// Single files have this name with an extension; tables lie in a directory of this name.
-    Named(PathBuf),
-}
-
-impl Destination {
-    /// By the rule that `hums decode --help` tells.
-    pub fn new(output: &Path, log: &Log, logs: usize, formats: Formats) -> Self {
-        if logs == 1 && formats.is_single_file() && !says_directory(output) {
-            return Self::File(output.to_owned());
-        }
-        Self::Named(inside(output, &log.name))
-    }
-
-    /// The path of the single file with this extension; `None` is standard output.
-    fn path(&self, extension: &str) -> Option<PathBuf> {
-        match self {
-            Self::Standard => None,
-            Self::File(path) => Some(path.clone()),
-            Self::Named(name) => Some(appended(name, extension)),
-        }
-    }
-
-    /// The directory of the tables. A single file has none.
-    fn dir(&self) -> Option<&Path> {
-        match self {
-            Self::Standard | Self::File(_) => None,
-            Self::Named(dir) => Some(dir),
-        }
-    }
-}
+use crate::plural::count;
 
 /// A single file, open.
 enum Single {
@@ -127,10 +82,7 @@ pub struct Writers<'a> {
     influx: Option<Influx>,
     thesis: Option<Thesis>,
     parquet: Option<ParquetTables>,
-    tables: BTreeMap<Table, BufWriter<File>>,
-    /// Tables that have their header; not all of them are open.
-    begun: BTreeSet<Table>,
-    headers: BTreeMap<&'static str, Vec<&'static str>>,
+    csv: Option<Tables>,
     /// A tlog has no place for gaps: they lie beside it.
     gaps: Option<Single>,
     frames: u64,
@@ -179,22 +131,19 @@ impl<'a> Writers<'a> {
             reference: Reference::new(),
             points: Vec::new(),
         });
-        let mut thesis = None;
-        if let Some(dir) = destination.dir() {
-            if formats.csv {
-                make_directory(dir)?;
-            }
-            if formats.thesis {
-                let dir = dir.join("thesis");
-                make_directory(&dir)?;
-                thesis = Some(Thesis::new(&dir, inputs, context.selection.clone(), context.epoch_us)?);
-            }
-        }
+        let folder = |wanted: bool, path: Option<PathBuf>| -> Result<Option<Folder>> {
+            let path = path.filter(|_| wanted);
+            path.map(|path| Folder::create(&path, inputs, &context.stamp)).transpose()
+        };
+        let csv = folder(formats.csv, destination.tables())?.map(Tables::new);
+        let thesis = folder(formats.thesis, destination.thesis())?
+            .map(|folder| Thesis::new(folder, context.selection.clone(), context.epoch_us))
+            .transpose()?;
         let about = [
             ("hums.vehicle", context.identity.vehicle.clone()),
             ("hums.session", context.identity.session.clone()),
         ];
-        let parquet = parquet.map(|dir| ParquetTables::new(dir, &about)).transpose()?;
+        let parquet = folder(formats.parquet, parquet)?.map(|folder| ParquetTables::new(folder, &about));
         Ok(Self {
             context,
             destination,
@@ -203,9 +152,7 @@ impl<'a> Writers<'a> {
             influx,
             thesis,
             parquet,
-            tables: BTreeMap::new(),
-            begun: BTreeSet::new(),
-            headers: BTreeMap::new(),
+            csv,
             gaps: None,
             frames: 0,
             records: 0,
@@ -230,46 +177,16 @@ impl<'a> Writers<'a> {
                 thesis.observe(observed.at, observed.source, &observed.observation)?;
             }
         }
-        for (name, columns) in &collected.headers {
-            self.headers.entry(name).or_insert_with(|| columns.clone());
-        }
-        for (table, lines) in &collected.tables {
-            self.table(*table, lines)?;
+        if let Some(csv) = &mut self.csv {
+            csv.headers(&collected.headers);
+            for (table, lines) in &collected.tables {
+                csv.put(*table, lines)?;
+            }
         }
         match &mut self.parquet {
             Some(parquet) => parquet.put(collected.parquet),
             None => Ok(()),
         }
-    }
-
-    fn table(&mut self, table: Table, lines: &[u8]) -> Result<()> {
-        let Some(dir) = self.destination.dir() else { return Ok(()) };
-        let path = dir.join(format!("{}.csv", table.name()));
-        if let Some(file) = self.tables.get_mut(&table) {
-            return write(file, lines, &path);
-        }
-        let mut file = if self.begun.contains(&table) {
-            let file = File::options().append(true).open(&path);
-            BufWriter::new(file.with_context(|| cannot_write(&path))?)
-        } else {
-            let file = File::create(&path).with_context(|| cannot_write(&path))?;
-            let mut file = BufWriter::with_capacity(16 * 1024, file);
-            let own = match table {
-                Table::Hums(name) => self.headers.get(name).map(Vec::as_slice).unwrap_or_default(),
-                _ => &[],
-            };
-            write(&mut file, header(table, own).as_bytes(), &path)?;
-            self.begun.insert(table);
-            file
-        };
-        write(&mut file, lines, &path)?;
-        if self.tables.len() >= OPEN_MAX
-            && let Some((closed, mut file)) = self.tables.pop_last()
-        {
-            settle(file.flush(), &dir.join(closed.name()))?;
-        }
-        self.tables.insert(table, file);
-        Ok(())
     }
 
     /// A gap beside the tlog, in a table of its own.
@@ -284,8 +201,7 @@ impl<'a> Writers<'a> {
         };
         let mut line = Vec::new();
         if first {
-            let names: Vec<&str> = row.cells.iter().map(|(name, _)| *name).collect();
-            line.extend_from_slice(names.join(",").as_bytes());
+            line.extend_from_slice(gaps_header().as_bytes());
             line.push(b'\n');
         }
         for (place, (_, cell)) in row.cells.iter().enumerate() {
@@ -298,34 +214,64 @@ impl<'a> Writers<'a> {
         file.write(&line)
     }
 
-    /// Writes what is still held, and says what was written.
+    /// Whether nothing was written but what every file begins with.
+    pub fn is_empty(&self) -> bool {
+        self.frames == 0 && self.records == 0
+    }
+
+    /// All of the log is there: the files get their names. Says what was written.
     pub fn finish(mut self) -> Result<Written> {
         let mut lines = Vec::new();
-        let (frames, records) = (self.frames, self.records);
+        let frames = count(self.frames, "frame");
+        let rows = format!("{frames}, {}", count(self.records, "record"));
+        let tlog = self.destination.path("tlog").filter(|_| self.tlog.is_some());
         let singles = [self.tlog.take(), self.jsonl.take(), self.influx.take().map(|influx| influx.file)];
         for file in singles.into_iter().flatten() {
-            lines.push(format!("{}: {frames} frames", file.finish()?.display()));
+            lines.push(format!("{}: {frames}", file.finish()?.display()));
         }
-        if let Some(file) = self.gaps.take() {
-            lines.push(format!("{}: gaps", file.finish()?.display()));
+        match (self.gaps.take(), tlog) {
+            (Some(file), _) => lines.push(format!("{}: gaps", file.finish()?.display())),
+            (None, Some(tlog)) => self.remove_earlier_gaps(&appended(&tlog, "gaps.csv"))?,
+            (None, None) => {}
         }
-        if let (true, Some(dir)) = (self.context.formats.csv, self.destination.dir()) {
-            for (table, file) in &mut self.tables {
-                settle(file.flush(), &dir.join(table.name()))?;
-            }
-            let tables = self.begun.len();
-            lines.push(format!("{}: {tables} tables, {frames} frames, {records} records", dir.display()));
+        if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
+            let tables = count(csv.count() as u64, "table");
+            csv.finish()?;
+            lines.push(format!("{}: {tables}, {rows}", dir.display()));
         }
-        if let (Some(thesis), Some(dir)) = (&mut self.thesis, self.destination.dir()) {
-            thesis.finish()?;
-            lines.push(format!("{}: {} seconds", dir.join("thesis").display(), thesis.rows));
+        if let Some(thesis) = self.thesis.take() {
+            let (dir, seconds) = thesis.finish()?;
+            lines.push(format!("{}: {}", dir.display(), count(seconds, "second")));
         }
         if let Some(parquet) = self.parquet.take() {
             let (dir, tables) = parquet.finish()?;
-            lines.push(format!("{}: {tables} tables, {frames} frames, {records} records", dir.display()));
+            lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
         }
         Ok(Written { lines, losses: self.losses })
     }
+
+    /// Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
+    fn remove_earlier_gaps(&self, path: &Path) -> Result<()> {
+        let is_ours = |path: &Path| {
+            let mut first = String::new();
+            let read = std::fs::File::open(path).and_then(|file| BufReader::new(file).read_line(&mut first));
+            read.is_ok() && first.trim_end() == gaps_header()
+        };
+        if path.is_file() && is_ours(path) { Output::remove(path, &self.context.inputs) } else { Ok(()) }
+    }
+}
+
+/// The first line of a table of gaps beside a tlog.
+fn gaps_header() -> String {
+    let nothing = Gap {
+        from: None,
+        to: None,
+        cause: Cause::Missing,
+        sectors_lost: 0,
+        sectors_skipped: 0,
+        frames: None,
+    };
+    gap_row(&nothing).cells.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(",")
 }
 
 impl<'a> Deliver<Collected<'a>> for Writers<'a> {
@@ -344,24 +290,4 @@ impl<'a> Deliver<Collected<'a>> for Writers<'a> {
     fn group(&mut self, collected: Collected<'a>) -> Result<()> {
         self.put(collected)
     }
-}
-
-/// A table's first line.
-fn header(table: Table, own: &[&str]) -> String {
-    let mut names: Vec<String> = vec!["time_boot[s]".into(), "time_utc".into()];
-    match table {
-        Table::Hums(_) => names.extend(own.iter().map(|name| (*name).to_owned())),
-        Table::Message(id) => {
-            names.extend(["system".into(), "component".into()]);
-            names.extend(hums_dialect::message(id).map(columns).unwrap_or_default());
-        }
-        Table::Unverified(_) | Table::Unknown(_) => {
-            names.extend(["system", "component", "sequence", "payload"].map(String::from));
-        }
-    }
-    names.join(",") + "\n"
-}
-
-fn write(file: &mut impl Write, bytes: &[u8], path: &Path) -> Result<()> {
-    settle(file.write_all(bytes), path)
 }

@@ -30,6 +30,12 @@ impl Inputs {
         inputs
     }
 
+    /// The same without the input folders: for outputs that the command names itself, after the session that is in them.
+    /// An earlier run's may be replaced, wherever they lie.
+    pub fn without_folders(&self) -> Self {
+        Self { files: self.files.clone(), folders: BTreeMap::new() }
+    }
+
     /// Adds a file or a folder. One that cannot be looked at is none: whoever opens it says so.
     pub fn add(&mut self, path: &Path) {
         let Ok(id) = FileId::of(path) else { return };

@@ -5,12 +5,16 @@
 //! Two kinds of files are updated in place by design and are not made here: a simulated card's image (`--sd`) and the
 //! simulated board's flash (`--store`). A test in `host-tools/tests/cli/files.rs` holds every other file to this module.
 
+mod ends;
+mod folder;
 mod identity;
 mod inputs;
 mod output;
 mod part;
 mod paths;
 
+pub use ends::{add_ends, short};
+pub use folder::{Folder, Held, buffered};
 pub use identity::FileId;
 pub use inputs::Inputs;
 pub use output::Output;

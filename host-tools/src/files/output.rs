@@ -63,6 +63,12 @@ impl Output {
         Ok((Self::begin(file, path, part)?, bytes))
     }
 
+    /// Removes a file that an earlier run made, and that is no input.
+    pub fn remove(path: &Path, inputs: &Inputs) -> Result<()> {
+        inputs.refuse(path)?;
+        fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))
+    }
+
     fn begin(file: File, path: &Path, part: Part) -> Result<Self> {
         lock(&file, path)?;
         let file = BufWriter::with_capacity(BUFFER_BYTES, file);

@@ -56,6 +56,14 @@ pub(super) fn remove_stale(part: &Path, target: &Path) -> Result<()> {
     std::fs::remove_file(part).with_context(|| cannot_write(part))
 }
 
+/// The same for a folder, whose lock is on its stamp.
+pub(super) fn is_written(stamp: &Path, target: &Path) -> Result<()> {
+    match File::open(stamp) {
+        Ok(file) => lock(&file, target),
+        Err(_) => Ok(()),
+    }
+}
+
 /// Makes a rename outlive a power loss of this PC, where the file system can do that.
 pub(super) fn sync_folder_of(path: &Path) {
     if cfg!(unix) {

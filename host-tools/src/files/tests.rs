@@ -2,6 +2,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
+use super::folder::{old_of, put_in_place};
 use super::*;
 
 /// A directory with a file `old` of this content.
@@ -122,4 +123,67 @@ fn what_is_no_regular_file_is_written_as_it_is() {
     assert!(!Path::new("/dev/null").is_file());
     let dir = Output::create(Path::new("/"), &Inputs::none()).expect_err("a directory").to_string();
     assert!(dir.contains("is a directory"), "{dir}");
+}
+
+/// A folder with one table of this text.
+fn made(path: &Path, stamp: &str, text: &str) {
+    let folder = Folder::create(path, &Inputs::none(), stamp).expect("begun");
+    folder.file("T.csv").expect("a file").write_all(text.as_bytes()).expect("written");
+    folder.finish().expect("whole");
+}
+
+fn table(path: &Path) -> String {
+    fs::read_to_string(path.join("T.csv")).expect("a table")
+}
+
+#[test]
+fn a_folder_replaces_its_own_and_nothing_else() {
+    let dir = furnished();
+    let path = dir.path().join("session");
+    made(&path, "one", "first");
+    let dropped = Folder::create(&path, &Inputs::none(), "one").expect("begun");
+    dropped.file("T.csv").expect("a file").write_all(b"half").expect("written");
+    drop(dropped);
+    assert_eq!((table(&path), names(dir.path())), ("first".to_owned(), vec!["old".into(), "session".into()]));
+    made(&path, "one", "second");
+    assert_eq!((table(&path), names(dir.path())), ("second".to_owned(), vec!["old".into(), "session".into()]));
+    let refused = Folder::create(&path, &Inputs::none(), "two").expect_err("another's").to_string();
+    assert!(refused.contains("another recording"), "{refused}");
+    fs::create_dir(dir.path().join("mine")).expect("made");
+    made(&dir.path().join("mine"), "one", "an empty folder is free");
+    fs::create_dir(path.join("inner")).expect("made");
+    let refused = Folder::create(&path, &Inputs::none(), "one").expect_err("has more").to_string();
+    assert!(refused.contains("inner, which hums did not make"), "{refused}");
+    assert!(Folder::remove(&path).is_err() && path.join("inner").exists());
+    assert!(Folder::remove(dir.path()).is_err() && dir.path().join("old").exists());
+    Folder::remove(&dir.path().join("mine")).expect("removed");
+    assert_eq!(table(&path), "second");
+}
+
+#[test]
+fn where_folders_cannot_be_swapped_two_renames_do_and_a_kill_between_them_loses_nothing() {
+    let dir = furnished();
+    let (path, other) = (dir.path().join("session"), dir.path().join("other"));
+    made(&path, "one", "old");
+    made(&other, "one", "new");
+    put_in_place(&other, &path, |_, _| false).expect("renamed");
+    assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
+    // Killed after the first rename.
+    fs::rename(&path, old_of(&path)).expect("renamed");
+    drop(Folder::create(&path, &Inputs::none(), "one").expect("begun"));
+    assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
+    // Killed before the old one was removed.
+    made(&old_of(&path), "one", "old");
+    drop(Folder::create(&path, &Inputs::none(), "one").expect("begun"));
+    assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
+}
+
+#[test]
+fn two_runs_do_not_write_one_folder() {
+    let dir = furnished();
+    let path = dir.path().join("session");
+    let first = Folder::create(&path, &Inputs::none(), "one").expect("begun");
+    let second = Folder::create(&path, &Inputs::none(), "one").expect_err("somebody writes it").to_string();
+    assert!(second.contains("another run of hums is writing it"), "{second}");
+    first.finish().expect("whole");
 }

@@ -24,10 +24,12 @@ use anyhow::{Result, bail};
 
 use crate::check;
 use crate::cli;
+use crate::decode::naming::{self, Traits};
 use crate::decode::side_by_side::side_by_side;
-use crate::files::{Inputs, Output, appended, inside, make_parent, says_directory, settle};
+use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::outcome::{Outcome, usage};
 use crate::output;
+use crate::plural::count;
 use crate::source::recording::{Place, find};
 
 /// Runs `hums report`.
@@ -46,18 +48,26 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         Ok(())
     })?;
     let wanted = wanted(args, &found.places)?;
-    let inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
+    let mut inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
+    if wanted.directory {
+        inputs = inputs.without_folders();
+    }
     for &index in &wanted.sessions {
         let (Some(place), Some(overview)) = (found.places.get(index), overviews.get(index)) else { continue };
         // A card's sessions are one box's; what lies in a folder beside a recording may be anybody's.
         let earlier = overviews.get(..index).filter(|_| place.own().is_some()).unwrap_or_default();
-        let path = wanted.path(place);
+        let path = wanted.path(place)?;
         make_parent(&path)?;
         let mut file = Output::create(&path, &inputs)?;
         let html = page::html(overview, &replay::Replay::of(place)?, &trend::of(overview, earlier))?;
         settle(file.write_all(html.as_bytes()), &path)?;
         file.finish()?;
-        output::line(&format!("{}: session {}, {} bytes", path.display(), place.name, html.len()))?;
+        output::line(&format!(
+            "{}: session {}, {}",
+            path.display(),
+            place.name,
+            count(html.len() as u64, "byte")
+        ))?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
     }
     if wanted.sessions.len() < found.places.len() && args.session.is_none() {
@@ -99,10 +109,16 @@ fn wanted(args: &cli::Report, logs: &[Place]) -> Result<Wanted> {
 }
 
 impl Wanted {
-    fn path(&self, place: &Place) -> PathBuf {
+    /// A page in a directory has the name that `hums decode` gives the session's files.
+    fn path(&self, place: &Place) -> Result<PathBuf> {
         if !self.directory {
-            return self.output.clone();
+            return Ok(self.output.clone());
         }
-        appended(&inside(&self.output, &place.name), "html")
+        let name = match (place.own(), place.path()) {
+            (Some(log), _) => Traits::of(log)?.name(log),
+            (None, Some(path)) => naming::of_recording(path)?,
+            (None, None) => place.name.clone(),
+        };
+        Ok(appended(&self.output.join(name), "html"))
     }
 }

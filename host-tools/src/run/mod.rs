@@ -10,6 +10,7 @@ pub(crate) mod params;
 mod paths;
 pub mod qemu;
 pub mod report;
+mod salt;
 pub mod sim;
 mod store;
 

@@ -12,6 +12,7 @@ use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::plural::count;
 use crate::summary::{FindingLine, Overview};
 
 /// The object of `--json`; its names are a contract.
@@ -182,8 +183,9 @@ impl Report {
         let _ = writeln!(text, "bytes    {} in, {} of no frame", self.bytes_in, self.bytes_not_frames);
         let _ = writeln!(
             text,
-            "card     {} bytes of log, {} blocks written",
-            self.bytes_logged, self.blocks_written
+            "card     {} of log, {} written",
+            count(self.bytes_logged, "byte"),
+            count(self.blocks_written, "block")
         );
         let (most, capacity) = (self.queue_bytes_max, self.queue_bytes_capacity);
         let _ = writeln!(
@@ -191,7 +193,8 @@ impl Report {
             "queue    {most} of {capacity} bytes at most; card slowest {} ms",
             self.sd_stall_ms_max
         );
-        let _ = writeln!(text, "ground   {} frames, {} bytes", self.gs_frames, self.gs_bytes);
+        let (frames, bytes) = (count(self.gs_frames, "frame"), count(self.gs_bytes, "byte"));
+        let _ = writeln!(text, "ground   {frames}, {bytes}");
         if self.power_cut {
             let _ = writeln!(text, "power    was cut, as asked");
         }

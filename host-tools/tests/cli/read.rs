@@ -1,10 +1,10 @@
 //! Reading: every format, filters, damage and what is no log at all.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use crate::support::{flight, frames, frames_of, json, px4, recorded, run, text};
+use crate::support::{flight, frames, frames_of, json, named, px4, recorded, run, text};
 
 /// A packed log of the PX4 flight.
 fn packed(dir: &Path) {
@@ -45,7 +45,9 @@ fn recorded_times_come_back_to_the_millisecond() {
 fn tables_have_a_row_for_each_frame_and_both_times() {
     let dir = recorded();
     run(dir.path(), "decode card.img -o out --format csv", 0);
-    let table = |name: &str| fs::read_to_string(dir.path().join("out/00001").join(name)).expect(name);
+    let out = dir.path().join("out");
+    let tables = out.join(named(&out, "00001"));
+    let table = |name: &str| fs::read_to_string(tables.join(name)).expect(name);
     let attitude = table("ATTITUDE.csv");
     let mut lines = attitude.lines();
     let header = lines.next().expect("a header");
@@ -113,14 +115,18 @@ fn where_files_go_depends_on_how_many_there_are() {
     run(at, "decode card.img -o one.tlog --format tlog", 0);
     assert!(at.join("one.tlog").is_file());
     run(at, "decode card.img -o both --format tlog,csv", 0);
-    assert!(at.join("both/00001.tlog").is_file() && at.join("both/00001/ATTITUDE.csv").is_file());
+    let name = format!("both/{}", named(&at.join("both"), "00001"));
+    assert!(at.join(format!("{name}.tlog")).is_file() && at.join(name).join("ATTITUDE.csv").is_file());
     run(at, "sim --input PX4 --sd card.img", 0);
     run(at, "decode card.img -o two --format tlog", 0);
-    assert!(at.join("two/00001.tlog").is_file() && at.join("two/00002.tlog").is_file());
+    let tlog = |dir: &str, base: &str, ending: &str| {
+        at.join(dir).join(named(&at.join(dir), base) + ending).is_file()
+    };
+    assert!(tlog("two", "00001", ".tlog") && tlog("two", "00002", ".tlog"));
     run(at, "decode card.img -o - --format tlog", 2);
     run(at, "pack PX4 -o cards.hum", 0);
     run(at, "decode card.img cards.hum -o all --format jsonl", 0);
-    assert!(at.join("all/card/00001.jsonl").is_file() && at.join("all/cards.jsonl").is_file());
+    assert!(tlog("all", "00001", ".jsonl") && tlog("all", "cards", ".jsonl"));
 }
 
 #[test]
@@ -134,14 +140,16 @@ fn a_bit_flipped_in_any_group_costs_that_group_and_is_told() {
         damaged[sector * 512 + 100] ^= 0x04;
         fs::write(dir.path().join("bad.hum"), damaged).expect("written");
         run(dir.path(), "decode bad.hum -o bad --format tlog,csv,jsonl", 3);
-        let back = frames_of(&dir.path().join("bad/bad.tlog"));
+        let made = dir.path().join("bad").join(named(&dir.path().join("bad"), "bad"));
+        let made = |ending: &str| PathBuf::from(format!("{}{ending}", made.display()));
+        let back = frames_of(&made(".tlog"));
         let group = clean.len() * 64 * 512 / log.len() + 500;
         assert!(back.len() + group >= clean.len(), "sector {sector}: {} of {}", back.len(), clean.len());
         let mut rest = clean.iter();
         assert!(back.iter().all(|frame| rest.any(|other| other == frame)), "sector {sector}: a wrong frame");
-        let read = |name: &str| fs::read_to_string(dir.path().join("bad").join(name)).expect(name);
-        assert_eq!(read("bad/HUMS_GAP.csv").lines().count(), 2, "sector {sector}");
-        assert!(read("bad.jsonl").contains("HUMS_GAP"), "sector {sector}");
+        let read = |ending: &str| fs::read_to_string(made(ending)).expect(ending);
+        assert_eq!(read("/HUMS_GAP.csv").lines().count(), 2, "sector {sector}");
+        assert!(read(".jsonl").contains("HUMS_GAP"), "sector {sector}");
         let verify = json(&run(dir.path(), "verify bad.hum --json", 3));
         assert_eq!(verify["ok"], false);
         let info = json(&run(dir.path(), "info bad.hum --json", 3));

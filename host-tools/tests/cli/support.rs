@@ -83,3 +83,28 @@ pub(crate) fn frames(tlog: &[u8]) -> Vec<Vec<u8>> {
 pub(crate) fn frames_of(path: &Path) -> Vec<Vec<u8>> {
     frames(&fs::read(path).expect("a recording"))
 }
+
+/// What the files of the log `base` (`00001`, or a packed log's own name) are called in a directory: that, the box and
+/// the session. There must be one such log.
+#[track_caller]
+pub(crate) fn named(dir: &Path, base: &str) -> String {
+    let names = all_named(dir, base);
+    assert_eq!(names.len(), 1, "{base} in {}: {names:?}", dir.display());
+    names[0].clone()
+}
+
+/// The names of all logs of this base, sorted.
+pub(crate) fn all_named(dir: &Path, base: &str) -> Vec<String> {
+    let entries = fs::read_dir(dir).expect("a directory").map(|entry| entry.expect("an entry").file_name());
+    let mut names: Vec<String> = entries
+        .filter_map(|name| {
+            let name = name.into_string().expect("UTF-8");
+            let session = base.len() + name.get(base.len()..)?.find("-s")?;
+            let end = session + "-s1a2b3c4d".len();
+            (name.starts_with(base) && name.len() >= end).then(|| name[..end].to_owned())
+        })
+        .collect();
+    names.sort();
+    names.dedup();
+    names
+}

@@ -85,21 +85,26 @@ fn fat16_in_fat32() -> Medium {
 
 fn all() -> Vec<(&'static str, Medium, CardState, &'static str)> {
     vec![
-        ("exFAT", exfat(), CardState::ExFat, "exFAT, format it as FAT32"),
-        ("FAT16", partitioned(0x06), CardState::Foreign, "not FAT32, format it"),
+        ("exFAT", exfat(), CardState::ExFat, "exFAT, look at it on a PC"),
+        ("FAT16", partitioned(0x06), CardState::Foreign, "not FAT32, look at it on a PC"),
         ("FAT16 in FAT32", fat16_in_fat32(), CardState::Damaged, "FAT32 is damaged"),
-        ("GPT", partitioned(0xEE), CardState::Foreign, "not FAT32, format it"),
-        ("Linux", partitioned(0x83), CardState::Foreign, "not FAT32, format it"),
-        ("FAT32 without partitions", without_partitions(), CardState::Unpartitioned, "no partition table"),
+        ("GPT", partitioned(0xEE), CardState::Foreign, "not FAT32, look at it on a PC"),
+        ("Linux", partitioned(0x83), CardState::Foreign, "not FAT32, look at it on a PC"),
+        (
+            "FAT32 without partitions",
+            without_partitions(),
+            CardState::Unpartitioned,
+            "unpartitioned, look at it on a PC",
+        ),
         (
             "FAT32 in a partition of everything",
             partition_of_everything(),
             CardState::Unpartitioned,
-            "no partition table",
+            "unpartitioned, look at it on a PC",
         ),
-        ("ext4 without partitions", linux(), CardState::Unpartitioned, "no partition table"),
-        ("empty", Medium::new(128 * MIB), CardState::Unpartitioned, "no partition table"),
-        ("garbage", garbage(), CardState::Unpartitioned, "no partition table"),
+        ("ext4 without partitions", linux(), CardState::Unpartitioned, "unpartitioned, look at it on a PC"),
+        ("empty", Medium::new(128 * MIB), CardState::Unpartitioned, "unpartitioned, look at it on a PC"),
+        ("garbage", garbage(), CardState::Unpartitioned, "unpartitioned, look at it on a PC"),
         ("damaged", damaged(), CardState::Damaged, "FAT32 is damaged"),
     ]
 }

@@ -54,16 +54,17 @@ impl Slot {
     }
 }
 
-/// One STATUSTEXT each. `docs/cards.md` says what to do.
+/// One STATUSTEXT each. `docs/cards.md` says what to do. None advises to format a card: logs may be on it, which only a
+/// look at all of its blocks tells.
 const fn words(state: CardState) -> Option<&'static str> {
     Some(match state {
         CardState::Unknown | CardState::Finished => return None,
         CardState::Recording => "HUMS: card: recording",
         CardState::Absent => "HUMS: card: none found, push one in",
-        CardState::Foreign => "HUMS: card: not FAT32, format it",
-        CardState::ExFat => "HUMS: card: exFAT, format it as FAT32",
-        CardState::Unpartitioned => "HUMS: card: no partition table, format it",
-        CardState::Damaged => "HUMS: card: FAT32 is damaged, copy and format it",
+        CardState::Foreign => "HUMS: card: not FAT32, look at it on a PC",
+        CardState::ExFat => "HUMS: card: exFAT, look at it on a PC",
+        CardState::Unpartitioned => "HUMS: card: unpartitioned, look at it on a PC",
+        CardState::Damaged => "HUMS: card: FAT32 is damaged, copy it on a PC",
         CardState::Full => "HUMS: card: full of other files, delete some",
         CardState::Failing => "HUMS: card: fails, use another one",
         CardState::Locked => "HUMS: card: write protected, use another one",

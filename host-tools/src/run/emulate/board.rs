@@ -16,6 +16,8 @@ const RESETS_MAX: u32 = 16;
 
 /// What stays the same over all starts.
 pub(super) struct Fixed {
+    /// What stands for true randomness at the first start; later ones count on from it.
+    pub(super) entropy: u32,
     pub(super) firmware: PathBuf,
     pub(super) card: PathBuf,
     pub(super) store: PathBuf,
@@ -71,7 +73,7 @@ impl Board {
 
     fn power_on(&mut self, survived: Option<Vec<u8>>) -> Result<()> {
         let Fixed { firmware, card, store, gs, autopilot, costs, provoke, .. } = &self.fixed;
-        let mut arguments = vec![format!("seed={}", self.earlier.starts)];
+        let mut arguments = vec![format!("seed={}", self.fixed.entropy.wrapping_add(self.earlier.starts))];
         // Once, also where power is lost in between.
         arguments.extend(provoke.iter().filter(|_| self.resets == 0).map(|what| format!("provoke={what}")));
         let (gs, autopilot, costs) = (gs.clone(), autopilot.clone(), *costs);

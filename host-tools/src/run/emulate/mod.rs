@@ -17,7 +17,7 @@ use serde::Deserialize;
 use super::qemu;
 use super::report::Report;
 use super::{
-    arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card, store,
+    arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card, salt, store,
 };
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -36,9 +36,9 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     check_flags(run)?;
     check_standard_output(run)?;
     let (speed, live) = pace(run)?;
+    let inputs = paths::inputs(run, None, args.firmware.as_deref())?;
     qemu::check()?;
     let firmware = firmware(args.firmware.as_deref())?;
-    let inputs = paths::inputs(run, None, Some(&firmware))?;
     let params = params::read(run.params.as_deref())?;
     let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
     // The board's flash is a file in any case; without --store it ends with the run.
@@ -52,7 +52,9 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run, &inputs)?;
+    let entropy = salt::salt(run, &mut arrivals)?;
     let mut board = Board::start(Fixed {
+        entropy,
         firmware,
         card: run.sd.clone(),
         store,

@@ -26,7 +26,7 @@ use super::arrivals::Arrivals;
 use super::ground::{self, Ground};
 use super::report::Report;
 use super::store::{self, FileFlash};
-use super::{check_standard_output, drive, pace, params, paths, prepare_card};
+use super::{check_standard_output, drive, pace, params, paths, prepare_card, salt};
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -53,6 +53,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     let earlier = logs::on_card(&run.sd).len();
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
     let (mut ground, gs) = ground::open(run, &inputs)?;
+    let entropy = salt::salt(run, &mut arrivals)?;
     let mut world = World {
         card: &card,
         flash: &flash,
@@ -61,7 +62,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         report: Report::default(),
         reboots: run.faults.reboot_at_us.clone(),
         boots: 0,
-        entropy: run.faults.seed as u32,
+        entropy,
         power_on_us: 0,
         frames_on_card: true,
         overwritten: false,

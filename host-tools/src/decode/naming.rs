@@ -1,0 +1,170 @@
+//! What a session's files are called. A name says whose session it is, so that no other one's files ever have it:
+//! `00042-box3f0042000d51373435363338-s1a2b3c4d` is the card's log 00042 of the board with that unique id, and the session
+//! that its sectors name. What is not known is left out: a packed log has no board.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use hums_blackbox::{Entry, GroupDecoder, Record, Step};
+use hums_recorder::LogName;
+use sha2::{Digest as _, Sha256};
+
+use crate::files::{add_ends, short};
+use crate::logs::Log;
+use crate::logs::groups::Groups;
+
+/// What tells a log from any other, read from its sectors' headers and its first records. Of a card's session it is
+/// the same wherever the card or a copy of it lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traits {
+    /// The session that the sectors name: 32 bits, of which a board makes random ones.
+    session: Option<u32>,
+    /// The board's unique id; none where the log does not begin with the record of its start.
+    board: Option<[u8; 12]>,
+    /// Of every sector's number and checksum: equal of copies only.
+    fingerprint: [u8; 16],
+}
+
+impl Traits {
+    /// Looks at all sectors of a log.
+    pub fn of(log: &Log) -> Result<Self> {
+        let mut groups = Groups::new(log);
+        let mut hash = Sha256::new();
+        let mut board = None;
+        let mut first = true;
+        while let Some(group) = groups.next_group()? {
+            if std::mem::take(&mut first) {
+                board = group.first().and_then(board_of);
+            }
+            for step in &group {
+                hash.update(step.header.number.to_le_bytes());
+                // A sector's last four bytes are its checksum.
+                hash.update(step.sector.bytes().last_chunk::<4>().unwrap_or(&[0; 4]));
+            }
+        }
+        let mut fingerprint = [0; 16];
+        fingerprint.iter_mut().zip(hash.finalize()).for_each(|(to, from)| *to = from);
+        Ok(Self { session: groups.session(), board, fingerprint })
+    }
+
+    /// The name of the log's files.
+    pub fn name(&self, log: &Log) -> String {
+        let mut name = base(log);
+        if let Some(board) = self.board {
+            name.push_str("-box");
+            name.push_str(&hex(&board));
+        }
+        if let Some(session) = self.session {
+            name.push_str(&format!("-s{session:08x}"));
+        }
+        name
+    }
+
+    /// A line for the stamp of a folder that is made of the log.
+    pub fn stamp(&self) -> String {
+        let session = self.session.map_or_else(|| "unknown".to_owned(), |session| format!("s{session:08x}"));
+        format!("hums session {session} sectors {}", hex(&self.fingerprint))
+    }
+}
+
+/// What a log's files are called in one command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Named {
+    /// By this name, and as the so-and-so-many-th log of its session, from 1.
+    As(String, u32),
+    /// Not at all: it is a copy of the log of this index.
+    Copy(usize),
+}
+
+/// Names the logs of one command, in their order. Two that share a session and are no copies of each other get
+/// different names: a copy that was cut short, for instance.
+pub fn names(logs: &[(&Log, Traits)]) -> Vec<Named> {
+    let mut known: BTreeMap<(Option<u32>, [u8; 16]), usize> = BTreeMap::new();
+    let mut of_session: BTreeMap<Option<u32>, u32> = BTreeMap::new();
+    let mut taken: BTreeMap<String, u32> = BTreeMap::new();
+    let name = |(index, (log, traits)): (usize, &(&Log, Traits))| {
+        if let Some(first) = known.get(&(traits.session, traits.fingerprint)) {
+            return Named::Copy(*first);
+        }
+        known.insert((traits.session, traits.fingerprint), index);
+        let count = of_session.entry(traits.session).or_default();
+        *count += 1;
+        let name = traits.name(log);
+        let of_name = taken.entry(name.clone()).or_default();
+        *of_name += 1;
+        Named::As(if *of_name > 1 { format!("{name}-{of_name}") } else { name }, *count)
+    };
+    logs.iter().enumerate().map(name).collect()
+}
+
+/// The name of files that are made of a recording, which is no log of ours: its own name, and what is in it.
+pub fn of_recording(path: &Path) -> Result<String> {
+    let name = path.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy());
+    let mut hash = Sha256::new();
+    add_ends(&mut hash, path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    Ok(format!("{name}-r{}", hex(&short(hash).to_be_bytes())))
+}
+
+/// What a log is called without its identity: its number on the card, or the name of its file.
+fn base(log: &Log) -> String {
+    let file = log.files.first().map_or(log.name.as_str(), String::as_str);
+    let path = Path::new(file);
+    let stem = path.file_stem().map_or_else(|| "log".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let segment = LogName::from_short(stem.to_ascii_uppercase().as_bytes(), b"HUM");
+    segment.map_or(stem, |segment| format!("{:05}", segment.session))
+}
+
+/// The board's unique id, by the record of its start, which is the first of a session.
+fn board_of(first: &Step) -> Option<[u8; 12]> {
+    let mut decoder = Box::new(GroupDecoder::new());
+    decoder.push(&first.header, &first.sector).ok()?;
+    while let Some(Ok(entry)) = decoder.next_entry() {
+        if let Entry::Record { record: Record::Boot(boot), .. } = entry {
+            return Some(boot.uid).filter(|uid| *uid != [0; 12]);
+        }
+    }
+    None
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let mut text = Vec::new();
+    super::text::push_hex(&mut text, bytes);
+    String::from_utf8_lossy(&text).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_are_known_and_other_logs_of_a_session_get_other_names() {
+        let log = |name: &str| Log {
+            name: name.to_owned(),
+            files: vec![format!("somewhere/{name}_00.HUM")],
+            pieces: Vec::new(),
+            session: None,
+        };
+        let traits = |session, fingerprint, board| Traits {
+            session: Some(session),
+            board,
+            fingerprint: [fingerprint; 16],
+        };
+        let (first, second) = (log("00001"), log("00002"));
+        let named = names(&[
+            (&first, traits(0x1a2b_3c4d, 1, None)),
+            (&first, traits(0x1a2b_3c4d, 1, None)),
+            (&first, traits(0x1a2b_3c4d, 2, None)),
+            (&second, traits(5, 3, Some([0x3f; 12]))),
+        ]);
+        assert_eq!(
+            named,
+            [
+                Named::As("00001-s1a2b3c4d".to_owned(), 1),
+                Named::Copy(0),
+                Named::As("00001-s1a2b3c4d-2".to_owned(), 2),
+                Named::As("00002-box3f3f3f3f3f3f3f3f3f3f3f3f-s00000005".to_owned(), 1),
+            ]
+        );
+    }
+}

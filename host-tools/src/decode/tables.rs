@@ -1,0 +1,95 @@
+//! The CSV tables of one log: a folder of files, of which only some are open at once.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+
+use anyhow::Result;
+
+use super::table::Table;
+use super::text::columns;
+use crate::files::{Folder, buffered, settle};
+
+/// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
+const OPEN_MAX: usize = 256;
+
+/// The tables, some of them open.
+pub struct Tables {
+    folder: Folder,
+    open: BTreeMap<Table, BufWriter<File>>,
+    /// Tables that have their header; not all of them are open.
+    begun: BTreeSet<Table>,
+    headers: BTreeMap<&'static str, Vec<&'static str>>,
+}
+
+impl Tables {
+    /// None yet; all of them will be in this folder.
+    pub fn new(folder: Folder) -> Self {
+        Self { folder, open: BTreeMap::new(), begun: BTreeSet::new(), headers: BTreeMap::new() }
+    }
+
+    /// The columns of the monitor's own tables.
+    pub fn headers(&mut self, headers: &BTreeMap<&'static str, Vec<&'static str>>) {
+        for (name, columns) in headers {
+            self.headers.entry(name).or_insert_with(|| columns.clone());
+        }
+    }
+
+    /// Adds lines to a table.
+    pub fn put(&mut self, table: Table, lines: &[u8]) -> Result<()> {
+        let name = format!("{}.csv", table.name());
+        let path = self.folder.path().join(&name);
+        if let Some(file) = self.open.get_mut(&table) {
+            return settle(file.write_all(lines), &path);
+        }
+        let mut file = if self.begun.contains(&table) {
+            buffered(self.folder.file_again(&name)?)
+        } else {
+            let mut file = buffered(self.folder.file(&name)?);
+            let own = match table {
+                Table::Hums(name) => self.headers.get(name).map(Vec::as_slice).unwrap_or_default(),
+                _ => &[],
+            };
+            settle(file.write_all(header(table, own).as_bytes()), &path)?;
+            self.begun.insert(table);
+            file
+        };
+        settle(file.write_all(lines), &path)?;
+        if self.open.len() >= OPEN_MAX
+            && let Some((closed, mut file)) = self.open.pop_last()
+        {
+            settle(file.flush(), &self.folder.path().join(closed.name()))?;
+        }
+        self.open.insert(table, file);
+        Ok(())
+    }
+
+    /// Tables so far.
+    pub fn count(&self) -> usize {
+        self.begun.len()
+    }
+
+    /// All lines are there: the folder gets its name.
+    pub fn finish(mut self) -> Result<()> {
+        for (table, mut file) in std::mem::take(&mut self.open) {
+            settle(file.flush(), &self.folder.path().join(table.name()))?;
+        }
+        self.folder.finish()
+    }
+}
+
+/// A table's first line.
+fn header(table: Table, own: &[&str]) -> String {
+    let mut names: Vec<String> = vec!["time_boot[s]".into(), "time_utc".into()];
+    match table {
+        Table::Hums(_) => names.extend(own.iter().map(|name| (*name).to_owned())),
+        Table::Message(id) => {
+            names.extend(["system".into(), "component".into()]);
+            names.extend(hums_dialect::message(id).map(columns).unwrap_or_default());
+        }
+        Table::Unverified(_) | Table::Unknown(_) => {
+            names.extend(["system", "component", "sequence", "payload"].map(String::from));
+        }
+    }
+    names.join(",") + "\n"
+}

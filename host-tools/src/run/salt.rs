@@ -1,0 +1,37 @@
+//! What stands for a board's true random number: on a board every session has a number of its own; here two recordings
+//! have two, and the same run has the same one again.
+
+use anyhow::{Context as _, Result};
+use sha2::{Digest as _, Sha256};
+
+use super::arrivals::Arrivals;
+use crate::cli::Run;
+use crate::endpoint::Endpoint;
+use crate::files::{add_ends, short};
+
+/// A number that depends on the input, on the parameters and on what is put in the way. What comes live comes once, so it
+/// is random then.
+pub(super) fn salt(run: &Run, arrivals: &mut Arrivals) -> Result<u32> {
+    let mut hash = Sha256::new();
+    hash.update(format!("{:?}", run.faults));
+    if let Some(params) = &run.params {
+        add_ends(&mut hash, params).with_context(|| format!("{}: cannot be read", params.display()))?;
+    }
+    match &run.input {
+        Endpoint::File(path) if path.is_file() => {
+            add_ends(&mut hash, path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        }
+        input if input.is_live() => {
+            let random = getrandom::u64().map_err(|error| anyhow::anyhow!("no random number: {error}"))?;
+            hash.update(random.to_le_bytes());
+        }
+        // A pipe is read once: its first bytes must do.
+        _ => {
+            if let Some(first) = arrivals.next_arrival()? {
+                hash.update(&first.bytes);
+                arrivals.put_back(first);
+            }
+        }
+    }
+    Ok(short(hash))
+}

@@ -1,0 +1,477 @@
+//! What commands may write: never an input, never half a file, never two sessions in one.
+
+use std::fs;
+use std::io::Write as _;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use clap::{Arg, CommandFactory as _};
+use hums::cli::Cli;
+use tempfile::TempDir;
+
+use crate::support::{all_named, attempt, flight, frames_of, named, px4, run, text};
+
+/// What an argument names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// A file or a folder that is only read.
+    Input,
+    /// A file or a folder that is written.
+    Output,
+    /// No file.
+    Other,
+}
+
+/// An argument that is not here fails the test: decide what it names, and the test tries it from then on.
+fn role(arg: &Arg) -> Role {
+    match arg.get_id().as_str() {
+        "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" => Role::Input,
+        "output" | "sd" | "gs" | "tap" | "store" | "dir" => Role::Output,
+        "bucket" | "card_out" | "card_size" | "cut_after_writes" | "cut_store_after" | "dashboard"
+        | "format" | "from" | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token"
+        | "message" | "name" | "names" | "noise" | "org" | "provoke" | "reboot_at_us" | "seed"
+        | "session" | "speed" | "stall" | "to" | "token" | "value" | "write_error" => Role::Other,
+        unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
+    }
+}
+
+/// A good value for an argument, where one is needed.
+fn value(command: &str, arg: &str) -> &'static str {
+    match (command, arg) {
+        ("decode" | "report" | "info" | "verify", "inputs") => "log.hum",
+        (_, "input" | "gs_input") => "flight.tlog",
+        (_, "params") => "hums.param",
+        (_, "key") => "key.txt",
+        (_, "firmware") => "hums.elf",
+        (_, "sd") => "new.img",
+        (_, "output") => "new.out",
+        (_, "format") => "tlog",
+        (_, "link") => "tcp:127.0.0.1:1",
+        (_, "dir") => "new",
+        (_, "name") => "GS_BUDGET",
+        (_, "names") => "GS_BUDGET",
+        (_, "value") => "1",
+        (command, arg) => panic!("hums {command} needs --{arg}: which value is good?"),
+    }
+}
+
+/// A directory with an input of each kind, as a file, through links, and in a folder.
+fn furnished() -> TempDir {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = |name: &str| dir.path().join(name);
+    fs::copy(px4(), at("flight.tlog")).expect("a copy");
+    run(dir.path(), "pack flight.tlog -o log.hum", 0);
+    fs::write(at("hums.param"), "CELL_VOLT_WARN 3.6\n").expect("a file");
+    fs::write(at("key.txt"), "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff\n")
+        .expect("a file");
+    let mut elf = b"\x7fELF".to_vec();
+    elf.resize(64, 0);
+    elf[18] = 40;
+    fs::write(at("hums.elf"), elf).expect("a file");
+    fs::create_dir(at("folder")).expect("a directory");
+    for name in ["flight.tlog", "log.hum", "hums.param", "key.txt", "hums.elf"] {
+        symlink(name, at(&format!("link-{name}"))).expect("a link");
+        fs::hard_link(at(name), at(&format!("hard-{name}"))).expect("a link");
+        fs::copy(at(name), at("folder").join(name)).expect("a copy");
+    }
+    dir
+}
+
+/// The words of a command line: its name, what it requires, and these arguments.
+fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
+    let mut words: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
+    let mut push = |arg: &Arg, value: String| {
+        if let Some(long) = arg.get_long() {
+            words.push(format!("--{long}"));
+        }
+        words.push(value);
+    };
+    for arg in command.get_arguments() {
+        let id = arg.get_id();
+        if let Some((_, value)) = given.iter().find(|(given, _)| given.get_id() == id) {
+            push(arg, value.clone());
+        } else if arg.is_required_set() {
+            push(arg, value(path[0], id.as_str()).to_owned());
+        }
+    }
+    words
+}
+
+/// All commands that do something, with the words that call them.
+fn leaves<'a>(
+    command: &'a clap::Command,
+    path: &[&'a str],
+    found: &mut Vec<(&'a clap::Command, Vec<&'a str>)>,
+) {
+    if command.get_subcommands().next().is_none() {
+        found.push((command, path.to_vec()));
+    }
+    for sub in command.get_subcommands().filter(|sub| sub.get_name() != "help") {
+        let path: Vec<&str> = path.iter().copied().chain([sub.get_name()]).collect();
+        leaves(sub, &path, found);
+    }
+}
+
+/// Everything that a directory has, by name.
+fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    let entries = fs::read_dir(dir).expect("a directory");
+    for path in entries.map(|entry| entry.expect("an entry").path()) {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if path.is_dir() {
+            found
+                .extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            found.push((name, fs::read(&path).expect("a file")));
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn no_command_writes_over_any_of_its_inputs() {
+    let mut root = Cli::command();
+    root.build();
+    let mut commands = Vec::new();
+    leaves(&root, &[], &mut commands);
+    let dir = furnished();
+    let before = contents(dir.path());
+    let mut tried = Vec::new();
+    for (command, path) in &commands {
+        let takes = |arg: &&Arg| arg.get_action().takes_values();
+        let of = |wanted: Role| -> Vec<&Arg> {
+            command.get_arguments().filter(takes).filter(|arg| role(arg) == wanted).collect()
+        };
+        for output in of(Role::Output) {
+            for input in of(Role::Input) {
+                let file = value(path[0], input.get_id().as_str());
+                let spellings = [
+                    file.to_owned(),
+                    format!("./folder/../{file}"),
+                    format!("link-{file}"),
+                    format!("hard-{file}"),
+                ];
+                for spelling in spellings {
+                    let given = [(input, file.to_owned()), (output, spelling)];
+                    refused(dir.path(), &words(command, path, &given), &before);
+                }
+                if input.get_id() == "inputs" {
+                    let given = [(input, "folder".to_owned()), (output, format!("folder/{file}"))];
+                    refused(dir.path(), &words(command, path, &given), &before);
+                }
+                tried.push(format!("{} --{}", path.join(" "), output.get_id()));
+            }
+        }
+    }
+    tried.dedup();
+    for known in ["decode --output", "report --output", "pack --output", "sim --sd", "sim --gs", "sim --tap"]
+    {
+        assert!(tried.iter().any(|tried| tried == known), "{known} is not among {tried:?}");
+    }
+}
+
+#[track_caller]
+fn refused(dir: &Path, words: &[String], before: &[(String, Vec<u8>)]) {
+    let line = words.join(" ");
+    let output = attempt(dir, &line);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(matches!(output.status.code(), Some(1 | 2)), "hums {line}: {:?}\n{said}", output.status);
+    // Nothing was changed, and nothing was left either.
+    let after = contents(dir);
+    for (name, bytes) in before {
+        let kept = after.iter().find(|(other, _)| other == name);
+        assert!(
+            kept.is_some_and(|(_, kept)| kept == bytes),
+            "hums {line}: {name} is not what it was\n{said}"
+        );
+    }
+    for (name, _) in &after {
+        let made = before.iter().all(|(other, _)| other != name);
+        if made {
+            assert!(name.starts_with("new"), "hums {line}: left {name}\n{said}");
+            let _ = fs::remove_file(dir.join(name));
+        }
+    }
+}
+
+#[test]
+fn an_output_into_an_input_folder_replaces_nothing_there() {
+    let dir = furnished();
+    let before = contents(&dir.path().join("folder"));
+    for line in ["decode folder -o folder --format tlog,csv,parquet,thesis", "report folder -o folder/"] {
+        run(dir.path(), line, 0);
+        // And again: what was made is replaced.
+        run(dir.path(), line, 0);
+    }
+    let after = contents(&dir.path().join("folder"));
+    assert!(before.iter().all(|file| after.contains(file)), "every input is what it was");
+    assert!(after.len() > before.len() + 60);
+}
+
+/// Two cards, each with the first session of a vehicle of its own.
+fn two_cards() -> TempDir {
+    let dir = tempfile::tempdir().expect("directory");
+    for (name, recording) in [("c1", "px4_hil_quad_low.tlog"), ("c2", "ap_quad_guided.tlog")] {
+        let recording = flight(recording);
+        let code = attempt(dir.path(), &format!("sim --input {} --sd {name}.img", recording.display()));
+        assert!(code.status.success(), "{name}");
+    }
+    dir
+}
+
+fn parquet_sessions(fleet: &Path) -> Vec<PathBuf> {
+    let mut sessions: Vec<PathBuf> = contents(fleet)
+        .into_iter()
+        .filter_map(|(name, _)| name.strip_suffix("/HEARTBEAT.parquet").map(PathBuf::from))
+        .collect();
+    sessions.sort();
+    sessions
+}
+
+#[test]
+fn two_cards_decoded_into_one_folder_stay_apart() {
+    let dir = two_cards();
+    let formats = "--format tlog,csv,parquet,thesis,jsonl,influx";
+    for card in ["c1", "c2"] {
+        run(dir.path(), &format!("decode {card}.img -o one_by_one {formats}"), 0);
+        run(dir.path(), &format!("decode {card}.img -o {card} --format tlog,csv"), 0);
+    }
+    run(dir.path(), &format!("decode c1.img c2.img -o at_once {formats}"), 0);
+    for folder in ["one_by_one", "at_once"] {
+        let folder = dir.path().join(folder);
+        assert_eq!(all_named(&folder, "00001").len(), 2, "{}", folder.display());
+        assert_eq!(parquet_sessions(&folder).len(), 2, "{}", folder.display());
+        for (card, recording) in [("c1", "px4_hil_quad_low.tlog"), ("c2", "ap_quad_guided.tlog")] {
+            let alone = dir.path().join(card);
+            let name = named(&alone, "00001");
+            assert_eq!(frames_of(&folder.join(format!("{name}.tlog"))), frames_of(&flight(recording)));
+            assert_eq!(
+                contents(&folder.join(&name)),
+                contents(&alone.join(&name)),
+                "{card}: tables of one card"
+            );
+        }
+    }
+    assert_eq!(contents(&dir.path().join("one_by_one")), contents(&dir.path().join("at_once")));
+}
+
+#[test]
+fn a_decoding_replaces_its_own_and_refuses_anothers() {
+    let dir = two_cards();
+    run(dir.path(), "decode c1.img -o out --format csv,tlog", 0);
+    let out = dir.path().join("out");
+    let name = named(&out, "00001");
+    let whole = contents(&out);
+    // Fewer tables than before: none of the others stays.
+    run(dir.path(), "decode c1.img -o out --format csv,tlog --message ATTITUDE", 0);
+    assert!(!out.join(&name).join("VFR_HUD.csv").exists() && out.join(&name).join("ATTITUDE.csv").exists());
+    run(dir.path(), "decode c1.img -o out --format csv,tlog", 0);
+    assert_eq!(contents(&out), whole, "the same again");
+    // A note that somebody put there stays.
+    fs::write(out.join(&name).join("notes.txt"), "mine").expect("written");
+    let said = run(dir.path(), "decode c1.img -o out --format csv", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("notes.txt, which hums did not make"));
+    fs::remove_file(out.join(&name).join("notes.txt")).expect("removed");
+    // Tables of another recording under this name, and a folder that is nobody's.
+    fs::write(out.join(&name).join(".hums"), "hums session s00000000 sectors 00\n").expect("written");
+    let said = run(dir.path(), "decode c1.img -o out --format csv", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("name another output with -o"));
+    fs::remove_file(out.join(&name).join(".hums")).expect("removed");
+    run(dir.path(), "decode c1.img -o out --format csv", 1);
+    assert!(out.join(&name).join("VFR_HUD.csv").exists(), "it is still there");
+}
+
+#[test]
+fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let log = fs::read(dir.path().join("log.hum")).expect("a log");
+    let mut damaged = log.clone();
+    damaged[150 * 512 + 100] ^= 4;
+    fs::write(dir.path().join("log.hum"), damaged).expect("written");
+    run(dir.path(), "decode log.hum -o back.tlog --format tlog", 3);
+    assert!(dir.path().join("back.tlog.gaps.csv").exists());
+    fs::write(dir.path().join("log.hum"), log).expect("written");
+    run(dir.path(), "decode log.hum -o back.tlog --format tlog", 0);
+    assert!(!dir.path().join("back.tlog.gaps.csv").exists());
+}
+
+#[test]
+fn a_time_in_which_there_is_nothing_is_told_and_nothing_is_written() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    for (output, format) in [("out", "csv,tlog,parquet,thesis"), ("out.tlog", "tlog"), ("-", "jsonl")] {
+        let line = format!("decode log.hum -o {output} --format {format} --from 99999");
+        let output = run(dir.path(), &line, 1);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            said.contains("log: nothing of it is within --from and --to: it goes from 0.000 s to "),
+            "{said}"
+        );
+        assert!(text(&output).is_empty());
+    }
+    assert!(!dir.path().join("out.tlog").exists());
+    assert!(all_named(&dir.path().join("out"), "log").is_empty());
+}
+
+/// Files and folders that are not whole.
+fn parts(dir: &Path) -> Vec<String> {
+    contents(dir).into_iter().map(|(name, _)| name).filter(|name| name.contains(".hums-part")).collect()
+}
+
+#[test]
+fn a_full_disk_leaves_the_old_file_or_nothing() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let program = env!("CARGO_BIN_EXE_hums");
+    let tlog = px4().display().to_string();
+    for (line, output) in [
+        ("decode log.hum -o old --format tlog", "old"),
+        ("decode log.hum -o old --format jsonl", "old"),
+        ("report log.hum -o old", "old"),
+        ("pack PX4 -o old", "old"),
+        ("decode log.hum -o new/ --format tlog", "new"),
+        ("decode log.hum -o new --format csv", "new"),
+        ("decode log.hum -o new --format thesis", "new"),
+        ("decode log.hum -o new --format parquet", "new"),
+    ] {
+        fs::write(dir.path().join("old"), "what was there").expect("written");
+        // No file may be longer than 20 KiB: a write beyond that fails as on a full disk.
+        let limited = format!("trap '' XFSZ; ulimit -f 20; exec {program} {}", line.replace("PX4", &tlog));
+        let output_of = Command::new("bash").args(["-c", &limited]).current_dir(dir.path()).output();
+        let ended = output_of.expect("it runs");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
+        assert!(said.contains("cannot be written"), "{line}: {said}");
+        assert_eq!(fs::read(dir.path().join("old")).expect("there"), b"what was there", "{line}");
+        assert_eq!(parts(dir.path()), Vec::<String>::new(), "{line}");
+        if output == "new" {
+            let left =
+                if dir.path().join("new").exists() { contents(&dir.path().join("new")) } else { Vec::new() };
+            assert_eq!(left, Vec::new(), "{line}");
+        }
+    }
+    run(dir.path(), "sim --input PX4 --sd card.img --gs /dev/full", 1);
+}
+
+/// Waits until something is so.
+#[track_caller]
+fn until(what: &str, is: impl Fn() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(30);
+    while !is() {
+        assert!(Instant::now() < limit, "{what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
+    let dir = tempfile::tempdir().expect("directory");
+    let (old, part) = (dir.path().join("old.hum"), dir.path().join(".old.hum.hums-part"));
+    fs::write(&old, "what was there").expect("written");
+    let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
+        .args(["pack", "-", "-o", "old.hum"])
+        .current_dir(dir.path())
+        .stdin(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    let tlog = fs::read(px4()).expect("a recording");
+    let mut input = program.stdin.take().expect("it is piped");
+    input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
+    until("it writes", || part.metadata().is_ok_and(|about| about.len() > 10_000));
+    // While it is written nobody else writes it.
+    let said = run(dir.path(), "pack PX4 -o old.hum", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("another run of hums is writing it"));
+    program.kill().expect("it is ours");
+    program.wait().expect("it is ours");
+    assert_eq!(fs::read(&old).expect("there"), b"what was there");
+    assert!(part.exists());
+    run(dir.path(), "pack PX4 -o old.hum", 0);
+    assert!(!part.exists());
+    run(dir.path(), "verify old.hum", 0);
+}
+
+#[test]
+fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode log.hum -o out --format csv,parquet --message ATTITUDE", 0);
+    let out = dir.path().join("out");
+    let (few, name) = (contents(&out), named(&out, "log"));
+    run(dir.path(), "decode log.hum -o whole --format csv,parquet", 0);
+    let whole = contents(&dir.path().join("whole"));
+    let of = |all: &[(String, Vec<u8>)], start: &str| -> Vec<(String, Vec<u8>)> {
+        let is_of = |file: &&(String, Vec<u8>)| file.0.starts_with(start) && !file.0.contains(".hums-part");
+        all.iter().filter(is_of).cloned().collect()
+    };
+    let mut killed = 0;
+    for after_ms in (0..60).step_by(6) {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
+            .args(["decode", "log.hum", "-o", "out", "--format", "csv,parquet"])
+            .current_dir(dir.path())
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("it runs");
+        std::thread::sleep(Duration::from_millis(after_ms));
+        program.kill().expect("it is ours");
+        killed += u32::from(!program.wait().expect("it is ours").success());
+        let now = contents(&out);
+        for tables in [format!("{name}/"), "vehicle=".to_owned()] {
+            let found = of(&now, &tables);
+            assert!(
+                found == of(&few, &tables) || found == of(&whole, &tables),
+                "{tables} after {after_ms} ms: {:?}",
+                found.iter().map(|(name, bytes)| (name, bytes.len())).collect::<Vec<_>>()
+            );
+        }
+    }
+    assert!(killed > 0);
+    run(dir.path(), "decode log.hum -o out --format csv,parquet", 0);
+    assert_eq!(contents(&out), whole, "and nothing of the killed runs is left");
+}
+
+#[test]
+fn a_demo_removes_nobodys_card() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("card.img"), "evidence").expect("written");
+    let said = run(dir.path(), "demo --input PX4 --dir . --dashboard never", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("no demo made it"));
+    assert_eq!(fs::read(dir.path().join("card.img")).expect("there"), b"evidence");
+}
+
+/// Where files may be made, emptied, renamed or removed besides `files/`, and why.
+const MAY_WRITE: [(&str, &str); 4] = [
+    ("card/image.rs", "a simulated card's image is updated in place, as a card is"),
+    ("run/store.rs", "the simulated board's flash is updated in place, as flash is"),
+    ("run/qemu/mod.rs", "files in a temporary directory of its own"),
+    ("talk/pull.rs", "not moved to `Output` yet"),
+];
+
+#[test]
+fn one_place_makes_files() {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    for (name, bytes) in contents(&sources).into_iter().filter(|(name, _)| name.ends_with(".rs")) {
+        let source = String::from_utf8(bytes).expect("UTF-8");
+        // Tests may do what they like.
+        let source = source.split("#[cfg(test)]").next().unwrap_or_default();
+        let calls = [
+            "File::create",
+            "File::options",
+            "OpenOptions::new",
+            "fs::write",
+            "fs::rename",
+            "fs::copy",
+            "fs::remove",
+            "fs::hard_link",
+        ];
+        let writes = calls.iter().any(|call| source.contains(call));
+        if writes && !name.starts_with("files/") && !MAY_WRITE.iter().any(|(file, _)| *file == name) {
+            found.push(name);
+        }
+    }
+    assert_eq!(found, Vec::<String>::new(), "use `files::Output`, or say here why not");
+}
