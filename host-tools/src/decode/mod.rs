@@ -43,6 +43,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::{Result, bail};
+use hums_core::time::Instant;
 
 use crate::cli;
 use crate::files::{Folder, Held, Inputs, says_directory};
@@ -284,7 +285,7 @@ impl Task<'_> {
 
 /// Says that nothing of a log is in the time that was asked for, and what time it has.
 fn nothing_of(log: &Log, summary: &Summary) -> String {
-    let seconds = |at: Option<hums_core::time::Instant>| at.map_or(0.0, |at| at.as_secs_f64());
+    let seconds = |at: Option<Instant>| at.map_or(0.0, Instant::as_secs_f64);
     format!(
         "{}: nothing of it is within --from and --to: it goes from {:.3} s to {:.3} s",
         log.name,
@@ -306,8 +307,9 @@ fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32, stamp: &str) -> Pa
     let held = |path: &PathBuf| Folder::held(path, stamp);
     let own = (1..).map(numbered).take_while(|path| held(path) != Held::Nothing);
     let mut own = own.filter(|path| held(path) == Held::TheSame);
-    let free = (nth..).map(numbered).find(|path| held(path) == Held::Nothing && !taken.contains(path));
-    let claimed = own.next().or(free).unwrap_or_else(|| dir.to_owned());
+    let is_free = |path: &PathBuf| held(path) == Held::Nothing && !taken.contains(path);
+    let free = || (nth..u32::MAX).map(numbered).find(is_free);
+    let claimed = own.next().or_else(free).unwrap_or_else(|| dir.to_owned());
     taken.insert(claimed.clone());
     claimed
 }

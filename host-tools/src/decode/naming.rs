@@ -56,7 +56,8 @@ impl Traits {
             name.push_str(&hex(&board));
         }
         if let Some(session) = self.session {
-            name.push_str(&format!("-s{session:08x}"));
+            name.push_str("-s");
+            name.push_str(&hex(&session.to_be_bytes()));
         }
         name
     }

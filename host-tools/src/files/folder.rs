@@ -74,9 +74,8 @@ impl Folder {
     pub fn held(path: &Path, stamp: &str) -> Held {
         match stamp_of(path) {
             Some(held) if held == stamp => Held::TheSame,
-            Some(_) => Held::Other,
             None if is_free(path) => Held::Nothing,
-            None => Held::Other,
+            _ => Held::Other,
         }
     }
 

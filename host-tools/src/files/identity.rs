@@ -23,21 +23,26 @@ type Node = (u64, u64);
 type Node = PathBuf;
 
 #[cfg(unix)]
-fn node(_: &Path, about: &fs::Metadata) -> io::Result<Node> {
+fn node(path: &Path) -> io::Result<Node> {
+    fs::metadata(path).map(|about| node_of(&about))
+}
+
+#[cfg(unix)]
+fn node_of(about: &fs::Metadata) -> Node {
     use std::os::unix::fs::MetadataExt as _;
-    Ok((about.dev(), about.ino()))
+    (about.dev(), about.ino())
 }
 
 #[cfg(not(unix))]
-fn node(path: &Path, _: &fs::Metadata) -> io::Result<Node> {
+fn node(path: &Path) -> io::Result<Node> {
     path.canonicalize()
 }
 
 impl FileId {
     /// The identity of what `path` means. Links are followed, also one to a file that is not there yet.
     pub fn of(path: &Path) -> io::Result<Self> {
-        match fs::metadata(path) {
-            Ok(about) => node(path, &about).map(Self::Existing),
+        match node(path) {
+            Ok(node) => Ok(Self::Existing(node)),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self::Place(place(path)?)),
             Err(error) => Err(error),
         }
@@ -58,7 +63,7 @@ impl FileId {
 fn standard(stream: impl std::os::fd::AsFd) -> Option<FileId> {
     let file = fs::File::from(stream.as_fd().try_clone_to_owned().ok()?);
     let about = file.metadata().ok().filter(fs::Metadata::is_file)?;
-    node(Path::new(""), &about).ok().map(FileId::Existing)
+    Some(FileId::Existing(node_of(&about)))
 }
 
 #[cfg(not(unix))]

@@ -32,9 +32,8 @@ pub(super) fn part_of(target: &Path) -> Result<PathBuf> {
 /// Takes the lock, which its owner keeps for as long as the file is open; whoever writes already is told of.
 pub(super) fn lock(file: &File, target: &Path) -> Result<()> {
     match file.try_lock() {
-        Ok(()) => Ok(()),
-        // A file system without locks: then nothing tells two runs apart.
-        Err(TryLockError::Error(_)) => Ok(()),
+        // On a file system without locks nothing tells two runs apart.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
         Err(TryLockError::WouldBlock) => {
             bail!(
                 "{}: another run of hums is writing it; wait for its end, or name another output",

@@ -24,7 +24,7 @@ fn a_file_is_the_old_one_until_the_new_one_is_whole() {
     let dir = furnished();
     let path = dir.path().join("old");
     let mut output = Output::create(&path, &Inputs::none()).expect("created");
-    output.write_all(&[b'x'; 100_000]).expect("written");
+    output.write_all(&vec![b'x'; 100_000]).expect("written");
     assert_eq!(fs::read(&path).expect("there"), b"what was there");
     drop(output);
     assert_eq!(names(dir.path()), ["old"], "what was dropped before its end leaves nothing");
@@ -146,7 +146,10 @@ fn a_folder_replaces_its_own_and_nothing_else() {
     drop(dropped);
     assert_eq!((table(&path), names(dir.path())), ("first".to_owned(), vec!["old".into(), "session".into()]));
     made(&path, "one", "second");
-    assert_eq!((table(&path), names(dir.path())), ("second".to_owned(), vec!["old".into(), "session".into()]));
+    assert_eq!(
+        (table(&path), names(dir.path())),
+        ("second".to_owned(), vec!["old".into(), "session".into()])
+    );
     let refused = Folder::create(&path, &Inputs::none(), "two").expect_err("another's").to_string();
     assert!(refused.contains("another recording"), "{refused}");
     fs::create_dir(dir.path().join("mine")).expect("made");
