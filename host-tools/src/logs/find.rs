@@ -13,6 +13,7 @@ use hums_recorder::layout::Layout;
 use super::fat::{CardFile, Extent, Volume};
 use super::places::{BLOCK_BYTES, Blocks, Log, Piece};
 use crate::card::ReadOnlyImage;
+use crate::files::is_part;
 use crate::mavlink::frame::{Peek, peek};
 
 /// Directories deeper than this are not walked: a loop of links would never end.
@@ -177,7 +178,8 @@ fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result<()> {
             .with_context(context)?;
         paths.sort();
         let mut sessions: BTreeMap<u32, Vec<(LogName, PathBuf)>> = BTreeMap::new();
-        for path in paths {
+        // What a run of this program has not made whole is nobody's log.
+        for path in paths.into_iter().filter(|path| !is_part(path)) {
             if path.is_dir() {
                 if depth < DEPTH_MAX {
                     waiting.push((path, depth + 1));
