@@ -88,7 +88,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
         messages
             .filter(|message| message["name"] == "ATTITUDE")
             .filter_map(|message| message["frames"].as_u64())
-            .sum()
+            .sum::<u64>()
     };
     let expected: u64 = logs.iter().map(attitude).sum();
     assert_eq!(printed.len(), 2, "{printed:?}");
