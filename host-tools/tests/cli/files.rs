@@ -28,11 +28,13 @@ enum Role {
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
         "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" => Role::Input,
-        "output" | "sd" | "gs" | "tap" | "store" | "dir" => Role::Output,
+        "output" | "sd" | "gs" | "tap" | "store" | "dir" | "spool" => Role::Output,
         "bucket" | "card_out" | "card_size" | "cut_after_writes" | "cut_store_after" | "dashboard"
         | "format" | "from" | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token"
         | "message" | "name" | "names" | "noise" | "org" | "provoke" | "reboot_at_us" | "seed"
-        | "session" | "speed" | "stall" | "to" | "token" | "value" | "write_error" => Role::Other,
+        | "session" | "speed" | "spool_limit" | "stall" | "to" | "token" | "value" | "write_error" => {
+            Role::Other
+        }
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
@@ -80,6 +82,7 @@ fn furnished() -> TempDir {
 
 /// The words of a command line: its name, what it requires, and these arguments.
 fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
+    let mut words_more = Vec::new();
     let mut words: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
     let mut push = |arg: &Arg, value: String| {
         if let Some(long) = arg.get_long() {
@@ -91,10 +94,15 @@ fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Ve
         let id = arg.get_id();
         if let Some((_, value)) = given.iter().find(|(given, _)| given.get_id() == id) {
             push(arg, value.clone());
+            if id == "spool" {
+                // Only with a database do points wait.
+                words_more = ["--influx", "http://127.0.0.1:9"].map(String::from).to_vec();
+            }
         } else if arg.is_required_set() {
             push(arg, value(path[0], id.as_str()).to_owned());
         }
     }
+    words.extend(words_more);
     words
 }
 
@@ -446,7 +454,10 @@ const MAY_WRITE: [(&str, &str); 4] = [
     ("card/image.rs", "a simulated card's image is updated in place, as a card is"),
     ("run/store.rs", "the simulated board's flash is updated in place, as flash is"),
     ("run/qemu/mod.rs", "files in a temporary directory of its own"),
-    ("talk/pull.rs", "not moved to `Output` yet"),
+    (
+        "live/influx/spool.rs",
+        "a queue that outlives the program, in place; it takes a file of its own kind only",
+    ),
 ];
 
 fn is_rust(name: &str) -> bool {
