@@ -3,7 +3,7 @@
 use hums_blackbox::SECTOR_BYTES;
 use hums_recorder::LogName;
 
-use crate::{dataflash, page};
+use crate::{dataflash, page, ulog};
 
 /// Each with its target and its name.
 pub fn inputs() -> Vec<(&'static str, &'static str, Vec<u8>)> {
@@ -36,6 +36,7 @@ pub fn inputs() -> Vec<(&'static str, &'static str, Vec<u8>)> {
             "pieces",
             (0..60_u8).flat_map(|at| [9, at, at, 0, 0, 0, 0, 2, 3, 81, 4, at % 7]).collect(),
         ),
+        ("ulog", "topics", ulog::log()),
     ]
 }
 

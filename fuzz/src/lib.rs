@@ -32,6 +32,7 @@ pub mod page;
 pub mod reader;
 pub mod recording;
 pub mod round_trip;
+pub mod ulog;
 
 /// A fuzz target.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +58,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "reader", bytes_max: 16_384, rounds: 500, check: reader::check },
     Target { name: "recording", bytes_max: 16_384, rounds: 500, check: recording::check },
     Target { name: "round_trip", bytes_max: 8_192, rounds: 500, check: round_trip::check },
+    Target { name: "ulog", bytes_max: 16_384, rounds: 1_000, check: ulog::check },
 ];
 
 /// The target of this name.

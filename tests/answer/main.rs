@@ -9,3 +9,5 @@ mod dataflash;
 mod fleet;
 #[cfg(feature = "oracle")]
 mod readback;
+#[cfg(feature = "oracle")]
+mod ulog;

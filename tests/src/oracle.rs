@@ -51,6 +51,11 @@ pub fn readback(recording: &Path, out: &Path) -> Value {
     json(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
 }
 
+/// Compares what was read of a PX4 log with what pyulog reads: see `tests/oracle/ulog.py`.
+pub fn ulog(log: &Path, folder: &Path) -> Value {
+    json(&run("ulog.py", &[log.to_owned(), folder.to_owned()]))
+}
+
 /// Decodes a log to `tlog` or `jsonl` by the format document alone: see `tests/oracle/hums_log`.
 pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
     outcome("hums_log", &[PathBuf::from("--format"), PathBuf::from(format), log.to_owned()]).stdout

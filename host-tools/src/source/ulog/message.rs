@@ -197,7 +197,7 @@ impl Parser<'_> {
             let known = rest
                 .get(HEADER_BYTES..HEADER_BYTES + 2)
                 .filter(|_| kind == b'D')
-                .and_then(|id| (self.fits)(u16::from_le_bytes(id.try_into().ok()?), bytes - 2));
+                .and_then(|id| (self.fits)(u16::from_le_bytes(id.try_into().ok()?), bytes.checked_sub(2)?));
             could_be(kind, bytes) && known != Some(false)
         })
     }

@@ -130,6 +130,13 @@ fn kinds_of_messages_that_are_newer_than_this_reader_are_skipped() {
 }
 
 #[test]
+fn a_message_of_data_that_is_shorter_than_its_number_is_damage() {
+    let read = read(&small().dropout(20).message(b'D', &[&[0]]).sync().bytes);
+    assert_eq!((read.of("row position").len(), read.gaps.len()), (20, 1), "{:?}", read.gaps);
+    assert_eq!(read.gaps[0].cause, Cause::Damaged);
+}
+
+#[test]
 fn a_subscription_that_is_removed_frees_its_number() {
     let log = small().message(b'R', &[&0_u16.to_le_bytes()]).subscribe(0, 2, "position");
     let read = read(&log.data(0, 4 * SECOND, &position(5.0, 5)).bytes);

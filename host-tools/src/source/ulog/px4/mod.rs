@@ -13,6 +13,8 @@ mod power;
 mod receivers;
 mod state;
 mod system;
+#[cfg(test)]
+mod tests;
 
 use hums_core::time::Instant;
 

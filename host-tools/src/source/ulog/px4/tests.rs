@@ -1,0 +1,163 @@
+//! What topics of several versions become.
+
+use crate::source::ulog::testing::{Read, Writer, read};
+
+const SECOND: u64 = 1_000_000;
+
+/// A topic with messages, each with its time in seconds.
+fn log(topics: &[(&str, &str, &[(u64, Vec<u8>)])]) -> Read {
+    let mut writer = Writer::new(SECOND);
+    for (name, fields, _) in topics {
+        writer = writer.format(&format!("{name}:uint64_t timestamp;{fields}"));
+    }
+    for (id, (name, ..)) in topics.iter().enumerate() {
+        writer = writer.subscribe(id as u16, 0, name);
+    }
+    let of = |(id, topic): (usize, &(_, _, &[(u64, Vec<u8>)]))| {
+        let messages = topic.2.iter().map(move |(second, data)| (*second, id as u16, data.clone()));
+        messages.collect::<Vec<_>>()
+    };
+    let mut messages: Vec<(u64, u16, Vec<u8>)> = topics.iter().enumerate().flat_map(of).collect();
+    messages.sort_by_key(|(second, ..)| *second);
+    for (second, id, data) in messages {
+        writer = writer.data(id, second * SECOND, &data);
+    }
+    read(&writer.bytes)
+}
+
+fn observations(read: &Read, kind: &str) -> Vec<String> {
+    let of = |text: &&str| text.strip_prefix("1: ").is_some_and(|text| text.starts_with(kind));
+    read.of("observation").into_iter().filter(of).map(str::to_owned).collect()
+}
+
+const STATUS: &str = "uint8_t arming_state;uint8_t nav_state;bool failsafe;uint8_t system_type;";
+
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+#[test]
+fn a_position_is_the_same_in_the_names_and_scales_of_all_versions() {
+    let old = [
+        &474_000_000_i32.to_le_bytes()[..],
+        &85_000_000_i32.to_le_bytes(),
+        &488_000_i32.to_le_bytes(),
+        &[3, 14],
+    ]
+    .concat();
+    let new =
+        [&47.4_f64.to_le_bytes()[..], &8.5_f64.to_le_bytes(), &488.0_f64.to_le_bytes(), &[3, 14]].concat();
+    let end = "uint8_t fix_type;uint8_t satellites_used;";
+    let of = |name, fields: &str, data| {
+        let read = log(&[(name, &format!("{fields}{end}"), &[(2, data)])]);
+        observations(&read, "Gnss(")
+    };
+    let old = of("vehicle_gps_position", "int32_t lat;int32_t lon;int32_t alt;", old);
+    let new = of("sensor_gps", "double latitude_deg;double longitude_deg;double altitude_msl_m;", new);
+    assert_eq!(old, new);
+    assert!(
+        old[0].contains("latitude_deg: 47.4, longitude_deg: 8.5") && old[0].contains("Metres(488.0)"),
+        "{old:?}"
+    );
+    assert!(old[0].contains("satellites: Some(14)") && old[0].contains("fix: 3"), "{old:?}");
+}
+
+#[test]
+fn the_state_is_what_the_heartbeat_would_say() {
+    let armed_with = |topic: &str, field: &str, data: [u8; 4]| {
+        let read = log(&[
+            (topic, &format!("bool {field};"), &[(2, vec![1])]),
+            ("vehicle_status", STATUS, &[(2, vec![1, 4, 0, 2]), (3, data.to_vec())]),
+        ]);
+        let last = observations(&read, "Heartbeat(").last().cloned().expect("a heartbeat");
+        let state = last.split("state: ").nth(1).and_then(|rest| rest.split(',').next()).map(str::to_owned);
+        (last.contains("armed: true"), state.expect("a state"))
+    };
+    assert_eq!(armed_with("nothing", "x", [1, 4, 0, 2]), (false, "3".to_owned()));
+    assert_eq!(armed_with("nothing", "x", [2, 4, 0, 2]), (true, "4".to_owned()));
+    assert_eq!(armed_with("nothing", "x", [2, 4, 1, 2]), (true, "5".to_owned()), "failsafe");
+    assert_eq!(armed_with("nothing", "x", [2, 13, 0, 2]), (true, "8".to_owned()), "termination");
+    assert_eq!(
+        armed_with("actuator_armed", "manual_lockdown", [2, 4, 0, 2]),
+        (true, "8".to_owned()),
+        "until v1.16"
+    );
+    assert_eq!(armed_with("actuator_armed", "kill", [2, 4, 0, 2]), (true, "8".to_owned()), "since v1.17");
+}
+
+#[test]
+fn a_mode_is_told_when_it_changes_with_the_number_that_mavlink_has() {
+    let read = log(&[(
+        "vehicle_status",
+        STATUS,
+        &[(2, vec![2, 4, 0, 2]), (3, vec![2, 4, 0, 2]), (4, vec![2, 18, 0, 2])],
+    )]);
+    assert_eq!(read.of("mode"), ["50593792 Hold", "100925440 Land"]);
+}
+
+#[test]
+fn a_battery_without_cells_has_the_voltage_of_the_whole_and_unknown_is_not_minus_one() {
+    let fields = "float voltage_v;float current_a;float remaining;float discharged_mah;bool connected;uint8_t cell_count;float[4] voltage_cell_v;";
+    let whole = |cells: [f32; 4]| {
+        let data = [floats(&[15.5, -1.0, 0.87, -1.0]), vec![1, 4], floats(&cells)].concat();
+        observations(&log(&[("battery_status", fields, &[(2, data)])]), "Battery(").remove(0)
+    };
+    let without = whole([0.0; 4]);
+    assert!(without.contains("voltage: Some(Volts(15.5)), current: None, consumed: None"), "{without}");
+    assert!(without.contains("cells: [None"), "{without}");
+    let with = whole([3.5, 3.75, 4.0, 4.0]);
+    assert!(
+        with.contains(
+            "cells: [Some(Volts(3.5)), Some(Volts(3.75)), Some(Volts(4.0)), Some(Volts(4.0)), None"
+        ),
+        "{with}"
+    );
+    assert!(with.contains("voltage: Some(Volts(15.25))"), "{with}");
+}
+
+#[test]
+fn a_receiver_that_falls_silent_has_no_fix_any_more_but_not_after_a_dropout() {
+    let messages: Vec<(u64, Vec<u8>)> = (2..20).map(|second| (second, vec![2, 4, 0, 2])).collect();
+    let read = log(&[
+        ("vehicle_status", STATUS, &messages),
+        ("sensor_gps", "uint8_t fix_type;", &[(2, vec![3]), (3, vec![3])]),
+    ]);
+    let fixes = observations(&read, "Gnss(");
+    assert!(fixes.len() > 10 && fixes[2..].iter().all(|gnss| gnss.contains("fix: 0")), "{fixes:?}");
+    let first = read.items.iter().find(|(_, item)| item.contains("Gnss(") && item.contains("fix: 0"));
+    assert_eq!(first.map(|(at, _)| *at), Some(6 * SECOND));
+}
+
+#[test]
+fn an_escs_temperature_in_kelvin_is_not_a_fire() {
+    let fields = "uint8_t esc_count;esc_report[2] esc;";
+    let report = |rpm: i32, temperature: f32| [&rpm.to_le_bytes()[..], &temperature.to_le_bytes()].concat();
+    let data = [vec![2], report(5_000, 295.15), report(0, 40.0)].concat();
+    let log = Writer::new(SECOND)
+        .format("esc_report:int32_t esc_rpm;float esc_temperature;")
+        .format(&format!("esc_status:uint64_t timestamp;{fields}"))
+        .subscribe(0, 0, "esc_status")
+        .data(0, 2 * SECOND, &data);
+    let escs = observations(&read(&log.bytes), "Escs(");
+    assert!(escs[0].contains("rpm: Some(Rpm(5000.0))") && escs[0].contains("Celsius(22"), "{escs:?}");
+    assert!(escs[0].contains("rpm: None") && escs[0].contains("Celsius(40.0)"), "{escs:?}");
+}
+
+#[test]
+fn an_attitude_is_that_of_its_quaternion_and_fast_topics_are_thinned() {
+    let half = 0.5_f32.sqrt();
+    let mut log = Writer::new(SECOND).format("vehicle_attitude:uint64_t timestamp;float[4] q;").subscribe(
+        0,
+        0,
+        "vehicle_attitude",
+    );
+    for step in 0..100 {
+        log = log.data(0, 2 * SECOND + step * 4_000, &floats(&[half, half, 0.0, 0.0]));
+    }
+    let attitudes = observations(&read(&log.bytes), "Attitude(");
+    assert_eq!(attitudes.len(), 8);
+    assert!(
+        attitudes[0].contains("roll: Radians(1.57") && attitudes[0].contains("boot_ms: Some(2000)"),
+        "{attitudes:?}"
+    );
+}

@@ -1,0 +1,69 @@
+//! PX4's logs, field by field, against pyulog.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+
+use hums::source::item::{Cause, Item, Rows, Value, Want};
+use hums::source::recording::Place;
+use hums_tests::{flights, oracle};
+use serde_json::json;
+
+#[test]
+fn every_field_of_a_px4_log_is_what_pyulog_reads() {
+    let log = flights::root().join("tests/labelled/px4/p23_motor_dead_quad.cut.ulg.gz");
+    let folder = tempfile::tempdir().unwrap();
+    write(&log, folder.path());
+    let result = oracle::ulog(&log, folder.path());
+    assert_eq!(result["wrong"], json!([]), "{result}");
+    assert!(result["topics"].as_u64() > Some(20) && result["values"].as_u64() > Some(200_000), "{result}");
+    assert!(result["parameters"].as_u64() > Some(800) && result["texts"].as_u64() > Some(5), "{result}");
+}
+
+/// What hums reads, as the script takes it: see `tests/oracle/ulog.py`.
+fn write(log: &Path, folder: &Path) {
+    let mut tables: BTreeMap<String, (Vec<String>, BufWriter<File>)> = BTreeMap::new();
+    let (mut parameters, mut texts, mut dropouts) = (BTreeMap::new(), Vec::new(), Vec::new());
+    let want = Want { frames: false, observations: false, rows: Rows::All };
+    let take = &mut |_, item: Item<'_>| {
+        match item {
+            Item::Row(row) => {
+                let name = &row.table.name;
+                let (_, out) = tables.entry(name.clone()).or_insert_with(|| {
+                    let columns = row.table.columns.iter().map(|column| column.name.clone()).collect();
+                    (columns, BufWriter::new(File::create(folder.join(format!("{name}.bin"))).unwrap()))
+                });
+                row.values.iter().try_for_each(|value| out.write_all(&bits(value).to_le_bytes()))?;
+            }
+            Item::Parameter(parameter) => {
+                parameters.insert(parameter.name.to_owned(), parameter.value);
+            }
+            Item::Text(text) => texts.push(text.words.to_owned()),
+            Item::Gap(gap) => {
+                assert_eq!(gap.cause, Cause::Lost, "{gap:?}");
+                dropouts.push(gap.to.zip(gap.from).map_or(0, |(to, from)| to.since(from).as_millis()));
+            }
+            _ => {}
+        }
+        Ok(())
+    };
+    Place::file(log).open().unwrap().read(want, take).unwrap();
+    let columns: BTreeMap<&String, &Vec<String>> =
+        tables.iter().map(|(name, (columns, _))| (name, columns)).collect();
+    fs::write(folder.join("tables.json"), json!(columns).to_string()).unwrap();
+    let rest = json!({ "parameters": parameters, "texts": texts, "dropouts": dropouts });
+    fs::write(folder.join("rest.json"), rest.to_string()).unwrap();
+    tables.values_mut().for_each(|(_, out)| out.flush().unwrap());
+}
+
+fn bits(value: &Value<'_>) -> u64 {
+    match *value {
+        Value::Unknown | Value::Text(_) => 0,
+        Value::Unsigned(number) => number,
+        Value::Signed(number) => number as u64,
+        Value::Single(number) => u64::from(number.to_bits()),
+        Value::Double(number) => number.to_bits(),
+        Value::Flag(flag) => u64::from(flag),
+    }
+}
