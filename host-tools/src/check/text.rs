@@ -12,6 +12,7 @@ use super::Checked;
 use super::judge::{Judged, JudgedBy};
 use super::problem::Problem;
 use crate::names::{autopilot_name, type_name};
+use crate::plural::count;
 use crate::source::item::{About, Cause};
 use crate::utc::iso8601;
 
@@ -117,8 +118,8 @@ impl Table {
     }
 }
 
-fn logs(count: u64) -> String {
-    if count == 1 { "1 log".to_owned() } else { format!("{count} logs") }
+fn logs(number: u64) -> String {
+    count(number, "log")
 }
 
 fn vehicle(judged: &Judged) -> String {

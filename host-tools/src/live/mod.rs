@@ -55,6 +55,7 @@ use crate::files::Inputs;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
 use crate::output;
+use crate::plural::count;
 
 /// Runs `hums live`.
 pub fn run(args: &cli::Live) -> Result<Outcome> {
@@ -137,8 +138,8 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, PathBuf)>> {
     let path = spool.path().to_owned();
     if spool.points() > 0 {
         eprintln!(
-            "hums: {} points of an earlier run wait in {}: they go first",
-            spool.points(),
+            "hums: of an earlier run, and written first: {} in {}",
+            count(spool.points(), "point"),
             path.display()
         );
     }
@@ -152,10 +153,11 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, PathBuf)>> {
 fn finish(influx: Influx, spool: &Path) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
-    eprintln!("{} points written", figures.written);
+    eprintln!("{} written", count(figures.written, "point"));
     if missing > 0 {
         let why = if figures.trouble.is_empty() { String::new() } else { format!(": {}", figures.trouble) };
-        eprintln!("{missing} points are not in the database{why}");
+        let are = if missing == 1 { "is" } else { "are" };
+        eprintln!("{} {are} not in the database{why}", count(missing, "point"));
         if figures.rejected > 0 {
             eprintln!("  {} refused by the database: {}", figures.rejected, figures.refusal);
         }

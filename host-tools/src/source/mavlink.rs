@@ -13,6 +13,7 @@ use super::stream::Source as _;
 use super::timeline::Timeline;
 use super::tlog::{Record, Records, TIME_BYTES, UTC_US_MIN};
 use crate::names::message_name;
+use crate::plural::count;
 
 /// Ids below this are counted in a table; above it lie few messages, and hostile ones are bounded by [`IDS_MAX`].
 const NEAR: usize = 1024;
@@ -89,7 +90,7 @@ impl Reader for TlogReader {
                     bytes
                 }
                 Record::Noise(bytes) => {
-                    let words = format!("{} bytes belong to no record of the tlog", bytes.len());
+                    let words = format!("of no record of the tlog: {}", count(bytes.len(), "byte"));
                     take(now, Item::Gap(&gap(now, Cause::Damaged, place, bytes.len(), words)))?;
                     bytes
                 }
@@ -134,7 +135,7 @@ impl Reader for RawReader {
         let noise = framer.counts().bytes_not_frames;
         if noise > 0 {
             // Noise on the line and damage of the file look alike here.
-            let words = format!("{noise} bytes belong to no frame: noise on the line");
+            let words = format!("of no frame, noise on the line: {}", count(noise, "byte"));
             let lost = Gap {
                 from: Some(Instant::ZERO),
                 to: Some(now),

@@ -11,6 +11,7 @@ use std::io::{self, Read};
 
 use super::stream::{Chunk, Source, read_some};
 use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
+use crate::plural::count;
 
 pub(super) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
@@ -192,10 +193,8 @@ impl<R: Read + Send> Source for Tlog<R> {
     fn remark(&self) -> Option<String> {
         let mut said = Vec::new();
         if self.noise_bytes > 0 {
-            said.push(format!(
-                "{} bytes of the tlog belong to no record; they arrive as noise",
-                self.noise_bytes
-            ));
+            let bytes = count(self.noise_bytes, "byte");
+            said.push(format!("of no record of the tlog, and arriving as noise: {bytes}"));
         }
         if self.arrival.jumps > 0 {
             said.push(format!(
