@@ -97,7 +97,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
         "{expected}: {}",
         printed[0]
     );
-    assert_eq!(printed[1].matches("'s").count(), 3, "a row for each session: {}", printed[1]);
+    assert_eq!(printed[1].matches("('").count(), 3, "a row for each session: {}", printed[1]);
 
     let recorders = rows(&results, "How the recorders did");
     let frames: u64 = recorders.iter().map(|row| row["frames_in"].as_u64().unwrap()).sum();
