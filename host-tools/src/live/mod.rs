@@ -109,10 +109,7 @@ fn follow(
         thread.spawn(move || Ok(feed.run()))
     } else {
         let opened = recording::open(&args.input, args.session.as_deref())?;
-        let name = match &opened {
-            recording::Opened::Log(log) => format!("{}, session {}", args.input, log.name),
-            recording::Opened::Stream(..) => args.input.to_string(),
-        };
+        let name = opened.name.clone();
         let player = Player::new(&name, limits.clone(), hub, commands, influx);
         thread.spawn(move || player.run(opened))
     };
