@@ -31,6 +31,11 @@ pub struct Text {
 }
 
 impl Text {
+    /// A text that is whole.
+    pub fn whole(at: Instant, source: Source, severity: u8, words: &str) -> Self {
+        Self { at, source, severity, words: words.to_owned(), id: 0, ends: true }
+    }
+
     /// The level of a finding as grave as this.
     pub fn level(&self) -> &'static str {
         level(self.severity)

@@ -124,6 +124,11 @@ impl Craft {
         }
     }
 
+    /// Takes what it said in words.
+    pub fn text(&mut self, text: Text, history: &mut Option<&mut History>) {
+        self.texts.take(text, &mut |text| say(history, text));
+    }
+
     /// Takes what somebody said of it.
     pub fn observe(
         &mut self,

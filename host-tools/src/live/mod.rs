@@ -20,6 +20,7 @@ pub mod history;
 pub mod hub;
 pub mod influx;
 pub mod latest;
+pub mod native;
 pub mod note;
 pub mod playback;
 pub mod plots;

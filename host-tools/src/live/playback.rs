@@ -12,6 +12,7 @@ use hums_link::Frame;
 
 use super::hub::{Command, Hub, Published};
 use super::influx::{Figures, Influx};
+use super::native::Native;
 use super::rate::{PUBLISH, Rate};
 use super::recording::{self, Heard, Opened};
 use super::show::{self, Around, SourceJson};
@@ -44,7 +45,7 @@ struct Copy {
 /// A recording that was read.
 #[derive(Debug)]
 struct Loaded {
-    spool: Spool,
+    played: Played,
     told: Vec<(Instant, Told)>,
     /// The next one of these.
     told_next: usize,
@@ -54,14 +55,27 @@ struct Loaded {
     frames: u64,
 }
 
-/// What gets each frame of a recording that is followed, after the world has; `false` ends it.
-type Each<'a> = dyn FnMut(Instant, &Frame<'_>, &mut World) -> bool + 'a;
+/// What is played.
+#[derive(Debug)]
+enum Played {
+    /// Frames, kept.
+    Frames(Spool),
+    /// An autopilot's own log, read again.
+    Native(Native),
+}
+
+/// What gets each frame of a recording that is followed, and each entry of one without frames, after the world has;
+/// `false` ends it.
+type Each<'a> = dyn FnMut(Instant, Option<&Frame<'_>>, &mut World) -> bool + 'a;
 
 impl Loaded {
     /// Goes to a place in it.
     fn seek(&mut self, offset: u64, told: usize) -> io::Result<()> {
         self.told_next = told;
-        self.spool.seek(offset)
+        match &mut self.played {
+            Played::Frames(spool) => spool.seek(offset),
+            Played::Native(native) => native.seek(offset),
+        }
     }
 
     /// The world takes what came by `now`.
@@ -73,12 +87,24 @@ impl Loaded {
     }
 
     fn follow(&mut self, world: &mut World, now: Instant, each: &mut Each<'_>) -> io::Result<()> {
-        while let Some(Spooled { at, check, bytes }) = self.spool.next_until(now)? {
-            tell(&self.told, &mut self.told_next, at, world);
-            if let Some(frame) = Frame::again(bytes, check) {
-                world.frame(at, &frame, None);
-                if !each(at, &frame, world) {
-                    return Ok(());
+        match &mut self.played {
+            Played::Frames(spool) => {
+                while let Some(Spooled { at, check, bytes }) = spool.next_until(now)? {
+                    tell(&self.told, &mut self.told_next, at, world);
+                    if let Some(frame) = Frame::again(bytes, check) {
+                        world.frame(at, &frame, None);
+                        if !each(at, Some(&frame), world) {
+                            return Ok(());
+                        }
+                    }
+                }
+            }
+            Played::Native(native) => {
+                while let Some((at, entry)) = native.next_until(now)? {
+                    world.entry(at, &entry, None);
+                    if !each(at, None, world) {
+                        return Ok(());
+                    }
                 }
             }
         }
@@ -154,8 +180,10 @@ impl Player {
                 start = Some(at);
                 world.begin(at);
             }
+            let native = matches!(heard, Heard::Entry(_));
             let frame = match heard {
-                Heard::Frame(frame) => frame,
+                Heard::Frame(frame) => Some(frame),
+                Heard::Entry(_) => None,
                 Heard::Told(what) => {
                     if told.len() < TOLD_MAX {
                         told.push((at, what.clone()));
@@ -174,10 +202,15 @@ impl Player {
                     });
                     copy_every = copy_every + copy_every;
                 }
-                copies.push(Copy { at, offset: writer.offset(), told: told.len(), world: world.clone() });
+                let offset = if native { frames } else { writer.offset() };
+                copies.push(Copy { at, offset, told: told.len(), world: world.clone() });
             }
-            writer.push(Spooled { at, check: frame.check(), bytes: frame.bytes() })?;
-            world.frame(at, frame, Some(&mut hub.histories()));
+            if let Some(frame) = frame {
+                writer.push(Spooled { at, check: frame.check(), bytes: frame.bytes() })?;
+                world.frame(at, frame, Some(&mut hub.histories()));
+            } else if let Heard::Entry(entry) = heard {
+                world.entry(at, entry, Some(&mut hub.histories()));
+            }
             world.found.clear();
             frames += 1;
             end = end.max(at);
@@ -199,7 +232,11 @@ impl Player {
         (self.source.start_s, self.source.end_s) = (start.as_secs_f64(), end.as_secs_f64());
         self.timeline = timeline(hub);
         self.rate = Rate::default();
-        Ok(Loaded { spool: writer.finish()?, told, told_next: 0, copies, start, end, frames })
+        let played = match opened.native() {
+            Some(native) => Played::Native(native),
+            None => Played::Frames(writer.finish()?),
+        };
+        Ok(Loaded { played, told, told_next: 0, copies, start, end, frames })
     }
 
     /// Gives all of it to the database, now that it is known who flew and when.
@@ -210,7 +247,9 @@ impl Player {
         world.begin(loaded.start);
         let end = loaded.end;
         loaded.follow(&mut world, end, &mut |at, frame, world| {
-            influx.frame(at, epoch_us, frame, world);
+            if let Some(frame) = frame {
+                influx.frame(at, epoch_us, frame, world);
+            }
             influx.found(epoch_us, world);
             influx.usage(at, epoch_us, world);
             world.found.clear();

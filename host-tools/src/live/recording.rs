@@ -1,5 +1,5 @@
-//! What can be played: a recording of any kind that holds MAVLink (a tlog or raw bytes, a file or `-`), or a log of ours (a
-//! log file, segments, a card's image or folder: one of its sessions).
+//! What can be played: a recording of any kind, or a log of ours (a log file, segments, a card's image or folder: one of its
+//! sessions).
 
 use std::io;
 use std::path::Path;
@@ -8,6 +8,7 @@ use anyhow::{Result, bail};
 use hums_core::time::Instant;
 use hums_link::Frame;
 
+use super::native::{Entry, Native, WANT};
 use super::told::Told;
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
@@ -22,6 +23,15 @@ pub struct Opened {
     /// What it is called.
     pub name: String,
     recording: Option<Recording>,
+    /// Where it is, of one without frames.
+    native: Option<Place>,
+}
+
+impl Opened {
+    /// An autopilot's own log, which is read again to be played.
+    pub fn native(&self) -> Option<Native> {
+        self.native.clone().map(Native::new)
+    }
 }
 
 /// Opens SRC, which is no live one; of several sessions the newest, or the one of this name.
@@ -34,9 +44,10 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
         return Err(usage(format!("--session is for a log, a card or a folder, and {endpoint} is none")));
     }
     let recording = place.open()?;
-    if !recording.format.is_of_link() {
+    let native = (!recording.format.is_of_link()).then(|| place.clone());
+    if native.is_some() && place.is_standard() {
         bail!(
-            "{endpoint}: is an {}, which cannot be played yet; `hums report {endpoint} -o page.html` shows it",
+            "{endpoint}: is an {}, which is read several times to be played; give a file",
             recording.format.words()
         );
     }
@@ -44,7 +55,7 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
         Some(log) => format!("{endpoint}, session {}", log.name),
         None => endpoint.to_string(),
     };
-    Ok(Opened { name, recording: Some(recording) })
+    Ok(Opened { name, recording: Some(recording), native })
 }
 
 /// What is to be played of all that a path holds.
@@ -75,6 +86,8 @@ fn listed(names: &[String]) -> String {
 pub enum Heard<'a> {
     /// A frame.
     Frame(&'a Frame<'a>),
+    /// What an autopilot's own log tells.
+    Entry(&'a Entry),
     /// What a log tells besides.
     Told(&'a Told),
 }
@@ -88,8 +101,15 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
     let Some(recording) = opened.recording.take() else { return Ok(()) };
     let progress = recording.progress.clone();
     let mut epoch_us = None;
-    recording.read(Want { frames: true, ..Want::default() }, &mut |at, item| {
+    let want = if opened.native.is_some() { WANT } else { Want { frames: true, ..Want::default() } };
+    let native = opened.native.is_some();
+    recording.read(want, &mut |at, item| {
+        let entry = if native { Entry::of(at, &item) } else { None };
         let heard = match item {
+            Item::Observation(..) | Item::Text(_) => match &entry {
+                Some(entry) => Heard::Entry(entry),
+                None => return Ok(()),
+            },
             Item::Frame(frame) => Heard::Frame(frame),
             Item::Record(told @ (Told::Parameter { .. } | Told::Part { .. })) => Heard::Told(told),
             Item::Epoch(epoch) => {

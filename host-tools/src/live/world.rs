@@ -11,6 +11,7 @@ use hums_link::{Check, Frame, observe};
 
 use super::craft::Craft;
 use super::history::History;
+use super::native::Entry;
 use super::told::{Limits, Told, parameter, place_of};
 
 /// Vehicles that are told apart; later ones are counted.
@@ -84,19 +85,7 @@ impl World {
         // Only an autopilot's heartbeat makes a system a vehicle.
         let told = if known { None } else { observe(frame) };
         match told {
-            Some((_, Observation::Heartbeat(_))) if self.crafts.len() < VEHICLES_MAX => {
-                let mut craft = Craft::new(at, self.limits.params());
-                if self.owner.is_none() {
-                    self.owner = Some(system);
-                    for (place, part) in self.parts.iter().enumerate() {
-                        if let Some(part) = part {
-                            craft.learn_part(place, *part);
-                        }
-                    }
-                }
-                self.crafts.insert(system, craft);
-            }
-            Some((_, Observation::Heartbeat(_))) => self.refused += 1,
+            Some((_, Observation::Heartbeat(_))) => self.meet(at, system),
             // A radio is a system of its own, and everybody's.
             Some((source, radio @ Observation::TelemetryRadio(_))) => {
                 for (system, craft) in &mut self.crafts {
@@ -113,6 +102,46 @@ impl World {
             if let Some((name, value)) = parameter(frame) {
                 self.limits.take(craft.monitor.params_mut(), &name, value);
             }
+        }
+    }
+
+    /// A vehicle has been heard for the first time.
+    fn meet(&mut self, at: Instant, system: u8) {
+        if self.crafts.len() >= VEHICLES_MAX {
+            self.refused += 1;
+            return;
+        }
+        let mut craft = Craft::new(at, self.limits.params());
+        if self.owner.is_none() {
+            self.owner = Some(system);
+            for (place, part) in self.parts.iter().enumerate() {
+                if let Some(part) = part {
+                    craft.learn_part(place, *part);
+                }
+            }
+        }
+        self.crafts.insert(system, craft);
+    }
+
+    /// Takes what an autopilot's own log tells, which has no frames.
+    pub fn entry(&mut self, at: Instant, entry: &Entry, mut histories: Option<&mut Histories>) {
+        self.advance(at, histories.as_deref_mut());
+        self.frames += 1;
+        let system = match entry {
+            Entry::Observation(source, _) => source.system,
+            Entry::Text(text) => text.source.system,
+        };
+        if let Entry::Observation(_, observation) = entry
+            && matches!(**observation, Observation::Heartbeat(_))
+            && !self.crafts.contains_key(&system)
+        {
+            self.meet(at, system);
+        }
+        let Some(craft) = self.crafts.get_mut(&system) else { return };
+        let mut history = histories.map(|histories| histories.entry(system).or_default());
+        match entry {
+            Entry::Observation(source, observation) => craft.observe(at, *source, observation, &mut history),
+            Entry::Text(text) => craft.text(text.clone(), &mut history),
         }
     }
 

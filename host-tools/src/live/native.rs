@@ -1,0 +1,135 @@
+//! An autopilot's own log, played. It has no frames that could be kept in a file of ours ([`super::spool`]): it is read
+//! again, from its beginning to the place that is wanted, by a thread that is a little ahead.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread;
+
+use hums_core::observation::{Observation, Source};
+use hums_core::time::Instant;
+
+use crate::source::item::{Item, Stop, Want};
+use crate::source::recording::Place;
+use crate::statustext::Text;
+
+/// Entries that are handed over at once, and how many such batches wait.
+const BATCH: usize = 256;
+const BATCHES: usize = 4;
+
+/// What such a log tells.
+#[derive(Clone, Debug)]
+pub enum Entry {
+    /// What the vehicle said.
+    Observation(Source, Box<Observation>),
+    /// What it said in words.
+    Text(Text),
+}
+
+impl Entry {
+    /// What an item tells, where it is of use here.
+    pub fn of(at: Instant, item: &Item<'_>) -> Option<Self> {
+        match *item {
+            Item::Observation(source, observation) => Some(Self::Observation(source, Box::new(*observation))),
+            Item::Text(text) => Some(Self::Text(Text::whole(at, text.source, text.severity, text.words))),
+            _ => None,
+        }
+    }
+}
+
+/// What is read of such a log.
+pub const WANT: Want<'_> = Want { frames: false, observations: true, rows: crate::source::item::Rows::None };
+
+type Batch = Vec<(Instant, Entry)>;
+
+/// A log that is played.
+#[derive(Debug)]
+pub struct Native {
+    place: Place,
+    batches: Option<Receiver<Batch>>,
+    waiting: VecDeque<(Instant, Entry)>,
+}
+
+impl Native {
+    /// From its beginning.
+    pub fn new(place: Place) -> Self {
+        Self { place, batches: None, waiting: VecDeque::new() }
+    }
+
+    /// Goes to where so many entries have been.
+    pub fn seek(&mut self, entries: u64) -> io::Result<()> {
+        let (sender, batches) = sync_channel(BATCHES);
+        let place = self.place.clone();
+        // A thread whose batches nobody takes any more ends with the next one.
+        thread::Builder::new().name("log".to_owned()).spawn(move || {
+            let (mut passed, mut batch) = (0_u64, Batch::new());
+            let read = place.open().and_then(|recording| {
+                recording.read(WANT, &mut |at, item| {
+                    let Some(entry) = Entry::of(at, &item) else { return Ok(()) };
+                    passed += 1;
+                    if passed > entries {
+                        batch.push((at, entry));
+                    }
+                    if batch.len() >= BATCH {
+                        sender.send(std::mem::take(&mut batch)).map_err(|_| Stop)?;
+                    }
+                    Ok(())
+                })
+            });
+            let _ = sender.send(batch);
+            // It was read once already, and what could not be read then was told.
+            drop(read);
+        })?;
+        self.batches = Some(batches);
+        self.waiting.clear();
+        Ok(())
+    }
+
+    /// The next entry, if it came by `until`; otherwise it stays the next.
+    pub fn next_until(&mut self, until: Instant) -> io::Result<Option<(Instant, Entry)>> {
+        if self.batches.is_none() {
+            self.seek(0)?;
+        }
+        while self.waiting.is_empty() {
+            match self.batches.as_ref().map(Receiver::recv) {
+                Some(Ok(batch)) => self.waiting.extend(batch),
+                _ => return Ok(None),
+            }
+        }
+        if self.waiting.front().is_some_and(|(at, _)| *at > until) {
+            return Ok(None);
+        }
+        Ok(self.waiting.pop_front())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn entries_come_by_their_time_and_again_from_any_place() {
+        // Any recording will do: what it says is the same stream.
+        let flight = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights/px4_hil_quad_low.tlog");
+        let mut native = Native::new(Place::file(&flight));
+        let mut take = |native: &mut Native, until_s: u64| {
+            let (until, mut times) = (Instant::from_millis(until_s * 1_000), Vec::new());
+            while let Some((at, _)) = native.next_until(until).expect("it is read") {
+                assert!(at <= until);
+                times.push(at);
+            }
+            times
+        };
+        let (first, rest) = (take(&mut native, 10), take(&mut native, 10_000));
+        assert!(first.len() > 1_000 && rest.len() > 10_000, "{} and {}", first.len(), rest.len());
+        native.seek(first.len() as u64).expect("it is read");
+        assert_eq!(take(&mut native, 10_000), rest, "again from there");
+        // In the middle of its being read.
+        native.seek(0).expect("it is read");
+        assert_eq!(take(&mut native, 10), first);
+        native.seek(0).expect("it is read");
+        assert_eq!(take(&mut native, 10), first);
+    }
+}
