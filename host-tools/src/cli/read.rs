@@ -26,7 +26,7 @@ Times: boot time counts from the monitor's power-on; UTC is known for a whole se
 #[derive(Args, Clone, Debug)]
 #[command(after_help = DECODE_EXAMPLES)]
 pub struct Decode {
-    /// Logs, card images, or directories with such
+    /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
@@ -44,7 +44,7 @@ pub struct Decode {
     /// Leave out what is later
     #[arg(long, value_name = "T")]
     pub to: Option<When>,
-    /// Only these MAVLink messages, by name; HUMS records and gaps stay
+    /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! `hums decode`: logs become files for other tools.
+//! `hums decode`: logs and recordings become files for other tools.
 //!
 //! | format | what | where |
 //! |---|---|---|
@@ -15,6 +15,8 @@
 //! A log's files are named after its session ([`naming`]), and no other session's files are ever written over. Folders of
 //! tables are replaced whole or not at all ([`crate::files::Folder`]).
 //!
+//! Recordings that are no logs of ours ([`recorded`]) become the same formats, an autopilot's log with its own tables.
+//!
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
 
 pub mod collect;
@@ -27,6 +29,7 @@ pub mod influx;
 pub mod naming;
 pub mod parquet;
 pub mod record;
+pub mod recorded;
 pub mod reference;
 pub mod row;
 pub mod selection;
@@ -48,9 +51,9 @@ use hums_core::time::Instant;
 use crate::cli;
 use crate::files::{Folder, Held, Inputs, says_directory};
 use crate::logs::reader::{self, Summary};
-use crate::logs::{self, Log};
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::plural::count;
+use crate::source::recording::{Place, find};
 use crate::{output, progress};
 use collect::Collected;
 use context::{Context, Formats};
@@ -64,19 +67,18 @@ use write::{Writers, Written};
 
 /// Runs `hums decode`.
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
-    let selection = Selection::new(args)?;
     let formats = Formats::new(&args.format);
-    let found = logs::find(&args.inputs, args.salvage)?;
+    let found = find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut outcome = Outcome::lossy(found.images.iter().any(|image| !image.damage.is_empty()));
+    let mut outcome = Outcome::lossy(found.damaged());
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
         eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
     }
     let standard_output = args.output == Path::new("-");
-    if standard_output && (found.logs.len() != 1 || !formats.is_single_file()) {
-        let why = match found.logs.len() {
+    if standard_output && (found.places.len() != 1 || !formats.is_single_file()) {
+        let why = match found.places.len() {
             1 => "these formats are more than that".to_owned(),
             count => format!("there are {count} logs"),
         };
@@ -85,23 +87,25 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
              name a file or a directory"
         )));
     }
-    let one_file = found.logs.len() == 1 && formats.is_single_file();
+    let one_file = found.places.len() == 1 && formats.is_single_file();
     if args.output.is_file() && !one_file {
         return Err(usage_error(format!(
             "-o {}: is a file, but tables, several formats and several logs need a directory; name one, or a new name",
             args.output.display()
         )));
     }
-    if found.logs.is_empty() {
+    if found.places.is_empty() {
         eprintln!("hums: no log is in there, so nothing was written");
     }
     let mut inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
     if !one_file || says_directory(&args.output) {
         inputs = inputs.without_folders();
     }
-    let logs = found.logs.len();
+    let logs = found.places.len();
+    let native = check_forms(&found.places, formats)?;
+    let selection = Selection::new(args, native)?;
     let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
-    let works = works(&found.logs)?;
+    let works = works(&found.places)?;
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
     side_by_side(
@@ -121,15 +125,37 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     Ok(outcome)
 }
 
+/// Whether any of these has messages of its own instead of MAVLink's; an error where one cannot become what is asked for.
+fn check_forms(places: &[Place], formats: Formats) -> Result<bool> {
+    let mut native = false;
+    for place in places.iter().filter(|place| place.own().is_none()) {
+        if place.is_standard() {
+            return Err(usage_error("-: a recording is read twice here; give a file"));
+        }
+        let format = place.open()?.format;
+        if !format.is_of_link() {
+            native = true;
+            if formats.tlog {
+                return Err(usage_error(format!(
+                    "{}: is an {}, which has no MAVLink frames for a tlog; --format csv, jsonl or parquet has all of it",
+                    place.title,
+                    format.words()
+                )));
+            }
+        }
+    }
+    Ok(native)
+}
+
 /// A log, and what its files are called.
 struct Work<'a> {
-    log: &'a Log,
+    log: &'a Place,
     traits: Traits,
     named: Named,
 }
 
 /// The logs with their names.
-fn works(logs: &[Log]) -> Result<Vec<Work<'_>>> {
+fn works(logs: &[Place]) -> Result<Vec<Work<'_>>> {
     let mut traits = Vec::new();
     // A log that cannot be read is named all the same: reading it says why.
     side_by_side(
@@ -140,7 +166,7 @@ fn works(logs: &[Log]) -> Result<Vec<Work<'_>>> {
             Ok(())
         },
     )?;
-    let logs: Vec<(&Log, Traits)> = logs.iter().zip(traits).collect();
+    let logs: Vec<(&Place, Traits)> = logs.iter().zip(traits).collect();
     let names = naming::names(&logs);
     Ok(logs.into_iter().zip(names).map(|((log, traits), named)| Work { log, traits, named }).collect())
 }
@@ -246,14 +272,20 @@ impl Task<'_> {
             stamp: work.traits.stamp(),
             ..Context::default()
         };
+        let Some(log) = work.log.own() else {
+            context.identity = recorded::identity(work.log)?;
+            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+            context.epoch_us = context.identity.epoch_us;
+            return Ok(context);
+        };
         context.epoch_us = if self.formats.influx || self.formats.parquet {
-            context.identity = Identity::of(work.log)?;
+            context.identity = Identity::of(log)?;
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
             context.identity.epoch_us
         } else if self.standard_output {
-            reader::epoch(work.log)?
+            reader::epoch(log)?
         } else {
-            reader::likely_epoch(work.log)?
+            reader::likely_epoch(log)?
         };
         Ok(context)
     }
@@ -261,7 +293,7 @@ impl Task<'_> {
     /// Reads a log and writes its files; none where nothing of it is in the time that was asked for.
     fn write(
         &self,
-        log: &Log,
+        place: &Place,
         name: &str,
         context: &Context,
         parquet: Option<&Path>,
@@ -272,10 +304,16 @@ impl Task<'_> {
             Destination::new(self.output, name, self.logs, self.formats)
         };
         let mut writers = Writers::new(context, destination, parquet.map(Path::to_owned))?;
-        let bar = progress::bar(log);
-        let new = || Collected::new(context);
-        let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
-        bar.finish_and_clear();
+        let summary = match place.own() {
+            Some(log) => {
+                let bar = progress::bar(log);
+                let new = || Collected::new(context);
+                let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
+                bar.finish_and_clear();
+                summary
+            }
+            None => recorded::read(place, context, &mut writers)?,
+        };
         if writers.is_empty() && context.selection.has_limits() {
             return Ok((summary, None));
         }
@@ -284,7 +322,7 @@ impl Task<'_> {
 }
 
 /// Says that nothing of a log is in the time that was asked for, and what time it has.
-fn nothing_of(log: &Log, summary: &Summary) -> String {
+fn nothing_of(log: &Place, summary: &Summary) -> String {
     let seconds = |at: Option<Instant>| at.map_or(0.0, Instant::as_secs_f64);
     format!(
         "{}: nothing of it is within --from and --to: it goes from {:.3} s to {:.3} s",

@@ -3,6 +3,8 @@
 //! that its sectors name. What is not known is left out: a packed log has no board.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
@@ -13,6 +15,7 @@ use sha2::{Digest as _, Sha256};
 use crate::files::{add_ends, short};
 use crate::logs::Log;
 use crate::logs::groups::Groups;
+use crate::source::recording::Place;
 
 /// What tells a log from any other, read from its sectors' headers and its first records. Of a card's session it is
 /// the same wherever the card or a copy of it lies.
@@ -27,8 +30,12 @@ pub struct Traits {
 }
 
 impl Traits {
-    /// Looks at all sectors of a log.
-    pub fn of(log: &Log) -> Result<Self> {
+    /// Looks at all sectors of a log; at all bytes of another recording.
+    pub fn of(place: &Place) -> Result<Self> {
+        let Some(log) = place.own() else {
+            let fingerprint = place.path().map(fingerprint).transpose()?.unwrap_or_default();
+            return Ok(Self { fingerprint, ..Self::default() });
+        };
         let mut groups = Groups::new(log);
         let mut hash = Sha256::new();
         let mut board = None;
@@ -49,7 +56,11 @@ impl Traits {
     }
 
     /// The name of the log's files.
-    pub fn name(&self, log: &Log) -> String {
+    pub fn name(&self, place: &Place) -> String {
+        let Some(log) = place.own() else {
+            let named = place.path().and_then(|path| of_recording(path).ok());
+            return named.unwrap_or_else(|| place.name.clone());
+        };
         let mut name = base(log);
         if let Some(board) = self.board {
             name.push_str("-box");
@@ -80,11 +91,11 @@ pub enum Named {
 
 /// Names the logs of one command, in their order. Two that share a session and are no copies of each other get
 /// different names: a copy that was cut short, for instance.
-pub fn names(logs: &[(&Log, Traits)]) -> Vec<Named> {
+pub fn names(logs: &[(&Place, Traits)]) -> Vec<Named> {
     let mut known: BTreeMap<(Option<u32>, [u8; 16]), usize> = BTreeMap::new();
     let mut of_session: BTreeMap<Option<u32>, u32> = BTreeMap::new();
     let mut taken: BTreeMap<String, u32> = BTreeMap::new();
-    let name = |(index, (log, traits)): (usize, &(&Log, Traits))| {
+    let name = |(index, (log, traits)): (usize, &(&Place, Traits))| {
         if let Some(first) = known.get(&(traits.session, traits.fingerprint)) {
             return Named::Copy(*first);
         }
@@ -105,6 +116,20 @@ pub fn of_recording(path: &Path) -> Result<String> {
     let mut hash = Sha256::new();
     add_ends(&mut hash, path).with_context(|| format!("{}: cannot be read", path.display()))?;
     Ok(format!("{name}-r{}", hex(&short(hash).to_be_bytes())))
+}
+
+/// Of all bytes of a file.
+fn fingerprint(path: &Path) -> Result<[u8; 16]> {
+    let context = || format!("{}: cannot be read", path.display());
+    let mut file = File::open(path).with_context(context)?;
+    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 64 * 1024]);
+    loop {
+        match file.read(&mut buffer).with_context(context)? {
+            0 => break,
+            got => hash.update(buffer.get(..got).unwrap_or_default()),
+        }
+    }
+    Ok(hash.finalize().first_chunk().copied().unwrap_or_default())
 }
 
 /// What a log is called without its identity: its number on the card, or the name of its file.
@@ -140,11 +165,14 @@ mod tests {
 
     #[test]
     fn copies_are_known_and_other_logs_of_a_session_get_other_names() {
-        let log = |name: &str| Log {
-            name: name.to_owned(),
-            files: vec![format!("somewhere/{name}_00.HUM")],
-            pieces: Vec::new(),
-            session: None,
+        let log = |name: &str| {
+            let log = Log {
+                name: name.to_owned(),
+                files: vec![format!("somewhere/{name}_00.HUM")],
+                pieces: Vec::new(),
+                session: None,
+            };
+            Place::log(name.to_owned(), log)
         };
         let traits = |session, fingerprint, board| Traits {
             session: Some(session),

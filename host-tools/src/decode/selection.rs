@@ -17,13 +17,23 @@ pub struct Selection {
     to: Option<When>,
     /// Message ids; empty: all.
     ids: Vec<u32>,
+    /// The names as they were given: those of other messages than MAVLink's.
+    names: Vec<String>,
 }
 
 impl Selection {
-    /// As the command line says it.
-    pub fn new(args: &cli::Decode) -> Result<Self> {
-        let ids = args.message.iter().map(|name| id_of(name)).collect::<Result<_>>()?;
-        Ok(Self { from: args.from, to: args.to, ids })
+    /// As the command line says it; `native` says that there are messages other than MAVLink's, with names of their own.
+    pub fn new(args: &cli::Decode, native: bool) -> Result<Self> {
+        let ids = args.message.iter().map(|name| id_of(name));
+        // A name of its own is no id: none at all is not every one.
+        let other = |id: Result<u32>| id.or_else(|error| if native { Ok(u32::MAX) } else { Err(error) });
+        let ids = ids.map(other).collect::<Result<_>>()?;
+        Ok(Self { from: args.from, to: args.to, ids, names: args.message.clone() })
+    }
+
+    /// The names of the messages that are wanted; none: all.
+    pub fn names(&self) -> &[String] {
+        &self.names
     }
 
     /// Whether a time was asked for.

@@ -115,7 +115,7 @@ impl Wanted {
             return Ok(self.output.clone());
         }
         let name = match (place.own(), place.path()) {
-            (Some(log), _) => Traits::of(log)?.name(log),
+            (Some(_), _) => Traits::of(place)?.name(place),
             (None, Some(path)) => naming::of_recording(path)?,
             (None, None) => place.name.clone(),
         };

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use super::support::{flight, json, recorded, run, text};
+use super::support::{flight, frames_of, json, recorded, run, text};
 
 /// Checks that tell of the place on a link, which a recording of another place cannot.
 const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
@@ -181,4 +181,28 @@ fn an_old_recording_is_a_page_and_a_summary_without_a_card_between() {
     let pages = fs::read_dir(dir.path().join("pages")).expect("a directory");
     let mut names = pages.map(|page| page.expect("a page").file_name().into_string().expect("UTF-8"));
     assert!(names.any(|name| name.starts_with("faults.tlog-r")));
+}
+
+#[test]
+fn a_recording_is_decoded_without_a_log_of_ours_between() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    run(dir.path(), "decode faults.tlog -o back.tlog --format tlog", 0);
+    assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&flight("ap_quad_faults.tlog")));
+    run(dir.path(), "decode faults.tlog -o out --format csv,jsonl,parquet", 0);
+    run(dir.path(), "pack faults.tlog -o packed.hum", 0);
+    run(dir.path(), "decode packed.hum -o packed --format csv", 0);
+    // The tables of the recording are those of its pack, but for what a log of ours has besides.
+    let table = |folder: &str| {
+        let folders = fs::read_dir(dir.path().join(folder)).expect("a folder");
+        let folder = folders
+            .map(|entry| entry.expect("an entry").path())
+            .find(|path| path.join("ATTITUDE.csv").is_file());
+        fs::read_to_string(folder.expect("tables").join("ATTITUDE.csv")).expect("a table")
+    };
+    let columns = |text: String| -> Vec<String> {
+        // Without both times: a log of ours keeps milliseconds.
+        text.lines().map(|line| line.splitn(3, ',').nth(2).unwrap_or_default().to_owned()).collect()
+    };
+    assert_eq!(columns(table("out")), columns(table("packed")));
 }

@@ -1,0 +1,196 @@
+//! Recordings that are no logs of ours, decoded: the frames of a tlog, the native rows of an autopilot's log.
+//!
+//! They go through the same collectors and writers as a log of ours, in parts of bounded size, on one thread.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Mutex;
+
+use anyhow::Result;
+use hums_blackbox::Entry;
+use hums_core::observation::Observation;
+use hums_core::time::Instant;
+use hums_link::Check;
+use sha2::{Digest as _, Sha256};
+
+use super::collect::Collected;
+use super::context::Context;
+use super::identity::Identity;
+use super::reference::Observed;
+use super::row::{Cell, CellType, Row};
+use super::write::Writers;
+use crate::logs::reader::{Collect as _, Deliver as _, Summary};
+use crate::progress;
+use crate::source::item::{Item, Kind, Rows, Table, Value, Want};
+use crate::source::recording::Place;
+use crate::utc::iso8601;
+
+/// Items of one part.
+const PART_ITEMS: u32 = 4_096;
+/// Names of tables and columns of all logs together, bytes: they are kept for as long as the program runs. A log that
+/// has more of them is not made by an autopilot; its further tables are left out, and counted.
+const NAMES_BYTES_MAX: usize = 4 << 20;
+
+/// Who flew and when; and UTC at time zero. The recording is read through for it.
+pub fn identity(place: &Place) -> Result<Identity> {
+    let (mut epoch_us, mut first, mut system, mut uid) = (None, None, None, None);
+    let mut hash = Sha256::new();
+    let want = Want { observations: true, ..Want::default() };
+    place.open()?.read(want, &mut |at, item| {
+        match item {
+            Item::Epoch(epoch) => epoch_us = Some(epoch),
+            Item::Observation(source, observation) => {
+                first.get_or_insert(at);
+                hash.update(at.as_micros().to_le_bytes());
+                match observation {
+                    Observation::Heartbeat(_) => system = system.or(Some(source.system)),
+                    Observation::Identity(told) if told.uid != 0 => uid = uid.or(Some(told.uid)),
+                    _ => {}
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    let vehicle = match (uid, system) {
+        (Some(uid), _) => format!("uid-{uid:016x}"),
+        (None, Some(system)) => format!("system-{system}"),
+        (None, None) => "unknown".to_owned(),
+    };
+    let utc_us =
+        epoch_us.zip(first).map(|(epoch, first): (u64, Instant)| epoch.saturating_add(first.as_micros()));
+    let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
+    // No recorder gave it a number: the times in it are its own.
+    let number: [u8; 4] = hash.finalize().first_chunk().copied().unwrap_or_default();
+    let session = format!("r{:08x}", u32::from_be_bytes(number));
+    Ok(Identity { vehicle, date, session, epoch_us })
+}
+
+/// Reads a recording into the writers.
+pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) -> Result<Summary> {
+    let recording = place.open()?;
+    let (format, seen) = (recording.format, recording.progress.clone());
+    let bar = progress::bytes(seen.total(), &place.title);
+    let formats = context.formats;
+    let rows = if formats.csv || formats.jsonl || formats.influx || formats.parquet {
+        Rows::All
+    } else {
+        Rows::None
+    };
+    let rows = match context.selection.names() {
+        [] => rows,
+        names => Rows::Named(names),
+    };
+    let want = Want { frames: format.is_of_link(), observations: formats.influx || formats.thesis, rows };
+    let mut part = Part { context, collected: Collected::new(context), items: 0, tables: BTreeMap::new() };
+    let mut summary = Summary::default();
+    recording.read(want, &mut |at, item| {
+        match item {
+            Item::Frame(frame) => {
+                let verified = frame.check() == Check::Verified;
+                summary.frames += 1;
+                part.collected.entry(&Entry::Frame { at, bytes: frame.bytes(), verified });
+            }
+            Item::Observation(source, observation) if !format.is_of_link() => {
+                part.collected.observed.push(Observed { at, source, observation: *observation });
+            }
+            Item::Row(row) if context.selection.has_time(at, context.epoch_us) => {
+                part.row(at, row.table, row.values);
+            }
+            Item::Gap(gap) => {
+                summary.gaps += u64::from(gap.cause.is_damage());
+                writers.group(part.take())?;
+                writers.gap(&gap.to_own())?;
+            }
+            _ => return Ok(()),
+        }
+        summary.first = summary.first.or(Some(at));
+        summary.last = summary.last.max(Some(at));
+        part.items += 1;
+        if part.items >= PART_ITEMS {
+            bar.set_position(seen.taken());
+            writers.group(part.take())?;
+        }
+        Ok(())
+    })?;
+    writers.group(part.take())?;
+    bar.finish_and_clear();
+    summary.epoch_us = context.epoch_us;
+    Ok(summary)
+}
+
+/// What waits to be written.
+struct Part<'a> {
+    context: &'a Context,
+    collected: Collected<'a>,
+    items: u32,
+    /// The names of tables that were seen, and of their columns with units; none where there was no room for them.
+    tables: BTreeMap<String, Option<Names>>,
+}
+
+type Names = (&'static str, Vec<&'static str>);
+
+impl<'a> Part<'a> {
+    fn take(&mut self) -> Collected<'a> {
+        self.items = 0;
+        std::mem::replace(&mut self.collected, Collected::new(self.context))
+    }
+
+    fn row(&mut self, at: Instant, table: &Table, values: &[Value<'_>]) {
+        if !self.tables.contains_key(&table.name) {
+            self.tables.insert(table.name.clone(), names(table));
+        }
+        let Some(Some((name, columns))) = self.tables.get(&table.name) else { return };
+        let kinds = table.columns.iter().map(|column| column.kind);
+        let cells = columns.iter().zip(kinds).zip(values);
+        let cells = cells.map(|((name, kind), value)| (*name, cell(kind, *value))).collect();
+        self.collected.rows(at, &[Row::new(name, cells)]);
+    }
+}
+
+/// The names of a table, kept for ever.
+fn names(table: &Table) -> Option<Names> {
+    let columns = table.columns.iter().map(|column| {
+        if column.unit.is_empty() {
+            kept(&column.name)
+        } else {
+            kept(&format!("{}[{}]", column.name, column.unit))
+        }
+    });
+    let columns = columns.collect::<Option<Vec<_>>>()?;
+    Some((kept(&table.name)?, columns))
+}
+
+/// A name that lives as long as the program; none where there are too many.
+fn kept(name: &str) -> Option<&'static str> {
+    static KEPT: Mutex<(BTreeSet<&'static str>, usize)> = Mutex::new((BTreeSet::new(), 0));
+    let mut kept = KEPT.lock().ok()?;
+    if let Some(known) = kept.0.get(name) {
+        return Some(known);
+    }
+    kept.1 += name.len();
+    if kept.1 > NAMES_BYTES_MAX {
+        return None;
+    }
+    let name: &'static str = Box::leak(name.to_owned().into_boxed_str());
+    kept.0.insert(name);
+    Some(name)
+}
+
+fn cell(kind: Kind, value: Value<'_>) -> Cell {
+    match value {
+        Value::Unsigned(value) => Cell::Count(value),
+        Value::Signed(value) => Cell::Signed(value),
+        Value::Single(value) => Cell::Single(value),
+        Value::Double(value) => Cell::Double(value),
+        Value::Flag(value) => Cell::Flag(value),
+        Value::Text(words) => Cell::Text(words.to_owned()),
+        Value::Unknown => Cell::Unknown(match kind {
+            Kind::Unsigned => CellType::Count,
+            Kind::Signed => CellType::Signed,
+            Kind::Single => CellType::Single,
+            Kind::Double => CellType::Double,
+            Kind::Flag => CellType::Flag,
+            Kind::Text => CellType::Text,
+        }),
+    }
+}
