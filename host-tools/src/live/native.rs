@@ -114,7 +114,7 @@ mod tests {
         // Any recording will do: what it says is the same stream.
         let flight = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights/px4_hil_quad_low.tlog");
         let mut native = Native::new(Place::file(&flight));
-        let mut take = |native: &mut Native, until_s: u64| {
+        let take = |native: &mut Native, until_s: u64| {
             let (until, mut times) = (Instant::from_millis(until_s * 1_000), Vec::new());
             while let Some((at, _)) = native.next_until(until).expect("it is read") {
                 assert!(at <= until);
