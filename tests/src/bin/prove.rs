@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use hums_tests::flights::root;
-use hums_tests::prove::{CAMPAIGNS, Campaign, Counting, Options, Provenance, write_report};
+use hums_tests::prove::{CAMPAIGNS, Campaign, Counting, Options, Part, Provenance, write_report};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -65,41 +65,53 @@ impl Arguments {
 
 fn run(arguments: &Arguments) -> Result<()> {
     let all = arguments.names.is_empty();
-    let chosen = CAMPAIGNS.iter().filter(|one| all || arguments.names.iter().any(|name| name == one.name));
-    for campaign in chosen {
-        if arguments.list {
+    let chosen: Vec<&'static Campaign> =
+        CAMPAIGNS.iter().filter(|one| all || arguments.names.iter().any(|name| name == one.name)).collect();
+    if arguments.list {
+        for campaign in chosen {
             println!("{:<12} {}", campaign.name, campaign.about);
-        } else {
-            prove(campaign, arguments)?;
         }
+        return Ok(());
+    }
+    let options = &arguments.options;
+    // Only all of them in their long form, with their own number of cases, are the document.
+    let is_whole = all && !options.short && options.runs.is_none() && arguments.report;
+    let commit = if is_whole { Some(commit()?) } else { None };
+    let parts = chosen.into_iter().map(|campaign| prove(campaign, options)).collect::<Result<Vec<_>>>()?;
+    if let Some(commit) = commit {
+        let path: PathBuf = root().join("docs/proof.md");
+        write_report(&path, &parts, &Provenance { commit, seed: options.seed })?;
+        println!("{}", path.display());
     }
     Ok(())
 }
 
-fn prove(campaign: &Campaign, arguments: &Arguments) -> Result<()> {
-    let options = &arguments.options;
-    let commit = commit();
+fn prove(campaign: &'static Campaign, options: &Options) -> Result<Part> {
     let start = Instant::now();
     let figures =
         (campaign.run)(options).with_context(|| format!("{}: {}", campaign.name, campaign.about))?;
     let seconds = start.elapsed().as_secs_f64();
     println!("{} held in {seconds:.1} s, seed {}\n{}", campaign.name, options.seed, figures.text());
-    // Only the long form with its own number of cases is a proof.
-    if arguments.report && !options.short && options.runs.is_none() {
-        let path: PathBuf = root().join("docs/proof.md");
-        write_report(&path, campaign, &figures, &Provenance { commit, seed: options.seed, seconds })?;
-    }
-    Ok(())
+    Ok(Part { campaign, figures, seconds })
 }
 
-/// The commit that was built, as far as git knows.
-fn commit() -> String {
-    let git = |arguments: &[&str]| {
-        let output = Command::new("git").current_dir(root()).args(arguments).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+/// The commit that was built. A document of changed files would be of no commit.
+fn commit() -> Result<String> {
+    let git = |arguments: &[&str]| -> Result<String> {
+        let output = Command::new("git").current_dir(root()).args(arguments).output().context("git")?;
+        if !output.status.success() {
+            bail!("git {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr).trim());
+        }
+        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
-    let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) else { return "unknown".to_owned() };
-    let changed = git(&["status", "--porcelain", "--untracked-files=no"]).unwrap_or_default();
-    let code = changed.lines().filter(|line| !line.ends_with("docs/proof.md")).count();
-    if code == 0 { commit } else { format!("{commit} with changes") }
+    let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
+    let changed: Vec<&str> = changed.lines().filter(|line| !line.ends_with("docs/proof.md")).collect();
+    if !changed.is_empty() {
+        bail!(
+            "docs/proof.md names the commit that it is of, and these files differ from it: {}; commit them, or run with \
+             --no-report",
+            changed.join(", ")
+        );
+    }
+    git(&["rev-parse", "--short=12", "HEAD"])
 }

@@ -11,7 +11,7 @@ use hums_blackbox::Header;
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};
-use super::figures::Figures;
+use super::figures::{Figures, Labels};
 use super::options::Options;
 use super::record::Record;
 use super::stream::{FULL_RATE, Stream};
@@ -23,6 +23,19 @@ const SECONDS: f64 = 15.0;
 /// The longest burst, in bits: a sector.
 const BURST_BITS_MAX: u64 = 8 * BLOCK as u64;
 
+/// What it prints.
+pub(super) const LABELS: Labels = Labels {
+    facts: &[
+        "errors",
+        "of them single bits",
+        "of them bursts of 2 to 4096 bits",
+        "noticed",
+        "frames lost at most, of one group",
+        "frames given out, all of them right",
+    ],
+    columns: &["flight", "sectors", "groups", "frames", "errors", "frames lost on average"],
+};
+
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let share = options.runs(10_000, 200).div_ceil(OWN.len() as u64);
     let outcomes = OWN.into_par_iter().enumerate().with_max_len(1).map(|(index, flight)| {
@@ -30,7 +43,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
-    let mut figures = Figures::default();
+    let mut figures = Figures::new(&LABELS);
     figures.fact("errors", sum(|one| one.single + one.bursts));
     figures.fact("of them single bits", sum(|one| one.single));
     figures.fact("of them bursts of 2 to 4096 bits", sum(|one| one.bursts));
@@ -40,9 +53,6 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         outcomes.iter().map(|one| one.lost_max).max().unwrap_or(0),
     );
     figures.fact("frames given out, all of them right", sum(|one| one.frames));
-    figures.head = ["flight", "sectors", "groups", "frames", "errors", "frames lost on average"]
-        .map(str::to_owned)
-        .into();
     for (flight, one) in OWN.iter().zip(&outcomes) {
         let errors = one.single + one.bursts;
         figures.row([

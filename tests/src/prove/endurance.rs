@@ -11,7 +11,7 @@ use hums::source::Chunk;
 use hums_core::params::Params;
 
 use super::card::Card;
-use super::figures::Figures;
+use super::figures::{Figures, Labels};
 use super::memory::held_bytes;
 use super::options::Options;
 use super::record::Record;
@@ -39,6 +39,26 @@ const BEHIND_MS_MAX: u64 = 200;
 const KEPT_MIN: f64 = 0.8;
 /// What may be allocated beyond that of the second look at the card, in bytes: the list of looks, a file's name.
 const GROWTH_BYTES_MAX: usize = 64 << 10;
+
+/// What it prints.
+pub(super) const LABELS: Labels = Labels {
+    facts: &[
+        "simulated hours",
+        "frames",
+        "frames lost",
+        "MAVLink, MB",
+        "log, MB",
+        "segments",
+        "of them in the place of an older one",
+        "block writes of the log, commands",
+        "the card was looked at",
+        "newest data on the card, whole, minutes at least",
+        "log behind the line at most, ms",
+        "bytes allocated at the second look and at most later",
+        "`fsck.vfat -n` at the end",
+    ],
+    columns: &[],
+};
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let form = if options.short { &SHORT } else { &LONG };
@@ -70,7 +90,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let late = seen.iter().skip(2).map(|about| about.held_bytes).max().unwrap_or(early);
     ensure!(late <= early + GROWTH_BYTES_MAX, "memory grew from {early} to {late} bytes");
 
-    let mut figures = Figures::default();
+    let mut figures = Figures::new(&LABELS);
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
     figures.fact("frames", done.stats.frames_in);
     figures.fact("frames lost", done.stats.frames_lost);

@@ -15,7 +15,7 @@ use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal};
 
 use super::card::Card;
-use super::figures::Figures;
+use super::figures::{Figures, Labels};
 use super::options::Options;
 use super::record::Record;
 use super::stream::Stream;
@@ -34,9 +34,27 @@ const BUDGET: u32 = 1_000;
 /// The most that anybody may set.
 const BUDGET_MAX: u32 = 5_000;
 
+/// What it prints.
+pub(super) const LABELS: Labels = Labels {
+    facts: &[
+        "simulated hours",
+        "without a key: hostile bytes, MB",
+        "without a key: frames of the vehicle, lost",
+        "without a key: bytes to the ground station in any second at most, of",
+        "without a key: parameters changed",
+        "without a key: sector queue at most, of",
+        "with a key: hostile bytes, MB",
+        "with a key: frames of the vehicle, lost",
+        "with a key: bytes to the ground station in any second at most, of",
+        "with a key: parameters changed",
+        "with a key: sector queue at most, of",
+    ],
+    columns: &[],
+};
+
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let seconds = options.runs(24 * 3600, 300);
-    let mut figures = Figures::default();
+    let mut figures = Figures::new(&LABELS);
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
     // Half of the time it may set what it likes, half of the time it would need the key.
     for (name, key) in [("without a key", None), ("with a key", Some(KEY))] {

@@ -5,7 +5,7 @@ use hums::logs::on_card;
 use rayon::prelude::*;
 
 use super::card::Card;
-use super::figures::Figures;
+use super::figures::{Figures, Labels};
 use super::options::Options;
 use super::record::Record;
 use super::stream::{Stream, hash};
@@ -21,6 +21,19 @@ const HIDDEN_MAX: usize = 16;
 /// A damaged frame that fits its checksum by chance, of 65,536; and a damaged header that makes a candidate of bytes
 /// within a frame, each of which has that chance again.
 const INVENTED_MAX: f64 = 1.0 / 2_000.0;
+
+/// What it prints.
+pub(super) const LABELS: Labels = Labels {
+    facts: &["runs", "frames", "whole frames that were not recorded"],
+    columns: &[
+        "a byte is damaged with",
+        "frames",
+        "damaged",
+        "whole and recorded",
+        "whole, under a false frame",
+        "damaged, but fit their checksum by chance",
+    ],
+};
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let rounds = options.runs(8, 1);
@@ -40,23 +53,13 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         record(stream, *probability, seed).map(|outcome| (*probability, outcome))
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
-    let mut figures = Figures::default();
+    let mut figures = Figures::new(&LABELS);
     figures.fact("runs", outcomes.len());
     figures.fact("frames", outcomes.iter().map(|(_, one)| one.frames).sum::<u64>());
     figures.fact(
         "whole frames that were not recorded",
         outcomes.iter().map(|(_, one)| one.missing).sum::<u64>(),
     );
-    figures.head = [
-        "a byte is damaged with",
-        "frames",
-        "damaged",
-        "whole and recorded",
-        "whole, under a false frame",
-        "damaged, but fit their checksum by chance",
-    ]
-    .map(str::to_owned)
-    .into();
     for probability in PROBABILITIES {
         let of = |figure: fn(&Outcome) -> u64| {
             let these = outcomes.iter().filter(|(this, _)| this.to_bits() == probability.to_bits());

@@ -19,7 +19,7 @@ use hums_core::params::Params;
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};
-use super::figures::Figures;
+use super::figures::{Figures, Labels};
 use super::options::Options;
 use super::record::Record;
 use super::stream::{FULL_RATE, Stream};
@@ -104,6 +104,19 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { name: "a log by arming on a full card", card_mib: 34, earlier: 18, ..BY_ARMING },
 ];
 
+/// What it prints.
+pub(super) const LABELS: Labels = Labels {
+    facts: &[
+        "cuts",
+        "of them torn",
+        "of them at the FAT or the directory",
+        "files of earlier sessions compared",
+        "frames decoded, all equal to those that went in",
+        "most that a cut cost, ms (200 allowed)",
+    ],
+    columns: &["scenario", "flight", "block writes", "cuts", "torn", "worst ms"],
+};
+
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let runs = options.runs(10_000, 240);
     let share = runs.div_ceil(SCENARIOS.len() as u64);
@@ -117,7 +130,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
-    let mut figures = Figures::default();
+    let mut figures = Figures::new(&LABELS);
     figures.fact("cuts", sum(|one| one.cuts));
     figures.fact("of them torn", sum(|one| one.torn));
     figures.fact("of them at the FAT or the directory", sum(|one| one.metadata));
@@ -125,8 +138,6 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     figures.fact("frames decoded, all equal to those that went in", sum(|one| one.frames));
     let worst = outcomes.iter().map(|one| one.loss_us_max).max().unwrap_or(0);
     figures.fact("most that a cut cost, ms (200 allowed)", worst / 1000);
-    figures.head =
-        ["scenario", "flight", "block writes", "cuts", "torn", "worst ms"].map(str::to_owned).into();
     for (one, scenario) in
         outcomes.iter().zip(SCENARIOS.iter().filter(|one| !options.short || one.seconds < 60.0))
     {

@@ -1,4 +1,6 @@
-//! What a campaign found, for people: on the terminal, and in `docs/proof.md`.
+//! What the campaigns found, as `docs/proof.md`.
+//!
+//! The document is written whole, by one run of all campaigns on one commit with one seed.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,11 +14,20 @@ use super::figures::Figures;
 /// Where figures come from.
 #[derive(Debug)]
 pub struct Provenance {
-    /// The commit, and whether files differed from it.
+    /// The commit, without any change.
     pub commit: String,
     /// The seed.
     pub seed: u64,
-    /// How long the campaign took, in seconds.
+}
+
+/// What one campaign found.
+#[derive(Debug)]
+pub struct Part {
+    /// Which.
+    pub campaign: &'static Campaign,
+    /// What it found.
+    pub figures: Figures,
+    /// How long it took, in seconds.
     pub seconds: f64,
 }
 
@@ -24,40 +35,126 @@ pub struct Provenance {
 const HEAD: &str = "\
 # Proof
 
-What the recorder promises, tried in bulk. `cargo xtask prove` makes this file anew (hours); `cargo xtask prove NAME`
-replaces one part of it; `cargo xtask test` runs the short form of each campaign. The same seed gives the same figures.
+What the recorder promises, tried in bulk. `cargo xtask prove` runs all campaigns (hours) on the recordings of the repository
+and writes this file whole; `cargo xtask prove NAME` only prints the figures of one. `cargo xtask test` runs the short form of
+each campaign. The same commit and seed give the same figures, apart from the seconds.
 ";
 
-/// Puts a campaign's figures into the document at `path`; those of other campaigns stay.
-pub fn write(path: &Path, campaign: &Campaign, figures: &Figures, from: &Provenance) -> Result<()> {
-    let old = fs::read_to_string(path).unwrap_or_default();
-    let mut parts: Vec<(String, String)> = old
-        .split("\n## ")
-        .skip(1)
-        .filter_map(|part| part.split_once('\n'))
-        .map(|(name, body)| (name.to_owned(), body.trim().to_owned()))
-        .collect();
-    let Provenance { commit, seed, seconds } = from;
-    let body = format!(
-        "{}.\n\nCommit {commit}, seed {seed}, {seconds:.0} s: `cargo xtask prove {} --seed {seed}`\n\n{}",
-        sentence(campaign.about),
-        campaign.name,
-        figures.text().trim()
-    );
-    match parts.iter_mut().find(|(name, _)| name == campaign.name) {
-        Some(part) => part.1 = body,
-        None => parts.push((campaign.name.to_owned(), body)),
-    }
-    let order = |name: &str| super::CAMPAIGNS.iter().position(|known| known.name == name);
-    parts.sort_by_key(|(name, _)| order(name).unwrap_or(usize::MAX));
-    let mut text = HEAD.to_owned();
-    for (name, body) in parts {
-        let _ = write!(text, "\n## {name}\n\n{body}\n");
-    }
-    fs::write(path, text).with_context(|| path.display().to_string())
+/// What the document says in place of its commit where campaigns changed and have not been run as a whole since.
+#[cfg(test)]
+const OUTDATED: &str = "**Outdated:** the figures below are of several older commits, and campaigns have changed since. The \
+                        next `cargo xtask prove` replaces all of them.";
+
+/// Writes the document.
+pub fn write(path: &Path, parts: &[Part], from: &Provenance) -> Result<()> {
+    fs::write(path, text(parts, from)).with_context(|| path.display().to_string())
 }
 
+fn text(parts: &[Part], from: &Provenance) -> String {
+    let Provenance { commit, seed } = from;
+    let mut text = format!("{HEAD}\nCommit {commit}, seed {seed}.\n");
+    for Part { campaign, figures, seconds } in parts {
+        let _ = write!(
+            text,
+            "\n{}\n\n{}\n\nIt took {seconds:.0} s.\n\n{}\n",
+            heading(campaign),
+            sentence(campaign.about),
+            figures.text().trim()
+        );
+    }
+    text
+}
+
+fn heading(campaign: &Campaign) -> String {
+    format!("## {}", campaign.name)
+}
+
+/// What the campaign tries, with a capital letter and a full stop.
 fn sentence(about: &str) -> String {
     let mut letters = about.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect()) + "."
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flights::root;
+    use crate::prove::CAMPAIGNS;
+
+    /// The lines of a document that are the same in each run, in order.
+    fn labels(text: &str) -> Vec<&str> {
+        let mut labels = Vec::new();
+        let mut is_heading = true;
+        for line in text.lines() {
+            let table = line.starts_with('|');
+            if line.starts_with("## ") || line.starts_with("* ") || (table && is_heading) {
+                // A figure has no colon and a space in it; a label may.
+                labels.push(
+                    line.starts_with("* ")
+                        .then(|| line.rsplit_once(": "))
+                        .flatten()
+                        .map_or(line, |(label, _)| &line[..=label.len()]),
+                );
+            }
+            is_heading = !table;
+        }
+        labels
+    }
+
+    /// What the campaigns print.
+    fn expected() -> Vec<String> {
+        CAMPAIGNS.iter().flat_map(|one| std::iter::once(heading(one)).chain(one.labels.lines())).collect()
+    }
+
+    fn figures(campaign: &'static Campaign) -> Figures {
+        let mut figures = Figures::new(&campaign.labels);
+        for what in campaign.labels.facts {
+            figures.fact(what, "1, 2");
+        }
+        figures
+    }
+
+    fn document() -> String {
+        let parts: Vec<Part> = CAMPAIGNS
+            .iter()
+            .map(|campaign| Part { campaign, figures: figures(campaign), seconds: 1.0 })
+            .collect();
+        text(&parts, &Provenance { commit: "0123456789ab".to_owned(), seed: 1 })
+    }
+
+    #[test]
+    fn what_is_written_has_each_label_once_one_commit_and_one_seed() {
+        let text = document();
+        assert_eq!(labels(&text), expected());
+        assert_eq!(text.matches("\nCommit 0123456789ab, seed 1.\n").count(), 1);
+        assert!(CAMPAIGNS.iter().all(|one| text.contains(&format!("\n{}\n", sentence(one.about)))));
+    }
+
+    #[test]
+    fn a_label_that_the_code_does_not_print_is_noticed() {
+        let text = document();
+        for (from, to) in [("* cuts:", "* cut:"), ("| recording |", "| flight |"), ("## noise", "## noises")]
+        {
+            assert!(text.contains(from), "{from}");
+            assert_ne!(labels(&text.replacen(from, to, 1)), expected(), "{to}");
+        }
+    }
+
+    #[test]
+    fn the_document_has_the_labels_that_the_campaigns_print() {
+        let text = fs::read_to_string(root().join("docs/proof.md")).unwrap();
+        assert!(text.starts_with(HEAD), "docs/proof.md has another beginning: `cargo xtask prove` writes it");
+        if text[HEAD.len()..].trim_start().starts_with(OUTDATED) {
+            return;
+        }
+        assert_eq!(labels(&text), expected(), "`cargo xtask prove` writes docs/proof.md");
+        assert_eq!(
+            text.lines().filter(|line| line.starts_with("Commit ")).count(),
+            1,
+            "one commit, one seed"
+        );
+        for campaign in CAMPAIGNS {
+            assert!(text.contains(&sentence(campaign.about)), "{}: what it tries", campaign.name);
+        }
+    }
 }

@@ -9,10 +9,10 @@ use hums_core::params::Params;
 use rayon::prelude::*;
 
 use super::card::Card;
-use super::figures::Figures;
+use super::figures::{Figures, Labels};
 use super::options::Options;
 use super::stream::{FULL_RATE, Stream};
-use crate::flights::{OWN, more, own};
+use crate::flights::{OWN, own};
 
 /// When the card stops answering, in seconds: at a moment for the short form, and at each of these for the long one.
 const STALLS_AT_S: [u64; 7] = [5, 2, 3, 4, 6, 7, 8];
@@ -21,9 +21,19 @@ const STALL_MS: u64 = 2_500;
 /// What is recorded at least, in seconds: a recording that is shorter comes again from its beginning.
 const SECONDS_MIN: f64 = 12.0;
 
+/// What it prints.
+pub(super) const LABELS: Labels = Labels {
+    facts: &[
+        "unsigned recordings",
+        "stalls of 2.5 s in each, every one alone, from second",
+        "frames",
+        "frames lost",
+    ],
+    columns: &["recording", "seconds", "frames", "lost at most", "queue at most", "of"],
+};
+
 pub(super) fn run(options: &Options) -> Result<Figures> {
-    let own = OWN.into_iter().map(own);
-    let paths: Vec<_> = if options.short { own.collect() } else { own.chain(more()).collect() };
+    let paths: Vec<_> = OWN.into_iter().map(own).collect();
     let moments = if options.short { &STALLS_AT_S[..1] } else { &STALLS_AT_S };
     let outcomes = paths.par_iter().with_max_len(1).map(|path| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -36,14 +46,12 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         Ok((name, stream, worst.context("no stall")?))
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
-    let mut figures = Figures::default();
+    let mut figures = Figures::new(&LABELS);
     let unsigned: Vec<_> = outcomes.iter().filter(|(_, stream, _)| !stream.is_signed).collect();
     figures.fact("unsigned recordings", unsigned.len());
     figures.fact("stalls of 2.5 s in each, every one alone, from second", seconds_of(moments));
     figures.fact("frames", unsigned.iter().map(|(.., stats)| stats.frames_in).sum::<u64>());
     figures.fact("frames lost", unsigned.iter().map(|(.., stats)| stats.frames_lost).sum::<u64>());
-    figures.head =
-        ["recording", "seconds", "frames", "lost at most", "queue at most", "of"].map(str::to_owned).into();
     for (name, stream, stats) in &outcomes {
         figures.row([
             if stream.is_signed { format!("{name} (signed)") } else { name.clone() },
