@@ -12,6 +12,7 @@ use hums::live::world::{Histories, World};
 use hums::logs;
 use hums::report::replay::Replay;
 use hums::report::{page, trend};
+use hums::source::recording::Place;
 use hums::summary::Overview;
 use hums_blackbox::record::Note;
 use hums_blackbox::{FRAME_BYTES_MAX, Record, Sector, SectorSink, Writer};
@@ -88,7 +89,8 @@ pub fn check(data: &[u8]) {
 fn report(path: &Path) {
     let found = logs::find(&[path.to_owned()], false).expect("it is a log");
     let overview = Overview::of(&found.logs[0]).expect("a file that can be read");
-    let replay = Replay::of(&found.logs[0]).expect("a file that can be read");
+    let place = Place::log("log".to_owned(), found.logs[0].clone());
+    let replay = Replay::of(&place).expect("a file that can be read");
     let html = page::html(&overview, &replay, &trend::of(&overview, &[])).expect("a page");
     let (_, data) = html.split_once(BEGINS).expect("it has data");
     let (data, after) = data.split_once('<').expect("the element ends");
@@ -108,6 +110,7 @@ fn live(path: &Path) {
         last = Some(at);
         match heard {
             Heard::Frame(frame) => world.frame(at, frame, Some(&mut histories)),
+            Heard::Entry(entry) => world.entry(at, entry, Some(&mut histories)),
             Heard::Told(told) => world.told(at, told, Some(&mut histories)),
         }
         world.found.clear();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hums_tests::flights::{OWN, more, own};
+use hums_tests::flights::{OWN, further, own};
 use hums_tests::program::hums;
 use hums_tests::{child, oracle};
 
@@ -38,8 +38,9 @@ fn every_field_of_every_message_of_our_recordings_reads_back_the_same() {
 }
 
 #[test]
+#[ignore = "further recordings (HUMS_FLIGHTS names no folder of them)"]
 fn every_field_of_every_message_of_further_recordings_reads_back_the_same() {
-    for path in more() {
+    for path in further() {
         compare(&path);
     }
 }

@@ -78,11 +78,9 @@ fn a_px4_flight_comes_out_bit_for_bit() {
 
 #[cfg(feature = "oracle")]
 #[test]
+#[ignore = "further recordings (HUMS_FLIGHTS names no folder of them)"]
 fn every_further_recording_comes_out_bit_for_bit() {
-    let files = hums_tests::flights::more();
-    if files.is_empty() {
-        return;
-    }
+    let files = hums_tests::flights::further();
     let manifest = hums_tests::oracle::manifest(&files);
     for file in files {
         eprintln!("{}", file.display());

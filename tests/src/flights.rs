@@ -25,11 +25,21 @@ pub fn own(name: &str) -> PathBuf {
     root().join("tests/flights").join(name)
 }
 
-/// More recordings, in the folders below `HUMS_FLIGHTS`; none where that is not set. Those that the repository has
+/// The recordings in the folders below `HUMS_FLIGHTS`, for a test of nothing else. Those that the repository has
 /// itself are left out.
+///
+/// # Panics
+/// Where `HUMS_FLIGHTS` names none: a test of nothing is no success.
+pub fn further() -> Vec<PathBuf> {
+    let found = more();
+    assert!(!found.is_empty(), "HUMS_FLIGHTS names no folder of recordings");
+    found
+}
+
+/// The recordings in the folders below `HUMS_FLIGHTS`, for a test that reads those of the repository too; none where
+/// that is not set.
 pub fn more() -> Vec<PathBuf> {
     let Some(folder) = std::env::var_os("HUMS_FLIGHTS").filter(|folder| !folder.is_empty()) else {
-        eprintln!("HUMS_FLIGHTS is not set: only the recordings of the repository are read");
         return Vec::new();
     };
     let mut found = Vec::new();

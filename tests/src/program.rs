@@ -31,7 +31,7 @@ pub fn path() -> &'static Path {
 
 fn build() -> PathBuf {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(root()).args(["build", "--release", "--package=hums", "--message-format=json"]);
+    cargo.current_dir(root()).args(["build", "--package=hums", "--message-format=json"]);
     let outcome = child::run(&mut cargo, Duration::from_mins(20)).expect_code(&[0]);
     let text = outcome.text();
     let mut messages = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());

@@ -1,11 +1,15 @@
 //! `cargo xtask costs`: a recording through the firmware in the emulator at the fastest line, and what the processor and
 //! the stack had to give for it, against `budgets.toml`.
 
+use std::path::Path;
+
 use anyhow::{Context as _, Result, bail};
 use serde_json::Value;
 
 use crate::bench::{BYTES_PER_S, load, record_at_full_rate};
 use crate::budgets::{Budgets, Row};
+use crate::firmware::{self, Board};
+use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
 
@@ -20,11 +24,17 @@ const STAGES: [(&str, &str); 5] = [
     ("summary", "summary"),
 ];
 
-/// Measures and compares.
+/// Builds, measures and compares.
 pub(crate) fn check() -> Result<()> {
     setup::ensure(&[Need::Linker, Need::FirmwareTarget, Need::Qemu], false).require_all()?;
+    let image = firmware::build(Board::Emulated)?;
+    check_built(&hums::build()?, &image)
+}
+
+/// Measures and compares, with `hums` and the emulated board's firmware as they were built.
+pub(crate) fn check_built(program: &Path, image: &Path) -> Result<()> {
     let budgets = Budgets::read()?;
-    let report = record_at_full_rate(&repo::root().join(FLIGHT))?;
+    let report = record_at_full_rate(program, image, &repo::root().join(FLIGHT))?;
     let rows = compare(&report, &budgets)?;
     println!("{FLIGHT} at 921,600 baud:");
     for row in &rows {

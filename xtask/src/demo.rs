@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
@@ -51,9 +51,9 @@ impl Options {
     }
 }
 
-/// In CI the demo must run in the emulator, and end.
+/// In CI the demo must run in the emulator, and end. Program and firmware are there already.
 pub(crate) fn as_test() -> Result<()> {
-    run(&Options::parse(&["--no-dashboard"])?)
+    fly(&Options::parse(&["--no-dashboard"])?, Some(&Board::Emulated.image()), Duration::ZERO)
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
@@ -63,19 +63,28 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     if !emulated && !options.pc {
         eprintln!("\nNo emulator here (what to type is above): the same pipeline runs on this PC instead.\n");
     }
-    hums::build()?;
+    // First the firmware: its last part is one core's work, beside which the program is built.
+    let (image, program) = std::thread::scope(|scope| {
+        let firmware = scope.spawn(|| emulated.then(|| firmware::build(Board::Emulated)).transpose());
+        (firmware.join(), hums::build())
+    });
+    program?;
+    let Ok(image) = image else { bail!("the build of the firmware panicked") };
+    fly(options, image?.as_deref(), start.elapsed())
+}
+
+/// Records the flight with the firmware in `image`, or on this PC without one, and shows what came of it.
+fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     let folder = repo::target().join("demo");
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
     }
     fs::create_dir_all(&folder)?;
-    let built = start.elapsed();
 
     let (card, gs, figures) = (folder.join("card.img"), folder.join("gs.bin"), folder.join("run.json"));
-    let pipeline = if emulated {
-        Shell::new(hums::program()).arg("emulate").arg("--firmware").arg(firmware::build(Board::Emulated)?)
-    } else {
-        Shell::new(hums::program()).arg("sim")
+    let pipeline = match image {
+        Some(image) => Shell::new(hums::program()).arg("emulate").arg("--firmware").arg(image),
+        None => Shell::new(hums::program()).arg("sim"),
     };
     let recording = Instant::now();
     let json = record(pipeline, &options.flight, &card, &gs)?;
@@ -87,20 +96,13 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     println!();
     Shell::new(hums::program()).arg("info").arg(&card).run()?;
     let run: serde_json::Value = serde_json::from_str(&json).context("what hums --json printed")?;
-    println!();
-    for (label, key) in [
-        ("frames in", "frames_in"),
-        ("frames logged", "frames_logged"),
-        ("frames lost", "frames_lost"),
-        ("bytes in", "bytes_in"),
-        ("bytes logged", "bytes_logged"),
-        ("frames to the ground station", "gs_frames"),
-    ] {
-        println!("{label:<30} {:>10}", run.get(key).map_or_else(|| "?".to_owned(), ToString::to_string));
-    }
-    println!();
+    show_figures(&run);
     println!("{:<30} {}", "the flight", repo::shown(&options.flight));
-    let by = if emulated { "the firmware, in the emulator" } else { "this PC, with the firmware's pipeline" };
+    let by = if image.is_some() {
+        "the firmware, in the emulator"
+    } else {
+        "this PC, with the firmware's pipeline"
+    };
     println!("{:<30} {by}", "recorded by");
     for (label, path) in [
         ("the SD card's image", &card),
@@ -122,8 +124,24 @@ pub(crate) fn run(options: &Options) -> Result<()> {
             .arg(card)
             .run();
     }
-    println!("{:<30} target/release/hums live --open --input {}", "the dashboard", repo::shown(&card));
+    let program = repo::shown(&hums::program());
+    println!("{:<30} {program} live --open --input {}", "the dashboard", repo::shown(&card));
     Ok(())
+}
+
+fn show_figures(run: &serde_json::Value) {
+    println!();
+    for (label, key) in [
+        ("frames in", "frames_in"),
+        ("frames logged", "frames_logged"),
+        ("frames lost", "frames_lost"),
+        ("bytes in", "bytes_in"),
+        ("bytes logged", "bytes_logged"),
+        ("frames to the ground station", "gs_frames"),
+    ] {
+        println!("{label:<30} {:>10}", run.get(key).map_or_else(|| "?".to_owned(), ToString::to_string));
+    }
+    println!();
 }
 
 /// Runs the flight through a pipeline; returns its figures.

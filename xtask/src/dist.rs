@@ -11,8 +11,9 @@ use std::{env, fs};
 use anyhow::{Context as _, Result, bail};
 use sha2::{Digest as _, Sha256};
 
+use crate::budgets;
 use crate::dfu;
-use crate::firmware::Board;
+use crate::firmware::{self, Board};
 use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, Need, STATIC_TARGET};
@@ -27,6 +28,11 @@ fn boards() -> impl Iterator<Item = Board> {
 pub(crate) fn run(check: bool) -> Result<()> {
     setup::ensure(&[Need::Linker, Need::FirmwareTarget, Need::StaticTarget], false).require_all()?;
     ensure_cyclonedx()?;
+    // `cargo xtask test` leaves out the board that none of its steps runs on.
+    for board in boards() {
+        firmware::lint(board)?;
+    }
+    budgets::check(&Board::ALL)?;
     let commit = git(&["rev-parse", "HEAD"])?;
     if !git(&["status", "--porcelain"])?.is_empty() {
         eprintln!("note: what is not committed is not in the release, which is of {commit}");

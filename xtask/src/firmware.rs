@@ -80,6 +80,11 @@ pub(crate) fn build(board: Board) -> Result<PathBuf> {
     Ok(image)
 }
 
+/// Lints the firmware for `board`; a warning is an error.
+pub(crate) fn lint(board: Board) -> Result<()> {
+    Shell::cargo().arg("clippy").args(board.cargo_arguments()).args(["--", "-D", "warnings"]).run()
+}
+
 /// An unchanged image keeps its time, so that nothing that depends on it is made anew.
 fn copy_if_different(from: &PathBuf, to: &PathBuf) -> io::Result<()> {
     let new = fs::read(from)?;

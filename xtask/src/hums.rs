@@ -1,4 +1,4 @@
-//! The `hums` program, as users build it.
+//! The `hums` program: one build for tests and demo, and the one that users make for what is measured.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,19 @@ use anyhow::Result;
 use crate::repo;
 use crate::shell::Shell;
 
-pub(crate) fn build() -> Result<()> {
-    Shell::cargo().args(["build", "--release", "--package=hums"]).run()
+/// The build that the tests share (profile `dev`, optimised as `Cargo.toml` says); returns where the program lies.
+pub(crate) fn build() -> Result<PathBuf> {
+    Shell::cargo().args(["build", "--package=hums"]).run()?;
+    Ok(program())
 }
 
+/// Where [`build`] leaves the program.
 pub(crate) fn program() -> PathBuf {
-    repo::target().join("release/hums")
+    repo::target().join("debug/hums")
+}
+
+/// The build that users make, for measurements; returns where the program lies.
+pub(crate) fn build_release() -> Result<PathBuf> {
+    Shell::cargo().args(["build", "--release", "--package=hums"]).run()?;
+    Ok(repo::target().join("release/hums"))
 }

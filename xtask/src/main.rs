@@ -16,6 +16,7 @@ mod fuzz;
 mod hums;
 mod image;
 mod oracle;
+mod pc;
 mod prove;
 mod repo;
 mod setup;
@@ -37,10 +38,11 @@ cargo xtask COMMAND
                                  a recorded flight through the firmware in the emulator, and what came of it;
                                  without an emulator, or with --pc, through the same pipeline on this PC;
                                  on a terminal the dashboard plays it at the end, until Ctrl-C
-  test [--only STEP]... [--list] everything that CI checks, or the steps named
+  test [--only STEP]... [--list] everything that CI checks, or the steps named with what they need; a table at the end
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
-                                 the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise; hours,
-                                 and docs/proof.md
+                                 the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise;
+                                 all of them (hours) make docs/proof.md
+  prove emulator                 the recordings of HUMS_FLIGHTS through the firmware in the emulator
   firmware [--board BOARD]       build the firmware: f405 (the default) or f429, which are real, or emulated
   bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, instructions; how fast logs are checked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
@@ -79,17 +81,28 @@ fn main() -> ExitCode {
 #[derive(Debug, PartialEq, Eq)]
 enum Command {
     Demo(demo::Options),
-    Test { only: Vec<String>, list: bool },
+    Test {
+        only: Vec<String>,
+        list: bool,
+    },
+    /// One step, in this process: what `test` starts for each.
+    Step(String),
     Prove(Vec<String>),
     Firmware(Board),
     Flash(flash::Options),
     Attach(flash::Options),
     Bench(Vec<bench::Bench>),
-    Fuzz { seconds: u32 },
-    Dist { check: bool },
+    Fuzz {
+        seconds: u32,
+    },
+    Dist {
+        check: bool,
+    },
     Size,
     Costs,
-    Setup { dry_run: bool },
+    Setup {
+        dry_run: bool,
+    },
     Structure,
     Manifest,
     Help,
@@ -106,6 +119,10 @@ impl Command {
         match name {
             "demo" => Ok(Self::Demo(demo::Options::parse(&rest)?)),
             "test" => parse_test(&rest),
+            "step" => match rest.as_slice() {
+                [step] => Ok(Self::Step((*step).to_owned())),
+                _ => bail!("step takes the name of one"),
+            },
             // The campaigns know their names and flags themselves.
             "prove" => Ok(Self::Prove(rest.iter().map(|word| (*word).to_owned()).collect())),
             "bench" => Ok(Self::Bench(bench::Bench::parse(&rest)?)),
@@ -147,6 +164,7 @@ impl Command {
                 Ok(())
             }
             Self::Test { only, list: false } => test::run(&only),
+            Self::Step(name) => test::run_step(&name),
             Self::Prove(arguments) => prove::run(&arguments),
             Self::Firmware(board) => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
@@ -161,7 +179,7 @@ impl Command {
             Self::Dist { check } => dist::run(check),
             Self::Size => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
-                budgets::check_all()
+                budgets::check(&Board::ALL)
             }
             Self::Setup { dry_run } => {
                 let outcome = setup::ensure(&Need::ALL, dry_run);

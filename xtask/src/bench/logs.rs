@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 
-use super::{median, on_one_core, work_folder};
+use super::tools::{median, on_one_core, work_folder};
 use crate::hums;
 use crate::oracle;
 use crate::repo;
@@ -36,7 +36,7 @@ pub(crate) fn run() -> Result<()> {
     if logs.is_empty() {
         bail!("no .bin and no .ulg, plain or .gz, is below `tests`; HUMS_LOGS=FOLDER names others");
     }
-    hums::build()?;
+    let program = hums::build_release()?;
     oracle::prepare()?;
     let python = oracle::python();
     println!("{:32} {:>8} {:>12} {:>12} {:>7}", "log", "MB", "hums check", "Python", "times");
@@ -46,7 +46,7 @@ pub(crate) fn run() -> Result<()> {
         let megabytes = fs::metadata(&path)?.len() as f64 / 1e6;
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
         for _ in 0..ROUNDS {
-            let mut command = on_one_core(hums::program().as_os_str(), true);
+            let mut command = on_one_core(program.as_os_str(), true);
             command.args(["check", "--json"]).arg(&path).env("RAYON_NUM_THREADS", "1");
             // 3 and 4: the log is damaged, or something was found.
             ours.push(seconds(command, &[0, 3, 4])?);

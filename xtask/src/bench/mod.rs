@@ -4,6 +4,7 @@
 //! costs repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
 
 mod logs;
+mod tools;
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -12,6 +13,8 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use serde_json::Value;
+
+use tools::{median, on_one_core, work_folder};
 
 use crate::firmware::{self, Board};
 use crate::hums;
@@ -141,7 +144,7 @@ fn sizes(flights: &[PathBuf]) -> Result<()> {
 /// What whole sessions take: with every finding, snapshot, counter and statistic that the monitor makes of a recording.
 fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     println!("\nSizes of whole sessions, with all that the monitor records of them\n");
-    hums::build()?;
+    let program = hums::build_release()?;
     let (card, packed) = (work_folder()?.join("card.img"), work_folder()?.join("flight.tlog.xz"));
     let (mut logs, mut xz_logs, mut count) = (0.0, 0.0, 0.0);
     println!("{:22} {:>9} {:>9} {:>9} {:>7} {:>7}", "recording", "tlog", "xz -9e", "session", "tlog/", "xz/");
@@ -149,7 +152,7 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
         let _ = fs::remove_file(&card);
         let sim = ["sim", "--json", "--speed", "max", "--input"];
         let (json, _) =
-            Shell::new(hums::program()).args(sim).arg(flight).arg("--sd").arg(&card).output_and_code()?;
+            Shell::new(&program).args(sim).arg(flight).arg("--sd").arg(&card).output_and_code()?;
         let report: Value = serde_json::from_str(&json).context("the report of hums sim")?;
         let bytes =
             report["bytes_logged"].as_f64().filter(|&bytes| bytes > 0.0).context("nothing was logged")?;
@@ -174,7 +177,7 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
 /// Decodes logs and unpacks the same tlogs, one after the other on one core, several times.
 fn speed(flights: &[PathBuf]) -> Result<()> {
     println!("\nSpeed of decoding to tlog, median of {ROUNDS} rounds\n");
-    hums::build()?;
+    let program = hums::build_release()?;
     let folder = work_folder()?;
     println!(
         "{:22} {:>10} {:>10} {:>7}  {:>12} {:>6}",
@@ -185,7 +188,7 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         let (log, zipped) = (folder.join("flight.hum"), folder.join("flight.tlog.gz"));
         let tlog = folder.join("long.tlog");
         repeat(flight, DECODED_MIN, &tlog)?;
-        let done = Command::new(hums::program()).arg("pack").arg(&tlog).arg("-o").arg(&log).output()?;
+        let done = Command::new(&program).arg("pack").arg(&tlog).arg("-o").arg(&log).output()?;
         if !log.is_file() || !done.status.success() {
             bail!("hums pack {}: {}", flight.display(), String::from_utf8_lossy(&done.stderr));
         }
@@ -193,7 +196,7 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         gzip.context("gzip cannot be started")?;
         let bytes = fs::metadata(&tlog)?.len() as f64;
         let decode = |threads: Option<&str>| {
-            let mut command = on_one_core(hums::program().as_os_str(), threads.is_some());
+            let mut command = on_one_core(program.as_os_str(), threads.is_some());
             command.arg("decode").arg(&log).args(["--format", "tlog", "-o", "-"]);
             if let Some(threads) = threads {
                 command.env("RAYON_NUM_THREADS", threads);
@@ -234,24 +237,6 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// A recording as often as it takes to have so many bytes.
-fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
-    let tlog = fs::read(flight)?;
-    let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;
-    fs::write(to, tlog.repeat(times)).with_context(|| to.display().to_string())
-}
-
-/// A program on the first core only, where `taskset` is there to see to it.
-fn on_one_core(program: &std::ffi::OsStr, one: bool) -> Command {
-    let pinned = one && Command::new("taskset").arg("--version").output().is_ok();
-    if !pinned {
-        return Command::new(program);
-    }
-    let mut command = Command::new("taskset");
-    command.args(["-c", "0"]).arg(program);
-    command
-}
-
 fn seconds(mut command: Command) -> Result<f64> {
     let start = Instant::now();
     let output = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).output()?;
@@ -261,9 +246,11 @@ fn seconds(mut command: Command) -> Result<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+/// A recording as often as it takes to have so many bytes.
+fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
+    let tlog = fs::read(flight)?;
+    let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;
+    fs::write(to, tlog.repeat(times)).with_context(|| to.display().to_string())
 }
 
 /// Runs recordings through the firmware in the emulator, back to back at the fastest line rate; it counts the
@@ -271,9 +258,10 @@ fn median(values: &mut [f64]) -> f64 {
 fn cost(flights: &[PathBuf]) -> Result<()> {
     println!("\nInstructions on a Cortex-M4 at {BAUD} baud, by stage\n");
     setup::ensure(&[Need::FirmwareTarget, Need::Qemu], false).require_all()?;
+    let (image, program) = (firmware::build(Board::Emulated)?, hums::build()?);
     let (mut dearest, mut all) = (("none".to_owned(), 0.0), (0.0, 0.0));
     for flight in unsigned(flights) {
-        let report = record_at_full_rate(flight)?;
+        let report = record_at_full_rate(&program, &image, flight)?;
         let (encoding, bytes) = print_costs(&name(flight), &report)?;
         all = (all.0 + encoding, all.1 + bytes);
         if encoding / bytes > dearest.1 {
@@ -300,15 +288,14 @@ fn cost(flights: &[PathBuf]) -> Result<()> {
 }
 
 /// Runs a recording through the firmware in the emulator, which counts, back to back at the fastest line: its report.
-pub(crate) fn record_at_full_rate(flight: &Path) -> Result<Value> {
-    let image = firmware::build(Board::Emulated)?;
-    hums::build()?;
+/// `program` is `hums`, `image` the emulated board's firmware.
+pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -> Result<Value> {
     let (card, input) = (work_folder()?.join("card.img"), work_folder()?.join("long.tlog"));
     let _ = fs::remove_file(&card);
     repeat(flight, SECONDS_MIN * BYTES_PER_S, &input)?;
-    let (json, _) = Shell::new(hums::program())
+    let (json, _) = Shell::new(program)
         .args(["emulate", "--json", "--costs", "--firmware"])
-        .arg(&image)
+        .arg(image)
         .arg("--input")
         .arg(&input)
         .args(["--line-rate", BAUD, "--sd"])
@@ -359,12 +346,6 @@ fn print_costs(flight: &str, report: &Value) -> Result<(f64, f64)> {
 /// The part of the processor that so many instructions a byte take on the fastest line.
 pub(crate) fn load(instructions_per_byte: f64) -> f64 {
     instructions_per_byte * BYTES_PER_S * CYCLES_PER_INSTRUCTION / CLOCK_HZ
-}
-
-fn work_folder() -> Result<PathBuf> {
-    let folder = repo::target().join("bench");
-    fs::create_dir_all(&folder)?;
-    Ok(folder)
 }
 
 #[cfg(test)]

@@ -1,0 +1,34 @@
+//! What the benches share.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::repo;
+
+/// A program on the first core only, where `taskset` is there to see to it.
+pub(super) fn on_one_core(program: &OsStr, one: bool) -> Command {
+    let pinned = one && Command::new("taskset").arg("--version").output().is_ok();
+    if !pinned {
+        return Command::new(program);
+    }
+    let mut command = Command::new("taskset");
+    command.args(["-c", "0"]).arg(program);
+    command
+}
+
+/// The middle of some values, which are put in order.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Where what is measured lies.
+pub(super) fn work_folder() -> Result<PathBuf> {
+    let folder = repo::target().join("bench");
+    fs::create_dir_all(&folder)?;
+    Ok(folder)
+}

@@ -1,0 +1,115 @@
+//! What is built for this PC: one choice of packages, features and profile, so that lints, tests and campaigns share
+//! what they compile. Test programs are run as they lie there, without asking cargo again: its lock on the build folder
+//! would make a test wait for the lints.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use cargo_metadata::{Artifact, Message, MetadataCommand, TargetKind};
+use serde::{Deserialize, Serialize};
+
+use crate::firmware::Board;
+use crate::hums;
+use crate::oracle;
+use crate::repo;
+use crate::shell::Shell;
+
+/// The choice. Without the firmware's binary: it turns on `defmt` in the crates that it shares with this PC.
+pub(crate) const CHOICE: [&str; 4] = ["--workspace", "--exclude=hums-app", "--features", FEATURES];
+
+/// All of the end-to-end tests.
+const FEATURES: &str = "hums-tests/emulator,hums-tests/browser,hums-tests/databases";
+
+/// The package of the end-to-end tests and of the campaigns.
+const END_TO_END: &str = "hums-tests";
+
+/// A program of tests.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct TestProgram {
+    package: String,
+    /// What cargo calls the target: the crate's name for its own tests.
+    name: String,
+    /// From `tests/`, not from the sources.
+    is_integration: bool,
+    folder: PathBuf,
+    path: PathBuf,
+}
+
+/// Builds `hums`, the campaigns and all tests.
+pub(crate) fn build() -> Result<()> {
+    let text = Shell::cargo()
+        .args(["test", "--no-run", "--message-format=json-render-diagnostics"])
+        .args(CHOICE)
+        .output()?;
+    let metadata = MetadataCommand::new().no_deps().current_dir(repo::root()).exec()?;
+    let mut programs = Vec::new();
+    for message in Message::parse_stream(text.as_bytes()) {
+        let Message::CompilerArtifact(Artifact { package_id, target, profile, executable, .. }) = message?
+        else {
+            continue;
+        };
+        let (Some(path), true) = (executable, profile.test) else { continue };
+        let package = metadata.packages.iter().find(|package| package.id == package_id);
+        let package = package.with_context(|| format!("cargo built {package_id}, which it does not know"))?;
+        programs.push(TestProgram {
+            package: package.name.to_string(),
+            name: target.name,
+            is_integration: target.kind.contains(&TargetKind::Test),
+            folder: package.manifest_path.parent().context("a package has a folder")?.into(),
+            path: path.into(),
+        });
+    }
+    programs.sort_by(|a, b| (&a.package, &a.name).cmp(&(&b.package, &b.name)));
+    fs::create_dir_all(list().parent().unwrap_or(Path::new(".")))?;
+    fs::write(list(), serde_json::to_vec(&programs)?)?;
+    println!("{} test programs", programs.len());
+    Ok(())
+}
+
+fn list() -> PathBuf {
+    repo::target().join("test/programs.json")
+}
+
+fn programs() -> Result<Vec<TestProgram>> {
+    let path = list();
+    let bytes = fs::read(&path).with_context(|| format!("{}", path.display()))?;
+    Ok(serde_json::from_slice(&bytes)?)
+}
+
+/// Runs the tests of each crate: all but the end-to-end ones.
+pub(crate) fn unit_tests() -> Result<()> {
+    for program in programs()?.iter().filter(|one| !(one.is_integration && one.package == END_TO_END)) {
+        run(program, &[])?;
+    }
+    Ok(())
+}
+
+/// Runs one program of the end-to-end tests, with all that it may use; `options` are the test runner's.
+pub(crate) fn end_to_end(name: &str, options: &[&str]) -> Result<()> {
+    oracle::prepare()?;
+    let programs = programs()?;
+    match programs.iter().find(|one| one.is_integration && one.package == END_TO_END && one.name == name) {
+        Some(program) => run(program, options),
+        None => bail!("{END_TO_END} has no tests named {name}"),
+    }
+}
+
+/// The campaigns in their short form.
+pub(crate) fn short_campaigns() -> Result<()> {
+    Shell::new(repo::target().join("debug/prove")).arg("--short").run()
+}
+
+/// As `cargo test` runs it.
+fn run(program: &TestProgram, options: &[&str]) -> Result<()> {
+    println!("\n{} {}", program.package, program.name);
+    Shell::new(&program.path)
+        .env("HUMS_FIRMWARE", Board::Emulated.image())
+        .env("HUMS_DIALECT", oracle::dialect())
+        .env("HUMS_PYTHON", oracle::python())
+        .env("HUMS_BIN", hums::program())
+        .env("CARGO_MANIFEST_DIR", &program.folder)
+        .within(&program.folder)
+        .args(options)
+        .run()
+}

@@ -1,0 +1,247 @@
+//! The steps of `cargo xtask test`.
+
+use anyhow::{Context as _, Result};
+
+use super::table::NOT_TESTED;
+use crate::budgets;
+use crate::costs;
+use crate::demo;
+use crate::firmware::{self, Board};
+use crate::hums;
+use crate::pc;
+use crate::prove;
+use crate::repo::FIRMWARE_TARGET;
+use crate::setup::Need;
+use crate::shell::Shell;
+use crate::structure;
+
+/// One thing that is checked.
+pub(super) struct Step {
+    pub(super) name: &'static str,
+    pub(super) about: &'static str,
+    pub(super) needs: &'static [Need],
+    /// Steps whose results it uses.
+    pub(super) after: &'static [&'static str],
+    /// The build folder whose lock it holds: cargo would let two such steps wait for each other.
+    pub(super) builds: Option<Builds>,
+    pub(super) run: fn() -> Result<()>,
+}
+
+/// A build folder of cargo's, with a lock of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Builds {
+    /// `target/debug`.
+    Pc,
+    /// `target/firmware`.
+    Firmware,
+}
+
+/// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
+/// wait for, then what takes longest.
+pub(super) const STEPS: [Step; 18] = [
+    Step {
+        name: "fmt",
+        about: "the formatting",
+        needs: &[Need::Rustfmt],
+        after: &[],
+        builds: None,
+        run: || Shell::cargo().args(["fmt", "--all", "--", "--check"]).run(),
+    },
+    Step {
+        name: "structure",
+        about: "no import goes in a circle, and docs/modules.dot is of this code",
+        needs: &[],
+        after: &[],
+        builds: None,
+        run: structure::check,
+    },
+    Step {
+        name: "build",
+        about: "hums, the campaigns and all tests of this PC compile",
+        needs: &[],
+        after: &[],
+        builds: Some(Builds::Pc),
+        run: pc::build,
+    },
+    Step {
+        name: "budgets",
+        about: "the firmware builds for the boards f405 and emulated, within budgets.toml",
+        needs: &[Need::FirmwareTarget],
+        after: &[],
+        builds: Some(Builds::Firmware),
+        run: check_budgets,
+    },
+    Step {
+        name: "emulator",
+        about: "end to end with the firmware in the emulator",
+        needs: &[Need::Qemu, Need::PythonVenv, Need::FirmwareTarget, Need::Dosfstools],
+        after: &["build", "budgets"],
+        builds: None,
+        run: || pc::end_to_end("emulator", &[]),
+    },
+    Step {
+        name: "clippy-firmware",
+        about: "lints of the firmware for the boards f405 and emulated, warnings as errors",
+        needs: &[Need::Clippy, Need::FirmwareTarget],
+        after: &[],
+        builds: Some(Builds::Firmware),
+        run: || FLOWN.into_iter().try_for_each(firmware::lint),
+    },
+    Step {
+        name: "clippy",
+        about: "lints of what runs on this PC, warnings as errors",
+        needs: &[Need::Clippy],
+        after: &["build"],
+        builds: Some(Builds::Pc),
+        run: clippy,
+    },
+    Step {
+        name: "unit",
+        about: "tests of each crate on this PC",
+        needs: &[],
+        after: &["build"],
+        builds: None,
+        run: pc::unit_tests,
+    },
+    Step {
+        name: "sim",
+        about: "end to end on this PC, against pymavlink",
+        needs: &[Need::Mtools, Need::Dosfstools, Need::PythonVenv],
+        after: &["build"],
+        builds: None,
+        run: sim,
+    },
+    Step {
+        name: "doc",
+        about: "the documentation builds without a warning, and its examples run",
+        needs: &[],
+        after: &["build"],
+        builds: Some(Builds::Pc),
+        run: doc,
+    },
+    Step {
+        name: "browser",
+        about: "the report and the live page in Chromium",
+        needs: &[Need::PythonVenv, Need::Chromium],
+        after: &["build"],
+        builds: None,
+        run: || pc::end_to_end("browser", &[]),
+    },
+    Step {
+        name: "prove",
+        about: "the campaigns in their short form",
+        needs: prove::NEEDS,
+        after: &["build"],
+        builds: None,
+        run: pc::short_campaigns,
+    },
+    Step {
+        name: "answer",
+        about: "every format against pymavlink, with pyarrow, DuckDB and InfluxDB as readers",
+        needs: &[Need::PythonVenv, Need::Influx],
+        after: &["build"],
+        builds: None,
+        run: || pc::end_to_end("answer", further()),
+    },
+    Step {
+        name: "live",
+        about: "live writing to InfluxDB and VictoriaMetrics, and the Grafana dashboards",
+        needs: &[Need::PythonVenv, Need::Influx, Need::Victoria],
+        after: &["build"],
+        builds: None,
+        run: || pc::end_to_end("live", &[]),
+    },
+    Step {
+        name: "costs",
+        about: "instructions and stack of the firmware against budgets.toml",
+        needs: &[Need::Qemu, Need::FirmwareTarget],
+        after: &["build", "budgets"],
+        builds: None,
+        run: || costs::check_built(&hums::program(), &Board::Emulated.image()),
+    },
+    Step {
+        name: "demo",
+        about: "cargo xtask demo",
+        needs: &[Need::Qemu, Need::FirmwareTarget],
+        after: &["build", "budgets"],
+        builds: None,
+        run: demo::as_test,
+    },
+    Step {
+        name: "no-std",
+        about: "the core crates build where there is no std, without what the firmware's binary turns on",
+        needs: &[Need::FirmwareTarget],
+        after: &[],
+        builds: Some(Builds::Firmware),
+        run: no_std,
+    },
+    Step {
+        name: "deny",
+        about: "licences, bans and sources of the dependencies",
+        needs: &[],
+        after: &["build"],
+        builds: None,
+        run: deny,
+    },
+];
+
+/// The boards that every change is tried for: the one that flies and the one of the emulator, which is built first
+/// because other steps wait for it. `cargo xtask dist` looks at all of them.
+const FLOWN: [Board; 2] = [Board::Emulated, Board::F405];
+
+fn check_budgets() -> Result<()> {
+    println!("{NOT_TESTED}board f429 (cargo xtask dist lints and measures it)");
+    budgets::check(&FLOWN)
+}
+
+fn clippy() -> Result<()> {
+    Shell::cargo().arg("clippy").args(pc::CHOICE).args(["--all-targets", "--", "-D", "warnings"]).run()
+}
+
+fn doc() -> Result<()> {
+    Shell::cargo()
+        .env("RUSTDOCFLAGS", "-D warnings")
+        .args(["doc", "--quiet", "--lib", "--no-deps", "--document-private-items"])
+        .args(pc::CHOICE)
+        .run()?;
+    Shell::cargo().args(["test", "--quiet", "--doc"]).args(pc::CHOICE).run()
+}
+
+/// `hums-onboard` depends on all other crates that fly. The target has no std, so whatever of them or of what they
+/// depend on asks for std does not compile; and `hums-app`, which turns further features on, takes no part.
+fn no_std() -> Result<()> {
+    Shell::cargo()
+        .args(["check", "--profile=firmware", "--target", FIRMWARE_TARGET, "--package=hums-onboard"])
+        .run()
+}
+
+fn sim() -> Result<()> {
+    // Half of their time they wait: links are as slow as radios are.
+    let threads = (2 * std::thread::available_parallelism().map_or(1, usize::from)).to_string();
+    let mut options = vec!["--test-threads", &threads];
+    options.extend(further());
+    pc::end_to_end("sim", &options)
+}
+
+/// The tests of further recordings are left out where there are none. In the emulator they are for `cargo xtask prove`.
+fn further() -> &'static [&'static str] {
+    let given = std::env::var_os("HUMS_FLIGHTS").is_some_and(|folder| !folder.is_empty());
+    if given { &["--include-ignored"] } else { &[] }
+}
+
+/// Advisories need a network, which may be missing, and appear on their own day: told, and never a failure.
+fn deny() -> Result<()> {
+    let deny = || Shell::cargo().args(["deny", "--log-level", "warn"]);
+    if Shell::cargo().args(["deny", "--version"]).ask().is_none() {
+        eprintln!("cargo-deny is not installed: building it, once (some minutes)");
+        // It has little to do: building it without optimisation takes a third of the time.
+        Shell::cargo().args(["install", "--quiet", "--locked", "--debug", "cargo-deny"]).run()?;
+    }
+    deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;
+    if deny().args(["fetch", "db"]).ask().is_none() {
+        println!("{NOT_TESTED}advisories about dependencies (their database cannot be fetched here)");
+    } else if deny().args(["check", "--disable-fetch", "advisories"]).run().is_err() {
+        eprintln!("warning: there are advisories about dependencies, see above");
+    }
+    Ok(())
+}
