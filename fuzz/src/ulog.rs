@@ -52,7 +52,9 @@ pub fn log() -> Vec<u8> {
         b"esc_status:uint64_t timestamp;uint8_t esc_count;esc_report[2] esc;uint8_t[3] _padding0;",
         b"esc_report:int32_t esc_rpm;float esc_voltage;float esc_current;",
     ];
-    topics.iter().for_each(|topic| message(b'F', &[topic]));
+    for topic in topics {
+        message(b'F', &[topic]);
+    }
     for (id, name) in [&b"vehicle_status"[..], b"vehicle_attitude", b"esc_status"].into_iter().enumerate() {
         message(b'A', &[&[0, id as u8, 0], name]);
     }

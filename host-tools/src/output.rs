@@ -19,6 +19,41 @@ pub fn json(value: &impl Serialize) -> Result<()> {
     line(&serde_json::to_string_pretty(value)?)
 }
 
+/// A JSON object that is printed as it is made: some members, then a list that is too long to be held. Its text is that
+/// of [`json`].
+pub struct JsonList {
+    empty: bool,
+}
+
+impl JsonList {
+    /// Prints the first member and the beginning of the list.
+    pub fn begin(name: &str, value: &impl Serialize, list: &str) -> Result<Self> {
+        print(&format!("{{\n  \"{name}\": {},\n  \"{list}\": [", indented(value, "  ")?))?;
+        Ok(Self { empty: true })
+    }
+
+    /// Prints an element of the list.
+    pub fn element(&mut self, value: &impl Serialize) -> Result<()> {
+        let comma = if self.empty { "" } else { "," };
+        self.empty = false;
+        print(&format!("{comma}\n    {}", indented(value, "    ")?))
+    }
+
+    /// Prints the end of the list and of the object.
+    pub fn end(self) -> Result<()> {
+        line(if self.empty { "]\n}" } else { "\n  ]\n}" })
+    }
+}
+
+/// A value as JSON whose lines after the first begin so. No string of JSON has a line's end in it.
+fn indented(value: &impl Serialize, by: &str) -> Result<String> {
+    Ok(serde_json::to_string_pretty(value)?.replace('\n', &format!("\n{by}")))
+}
+
+fn print(text: &str) -> Result<()> {
+    settle(io::stdout().lock().write_all(text.as_bytes()))
+}
+
 /// A broken pipe on standard output becomes [`ReaderGone`].
 pub fn settle(result: io::Result<()>) -> Result<()> {
     result.map_err(|error| match error.kind() {

@@ -22,6 +22,11 @@ use crate::source::told::Finding;
 /// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
 pub const LISTED_MAX: usize = 10_000;
 
+/// Messages without a definition of ours that are counted one by one: there are 16 million ids.
+const UNVERIFIED_MAX: usize = 4_096;
+/// Checks with exceedances that are kept: four times those that there are, with all their instances.
+const EXCEEDANCES_MAX: usize = 1_000;
+
 /// Ids below half of this are counted in a table.
 const NEAR: usize = 1024;
 
@@ -127,6 +132,8 @@ pub struct Contents {
     pub messages: BTreeMap<(u32, bool), MessageCount>,
     /// Messages that have a name and no id: those of recordings other than MAVLink's.
     pub named: Vec<item::MessageCount>,
+    /// Frames of further messages, none of which is verified: only so many ids are told apart.
+    pub other_messages: MessageCount,
     /// Records of the monitor's own.
     pub records: u64,
     /// The first boot record.
@@ -173,7 +180,7 @@ pub struct Contents {
 impl Contents {
     /// Frames of all messages.
     pub fn frames(&self) -> u64 {
-        self.messages.values().map(|count| count.frames).sum()
+        self.messages.values().map(|count| count.frames).sum::<u64>() + self.other_messages.frames
     }
 
     /// Whether what recorded it checked the vehicle's health: only such a recorder writes these records.
@@ -192,7 +199,7 @@ impl Contents {
 
     /// Bytes of all frames.
     pub fn frame_bytes(&self) -> u64 {
-        self.messages.values().map(|count| count.bytes).sum()
+        self.messages.values().map(|count| count.bytes).sum::<u64>() + self.other_messages.bytes
     }
 
     /// Bytes that the frames take in a tlog.
@@ -265,7 +272,7 @@ impl Contents {
                     lifetime: record.lifetime,
                     unit: record.unit.to_owned(),
                 };
-                self.exceedances.insert((record.check.to_owned(), record.instance), line);
+                self.exceeded((record.check.to_owned(), record.instance), line);
             }
             // A part that was replaced is not there any more; its successor is recorded after it.
             Record::Component(record) if record.why != Why::Replaced => {
@@ -290,15 +297,30 @@ impl Contents {
         }
     }
 
+    fn exceeded(&mut self, key: (String, u8), line: ExceedanceLine) {
+        if self.exceedances.len() < EXCEEDANCES_MAX || self.exceedances.contains_key(&key) {
+            self.exceedances.insert(key, line);
+        }
+    }
+
+    /// Where a message's frames are added up.
+    fn sum(&mut self, key: (u32, bool)) -> &mut MessageCount {
+        let (_, verified) = key;
+        if !verified && self.messages.len() >= UNVERIFIED_MAX && !self.messages.contains_key(&key) {
+            return &mut self.other_messages;
+        }
+        self.messages.entry(key).or_default()
+    }
+
     /// Adds what the next group held.
     fn add(&mut self, next: Self) {
         for (place, count) in next.near.iter().enumerate().filter(|(_, count)| count.frames > 0) {
-            let sum = self.messages.entry(((place >> 1) as u32, place & 1 != 0)).or_default();
+            let sum = self.sum(((place >> 1) as u32, place & 1 != 0));
             sum.frames += count.frames;
             sum.bytes += count.bytes;
         }
         for (key, count) in next.messages {
-            let sum = self.messages.entry(key).or_default();
+            let sum = self.sum(key);
             sum.frames += count.frames;
             sum.bytes += count.bytes;
         }
@@ -310,7 +332,7 @@ impl Contents {
         self.findings.extend(next.findings.into_iter().take(room));
         self.usage.extend(next.usage);
         self.lifetime.extend(next.lifetime);
-        self.exceedances.extend(next.exceedances);
+        next.exceedances.into_iter().for_each(|(key, line)| self.exceeded(key, line));
         self.components.extend(next.components);
         for loss in next.losses.values() {
             add_loss(&mut self.losses, loss);
@@ -343,6 +365,12 @@ impl Collect for Contents {
             Entry::Frame { bytes, verified, .. } => self.whole(bytes, *verified),
             Entry::Record { record, .. } => self.record(record),
         }
+    }
+
+    fn held_bytes(&self) -> usize {
+        // What an entry of a tree takes, texts on the heap included.
+        const ENTRY_BYTES: usize = 256;
+        ENTRY_BYTES * (self.messages.len() + self.findings.len() + self.exceedances.len())
     }
 
     fn only_counts(&self) -> bool {

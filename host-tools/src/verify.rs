@@ -105,7 +105,8 @@ impl LogJson {
             .iter()
             .filter(|((_, verified), _)| !verified)
             .map(|(_, count)| count.frames)
-            .sum();
+            .sum::<u64>()
+            + contents.other_messages.frames;
         let gaps = || contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed);
         let missing: u64 = gaps().map(|gap| u64::from(gap.sectors_lost)).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();

@@ -9,7 +9,7 @@ use hums_tests::flights::{Manifest, own};
 use hums_tests::program::{Decoded, Machine, Recording, hums};
 
 /// More than the program may need for any input, in KiB.
-const MEMORY_KIB_MAX: u64 = 400 << 10;
+const MEMORY_KIB_MAX: u64 = 120 << 10;
 
 /// The commands that read a log or an image.
 fn readers(file: &Path, out: &Path) -> [Vec<String>; 3] {

@@ -7,6 +7,7 @@
 //! * [`flights`] knows the recordings and what pymavlink found in them; [`oracle`] asks it about others.
 //! * [`live`] starts `hums live`, and sends it frames.
 //! * [`prove`] are the campaigns, thousands of cases each.
+//! * [`hostile`] makes inputs that are far larger inside than outside.
 //! * [`store`] reads what outlives power.
 //! * [`damage`] makes noise; [`fat`] checks a card's file system with the system's own tools.
 #![allow(
@@ -21,6 +22,7 @@ pub mod damage;
 pub mod fat;
 pub mod flights;
 pub mod frames;
+pub mod hostile;
 pub mod live;
 pub mod oracle;
 pub mod program;

@@ -65,6 +65,11 @@ pub fn open_or_make(path: &Path, size_mib: Option<u64>) -> Result<(File, Found)>
     }
 }
 
+/// Bytes of a file, or of a raw device, whose metadata says 0.
+pub fn length(mut file: &File) -> io::Result<u64> {
+    file.seek(SeekFrom::End(0))
+}
+
 /// An image file as a card with its write protection on.
 #[derive(Debug)]
 pub struct ReadOnlyImage {
@@ -75,7 +80,7 @@ pub struct ReadOnlyImage {
 impl ReadOnlyImage {
     /// The whole blocks of `file`.
     pub fn new(file: File) -> io::Result<Self> {
-        let blocks = file.metadata()?.len() / Block::LEN as u64;
+        let blocks = length(&file)? / Block::LEN as u64;
         Ok(Self { file: RefCell::new(file), blocks: u32::try_from(blocks).unwrap_or(u32::MAX) })
     }
 }

@@ -5,5 +5,5 @@ pub mod image;
 pub mod sim;
 
 pub use faults::Faults;
-pub use image::ReadOnlyImage;
+pub use image::{ReadOnlyImage, length};
 pub use sim::SimCard;

@@ -45,7 +45,12 @@ pub struct Collected<'a> {
     pub records: u64,
     /// What the log says was lost while recording.
     pub losses: u64,
+    /// Bytes in `tables`, and what the tables themselves take.
+    tables_bytes: usize,
 }
+
+/// A table with its first buffer, in a tree.
+const TABLE_BYTES: usize = 256;
 
 impl<'a> Collected<'a> {
     /// Nothing yet.
@@ -62,6 +67,7 @@ impl<'a> Collected<'a> {
             frames: 0,
             records: 0,
             losses: 0,
+            tables_bytes: 0,
         }
     }
 
@@ -107,6 +113,7 @@ impl<'a> Collected<'a> {
 
     fn csv_frame(&mut self, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
         let out = self.tables.entry(Table::of(frame, known.is_some())).or_default();
+        let before = table_bytes(out);
         push_times_csv(out, at, self.context.epoch_us);
         for number in [frame.system, frame.component] {
             out.push(b',');
@@ -121,6 +128,7 @@ impl<'a> Collected<'a> {
             push_hex(out, frame.payload);
         }
         out.push(b'\n');
+        self.tables_bytes += table_bytes(out) - before;
     }
 
     fn json_frame(&mut self, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
@@ -154,12 +162,14 @@ impl<'a> Collected<'a> {
                     .entry(row.table)
                     .or_insert_with(|| row.cells.iter().map(|(name, _)| *name).collect());
                 let out = self.tables.entry(Table::Hums(row.table)).or_default();
+                let before = table_bytes(out);
                 push_times_csv(out, at, self.context.epoch_us);
                 for (_, cell) in &row.cells {
                     out.push(b',');
                     cell.push_csv(out);
                 }
                 out.push(b'\n');
+                self.tables_bytes += table_bytes(out) - before;
             }
             if self.context.formats.jsonl {
                 let out = &mut self.jsonl;
@@ -201,6 +211,20 @@ impl Collect for Collected<'_> {
             Entry::Record { .. } => {}
         }
     }
+
+    fn held_bytes(&self) -> usize {
+        self.tlog.len()
+            + self.jsonl.len()
+            + self.tables_bytes
+            + self.influx.held_bytes()
+            + self.parquet.held_bytes()
+            + size_of::<Observed>() * self.observed.len()
+    }
+}
+
+/// What a table's lines take; nothing before the first one.
+fn table_bytes(lines: &[u8]) -> usize {
+    if lines.is_empty() { 0 } else { TABLE_BYTES + lines.len() }
 }
 
 /// The first two cells of every row.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use arrow_array::builder::StringBuilder;
 use arrow_array::types::{
     ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type,
     UInt16Type, UInt32Type, UInt64Type,
@@ -42,17 +43,17 @@ enum Values {
 
 /// Text; what is not UTF-8 gets replacement characters.
 #[derive(Debug, Default)]
-pub struct TextColumn(Vec<String>);
+pub struct TextColumn(StringBuilder);
 
 impl TextColumn {
     /// Adds one.
     pub fn push(&mut self, text: &[u8]) {
-        self.0.push(String::from_utf8_lossy(text).into_owned());
+        self.0.append_value(String::from_utf8_lossy(text));
     }
 
     /// All of them.
-    pub fn array(self) -> ArrayRef {
-        Arc::new(StringArray::from(self.0))
+    pub fn array(mut self) -> ArrayRef {
+        Arc::new(self.0.finish())
     }
 }
 

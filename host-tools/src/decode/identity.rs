@@ -86,6 +86,10 @@ impl Collect for Known {
             _ => {}
         }
     }
+
+    fn held_bytes(&self) -> usize {
+        0
+    }
 }
 
 impl Deliver<Self> for Known {

@@ -70,6 +70,11 @@ impl Lines {
         self.ends.is_empty()
     }
 
+    /// Bytes of memory that it holds.
+    pub fn held_bytes(&self) -> usize {
+        self.text.len() + size_of::<(usize, Instant)>() * self.ends.len()
+    }
+
     /// How many there are.
     pub fn len(&self) -> usize {
         self.ends.len()

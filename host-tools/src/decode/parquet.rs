@@ -59,7 +59,16 @@ pub(super) const TAKEN_FRAMES: [&str; 7] =
 pub struct Batches {
     frames: BTreeMap<Table, FrameColumns>,
     rows: BTreeMap<&'static str, RowColumns>,
+    held_bytes: usize,
 }
+
+/// What a table takes without a row, and a row besides the values of its message: its times, its sender.
+const TABLE_BYTES: usize = 4_096;
+const ROW_BYTES: usize = 32;
+/// What an offset or a length takes, for each field.
+const FIELD_BYTES: usize = 4;
+/// What a cell of the monitor's own takes, its text on the heap included.
+const CELL_BYTES: usize = 96;
 
 /// The columns of frames of one type.
 #[derive(Debug)]
@@ -128,7 +137,14 @@ impl Batches {
     /// Adds a frame.
     pub fn frame(&mut self, at: Instant, epoch_us: Option<u64>, frame: &Frame<'_>, known: Option<&Payload>) {
         let table = table_of(frame, known.is_some());
-        let columns = self.frames.entry(table).or_insert_with(|| FrameColumns::new(frame, known.is_some()));
+        let columns = self.frames.entry(table).or_insert_with(|| {
+            self.held_bytes += TABLE_BYTES;
+            FrameColumns::new(frame, known.is_some())
+        });
+        // A payload is sent without the zeros at its end; opaque ones are digits.
+        let sent =
+            known.and(frame.message()).map_or(2 * frame.payload.len(), |message| message.len_max.into());
+        self.held_bytes += ROW_BYTES + FIELD_BYTES * columns.fields.len() + sent;
         columns.times.push(at, epoch_us);
         columns.system.push(frame.system);
         columns.component.push(frame.component);
@@ -149,8 +165,14 @@ impl Batches {
     /// Adds a row of the monitor's own.
     pub fn row(&mut self, at: Instant, epoch_us: Option<u64>, row: &Row) {
         let columns = self.rows.entry(row.table).or_default();
+        self.held_bytes += ROW_BYTES + CELL_BYTES * (1 + row.cells.len());
         columns.times.push(at, epoch_us);
         columns.rows.push(row.clone());
+    }
+
+    /// Bytes of memory that it holds, roughly.
+    pub fn held_bytes(&self) -> usize {
+        self.held_bytes
     }
 
     /// Each table's rows.
@@ -269,8 +291,6 @@ struct TableFile {
 impl ParquetTables {
     /// Tables in a folder; `about` goes into each file's metadata.
     pub fn new(folder: Folder, about: &[(&str, String)]) -> Self {
-        // Makes the threads that encode: while a log is read they would inherit the one core that its reader keeps to.
-        rayon::current_num_threads();
         let about =
             about.iter().map(|(name, value)| KeyValue::new((*name).to_owned(), value.clone())).collect();
         let properties = WriterProperties::builder()

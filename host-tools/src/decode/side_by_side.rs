@@ -7,6 +7,8 @@ use crate::logs::in_order::{in_order, workers};
 
 /// Logs in work at most: writing one leaves its workers idle; a few fill these pauses.
 const AT_ONCE: usize = 4;
+/// Logs at most that are in work or done and wait for an earlier one.
+const AHEAD_MAX: usize = 16;
 
 /// Calls `work` for each item, some side by side, and `tell` with the results in the items' order. The first error of
 /// `tell` ends it: what is in work is finished, what is not is left.
@@ -16,7 +18,7 @@ pub fn side_by_side<I: Sync, R: Send>(
     tell: impl FnMut(R) -> Result<()>,
 ) -> Result<()> {
     let mut next = items.iter();
-    in_order(workers().min(AT_ONCE), None, items.len(), || Ok(next.next()), work, tell)
+    in_order(workers().min(AT_ONCE), AHEAD_MAX, || Ok(next.next()), work, tell)
 }
 
 #[cfg(test)]

@@ -9,15 +9,6 @@ use crate::source::recording::Format;
 use crate::summary::{Contents, Overview};
 use crate::utc::iso8601;
 
-/// What `info --json` prints.
-#[derive(Debug, Serialize)]
-pub struct InfoJson {
-    /// The card images.
-    pub images: Vec<ImageJson>,
-    /// Their logs, and those that are files of their own.
-    pub logs: Vec<LogJson>,
-}
-
 /// A card image's file system.
 #[derive(Debug, Serialize)]
 pub struct ImageJson {
@@ -60,6 +51,8 @@ pub struct LogJson {
     frame_bytes: u64,
     records: u64,
     messages: Vec<MessageJson>,
+    /// Frames of ids beyond those that are listed, none of which has a definition here.
+    frames_of_other_messages: u64,
     gaps_count: u64,
     frames_missing: u64,
     gaps: Vec<GapJson>,
@@ -248,6 +241,7 @@ impl LogJson {
             frame_bytes: contents.frame_bytes(),
             records: contents.records,
             messages: messages(contents),
+            frames_of_other_messages: contents.other_messages.frames,
             gaps_count: summary.gaps,
             frames_missing: summary.frames_missing,
             gaps: gaps(contents),

@@ -12,7 +12,7 @@ use crate::decode::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::source::recording::find;
-use json::{InfoJson, LogJson, images_json};
+use json::{LogJson, images_json};
 use text::{image_text, text};
 
 /// Runs `hums info`.
@@ -21,9 +21,11 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut logs = Vec::new();
     let mut outcome = Outcome::lossy(found.damaged());
-    if !args.json {
+    let mut list = None;
+    if args.json {
+        list = Some(output::JsonList::begin("images", &images_json(&found.images), "logs")?);
+    } else {
         for image in &found.images {
             output::line(&image_text(image))?;
         }
@@ -31,15 +33,14 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     side_by_side(&found.places, check::overview, |overview| {
         let overview = overview?;
         outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
-        if args.json {
-            logs.push(LogJson::new(&overview));
-            return Ok(());
+        if let Some(list) = &mut list {
+            return list.element(&LogJson::new(&overview));
         }
         output::line(text(&overview).trim_end())?;
         output::line("")
     })?;
-    if args.json {
-        output::json(&InfoJson { images: images_json(&found.images), logs })?;
+    if let Some(list) = list {
+        list.end()?;
     } else if found.places.is_empty() {
         output::line("no log is on it")?;
     }

@@ -233,4 +233,8 @@ fn messages_text(text: &mut String, log: &Overview) {
     for message in &contents.named {
         line(&message.name, message.count, message.bytes);
     }
+    let other = contents.other_messages;
+    if other.frames > 0 {
+        let _ = writeln!(text, "    {:<36} {:>10} {:>20}", "ids beyond these", other.frames, other.bytes);
+    }
 }

@@ -10,8 +10,6 @@ use std::thread;
 
 use anyhow::Result;
 
-use super::apart::Apart;
-
 /// How many may work: as many as there are processors that this program may use, or as `RAYON_NUM_THREADS` says, which
 /// the libraries obey as well.
 pub fn workers() -> usize {
@@ -25,10 +23,9 @@ pub fn workers() -> usize {
 }
 
 /// Calls `work` for each item that `next` gives, and `take` with the results in the items' order. `ahead_max` items at
-/// most are in work or wait for an earlier one. `apart` says which cores they keep to. The first error ends it.
+/// most are in work or wait for an earlier one. The first error ends it.
 pub fn in_order<T: Send, R: Send>(
     workers: usize,
-    apart: Option<&Apart>,
     ahead_max: usize,
     mut next: impl FnMut() -> Result<Option<T>>,
     work: impl Fn(T) -> R + Sync,
@@ -51,21 +48,14 @@ pub fn in_order<T: Send, R: Send>(
             }
             // After the first items are there: a single one is sooner done than a thread awake.
             if let Some(sender) = sender.take() {
-                let helpers = workers.min(given).saturating_sub(1);
-                for _ in 0..helpers {
+                for _ in 1..workers.min(given) {
                     let (queue, work, sender) = (&queue, &work, sender.clone());
                     scope.spawn(move || {
-                        if let Some(apart) = apart {
-                            apart.keep_off();
-                        }
                         while let Some((index, item)) = queue.wait() {
                             let promise = Promise { sender: &sender, index, result: None };
                             promise.keep(work(item));
                         }
                     });
-                }
-                if let Some(apart) = apart.filter(|_| helpers > 0) {
-                    apart.stay();
                 }
             }
             waiting.extend(results.try_iter());
@@ -166,7 +156,7 @@ mod tests {
                 thread::sleep(std::time::Duration::from_micros((item as u64 * 7 % 5) * 300));
                 item
             };
-            in_order(workers, None, 6, numbers(40), work, |item| {
+            in_order(workers, 6, numbers(40), work, |item| {
                 taken.push(item);
                 Ok(())
             })
@@ -186,7 +176,6 @@ mod tests {
         };
         in_order(
             4,
-            None,
             7,
             next,
             |item| item,
@@ -207,14 +196,14 @@ mod tests {
             ensure!(item != 3, "enough");
             Ok(())
         };
-        assert!(in_order(3, None, 8, numbers(1_000), |item| item, refuse).is_err());
+        assert!(in_order(3, 8, numbers(1_000), |item| item, refuse).is_err());
         let mut left = 5;
         let next = || {
             left -= 1;
             ensure!(left > 0, "the card is gone");
             Ok(Some(left))
         };
-        assert!(in_order(3, None, 8, next, |item| item, |_| Ok(())).is_err());
+        assert!(in_order(3, 8, next, |item| item, |_| Ok(())).is_err());
     }
 
     #[test]
@@ -225,6 +214,6 @@ mod tests {
             assert!(thread::current().name().is_some() || item < 10, "for this test");
             thread::sleep(std::time::Duration::from_millis(1));
         };
-        let _ = in_order(4, None, 8, numbers(100), work, |()| Ok(()));
+        let _ = in_order(4, 8, numbers(100), work, |()| Ok(()));
     }
 }

@@ -4,15 +4,20 @@
 //! (`00042_00.HUM`, `00042_01.HUM`, …); copied off the card the same files, in a directory; packed, one file.
 //! Whatever it was, here it is a list of places to read blocks of 512 bytes from.
 
-pub mod apart;
+mod card;
 pub mod fat;
 pub mod find;
+mod folder;
+mod found;
 pub mod groups;
 pub mod in_order;
+mod look;
 pub mod places;
 pub mod reader;
+mod scan;
 
-pub use find::{Content, Found, find, on_card};
+pub use card::on_card;
+pub use find::{Content, Found, find};
 pub use places::{Log, Piece};
 
 impl Found {

@@ -1,5 +1,10 @@
 //! Reads a log: groups are decoded in parallel, a few at a time, and what they hold is handed on in order, with the
-//! gaps between them. Memory is bounded by the groups in work, whatever the log's size.
+//! gaps between them.
+//!
+//! Memory is bounded, whatever the log's size and whatever is in it: two groups are in work for each worker, 16 at most,
+//! and each becomes [`PART_BYTES`] and one entry at most. A group that becomes more (equal frames are coded 2,000 times
+//! smaller than they are) is handed on in parts: its decoder waits with the first part until its turn comes, and decodes
+//! the rest then.
 
 use std::cell::Cell;
 
@@ -8,19 +13,24 @@ use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
 use hums_core::time::Instant;
 
-use super::apart::Apart;
 use super::groups::{Group, Groups};
 use super::in_order::{in_order, workers};
 use super::places::Log;
 
-/// Groups in work for each worker, and at most: each becomes up to some megabytes of text.
+/// Groups in work for each worker, and at most.
 const GROUPS_PER_WORKER: usize = 2;
 const GROUPS_MAX: usize = 16;
+/// What a group's entries may become before they are handed on: more than a group of a usual flight becomes in any
+/// format (a few megabytes as JSON lines), so that usual flights are decoded in parallel from end to end.
+pub const PART_BYTES: usize = 4 << 20;
 
-/// What one group's entries become; made in parallel, handed on in order.
+/// What one group's entries become, or a part of them; made in parallel, handed on in order.
 pub trait Collect: Send {
     /// Takes the next entry of the group.
     fn entry(&mut self, entry: &Entry<'_>);
+
+    /// Bytes of memory that it holds, roughly. Beyond [`PART_BYTES`] it is handed on, and another one goes on.
+    fn held_bytes(&self) -> usize;
 
     /// Whether frames are only counted: then `frame` gets them, which is cheaper, but for those that are odd.
     fn only_counts(&self) -> bool {
@@ -35,7 +45,7 @@ pub trait Collect: Send {
 pub trait Deliver<C> {
     /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
-    /// The entries of the next group.
+    /// The entries of the next group, or of the next part of one.
     fn group(&mut self, collected: C) -> Result<()>;
 }
 
@@ -86,14 +96,12 @@ pub fn read<C: Collect>(
         progress(groups.counts().blocks);
         Ok(group)
     };
-    let apart = Apart::begin();
     in_order(
         workers,
-        apart.as_ref(),
         ahead_max,
         next,
-        |group| decode_here(&group, new()),
-        |decoded| stitch.take(decoded, deliver),
+        |group| decode_here(group, new()),
+        |decoded| stitch.take(decoded, &new, deliver),
     )?;
     stitch.end(groups.damaged_at_end(), deliver)?;
     let mut summary = stitch.summary;
@@ -102,18 +110,34 @@ pub fn read<C: Collect>(
     Ok(summary)
 }
 
-/// Decodes with this thread's decoder, which is large and made once.
-fn decode_here<C: Collect>(group: &Group, collected: C) -> Decoded<C> {
+/// Decodes with this thread's decoder, which is large and made once; one that waits for its turn is another one's.
+fn decode_here<C: Collect>(group: Group, mut collected: C) -> Decoded<C> {
     thread_local!(static DECODER: Cell<Option<Box<GroupDecoder>>> = const { Cell::new(None) });
-    let mut decoder = DECODER.take().unwrap_or_else(|| Box::new(GroupDecoder::new()));
-    let decoded = decode(&mut decoder, group, collected);
-    DECODER.set(Some(decoder));
+    let mut decoded = Decoded::of(&group);
+    let decoder = DECODER.take().unwrap_or_else(|| Box::new(GroupDecoder::new()));
+    let mut rest = Rest { decoder, group, at: 0 };
+    let whole = decoded.go_on(&mut rest, &mut collected);
+    decoded.collected = Some(collected);
+    if whole {
+        DECODER.set(Some(rest.decoder));
+    } else {
+        decoded.rest = Some(rest);
+    }
     decoded
 }
 
-/// A group, decoded.
+/// A group that is not decoded to its end.
+struct Rest {
+    decoder: Box<GroupDecoder>,
+    group: Group,
+    /// Sectors of it that the decoder got.
+    at: usize,
+}
+
+/// A group, decoded as far as it was.
 struct Decoded<C> {
-    collected: C,
+    collected: Option<C>,
+    rest: Option<Rest>,
     /// Sectors missing before it, and whether blocks there were damaged.
     missing: u32,
     damaged: bool,
@@ -137,62 +161,79 @@ struct Decoded<C> {
     epoch_us: Option<u64>,
 }
 
-fn decode<C: Collect>(decoder: &mut GroupDecoder, group: &Group, mut collected: C) -> Decoded<C> {
-    let (mut error, mut begun, mut frames, mut last) = (None, None, 0, None);
-    let mut keeps: Option<(Keep, Keep)> = None;
-    let mut epoch_us = None;
-    let counts = collected.only_counts();
-    for step in group {
-        if let Err(why) = decoder.push(&step.header, &step.sector) {
-            error = error.or(Some(why));
-            break;
-        }
-        let preamble = decoder.preamble();
-        begun.get_or_insert((Instant::from_millis(preamble.start_ms), preamble.frames_before));
-        epoch_us = epoch_us.or(preamble.epoch_micros);
-        while let Some(outline) = next(decoder, counts) {
-            match outline {
-                Ok(Outline::Frame { at, id, bytes, verified }) => {
-                    last = Some(at);
-                    frames += 1;
-                    collected.frame(at, id, bytes, verified);
-                }
-                Ok(Outline::Whole(entry)) => {
-                    let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
-                    last = Some(at);
-                    frames += u32::from(matches!(entry, Entry::Frame { .. }));
-                    match entry {
-                        Entry::Record { record: Record::Keep(keep), .. } => {
-                            keeps = Some((keeps.map_or(keep, |(first, _)| first), keep));
-                        }
-                        Entry::Record { record: Record::Clock(clock), .. } => {
-                            epoch_us = Some(clock.epoch_micros());
-                        }
-                        _ => {}
-                    }
-                    collected.entry(&entry);
-                }
-                Err(why) => error = error.or(Some(why)),
-            }
+impl<C: Collect> Decoded<C> {
+    /// What its sectors say of it.
+    fn of(group: &Group) -> Self {
+        let (first, last) = (group.first(), group.last());
+        Self {
+            collected: None,
+            rest: None,
+            missing: first.map_or(0, |step| step.missing),
+            damaged: first.is_some_and(|step| step.damaged > 0),
+            sectors: group.len() as u32,
+            number: first.map_or(0, |step| step.header.number),
+            frames_said: group.iter().map(|step| u32::from(step.header.frames)).sum(),
+            begun: None,
+            frames: 0,
+            last: None,
+            error: None,
+            ends_partial: last.is_some_and(|step| step.header.partial),
+            damaged_partial: last.filter(|step| step.header.partial).map_or(0, |step| step.damaged),
+            closed: last.is_some_and(|step| step.header.closed),
+            keeps: None,
+            epoch_us: None,
         }
     }
-    let first = group.first();
-    Decoded {
-        collected,
-        missing: first.map_or(0, |step| step.missing),
-        damaged: first.is_some_and(|step| step.damaged > 0),
-        sectors: group.len() as u32,
-        number: first.map_or(0, |step| step.header.number),
-        frames_said: group.iter().map(|step| u32::from(step.header.frames)).sum(),
-        begun,
-        frames,
-        last,
-        error,
-        ends_partial: group.last().is_some_and(|step| step.header.partial),
-        damaged_partial: group.last().filter(|step| step.header.partial).map_or(0, |step| step.damaged),
-        closed: group.last().is_some_and(|step| step.header.closed),
-        keeps,
-        epoch_us,
+
+    /// Decodes to the group's end, or until what was collected is enough for a part. Whether it was the end.
+    fn go_on(&mut self, rest: &mut Rest, collected: &mut C) -> bool {
+        let Rest { decoder, group, at } = rest;
+        let counts = collected.only_counts();
+        loop {
+            while let Some(outline) = next(decoder, counts) {
+                match outline {
+                    Ok(outline) => self.entry(outline, collected),
+                    Err(why) => self.error = self.error.or(Some(why)),
+                }
+                if collected.held_bytes() >= PART_BYTES {
+                    return false;
+                }
+            }
+            let Some(step) = group.get(*at) else { return true };
+            *at += 1;
+            if let Err(why) = decoder.push(&step.header, &step.sector) {
+                self.error = self.error.or(Some(why));
+                return true;
+            }
+            let preamble = decoder.preamble();
+            self.begun.get_or_insert((Instant::from_millis(preamble.start_ms), preamble.frames_before));
+            self.epoch_us = self.epoch_us.or(preamble.epoch_micros);
+        }
+    }
+
+    fn entry(&mut self, outline: Outline<'_>, collected: &mut C) {
+        match outline {
+            Outline::Frame { at, id, bytes, verified } => {
+                self.last = Some(at);
+                self.frames += 1;
+                collected.frame(at, id, bytes, verified);
+            }
+            Outline::Whole(entry) => {
+                let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = entry;
+                self.last = Some(at);
+                self.frames += u32::from(matches!(entry, Entry::Frame { .. }));
+                match entry {
+                    Entry::Record { record: Record::Keep(keep), .. } => {
+                        self.keeps = Some((self.keeps.map_or(keep, |(first, _)| first), keep));
+                    }
+                    Entry::Record { record: Record::Clock(clock), .. } => {
+                        self.epoch_us = Some(clock.epoch_micros());
+                    }
+                    _ => {}
+                }
+                collected.entry(&entry);
+            }
+        }
     }
 }
 
@@ -217,7 +258,12 @@ struct Stitch {
 }
 
 impl Stitch {
-    fn take<C>(&mut self, group: Decoded<C>, deliver: &mut impl Deliver<C>) -> Result<()> {
+    fn take<C: Collect>(
+        &mut self,
+        mut group: Decoded<C>,
+        new: &impl Fn() -> C,
+        deliver: &mut impl Deliver<C>,
+    ) -> Result<()> {
         let begins_late = self.summary.groups == 0 && self.open.is_none() && group.number > 0;
         let cut = std::mem::replace(&mut self.cut, group.ends_partial);
         self.damaged_partial = group.damaged_partial;
@@ -233,8 +279,6 @@ impl Stitch {
         }
         self.summary.closed = group.closed;
         self.next_number = group.number.wrapping_add(group.sectors);
-        self.keep = group.keeps.map(|(_, last)| last).or(self.keep);
-        self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         match group.begun {
             None => self.skip(&group),
             Some((start, frames_before)) => {
@@ -248,12 +292,12 @@ impl Stitch {
                     self.close(gap, deliver)?;
                 }
                 self.summary.times_fell += u64::from(self.summary.last.is_some_and(|last| start < last));
+                hand_on(&mut group, new, deliver)?;
                 self.expected = Some(frames_before.wrapping_add(group.frames));
                 self.summary.first = self.summary.first.or(Some(start));
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);
-                deliver.group(group.collected)?;
                 if let Some(error) = group.error {
                     let gap = self.gap(cause_of(error));
                     gap.frames = Some(group.frames_said.saturating_sub(group.frames));
@@ -261,6 +305,8 @@ impl Stitch {
                 }
             }
         }
+        self.keep = group.keeps.map(|(_, last)| last).or(self.keep);
+        self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         Ok(())
     }
 
@@ -308,6 +354,25 @@ impl Stitch {
             None => Ok(()),
         }
     }
+}
+
+/// Hands a group on: what was decoded of it, and part by part what was not.
+fn hand_on<C: Collect>(
+    group: &mut Decoded<C>,
+    new: &impl Fn() -> C,
+    deliver: &mut impl Deliver<C>,
+) -> Result<()> {
+    if let Some(collected) = group.collected.take() {
+        deliver.group(collected)?;
+    }
+    while let Some(mut rest) = group.rest.take() {
+        let mut collected = new();
+        if !group.go_on(&mut rest, &mut collected) {
+            group.rest = Some(rest);
+        }
+        deliver.group(collected)?;
+    }
+    Ok(())
 }
 
 fn cause_of(error: GroupError) -> Cause {

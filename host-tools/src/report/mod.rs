@@ -18,6 +18,7 @@ pub mod samples;
 pub mod trend;
 
 use std::io::Write as _;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
@@ -39,38 +40,37 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         eprintln!("hums: {remark}");
     }
     let mut outcome = Outcome::lossy(found.damaged());
-    let mut overviews = Vec::new();
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
-    side_by_side(&found.places, check::overview, |overview| {
-        overviews.push(overview?);
-        Ok(())
-    })?;
     let wanted = wanted(args, &found.places)?;
     let mut inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
     if wanted.directory {
         inputs = inputs.without_folders();
     }
-    for &index in &wanted.sessions {
-        let (Some(place), Some(overview)) = (found.places.get(index), overviews.get(index)) else { continue };
-        // A card's sessions are one box's; what lies in a folder beside a recording may be anybody's.
-        let earlier = overviews.get(..index).filter(|_| place.own().is_some()).unwrap_or_default();
-        let path = wanted.path(place)?;
-        make_parent(&path)?;
-        let mut file = Output::create(&path, &inputs)?;
-        let html = page::html(overview, &replay::Replay::of(place)?, &trend::of(overview, earlier))?;
-        settle(file.write_all(html.as_bytes()), &path)?;
-        file.finish()?;
-        output::line(&format!(
-            "{}: session {}, {}",
-            path.display(),
-            place.name,
-            count(html.len() as u64, "byte")
-        ))?;
-        outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
-    }
-    if wanted.sessions.len() < found.places.len() && args.session.is_none() {
+    // Of each session only what later ones are compared with is kept.
+    let mut earlier: Vec<trend::Session> = Vec::new();
+    let read = found.places.get(..=*wanted.sessions.end()).unwrap_or_default();
+    side_by_side(read, check::overview, |overview| {
+        let overview = overview?;
+        let (index, this) = (earlier.len(), trend::Session::of(&overview));
+        if let Some(place) = found.places.get(index).filter(|_| wanted.sessions.contains(&index)) {
+            // A card's sessions are one box's; what lies in a folder beside a recording may be anybody's.
+            let before = if place.own().is_some() { &earlier[..] } else { &[] };
+            let path = wanted.path(place)?;
+            make_parent(&path)?;
+            let mut file = Output::create(&path, &inputs)?;
+            let html = page::html(&overview, &replay::Replay::of(place)?, &trend::of(&this, before))?;
+            settle(file.write_all(html.as_bytes()), &path)?;
+            file.finish()?;
+            let bytes = count(html.len() as u64, "byte");
+            output::line(&format!("{}: session {}, {bytes}", path.display(), place.name))?;
+            outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
+        }
+        earlier.push(this);
+        Ok(())
+    })?;
+    if *wanted.sessions.start() > 0 && args.session.is_none() {
         eprintln!(
             "hums: this is the newest of {} sessions; -o DIR/ writes a page for each, --session NAME one of them",
             found.places.len()
@@ -81,7 +81,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
 
 /// Which sessions get a page, and where.
 struct Wanted {
-    sessions: Vec<usize>,
+    sessions: RangeInclusive<usize>,
     output: PathBuf,
     directory: bool,
 }
@@ -100,10 +100,10 @@ fn wanted(args: &cli::Report, logs: &[Place]) -> Result<Wanted> {
                     names.join(", ")
                 )));
             };
-            vec![index]
+            index..=index
         }
-        None if directory => (0..logs.len()).collect(),
-        None => vec![last],
+        None if directory => 0..=last,
+        None => last..=last,
     };
     Ok(Wanted { sessions, output: args.output.clone(), directory })
 }

@@ -32,7 +32,7 @@ pub struct Trend {
     rows: Vec<RowJson>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 struct SessionJson {
     name: String,
     start_utc: Option<String>,
@@ -46,33 +46,53 @@ struct RowJson {
     values: Vec<Option<f64>>,
 }
 
+/// What later sessions are compared with.
+#[derive(Clone, Debug)]
+pub struct Session {
+    json: SessionJson,
+    /// System, unique id, autopilot and type, where they are known.
+    vehicle: Option<(u8, u64, u8, u8)>,
+    /// By [`FOLLOWED`].
+    values: [Option<f64>; FOLLOWED.len()],
+    worrying: f64,
+}
+
+impl Session {
+    /// Of a session that was read.
+    pub fn of(log: &Overview) -> Self {
+        let start_utc = log.summary.first.and_then(|first| log.utc_us(first)).map(iso8601);
+        let vehicle = log
+            .contents
+            .vehicle
+            .map(|vehicle| (vehicle.system, vehicle.uid, vehicle.autopilot, vehicle.vehicle_type));
+        Self {
+            json: SessionJson { name: log.name.clone(), start_utc },
+            vehicle,
+            values: FOLLOWED.map(|(counter, _, _, hourly)| value(log, counter, hourly)),
+            worrying: worrying(log),
+        }
+    }
+}
+
 /// Compares a session with those before it of the same vehicle, as far as the vehicle is known.
-pub fn of(this: &Overview, earlier: &[Overview]) -> Trend {
-    let who = |log: &Overview| {
-        let vehicle = log.contents.vehicle?;
-        Some((vehicle.system, vehicle.uid, vehicle.autopilot, vehicle.vehicle_type))
-    };
+pub fn of(this: &Session, earlier: &[Session]) -> Trend {
     let of_vehicle =
-        |other: &&Overview| who(this).is_none() || who(other).is_none() || who(this) == who(other);
-    let mut sessions: Vec<&Overview> = earlier.iter().filter(of_vehicle).collect();
+        |other: &&Session| this.vehicle.is_none() || other.vehicle.is_none() || this.vehicle == other.vehicle;
+    let mut sessions: Vec<&Session> = earlier.iter().filter(of_vehicle).collect();
     sessions.drain(..sessions.len().saturating_sub(EARLIER_MAX));
     sessions.push(this);
-    let name = |log: &&Overview| SessionJson {
-        name: log.name.clone(),
-        start_utc: log.summary.first.and_then(|first| log.utc_us(first)).map(iso8601),
-    };
-    let mut rows: Vec<RowJson> = FOLLOWED
-        .iter()
-        .map(|&(counter, title, unit, hourly)| RowJson {
+    let followed = FOLLOWED.iter().enumerate();
+    let mut rows: Vec<RowJson> = followed
+        .map(|(place, &(_, title, unit, _))| RowJson {
             title,
             unit,
-            values: sessions.iter().map(|log| value(log, counter, hourly)).collect(),
+            values: sessions.iter().map(|session| session.values.get(place).copied().flatten()).collect(),
         })
         .collect();
-    let findings = sessions.iter().map(|log| Some(worrying(log))).collect();
+    let findings = sessions.iter().map(|session| Some(session.worrying)).collect();
     rows.push(RowJson { title: "Findings, warning or worse", unit: "", values: findings });
     rows.retain(|row| row.values.iter().any(Option::is_some));
-    Trend { sessions: sessions.iter().map(name).collect(), rows }
+    Trend { sessions: sessions.iter().map(|session| session.json.clone()).collect(), rows }
 }
 
 fn value(log: &Overview, counter: &str, hourly: bool) -> Option<f64> {

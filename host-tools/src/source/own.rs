@@ -89,6 +89,12 @@ impl Collect for Collected {
             }
         }
     }
+
+    fn held_bytes(&self) -> usize {
+        // Observations lie on the heap, each with what the allocator adds.
+        const ENTRY_BYTES: usize = size_of::<(Instant, Kept)>() + size_of::<Observation>() + 16;
+        self.bytes.len() + self.entries.len() * ENTRY_BYTES
+    }
 }
 
 /// Hands groups on.

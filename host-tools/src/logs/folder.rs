@@ -1,0 +1,162 @@
+//! Walks a folder for logs and images of cards. Only files and folders count: links, pipes, sockets and devices in it are
+//! passed over, and said so. So no loop of links is walked, nothing waits for a pipe's other end, and a log that a link
+//! leads to is not found twice.
+
+use std::collections::BTreeMap;
+use std::fs::{self, FileType};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use hums_recorder::LogName;
+
+use super::card::{image, is_card, whole_file};
+use super::found::{Found, LOGS_MAX};
+use super::look::{Content, look};
+use super::places::Log;
+use crate::files::is_part;
+
+/// Folders deeper than this are not walked.
+const DEPTH_MAX: usize = 16;
+/// Folders that wait to be walked, at most.
+const WAITING_MAX: usize = 10_000;
+/// Segments of one folder that are kept.
+const SEGMENTS_MAX: usize = 8 * LOGS_MAX;
+
+/// What lies in a folder and may be ours.
+#[derive(Default)]
+struct Entries {
+    /// Segments by session.
+    sessions: BTreeMap<u32, Vec<(LogName, PathBuf)>>,
+    segments: usize,
+    /// Logs and images.
+    files: Vec<PathBuf>,
+    folders: Vec<PathBuf>,
+}
+
+/// Walks a folder: segments of one session in one folder are one log.
+pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result<()> {
+    let mut waiting = vec![(root.to_owned(), 0)];
+    while let Some((dir, depth)) = waiting.pop() {
+        let Entries { sessions, mut files, mut folders, .. } = entries(&dir, found)?;
+        files.sort();
+        folders.sort();
+        for path in files {
+            if found.is_known(&path) {
+                found.remark(format!("{}: is the same file as another one; it is read once", path.display()));
+            } else if let Err(error) = file(&path, salvage, found) {
+                found.remark(format!("{error:#}"));
+            }
+        }
+        for folder in folders {
+            if depth < DEPTH_MAX && waiting.len() < WAITING_MAX {
+                waiting.push((folder, depth + 1));
+            } else {
+                found.remark(format!(
+                    "{}: is not looked into: too deep, or too many folders",
+                    folder.display()
+                ));
+            }
+        }
+        let prefix = dir.strip_prefix(root).unwrap_or(Path::new("")).to_string_lossy().into_owned();
+        for (session, mut segments) in sessions {
+            segments.sort();
+            let name =
+                if prefix.is_empty() { format!("{session:05}") } else { format!("{prefix}/{session:05}") };
+            let mut log = Log { name, files: Vec::new(), pieces: Vec::new(), session: None };
+            for (_, path) in segments {
+                if found.is_known(&path) {
+                    found.remark(format!(
+                        "{}: is the same file as another one; it is read once",
+                        path.display()
+                    ));
+                    continue;
+                }
+                let segment = whole_file(&path)?;
+                log.files.extend(segment.files);
+                log.pieces.extend(segment.pieces);
+            }
+            if !log.pieces.is_empty() {
+                found.log(log);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Looks at each entry of a folder as it is read: there may be millions that are not ours.
+fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
+    let context = || format!("{}: cannot be read", dir.display());
+    let mut entries = Entries::default();
+    for entry in fs::read_dir(dir).with_context(context)? {
+        let entry = entry.with_context(context)?;
+        let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
+        if is_part(&path) {
+            // What a run of this program has not made whole is nobody's log.
+            continue;
+        }
+        if kind.is_dir() && entries.folders.len() < WAITING_MAX {
+            entries.folders.push(path);
+        } else if !kind.is_file() {
+            found.remark(format!("{}: is {}, and passed over", path.display(), what(kind)));
+        } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Content::Log))) {
+            if entries.segments < SEGMENTS_MAX {
+                entries.segments += 1;
+                entries.sessions.entry(name.session).or_default().push((name, path));
+            } else {
+                found.remark(format!("{}: is left out: there are too many segments", path.display()));
+            }
+        } else {
+            match look(&path) {
+                Ok(Content::Log | Content::Image) if entries.files.len() < LOGS_MAX => {
+                    entries.files.push(path);
+                }
+                Ok(Content::Log | Content::Image) => {
+                    found.remark(format!("{}: is left out: there are too many files", path.display()));
+                }
+                Ok(Content::Newer(version)) => {
+                    found.remark(format!(
+                        "{}: format version {version} is newer than this program",
+                        path.display()
+                    ));
+                }
+                Ok(_) => {}
+                Err(error) => found.remark(format!("{error:#}")),
+            }
+        }
+    }
+    Ok(entries)
+}
+
+fn what(kind: FileType) -> &'static str {
+    if kind.is_symlink() {
+        return "a link";
+    }
+    if kind.is_dir() {
+        return "one folder too many";
+    }
+    "a pipe, a socket or a device"
+}
+
+/// A log, or an image, that happens to lie in a folder.
+fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
+    match look(path)? {
+        Content::Log => found.log(whole_file(path)?),
+        Content::Image if is_card(path)? => {
+            let before = found.logs.len();
+            image(path, salvage, found)?;
+            let stem = path.file_stem().map_or("card".into(), |stem| stem.to_string_lossy());
+            for log in found.logs.iter_mut().skip(before) {
+                log.name = format!("{stem}/{}", log.name);
+            }
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// `00042_07.HUM` in any case of letters.
+fn segment_name(path: &Path) -> Option<LogName> {
+    let name = path.file_name()?.to_str()?.to_ascii_uppercase();
+    let (base, extension) = name.split_once('.')?;
+    LogName::from_short(base.as_bytes(), extension.as_bytes())
+}

@@ -1,0 +1,98 @@
+//! What was found, and what was passed over: bounded, and what is left out is counted.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use super::places::Log;
+use crate::files::FileId;
+
+/// Logs that are kept: each takes some hundred bytes. A card of 32 GB has room for 4,096 full segments.
+pub(super) const LOGS_MAX: usize = 10_000;
+/// Remarks that are kept.
+const REMARKS_MAX: usize = 20;
+/// Files of logs and images that are told from each other by their numbers.
+const SEEN_MAX: usize = 200_000;
+/// What was found.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// The logs, oldest session first.
+    pub logs: Vec<Log>,
+    /// What the file systems of the images say of themselves, one for each image.
+    pub images: Vec<Image>,
+    /// What was passed over, as sentences: the first [`REMARKS_MAX`], then one that counts the others.
+    pub remarks: Vec<String>,
+    remarks_more: u64,
+    /// Files that were found a second time.
+    pub(super) repeats: u64,
+    /// Logs beyond [`LOGS_MAX`].
+    pub(super) logs_more: u64,
+    /// Files that were looked at, by device and number: one that has two names is one log.
+    seen: BTreeSet<FileId>,
+}
+
+impl Found {
+    /// Something was passed over.
+    pub(super) fn remark(&mut self, sentence: String) {
+        if self.remarks.len() < REMARKS_MAX {
+            self.remarks.push(sentence);
+        } else {
+            self.remarks_more += 1;
+        }
+    }
+
+    /// Adds a log, as far as there is room.
+    pub(super) fn log(&mut self, log: Log) {
+        if self.logs.len() < LOGS_MAX {
+            self.logs.push(log);
+        } else {
+            self.logs_more += 1;
+        }
+    }
+
+    /// Adds logs, as far as there is room.
+    pub(super) fn add(&mut self, logs: impl IntoIterator<Item = Log>) {
+        logs.into_iter().for_each(|log| self.log(log));
+    }
+
+    /// Whether this file was met before, under this name or another one. Where the system has no numbers for files, no.
+    pub(super) fn is_known(&mut self, path: &Path) -> bool {
+        let Ok(identity) = FileId::of(path) else { return false };
+        let known = self.seen.contains(&identity);
+        self.repeats += u64::from(known);
+        if self.seen.len() < SEEN_MAX {
+            self.seen.insert(identity);
+        }
+        known
+    }
+
+    /// What was left out becomes a remark.
+    pub(super) fn finish(&mut self) {
+        if self.logs_more > 0 {
+            self.remarks.push(format!(
+                "{} logs beyond {LOGS_MAX} are left out: name fewer files or folders at once",
+                self.logs_more
+            ));
+        }
+        if self.remarks_more > 0 {
+            self.remarks.push(format!("and {} more were passed over", self.remarks_more));
+        }
+    }
+
+    /// Whether logs were left out.
+    pub fn is_cut(&self) -> bool {
+        self.logs_more > 0
+    }
+}
+
+/// A card image's file system.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// The file.
+    pub path: PathBuf,
+    /// What does not hold, as sentences; empty where everything does.
+    pub damage: Vec<String>,
+    /// Clusters that belong to no file.
+    pub lost_clusters: u64,
+    /// The logs were found by looking at every block, because the file system could not tell.
+    pub scanned: bool,
+}

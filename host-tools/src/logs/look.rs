@@ -1,0 +1,77 @@
+//! What a file is, by what is in it.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use hums_blackbox::{Header, NotASector};
+
+use super::places::BLOCK_BYTES;
+use crate::mavlink::frame::{Peek, peek};
+
+/// How far into a file to look for a first sector before calling it no log.
+const LOOK_BLOCKS: usize = 2048;
+
+/// What a file is, by its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// Sectors of a log.
+    Log,
+    /// A card: a partition table, or blocks to be looked through.
+    Image,
+    /// A log of a newer format version.
+    Newer(u8),
+    /// A ground station's log or raw MAVLink: to be recorded first.
+    Mavlink,
+    /// Nothing in it.
+    Empty,
+    /// Anything else.
+    Other,
+}
+
+/// What a file is.
+pub fn look(path: &Path) -> Result<Content> {
+    let context = || format!("{}: cannot be read", path.display());
+    let mut file = File::open(path).with_context(context)?;
+    let mut start = Vec::new();
+    file.by_ref().take(BLOCK_BYTES as u64).read_to_end(&mut start).with_context(context)?;
+    if start.first_chunk().is_some_and(|block| Header::read(block).is_ok()) {
+        // Nearly every log: its first block tells.
+        return Ok(Content::Log);
+    }
+    let rest = ((LOOK_BLOCKS - 1) * BLOCK_BYTES) as u64;
+    file.by_ref().take(rest).read_to_end(&mut start).with_context(context)?;
+    if start.is_empty() {
+        return Ok(Content::Empty);
+    }
+    let mut newer = None;
+    let mut log_blocks = 0_usize;
+    let mut other_blocks = 0_usize;
+    for block in start.chunks(BLOCK_BYTES) {
+        let mut whole = [0; BLOCK_BYTES];
+        whole.iter_mut().zip(block).for_each(|(to, from)| *to = *from);
+        match Header::read(&whole) {
+            Ok(_) => log_blocks += 1,
+            Err(NotASector::OtherVersion(version)) => newer = Some(version),
+            Err(NotASector::Empty | NotASector::Damaged) => {}
+            Err(NotASector::Foreign) => other_blocks += 1,
+        }
+        // A partition table stands before everything; a log has a sector early.
+        if log_blocks > 0 {
+            break;
+        }
+    }
+    let signed = start.get(510..512) == Some(&[0x55, 0xaa]);
+    let large = start.len() == LOOK_BLOCKS * BLOCK_BYTES;
+    let frame_at = |at: usize| start.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
+    Ok(match (log_blocks, newer) {
+        _ if signed && other_blocks > 0 => Content::Image,
+        (1.., _) => Content::Log,
+        (0, Some(version)) => Content::Newer(version),
+        _ if frame_at(0) || frame_at(8) => Content::Mavlink,
+        // A card whose first blocks are gone: only looking at all of it tells.
+        _ if large => Content::Image,
+        _ => Content::Other,
+    })
+}

@@ -1,0 +1,154 @@
+//! Looks at every block of a card for sectors of logs, and puts those of each session in order.
+//!
+//! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card that has more is not ours or was
+//! made to take our memory: of too many sessions those with the most sectors stay, and what is left out is counted.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Result;
+use hums_blackbox::Header;
+
+use super::fat::Extent;
+use super::places::{BLOCK_BYTES, Blocks, Log, Piece};
+
+/// Runs of all sessions together: 16 MiB. The recorder makes a segment in a few runs.
+const RUNS_MAX: usize = 1 << 20;
+/// Sessions that are kept.
+const SESSIONS_MAX: usize = 10_000;
+
+/// What a scan found.
+pub(super) struct Scan {
+    /// The sessions, by their number.
+    pub(super) logs: Vec<Log>,
+    /// Sectors that belong to none of them, because there were too many sessions or runs.
+    pub(super) left_out: u64,
+}
+
+/// Sectors that follow each other, in place and in number; damaged ones between them are theirs.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    /// The block where it starts.
+    start: u64,
+    number: u32,
+    blocks: u32,
+}
+
+impl Run {
+    /// Whether a sector of this number in this block continues it, with at most a group between that is none.
+    fn goes_on(&self, number: u32, at: u64) -> bool {
+        let blocks = at.checked_sub(self.start);
+        let numbers = number.checked_sub(self.number).map(u64::from);
+        let (held, group) = (u64::from(self.blocks), hums_blackbox::GROUP_SECTORS as u64);
+        blocks == numbers && blocks.is_some_and(|blocks| (held..=held + group).contains(&blocks))
+    }
+}
+
+/// The runs of each session.
+#[derive(Default)]
+struct Sessions {
+    runs: BTreeMap<u32, Vec<Run>>,
+    count: usize,
+    left_out: u64,
+}
+
+impl Sessions {
+    fn sector(&mut self, header: &Header, at: u64) {
+        if let Some(last) = self.runs.get_mut(&header.session).and_then(|runs| runs.last_mut())
+            && last.goes_on(header.number, at)
+        {
+            last.blocks = header.number - last.number + 1;
+            return;
+        }
+        if self.count >= RUNS_MAX || self.runs.len() >= 2 * SESSIONS_MAX {
+            self.make_room();
+        }
+        if self.count >= RUNS_MAX {
+            self.left_out += 1;
+            return;
+        }
+        self.count += 1;
+        let run = Run { start: at, number: header.number, blocks: 1 };
+        self.runs.entry(header.session).or_insert_with(|| Vec::with_capacity(1)).push(run);
+    }
+
+    /// Leaves out the sessions with the fewest sectors, so that [`SESSIONS_MAX`] stay.
+    fn make_room(&mut self) {
+        if self.runs.len() <= SESSIONS_MAX {
+            return;
+        }
+        let sectors = |runs: &[Run]| runs.iter().map(|run| u64::from(run.blocks)).sum::<u64>();
+        let mut sizes: Vec<(u64, u32)> =
+            self.runs.iter().map(|(session, runs)| (sectors(runs), *session)).collect();
+        sizes.sort_unstable();
+        for &(sectors, session) in sizes.iter().take(self.runs.len() - SESSIONS_MAX) {
+            self.left_out += sectors;
+            self.count -= self.runs.remove(&session).map_or(0, |runs| runs.len());
+        }
+    }
+}
+
+/// Looks at every block of `length` bytes.
+pub(super) fn scan(path: &Path, length: u64) -> Result<Scan> {
+    let everything = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
+    let all = Log { name: String::new(), files: Vec::new(), pieces: vec![everything], session: None };
+    let mut blocks: Blocks<'_> = all.blocks();
+    let mut sessions = Sessions::default();
+    let mut at = 0;
+    while let Some(block) = blocks.next_block()? {
+        if let Ok(header) = Header::read(&block) {
+            sessions.sector(&header, at);
+        }
+        at += 1;
+    }
+    sessions.make_room();
+    let Sessions { runs, left_out, .. } = sessions;
+    let block_bytes = BLOCK_BYTES as u64;
+    let log = |(session, mut runs): (u32, Vec<Run>)| {
+        runs.sort_unstable_by_key(|run| (run.number, run.start));
+        let extent = |run: &Run| Extent {
+            start: run.start * block_bytes,
+            length: u64::from(run.blocks) * block_bytes,
+        };
+        let piece = Piece { path: path.to_owned(), extents: runs.iter().map(extent).collect() };
+        let files = vec![path.display().to_string()];
+        Log { name: format!("session-{session:08x}"), files, pieces: vec![piece], session: Some(session) }
+    };
+    Ok(Scan { logs: runs.into_iter().map(log).collect(), left_out })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use hums_blackbox::{SECTOR_BYTES, Sector};
+
+    use super::*;
+
+    fn sector(session: u32, number: u8) -> [u8; SECTOR_BYTES] {
+        let mut bytes = [0; SECTOR_BYTES];
+        bytes[..3].copy_from_slice(&[0x48, 0xb1, number]);
+        bytes[11] = number;
+        let mut sector = Sector::from_bytes(bytes);
+        sector.seal(session);
+        *sector.bytes()
+    }
+
+    #[test]
+    fn a_flight_is_found_among_more_sessions_than_are_kept_and_what_is_left_out_is_counted() {
+        let mut file = tempfile::NamedTempFile::new().expect("a file");
+        let others = 3 * SESSIONS_MAX as u32;
+        for session in 0..others {
+            file.write_all(&sector(1_000_000 + session, 0)).expect("room");
+            if session == others / 2 {
+                (0..40).for_each(|number| file.write_all(&sector(7, number)).expect("room"));
+            }
+        }
+        let length = u64::from(others + 40) * 512;
+        let Scan { logs, left_out } = scan(file.path(), length).expect("a file");
+        assert_eq!(logs.len(), SESSIONS_MAX);
+        assert_eq!(left_out, u64::from(others + 1) - SESSIONS_MAX as u64);
+        let flight = logs.iter().find(|log| log.session == Some(7)).expect("the flight");
+        assert_eq!(flight.bytes(), 40 * 512);
+    }
+}

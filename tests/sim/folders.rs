@@ -1,0 +1,66 @@
+//! Folders with more in them than logs: links, pipes, sockets, names that mean the same file.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::os::unix::net::UnixListener;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use hums_tests::child;
+use hums_tests::hostile;
+use hums_tests::program::{command, hums};
+use serde_json::Value;
+
+/// Longer than it takes to look at a handful of files, on a machine that has much to do.
+const SOON: Duration = Duration::from_secs(20);
+
+fn names(outcome: &child::Outcome) -> Vec<String> {
+    let json: Value = serde_json::from_str(&outcome.text()).unwrap();
+    let logs = json["logs"].as_array().unwrap();
+    logs.iter().map(|log| log["name"].as_str().unwrap().to_owned()).collect()
+}
+
+fn info(path: &Path) -> child::Outcome {
+    child::run(&mut command(["info".as_ref(), "--json".as_ref(), path.as_os_str()]), SOON)
+}
+
+#[test]
+fn a_loop_of_links_ends_at_once_and_a_log_is_listed_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = hostile::heartbeats(dir.path(), 100);
+    for name in ["a", "b", "c"] {
+        symlink(".", dir.path().join(name)).unwrap();
+    }
+    symlink(&log, dir.path().join("link.hum")).unwrap();
+    fs::hard_link(&log, dir.path().join("twin.hum")).unwrap();
+    let outcome = info(dir.path()).expect_code(&[0]);
+    assert_eq!(names(&outcome), ["heartbeats"]);
+    for said in ["a: is a link", "link.hum: is a link", "twin.hum: is the same file"] {
+        assert!(outcome.stderr.contains(said), "{said}: {}", outcome.stderr);
+    }
+    let twice = ["info".as_ref(), "--json".as_ref(), log.as_os_str(), dir.path().as_os_str()];
+    assert_eq!(names(&hums(twice).expect_code(&[0])).len(), 1);
+}
+
+#[test]
+fn pipes_and_sockets_in_a_folder_are_passed_over_and_said() {
+    let dir = tempfile::tempdir().unwrap();
+    hostile::heartbeats(dir.path(), 100);
+    assert!(Command::new("mkfifo").arg(dir.path().join("pipe.hum")).status().unwrap().success());
+    let _listener = UnixListener::bind(dir.path().join("socket.hum")).unwrap();
+    let outcome = info(dir.path()).expect_code(&[0]);
+    assert_eq!(names(&outcome), ["heartbeats"]);
+    for said in ["pipe.hum: is a pipe", "socket.hum: is a pipe, a socket or a device"] {
+        assert!(outcome.stderr.contains(said), "{said}: {}", outcome.stderr);
+    }
+}
+
+#[test]
+fn a_pipe_that_is_named_is_refused_with_the_way_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let pipe = dir.path().join("pipe.hum");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let outcome = info(&pipe).expect_clear_failure();
+    assert!(outcome.stderr.contains("copy it into a file first"), "{}", outcome.stderr);
+}

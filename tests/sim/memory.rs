@@ -1,0 +1,111 @@
+//! Memory: no input makes a command take more than 64 MiB above what it takes for nearly nothing.
+//!
+//! One worker; `docs/decode.md` says what each further one adds. The inputs are larger than what may be held.
+
+use std::fs;
+use std::path::Path;
+use std::thread;
+use std::time::Duration;
+
+use hums_tests::child::{self, Outcome};
+use hums_tests::hostile;
+use hums_tests::live::Live;
+use hums_tests::program::{LIMIT, command};
+
+/// What a command may take beyond an empty run, KiB.
+const ABOVE_KIB_MAX: u64 = 64 << 10;
+
+fn run(arguments: &[&str]) -> Outcome {
+    child::run(command(arguments).env("RAYON_NUM_THREADS", "1"), LIMIT).expect_code(&[0, 1, 3])
+}
+
+/// What a run takes that has nearly nothing to do, KiB.
+fn empty_run(dir: &Path) -> u64 {
+    let log = hostile::heartbeats(dir, 10);
+    run(&["info", log.to_str().unwrap()]).memory_kib_max
+}
+
+#[track_caller]
+fn assert_bounded(what: &str, kib: u64, empty: u64) {
+    assert!(kib <= empty + ABOVE_KIB_MAX, "{what} took {kib} KiB, an empty run {empty} KiB");
+}
+
+/// Each command that reads a log, and each format.
+fn assert_all_bounded(log: &Path, empty: u64) {
+    let log = log.to_str().unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let page = dir.path().join("page.html");
+    let page = page.to_str().unwrap();
+    for arguments in [
+        &["info", log][..],
+        &["info", "--json", log],
+        &["verify", log],
+        &["check", log],
+        &["report", log, "-o", page],
+    ] {
+        assert_bounded(&arguments.join(" "), run(arguments).memory_kib_max, empty);
+    }
+    for format in ["tlog", "csv", "jsonl", "influx", "parquet", "thesis"] {
+        let out = format!("{}/{format}/", dir.path().display());
+        let outcome = run(&["decode", log, "-o", &out, "--format", format]);
+        assert_bounded(&format!("{format} of {log}"), outcome.memory_kib_max, empty);
+        let _ = fs::remove_dir_all(out);
+    }
+}
+
+/// `hums live`, until it has read all.
+fn assert_live_bounded(log: &Path, empty: u64) {
+    let live = Live::start(&["--input", log.to_str().unwrap()]);
+    let mut before = (-1.0, 0);
+    let most = loop {
+        let (seconds, _, most) = live.program.cost().expect("it runs");
+        // It publishes ten times a second once it plays, which takes next to nothing.
+        if seconds - before.0 < 0.1 && seconds > 0.1 {
+            break most;
+        }
+        before = (seconds, most);
+        thread::sleep(Duration::from_millis(500));
+    };
+    assert_bounded(&format!("live of {}", log.display()), most, empty);
+}
+
+#[test]
+fn a_log_that_expands_two_thousand_fold_takes_little_memory_with_any_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    let log = hostile::heartbeats(dir.path(), 600_000);
+    assert!(fs::metadata(&log).unwrap().len() < 200_000);
+    assert_all_bounded(&log, empty);
+    assert_live_bounded(&log, empty);
+}
+
+#[test]
+fn logs_of_one_kind_of_message_take_little_memory_with_any_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    for log in [hostile::texts(dir.path(), 100_000), hostile::parameters(dir.path(), 60_000)] {
+        assert_all_bounded(&log, empty);
+        assert_live_bounded(&log, empty);
+    }
+    let ids = hostile::unknown_ids(dir.path(), 60_000);
+    for command in ["info", "verify", "check"] {
+        assert_bounded(command, run(&[command, ids.to_str().unwrap()]).memory_kib_max, empty);
+    }
+}
+
+#[test]
+fn cards_full_of_entries_or_sessions_take_little_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    let cards = [
+        hostile::directories(dir.path(), 12, false),
+        hostile::directories(dir.path(), 12, true),
+        hostile::sessions(dir.path(), 60_000),
+    ];
+    for card in cards {
+        for flag in ["--json", "--salvage"] {
+            let outcome = run(&["info", flag, card.to_str().unwrap()]);
+            assert_bounded(&format!("info {flag} {}", card.display()), outcome.memory_kib_max, empty);
+        }
+    }
+}

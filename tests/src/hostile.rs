@@ -1,0 +1,145 @@
+//! Inputs that are made to take memory: well-formed, and far larger inside than outside.
+
+use std::fs::{self, File};
+use std::io::{Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use hums::card::ReadOnlyImage;
+use hums_blackbox::{SECTOR_BYTES, Sector};
+use hums_dialect::crc;
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+use hums_recorder::layout::Layout;
+
+use crate::program::hums;
+
+/// HEARTBEAT of an `ArduPilot` quadrotor with its checksum, as MAVLink 1.
+const HEARTBEAT: [u8; 17] = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
+/// Blocks of a directory at most: 65,536 entries of 32 bytes.
+const DIRECTORY_BLOCKS: u32 = 4_096;
+/// The first of the clusters that are given away: what lies before them stays as it is.
+const CLUSTER: u32 = 60_000;
+
+/// Packs these bytes of a line.
+fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
+    let (recording, log) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.hum")));
+    fs::write(&recording, raw).unwrap();
+    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0]);
+    fs::remove_file(recording).unwrap();
+    log
+}
+
+/// The same heartbeat so many times: 200 bytes of the log are 30,000 frames.
+pub fn heartbeats(dir: &Path, count: usize) -> PathBuf {
+    packed(dir, "heartbeats", &HEARTBEAT.repeat(count))
+}
+
+fn messages(dir: &Path, name: &str, count: u32, packet: impl Fn(u32) -> Packet) -> PathBuf {
+    let mut encoder = Encoder::of(1, 1);
+    let mut raw = HEARTBEAT.to_vec();
+    for number in 0..count {
+        let mut buffer = [0; FRAME_BYTES_MAX];
+        raw.extend_from_slice(encoder.frame(&mut buffer, &packet(number)));
+    }
+    packed(dir, name, &raw)
+}
+
+/// Nothing but different texts.
+pub fn texts(dir: &Path, count: u32) -> PathBuf {
+    messages(dir, "texts", count, |number| {
+        Packet::new(253).u8(0, 4).text(1, 50, &format!("the same words over and over, {number:09}"))
+    })
+}
+
+/// Nothing but parameters, each with a name of its own, of a HUMS on board.
+pub fn parameters(dir: &Path, count: u32) -> PathBuf {
+    messages(dir, "parameters", count, |number| {
+        Packet::new(22).f32(0, 1.0).u16(4, 60_000).text(8, 16, &format!("P{number:09}")).u8(24, 9)
+    })
+}
+
+/// Nothing but messages that nobody knows, each with an id of its own.
+pub fn unknown_ids(dir: &Path, count: u32) -> PathBuf {
+    let mut raw = HEARTBEAT.to_vec();
+    for number in 0..count {
+        let [low, middle, high, _] = (70_000 + number).to_le_bytes();
+        let mut frame = vec![0xfd, 1, 0, 0, number as u8, 1, 1, low, middle, high, 1];
+        // With the seed 0: some seed is right for it, so it is a frame.
+        let crc = crc::step(crc::update(crc::START, &frame[1..]), 0);
+        frame.extend_from_slice(&crc.to_le_bytes());
+        raw.extend_from_slice(&frame);
+    }
+    packed(dir, "unknown", &raw)
+}
+
+/// A card of 64 MiB with a short session on it.
+fn card(dir: &Path, name: &str) -> (PathBuf, File, Layout) {
+    let (recording, image) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.img")));
+    fs::write(&recording, HEARTBEAT.repeat(100)).unwrap();
+    let sim =
+        ["sim".as_ref(), "--input".as_ref(), recording.as_os_str(), "--card-size".as_ref(), "64".as_ref()];
+    hums(sim.into_iter().chain(["--sd".as_ref(), image.as_os_str()])).expect_code(&[0]);
+    let file = File::options().read(true).write(true).open(&image).unwrap();
+    let layout = Layout::read(&ReadOnlyImage::new(file.try_clone().unwrap()).unwrap()).unwrap();
+    assert_eq!(layout.cluster_blocks, 1, "a cluster is a block");
+    (image, file, layout)
+}
+
+fn write_at(file: &mut File, block: u32, bytes: &[u8]) {
+    file.seek(SeekFrom::Start(u64::from(block) * 512)).unwrap();
+    file.write_all(bytes).unwrap();
+}
+
+fn entry(name: &[u8; 11], attributes: u8, cluster: u32, size: u32) -> [u8; 32] {
+    let mut entry = [0; 32];
+    entry[..11].copy_from_slice(name);
+    entry[11] = attributes;
+    let [low, second, third, high] = cluster.to_le_bytes();
+    (entry[20], entry[21], entry[26], entry[27]) = (third, high, low, second);
+    entry[28..].copy_from_slice(&size.to_le_bytes());
+    entry
+}
+
+/// A card whose directories are full of segments: empty ones, or such as lie in no cluster.
+pub fn directories(dir: &Path, count: u32, bogus: bool) -> PathBuf {
+    let (image, mut file, layout) = card(dir, if bogus { "bogus" } else { "empty" });
+    let root: Vec<u8> = (0..count)
+        .flat_map(|number| {
+            let mut name = *b"FOLDER     ";
+            name[7] = b'A' + number as u8;
+            entry(&name, 0x10, CLUSTER + number * DIRECTORY_BLOCKS, 0)
+        })
+        .collect();
+    assert!(root.len() <= 512);
+    let mut first = root;
+    first.resize(512, 0);
+    write_at(&mut file, layout.data_start, &first);
+    let (cluster, size) = if bogus { (1, 512) } else { (0, 0) };
+    let block = entry(b"00001_00HUM", 0x20, cluster, size).repeat(16);
+    let clusters = count * DIRECTORY_BLOCKS;
+    write_at(&mut file, layout.data_start + CLUSTER - 2, &block.repeat(clusters as usize));
+    let chain: Vec<u8> = (1..=clusters)
+        .flat_map(|number| {
+            let next = if number % DIRECTORY_BLOCKS == 0 { 0x0fff_ffff } else { CLUSTER + number };
+            next.to_le_bytes()
+        })
+        .collect();
+    file.seek(SeekFrom::Start(u64::from(layout.fat_start) * 512 + u64::from(CLUSTER) * 4)).unwrap();
+    file.write_all(&chain).unwrap();
+    image
+}
+
+/// A card with so many sectors, each of a session of its own.
+pub fn sessions(dir: &Path, count: u32) -> PathBuf {
+    let (image, mut file, layout) = card(dir, "sessions");
+    let mut sectors = Vec::new();
+    for session in 0..count {
+        let mut bytes = [0; SECTOR_BYTES];
+        bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+        let mut sector = Sector::from_bytes(bytes);
+        sector.seal(1_000_000 + session);
+        sectors.extend_from_slice(sector.bytes());
+    }
+    write_at(&mut file, layout.data_start + CLUSTER, &sectors);
+    image
+}
