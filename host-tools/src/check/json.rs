@@ -4,7 +4,7 @@ use hums_core::health::{Level, vocabulary};
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use super::Checked;
+use super::checked::Checked;
 use super::judge::{Judged, JudgedBy};
 use super::problem::Problem;
 use super::text::{firmware, flown};

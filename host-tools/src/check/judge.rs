@@ -16,15 +16,13 @@ use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
-use super::problem::{Problem, Problems};
+use super::problem::{LISTED_MAX, Problem, Problems};
 use crate::source::item::{About, Gap, Item};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
-/// What is kept one by one of findings, flights, gaps; the rest is counted.
-pub const LISTED_MAX: usize = 10_000;
 /// How often it is noted which checks have something to judge.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
@@ -318,6 +316,10 @@ impl Judge {
         }
         let given = !self.limits.given.is_empty();
         let by = if self.checked_on_board && !given { JudgedBy::Board } else { JudgedBy::Here };
+        if !self.checked_on_board {
+            // Nobody knows where it was heard: a packed recording may be that of a ground station.
+            self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
+        }
         let (judged, not_judged) = self.coverage(by);
         let last = self.last;
         let mut problems = match by {
@@ -538,6 +540,22 @@ mod tests {
         let judged = judge.end();
         assert_eq!((judged.worst(), judged.damages), (None, 1));
         assert!(judged.judged.is_empty(), "{:?}", judged.judged);
+    }
+
+    #[test]
+    fn silence_of_a_link_is_no_finding_where_nobody_knows_which_link_it_was() {
+        for (checked, heartbeats) in [(false, 0), (true, 1)] {
+            let given = [(Param::BatRemWarn.spec(), 15.0)];
+            let mut judge = Judge::new(&Limits::new(&given), Format::Hums);
+            if checked {
+                judge.item(Instant::ZERO, Item::Record(&Told::Checked));
+            }
+            fly(&mut judge, 0, 10, 10, 0.9);
+            fly(&mut judge, 30, 40, 10, 0.9);
+            let problems = judge.end().problems;
+            let of_link = problems.iter().filter(|problem| problem.check == "heartbeat").count();
+            assert_eq!(of_link, heartbeats, "{problems:?}");
+        }
     }
 
     #[test]

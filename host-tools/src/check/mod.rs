@@ -3,6 +3,7 @@
 //! [`judge`] runs the monitor of the board over the stream of a recording; [`problem`] puts its findings together;
 //! [`text`] and [`json`] say what came of it.
 
+pub mod checked;
 pub mod json;
 pub mod judge;
 mod overview;
@@ -19,28 +20,10 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::progress;
 use crate::run::params;
-use crate::source::recording::{Format, Place, find};
-use judge::{Judged, Limits};
+use crate::source::recording::{Place, find};
+use checked::Checked;
+use judge::Limits;
 use text::Table;
-
-/// A recording, judged.
-pub struct Checked {
-    /// What people call it.
-    pub name: String,
-    /// What it is.
-    pub format: Format,
-    /// What came of it.
-    pub judged: Judged,
-}
-
-impl Checked {
-    /// How the run ended for this one.
-    fn outcome(&self) -> Outcome {
-        let damaged = self.judged.damages > 0 || (self.format == Format::Hums && self.judged.losses > 0);
-        let wrong = !self.judged.problems.is_empty();
-        Outcome::lossy(damaged).and(if wrong { Outcome::Findings } else { Outcome::Done })
-    }
-}
 
 /// Runs `hums check`.
 pub fn run(args: &cli::Check) -> Result<Outcome> {

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use hums_core::health::{Level, Side, Subsystem, checks};
 use hums_core::time::{Instant, Span};
 
-use super::judge::LISTED_MAX;
 use crate::source::told::Finding;
 
+/// What is kept one by one of findings, flights, gaps; the rest is counted.
+pub const LISTED_MAX: usize = 10_000;
 /// Parts that are followed at most: there are 140 of them, and a log may name what it likes.
 const FOLLOWED_MAX: usize = 1_000;
 
@@ -117,6 +118,14 @@ impl Problems {
         if let Some((problem, _)) = self.open.get_mut(&(check.to_owned(), instance)) {
             problem.value = worse(problem.value, value, check);
         }
+    }
+
+    /// Leaves some checks out, as if they had said nothing.
+    pub(super) fn drop_checks(&mut self, out: impl Fn(&str) -> bool) {
+        let before = self.findings.len();
+        self.findings.retain(|finding| !out(&finding.check));
+        self.findings_count -= (before - self.findings.len()) as u64;
+        self.open.retain(|(check, _), _| !out(check));
     }
 
     /// Nothing follows.

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use hums_core::health::{Level, vocabulary};
 use hums_core::time::{Instant, Span};
 
-use super::Checked;
+use super::checked::Checked;
 use super::judge::{Judged, JudgedBy};
 use super::problem::Problem;
 use crate::names::{autopilot_name, type_name};
