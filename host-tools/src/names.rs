@@ -73,6 +73,8 @@ pub fn event_name(number: u8) -> &'static str {
         10 => "autopilot_reboot",
         11 => "other_airframe",
         12 => "by_link",
+        13 => "other_vehicle",
+        14 => "flight_resumed",
         _ => "other",
     }
 }

@@ -115,8 +115,7 @@ impl Derived {
             }
             Observation::Battery(battery) => {
                 self.take_voltages(vehicle);
-                let same = |slot: &Latest<Battery>| slot.get().is_some_and(|known| known.id == battery.id);
-                if let Some(index) = vehicle.batteries.iter().position(same) {
+                if let Some(index) = vehicle.told_battery {
                     self.resistance[index].take(battery);
                 }
             }
@@ -180,7 +179,7 @@ impl Derived {
         recorder: &RecorderStatus,
     ) {
         match event {
-            Some(FlightEvent::TakeOff) => self.clips_at_takeoff = clips(vehicle),
+            Some(FlightEvent::TakeOff | FlightEvent::Resumed) => self.clips_at_takeoff = clips(vehicle),
             Some(FlightEvent::Landing) => self.clips_at_takeoff = None,
             None => {}
         }
@@ -265,7 +264,7 @@ impl Derived {
     ) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
         let mean = self.mean_of_others(motor)?;
-        if !Self::is_steady(now, vehicle, flight) {
+        if !vehicle.is_multicopter() || !Self::is_steady(now, vehicle, flight) {
             return None;
         }
         Reading::new(track.last, Some((track.smooth_rpm - mean).abs() / mean * 100.0))

@@ -1,8 +1,22 @@
-//! On the ground or in the air, and since when.
+//! On the ground or in the air, and since when; and which flights that makes.
 //!
-//! The autopilot's own word ([`LandedState`]) counts where it is given. Otherwise, armed and one metre above the place
-//! of arming (or a plane at flying speed) for half a second is a take-off; disarmed, or below half a metre and still for
-//! two seconds, is a landing. Vehicles that do not fly are never in the air.
+//! # In the air
+//! Only what is armed flies, and only what can: a rover, a boat or a submarine never does, whatever its landed state says
+//! (PX4 calls an armed rover "in air"). The autopilot's own word ([`LandedState`], `EXTENDED_SYS_STATE`) counts where it is
+//! given. Otherwise, for half a second:
+//!
+//! | what is known | in the air | on the ground again, for two seconds |
+//! |---|---|---|
+//! | a height above home or above the local origin | more than one metre above the place of arming | less than half a metre, and still |
+//! | the speed of a plane or VTOL | faster than 8 m/s | as above |
+//! | only the throttle (no position at all) | more than a fifth | less than a tenth |
+//!
+//! The place of arming counts only where arming was seen. Whoever hears an armed vehicle first (a restart in the air) takes
+//! the height above home as it is, and goes on in the air at once: [`FlightEvent::Resumed`].
+//!
+//! # Flights
+//! A flight begins with leaving the ground. It ends when the vehicle is disarmed, or when it has been on the ground for
+//! [`GROUND_LASTS`]; so a bounce and a touch-and-go are parts of one flight.
 
 use crate::observation::{LandedState, VehicleKind};
 use crate::time::{Instant, Span};
@@ -11,13 +25,20 @@ use crate::vehicle::Vehicle;
 const TAKEOFF_HEIGHT_M: f32 = 1.0;
 const LANDED_HEIGHT_M: f32 = 0.5;
 const PLANE_FLYING_MPS: f32 = 8.0;
+/// A multicopter hovers at a quarter to three quarters of its throttle and idles on the ground below a tenth.
+const FLYING_THROTTLE: f32 = 0.2;
+const IDLE_THROTTLE: f32 = 0.1;
 /// Nothing that is watched here is faster: garbage, which must not get into sums and maxima.
 const SPEED_MAX_MPS: f32 = 1_000.0;
 const STILL_MPS: f32 = 0.5;
 const TAKEOFF_DEBOUNCE: Span = Span::from_millis(500);
 const LANDING_DEBOUNCE: Span = Span::from_secs(2);
+/// The autopilot's word has its own debounce; one message of nonsense at 2 Hz has none.
+const WORD_DEBOUNCE: Span = Span::from_millis(600);
+/// On the ground, still armed, for so long: the flight is over. A plane rolls on from a touch-and-go within this.
+const GROUND_LASTS: Span = Span::from_secs(8);
 /// `EXTENDED_SYS_STATE` comes at 1 Hz or faster where it comes at all.
-const LANDED_STATE_AGE: Span = Span::from_secs(5);
+pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
 /// Positions and speeds older than this decide nothing.
 const MOTION_AGE: Span = Span::from_secs(3);
 
@@ -62,12 +83,14 @@ const CRUISE_MPS: f32 = 1.5;
 /// Below this height above the place of arming it takes off or lands.
 const NEAR_GROUND_M: f32 = 3.0;
 
-/// A change between ground and air.
+/// A flight begins or ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlightEvent {
     /// The vehicle left the ground.
     TakeOff,
-    /// The vehicle is back on the ground.
+    /// The vehicle was armed and in the air when it was heard first: the flight that it is on began before.
+    Resumed,
+    /// The flight is over: the vehicle is back on the ground, or disarmed.
     Landing,
 }
 
@@ -75,8 +98,14 @@ pub enum FlightEvent {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Flight {
     airborne_since: Option<Instant>,
-    armed_since: Option<Instant>,
-    /// Height above home where it was armed.
+    /// A flight is going on, and when the vehicle was in the air last.
+    flew_at: Option<Instant>,
+    /// The vehicle was heard disarmed: where it is armed next is the place of arming.
+    seen_disarmed: bool,
+    /// The vehicle was seen on the ground: what follows is a take-off.
+    seen_on_ground: bool,
+    armed: bool,
+    /// Height where it was armed.
     armed_height_m: Option<f32>,
     changing_since: Option<Instant>,
 }
@@ -84,7 +113,15 @@ pub struct Flight {
 impl Flight {
     /// On the ground.
     pub const fn grounded() -> Self {
-        Self { airborne_since: None, armed_since: None, armed_height_m: None, changing_since: None }
+        Self {
+            airborne_since: None,
+            flew_at: None,
+            seen_disarmed: false,
+            seen_on_ground: false,
+            armed: false,
+            armed_height_m: None,
+            changing_since: None,
+        }
     }
 
     /// Whether it is in the air.
@@ -92,40 +129,70 @@ impl Flight {
         self.airborne_since.is_some()
     }
 
-    /// When it took off, while it is in the air.
+    /// When it left the ground last, while it is in the air.
     pub const fn airborne_since(&self) -> Option<Instant> {
         self.airborne_since
     }
 
     /// One step, at least every 50 ms.
     pub fn step(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
-        let height_m = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
-        if !vehicle.armed() {
-            self.armed_since = None;
-            self.armed_height_m = None;
-        } else if self.armed_since.is_none() {
-            self.armed_since = Some(now);
-            self.armed_height_m = height_m;
-        }
+        self.note_arming(now, vehicle);
         let says = Self::autopilot_says(now, vehicle);
+        let flies = self.armed && can_fly(vehicle) && says.unwrap_or_else(|| self.seems_to_fly(now, vehicle));
         let debounce = match (says, self.airborne()) {
-            (Some(_), _) => Span::ZERO,
+            // What is on the ground is judged as such at once: motors that stop are no fault there. One wrong word ends no
+            // flight.
+            (Some(_), true) => Span::ZERO,
+            (_, true) if !self.armed => Span::ZERO,
+            (Some(_), false) => WORD_DEBOUNCE,
             (None, false) => TAKEOFF_DEBOUNCE,
-            (None, true) if !vehicle.armed() => Span::ZERO,
             (None, true) => LANDING_DEBOUNCE,
         };
-        let flies = says.unwrap_or_else(|| self.seems_to_fly(now, vehicle, height_m));
         if flies == self.airborne() {
             self.changing_since = None;
-            return None;
+            let knows = says.is_some() || !self.armed || height_m(now, vehicle).is_some();
+            self.seen_on_ground |= !flies && knows && vehicle.heartbeat.get().is_some();
+        } else {
+            let since = *self.changing_since.get_or_insert(now);
+            if now.since(since) >= debounce {
+                self.changing_since = None;
+                self.airborne_since = flies.then_some(since);
+            }
         }
-        let since = *self.changing_since.get_or_insert(now);
-        if now.since(since) < debounce {
-            return None;
+        self.begin_or_end(now)
+    }
+
+    fn note_arming(&mut self, now: Instant, vehicle: &Vehicle) {
+        let Some(heartbeat) = vehicle.heartbeat.get() else { return };
+        if !heartbeat.armed {
+            (self.seen_disarmed, self.armed_height_m) = (true, None);
+        } else if self.seen_disarmed && !self.armed {
+            self.armed_height_m = height_m(now, vehicle);
         }
-        self.changing_since = None;
-        self.airborne_since = flies.then_some(since);
-        Some(if flies { FlightEvent::TakeOff } else { FlightEvent::Landing })
+        self.armed = heartbeat.armed;
+    }
+
+    fn begin_or_end(&mut self, now: Instant) -> Option<FlightEvent> {
+        match (self.airborne(), self.flew_at) {
+            (true, None) => {
+                self.flew_at = Some(now);
+                Some(if self.seen_on_ground { FlightEvent::TakeOff } else { FlightEvent::Resumed })
+            }
+            (true, Some(_)) => {
+                self.flew_at = Some(now);
+                None
+            }
+            (false, Some(last)) if !self.armed || now.since(last) >= GROUND_LASTS => {
+                self.flew_at = None;
+                Some(FlightEvent::Landing)
+            }
+            (false, _) => None,
+        }
+    }
+
+    /// Height above the place of arming where that was seen, above home otherwise.
+    fn height_above_start_m(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+        height_m(now, vehicle).map(|height_m| height_m - self.armed_height_m.unwrap_or(0.0))
     }
 
     /// What the vehicle is doing now.
@@ -134,9 +201,8 @@ impl Flight {
             return Phase::Ground;
         }
         let climb_mps = climb_mps(now, vehicle).unwrap_or(0.0);
-        let height_m = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
-        let height_m = height_m.map(|height_m| height_m - self.armed_height_m.unwrap_or(0.0));
-        let near_ground = height_m.is_some_and(|height_m| height_m < NEAR_GROUND_M);
+        let near_ground =
+            self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m < NEAR_GROUND_M);
         if near_ground && climb_mps > VERTICAL_MPS / 2.0 {
             Phase::TakeOff
         } else if near_ground && climb_mps < -VERTICAL_MPS / 2.0 {
@@ -162,20 +228,37 @@ impl Flight {
         }
     }
 
-    fn seems_to_fly(&self, now: Instant, vehicle: &Vehicle, height_m: Option<f32>) -> bool {
-        let Some(heartbeat) = vehicle.heartbeat.get() else { return false };
-        if !heartbeat.armed || heartbeat.kind == VehicleKind::Surface {
-            return false;
-        }
-        let speed_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
-        let height_m = height_m.map(|height_m| height_m - self.armed_height_m.unwrap_or(0.0));
+    fn seems_to_fly(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let speed_mps = ground_speed_mps(now, vehicle);
+        let Some(height_m) = self.height_above_start_m(now, vehicle) else {
+            let fast = speed_mps.is_some_and(|speed_mps| has_wings(vehicle) && speed_mps > PLANE_FLYING_MPS);
+            let throttle = vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.throttle);
+            let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
+            let thrust = throttle.is_none_or(|throttle| throttle.0 > enough);
+            // Without any word about height, speed or thrust it goes on with what it does.
+            return fast || (thrust && (self.airborne() || (throttle.is_some() && !has_wings(vehicle))));
+        };
+        let speed_mps = speed_mps.unwrap_or(0.0);
         if self.airborne() {
-            return height_m.is_none_or(|height_m| height_m > LANDED_HEIGHT_M) || speed_mps > STILL_MPS;
+            return height_m > LANDED_HEIGHT_M || speed_mps > STILL_MPS;
         }
-        let plane = matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol);
-        height_m.is_some_and(|height_m| height_m > TAKEOFF_HEIGHT_M)
-            || (plane && speed_mps > PLANE_FLYING_MPS)
+        height_m > TAKEOFF_HEIGHT_M || (has_wings(vehicle) && speed_mps > PLANE_FLYING_MPS)
     }
+}
+
+fn can_fly(vehicle: &Vehicle) -> bool {
+    vehicle.kind() != VehicleKind::Surface
+}
+
+fn has_wings(vehicle: &Vehicle) -> bool {
+    matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Vtol)
+}
+
+/// Height above home; above the local origin where there is no global position.
+pub(crate) fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+    let global = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
+    let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.position[2].0);
+    global.or_else(local).filter(|height_m| height_m.is_finite())
 }
 
 /// Speed upwards from the best source that is fresh, in m/s.
@@ -227,8 +310,9 @@ mod tests {
 
     #[test]
     fn height_above_the_place_of_arming_is_a_take_off() {
-        let heights = [(5_000, 20.0), (10_000, 25.0), (20_000, 20.1)];
-        let expected = [(5_500, FlightEvent::TakeOff), (12_000, FlightEvent::Landing)];
+        let heights = [(5_000, 20.0), (10_000, 25.0), (30_000, 20.1)];
+        // Two seconds of standing, and then the flight is over.
+        let expected = [(5_500, FlightEvent::TakeOff), (19_950, FlightEvent::Landing)];
         assert_eq!(fly(VehicleKind::Rotorcraft, &heights), expected);
     }
 
@@ -238,20 +322,96 @@ mod tests {
     }
 
     #[test]
-    fn the_autopilots_own_word_counts() {
-        let mut vehicle = Vehicle::unknown();
-        let mut flight = Flight::grounded();
-        let heartbeat = Heartbeat { armed: true, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
-        vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-        for (landed, event) in [
-            (LandedState::OnGround, None),
-            (LandedState::TakingOff, None),
-            (LandedState::InAir, Some(FlightEvent::TakeOff)),
-            (LandedState::Landing, None),
-            (LandedState::OnGround, Some(FlightEvent::Landing)),
-        ] {
-            vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Landed(landed));
-            assert_eq!(flight.step(Instant::ZERO, &vehicle), event, "{landed:?}");
+    fn a_bounce_and_a_touch_and_go_are_one_flight() {
+        let heights = [
+            (5_000, 0.0),
+            (20_000, 25.0),
+            (25_000, 0.0),
+            (26_000, 3.0),
+            (32_000, 0.0),
+            (50_000, 25.0),
+            (70_000, 0.0),
+        ];
+        let events: Vec<_> =
+            fly(VehicleKind::Rotorcraft, &heights).into_iter().map(|(_, event)| event).collect();
+        assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
+    }
+
+    /// Armed all along; what the autopilot says of it, each for so many messages, two a second.
+    fn told(kind: VehicleKind, words: &[(u64, LandedState)]) -> Vec<(u64, FlightEvent)> {
+        let (mut vehicle, mut flight, mut events, mut now_ms) =
+            (Vehicle::unknown(), Flight::grounded(), Vec::new(), 0);
+        let heartbeat = Heartbeat { armed: true, kind, ..Heartbeat::default() };
+        for (messages, landed) in words {
+            for _ in 0..messages * 10 {
+                let now = Instant::from_millis(now_ms);
+                vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
+                if now_ms % 500 == 0 {
+                    vehicle.observe(now, AUTOPILOT, &Observation::Landed(*landed));
+                }
+                events.extend(flight.step(now, &vehicle).map(|event| (now_ms, event)));
+                now_ms += 50;
+            }
         }
+        events
+    }
+
+    #[test]
+    fn the_autopilots_own_word_counts() {
+        let words = [
+            (10, LandedState::OnGround),
+            (4, LandedState::TakingOff),
+            (20, LandedState::InAir),
+            (10, LandedState::Landing),
+            (40, LandedState::OnGround),
+        ];
+        let expected = [(7_600, FlightEvent::TakeOff), (29_950, FlightEvent::Landing)];
+        assert_eq!(told(VehicleKind::Rotorcraft, &words), expected);
+    }
+
+    #[test]
+    fn a_rover_never_flies_whatever_its_landed_state_says() {
+        assert_eq!(told(VehicleKind::Surface, &[(10, LandedState::OnGround), (40, LandedState::InAir)]), []);
+    }
+
+    #[test]
+    fn one_wrong_word_is_no_landing() {
+        let mut words = vec![(10, LandedState::OnGround), (20, LandedState::InAir)];
+        words.extend([(1, LandedState::OnGround), (40, LandedState::InAir)]);
+        assert_eq!(told(VehicleKind::Rotorcraft, &words).len(), 1);
+    }
+
+    #[test]
+    fn a_landed_state_that_is_lost_leaves_the_decision_to_what_else_is_known() {
+        let (mut vehicle, mut flight, mut events) = (Vehicle::unknown(), Flight::grounded(), Vec::new());
+        for now_ms in (0..60_000).step_by(50) {
+            let now = Instant::from_millis(now_ms);
+            let heartbeat =
+                Heartbeat { armed: now_ms >= 1_000, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
+            vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
+            let height_m = if (5_000..50_000).contains(&now_ms) { 30.0 } else { 0.0 };
+            let global = GlobalPosition { relative_altitude: Metres(height_m), ..GlobalPosition::default() };
+            vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
+            if (5_000..20_000).contains(&now_ms) {
+                vehicle.observe(now, AUTOPILOT, &Observation::Landed(LandedState::InAir));
+            }
+            events.extend(flight.step(now, &vehicle));
+        }
+        assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
+    }
+
+    #[test]
+    fn who_is_heard_first_in_the_air_goes_on_in_the_air_at_once() {
+        let (mut vehicle, mut flight) = (Vehicle::unknown(), Flight::grounded());
+        let mut events = Vec::new();
+        for now_ms in (0..2_000).step_by(50) {
+            let now = Instant::from_millis(now_ms);
+            let heartbeat = Heartbeat { armed: true, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
+            vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
+            let global = GlobalPosition { relative_altitude: Metres(50.0), ..GlobalPosition::default() };
+            vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
+            events.extend(flight.step(now, &vehicle).map(|event| (now_ms, event)));
+        }
+        assert_eq!(events, [(500, FlightEvent::Resumed)]);
     }
 }

@@ -12,7 +12,9 @@ pub enum Happening {
     Disarmed,
     /// It left the ground.
     TakeOff,
-    /// It is back on the ground.
+    /// We were restarted in the air: the flight that began before goes on.
+    FlightResumed,
+    /// The flight is over: it is back on the ground, or disarmed.
     Landing,
     /// It does something else now, for a second at least.
     Phase(Phase),
@@ -20,6 +22,8 @@ pub enum Happening {
     AutopilotReboot,
     /// The lifetime that was stored is that of another airframe; a new one begins.
     OtherAirframe,
+    /// Another system on the autopilot's port is the vehicle from now on.
+    OtherVehicle,
     /// A step of the protective action.
     Protect(protect::Step),
 }

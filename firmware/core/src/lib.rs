@@ -6,6 +6,7 @@ pub mod baseline;
 mod bytes;
 pub mod component;
 pub mod derived;
+pub mod election;
 pub mod exposure;
 pub mod flight;
 pub mod half;

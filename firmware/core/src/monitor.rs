@@ -14,12 +14,12 @@ use crate::health::{Finding, Health, Inputs, Subsystem};
 use crate::lifetime::{Airframe, ItemKey, Lifetime, Saving};
 use crate::observation::{Observation, Source};
 use crate::params::Params;
-use crate::protect::{Protect, Request};
+use crate::protect::{Protect, Request, Situation};
 use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{Instant, Span};
 use crate::trends::Trends;
-use crate::usage::{Usage, baseline_number, exposure_number};
+use crate::usage::{Usage, UsageCounter, baseline_number, exposure_number};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// How often [`Monitor::tick`] is to be called: a finding comes at most this much after its debounce.
@@ -58,14 +58,30 @@ struct Before {
     reboots: u32,
     /// The phase that was told last, and the one that would be next, since when.
     phase: Phase,
+    /// How often another system had become the vehicle.
+    changes: u32,
     next_phase: Phase,
     next_since: Instant,
+}
+
+impl Before {
+    const NOTHING: Self = Self {
+        armed: false,
+        reboots: 0,
+        phase: Phase::Ground,
+        changes: 0,
+        next_phase: Phase::Ground,
+        next_since: Instant::ZERO,
+    };
 }
 
 /// A phase that does not last this long is not told: speeds cross their limits back and forth.
 const PHASE_LASTS: Span = Span::from_secs(1);
 
-const _: () = assert!(size_of::<Monitor>() <= 12 * 1024);
+/// `AUTOPILOT_VERSION` is asked for and answered long before: whoever has said no unique id by then says none.
+const UID_COMES: Span = Span::from_secs(60);
+
+const _: () = assert!(size_of::<Monitor>() <= 14 * 1024);
 
 impl Monitor {
     /// Before the first observation.
@@ -89,24 +105,32 @@ impl Monitor {
             protect: Protect::new(),
             saving: Saving::new(),
             happenings: Happenings::new(),
-            before_tick: Before {
-                armed: false,
-                reboots: 0,
-                phase: Phase::Ground,
-                next_phase: Phase::Ground,
-                next_since: Instant::ZERO,
-            },
+            before_tick: Before::NOTHING,
         }
     }
 
     /// Takes what somebody on the link said; `false` when it is not of the monitored vehicle.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
-        if !self.vehicle.observe(at, source, observation) {
+        let known = self.vehicle.observe(at, source, observation);
+        if self.before_tick.changes != self.vehicle.changes {
+            self.begin_with_another();
+        }
+        if !known {
             return false;
         }
         self.derived.observe(at, &self.vehicle, observation);
         self.usage.observe(at, &self.vehicle, &self.flight, &self.derived, observation);
         true
+    }
+
+    /// Another system on the port is the vehicle from now on: nothing that was known of the one before is of it.
+    fn begin_with_another(&mut self) {
+        self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
+        self.flight = Flight::grounded();
+        self.derived = Derived::new();
+        self.health = Health::new();
+        self.protect = Protect::new();
+        self.happenings.push(Happening::OtherVehicle);
     }
 
     /// One step, every [`TICK`]: flight, checks, usage. Each change of a check's level is given to `findings`, once.
@@ -117,7 +141,11 @@ impl Monitor {
         recorder: &RecorderStatus,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let event = self.flight.step(now, &self.vehicle);
+        let event = self.flight.step(now, &self.vehicle).map(|event| match event {
+            // A recording that begins in the air: nobody has counted this flight yet.
+            FlightEvent::Resumed if !self.has_open_flight() => FlightEvent::TakeOff,
+            event => event,
+        });
         self.derived.step(now, &self.vehicle, event, recorder);
         self.step_trends(now, event);
         self.usage.step(now, &self.vehicle, &self.flight, event, &self.params);
@@ -146,7 +174,7 @@ impl Monitor {
         }
         self.exposure.step(now, &self.vehicle, self.usage.current_a());
         self.step_protect(now, event);
-        self.step_life(event);
+        self.step_life(now, event);
         self.step_happenings(now, event);
     }
 
@@ -171,9 +199,15 @@ impl Monitor {
         }
     }
 
+    /// Whether the stored life has a flight that began and did not end: we were restarted in the air.
+    fn has_open_flight(&self) -> bool {
+        let count = |counter| self.before.totals.raw(counter);
+        count(UsageCounter::Flights) > count(UsageCounter::Landings)
+    }
+
     fn step_trends(&mut self, now: Instant, event: Option<FlightEvent>) {
         let Self { vehicle, flight, derived, params, baselines, trends, saving, .. } = self;
-        if event == Some(FlightEvent::TakeOff) {
+        if event.is_some_and(|event| event != FlightEvent::Landing) {
             for battery in 0..BATTERIES_MAX {
                 if let Some(ohm) = baselines.get(Quantity::Resistance(battery as u8)).known() {
                     derived.set_resistance_baseline(battery, ohm);
@@ -200,7 +234,8 @@ impl Monitor {
 
     fn step_protect(&mut self, now: Instant, event: Option<FlightEvent>) {
         let Self { vehicle, flight, health, params, protect, happenings, .. } = self;
-        if let Some(step) = protect.step(now, vehicle, flight.airborne(), event, health, params) {
+        let situation = Situation { now, vehicle, flight, health, params };
+        if let Some(step) = protect.step(&situation, event) {
             happenings.push(Happening::Protect(step));
         }
     }
@@ -213,6 +248,7 @@ impl Monitor {
         }
         match event {
             Some(FlightEvent::TakeOff) => happenings.push(Happening::TakeOff),
+            Some(FlightEvent::Resumed) => happenings.push(Happening::FlightResumed),
             Some(FlightEvent::Landing) => happenings.push(Happening::Landing),
             None => {}
         }
@@ -235,8 +271,14 @@ impl Monitor {
     }
 
     /// Whose life it is, and what of it is to be saved.
-    fn step_life(&mut self, event: Option<FlightEvent>) {
+    fn step_life(&mut self, now: Instant, event: Option<FlightEvent>) {
         let uid = self.vehicle.identity.get().map_or(0, |identity| identity.uid);
+        // A system id can be set: where the unique id is known it is waited for, and before the vehicle is surely the
+        // vehicle nothing is decided.
+        let waits = uid == 0 && self.before.airframe.uid != 0 && self.vehicle.known_for(now) < UID_COMES;
+        if waits || !self.vehicle.is_settled(now) {
+            return self.save_life(event);
+        }
         let seen = Airframe { system: self.vehicle.source.map_or(0, |source| source.system), uid };
         if self.before.airframe.differs(seen) {
             // A lifetime belongs to an airframe: this one's begins with this session.
@@ -254,6 +296,10 @@ impl Monitor {
             self.before.airframe = airframe;
             self.saving.hurry(ItemKey::Lifetime);
         }
+        self.save_life(event);
+    }
+
+    fn save_life(&mut self, event: Option<FlightEvent>) {
         self.saving.change(ItemKey::Session);
         if event == Some(FlightEvent::Landing) || (self.before_tick.armed && !self.vehicle.armed()) {
             self.saving.hurry_all();

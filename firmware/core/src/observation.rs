@@ -16,6 +16,9 @@ pub const CELLS_MAX: usize = 14;
 /// Motors in one ESC message.
 pub const ESC_GROUP: usize = 4;
 
+/// Our own component id on the vehicle's system: `MAV_COMP_ID_ONBOARD_COMPUTER`.
+pub const OUR_COMPONENT: u8 = 191;
+
 /// Who said it: MAVLink system and component id.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Source {
@@ -83,8 +86,9 @@ pub struct SystemStatus {
     pub current: Option<Amperes>,
     /// What is left of the battery.
     pub remaining: Option<Fraction>,
-    /// Sensors present and enabled that report themselves unhealthy (`MAV_SYS_STATUS_SENSOR` bits).
-    pub unhealthy: u32,
+    /// Sensors present and enabled that report themselves unhealthy (`MAV_SYS_STATUS_SENSOR` bits); `None` where nothing is
+    /// said of sensors (a log of PX4 since v1.14).
+    pub unhealthy: Option<u32>,
 }
 
 /// Time: `SYSTEM_TIME`.
@@ -256,6 +260,20 @@ pub struct Battery {
     pub faults: u32,
     /// Lithium polymer or lithium ion, or not said: what the limits of a cell's voltage are made for.
     pub lithium: bool,
+    /// What it feeds.
+    pub feeds: Feeds,
+}
+
+/// What a battery feeds: `MAV_BATTERY_FUNCTION`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Feeds {
+    /// Motors, everything, or not said: the vehicle comes down without it.
+    #[default]
+    Vehicle,
+    /// Avionics only.
+    Avionics,
+    /// The payload only.
+    Payload,
 }
 
 impl Default for Battery {
@@ -271,6 +289,7 @@ impl Default for Battery {
             temperature: None,
             faults: 0,
             lithium: true,
+            feeds: Feeds::Vehicle,
         }
     }
 }
@@ -431,6 +450,8 @@ pub struct CommandAck {
     pub command: u16,
     /// `MAV_RESULT`.
     pub result: u8,
+    /// Whose command it answers; `None` where the sender does not say (MAVLink 1, old firmware).
+    pub target: Option<Source>,
 }
 
 /// One message's worth of knowledge.

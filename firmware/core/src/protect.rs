@@ -8,18 +8,23 @@
 //!   \--- landed: the next flight ---------------------------------------------------/
 //! ```
 //! Only in flight and armed. It is announced with a countdown; the pilot cancels it by changing the flight mode, by
-//! disarming, or by a command. Each step is a record, with the autopilot's answer.
+//! disarming, or by a command, and one cancel holds for the flight. Each step is a record, with the autopilot's answer.
+//!
+//! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: on multicopters
+//! and helicopters. Nothing is asked of a vehicle that returns or lands already, by its mode, by its landed state or because
+//! it sinks close above the ground. The control structure and what could go wrong with it are in docs/safety.md.
 
 use core::fmt::Write as _;
 
 use heapless::String;
 
-use crate::flight::FlightEvent;
+use crate::flight::{Flight, FlightEvent, LANDED_STATE_AGE, Phase};
 use crate::health::{Health, Level, Subsystem};
-use crate::observation::{Autopilot, CommandAck, VehicleKind};
+use crate::latest::Latest;
+use crate::observation::{Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Bytes of a text that a ground station shows to the pilot as it comes: those of one `STATUSTEXT`.
 pub const TEXT_BYTES_MAX: usize = 50;
@@ -28,8 +33,16 @@ pub const TEXT_BYTES_MAX: usize = 50;
 const AGAIN: Span = Span::from_secs(1);
 /// Requests at most.
 const ATTEMPTS_MAX: u8 = 3;
-/// `MAV_RESULT_IN_PROGRESS` and lower: accepted, or refused for good; both are answers.
-const RESULT_TEMPORARILY_REJECTED: u8 = 1;
+/// How long `MAV_RESULT_IN_PROGRESS` is waited for.
+const PROGRESS: Span = Span::from_secs(10);
+/// A mission's last item is reached this long before the autopilot leaves the mission by itself.
+const MISSION_ENDS: Span = Span::from_secs(3);
+/// `MAV_RESULT_ACCEPTED`
+const ACCEPTED: u8 = 0;
+/// `MAV_RESULT_TEMPORARILY_REJECTED`: asked again.
+const TEMPORARILY_REJECTED: u8 = 1;
+/// `MAV_RESULT_IN_PROGRESS`: the answer is to come.
+const IN_PROGRESS: u8 = 5;
 
 /// What is asked for. The numbers are those of `PROT_ACTION`, and are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,7 +208,11 @@ enum State {
         action: Action,
         attempt: u8,
         at: Instant,
+        /// It was understood; the answer is to come.
+        progress: bool,
     },
+    /// A return was refused: a landing is asked for next.
+    Refused,
     /// Nothing more in this flight.
     Done,
 }
@@ -206,6 +223,22 @@ pub struct Protect {
     state: State,
     request: Option<Request>,
     cancelled: bool,
+}
+
+/// What a step looks at.
+#[derive(Clone, Copy)]
+pub(crate) struct Situation<'a> {
+    pub(crate) now: Instant,
+    pub(crate) vehicle: &'a Vehicle,
+    pub(crate) flight: &'a Flight,
+    pub(crate) health: &'a Health,
+    pub(crate) params: &'a Params,
+}
+
+impl Situation<'_> {
+    fn flies(&self) -> bool {
+        self.flight.airborne() && self.vehicle.armed() && self.vehicle.kind() != VehicleKind::Surface
+    }
 }
 
 impl Protect {
@@ -221,21 +254,14 @@ impl Protect {
 
     /// Somebody sent the command to cancel; `true` where there is something to cancel.
     pub(crate) const fn cancel(&mut self) -> bool {
-        self.cancelled = matches!(self.state, State::Counting { .. } | State::Asking { .. });
+        self.cancelled = matches!(self.state, State::Counting { .. } | State::Asking { .. } | State::Refused);
         self.cancelled
     }
 
     /// One step, after the checks'.
-    pub(crate) fn step(
-        &mut self,
-        now: Instant,
-        vehicle: &Vehicle,
-        airborne: bool,
-        event: Option<FlightEvent>,
-        health: &Health,
-        params: &Params,
-    ) -> Option<Step> {
-        if event == Some(FlightEvent::TakeOff) && self.state == State::Done {
+    pub(crate) fn step(&mut self, situation: &Situation<'_>, event: Option<FlightEvent>) -> Option<Step> {
+        let Situation { now, health, params, vehicle, .. } = *situation;
+        if event.is_some_and(|event| event != FlightEvent::Landing) && self.state == State::Done {
             self.state = State::Idle;
         }
         let cancelled = core::mem::take(&mut self.cancelled);
@@ -243,52 +269,63 @@ impl Protect {
             State::Done => None,
             State::Idle => {
                 let action = Action::from_number(params.get(Param::ProtAction) as u8)?;
-                let flies = airborne && vehicle.armed();
-                let starts = flies && concerned(health, params);
-                starts.then(|| self.announce(now, vehicle, action, params)).flatten()
+                let starts = situation.flies() && concerned(vehicle, health, params);
+                starts.then(|| self.announce(situation, action)).flatten()
             }
             State::Counting { action, until, mode, told_s } => {
-                let end = |stage| Some(Step { action, stage, detail: 0 });
-                if !airborne || !vehicle.armed() {
-                    self.state = State::Done;
-                    return end(Stage::CancelledOnGround);
+                if let Some(stage) = Self::ends(situation, cancelled) {
+                    return Some(self.done(action, stage));
                 }
-                if cancelled {
-                    self.state = State::Done;
-                    return end(Stage::CancelledByCommand);
+                let mode_now = vehicle.heartbeat.get().map_or(mode, |heartbeat| heartbeat.mode);
+                if mode_now != mode && !mission_ended(now, vehicle, mode, mode_now) {
+                    return Some(self.done(action, Stage::CancelledByMode));
                 }
-                if on_its_way(vehicle) {
-                    self.state = State::Done;
-                    return end(Stage::AlreadyDone);
-                }
-                if vehicle.heartbeat.get().is_some_and(|heartbeat| heartbeat.mode != mode) {
-                    self.state = State::Done;
-                    return end(Stage::CancelledByMode);
-                }
-                if !concerned(health, params) {
+                if !concerned(vehicle, health, params) {
                     self.state = State::Idle;
-                    return end(Stage::CancelledClear);
+                    return Some(Step { action, stage: Stage::CancelledClear, detail: 0 });
                 }
                 if now >= until {
                     return Some(self.ask(now, action, 1));
                 }
                 let left_s = until.since(now).as_millis().div_ceil(1_000).min(255) as u8;
                 let tells = left_s < told_s && (left_s.is_multiple_of(5) || left_s <= 3);
-                if tells {
-                    self.state = State::Counting { action, until, mode, told_s: left_s };
-                }
+                let told_s = if tells { left_s } else { told_s };
+                self.state = State::Counting { action, until, mode: mode_now, told_s };
                 tells.then_some(Step { action, stage: Stage::Counting, detail: left_s })
             }
-            State::Asking { action, attempt, at } => {
-                self.wait_for_answer(now, vehicle, action, attempt, at, cancelled || !vehicle.armed())
-            }
+            State::Asking { action, attempt, at, .. } => self
+                .hear(situation, action, attempt, at)
+                .or_else(|| Self::ends(situation, cancelled).map(|stage| self.done(action, stage)))
+                .or_else(|| self.insist(now)),
+            State::Refused => match Self::ends(situation, cancelled) {
+                Some(stage) => Some(self.done(Action::Land, stage)),
+                None => Some(self.ask(now, Action::Land, 1)),
+            },
         }
     }
 
-    fn announce(&mut self, now: Instant, vehicle: &Vehicle, action: Action, params: &Params) -> Option<Step> {
-        if on_its_way(vehicle) {
-            self.state = State::Done;
-            return Some(Step { action, stage: Stage::AlreadyDone, detail: 0 });
+    /// What ends it before the autopilot has answered.
+    fn ends(situation: &Situation<'_>, cancelled: bool) -> Option<Stage> {
+        if !situation.flies() {
+            Some(Stage::CancelledOnGround)
+        } else if cancelled {
+            Some(Stage::CancelledByCommand)
+        } else if on_its_way(situation) {
+            Some(Stage::AlreadyDone)
+        } else {
+            None
+        }
+    }
+
+    fn done(&mut self, action: Action, stage: Stage) -> Step {
+        self.state = State::Done;
+        Step { action, stage, detail: 0 }
+    }
+
+    fn announce(&mut self, situation: &Situation<'_>, action: Action) -> Option<Step> {
+        let Situation { now, vehicle, params, .. } = *situation;
+        if on_its_way(situation) {
+            return Some(self.done(action, Stage::AlreadyDone));
         }
         let mode = vehicle.heartbeat.get()?.mode;
         let delay_s = params.get(Param::ProtDelay).clamp(0.0, 250.0) as u8;
@@ -298,34 +335,36 @@ impl Protect {
     }
 
     fn ask(&mut self, now: Instant, action: Action, attempt: u8) -> Step {
-        self.state = State::Asking { action, attempt, at: now };
+        self.state = State::Asking { action, attempt, at: now, progress: false };
         self.request = Some(Request { command: action.command(), confirmation: attempt - 1 });
         Step { action, stage: Stage::Asked, detail: attempt }
     }
 
-    fn wait_for_answer(
-        &mut self,
-        now: Instant,
-        vehicle: &Vehicle,
-        action: Action,
-        attempt: u8,
-        at: Instant,
-        cancelled: bool,
-    ) -> Option<Step> {
-        let mine = |ack: &&CommandAck| ack.command == action.command();
-        let answered = vehicle.command_ack.at().is_some_and(|answered| answered >= at);
-        let answer = vehicle.command_ack.get().filter(mine).filter(|_| answered);
-        if let Some(ack) = answer
-            && (ack.result != RESULT_TEMPORARILY_REJECTED || attempt >= ATTEMPTS_MAX)
-        {
-            self.state = State::Done;
-            return Some(Step { action, stage: Stage::Answered, detail: ack.result });
+    /// The autopilot's answer, once it has come.
+    fn hear(&mut self, situation: &Situation<'_>, action: Action, attempt: u8, at: Instant) -> Option<Step> {
+        let Situation { vehicle, .. } = *situation;
+        let answered_at = vehicle.command_ack.at().filter(|answered_at| *answered_at >= at)?;
+        let ack = vehicle.command_ack.get().filter(|ack| is_ours(ack, vehicle, action))?;
+        match ack.result {
+            TEMPORARILY_REJECTED if attempt < ATTEMPTS_MAX => return None,
+            IN_PROGRESS => {
+                // What follows is waited for from here on.
+                self.state = State::Asking { action, attempt, at: answered_at, progress: true };
+                return None;
+            }
+            ACCEPTED => self.state = State::Done,
+            _ => {
+                let lands = action == Action::Return && vehicle.kind() == VehicleKind::Rotorcraft;
+                self.state = if lands { State::Refused } else { State::Done };
+            }
         }
-        if cancelled {
-            self.state = State::Done;
-            return Some(Step { action, stage: Stage::CancelledByCommand, detail: 0 });
-        }
-        if now.since(at) < AGAIN {
+        Some(Step { action, stage: Stage::Answered, detail: ack.result })
+    }
+
+    /// Asks again where there is no answer.
+    fn insist(&mut self, now: Instant) -> Option<Step> {
+        let State::Asking { action, attempt, at, progress } = self.state else { return None };
+        if now.since(at) < if progress { PROGRESS } else { AGAIN } {
             return None;
         }
         if attempt < ATTEMPTS_MAX {
@@ -336,36 +375,70 @@ impl Protect {
     }
 }
 
+/// An answer to our command, and not to what somebody else asked.
+fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
+    let system = vehicle.source.map_or(0, |source| source.system);
+    let us = Source { system, component: OUR_COMPONENT };
+    ack.command == action.command() && ack.target.is_none_or(|target| target == us)
+}
+
 /// Whether a check that `PROT_CHECK` names is critical: 0 an empty battery (by what remains or by its cells), from 1 on
-/// any check of a subsystem.
-fn concerned(health: &Health, params: &Params) -> bool {
+/// any check of a subsystem. A battery that feeds the avionics or the payload alone is no reason to come down.
+fn concerned(vehicle: &Vehicle, health: &Health, params: &Params) -> bool {
     let chosen = params.get(Param::ProtCheck) as u8;
-    health.levels().any(|(check, _, level)| {
+    health.levels().any(|(check, instance, level)| {
         let concerned = match chosen.checked_sub(1) {
             None => matches!(check.name, "batt_remaining" | "cell_voltage"),
             Some(subsystem) => Subsystem::from_number(subsystem) == Some(check.subsystem),
         };
-        concerned && level == Level::Critical
+        let battery = vehicle.batteries.get(usize::from(instance)).and_then(Latest::get);
+        let other = check.subsystem == Subsystem::Power
+            && check.instances as usize == BATTERIES_MAX
+            && battery.is_some_and(|battery| battery.feeds != Feeds::Vehicle);
+        concerned && level == Level::Critical && !other
     })
 }
 
-/// Whether the autopilot returns or lands already, by its own mode number.
-fn on_its_way(vehicle: &Vehicle) -> bool {
+/// Whether the autopilot left a mission by itself because it was flown to its end: then nobody has cancelled anything.
+fn mission_ended(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bool {
     let Some(heartbeat) = vehicle.heartbeat.get() else { return false };
-    match (heartbeat.autopilot, heartbeat.kind) {
-        // PX4: main mode AUTO (4), sub modes RTL (5), LAND (6), PRECLAND (9).
+    let left = match (heartbeat.autopilot, heartbeat.kind) {
+        // PX4: AUTO (4) from MISSION (4) to LOITER (3).
         (Autopilot::Px4, _) => {
-            let [_, _, main, sub] = heartbeat.mode.to_le_bytes();
-            main == 4 && matches!(sub, 5 | 6 | 9)
+            let main_and_sub = |mode: u32| (mode >> 16) as u16;
+            (main_and_sub(before), main_and_sub(after)) == (0x0404, 0x0304)
         }
-        // ArduPlane: RTL, QLAND, QRTL, AUTOLAND.
-        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => {
-            matches!(heartbeat.mode, 11 | 20 | 21 | 26)
-        }
-        // ArduCopter: RTL, LAND, SMART_RTL, AUTO_RTL.
-        (Autopilot::ArduPilot, _) => matches!(heartbeat.mode, 6 | 9 | 21 | 27),
+        // ArduPlane: from AUTO to LOITER. A mission's end in RTL is a return.
+        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => (before, after) == (10, 12),
+        // ArduCopter: from AUTO to LOITER or BRAKE.
+        (Autopilot::ArduPilot, _) => before == 3 && matches!(after, 5 | 17),
         (Autopilot::Other, _) => false,
-    }
+    };
+    left && vehicle.mission_reached.within(now, MISSION_ENDS).is_some()
+}
+
+/// Whether the autopilot returns or lands already: by its own mode number, by its landed state, or because it sinks close
+/// above the ground.
+fn on_its_way(situation: &Situation<'_>) -> bool {
+    let Situation { now, vehicle, flight, .. } = *situation;
+    let Some(heartbeat) = vehicle.heartbeat.get() else { return false };
+    let lands = vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::Landing)
+        || flight.phase(now, vehicle) == Phase::Landing;
+    lands
+        || match (heartbeat.autopilot, heartbeat.kind) {
+            // PX4: main mode AUTO (4), sub modes RTL (5), LAND (6), PRECLAND (9).
+            (Autopilot::Px4, _) => {
+                let [_, _, main, sub] = heartbeat.mode.to_le_bytes();
+                main == 4 && matches!(sub, 5 | 6 | 9)
+            }
+            // ArduPlane: RTL, QLAND, QRTL, AUTOLAND.
+            (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => {
+                matches!(heartbeat.mode, 11 | 20 | 21 | 26)
+            }
+            // ArduCopter: RTL, LAND, SMART_RTL, AUTO_RTL.
+            (Autopilot::ArduPilot, _) => matches!(heartbeat.mode, 6 | 9 | 21 | 27),
+            (Autopilot::Other, _) => false,
+        }
 }
 
 #[cfg(test)]

@@ -95,7 +95,7 @@ impl Trends {
     /// A flight begins or ends; `true` where the baselines learned from it.
     pub(crate) fn event(&mut self, event: FlightEvent, params: &Params, baselines: &mut Baselines) -> bool {
         match event {
-            FlightEvent::TakeOff => {
+            FlightEvent::TakeOff | FlightEvent::Resumed => {
                 *self = Self::new();
                 false
             }

@@ -1,17 +1,18 @@
 //! What is known of the vehicle now: the latest of each observation with its time.
 //!
-//! The vehicle is the first system whose autopilot sends a heartbeat; other systems on the link (ground stations, other
-//! vehicles) are recorded but not monitored. Bounded: [`BATTERIES_MAX`] batteries, [`MOTORS_MAX`] motors; what is
+//! Which system on the link is the vehicle is decided by [`crate::election`]; the others (ground stations, other vehicles)
+//! are recorded and judged by nobody. Bounded: [`BATTERIES_MAX`] batteries, [`MOTORS_MAX`] motors; what is
 //! beyond is recorded only.
 
+use crate::election::Election;
 use crate::latest::Latest;
 use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
     GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
-    Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio, Vibration,
-    VibrationScale,
+    Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio,
+    VehicleKind, Vibration, VibrationScale,
 };
-use crate::time::Instant;
+use crate::time::{Instant, Span};
 
 /// Batteries that are monitored.
 pub const BATTERIES_MAX: usize = 4;
@@ -68,6 +69,10 @@ pub struct Vehicle {
     pub rails: Latest<Rails>,
     /// Batteries in the order in which they were first seen.
     pub batteries: [Latest<Battery>; BATTERIES_MAX],
+    /// The component that each battery is told by: two components may both have a battery 0.
+    battery_of: [u8; BATTERIES_MAX],
+    /// The place of the battery that was told of last.
+    pub(crate) told_battery: Option<usize>,
     /// The estimator.
     pub estimator: Latest<Estimator>,
     /// Vibration.
@@ -84,10 +89,15 @@ pub struct Vehicle {
     pub identity: Latest<AutopilotIdentity>,
     /// The last answer to a command.
     pub command_ack: Latest<CommandAck>,
+    /// The mission's item that was reached last.
+    pub mission_reached: Latest<u16>,
     /// How often the autopilot has rebooted since our power-on.
     pub reboots: u32,
     /// When it did last.
     pub rebooted_at: Option<Instant>,
+    /// How often another system has become the vehicle: everything else here is then of that one.
+    pub changes: u32,
+    election: Election,
     /// The highest boot time since its last boot, milliseconds.
     boot_ms: Option<u32>,
 }
@@ -118,6 +128,8 @@ impl Vehicle {
             radio: Latest::nothing(),
             rails: Latest::nothing(),
             batteries: [const { Latest::nothing() }; BATTERIES_MAX],
+            battery_of: [0; BATTERIES_MAX],
+            told_battery: None,
             estimator: Latest::nothing(),
             vibration: Latest::nothing(),
             motors: [Motor {
@@ -137,8 +149,11 @@ impl Vehicle {
             processor: Latest::nothing(),
             identity: Latest::nothing(),
             command_ack: Latest::nothing(),
+            mission_reached: Latest::nothing(),
             reboots: 0,
             rebooted_at: None,
+            changes: 0,
+            election: Election::new(),
             boot_ms: None,
         }
     }
@@ -148,15 +163,42 @@ impl Vehicle {
         self.heartbeat.get().is_some_and(|heartbeat| heartbeat.armed)
     }
 
+    /// What kind of vehicle it is.
+    pub fn kind(&self) -> VehicleKind {
+        self.heartbeat.get().map_or(VehicleKind::Other, |heartbeat| heartbeat.kind)
+    }
+
+    /// Whether it hangs on several like rotors: only there are motors to be compared with each other. A helicopter's tail,
+    /// a VTOL's pusher and a plane's two engines turn as they need to.
+    pub fn is_multicopter(&self) -> bool {
+        // MAV_TYPE: quadrotor, hexarotor, octorotor, tricopter, dodecarotor, decarotor.
+        self.heartbeat
+            .get()
+            .is_some_and(|heartbeat| matches!(heartbeat.type_number, 2 | 13 | 14 | 15 | 29 | 35))
+    }
+
+    /// Whether this is surely the vehicle: no other one takes its place for as long as it is heard.
+    pub fn is_settled(&self, now: Instant) -> bool {
+        self.election.is_settled(now)
+    }
+
+    /// For how long this has been the vehicle.
+    pub fn known_for(&self, now: Instant) -> Span {
+        self.election.lasts(now)
+    }
+
     /// Takes an observation; `false` when it is not of this vehicle.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
-        if self.source.is_none() && matches!(observation, Observation::Heartbeat(_)) {
-            self.source = Some(source);
+        let heartbeat = matches!(observation, Observation::Heartbeat(_));
+        let chosen = self.election.hear(at, self.source, source, heartbeat);
+        if chosen != self.source {
+            let changes = self.changes.saturating_add(u32::from(self.source.is_some()));
+            *self = Self { source: chosen, changes, election: self.election, ..Self::unknown() };
         }
         if !self.concerns(source, observation) {
             return false;
         }
-        self.take(at, observation);
+        self.take(at, source.component, observation);
         true
     }
 
@@ -171,7 +213,7 @@ impl Vehicle {
         }
     }
 
-    fn take(&mut self, at: Instant, observation: &Observation) {
+    fn take(&mut self, at: Instant, component: u8, observation: &Observation) {
         match *observation {
             Observation::Heartbeat(heartbeat) => self.heartbeat.set(at, heartbeat),
             Observation::SystemStatus(system) => self.system.set(at, system),
@@ -198,7 +240,7 @@ impl Vehicle {
             Observation::RadioControl(rc) => self.rc.set(at, rc),
             Observation::TelemetryRadio(radio) => self.radio.set(at, radio),
             Observation::Rails(rails) => self.rails.set(at, rails),
-            Observation::Battery(battery) => self.take_battery(at, battery),
+            Observation::Battery(battery) => self.take_battery(at, component, battery),
             Observation::Estimator(estimator) => self.estimator.set(at, estimator),
             Observation::Vibration(vibration) => self.take_vibration(at, vibration),
             Observation::Escs(group) => self.take_escs(at, &group),
@@ -207,9 +249,9 @@ impl Vehicle {
             Observation::Processor(processor) => self.processor.set(at, processor),
             Observation::Identity(identity) => self.identity.set(at, identity),
             Observation::CommandAck(ack) => self.command_ack.set(at, ack),
+            Observation::MissionReached(item) => self.mission_reached.set(at, item),
             Observation::SpeedSensors(_)
             | Observation::MissionCurrent(_)
-            | Observation::MissionReached(_)
             | Observation::FlightInformation { .. } => {}
         }
     }
@@ -248,10 +290,15 @@ impl Vehicle {
         self.vibration.set(at, Vibration { scale, ..vibration });
     }
 
-    fn take_battery(&mut self, at: Instant, battery: Battery) {
-        let known = |slot: &Latest<Battery>| slot.get().is_none_or(|other| other.id == battery.id);
-        if let Some(slot) = self.batteries.iter_mut().find(|slot| known(slot)) {
-            slot.set(at, battery);
+    fn take_battery(&mut self, at: Instant, component: u8, battery: Battery) {
+        let Self { batteries, battery_of, told_battery, .. } = self;
+        *told_battery = batteries
+            .iter()
+            .zip(battery_of.iter())
+            .position(|(slot, of)| slot.get().is_none_or(|other| other.id == battery.id && *of == component));
+        if let Some(place) = *told_battery {
+            batteries[place].set(at, battery);
+            battery_of[place] = component;
         }
     }
 

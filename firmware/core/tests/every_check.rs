@@ -133,7 +133,7 @@ const FAULTS: [(&str, u8, Level, Fault); 51] = [
         let kind = VehicleKind::Rotorcraft;
         more.push(Observation::Heartbeat(Heartbeat { armed: true, kind, state: 5, ..Heartbeat::default() }));
     }),
-    ("sensors", 0, Level::Warning, |quad, _| quad.system.unhealthy = 0x20),
+    ("sensors", 0, Level::Warning, |quad, _| quad.system.unhealthy = Some(0x20)),
     ("roll", 0, Level::Critical, |quad, _| quad.roll = -1.2),
     ("pitch", 0, Level::Critical, |_, more| {
         more.push(Observation::Attitude(Attitude { pitch: Radians(1.2), ..Attitude::default() }));

@@ -125,6 +125,7 @@ impl Random {
             temperature: self.float(Celsius),
             faults: self.u32(),
             lithium: self.below(4) != 0,
+            feeds: hums_core::observation::Feeds::Vehicle,
         }
     }
 
@@ -181,7 +182,7 @@ impl Random {
                 voltage: self.float(Volts),
                 current: self.float(Amperes),
                 remaining: self.float(Fraction),
-                unhealthy: self.u32(),
+                unhealthy: Some(self.u32()),
             }),
             4 => Observation::SystemTime(SystemTime {
                 utc_micros: self.maybe(Self::next),
@@ -274,6 +275,7 @@ impl Random {
         match self.below(4) {
             0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.u32() }),
             1 => Observation::CommandAck(CommandAck {
+                target: None,
                 command: self.pick(&[20, 21]),
                 result: self.next() as u8,
             }),
@@ -435,7 +437,12 @@ fn what_is_said_to_be_unknown_is_never_ok() {
         let mut monitor = Monitor::new(Params::defaults());
         for now_ms in (0..120_000).step_by(50) {
             let now = Instant::from_millis(now_ms);
-            let heartbeat = Heartbeat { armed: now_ms > 1_000, state: 4, ..random.heartbeat() };
+            let heartbeat = Heartbeat {
+                armed: now_ms > 1_000,
+                state: 4,
+                kind: VehicleKind::Rotorcraft,
+                ..random.heartbeat()
+            };
             monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
             let landed = if now_ms > 2_000 { LandedState::InAir } else { LandedState::OnGround };
             monitor.observe(now, AUTOPILOT, &Observation::Landed(landed));

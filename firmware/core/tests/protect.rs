@@ -6,7 +6,9 @@ mod common;
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::happening::Happening;
-use hums_core::observation::{CommandAck, Observation};
+use hums_core::observation::{
+    Autopilot, Battery, CommandAck, Feeds, LandedState, Observation, Source, VehicleKind,
+};
 use hums_core::params::Params;
 use hums_core::protect::{Action, Request, Stage};
 use hums_core::status::LinkReading;
@@ -51,10 +53,8 @@ fn fly(params: &Params, script: impl Fn(u64, &mut Quad, &mut Monitor)) -> Outcom
         monitor.tick(now, &link, &quad.recorder, &mut |_| {});
         while let Some(happening) = monitor.take_happening() {
             if let Happening::Protect(step) = happening {
-                assert_eq!(
-                    Some(step.action),
-                    Action::from_number(params.get(hums_core::params::Param::ProtAction) as u8)
-                );
+                let asked_for = Action::from_number(params.get(hums_core::params::Param::ProtAction) as u8);
+                assert!(Some(step.action) == asked_for || step.action == Action::Land);
                 outcome.steps.push((now_ms, step.stage, step.detail));
             }
         }
@@ -66,7 +66,7 @@ fn fly(params: &Params, script: impl Fn(u64, &mut Quad, &mut Monitor)) -> Outcom
 fn answer(at_ms: u64, result: u8) -> impl Fn(u64, &mut Quad, &mut Monitor) {
     move |now_ms, _, monitor| {
         if now_ms == at_ms {
-            let ack = Observation::CommandAck(CommandAck { command: 20, result });
+            let ack = Observation::CommandAck(CommandAck { command: 20, result, target: None });
             monitor.observe(Instant::from_millis(now_ms), AUTOPILOT, &ack);
         }
     }
@@ -111,11 +111,186 @@ fn an_answer_to_something_else_or_from_before_is_none() {
     assert_eq!(outcome.requests.len(), 3, "before it was asked");
 }
 
+fn ack(now_ms: u64, monitor: &mut Monitor, at_ms: u64, command: u16, result: u8, target: Option<Source>) {
+    if now_ms == at_ms {
+        let ack = Observation::CommandAck(CommandAck { command, result, target });
+        monitor.observe(Instant::from_millis(now_ms), AUTOPILOT, &ack);
+    }
+}
+
+const ASKED_MS: u64 = FOUND_MS + 10_000;
+
 #[test]
-fn a_refusal_is_an_answer() {
-    let outcome = fly(&params(Action::Return), answer(FOUND_MS + 10_300, 4));
-    assert_eq!(outcome.steps.last(), Some(&(FOUND_MS + 10_300, Stage::Answered, 4)));
+fn a_return_that_is_refused_is_followed_by_a_landing_of_what_hangs_on_rotors() {
+    let outcome = fly(&params(Action::Return), |now_ms, _, monitor| {
+        ack(now_ms, monitor, ASKED_MS + 300, 20, 4, None);
+        ack(now_ms, monitor, ASKED_MS + 700, 21, 0, None);
+    });
+    let commands: Vec<_> = outcome.requests.iter().map(|(_, request)| request.command).collect();
+    assert_eq!(commands, [20, 21]);
+    let stages: Vec<_> = outcome.steps.iter().skip(5).map(|(_, stage, detail)| (*stage, *detail)).collect();
+    let expected = [(Stage::Asked, 1), (Stage::Answered, 4), (Stage::Asked, 1), (Stage::Answered, 0)];
+    assert_eq!(stages, expected);
+}
+
+#[test]
+fn a_plane_or_a_vtol_whose_return_is_refused_is_not_landed_where_it_is() {
+    for (kind, type_number) in [(VehicleKind::Plane, 1), (VehicleKind::Vtol, 22)] {
+        let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+            (quad.kind, quad.type_number) = (kind, type_number);
+            ack(now_ms, monitor, ASKED_MS + 300, 20, 4, None);
+        });
+        assert_eq!(outcome.requests.len(), 1, "{kind:?}");
+        assert_eq!(outcome.steps.last(), Some(&(ASKED_MS + 300, Stage::Answered, 4)));
+    }
+}
+
+#[test]
+fn progress_is_no_refusal_and_the_answer_that_follows_counts() {
+    let outcome = fly(&params(Action::Return), |now_ms, _, monitor| {
+        ack(now_ms, monitor, ASKED_MS + 300, 20, 5, None);
+        ack(now_ms, monitor, ASKED_MS + 6_000, 20, 0, None);
+    });
+    assert_eq!(outcome.requests.len(), 1, "it is not asked again meanwhile");
+    assert_eq!(outcome.steps.last(), Some(&(ASKED_MS + 6_000, Stage::Answered, 0)));
+}
+
+#[test]
+fn an_answer_to_the_ground_station_is_not_ours() {
+    let station = Source { system: 255, component: 190 };
+    let us = Source { system: 1, component: 191 };
+    let outcome = fly(&params(Action::Return), |now_ms, _, monitor| {
+        ack(now_ms, monitor, ASKED_MS + 300, 20, 0, Some(station));
+        ack(now_ms, monitor, ASKED_MS + 1_700, 20, 0, Some(us));
+    });
+    assert_eq!(outcome.requests.len(), 2, "asked again after a second");
+    assert_eq!(outcome.steps.last(), Some(&(ASKED_MS + 1_700, Stage::Answered, 0)));
+}
+
+#[test]
+fn an_answer_that_is_lost_is_seen_in_the_mode_and_nothing_is_repeated() {
+    let outcome = fly(&params(Action::Return), |now_ms, quad, _| {
+        if now_ms >= ASKED_MS + 500 {
+            quad.mode = 6;
+        }
+    });
     assert_eq!(outcome.requests.len(), 1);
+    assert_eq!(outcome.steps.last().map(|(_, stage, _)| *stage), Some(Stage::AlreadyDone));
+}
+
+#[test]
+fn any_landing_under_way_is_left_alone() {
+    let landings: [Script; 4] = [
+        // A mission's landing, by the autopilot's landed state: PX4 and ArduPilot.
+        |_, quad, _| {
+            (quad.autopilot, quad.mode, quad.landed) =
+                (Autopilot::Px4, 0x0404_0000, Some(LandedState::Landing));
+        },
+        |_, quad, _| (quad.mode, quad.landed) = (3, Some(LandedState::Landing)),
+        // The pilot's own, close above the ground.
+        |_, quad, _| (quad.height, quad.climb) = (2.5, -0.6),
+        // PX4's precision landing.
+        |_, quad, _| (quad.autopilot, quad.mode) = (Autopilot::Px4, 0x0904_0000),
+    ];
+    for (number, landing) in landings.into_iter().enumerate() {
+        let outcome = fly(&params(Action::Return), landing);
+        assert!(outcome.requests.is_empty(), "{number}");
+        assert_eq!(outcome.steps.last().map(|(_, stage, _)| *stage), Some(Stage::AlreadyDone), "{number}");
+    }
+}
+
+#[test]
+fn a_mission_that_ends_during_the_countdown_cancels_nothing_and_a_pilot_who_leaves_it_does() {
+    for (reached, requests) in [(true, 3), (false, 0)] {
+        let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+            quad.autopilot = Autopilot::Px4;
+            quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+            quad.mode = if now_ms < FOUND_MS + 5_000 { 0x0404_0000 } else { 0x0304_0000 };
+            if reached && now_ms == FOUND_MS + 4_000 {
+                let item = Observation::MissionReached(12);
+                monitor.observe(Instant::from_millis(now_ms), AUTOPILOT, &item);
+            }
+        });
+        assert_eq!(outcome.requests.len(), requests, "{:?}", outcome.steps);
+    }
+}
+
+#[test]
+fn one_cancel_holds_for_the_flight_and_the_next_flight_is_protected_again() {
+    let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+        if now_ms == FOUND_MS + 3_000 {
+            assert!(monitor.cancel_protection());
+        }
+        // Well again and empty again, in the same flight; then down, and up once more.
+        if (27_000..30_000).contains(&now_ms) {
+            quad.battery.remaining = Some(Fraction(0.5));
+        }
+        if (38_000..42_000).contains(&now_ms) {
+            (quad.height, quad.armed) = (0.0, now_ms >= 40_000);
+        }
+    });
+    let announced = outcome.steps.iter().filter(|(_, stage, _)| *stage == Stage::Announced);
+    let announced: Vec<_> = announced.map(|(at_ms, ..)| *at_ms).collect();
+    assert!(matches!(announced[..], [FOUND_MS, 42_000..44_000]), "{announced:?}");
+}
+
+#[test]
+fn a_battery_of_the_payload_or_of_another_component_is_no_reason_to_come_down() {
+    let payload = fly(&params(Action::Land), |now_ms, quad, monitor| {
+        quad.battery.remaining = Some(Fraction(0.8));
+        let battery =
+            Battery { id: 0, feeds: Feeds::Payload, remaining: Some(Fraction(0.05)), ..Battery::default() };
+        let gimbal = Source { system: 1, component: 181 };
+        monitor.observe(Instant::from_millis(now_ms), gimbal, &Observation::Battery(battery));
+    });
+    assert!(payload.steps.is_empty(), "{:?}", payload.steps);
+    let other_vehicle = fly(&params(Action::Land), |now_ms, quad, monitor| {
+        quad.battery.remaining = Some(Fraction(0.8));
+        let battery = Battery { remaining: Some(Fraction(0.05)), ..Battery::default() };
+        let source = Source { system: 2, component: 1 };
+        monitor.observe(Instant::from_millis(now_ms), source, &Observation::Battery(battery));
+    });
+    assert!(other_vehicle.steps.is_empty(), "{:?}", other_vehicle.steps);
+}
+
+#[test]
+fn one_message_of_nonsense_brings_nobody_down() {
+    let mut at_once = params(Action::Land);
+    at_once.set("PROT_DELAY", 0.0).unwrap();
+    let outcome = fly(&at_once, |now_ms, quad, _| {
+        // The battery is told of once in 2.5 s.
+        quad.battery.remaining = Some(Fraction(if now_ms == EMPTY_MS { 0.0 } else { 0.8 }));
+    });
+    assert!(outcome.requests.is_empty(), "{:?}", outcome.steps);
+}
+
+#[test]
+fn nothing_is_ever_asked_of_a_vehicle_that_does_not_fly() {
+    for type_number in [10, 11, 12] {
+        let outcome = fly(&params(Action::Land), |_, quad, _| {
+            (quad.autopilot, quad.kind, quad.type_number) =
+                (Autopilot::Px4, VehicleKind::Surface, type_number);
+            quad.landed = Some(LandedState::InAir);
+        });
+        assert!(outcome.steps.is_empty(), "{type_number}: {:?}", outcome.steps);
+    }
+}
+
+#[test]
+fn a_box_that_restarts_in_the_air_protects_at_once() {
+    let outcome = fly(&params(Action::Land), |_, quad, _| {
+        quad.start_height = 50.0;
+        quad.height = 50.0;
+        quad.battery.remaining = Some(Fraction(0.05));
+    });
+    assert!(matches!(outcome.steps.first(), Some((0..4_000, Stage::Announced, _))), "{:?}", outcome.steps);
+}
+
+#[test]
+fn a_vehicle_that_is_disarmed_while_it_is_asked_is_not_asked_again() {
+    let outcome = fly(&params(Action::Land), |now_ms, quad, _| quad.armed = now_ms < ASKED_MS + 500);
+    assert_eq!(outcome.requests.len(), 1);
+    assert_eq!(outcome.steps.last().map(|(_, stage, _)| *stage), Some(Stage::CancelledOnGround));
 }
 
 #[test]

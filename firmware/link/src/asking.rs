@@ -66,7 +66,7 @@ const WANTED: [Wanted; 24] = [
     (241, By::Both, 2, 44),         // VIBRATION
     (2, By::Both, 1, 24),           // SYSTEM_TIME
     (65, By::Both, 2, 54),          // RC_CHANNELS
-    (245, By::Px4, 2, 14),          // EXTENDED_SYS_STATE
+    (245, By::Both, 2, 14),         // EXTENDED_SYS_STATE
     (230, By::Px4, 2, 54),          // ESTIMATOR_STATUS
     (291, By::Px4, 5, 69),          // ESC_STATUS
     (290, By::Px4, 1, 58),          // ESC_INFO

@@ -9,7 +9,7 @@ use crate::packet::Packet;
 use crate::signing::Seal;
 
 /// `MAV_COMP_ID_ONBOARD_COMPUTER`
-pub const COMPONENT: u8 = 191;
+pub const COMPONENT: u8 = hums_core::observation::OUR_COMPONENT;
 /// The system id until the vehicle's is known: what most autopilots have by default.
 const SYSTEM_DEFAULT: u8 = 1;
 

@@ -12,7 +12,7 @@ SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link"
               "recorder"]
 LOSSES = ["uart_overrun", "bytes_not_frames", "damaged_frames", "queue_full", "card", "records"]
 EVENTS = ["", "armed", "disarmed", "take_off", "landing", "snapshot", "card_in", "card_out", "critical", "phase",
-          "autopilot_reboot", "other_airframe"]
+          "autopilot_reboot", "other_airframe", "by_link", "other_vehicle", "flight_resumed"]
 SOURCES = ["unknown", "SYSTEM_TIME", "recording", "GNSS"]
 FAULTS = ["unknown", "panic", "hard_fault", "watchdog"]
 STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_not_frames", "bytes_logged",

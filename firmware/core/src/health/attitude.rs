@@ -1,11 +1,11 @@
-//! Roll and pitch.
+//! Roll and pitch of what hangs on rotors. A plane banks as it needs to, and a VTOL is one of both at a time.
 
 use super::check::{Check, Side, When};
 use super::common::STALE;
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::latest::Reading;
-use crate::observation::Attitude;
+use crate::observation::{Attitude, VehicleKind};
 use crate::params::Param;
 use crate::time::Span;
 use crate::units::Radians;
@@ -40,6 +40,9 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians) -> Option<Reading> {
+    if inputs.vehicle.kind() != VehicleKind::Rotorcraft {
+        return None;
+    }
     let slot = &inputs.vehicle.attitude;
     Reading::new(slot.at(), slot.get().map(|attitude| angle(attitude).0.to_degrees().abs()))
 }

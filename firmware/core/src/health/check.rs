@@ -3,6 +3,9 @@
 //! A check is data ([`Check`]) plus one pure function that reads its value; its memory is a [`State`]. Adding a check
 //! is one entry in its subsystem's table and one function.
 //!
+//! "Bad for `debounce`" takes time and samples: the value is beyond its limit for so long, and in [`SAMPLES`] measurements
+//! of it. A slow stream holds its last value: that is one sample, however long it is held.
+//!
 //! ```text
 //!            bad for `debounce`             silent for `stale_after`
 //!      Ok ------------------------> Warning, Critical ----------> Stale
@@ -78,6 +81,9 @@ pub struct Check {
 /// How long a value must be good before the level falls, so that a value at its limit does not flicker.
 pub const CLEAR: Span = Span::from_secs(2);
 
+/// Measurements that have to be bad, one after the other: one message of nonsense is no alarm.
+pub const SAMPLES: u8 = 2;
+
 /// A point in time in four bytes, because there are some 140 states: milliseconds modulo 2^32, and never zero. What is
 /// measured from it is far shorter than the 49.7 days after which it would be mistaken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -127,6 +133,9 @@ pub struct State {
     level: Option<Level>,
     /// What it does not fall below, while levels are held: a warning or a critical level.
     held: Option<Level>,
+    /// Measurements in a row beyond the warning's limit, and beyond the critical one.
+    bad_samples: u8,
+    very_bad_samples: u8,
     bad: Stamp,
     very_bad: Stamp,
     better: Stamp,
@@ -155,6 +164,8 @@ impl State {
         Self {
             level: None,
             held: None,
+            bad_samples: 0,
+            very_bad_samples: 0,
             bad: Stamp::NONE,
             very_bad: Stamp::NONE,
             better: Stamp::NONE,
@@ -188,13 +199,14 @@ impl State {
             });
         }
         let reading = reading.filter(|reading| reading.value.is_finite());
-        self.seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.min(now)));
+        let seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.min(now)));
+        let measured = core::mem::replace(&mut self.seen, seen) != seen;
         // A value that was measured once and no longer is grows old like one whose message stops.
         if check.stale_after.is_some_and(|limit| self.seen.older_than(now, limit)) {
             *self = Self { level: self.level, seen: self.seen, ..Self::new() };
             return self.go(Level::Stale, f32::NAN, f32::NAN);
         }
-        self.judge(check, now, reading?.value, params)
+        self.judge(check, now, reading?.value, measured, params)
     }
 
     /// After a step, where levels are not to fall: a warning stays one, and what grew old comes back as what it was.
@@ -222,7 +234,15 @@ impl State {
         change
     }
 
-    fn judge(&mut self, check: &Check, now: Instant, value: f32, params: &Params) -> Option<Change> {
+    /// `measured`: the value was measured since the last step, and not only held.
+    fn judge(
+        &mut self,
+        check: &Check,
+        now: Instant,
+        value: f32,
+        measured: bool,
+        params: &Params,
+    ) -> Option<Change> {
         let level = self.level.unwrap_or(Level::Ok);
         let warn = check.warn.map_or(f32::NAN, |param| params.get(param));
         let critical = check.critical.map_or(f32::NAN, |param| params.get(param));
@@ -231,10 +251,12 @@ impl State {
             Side::Above => value > limit - margin,
             Side::Below => value < limit + margin,
         };
-        let very_bad = self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical);
+        let very_bad = count(&mut self.very_bad_samples, beyond(critical, 0.0), measured)
+            & self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical);
         // Without a warning limit there is no warning on the way to critical.
         let warned = beyond(warn, 0.0) || (!warn.is_nan() && beyond(critical, 0.0));
-        let bad = self.bad.run(warned, now, check.debounce_warn);
+        let bad =
+            count(&mut self.bad_samples, warned, measured) & self.bad.run(warned, now, check.debounce_warn);
         let undecided = self.bad.is_set() || self.very_bad.is_set();
 
         let held = match level {
@@ -267,6 +289,12 @@ impl State {
         self.better = Stamp::NONE;
         Some(Change { level, previous, value, limit })
     }
+}
+
+/// Counts measurements that are bad one after the other; whether there were enough.
+fn count(samples: &mut u8, bad: bool, measured: bool) -> bool {
+    *samples = if bad { samples.saturating_add(u8::from(measured || *samples == 0)) } else { 0 };
+    *samples >= SAMPLES
 }
 
 #[cfg(test)]

@@ -97,7 +97,10 @@ fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
 fn unhealthy_sensors(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     const NOT_SENSORS: u32 = 0x1001_0000;
     let slot = &inputs.vehicle.system;
-    Reading::new(slot.at(), slot.get().map(|system| (system.unhealthy & !NOT_SENSORS).count_ones() as f32))
+    Reading::new(
+        slot.at(),
+        slot.get()?.unhealthy.map(|unhealthy| (unhealthy & !NOT_SENSORS).count_ones() as f32),
+    )
 }
 
 fn temperature_c(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

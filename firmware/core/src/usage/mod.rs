@@ -4,6 +4,7 @@
 mod counters;
 mod drawn;
 mod totals;
+mod touchdown;
 
 pub use counters::{
     BASELINE_FIRST, CounterName, EXPOSURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST,
@@ -12,13 +13,14 @@ pub use counters::{
 pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
-use crate::flight::{Flight, FlightEvent, Phase, climb_mps, ground_speed_mps};
+use crate::flight::{Flight, FlightEvent, Phase, climb_mps, ground_speed_mps, height_m};
 use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::rainflow::Rainflow;
 use crate::time::{Instant, Span};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 use drawn::{Drawn, MOTOR_AGE, discharge_a, drawn};
+use touchdown::Touchdown;
 
 /// Integration steps longer than this are gaps: nothing is known of what happened in them.
 const STEP_MAX: Span = Span::from_secs(2);
@@ -45,9 +47,10 @@ pub struct Usage {
     current_a: Option<f32>,
     /// All but what is worked out when it is asked for: the cycles of the load factor.
     totals: Totals,
-    /// The fastest descent near the ground of this second and of the three before.
-    sinks_mps: [f32; 4],
-    sinks_second: u64,
+    touchdown: Touchdown,
+    airborne: bool,
+    /// The hardest touch of this flight.
+    touched_mps: f32,
     capacity_ah: f32,
     /// Full discharges of each battery, where the capacity is known: each has an equal share of it.
     battery_cycles: [f64; BATTERIES_MAX],
@@ -74,8 +77,9 @@ impl Usage {
             last: None,
             current_a: None,
             totals: Totals::nothing(),
-            sinks_mps: [0.0; 4],
-            sinks_second: 0,
+            touchdown: Touchdown::new(),
+            airborne: false,
+            touched_mps: 0.0,
             capacity_ah: 0.0,
             battery_cycles: [0.0; BATTERIES_MAX],
             load_cycles: Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
@@ -137,19 +141,20 @@ impl Usage {
         event: Option<FlightEvent>,
         params: &Params,
     ) {
-        match event {
-            Some(FlightEvent::TakeOff) => {
-                self.totals.add(UsageCounter::Flights, 1.0);
-                // It was seen a moment after it happened.
-                let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
-                self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
-            }
-            Some(FlightEvent::Landing) => self.land(params),
-            None => {}
+        if event == Some(FlightEvent::TakeOff) {
+            self.totals.add(UsageCounter::Flights, 1.0);
+        }
+        if flight.airborne() && !self.airborne {
+            // It was seen a moment after it happened.
+            let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
+            self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
+        }
+        self.note_touch(now, vehicle, flight);
+        if event == Some(FlightEvent::Landing) {
+            self.land(params);
         }
         self.totals.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
         self.capacity_ah = params.get(Param::BatCapacity);
-        self.note_sink(now, vehicle, flight);
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
         self.last = Some(now);
         self.totals.set(UsageCounter::Powered, now.as_secs_f64());
@@ -190,26 +195,26 @@ impl Usage {
         }
     }
 
-    /// The autopilot says that it has landed a second or two after it touched down.
+    /// The flight is over.
     fn land(&mut self, params: &Params) {
+        let touched_mps = core::mem::take(&mut self.touched_mps);
         self.totals.add(UsageCounter::Landings, 1.0);
-        let touchdown_mps = self.sinks_mps.into_iter().fold(0.0, f32::max);
-        self.totals.extend(UsageCounter::TouchdownMax, f64::from(touchdown_mps));
-        if touchdown_mps >= params.get(Param::HardLanding) {
+        self.totals.extend(UsageCounter::TouchdownMax, f64::from(touched_mps));
+        if touched_mps >= params.get(Param::HardLanding) {
             self.totals.add(UsageCounter::HardLandings, 1.0);
         }
     }
 
-    fn note_sink(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
-        let second = now.as_millis() / 1_000;
-        if second != self.sinks_second {
-            self.sinks_second = second;
-            self.sinks_mps = [0.0, self.sinks_mps[0], self.sinks_mps[1], self.sinks_mps[2]];
+    fn note_touch(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
+        let height_m = height_m(now, vehicle);
+        if flight.airborne() {
+            if let (Some(climb_mps), Some(height_m)) = (climb_mps(now, vehicle), height_m) {
+                self.touchdown.step(now, -climb_mps, height_m);
+            }
+        } else if self.airborne {
+            self.touched_mps = self.touched_mps.max(self.touchdown.take(now, height_m));
         }
-        if flight.phase(now, vehicle) == Phase::Landing {
-            let sink_mps = -climb_mps(now, vehicle).unwrap_or(0.0);
-            self.sinks_mps[0] = self.sinks_mps[0].max(sink_mps);
-        }
+        self.airborne = flight.airborne();
     }
 
     fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {

@@ -3,8 +3,8 @@
 
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss,
-    GnssIntegrity, Heartbeat, Hud, Imu, Observation, Source, SystemStatus, SystemTime, VehicleKind,
-    Vibration,
+    GnssIntegrity, Heartbeat, Hud, Imu, LandedState, Observation, Source, SystemStatus, SystemTime,
+    VehicleKind, Vibration,
 };
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::units::{
@@ -35,6 +35,16 @@ pub struct Quad {
     pub throttle: f32,
     /// The autopilot's own mode number.
     pub mode: u32,
+    pub autopilot: Autopilot,
+    pub kind: VehicleKind,
+    /// `MAV_TYPE`
+    pub type_number: u8,
+    /// Metres a second, upwards.
+    pub climb: f32,
+    /// `EXTENDED_SYS_STATE`, where it is sent.
+    pub landed: Option<LandedState>,
+    /// Metres above home before the flight, for its first two seconds.
+    pub start_height: f32,
 }
 
 impl Quad {
@@ -78,7 +88,7 @@ impl Quad {
             vibration: Vibration { levels: [Some(5.0); 3], clips: [7; 3], ..Vibration::default() },
             acceleration_down: -9.8,
             roll: 0.02,
-            system: SystemStatus { load: Some(Fraction(0.3)), ..SystemStatus::default() },
+            system: SystemStatus { load: Some(Fraction(0.3)), unhealthy: Some(0), ..SystemStatus::default() },
             recorder: RecorderStatus {
                 recording: Recording::Running,
                 room: Some(0.9),
@@ -88,6 +98,12 @@ impl Quad {
             height: 20.0,
             throttle: 0.5,
             mode: 4,
+            autopilot: Autopilot::ArduPilot,
+            kind: VehicleKind::Rotorcraft,
+            type_number: 2,
+            climb: -0.1,
+            landed: None,
+            start_height: 0.0,
         }
     }
 
@@ -97,10 +113,11 @@ impl Quad {
             return Vec::new();
         }
         let boot_ms = (now_ms as i64 + self.boot_offset_ms).max(0) as u32;
-        let height = if now_ms < 2_000 { 0.0 } else { self.height };
+        let height = if now_ms < 2_000 { self.start_height } else { self.height };
         let heartbeat = Heartbeat {
-            autopilot: Autopilot::ArduPilot,
-            kind: VehicleKind::Rotorcraft,
+            autopilot: self.autopilot,
+            kind: self.kind,
+            type_number: self.type_number,
             armed: self.armed,
             state: 4,
             mode: self.mode,
@@ -115,7 +132,7 @@ impl Quad {
             }),
             Observation::GlobalPosition(GlobalPosition {
                 relative_altitude: Metres(height),
-                velocity: [MetresPerSecond(0.1); 3],
+                velocity: [0.1, 0.1, -self.climb].map(MetresPerSecond),
                 ..GlobalPosition::default()
             }),
             Observation::Hud(Hud { throttle: Some(Fraction(self.throttle)), ..Hud::default() }),
@@ -131,6 +148,7 @@ impl Quad {
         if now_ms.is_multiple_of(500) {
             said.push(Observation::Heartbeat(heartbeat));
             said.push(Observation::SystemTime(SystemTime { boot_ms, utc_micros: None }));
+            said.extend(self.landed.map(Observation::Landed));
         }
         said
     }

@@ -1,10 +1,11 @@
 //! Batteries and rails.
 
-use hums_core::observation::{Battery, CELLS_MAX, Rails};
+use hums_core::observation::{Battery, CELLS_MAX, Feeds, Rails};
 use hums_core::units::{AmpereHours, Celsius, Volts, WattHours};
 use mavlink::dialects::ardupilotmega as ap;
 
 use super::fields::{current, percent, read, voltage};
+use crate::packet::Fields;
 
 /// No lithium cell is charged above this, mV: what says more is the sum of several.
 const CELL_MAX_MV: u16 = 5_000;
@@ -35,6 +36,12 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
             .then(|| Celsius(f32::from(battery.temperature) / 100.0)),
         faults: battery.fault_bitmask.bits(),
         lithium: battery.mavtype as u8 != LITHIUM_IRON && battery.mavtype as u8 != NICKEL,
+        // MAV_BATTERY_FUNCTION
+        feeds: match Fields(payload).u8(33) {
+            3 => Feeds::Avionics,
+            4 => Feeds::Payload,
+            _ => Feeds::Vehicle,
+        },
     })
 }
 

@@ -2,7 +2,7 @@
 
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, Processor, RadioControl,
-    SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
+    Source, SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
 };
 use hums_core::units::{Celsius, Fraction};
 use mavlink::dialects::ardupilotmega as ap;
@@ -51,7 +51,7 @@ pub(super) fn status(payload: &[u8]) -> Option<SystemStatus> {
         voltage: voltage(status.voltage_battery),
         current: current(status.current_battery),
         remaining: percent(status.battery_remaining),
-        unhealthy,
+        unhealthy: Some(unhealthy),
     })
 }
 
@@ -109,5 +109,7 @@ pub(super) fn flight_information(payload: &[u8]) -> Option<Observation> {
 /// Read as it is: the list of commands grows faster than any definition.
 pub(super) fn command_ack(payload: &[u8]) -> CommandAck {
     let fields = Fields(payload);
-    CommandAck { command: fields.u16(0), result: fields.u8(2) }
+    let (system, component) = (fields.u8(8), fields.u8(9));
+    let target = (system != 0).then_some(Source { system, component });
+    CommandAck { command: fields.u16(0), result: fields.u8(2), target }
 }

@@ -27,9 +27,11 @@ pub(super) fn record(
             Happening::Disarmed => (2, ""),
             Happening::TakeOff => (3, ""),
             Happening::Landing => (4, ""),
+            Happening::FlightResumed => (14, ""),
             Happening::Phase(phase) => (9, phase.name()),
             Happening::AutopilotReboot => (10, ""),
             Happening::OtherAirframe => (11, "the stored lifetime was another one's"),
+            Happening::OtherVehicle => (13, "another system on the port is the vehicle"),
             Happening::Protect(step) => {
                 book.journal.record(now, &Record::Protection(Protection::new(&step)), sectors);
                 notices.announce(step);

@@ -217,3 +217,37 @@ fn what_no_longer_applies_is_no_longer_bad() {
     let change = state.step(&CHECK, Instant::from_millis(1_000), None, false, &params).expect("it clears");
     assert_eq!(change.level, Level::Ok);
 }
+
+/// Steps every 50 ms through measurements (milliseconds, value), each of which is held until the next.
+fn hold(check: &Check, samples: &[(u64, f32)], until_ms: u64) -> Vec<(u64, Level)> {
+    let params = Params::defaults();
+    let mut state = State::new();
+    let mut changes = Vec::new();
+    for now_ms in (0..until_ms).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        let last = samples.iter().rev().find(|(at_ms, _)| *at_ms <= now_ms);
+        let reading = last.map(|(at_ms, value)| Reading { at: Instant::from_millis(*at_ms), value: *value });
+        let change = state.step(check, now, reading, true, &params);
+        changes.extend(change.map(|change| (now_ms, change.level)));
+    }
+    changes
+}
+
+#[test]
+fn one_message_of_nonsense_is_never_an_alarm_however_long_it_is_held() {
+    // BATTERY_STATUS comes every 2.5 s over a radio.
+    let slow = Check { stale_after: Some(Span::from_secs(12)), ..CHECK };
+    assert_eq!(hold(&slow, &[(0, 10.0), (2_500, 170.0), (5_000, 10.0)], 10_000), []);
+    assert_eq!(hold(&slow, &[(0, 10.0), (2_500, 170.0)], 14_000), [], "nor is the last one");
+    let twice = [(0, 10.0), (2_500, 170.0), (5_000, 170.0), (7_500, 10.0)];
+    assert_eq!(hold(&slow, &twice, 12_000), [(5_000, Level::Critical), (9_500, Level::Ok)]);
+    let no_debounce = Check { debounce_critical: Span::ZERO, debounce_warn: Span::ZERO, ..slow };
+    assert_eq!(hold(&no_debounce, &twice, 7_500), [(5_000, Level::Critical)]);
+}
+
+#[test]
+fn a_critical_value_needs_two_samples_of_its_own() {
+    let slow = Check { stale_after: Some(Span::from_secs(12)), ..CHECK };
+    let samples = [(0, 50.0), (1_000, 50.0), (2_000, 70.0), (3_000, 50.0), (4_000, 70.0), (5_000, 70.0)];
+    assert_eq!(hold(&slow, &samples, 6_000), [(1_000, Level::Warning), (5_000, Level::Critical)]);
+}

@@ -114,8 +114,7 @@ fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         remaining: remaining.map(Fraction),
         // A battery without a thermometer says 0.
         temperature: given.single(5).filter(|celsius| *celsius != 0.0).map(Celsius),
-        faults: 0,
-        lithium: true,
+        ..Battery::default()
     }));
 }
 

@@ -255,7 +255,7 @@ impl State {
             voltage,
             current: self.current.within(now, AGE).map(Amperes),
             remaining: self.remaining.within(now, AGE).map(Fraction),
-            unhealthy,
+            unhealthy: Some(unhealthy),
         })
     }
 

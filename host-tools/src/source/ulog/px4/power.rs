@@ -86,7 +86,7 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
         temperature: when(fields.finite(7)).map(Celsius),
         faults: fields.count(8).unwrap_or(0) as u32,
         // PX4 calls every battery lithium polymer.
-        lithium: true,
+        ..Battery::default()
     };
     let voltage = when(fields.finite(2).or_else(|| fields.finite(1))).filter(|volts| *volts > 0.0).map(Volts);
     if let Some(pack) = px4.power.batteries.get_mut(usize::from(said.instance)) {

@@ -104,7 +104,7 @@ pub(super) struct Status {
     pub(super) hil: bool,
     pub(super) calibrating: bool,
     pub(super) takeoff_us: Option<u64>,
-    pub(super) unhealthy: u32,
+    pub(super) unhealthy: Option<u32>,
 }
 
 /// What topics said of motion.

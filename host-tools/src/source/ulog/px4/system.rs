@@ -125,8 +125,8 @@ impl System {
     }
 
     /// Sensors that are present and enabled and not healthy, where the log says so (until v1.13).
-    pub(super) fn unhealthy(&self) -> u32 {
-        self.status.map_or(0, |status| status.unhealthy)
+    pub(super) fn unhealthy(&self) -> Option<u32> {
+        self.status?.unhealthy
     }
 
     pub(super) fn utc(&mut self, utc_us: u64, recorded_us: u64) {
@@ -243,7 +243,8 @@ fn custom_mode(nav: u8) -> u32 {
 
 fn status(px4: &mut Px4, said: &Said<'_>) {
     let fields = &said.fields;
-    let bits = |field| fields.count(field).unwrap_or(0) as u32;
+    let bits = |field| Some(fields.count(field)? as u32);
+    let sensors = || Some(bits(6)? & bits(7)? & !bits(8)?);
     let before = px4.system.status;
     let status = Status {
         arming: fields.byte(0).unwrap_or(0),
@@ -252,7 +253,7 @@ fn status(px4: &mut Px4, said: &Said<'_>) {
         type_number: fields.byte(3).unwrap_or(0),
         hil: fields.flag(4),
         takeoff_us: fields.count(5),
-        unhealthy: bits(6) & bits(7) & !bits(8),
+        unhealthy: sensors(),
         calibrating: fields.flag(9),
     };
     px4.system.status = Some(status);
@@ -320,7 +321,7 @@ fn mission(px4: &mut Px4, said: &Said<'_>) {
 
 fn ack(px4: &mut Px4, said: &Said<'_>) {
     let (command, result) = (said.fields.count(0).unwrap_or(0) as u16, said.fields.byte(1).unwrap_or(0));
-    px4.observe(Observation::CommandAck(CommandAck { command, result }));
+    px4.observe(Observation::CommandAck(CommandAck { command, result, target: None }));
 }
 
 /// The lower half of the levels is for those outside, as `MAV_SEVERITY`; 8 and more are not for people.

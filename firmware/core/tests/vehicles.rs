@@ -1,0 +1,135 @@
+//! More than one quad of ArduPilot: other systems on the port, other vehicles, other batteries.
+#![expect(clippy::unwrap_used, reason = "that is how a test fails")]
+
+mod common;
+
+use common::{AUTOPILOT, Quad};
+use hums_core::Monitor;
+use hums_core::happening::Happening;
+use hums_core::health::Finding;
+use hums_core::lifetime::{Airframe, ItemKey, Lifetime};
+use hums_core::observation::{AutopilotIdentity, Heartbeat, Observation, Source, VehicleKind};
+use hums_core::params::Params;
+use hums_core::status::LinkReading;
+use hums_core::time::Instant;
+use hums_core::units::Rpm;
+use hums_core::usage::UsageCounter;
+
+const OTHER: Source = Source { system: 7, component: 1 };
+
+/// A monitor whose stored life is of this airframe.
+fn with_life_of(airframe: Airframe) -> Monitor {
+    let mut monitor = Monitor::new(Params::defaults());
+    let life = Lifetime { airframe, boots: 41, ..Lifetime::new() };
+    let mut bytes = [0; Lifetime::BYTES];
+    life.encode(&mut bytes);
+    monitor.restore(ItemKey::Lifetime, &bytes).unwrap();
+    monitor
+}
+
+/// Steps the monitor from `from_ms` to `to_ms`; `say` gives what is said at each tenth of a second, and by whom.
+fn run(
+    monitor: &mut Monitor,
+    from_ms: u64,
+    to_ms: u64,
+    say: impl Fn(u64) -> Vec<(Source, Vec<Observation>)>,
+) -> (Vec<Finding>, Vec<(u64, Happening)>) {
+    let (mut findings, mut happenings) = (Vec::new(), Vec::new());
+    for now_ms in (from_ms..to_ms).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        if now_ms.is_multiple_of(100) {
+            for (source, said) in say(now_ms) {
+                for observation in said {
+                    monitor.observe(now, source, &observation);
+                }
+            }
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &Quad::healthy().recorder, &mut |finding| findings.push(*finding));
+        while let Some(happening) = monitor.take_happening() {
+            happenings.push((now_ms, happening));
+        }
+    }
+    (findings, happenings)
+}
+
+fn forwarded_heartbeat(now_ms: u64) -> (Source, Vec<Observation>) {
+    let heartbeat = Heartbeat { kind: VehicleKind::Plane, ..Heartbeat::default() };
+    let due = now_ms.is_multiple_of(1_000);
+    (OTHER, due.then_some(Observation::Heartbeat(heartbeat)).into_iter().collect())
+}
+
+#[test]
+fn another_vehicles_heartbeat_that_is_forwarded_first_does_not_make_it_the_vehicle() {
+    let mut monitor = with_life_of(Airframe { system: 1, uid: 0 });
+    let (_, happenings) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let quad = if now_ms < 200 { Vec::new() } else { Quad::healthy().says(now_ms) };
+        vec![forwarded_heartbeat(now_ms), (AUTOPILOT, quad)]
+    });
+    assert_eq!(monitor.vehicle().source, Some(AUTOPILOT));
+    assert_eq!(monitor.usage().value(UsageCounter::Flights), Some(1.0));
+    let others = happenings.iter().filter(|(_, happening)| *happening == Happening::OtherAirframe);
+    assert_eq!(others.count(), 0, "its life goes on: {happenings:?}");
+    assert_eq!(monitor.lifetime().boots, 42);
+}
+
+#[test]
+fn a_system_id_that_is_changed_is_followed_and_the_life_of_its_unique_id_goes_on() {
+    let airframe = Airframe { system: 1, uid: 99 };
+    let mut monitor = with_life_of(airframe);
+    let identity = Observation::Identity(AutopilotIdentity { uid: 99, ..AutopilotIdentity::default() });
+    let says = |source: Source| {
+        move |now_ms: u64| {
+            let mut said = Quad { armed: false, height: 0.0, ..Quad::healthy() }.says(now_ms);
+            said.extend((now_ms % 20_000 == 19_000).then_some(identity));
+            vec![(source, said)]
+        }
+    };
+    run(&mut monitor, 0, 30_000, says(AUTOPILOT));
+    let (_, happenings) = run(&mut monitor, 30_000, 90_000, says(OTHER));
+    assert_eq!(monitor.vehicle().source, Some(OTHER));
+    let changes: Vec<_> = happenings.iter().filter(|(_, what)| *what == Happening::OtherVehicle).collect();
+    assert!(matches!(changes[..], [(59_900..62_000, _)]), "{happenings:?}");
+    assert!(happenings.iter().all(|(_, what)| *what != Happening::OtherAirframe), "{happenings:?}");
+    assert_eq!(monitor.lifetime().airframe, Airframe { system: 7, uid: 99 });
+}
+
+#[test]
+fn what_another_system_says_is_judged_by_nobody() {
+    let mut monitor = Monitor::new(Params::defaults());
+    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let mut bad = Quad::healthy();
+        bad.vibration.levels = [Some(90.0); 3];
+        bad.estimator.velocity = Some(9.0);
+        vec![(AUTOPILOT, Quad::healthy().says(now_ms)), (OTHER, bad.says(now_ms))]
+    });
+    assert_eq!(findings, []);
+}
+
+/// A minute of flight of a vehicle of this kind that banks to 70 degrees and whose first motor turns half as fast.
+fn banked(kind: VehicleKind, type_number: u8) -> Vec<&'static str> {
+    let mut monitor = Monitor::new(Params::defaults());
+    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let mut vehicle = Quad { kind, type_number, ..Quad::healthy() };
+        if (20_000..25_000).contains(&now_ms) {
+            vehicle.roll = 1.2;
+        }
+        if let Some(esc) = vehicle.escs[0].as_mut() {
+            esc.rpm = Some(Rpm(2_500.0));
+        }
+        vec![(AUTOPILOT, vehicle.says(now_ms))]
+    });
+    let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
+    checks.sort_unstable();
+    checks.dedup();
+    checks
+}
+
+#[test]
+fn what_is_a_fault_of_a_multicopter_is_none_of_a_plane_a_vtol_or_a_helicopter() {
+    assert_eq!(banked(VehicleKind::Rotorcraft, 2), ["motor_imbalance", "roll"]);
+    assert_eq!(banked(VehicleKind::Rotorcraft, 4), ["roll"], "a helicopter's tail turns at its own speed");
+    for (kind, type_number) in [(VehicleKind::Plane, 1), (VehicleKind::Vtol, 22)] {
+        assert!(banked(kind, type_number).is_empty(), "{kind:?}");
+    }
+}
