@@ -110,7 +110,8 @@ fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_end
     let live = Live::start(&input);
     let (code, words) = live.terminate(Duration::from_secs(40));
     assert_eq!(code, Some(3), "{words}");
-    assert!(words.contains("points are not in the database"), "{words}");
+    // How many it is depends on how soon it is ended: one, or some.
+    assert!(words.contains("not in the database"), "{words}");
 }
 
 #[test]

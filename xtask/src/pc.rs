@@ -85,9 +85,9 @@ pub(crate) fn unit_tests() -> Result<()> {
     Ok(())
 }
 
-/// Runs one program of the end-to-end tests, with all that it may use; `options` are the test runner's.
+/// Runs one program of the end-to-end tests, with all that it may use; `options` are the test runner's. The oracle is
+/// prepared before.
 pub(crate) fn end_to_end(name: &str, options: &[&str]) -> Result<()> {
-    oracle::prepare()?;
     let programs = programs()?;
     match programs.iter().find(|one| one.is_integration && one.package == END_TO_END && one.name == name) {
         Some(program) => run(program, options),

@@ -7,6 +7,7 @@
 use anyhow::{Result, bail};
 
 use crate::firmware::{self, Board};
+use crate::oracle;
 use crate::pc;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
@@ -40,5 +41,6 @@ fn further_recordings() -> Result<()> {
     setup::ensure(&needs, false).require_all()?;
     firmware::build(Board::Emulated)?;
     pc::build()?;
+    oracle::prepare()?;
     pc::end_to_end("emulator", &["--ignored"])
 }

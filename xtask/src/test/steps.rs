@@ -8,6 +8,7 @@ use crate::costs;
 use crate::demo;
 use crate::firmware::{self, Board};
 use crate::hums;
+use crate::oracle;
 use crate::pc;
 use crate::prove;
 use crate::repo::FIRMWARE_TARGET;
@@ -38,7 +39,7 @@ pub(super) enum Builds {
 
 /// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
 /// wait for, then what takes longest.
-pub(super) const STEPS: [Step; 18] = [
+pub(super) const STEPS: [Step; 19] = [
     Step {
         name: "fmt",
         about: "the formatting",
@@ -54,6 +55,14 @@ pub(super) const STEPS: [Step; 18] = [
         after: &[],
         builds: None,
         run: structure::check,
+    },
+    Step {
+        name: "oracle",
+        about: "pymavlink and the other readers that the tests compare with are there",
+        needs: &[Need::PythonVenv],
+        after: &[],
+        builds: None,
+        run: oracle::prepare,
     },
     Step {
         name: "build",
@@ -75,7 +84,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "emulator",
         about: "end to end with the firmware in the emulator",
         needs: &[Need::Qemu, Need::PythonVenv, Need::FirmwareTarget, Need::Dosfstools],
-        after: &["build", "budgets"],
+        after: &["oracle", "build", "budgets"],
         builds: None,
         run: || pc::end_to_end("emulator", &[]),
     },
@@ -107,7 +116,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "sim",
         about: "end to end on this PC, against pymavlink",
         needs: &[Need::Mtools, Need::Dosfstools, Need::PythonVenv],
-        after: &["build"],
+        after: &["oracle", "build"],
         builds: None,
         run: sim,
     },
@@ -123,7 +132,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "browser",
         about: "the report and the live page in Chromium",
         needs: &[Need::PythonVenv, Need::Chromium],
-        after: &["build"],
+        after: &["oracle", "build"],
         builds: None,
         run: || pc::end_to_end("browser", &[]),
     },
@@ -139,7 +148,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "answer",
         about: "every format against pymavlink, with pyarrow, DuckDB and InfluxDB as readers",
         needs: &[Need::PythonVenv, Need::Influx],
-        after: &["build"],
+        after: &["oracle", "build"],
         builds: None,
         run: || pc::end_to_end("answer", further()),
     },
@@ -147,7 +156,7 @@ pub(super) const STEPS: [Step; 18] = [
         name: "live",
         about: "live writing to InfluxDB and VictoriaMetrics, and the Grafana dashboards",
         needs: &[Need::PythonVenv, Need::Influx, Need::Victoria],
-        after: &["build"],
+        after: &["oracle", "build"],
         builds: None,
         run: || pc::end_to_end("live", &[]),
     },
