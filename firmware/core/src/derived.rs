@@ -21,6 +21,10 @@ const INTERVALS_MISSED: f32 = 3.0;
 /// Steady flight: in the air for this long, and not tilted further.
 const STEADY_AFTER: Span = Span::from_secs(3);
 const STEADY_TILT_RAD: f32 = 0.26;
+/// Motors that are compared have all been told of within this.
+const MOTORS_TOLD: Span = Span::from_secs(1);
+/// Below this part of their highest speed motors do not carry a vehicle (thrust goes by the square).
+const FLYING_PART: f32 = 0.2;
 /// Time constant of the motor speeds that are compared.
 const MOTOR_SMOOTHING_S: f32 = 1.0;
 /// How long a loss of frames stays a warning.
@@ -264,10 +268,22 @@ impl Derived {
     ) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
         let mean = self.mean_of_others(motor)?;
-        if !vehicle.is_multicopter() || !Self::is_steady(now, vehicle, flight) {
+        let compares = vehicle.is_multicopter() && self.motors_told(now, mean);
+        if !compares || !Self::is_steady(now, vehicle, flight) {
             return None;
         }
         Reading::new(track.last, Some((track.smooth_rpm - mean).abs() / mean * 100.0))
+    }
+
+    /// Whether all motors that are fitted were told of just now, and turn as in flight: speeds that are held, or zeros of ESCs
+    /// that lost their telemetry, say nothing about a motor.
+    fn motors_told(&self, now: Instant, mean_rpm: f32) -> bool {
+        let mut fitted = self.motors.iter().filter(|track| track.highest_rpm > TURNING_RPM);
+        let flying = |track: &MotorTrack| {
+            track.last.is_some_and(|last| now.since(last) <= MOTORS_TOLD)
+                && mean_rpm >= FLYING_PART * track.highest_rpm
+        };
+        fitted.all(flying)
     }
 
     /// The same with its sign, wherever it flies; `None` for a motor that is not fitted.

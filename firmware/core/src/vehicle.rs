@@ -18,6 +18,8 @@ use crate::time::{Instant, Span};
 pub const BATTERIES_MAX: usize = 4;
 /// GNSS receivers that are monitored.
 pub const RECEIVERS_MAX: usize = 2;
+/// How long after an autopilot's first heartbeat its boot time is told.
+const RESTART_SHOWS: Span = Span::from_secs(3);
 /// A boot time that falls by more than this is a reboot, not reordering.
 const REBOOT_MS: u32 = 3_000;
 /// A fall from here is the end of the counter's range.
@@ -95,6 +97,10 @@ pub struct Vehicle {
     pub reboots: u32,
     /// When it did last.
     pub rebooted_at: Option<Instant>,
+    /// Whether it was armed then: a restart on the ground is none that endangers anybody.
+    pub rebooted_armed: bool,
+    /// Since when it has said that it is disarmed, after it was armed.
+    disarmed_since: Option<Instant>,
     /// How often another system has become the vehicle: everything else here is then of that one.
     pub changes: u32,
     election: Election,
@@ -152,6 +158,8 @@ impl Vehicle {
             mission_reached: Latest::nothing(),
             reboots: 0,
             rebooted_at: None,
+            rebooted_armed: false,
+            disarmed_since: None,
             changes: 0,
             election: Election::new(),
             boot_ms: None,
@@ -215,7 +223,7 @@ impl Vehicle {
 
     fn take(&mut self, at: Instant, component: u8, observation: &Observation) {
         match *observation {
-            Observation::Heartbeat(heartbeat) => self.heartbeat.set(at, heartbeat),
+            Observation::Heartbeat(heartbeat) => self.take_heartbeat(at, heartbeat),
             Observation::SystemStatus(system) => self.system.set(at, system),
             Observation::SystemTime(time) => self.take_time(at, time),
             Observation::Gnss(gnss) => set_instance(&mut self.gnss, gnss.instance, at, gnss),
@@ -256,6 +264,15 @@ impl Vehicle {
         }
     }
 
+    fn take_heartbeat(&mut self, at: Instant, heartbeat: Heartbeat) {
+        if heartbeat.armed {
+            self.disarmed_since = None;
+        } else if self.armed() {
+            self.disarmed_since = Some(at);
+        }
+        self.heartbeat.set(at, heartbeat);
+    }
+
     fn take_time(&mut self, at: Instant, time: SystemTime) {
         self.take_boot_time(at, time.boot_ms);
         self.time.set(at, time);
@@ -270,6 +287,9 @@ impl Vehicle {
         } else if boot_ms.saturating_add(REBOOT_MS) < before {
             self.reboots = self.reboots.saturating_add(1);
             self.rebooted_at = Some(at);
+            // The first heartbeat after a restart says disarmed, and may come before the time that shows the restart.
+            self.rebooted_armed =
+                self.armed() || self.disarmed_since.is_some_and(|since| at.since(since) <= RESTART_SHOWS);
             self.boot_ms = Some(boot_ms);
         } else {
             self.boot_ms = Some(before.max(boot_ms));

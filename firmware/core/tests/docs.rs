@@ -63,7 +63,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("radio_margin", "RADIO_STATUS: signal above noise, the worse end"),
     ("load", "SYS_STATUS"),
     ("mcu_temperature", "MCU_STATUS"),
-    ("autopilot_reboot", "ATTITUDE, SYSTEM_TIME: a boot time that falls, for 30 s"),
+    ("autopilot_reboot", "ATTITUDE, SYSTEM_TIME: a boot time that falls while it is armed, for 30 s"),
     ("autopilot_state", "HEARTBEAT: MAV_STATE"),
     ("sensors", "SYS_STATUS: sensors present and enabled that are not healthy"),
     ("roll", "ATTITUDE"),

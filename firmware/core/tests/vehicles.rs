@@ -133,3 +133,50 @@ fn what_is_a_fault_of_a_multicopter_is_none_of_a_plane_a_vtol_or_a_helicopter() 
         assert!(banked(kind, type_number).is_empty(), "{kind:?}");
     }
 }
+
+/// Says it restarted at 30 s, armed or not; the findings.
+fn restarted(armed: bool) -> Vec<&'static str> {
+    let mut monitor = Monitor::new(Params::defaults());
+    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let height = if armed { 20.0 } else { 0.0 };
+        let mut quad = Quad { armed: armed && now_ms < 30_000, height, ..Quad::healthy() };
+        if now_ms >= 30_000 {
+            quad.boot_offset_ms = -29_000;
+        }
+        vec![(AUTOPILOT, quad.says(now_ms))]
+    });
+    assert_eq!(monitor.vehicle().reboots, 1);
+    findings
+        .iter()
+        .filter(|finding| finding.check == "autopilot_reboot")
+        .map(|finding| finding.check)
+        .collect()
+}
+
+#[test]
+fn an_autopilot_that_restarts_on_the_ground_is_counted_and_one_that_restarts_armed_is_an_alarm() {
+    assert!(restarted(false).is_empty());
+    assert!(!restarted(true).is_empty());
+}
+
+#[test]
+fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() {
+    for silent in [true, false] {
+        let mut monitor = Monitor::new(Params::defaults());
+        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+            let mut quad = Quad::healthy();
+            // One motor is a little faster than the others, as they are.
+            quad.escs[1].as_mut().unwrap().rpm = Some(Rpm(5_600.0));
+            if now_ms >= 30_000 {
+                for esc in &mut quad.escs {
+                    match silent {
+                        true => *esc = None,
+                        false => esc.as_mut().unwrap().rpm = Some(Rpm(0.0)),
+                    }
+                }
+            }
+            vec![(AUTOPILOT, quad.says(now_ms))]
+        });
+        assert!(findings.iter().all(|finding| finding.check != "motor_imbalance"), "{silent}: {findings:?}");
+    }
+}

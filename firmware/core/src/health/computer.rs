@@ -85,11 +85,12 @@ fn load_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     Reading::new(slot.at(), slot.get()?.load.map(|load| load.0 * 100.0))
 }
 
-/// 1 for half a minute after a restart.
+/// 1 for half a minute after a restart while it was armed.
 fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     inputs.vehicle.heartbeat.get()?;
     let recently = |at| inputs.now.since(at) <= Span::from_secs(30);
-    let value = f32::from(u8::from(inputs.vehicle.rebooted_at.is_some_and(recently)));
+    let vehicle = inputs.vehicle;
+    let value = f32::from(u8::from(vehicle.rebooted_armed && vehicle.rebooted_at.is_some_and(recently)));
     Some(Reading { at: inputs.now, value })
 }
 

@@ -154,7 +154,9 @@ fn current_percent(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
     let mean = sum / f32::from(count);
     let throttle = inputs.vehicle.hud.within(inputs.now, FRESH)?.throttle?.0;
     let asked = count >= 2 && mean > CURRENT_MIN_A && throttle > THROTTLE_MIN;
-    asked.then(|| Reading { at: inputs.now, value: own / mean * 100.0 })
+    // Measured when this motor told it: a value that is held is one sample. Noise around zero may be negative.
+    let at = motor(inputs, number)?.moved_at?;
+    asked.then(|| Reading { at, value: own.max(0.0) / mean * 100.0 })
 }
 
 fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {

@@ -4,6 +4,7 @@
 //! ([`writer`]). A database that is away costs nothing: batches wait in a file that outlives the program ([`queue`],
 //! [`spool`], [`place`]), and are written when it is back.
 
+pub mod batch;
 mod figures;
 pub mod names;
 pub mod place;
@@ -22,9 +23,10 @@ use hums_blackbox::record::{FindingRecord, Moment, USAGE_ENTRIES_MAX, Usage};
 use hums_core::time::{Instant, Span};
 use hums_link::{Frame, observe};
 
+use self::batch::Batch;
 pub use self::figures::Figures;
 use self::names::Names;
-use self::queue::{Batch, Queue};
+use self::queue::Queue;
 use self::spool::Spool;
 use self::target::Target;
 use super::world::World;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant as Wall};
 
 use anyhow::{Result, anyhow};
 
-use super::queue::Batch;
+use super::batch::Batch;
 use crate::decode::influx::Tags;
 use crate::live::world::World;
 

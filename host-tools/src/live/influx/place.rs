@@ -81,7 +81,7 @@ fn name(target: &Target, number: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::live::influx::queue::Batch;
+    use crate::live::influx::batch::Batch;
 
     #[test]
     fn the_folder_is_the_services_or_the_users() {

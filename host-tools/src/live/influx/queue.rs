@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant as Wall};
 
+use super::batch::Batch;
 use super::figures::Figures;
 use super::spool::Spool;
 
@@ -15,15 +16,6 @@ use super::spool::Spool;
 pub const MEMORY_BYTES: usize = 16 * 1024 * 1024;
 /// How often it is looked whether there is room by now.
 const LOOK: Duration = Duration::from_millis(200);
-
-/// Lines, and how many they are.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Batch {
-    /// Line protocol.
-    pub text: Vec<u8>,
-    /// Its lines.
-    pub points: u64,
-}
 
 /// What became of a batch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

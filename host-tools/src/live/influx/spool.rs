@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use crc::{CRC_32_ISCSI, Crc};
 
-use super::queue::Batch;
+use super::batch::Batch;
 
 const MAGIC: &[u8; 8] = b"HUMSPOOL";
 const VERSION: u32 = 1;

@@ -11,7 +11,8 @@ use std::time::Duration;
 use anyhow::{Context as _, Result};
 use ureq::Agent;
 
-use super::queue::{Batch, Delivered, Queue};
+use super::batch::Batch;
+use super::queue::{Delivered, Queue};
 use super::target::Target;
 
 /// A database that has not answered by then will not.
