@@ -47,6 +47,7 @@ pub fn check(data: &[u8]) {
     assert_eq!(end.frames + end.records, entries);
     assert_eq!(end.gaps, gaps);
     let seen = end.blocks;
-    let kinds = seen.sectors + seen.superseded + seen.damaged + seen.stale + seen.empty + seen.foreign;
+    let ours = seen.sectors + seen.superseded + seen.misplaced + seen.damaged;
+    let kinds = ours + seen.stale + seen.empty + seen.erased + seen.foreign;
     assert_eq!((seen.blocks, kinds), (blocks.len() as u64, blocks.len() as u64));
 }

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
+use hums_blackbox::record::{Before, Found, Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Entry, Gap, Record};
 use hums_core::component::Figures;
 use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
 
+use crate::ending::{Proof, has_newer};
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, Summary, read};
 use crate::loss::lost;
@@ -138,6 +139,8 @@ pub struct Contents {
     pub records: u64,
     /// The first boot record.
     pub boot: Option<BootLine>,
+    /// The session before on the card, as its last boot record found it.
+    pub before: Option<Before>,
     /// The last vehicle record.
     pub vehicle: Option<Vehicle>,
     /// UTC at power-on, microseconds since 1970.
@@ -242,6 +245,8 @@ impl Contents {
         self.records += 1;
         match record {
             Record::Boot(boot) => {
+                self.before =
+                    Some(boot.before).filter(|before| before.found != Found::Unknown).or(self.before);
                 self.boot.get_or_insert_with(|| BootLine {
                     version: boot.version.to_owned(),
                     git: boot.git.to_owned(),
@@ -326,6 +331,7 @@ impl Contents {
         }
         self.records += next.records;
         self.boot = self.boot.take().or(next.boot);
+        self.before = next.before.or(self.before);
         self.vehicle = next.vehicle.or(self.vehicle);
         self.findings_count += next.findings_count;
         let room = LISTED_MAX.saturating_sub(self.findings.len());
@@ -413,6 +419,10 @@ pub struct Overview {
     pub summary: Summary,
     /// What is in it.
     pub contents: Contents,
+    /// What is known of its end.
+    pub proof: Proof,
+    /// The number of a log that was recorded on the card just before this one and is not there.
+    pub gone_before: Option<u32>,
 }
 
 impl Overview {
@@ -435,6 +445,7 @@ impl Overview {
         bar.finish_and_clear();
         contents.epoch_us = summary.epoch_us;
         let files = log.files.clone();
+        let proof = Proof::of(&summary, None);
         Ok(Self {
             name: log.name.clone(),
             format: None,
@@ -442,12 +453,26 @@ impl Overview {
             bytes_on_card: log.bytes(),
             summary,
             contents,
+            proof,
+            gone_before: None,
         })
     }
 
     /// Whether anything was lost or damaged.
     pub fn is_lossy(&self) -> bool {
-        self.summary.gaps > 0 || self.summary.blocks.damaged > 0 || self.contents.lost > 0
+        let blocks = &self.summary.blocks;
+        self.summary.gaps > 0 || blocks.damaged > 0 || blocks.misplaced > 0 || self.contents.lost > 0
+    }
+
+    /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark. A recording
+    /// of another format has nothing that could prove its end.
+    pub fn is_proved(&self) -> bool {
+        let summary = &self.summary;
+        if self.format.is_some() {
+            return !self.is_lossy();
+        }
+        let newer = has_newer(summary) && !self.proof.is_whole();
+        !self.is_lossy() && self.proof.holds() && summary.marks.wrong == 0 && !newer
     }
 
     /// UTC at this time, where it is known.
@@ -465,9 +490,9 @@ impl Overview {
         self.contents.tlog_bytes() as f64 / self.log_bytes().max(1) as f64
     }
 
-    /// How the session ended, as a sentence.
-    pub fn ending(&self) -> &'static str {
-        if self.summary.closed { "ended in order" } else { "ended by power-off" }
+    /// How the session ended, as a part of a sentence.
+    pub fn ending(&self) -> String {
+        self.proof.words(&self.summary)
     }
 
     /// Whether a group could not be read because this program is too old for it.

@@ -6,6 +6,8 @@ use serde::Serialize;
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
+use crate::ending::{BlocksJson, EndJson, behind_words, count, has_newer};
+use crate::followed::Followed;
 use crate::info::json::{ImageJson, images_json};
 use crate::logs::{self, find::Image};
 use crate::outcome::Outcome;
@@ -27,26 +29,40 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
             print(&[check])?;
         }
     }
-    side_by_side(&found.logs, Overview::verified, |overview| {
-        let overview = overview?;
-        let log = LogJson::new(&overview);
+    let mut followed = Followed::default();
+    let mut whole = true;
+    let mut done = |overview: &Overview| {
+        let log = LogJson::new(overview);
         json.ok &= log.ok;
+        whole &= overview.proof.is_whole();
         if !args.json {
             output::line(&format!("Session {} ({})", log.name, overview.files.join(", ")))?;
             print(&log.checks)?;
         }
         json.logs.push(log);
         Ok(())
+    };
+    side_by_side(&found.logs, Overview::verified, |overview| {
+        followed.push(overview?).iter().try_for_each(&mut done)
     })?;
+    followed.finish().try_for_each(|overview| done(&overview))?;
     let ok = json.ok;
     if args.json {
         output::json(&json)?;
     } else {
-        let logs = json.logs.len();
-        let verdict = if ok { "everything holds" } else { "damage or losses: see above" };
-        output::line(&format!("{logs} sessions: {verdict}"))?;
+        let logs = count(json.logs.len() as u64, "session");
+        output::line(&format!("{logs}: {}", verdict(ok, whole)))?;
     }
     Ok(Outcome::lossy(!ok))
+}
+
+/// All of it in a few words. Only what is proved to its end holds.
+const fn verdict(ok: bool, whole: bool) -> &'static str {
+    match (ok, whole) {
+        (true, true) => "everything holds",
+        (true, false) => "whole to the last end marks; what came after them cannot be proved",
+        (false, _) => "damage, losses or an end that is not proved: see above",
+    }
 }
 
 fn print(checks: &[Check]) -> Result<()> {
@@ -72,8 +88,12 @@ struct VerifyJson {
 struct LogJson {
     name: String,
     ok: bool,
-    /// The session ended in order; otherwise by power-off, which is no damage.
+    /// The session ended in order.
     closed: bool,
+    /// What is known of its end.
+    end: EndJson,
+    /// All blocks of its files.
+    blocks: BlocksJson,
     checks: Vec<Check>,
 }
 
@@ -110,7 +130,7 @@ impl LogJson {
         let gaps = || contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed);
         let missing: u64 = gaps().map(|gap| u64::from(gap.sectors_lost)).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
-        let checks = vec![
+        let mut checks = vec![
             check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, String::new()),
             check("sector sequence", blocks.sectors, missing, gaps_detail(log)),
             check("group decoding", summary.groups, useless, newer(log)),
@@ -137,20 +157,49 @@ impl LogJson {
             ),
             check("recorder losses", contents.frames() + contents.lost, contents.lost, losses_detail(log)),
         ];
-        let ok = checks.iter().all(|check| check.failed == 0) && !log.is_lossy();
-        Self { name: log.name.clone(), ok, closed: summary.closed, checks }
+        checks.extend(ends(log));
+        let ok = checks.iter().all(|check| check.failed == 0) && log.is_proved();
+        let end = EndJson::new(log.proof, summary);
+        let blocks = BlocksJson::new(&blocks);
+        Self { name: log.name.clone(), ok, closed: summary.closed, end, blocks, checks }
     }
+}
+
+/// What the log says of its end and of its place.
+fn ends(log: &Overview) -> [Check; 4] {
+    let summary = &log.summary;
+    let blocks = &summary.blocks;
+    let check = |name, checked, failed, detail: String| Check { name, checked, failed, detail };
+    let newer = has_newer(summary) && !log.proof.is_whole();
+    let behind = match (behind_words(&summary.behind), newer) {
+        (words, _) if words.is_empty() => "nothing behind its last sector".to_owned(),
+        (words, false) => format!("behind its last sector: {words}"),
+        (words, true) => format!("behind its last sector: {words}; some are of a session that began later"),
+    };
+    let gone = log.gone_before.map_or_else(String::new, |number| {
+        format!("session {number:05}, which was recorded just before it, is not there")
+    });
+    let twice = "sectors that are there twice, or lie where others belong".to_owned();
+    let twice = if blocks.misplaced > 0 { twice } else { String::new() };
+    [
+        check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, twice),
+        check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
+        check("end", 1, u64::from(!log.proof.holds() || newer), format!("{}; {behind}", log.ending())),
+        check("session before", 1, u64::from(log.gone_before.is_some()), gone),
+    ]
 }
 
 fn gaps_detail(log: &Overview) -> String {
     let not_kept = match log.summary.not_kept {
         0 => String::new(),
-        times => format!("not recorded while disarmed: {times} times; "),
+        times => format!("not recorded while disarmed: {}; ", count(times, "time")),
     };
     match log.summary.gaps {
-        0 => format!("{not_kept}{}", log.ending()),
-        gaps => format!("{gaps} gaps; {not_kept}{}", log.ending()),
+        0 => not_kept,
+        gaps => format!("{}; {not_kept}", count(gaps, "gap")),
     }
+    .trim_end_matches("; ")
+    .to_owned()
 }
 
 fn newer(log: &Overview) -> String {

@@ -25,7 +25,7 @@ mod trap;
 mod watch;
 
 use hums_blackbox::Writer;
-use hums_blackbox::record::Boot;
+use hums_blackbox::record::{Before, Boot};
 use hums_core::Monitor;
 use hums_core::params::Params;
 use hums_onboard::persist::mailbox::MailboxOut;
@@ -74,6 +74,7 @@ fn start() -> board::Idle {
         reset_name: parts.boot.cause.name(),
         uid: parts.boot.id,
         boots,
+        before: Before::default(),
     };
     let monitor = MONITOR.take();
     let (items_in, items_out) = status::MAILBOX.split();

@@ -3,8 +3,20 @@
 //!
 //! A sector in progress is written as partial copies at its own place and the one after, in turn, so several versions
 //! of one number may lie next to each other; the fullest one counts. That needs one sector held back.
+//!
+//! A card may also put a page in the wrong place. A number that jumps ahead is therefore believed only when the next
+//! [`PAGE_SECTORS`] sectors go on from there; if the numbers before it come after all, what was ahead of them does not
+//! belong there. So a misplaced page costs as much as a missing one, and not all that lies between.
+
+use heapless::Deque;
 
 use crate::sector::{Header, NotASector, SECTOR_BYTES, Sector};
+
+/// Sectors of the largest page that a card may put in the wrong place: 16 KiB.
+pub const PAGE_SECTORS: usize = 32;
+
+/// One more decides.
+const AHEAD_MAX: usize = PAGE_SECTORS + 1;
 
 /// What was seen so far, in blocks of 512 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,18 +25,42 @@ pub struct BlockCounts {
     pub blocks: u64,
     /// Sectors given out.
     pub sectors: u64,
-    /// Copies of a sector that a fuller one supersedes.
+    /// Copies of a sector in progress that a fuller one supersedes, and sectors from before the log's first one, which
+    /// its file held before.
     pub superseded: u64,
+    /// Whole sectors of this session that are there twice or lie where others belong.
+    pub misplaced: u64,
     /// Blocks of this session, as far as can be told, that fail their check: torn or damaged.
     pub damaged: u64,
     /// Sectors of another session, sound or not: left over from an earlier file.
     pub stale: u64,
     /// All zeros.
     pub empty: u64,
+    /// All ones: erased.
+    pub erased: u64,
     /// Anything else, for instance sectors of another format version.
     pub foreign: u64,
     /// Sound sectors of a format version that this build does not read, also counted as foreign.
     pub other_version: u64,
+}
+
+impl BlockCounts {
+    /// What came after `before` was counted.
+    #[must_use]
+    pub const fn since(&self, before: &Self) -> Self {
+        Self {
+            blocks: self.blocks - before.blocks,
+            sectors: self.sectors - before.sectors,
+            superseded: self.superseded - before.superseded,
+            misplaced: self.misplaced - before.misplaced,
+            damaged: self.damaged - before.damaged,
+            stale: self.stale - before.stale,
+            empty: self.empty - before.empty,
+            erased: self.erased - before.erased,
+            foreign: self.foreign - before.foreign,
+            other_version: self.other_version - before.other_version,
+        }
+    }
 }
 
 /// A sector in its order.
@@ -36,21 +72,33 @@ pub struct Step {
     pub sector: Sector,
     /// Numbers missing between the sector before and this one.
     pub missing: u32,
-    /// Blocks between the sector before and this one that fail their check or are no sector.
+    /// Blocks between the sector before and this one that fail their check, are no sector or do not belong there.
     pub damaged: u32,
 }
 
-/// Puts the sectors of one session in order.
+/// Puts the sectors of one session in order. After each block, [`Self::next`] gives what is then known to be in order.
 #[derive(Debug, Default)]
 pub struct Assembler {
     session: Option<u32>,
     held: Option<Step>,
+    /// The one that was held before it.
+    out: Option<Step>,
+    /// Sectors whose number jumped, until it is clear whether the log goes on with them.
+    ahead: Deque<Step, AHEAD_MAX>,
+    /// It does: they are given out.
+    believed: bool,
+    ended: bool,
+    first_number: Option<u32>,
     last_number: Option<u32>,
-    /// Blocks that are no sector since the sector held.
+    /// Blocks that are no sector since the last one.
     bad_blocks: u32,
     /// Those of them that were sectors of this session, as far as can be told.
     bad_own: u32,
     counts: BlockCounts,
+    /// The counts at the last sector.
+    at_last: BlockCounts,
+    /// The latest power-on that a sector of another session tells, microseconds since 1970.
+    other_epoch: Option<u64>,
 }
 
 impl Assembler {
@@ -64,45 +112,151 @@ impl Assembler {
         Self { session: Some(session), ..Self::default() }
     }
 
-    /// Takes the next block; gives the sector that is now known to be the fullest of its number.
-    pub fn feed(&mut self, block: &[u8; SECTOR_BYTES]) -> Option<Step> {
+    /// Takes the next block. Call [`Self::next`] until it gives `None` before the next one.
+    pub fn feed(&mut self, block: &[u8; SECTOR_BYTES]) {
         self.counts.blocks += 1;
         let header = match Header::read(block) {
             Ok(header) => header,
-            Err(error) => {
-                self.count(error, block);
-                return None;
-            }
+            Err(error) => return self.count(error, block),
         };
+        let sector = Sector::from_bytes(*block);
         if *self.session.get_or_insert(header.session) != header.session {
             self.counts.stale += 1;
-            return None;
+            let epoch = sector.preamble().and_then(|preamble| preamble.epoch_micros);
+            self.other_epoch = self.other_epoch.max(epoch);
+            return;
         }
-        let sector = Sector::from_bytes(*block);
-        let number_held = self.held.as_ref().map(|held| held.header.number).or(self.last_number);
-        if let Some(held) = self.held.as_mut().filter(|held| held.header.number == header.number) {
-            self.counts.superseded += 1;
-            if fullness(&header) >= fullness(&held.header) {
-                held.header = header;
-                held.sector = sector;
-            }
-            return None;
-        }
-        if number_held.is_some_and(|number| header.number <= number) {
-            self.counts.superseded += 1;
-            return None;
-        }
-        let damaged = core::mem::take(&mut self.bad_blocks);
-        self.bad_own = 0;
-        let missing = number_held.map_or(u32::from(header.since_first), |number| header.number - number - 1);
-        let released = self.release();
-        self.held = Some(Step { header, sector, missing, damaged });
-        released
+        self.place(Step { header, sector, missing: 0, damaged: 0 });
     }
 
-    /// No more blocks: gives the last sector.
-    pub fn end(&mut self) -> Option<Step> {
-        self.release()
+    /// Takes a block of zeros, which is only counted.
+    pub const fn skip_empty(&mut self) {
+        self.counts.blocks += 1;
+        self.counts.empty += 1;
+    }
+
+    /// The next sector that is known to be in order and the fullest of its number; `None`: feed the next block.
+    #[expect(clippy::should_implement_trait, reason = "it goes on after `None`")]
+    pub fn next(&mut self) -> Option<Step> {
+        loop {
+            if let Some(step) = self.out.take() {
+                return Some(self.give(step));
+            }
+            if self.believed
+                && let Some(step) = self.ahead.pop_front()
+            {
+                self.hold(step);
+                continue;
+            }
+            self.believed = false;
+            if !self.ended {
+                return None;
+            }
+            let step = self.held.take()?;
+            return Some(self.give(step));
+        }
+    }
+
+    /// No more blocks: [`Self::next`] gives what is left.
+    pub const fn end(&mut self) {
+        self.ended = true;
+        self.believed = true;
+    }
+
+    /// A sound sector of this session.
+    fn place(&mut self, mut step: Step) {
+        let number = step.header.number;
+        let last = self.held.as_ref().map(|held| held.header.number).or(self.last_number);
+        match last {
+            Some(last) if number <= last => self.behind(&step, last),
+            _ if number == last.map_or(0, |last| last.wrapping_add(1)) => {
+                self.drop_ahead();
+                step.damaged = core::mem::take(&mut self.bad_blocks);
+                self.reached();
+                self.hold(step);
+            }
+            _ => self.jumped(step),
+        }
+    }
+
+    /// A number that was there already, or that belongs before what is there.
+    fn behind(&mut self, step: &Step, last: u32) {
+        let number = step.header.number;
+        let before_all = self.first_number.is_none_or(|first| number < first);
+        if step.header.partial || before_all {
+            self.counts.superseded += 1;
+        } else if let Some(held) = &self.held
+            && number == last
+            && held.header.partial
+        {
+            self.counts.superseded += 1;
+        } else {
+            self.counts.misplaced += 1;
+        }
+        if let Some(held) = self.held.as_mut().filter(|held| held.header.number == number) {
+            replace(held, step);
+            if self.ahead.is_empty() {
+                self.reached();
+            }
+        }
+    }
+
+    /// A number that does not follow: perhaps the log goes on there.
+    fn jumped(&mut self, mut step: Step) {
+        match self.ahead.back_mut() {
+            Some(last) if last.header.number == step.header.number => {
+                self.counts.superseded += 1;
+                replace(last, &step);
+                return;
+            }
+            Some(last) if last.header.number > step.header.number => self.drop_ahead(),
+            _ => {}
+        }
+        step.damaged = core::mem::take(&mut self.bad_blocks);
+        self.reached();
+        // There is room: a full row is given out or dropped before the next block.
+        let _ = self.ahead.push_back(step);
+        self.believed = self.ahead.is_full();
+    }
+
+    /// What was ahead does not belong there.
+    fn drop_ahead(&mut self) {
+        while let Some(step) = self.ahead.pop_front() {
+            self.counts.misplaced += 1;
+            self.bad_blocks = self.bad_blocks.saturating_add(step.damaged).saturating_add(1);
+        }
+    }
+
+    /// The latest sector so far.
+    const fn reached(&mut self) {
+        self.bad_own = 0;
+        self.at_last = self.counts;
+    }
+
+    fn hold(&mut self, mut step: Step) {
+        let number = step.header.number;
+        let last = self.held.as_ref().map(|held| held.header.number).or(self.last_number);
+        step.missing = last.map_or(u32::from(step.header.since_first), |last| number - last - 1);
+        self.first_number.get_or_insert(number);
+        self.out = self.held.replace(step);
+    }
+
+    const fn give(&mut self, step: Step) -> Step {
+        self.last_number = Some(step.header.number);
+        self.counts.sectors += 1;
+        self.at_last.sectors += 1;
+        step
+    }
+
+    /// What the blocks after the last sector were.
+    pub const fn behind_last(&self) -> BlockCounts {
+        self.counts.since(&self.at_last)
+    }
+
+    /// The latest power-on that a sector of another session tells, microseconds since 1970. What is left over in a file
+    /// is older than the log that replaced it.
+    pub const fn other_epoch_micros(&self) -> Option<u64> {
+        self.other_epoch
     }
 
     /// Blocks since the last sector that were sectors of this session and fail their check. What a file was before it
@@ -119,13 +273,6 @@ impl Assembler {
     /// The session, once it is known.
     pub const fn session(&self) -> Option<u32> {
         self.session
-    }
-
-    fn release(&mut self) -> Option<Step> {
-        let step = self.held.take()?;
-        self.last_number = Some(step.header.number);
-        self.counts.sectors += 1;
-        Some(step)
     }
 
     /// Whether a block that fails its check was a sector of this session. It says so where it says which one it is, and
@@ -149,6 +296,10 @@ impl Assembler {
         self.bad_own = self.bad_own.saturating_add(u32::from(is_own));
         match error {
             NotASector::Empty => self.counts.empty += 1,
+            NotASector::Erased => {
+                self.counts.erased += 1;
+                self.bad_blocks = self.bad_blocks.saturating_add(1);
+            }
             NotASector::Foreign => {
                 self.counts.foreign += 1;
                 self.bad_blocks = self.bad_blocks.saturating_add(1);
@@ -166,6 +317,14 @@ impl Assembler {
                 self.bad_blocks = self.bad_blocks.saturating_add(1);
             }
         }
+    }
+}
+
+/// Takes the fuller of two versions of a sector.
+fn replace(held: &mut Step, step: &Step) {
+    if fullness(&step.header) >= fullness(&held.header) {
+        held.header = step.header;
+        held.sector = step.sector;
     }
 }
 

@@ -26,7 +26,7 @@ pub mod record;
 mod sector;
 mod writer;
 
-pub use assemble::{Assembler, BlockCounts, Step};
+pub use assemble::{Assembler, BlockCounts, PAGE_SECTORS, Step};
 pub use group::{Entry, GroupDecoder, GroupError, Outline};
 pub use hums_dialect::wire::FRAME_BYTES_MAX;
 pub use preamble::Preamble;

@@ -128,8 +128,8 @@ pub struct LogReader {
     epoch_micros: Option<u64>,
     /// Damaged blocks at the place of the last sector, where that is a partial one: one may have been the whole one.
     damaged_partial: u32,
-    /// Damaged blocks after the last sector, until they are given out as a gap.
-    damaged_at_end: u32,
+    /// Damaged blocks after the last sector were given out as a gap.
+    counted_end: bool,
     summary: Summary,
     state: State,
 }
@@ -169,7 +169,7 @@ impl LogReader {
             frames_expected: None,
             epoch_micros: None,
             damaged_partial: 0,
-            damaged_at_end: 0,
+            counted_end: false,
             summary: Summary::default(),
             state: State::Reading,
         }
@@ -188,9 +188,7 @@ impl LogReader {
 
     /// Takes the next block. Call `next` until it gives `None` before the next one: entries not fetched are lost.
     pub fn feed(&mut self, block: &[u8; SECTOR_BYTES]) {
-        if let Some(step) = self.assembler.feed(block) {
-            self.step(&step);
-        }
+        self.assembler.feed(block);
     }
 
     /// There are no more blocks: `next` gives what is left, then `End`.
@@ -198,32 +196,38 @@ impl LogReader {
         if self.state != State::Reading {
             return;
         }
-        if let Some(step) = self.assembler.end() {
-            self.step(&step);
-        }
-        self.damaged_at_end = self.assembler.damaged_since().saturating_add(self.damaged_partial);
+        self.assembler.end();
         self.state = State::Ending;
     }
 
     /// The next item; `None`: feed the next block.
     #[expect(clippy::should_implement_trait, reason = "the items borrow from the reader")]
     pub fn next(&mut self) -> Option<Item<'_>> {
-        if let Some(gap) = self.gap_due.take() {
-            return Some(self.give(gap));
-        }
-        match self.decoder.advance() {
-            Some(Ok(())) => return Some(self.item()),
-            Some(Err(error)) => {
-                self.open(cause_of(error));
+        loop {
+            if let Some(gap) = self.gap_due.take() {
+                return Some(self.give(gap));
             }
-            None => {}
+            match self.decoder.advance() {
+                Some(Ok(())) => return Some(self.item()),
+                Some(Err(error)) => {
+                    self.open(cause_of(error));
+                }
+                None => {}
+            }
+            match self.assembler.next() {
+                Some(step) => self.step(&step),
+                None => break,
+            }
         }
         if self.state != State::Ending {
             return None;
         }
-        let damaged = core::mem::take(&mut self.damaged_at_end);
-        if damaged > 0 && self.open_gap.is_none() {
-            self.open(Cause::Damaged).sectors_lost = damaged;
+        if !self.counted_end {
+            self.counted_end = true;
+            let damaged = self.assembler.damaged_since().saturating_add(self.damaged_partial);
+            if damaged > 0 && self.open_gap.is_none() {
+                self.open(Cause::Damaged).sectors_lost = damaged;
+            }
         }
         if let Some(gap) = self.open_gap.take() {
             return Some(self.give(gap));

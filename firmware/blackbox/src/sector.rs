@@ -17,6 +17,7 @@
 //! same number supersedes it. *Closed* marks the last sector of a session that ended in order.
 
 use crate::crc::crc32c;
+use crate::preamble::Preamble;
 
 /// Bytes of a sector: a block of an SD card.
 pub const SECTOR_BYTES: usize = 512;
@@ -102,6 +103,11 @@ impl Sector {
         u16::from_le_bytes([self.bytes[5], self.bytes[6]])
     }
 
+    /// What the group that begins in it says of itself; `None` where none begins.
+    pub fn preamble(&self) -> Option<Preamble> {
+        Preamble::read(self.body()).filter(|_| self.starts_group())
+    }
+
     /// The body: what is in use of it is for `Header::body_bytes` to say.
     pub(crate) fn body(&self) -> &[u8] {
         &self.bytes[BODY_AT..CRC_AT]
@@ -159,6 +165,8 @@ pub struct Header {
 pub enum NotASector {
     /// All zeros: space that was set aside and not written yet.
     Empty,
+    /// All ones: flash memory that was erased and not written, or whose writing failed.
+    Erased,
     /// It does not begin as a sector does: some other file's data.
     Foreign,
     /// It begins as a sector of another format version does, and its check is right.
@@ -172,8 +180,12 @@ impl Header {
     pub fn read(block: &[u8; SECTOR_BYTES]) -> Result<Self, NotASector> {
         let sector = Sector { bytes: *block };
         if block[0] != MAGIC || block[1] & 0xf0 != 0xb0 {
-            let empty = block.iter().all(|&byte| byte == 0);
-            return Err(if empty { NotASector::Empty } else { NotASector::Foreign });
+            let all = |value: u8| block.iter().all(|&byte| byte == value);
+            return Err(match block[0] {
+                0 if all(0) => NotASector::Empty,
+                0xff if all(0xff) => NotASector::Erased,
+                _ => NotASector::Foreign,
+            });
         }
         if crc32c(&block[..CRC_AT]) != sector.u32_at(CRC_AT) {
             return Err(NotASector::Damaged);
@@ -257,7 +269,8 @@ mod tests {
     #[test]
     fn zeros_other_data_and_other_versions_are_told_apart() {
         assert_eq!(Header::read(&[0; SECTOR_BYTES]), Err(NotASector::Empty));
-        assert_eq!(Header::read(&[0xff; SECTOR_BYTES]), Err(NotASector::Foreign));
+        assert_eq!(Header::read(&[0xff; SECTOR_BYTES]), Err(NotASector::Erased));
+        assert_eq!(Header::read(&[7; SECTOR_BYTES]), Err(NotASector::Foreign));
         let (_, mut sector) = sample();
         sector.bytes[1] = 0xb2;
         assert_eq!(Header::read(sector.bytes()), Err(NotASector::Damaged));

@@ -13,7 +13,7 @@ use crate::codec::{CODED_BYTES_MAX, Entry, Frame, Kind, Model, Out};
 use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
 use crate::layouts::{self, Layouts};
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
-use crate::record::{RECORD_BYTES_MAX, Record};
+use crate::record::{Mark, RECORD_BYTES_MAX, Record, Resting};
 use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
 
 /// Sectors that one entry completes at most: the one that ends the old group, and those that a longest entry fills
@@ -165,6 +165,12 @@ impl Writer {
         }
         self.counters.records += 1;
         Ok(())
+    }
+
+    /// Adds an end mark: the vehicle rests, and the log is whole up to here. Give storage [`Self::partial`] next.
+    pub fn mark(&mut self, at: Instant, why: Resting, sink: &mut impl SectorSink) -> Result<(), Full> {
+        let mark = Mark { why, sector: self.header.number, frames: self.counters.frames as u32 };
+        self.record(at, &Record::Mark(mark), sink)
     }
 
     /// A copy of the sector in progress that decodes up to the last entry; `false` where nothing is new since the

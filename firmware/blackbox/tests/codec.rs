@@ -163,8 +163,13 @@ fn outlines(sectors: &[Sector]) -> Vec<(u64, u32, usize, bool)> {
         _ => panic!("no frame: {bytes:?}"),
     };
     let (mut assembler, mut decoder) = (Assembler::new(), Box::new(GroupDecoder::new()));
-    let mut steps: Vec<_> = sectors.iter().filter_map(|sector| assembler.feed(sector.bytes())).collect();
-    steps.extend(assembler.end());
+    let mut steps = Vec::new();
+    for sector in sectors {
+        assembler.feed(sector.bytes());
+        steps.extend(assembler.next());
+    }
+    assembler.end();
+    steps.extend(std::iter::from_fn(|| assembler.next()));
     let mut found = Vec::new();
     for step in &steps {
         decoder.push(&step.header, &step.sector).expect("in order");
@@ -224,7 +229,9 @@ fn frames_with_flags_that_we_know_need_no_more_than_their_outline() {
     }
     assert!(writer.finish(&mut card));
     let (mut assembler, mut decoder) = (Assembler::new(), Box::new(GroupDecoder::new()));
-    for step in [assembler.feed(card.0[0].bytes()), assembler.end()].into_iter().flatten() {
+    assembler.feed(card.0[0].bytes());
+    assembler.end();
+    while let Some(step) = assembler.next() {
         decoder.push(&step.header, &step.sector).expect("in order");
     }
     for (id, len) in [(200, 9), (0x01_0203, 13), (0x02_0304, 26)] {

@@ -1,6 +1,6 @@
 //! The container, from outside: what is written reads back, whatever happens to the sectors in between.
 
-use hums_blackbox::record::Note;
+use hums_blackbox::record::{Mark, Note, Resting};
 use hums_blackbox::{ENTRY_SECTORS_MAX, Full, Item, LogReader, Record, Sector, SectorSink, Summary, Writer};
 use hums_core::time::Instant;
 use proptest::prelude::*;
@@ -264,6 +264,100 @@ fn records_stand_among_frames_and_restart_begins_a_group() {
     let start = queue.sectors.iter().rposition(Sector::starts_group).expect("a group");
     let log = read(&bytes(&queue.sectors[start..]));
     assert_eq!((log.frames.len(), log.gaps.len()), (25, 0));
+}
+
+/// What a card does that puts a page where it does not belong.
+#[derive(Clone, Copy, Debug)]
+enum Misplaced {
+    /// Two pages are exchanged.
+    Swapped,
+    /// A page lies in the place of another one as well.
+    Copied,
+    /// A page is there twice, and what follows it lies further back.
+    Inserted,
+}
+
+#[test]
+fn a_page_in_a_wrong_place_costs_no_more_than_the_groups_that_it_touches() {
+    let frames = frames(9_000, 3);
+    let blocks = bytes(&write(&frames, true));
+    let group = frames.len() / (blocks.len() / 64);
+    for page in [1, 8, 32] {
+        let pages = blocks.len() / page;
+        for (one, other) in [(0, pages - 1), (1, pages / 2), (pages / 3, pages - 2), (2, 3), (pages - 1, 1)] {
+            for how in [Misplaced::Swapped, Misplaced::Copied, Misplaced::Inserted] {
+                let mut damaged = blocks.clone();
+                let (from, to) = (one * page, other * page);
+                match how {
+                    Misplaced::Swapped => (0..page).for_each(|at| damaged.swap(from + at, to + at)),
+                    Misplaced::Copied => damaged.copy_within(from..from + page, to),
+                    Misplaced::Inserted => {
+                        let copy = damaged[from..from + page].to_vec();
+                        damaged.splice(to..to, copy);
+                    }
+                }
+                let what = format!("{how:?}: page {one} of {page} sectors, {other} of {pages}");
+                let log = read(&damaged);
+                assert!(is_subsequence(&log.frames, &frames), "{what}");
+                let lost = frames.len() - log.frames.len();
+                assert!(lost <= 4 * group, "{what}: {lost} frames of {} lost", frames.len());
+                let end = log.end.expect("end");
+                let noticed = end.blocks.misplaced > 0 || !log.gaps.is_empty() || !end.closed;
+                assert!(noticed, "{what}: {end:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn sectors_behind_the_first_of_a_ring_are_left_over_and_not_misplaced() {
+    let frames = frames(6_000, 9);
+    let blocks = bytes(&write(&frames, true));
+    let starts: Vec<_> =
+        (0..blocks.len()).filter(|at| Sector::from_bytes(blocks[*at]).starts_group()).collect();
+    let (first, last) = (starts[2], starts[starts.len() - 1]);
+    // The segment that held the first two groups was written anew with the last one, which is shorter.
+    let mut medium = blocks[first..].to_vec();
+    medium.extend_from_slice(&blocks[blocks.len() - last..first]);
+    let log = read(&medium);
+    assert_eq!((log.gaps.len(), log.end.expect("end").blocks.misplaced), (0, 0));
+}
+
+#[test]
+fn an_end_mark_says_how_many_frames_came_before_it_and_is_read_from_the_copy_in_progress() {
+    let (mut writer, mut queue) = (Box::new(Writer::new()), queue());
+    for (index, (at, bytes, verified)) in frames(500, 4).iter().enumerate() {
+        writer.frame(Instant::from_millis(*at), bytes, *verified, &mut queue).expect("room");
+        if index % 100 != 99 {
+            continue;
+        }
+        writer.mark(Instant::from_millis(*at), Resting::Landed, &mut queue).expect("room");
+        let mut sectors = queue.sectors.clone();
+        let mut partial = Sector::zeroed();
+        if writer.partial(&mut partial) {
+            sectors.push(partial);
+        }
+        sectors.iter_mut().for_each(|sector| sector.seal(SESSION));
+        let (mut reader, mut frames, mut last) = (Box::new(LogReader::new()), 0, None);
+        let mut take = |reader: &mut LogReader| {
+            while let Some(item) = reader.next() {
+                match item {
+                    Item::Frame { .. } => frames += 1,
+                    Item::Record { record: Record::Mark(mark), .. } => last = Some((mark, frames)),
+                    _ => {}
+                }
+            }
+        };
+        for sector in &sectors {
+            reader.feed(sector.bytes());
+            take(&mut reader);
+        }
+        reader.end();
+        take(&mut reader);
+        let (Mark { why, sector, frames }, read) = last.expect("a mark");
+        assert_eq!((why, frames, read), (Resting::Landed, index as u32 + 1, index + 1));
+        assert!(sector as usize + 1 >= queue.sectors.len(), "{sector}");
+    }
 }
 
 proptest! {

@@ -3,7 +3,7 @@
 
 use core::fmt::{Arguments, Write as _};
 
-use hums_blackbox::record::{Event, Loss, Lost, Parameter, Record};
+use hums_blackbox::record::{Event, Loss, Lost, Parameter, Record, Resting};
 use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
 use hums_core::Monitor;
 use hums_core::time::Instant;
@@ -47,6 +47,11 @@ impl<'a> Journal<'a> {
             self.lose(now, Lost::Records, 1);
         }
         written
+    }
+
+    /// Writes an end mark; whether there was room. Where there was none it is no loss: it can be written later.
+    pub(crate) fn mark(&mut self, now: Instant, why: Resting, sectors: &mut SectorsIn) -> bool {
+        sectors.with_reserve(|sink| self.writer.mark(now, why, sink)).is_ok()
     }
 
     /// Records that somebody did something; what does not fit into 50 characters is cut.

@@ -11,6 +11,7 @@
 //! What fails is tried again, then given a new segment, then the card is given up and looked for once a second. A
 //! sector is only counted lost when it can never be written: the caller keeps it until then.
 
+mod before;
 mod segments;
 mod slot;
 mod trouble;

@@ -3,6 +3,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use embedded_sdmmc::{TimeSource, Timestamp};
+use hums_blackbox::record::{Before, Found};
 use hums_core::time::{Instant, Span};
 
 /// Every sector is kept: what [`CardStatus`] says while a recording is to stay.
@@ -93,6 +94,13 @@ pub struct CardStatus {
     /// How much of them, in milliseconds.
     waiting_ms: AtomicU32,
     fat_time: AtomicU32,
+    /// The session before on this card: whether it is news, and what was found.
+    before_news: AtomicBool,
+    before_found: AtomicU8,
+    before_number: AtomicU32,
+    before_session: AtomicU32,
+    before_sectors: AtomicU32,
+    before_frames: AtomicU32,
 }
 
 /// A reading of [`CardStatus`].
@@ -153,6 +161,12 @@ impl CardStatus {
             waiting_from: AtomicU32::new(KEEP_ALL),
             waiting_ms: AtomicU32::new(0),
             fat_time: AtomicU32::new(0),
+            before_news: AtomicBool::new(false),
+            before_found: AtomicU8::new(Found::Unknown as u8),
+            before_number: AtomicU32::new(0),
+            before_session: AtomicU32::new(0),
+            before_sectors: AtomicU32::new(0),
+            before_frames: AtomicU32::new(0),
         }
     }
 
@@ -264,6 +278,28 @@ impl CardStatus {
         let from = self.waiting_from.load(Ordering::Acquire);
         let keep = Span::from_millis(u64::from(self.waiting_ms.load(Ordering::Relaxed)));
         (from != KEEP_ALL).then_some((from, keep))
+    }
+
+    /// Tells which session was recorded before on the card that is in.
+    pub(crate) fn set_before(&self, before: &Before) {
+        self.before_found.store(before.found as u8, Ordering::Relaxed);
+        self.before_number.store(before.number, Ordering::Relaxed);
+        self.before_session.store(before.session, Ordering::Relaxed);
+        self.before_sectors.store(before.sectors, Ordering::Relaxed);
+        self.before_frames.store(before.frames, Ordering::Relaxed);
+        self.before_news.store(true, Ordering::Release);
+    }
+
+    /// Which session was recorded before, once for each card that is opened. The fields are written long before the next
+    /// card can be: storage looks for one once a second.
+    pub fn take_before(&self) -> Option<Before> {
+        self.before_news.swap(false, Ordering::Acquire).then(|| Before {
+            found: Found::from_number(self.before_found.load(Ordering::Relaxed)),
+            number: self.before_number.load(Ordering::Relaxed),
+            session: self.before_session.load(Ordering::Relaxed),
+            sectors: self.before_sectors.load(Ordering::Relaxed),
+            frames: self.before_frames.load(Ordering::Relaxed),
+        })
     }
 
     /// Tells the date for directory entries, in seconds since 1970 UTC.

@@ -7,6 +7,7 @@ use std::rc::Rc;
 
 use common::{MIB_BLOCKS, MemCard, held};
 use embedded_sdmmc::Block;
+use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
 use hums_core::time::{Instant, Span};
 use hums_recorder::card::Card;
@@ -294,4 +295,78 @@ fn while_waiting_only_the_last_while_is_kept() {
     assert!((30.0..100.0).contains(&before_s), "{before_s} s before arming are kept");
     let segments = stored(&device).iter().map(|(name, ..)| *name).collect::<std::collections::BTreeSet<_>>();
     assert!(segments.len() <= 5, "{segments:?}");
+}
+
+/// Whatever the session before wrote, the next start finds where it ended.
+#[test]
+fn the_next_start_finds_where_the_session_before_ended() {
+    for count in [0_u32, 1, 7, 100, 2_000, 30_000] {
+        let device = MemCard::formatted(64 * MIB_BLOCKS);
+        let status = CardStatus::new();
+        let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+        let all = sectors(count);
+        // The last one is not closed: power goes.
+        let written = if count == 0 { &[] } else { &all[..all.len() - 1] };
+        assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
+        for sector in written {
+            assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+        }
+        assert_eq!(status.take_before().map(|before| before.found), Some(Found::Nothing));
+        assert_eq!(status.take_before(), None, "told once");
+        let frames = written.iter().map(|sector| u32::from(sector.frames())).sum();
+        let before = found_at_next_start(&device);
+        if written.is_empty() {
+            assert_eq!((before.found, before.number), (Found::Unreadable, 1));
+            continue;
+        }
+        let session = stored(&device)[0].2.session;
+        let expected =
+            Before { found: Found::Frames, number: 1, session, sectors: written.len() as u32, frames };
+        assert_eq!(before, expected, "{count} frames");
+        // Nothing was written by the start after it: the same is found behind its empty segment.
+        let again = found_at_next_start(&device);
+        assert_eq!((again.session, again.sectors), (session, written.len() as u32));
+    }
+}
+
+#[test]
+fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let all = sectors(4_000);
+    for sector in &all[..all.len() - 1] {
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+    }
+    let (reads_before, whole) = (device.reads.get(), device.blocks.borrow().clone());
+    let first =
+        device.journal.borrow().iter().find(|(_, bytes)| Header::read(bytes).is_ok()).map(|(at, _)| *at);
+    let first = first.expect("a sector was written");
+    assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
+    let reads = device.reads.get() - reads_before;
+    assert!(reads < 400, "{reads} blocks were read");
+    for page in (1..all.len() as u32 / 8 - 1).step_by(3) {
+        device.blocks.replace(whole.clone());
+        for at in 8 * page..8 * page + 8 {
+            device.blocks.borrow_mut().insert(first + at, [0xff; 512]);
+        }
+        let before = found_at_next_start(&device);
+        assert_eq!(before.sectors, all.len() as u32 - 1, "page {page}");
+    }
+    // Behind the end lies what another session left there.
+    device.blocks.replace(whole.clone());
+    for at in 0..200 {
+        let mut sector = Sector::from_bytes(*all[at].bytes());
+        sector.seal(99);
+        device.blocks.borrow_mut().insert(first + all.len() as u32 + at as u32, *sector.bytes());
+    }
+    assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
+}
+
+/// What a recorder that starts now says of the session before.
+fn found_at_next_start(device: &MemCard) -> Before {
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
+    assert!(recorder.ready(Instant::ZERO));
+    status.take_before().expect("it was looked for")
 }

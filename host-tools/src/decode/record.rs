@@ -31,6 +31,11 @@ pub fn rows(record: &Record<'_>) -> Vec<Row> {
                 ("reset_name", text(boot.reset_name)),
                 ("uid", Cell::Hex(boot.uid.to_vec())),
                 ("boots", count(boot.boots)),
+                ("before", text(boot.before.found.name())),
+                ("before_number", count(boot.before.number)),
+                ("before_session", count(boot.before.session)),
+                ("before_sectors", count(boot.before.sectors)),
+                ("before_frames", count(boot.before.frames)),
             ],
         ),
         Record::Vehicle(vehicle) => one(
@@ -129,6 +134,14 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("all", count(u8::from(keep.all))),
                 ("from_sector", count(keep.from)),
                 ("seconds", count(keep.seconds)),
+            ],
+        ),
+        Record::Mark(mark) => one(
+            "HUMS_MARK",
+            vec![
+                ("why", text(mark.why.name())),
+                ("sector", count(mark.sector)),
+                ("frames", count(mark.frames)),
             ],
         ),
         Record::Snapshot(snapshot) => wear::snapshot(snapshot),

@@ -3,6 +3,7 @@
 use hums_core::time::Instant;
 use serde::Serialize;
 
+use crate::ending::{BlocksJson, EndJson};
 use crate::logs;
 use crate::names::{autopilot_name, type_name};
 use crate::source::recording::Format;
@@ -39,6 +40,8 @@ pub struct LogJson {
     /// As its sectors name it, hexadecimal.
     session: Option<String>,
     closed: bool,
+    /// What is known of its end; `null` for a recording of another format, which has nothing that could prove it.
+    end: Option<EndJson>,
     start_utc: Option<String>,
     end_utc: Option<String>,
     /// Seconds since the monitor's power-on.
@@ -71,6 +74,8 @@ pub struct LogJson {
     bytes_on_card: u64,
     sectors: u64,
     sectors_damaged: u64,
+    /// All blocks of its files.
+    blocks: BlocksJson,
 }
 
 #[derive(Debug, Serialize)]
@@ -224,6 +229,7 @@ impl LogJson {
             files: log.files.clone(),
             session: summary.session.map(|session| format!("{session:08x}")),
             closed: summary.closed,
+            end: log.format.is_none().then(|| EndJson::new(log.proof, summary)),
             start_utc: utc(summary.first),
             end_utc: utc(summary.last),
             start_s: summary.first.map(seconds),
@@ -259,6 +265,7 @@ impl LogJson {
             bytes_on_card: log.bytes_on_card,
             sectors: summary.blocks.sectors,
             sectors_damaged: summary.blocks.damaged,
+            blocks: BlocksJson::new(&summary.blocks),
         }
     }
 }

@@ -9,9 +9,11 @@ use anyhow::Result;
 use crate::check;
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
+use crate::followed::Followed;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::source::recording::find;
+use crate::summary::Overview;
 use json::{LogJson, images_json};
 use text::{image_text, text};
 
@@ -30,15 +32,19 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&image_text(image))?;
         }
     }
-    side_by_side(&found.places, check::overview, |overview| {
-        let overview = overview?;
-        outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
+    let mut followed = Followed::default();
+    let mut done = |overview: &Overview| {
+        outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
         if let Some(list) = &mut list {
-            return list.element(&LogJson::new(&overview));
+            return list.element(&LogJson::new(overview));
         }
-        output::line(text(&overview).trim_end())?;
+        output::line(text(overview).trim_end())?;
         output::line("")
+    };
+    side_by_side(&found.places, check::overview, |overview| {
+        followed.push(overview?).iter().try_for_each(&mut done)
     })?;
+    followed.finish().try_for_each(|overview| done(&overview))?;
     if let Some(list) = list {
         list.end()?;
     } else if found.places.is_empty() {

@@ -11,6 +11,7 @@ use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
 use super::wear;
+use crate::ending::{behind_words, count, has_newer};
 use crate::logs;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
 use crate::utc::iso8601;
@@ -49,7 +50,7 @@ fn heading(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.summary, &log.contents);
     let _ = match log.format {
         Some(format) => writeln!(text, "{}: {}", log.files.join(", "), format.words()),
-        None => writeln!(text, "Session {} ({}), {}", log.name, log.files.join(", "), log.ending()),
+        None => writeln!(text, "Session {} ({})", log.name, log.files.join(", ")),
     };
     match (summary.first, summary.last) {
         (Some(first), Some(last)) => {
@@ -60,6 +61,9 @@ fn heading(text: &mut String, log: &Overview) {
             let _ = writeln!(text, "  to       {:>10.3} s  {}", last.as_secs_f64(), utc(last));
         }
         _ => text.push_str("  nothing in it can be read\n"),
+    }
+    if log.format.is_none() {
+        ending(text, log);
     }
     if let Some(vehicle) = vehicle(log) {
         let firmware = vehicle.firmware.map_or_else(String::new, |version| format!(" {version}"));
@@ -85,6 +89,27 @@ fn heading(text: &mut String, log: &Overview) {
         let _ = write!(text, "; as a tlog {} bytes: {:.2} times smaller", contents.tlog_bytes(), log.ratio());
     }
     text.push('\n');
+}
+
+/// How it ends, and what lies behind that.
+fn ending(text: &mut String, log: &Overview) {
+    let _ = writeln!(text, "  end      {}", log.ending());
+    let behind = behind_words(&log.summary.behind);
+    if !behind.is_empty() {
+        let _ = writeln!(text, "  behind   {behind}");
+    }
+    if has_newer(&log.summary) && !log.proof.is_whole() {
+        text.push_str("           some of them are of a session that began later: two logs are mixed here\n");
+    }
+    let (superseded, misplaced) = (log.summary.blocks.superseded, log.summary.blocks.misplaced);
+    if superseded > 0 || misplaced > 0 {
+        let _ = writeln!(
+            text,
+            "  copies   {} superseded, {} there twice or where others belong",
+            count(superseded, "sector"),
+            count(misplaced, "sector")
+        );
+    }
 }
 
 fn findings_text(text: &mut String, log: &Overview) {
@@ -175,11 +200,11 @@ fn gaps_text(text: &mut String, log: &Overview) {
             gap.frames.map_or_else(|| "an unknown number of".to_owned(), |frames| frames.to_string());
         let _ = writeln!(
             text,
-            "    from {} to {}: {}, {} sectors lost, {} more of no use, {frames} frames missing",
+            "    from {} to {}: {}, {} lost, {} more of no use, {frames} frames missing",
             time(gap.from, "the beginning"),
             time(gap.to, "the end"),
             words(gap.cause),
-            gap.sectors_lost,
+            count(gap.sectors_lost.into(), "sector"),
             gap.sectors_skipped
         );
     }

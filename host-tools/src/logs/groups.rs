@@ -19,8 +19,6 @@ pub struct Groups<'a> {
     blocks: Blocks<'a>,
     assembler: Assembler,
     group: Group,
-    /// Blocks of zeros, which the assembler does not get.
-    empty: u64,
     ended: bool,
     ends_short: bool,
 }
@@ -33,7 +31,6 @@ impl<'a> Groups<'a> {
             blocks: log.blocks(),
             assembler,
             group: Vec::new(),
-            empty: 0,
             ended: false,
             ends_short: log.ends_short(),
         }
@@ -41,18 +38,14 @@ impl<'a> Groups<'a> {
 
     /// The next group; `None` at the end.
     pub fn next_group(&mut self) -> Result<Option<Group>> {
-        while !self.ended {
-            let step = if let Some(block) = self.blocks.next_block()? {
-                if is_empty(&block) {
-                    self.empty += 1;
-                    continue;
+        loop {
+            let Some(step) = self.assembler.next() else {
+                if self.ended {
+                    break;
                 }
-                self.assembler.feed(&block)
-            } else {
-                self.ended = true;
-                self.assembler.end()
+                self.next_block()?;
+                continue;
             };
-            let Some(step) = step else { continue };
             let full = self.group.len() >= GROUP_SECTORS;
             let broken = step.missing > 0 || self.group.last().is_some_and(|last| last.header.partial);
             if !self.group.is_empty() && (step.header.starts_group() || broken || full) {
@@ -65,10 +58,31 @@ impl<'a> Groups<'a> {
         Ok((!self.group.is_empty()).then(|| std::mem::take(&mut self.group)))
     }
 
+    fn next_block(&mut self) -> Result<()> {
+        match self.blocks.next_block()? {
+            Some(block) if is_empty(&block) => self.assembler.skip_empty(),
+            Some(block) => self.assembler.feed(&block),
+            None => {
+                self.ended = true;
+                self.assembler.end();
+            }
+        }
+        Ok(())
+    }
+
     /// What was seen so far.
-    pub fn counts(&self) -> BlockCounts {
-        let counts = self.assembler.counts();
-        BlockCounts { blocks: counts.blocks + self.empty, empty: counts.empty + self.empty, ..counts }
+    pub const fn counts(&self) -> BlockCounts {
+        self.assembler.counts()
+    }
+
+    /// What lies behind the last sector.
+    pub const fn behind(&self) -> BlockCounts {
+        self.assembler.behind_last()
+    }
+
+    /// The latest power-on that sectors of other sessions tell, microseconds since 1970.
+    pub const fn other_epoch_us(&self) -> Option<u64> {
+        self.assembler.other_epoch_micros()
     }
 
     /// The session that its sectors name, once one was seen.

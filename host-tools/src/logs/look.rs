@@ -54,7 +54,7 @@ pub fn look(path: &Path) -> Result<Content> {
         match Header::read(&whole) {
             Ok(_) => log_blocks += 1,
             Err(NotASector::OtherVersion(version)) => newer = Some(version),
-            Err(NotASector::Empty | NotASector::Damaged) => {}
+            Err(NotASector::Empty | NotASector::Erased | NotASector::Damaged) => {}
             Err(NotASector::Foreign) => other_blocks += 1,
         }
         // A partition table stands before everything; a log has a sector early.

@@ -12,6 +12,7 @@ mod found;
 pub mod groups;
 pub mod in_order;
 mod look;
+mod marks;
 pub mod places;
 pub mod reader;
 mod scan;

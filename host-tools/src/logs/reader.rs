@@ -15,6 +15,7 @@ use hums_core::time::Instant;
 
 use super::groups::{Group, Groups};
 use super::in_order::{in_order, workers};
+pub use super::marks::Marks;
 use super::places::Log;
 
 /// Groups in work for each worker, and at most.
@@ -76,6 +77,16 @@ pub struct Summary {
     pub last: Option<Instant>,
     /// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.
     pub epoch_us: Option<u64>,
+    /// End marks and what came after the last one.
+    pub marks: Marks,
+    /// The number of the last sector.
+    pub last_number: Option<u32>,
+    /// Frames of the session up to its end, modulo 2^32.
+    pub frames_end: Option<u32>,
+    /// What lies behind the last sector.
+    pub behind: BlockCounts,
+    /// The latest power-on of another session whose sectors lie among this one's or behind it, microseconds since 1970.
+    pub other_epoch_us: Option<u64>,
 }
 
 /// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
@@ -105,6 +116,9 @@ pub fn read<C: Collect>(
     )?;
     stitch.end(groups.damaged_at_end(), deliver)?;
     let mut summary = stitch.summary;
+    summary.frames_end = stitch.expected;
+    summary.behind = groups.behind();
+    summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();
     Ok(summary)
@@ -155,6 +169,7 @@ struct Decoded<C> {
     /// Where it ends so: damaged blocks at that place, one of which may have been the whole sector.
     damaged_partial: u32,
     closed: bool,
+    marks: Marks,
     /// What its records say of what is kept: the first and the last one.
     keeps: Option<(Keep, Keep)>,
     /// UTC at power-on by what it learned last, microseconds since 1970.
@@ -180,6 +195,7 @@ impl<C: Collect> Decoded<C> {
             ends_partial: last.is_some_and(|step| step.header.partial),
             damaged_partial: last.filter(|step| step.header.partial).map_or(0, |step| step.damaged),
             closed: last.is_some_and(|step| step.header.closed),
+            marks: Marks::default(),
             keeps: None,
             epoch_us: None,
         }
@@ -229,7 +245,11 @@ impl<C: Collect> Decoded<C> {
                     Entry::Record { record: Record::Clock(clock), .. } => {
                         self.epoch_us = Some(clock.epoch_micros());
                     }
-                    _ => {}
+                    Entry::Record { record, .. } => {
+                        let before = self.begun.map_or(0, |(_, frames_before)| frames_before);
+                        self.marks.record(at, &record, before.wrapping_add(self.frames));
+                    }
+                    Entry::Frame { .. } => {}
                 }
                 collected.entry(&entry);
             }
@@ -278,6 +298,7 @@ impl Stitch {
             gap.sectors_lost = gap.sectors_lost.saturating_add(missing);
         }
         self.summary.closed = group.closed;
+        self.summary.last_number = Some(group.number.wrapping_add(group.sectors).wrapping_sub(1));
         self.next_number = group.number.wrapping_add(group.sectors);
         match group.begun {
             None => self.skip(&group),
@@ -305,6 +326,8 @@ impl Stitch {
                 }
             }
         }
+        // Only now the group is decoded to its end.
+        self.summary.marks.add(&group.marks);
         self.keep = group.keeps.map(|(_, last)| last).or(self.keep);
         self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         Ok(())

@@ -15,6 +15,8 @@ EVENTS = ["", "armed", "disarmed", "take_off", "landing", "snapshot", "card_in",
           "autopilot_reboot", "other_airframe", "by_link", "other_vehicle", "flight_resumed"]
 SOURCES = ["unknown", "SYSTEM_TIME", "recording", "GNSS"]
 FAULTS = ["unknown", "panic", "hard_fault", "watchdog"]
+FOUND = ["unknown", "nothing", "sectors", "frames", "unreadable"]
+RESTING = ["unknown", "disarmed", "landed"]
 STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_not_frames", "bytes_logged",
               "blocks_written", "queue_bytes_max", "queue_bytes_capacity", "sd_stall_ms_max", "gs_frames",
               "gs_bytes", "frame_queue_bytes_max", "frame_queue_bytes_capacity", "gs_queue_bytes_max",
@@ -25,7 +27,8 @@ STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_no
 # or a list of names.
 RECORDS = {
     1: ("HUMS_BOOT", {"version": "text", "git": "text", "board": "text", "reset": "I", "reset_name": "text", "uid": 12,
-                      "boots": "I"}),
+                      "boots": "I", "before_number": "I", "before_session": "I", "before_sectors": "I",
+                      "before_frames": "I", "before": FOUND}),
     2: ("HUMS_VEHICLE", {"system": "B", "component": "B", "autopilot": "B", "type": "B", "firmware": "I", "uid": "Q"}),
     3: ("HUMS_PARAM", {"name": "text", "value": "d", "changed": "?", "by_system": "B", "by_component": "B"}),
     4: ("HUMS_CLOCK", {"boot[s]": "time", "utc[us]": "Q", "source": SOURCES}),
@@ -37,6 +40,7 @@ RECORDS = {
     10: ("HUMS_EVENT", {"event": EVENTS, "text": "text"}),
     11: ("HUMS_NOTE", {"severity": "B", "text": "text"}),
     15: ("HUMS_KEEP", {"all": "B", "from_sector": "I", "seconds": "I"}),
+    18: ("HUMS_MARK", {"why": RESTING, "sector": "I", "frames": "I"}),
 }
 
 

@@ -1,6 +1,70 @@
-//! Who recorded, and how the boot before ended.
+//! Who recorded, what was on the card before, and how the boot before ended.
 
 use super::stored::{Fields, Sink};
+
+/// What was found of the session before on the card.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Found {
+    /// Nobody has looked yet: the first boot record of a log is written before the card is open.
+    #[default]
+    Unknown = 0,
+    /// The card holds no earlier log.
+    Nothing = 1,
+    /// Where it ended; frames could not be counted.
+    Sectors = 2,
+    /// Where it ended, and how many frames it had.
+    Frames = 3,
+    /// There is a log, but no sector of it can be read.
+    Unreadable = 4,
+}
+
+impl Found {
+    /// The one of a stored number; later ones are unknown.
+    pub const fn from_number(number: u8) -> Self {
+        match number {
+            1 => Self::Nothing,
+            2 => Self::Sectors,
+            3 => Self::Frames,
+            4 => Self::Unreadable,
+            _ => Self::Unknown,
+        }
+    }
+
+    /// The name that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unknown => "unknown",
+            Self::Nothing => "nothing",
+            Self::Sectors => "sectors",
+            Self::Frames => "frames",
+            Self::Unreadable => "unreadable",
+        }
+    }
+}
+
+/// The session that was recorded on this card before this one, as the recorder found it when it opened the card. With it
+/// the end of an earlier log is known, and that something is missing there is seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Before {
+    /// What was found.
+    pub found: Found,
+    /// Its number on the card, which its files' names begin with.
+    pub number: u32,
+    /// The session that its sectors name.
+    pub session: u32,
+    /// The number of its last sector and one: as many sectors as it has, if it is whole from its beginning on.
+    pub sectors: u32,
+    /// Its frames, modulo 2^32.
+    pub frames: u32,
+}
+
+impl Before {
+    /// Where the session before ended, if that was found.
+    pub const fn has_end(&self) -> bool {
+        matches!(self.found, Found::Sectors | Found::Frames)
+    }
+}
 
 /// The monitor started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,12 +83,17 @@ pub struct Boot<'a> {
     pub uid: [u8; 12],
     /// Boots so far.
     pub boots: u32,
+    /// The session before on this card. Known only after the card is open: the record is then written again.
+    pub before: Before,
 }
 
 impl<'a> Boot<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        let Before { found, number, session, sectors, frames } = self.before;
         sink.head(1).u32(self.reset).u32(self.boots);
+        sink.u32(number).u32(session).u32(sectors).u32(frames);
         sink.name(self.version).name(self.git).name(self.board).name(self.reset_name).bytes(&self.uid);
+        sink.u8(found as u8);
     }
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {
@@ -36,6 +105,13 @@ impl<'a> Boot<'a> {
             reset_name: fields.text(),
             uid: fields.array(),
             boots: fields.u32(),
+            before: Before {
+                number: fields.u32(),
+                session: fields.u32(),
+                sectors: fields.u32(),
+                frames: fields.u32(),
+                found: Found::from_number(fields.u8()),
+            },
         }
     }
 }

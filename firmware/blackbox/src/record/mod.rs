@@ -9,6 +9,7 @@ mod boot;
 mod finding;
 mod keep;
 mod loss;
+mod mark;
 mod snapshot;
 mod stored;
 mod usage;
@@ -18,10 +19,11 @@ mod wear;
 use core::fmt;
 
 pub use crate::limits::{NAME_BYTES_MAX, RECORD_BYTES_MAX, TEXT_BYTES_MAX};
-pub use boot::{Boot, Fault};
+pub use boot::{Before, Boot, Fault, Found};
 pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
+pub use mark::{Mark, Resting};
 pub use snapshot::{Protection, Snapshot, SnapshotValues};
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage};
 pub use vehicle::{Clock, Parameter, Vehicle};
@@ -31,7 +33,7 @@ use stored::{Fields, Sink};
 pub(crate) use stored::{HEAD_BYTES, Shape};
 
 // The longest records: a boot and a fault.
-const _: () = assert!(HEAD_BYTES + 4 + 4 + 4 * (1 + NAME_BYTES_MAX) + 12 <= RECORD_BYTES_MAX);
+const _: () = assert!(HEAD_BYTES + 6 * 4 + 4 * (1 + NAME_BYTES_MAX) + 12 + 1 <= RECORD_BYTES_MAX);
 const _: () =
     assert!(HEAD_BYTES + 12 * 4 + 1 + 2 * (1 + NAME_BYTES_MAX) + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
 
@@ -73,6 +75,8 @@ pub enum Record<'a> {
     Snapshot(Snapshot<'a>),
     /// Kind 17: a step of the protective action.
     Protection(Protection),
+    /// Kind 18: the log is whole up to here.
+    Mark(Mark),
     /// A kind that this reader does not know.
     Unknown {
         /// The stored kind.
@@ -118,6 +122,7 @@ impl<'a> Record<'a> {
             Self::Keep(keep) => keep.store(&mut sink),
             Self::Snapshot(snapshot) => snapshot.store(&mut sink),
             Self::Protection(protection) => protection.store(&mut sink),
+            Self::Mark(mark) => mark.store(&mut sink),
             Self::Unknown { kind, version, bytes } => {
                 sink.bytes(&[*kind, *version]).bytes(bytes);
             }
@@ -148,6 +153,7 @@ impl<'a> Record<'a> {
             15 => Self::Keep(Keep::read(fields)),
             16 => Snapshot::read(fields).map_or(unknown, Self::Snapshot),
             17 => Protection::read(fields).map_or(unknown, Self::Protection),
+            18 => Mark::read(fields).map_or(unknown, Self::Mark),
             _ => unknown,
         }
     }
@@ -186,7 +192,9 @@ mod tests {
             reset_name: "pin",
             uid: *b"123456789012",
             boots: 99,
+            before: Before { found: Found::Frames, number: 7, session: 0xfeed, sectors: 99, frames: 12_345 },
         }));
+        reads_back(Record::Mark(Mark { why: Resting::Landed, sector: 70_000, frames: u32::MAX }));
         reads_back(Record::Vehicle(Vehicle {
             system: 1,
             component: 1,

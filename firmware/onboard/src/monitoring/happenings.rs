@@ -1,10 +1,11 @@
 //! What happened, into the record: take-off and landing, phases of flight, snapshots around critical findings, the
 //! protective action.
 
-use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Snapshot, SnapshotValues};
+use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Resting, Snapshot, SnapshotValues};
 use hums_core::happening::Happening;
 use hums_core::time::Instant;
 
+use super::marks::Marks;
 use crate::journal::Logbook;
 use crate::notices::Notices;
 use crate::queues::SectorsIn;
@@ -19,6 +20,7 @@ pub(super) fn record(
     book: &mut Logbook<'_>,
     recorded: &mut Recorded,
     notices: &mut Notices,
+    marks: &mut Marks,
     sectors: &mut SectorsIn,
 ) {
     while let Some(happening) = book.monitor.take_happening() {
@@ -39,8 +41,14 @@ pub(super) fn record(
             }
         };
         book.journal.record(now, &Record::Event(Event { number, text }), sectors);
-        if happening == Happening::Landing {
-            recorded.usage(now, Moment::End, book, sectors);
+        match happening {
+            Happening::Armed | Happening::TakeOff => marks.moves(),
+            Happening::Landing => {
+                recorded.usage(now, Moment::End, book, sectors);
+                marks.rests(Resting::Landed);
+            }
+            Happening::Disarmed if !book.monitor.flight().airborne() => marks.rests(Resting::Disarmed),
+            _ => {}
         }
     }
     let Logbook { monitor, journal, .. } = book;

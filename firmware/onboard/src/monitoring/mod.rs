@@ -6,11 +6,12 @@
 
 mod figures;
 mod happenings;
+mod marks;
 mod slot;
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::Writer;
-use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Moment, Note, Record, Stats};
+use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Found, Moment, Note, Record, Stats};
 use hums_core::health::{Finding, Level};
 use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, monitor};
@@ -31,6 +32,7 @@ use crate::supervisor::Task;
 use figures::Figures;
 pub use figures::Machine;
 use happenings::CRITICAL;
+use marks::Marks;
 use slot::Slot;
 
 /// How often [`Monitoring::tick`] is to be called.
@@ -73,6 +75,7 @@ pub struct Monitoring<'a> {
     slot: Slot,
     keeping: Keeping,
     figures: Figures<'a>,
+    marks: Marks,
     partial_at: Instant,
     stats_at: Instant,
 }
@@ -97,6 +100,7 @@ impl<'a> Monitoring<'a> {
             slot: Slot::new(),
             keeping: Keeping::new(),
             figures: Figures::new(port, card),
+            marks: Marks::new(),
             partial_at: Instant::ZERO,
             stats_at: Instant::ZERO,
         }
@@ -117,6 +121,17 @@ impl<'a> Monitoring<'a> {
         if keeping.takes_new_file(book.card) {
             recorded.heading(now, identity, book, sectors);
             recorded.usage_anew(now, book, sectors);
+        }
+    }
+
+    /// The card is open: which session was recorded before on it stands in a second boot record, and in that of each
+    /// further file.
+    #[inline(never)]
+    fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
+        let Some(before) = self.book.card.take_before() else { return };
+        self.identity.before = before;
+        if before.found != Found::Nothing {
+            self.book.journal.record(now, &Record::Boot(self.identity), sectors);
         }
     }
 
@@ -229,13 +244,14 @@ impl<'a> Monitoring<'a> {
         if card.take_group_wanted() && !journal.writer().restart(sectors) {
             card.want_group();
         }
+        self.tell_before(now, sectors);
         self.keep(now, sectors);
         let Self { book, figures, slot, notices, .. } = self;
         figures.count(now, book.card, &mut book.journal, sectors);
         slot.tick(now, book.card.read().state, &mut book.journal, notices, sectors);
         self.check(now, sectors, gs, findings);
-        let Self { book, recorded, notices, .. } = self;
-        happenings::record(now, book, recorded, notices, sectors);
+        let Self { book, recorded, notices, marks, .. } = self;
+        happenings::record(now, book, recorded, notices, marks, sectors);
         recorded.vehicle(now, book, sectors);
         recorded.clock(now, book, sectors);
         book.journal.record_losses(now, false, sectors);
@@ -246,6 +262,7 @@ impl<'a> Monitoring<'a> {
         if now.since(self.recorded.usage_at()) >= USAGE {
             self.recorded.usage(now, Moment::Periodic, &mut self.book, sectors);
         }
+        self.marks.tick(now, &mut self.book.journal, sectors);
         // Unless full sectors keep storage busy anyway.
         if now.since(self.partial_at) >= PARTIAL && sectors.is_empty() {
             self.partial_at = now;

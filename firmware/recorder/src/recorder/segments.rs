@@ -3,6 +3,7 @@
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
 use hums_core::time::Instant;
 
+use super::before;
 use crate::CardDevice;
 use crate::card::{Card, CardError, LogEntry};
 use crate::name::LogName;
@@ -60,6 +61,7 @@ impl<'a> Segments<'a> {
         let log = if let Some(log) = resumed {
             log
         } else {
+            self.status.set_before(&before::look(card, newest));
             let name = newest.map_or(Some(LogName { session: 1, segment: 0 }), LogName::next_session);
             // The numbers end at 99,999; the last session number then goes on with its segments.
             let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;

@@ -36,6 +36,8 @@ pub struct MemCard {
     pub broken: Rc<Cell<bool>>,
     /// Write commands, of however many blocks.
     pub writes: Rc<Cell<u32>>,
+    /// Blocks that were read.
+    pub reads: Rc<Cell<u32>>,
     /// After so many more blocks one write fails.
     pub fail_after: Rc<Cell<Option<u32>>>,
 }
@@ -53,6 +55,7 @@ impl MemCard {
             journal: Rc::default(),
             broken: Rc::default(),
             writes: Rc::default(),
+            reads: Rc::default(),
             fail_after: Rc::default(),
         }
     }
@@ -69,6 +72,7 @@ impl BlockDevice for MemCard {
     type Error = Broken;
 
     fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), Broken> {
+        self.reads.set(self.reads.get() + blocks.len() as u32);
         for (at, block) in (start.0..).zip(blocks) {
             if self.broken.get() || at >= self.size {
                 return Err(Broken);

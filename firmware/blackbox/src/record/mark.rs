@@ -1,0 +1,60 @@
+//! End marks: moments up to which a log is known to be whole, written while nothing more is to come for a while.
+
+use super::stored::{Fields, Sink};
+
+/// Why a mark was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resting {
+    /// The vehicle was disarmed on the ground.
+    Disarmed = 1,
+    /// The vehicle landed.
+    Landed = 2,
+}
+
+impl Resting {
+    /// The name that reports use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Disarmed => "disarmed",
+            Self::Landed => "landed",
+        }
+    }
+
+    /// What happened, in a sentence.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Disarmed => "disarming",
+            Self::Landed => "landing",
+        }
+    }
+}
+
+/// An end mark. The sector that holds it is given to the card at once. A log that is read without a gap up to a mark
+/// holds all that was recorded until then; what comes after the last mark has an end that nothing proves.
+///
+/// A chain value over the sectors before it can be appended to the record, as to any other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// Why it was written.
+    pub why: Resting,
+    /// The number of the sector that was in progress: the mark begins in it or in the one after it.
+    pub sector: u32,
+    /// Frames of the session before the mark, modulo 2^32.
+    pub frames: u32,
+}
+
+impl Mark {
+    pub(super) fn store(&self, sink: &mut Sink<'_>) {
+        sink.head(18).u32(self.sector).u32(self.frames).u8(self.why as u8);
+    }
+
+    /// `None` for a reason that this reader does not know.
+    pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
+        let why = match fields.u8() {
+            1 => Resting::Disarmed,
+            2 => Resting::Landed,
+            _ => return None,
+        };
+        Some(Self { why, sector: fields.u32(), frames: fields.u32() })
+    }
+}

@@ -1,0 +1,50 @@
+//! End marks of a log, and whether the vehicle moved on after the last one.
+
+use hums_blackbox::Record;
+use hums_blackbox::record::Resting;
+use hums_core::time::Instant;
+
+/// Numbers of the events that say that the vehicle moves.
+const ARMED: u8 = 1;
+const TAKE_OFF: u8 = 3;
+
+/// What the marks of a part of a log say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Marks {
+    /// How many there are.
+    pub count: u64,
+    /// How many of them tell another count of frames than was read.
+    pub wrong: u64,
+    /// The last one.
+    pub last: Option<(Instant, Resting)>,
+    /// The first time after it that the vehicle was armed or took off.
+    pub moved: Option<Instant>,
+}
+
+impl Marks {
+    /// Takes the next record; `frames` of the session were read before it, modulo 2^32.
+    pub(super) fn record(&mut self, at: Instant, record: &Record<'_>, frames: u32) {
+        match record {
+            Record::Mark(mark) => {
+                self.count += 1;
+                self.wrong += u64::from(mark.frames != frames);
+                (self.last, self.moved) = (Some((at, mark.why)), None);
+            }
+            Record::Event(event) if matches!(event.number, ARMED | TAKE_OFF) => {
+                self.moved = self.moved.or(Some(at));
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds those of what follows.
+    pub(super) fn add(&mut self, next: &Self) {
+        self.count += next.count;
+        self.wrong += next.wrong;
+        if next.last.is_some() {
+            (self.last, self.moved) = (next.last, next.moved);
+        } else {
+            self.moved = self.moved.or(next.moved);
+        }
+    }
+}
