@@ -17,15 +17,17 @@ use crate::utc::iso8601;
 const EPOCH_SLACK_US: u64 = 60_000_000;
 
 /// What proves how a log ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proof {
     /// Its last sector says that the session was ended in order.
     Closed,
-    /// The next start on the card found that it ends there.
-    NextStart,
+    /// The next start on the card found that it ends there; with when the vehicle was armed or took off, if power went
+    /// then: what the card did not take any more nobody knows.
+    NextStart(Option<Instant>),
     /// It is whole to its last end mark.
     Mark(Instant, Resting),
     /// Nothing: it has no end mark, or the vehicle was armed or took off after the last one.
+    #[default]
     None,
     /// The next start on the card found more than is there now: so many sectors, and frames where they were counted.
     Short {
@@ -53,7 +55,7 @@ impl Proof {
             return Self::Closed;
         }
         if next.is_some_and(|next| next.sectors == sectors) {
-            return Self::NextStart;
+            return Self::NextStart(summary.marks.moved);
         }
         match summary.marks.last {
             Some((at, why)) if summary.marks.moved.is_none() => Self::Mark(at, why),
@@ -63,18 +65,18 @@ impl Proof {
 
     /// Whether nothing is known to be missing at the end, up to the last end mark at least.
     pub const fn holds(self) -> bool {
-        matches!(self, Self::Closed | Self::NextStart | Self::Mark(..))
+        matches!(self, Self::Closed | Self::NextStart(None) | Self::Mark(..))
     }
 
     /// Whether all of the end is proved.
     pub const fn is_whole(self) -> bool {
-        matches!(self, Self::Closed | Self::NextStart)
+        matches!(self, Self::Closed | Self::NextStart(None))
     }
 
     const fn name(self) -> &'static str {
         match self {
             Self::Closed => "closed",
-            Self::NextStart => "next_start",
+            Self::NextStart(_) => "next_start",
             Self::Mark(..) => "mark",
             Self::None => "none",
             Self::Short { .. } => "short",
@@ -86,7 +88,12 @@ impl Proof {
         let moment = |at| moment(summary, at);
         match self {
             Self::Closed => "ended in order".to_owned(),
-            Self::NextStart => "whole to its end, as the next start found it".to_owned(),
+            Self::NextStart(None) => "whole to its end, as the next start found it".to_owned(),
+            Self::NextStart(Some(moved)) => format!(
+                "whole to its end, as the next start found it; armed or in the air since {} when power went: what was \
+                 not written then is not known",
+                moment(moved)
+            ),
             Self::Mark(at, why) => match seconds_after(summary, at).unwrap_or(0.0) {
                 ..0.05 => format!("whole to the {} at {}; its end cannot be proved", why.words(), moment(at)),
                 after => format!(

@@ -30,11 +30,11 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         }
     }
     let mut followed = Followed::default();
-    let mut whole = true;
+    let mut worst = Verdict::Holds;
     let mut done = |overview: &Overview| {
         let log = LogJson::new(overview);
         json.ok &= log.ok;
-        whole &= overview.proof.is_whole();
+        worst = worst.max(log.verdict);
         if !args.json {
             output::line(&format!("Session {} ({})", log.name, overview.files.join(", ")))?;
             print(&log.checks)?;
@@ -51,18 +51,37 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         output::json(&json)?;
     } else {
         let logs = count(json.logs.len() as u64, "session");
-        output::line(&format!("{logs}: {}", verdict(ok, whole)))?;
+        let worst = if ok { worst } else { Verdict::NotProved };
+        output::line(&format!("{logs}: {}", worst.words()))?;
     }
     Ok(Outcome::lossy(!ok))
 }
 
-/// All of it in a few words. Only what is proved to its end holds.
-const fn verdict(ok: bool, whole: bool) -> &'static str {
-    match (ok, whole) {
-        (true, true) => "everything holds",
-        (true, false) => "whole to the last end marks; what came after them cannot be proved",
-        (false, _) => "damage, losses or an end that is not proved: see above",
+/// What can be said of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verdict {
+    /// All checks hold, and nothing is missing at its end.
+    Holds,
+    /// All checks hold up to its last end mark. What came after it is read as far as it goes.
+    ToMark,
+    /// A check failed, or nothing proves that it goes to a landing, a disarming or an orderly end.
+    NotProved,
+}
+
+impl Verdict {
+    /// Of all logs together, in a few words.
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Holds => "everything holds",
+            Self::ToMark => "whole to the last end marks; what came after them cannot be proved",
+            Self::NotProved => "damage, losses or an end that is not proved: see above",
+        }
     }
+}
+
+/// What can be said of a log that was read with [`Overview::verified`].
+pub fn verdict(log: &Overview) -> Verdict {
+    LogJson::new(log).verdict
 }
 
 fn print(checks: &[Check]) -> Result<()> {
@@ -95,6 +114,8 @@ struct LogJson {
     /// All blocks of its files.
     blocks: BlocksJson,
     checks: Vec<Check>,
+    #[serde(skip)]
+    verdict: Verdict,
 }
 
 /// One kind of check.
@@ -161,7 +182,12 @@ impl LogJson {
         let ok = checks.iter().all(|check| check.failed == 0) && log.is_proved();
         let end = EndJson::new(log.proof, summary);
         let blocks = BlocksJson::new(&blocks);
-        Self { name: log.name.clone(), ok, closed: summary.closed, end, blocks, checks }
+        let verdict = match (ok, log.proof.is_whole()) {
+            (true, true) => Verdict::Holds,
+            (true, false) => Verdict::ToMark,
+            (false, _) => Verdict::NotProved,
+        };
+        Self { name: log.name.clone(), ok, closed: summary.closed, end, blocks, checks, verdict }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Bits flip anywhere in a log.
+//! Bits flip anywhere in a log; whole pages and ends are in [`super::pages`].
 //!
 //! A log is recorded once, and read: every frame that went in comes out. Then a bit, or a burst of some, is flipped in
 //! the image, the log is read, and the bits are put back: what comes out is compared with what came out before.
@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::card::{BLOCK, Card};
 use super::figures::{Figures, Labels};
 use super::options::Options;
+use super::pages;
 use super::record::Record;
 use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
@@ -26,55 +27,93 @@ const BURST_BITS_MAX: u64 = 8 * BLOCK as u64;
 /// What it prints.
 pub(super) const LABELS: Labels = Labels {
     facts: &[
-        "errors",
+        "errors in bits",
         "of them single bits",
         "of them bursts of 2 to 4096 bits",
-        "noticed",
+        "of them noticed",
         "frames lost at most, of one group",
         "frames given out, all of them right",
+        "damaged pages and ends",
+        "of them noticed: `verify` does not call it good",
+        "of them read as the other session, and told",
+        "of them told: whole up to the end mark that is named, and no further",
+        "missed, or told wrong",
+        "frames given out after them, all of them right",
     ],
-    columns: &["flight", "sectors", "groups", "frames", "errors", "frames lost on average"],
+    columns: &["damage", "how often", "noticed", "told", "missed", "most frames lost"],
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
+    let mut figures = Figures::new(&LABELS);
+    bits(options, &mut figures)?;
+    whole_pages(options, &mut figures)?;
+    Ok(figures)
+}
+
+fn bits(options: &Options, figures: &mut Figures) -> Result<()> {
     let share = options.runs(10_000, 200).div_ceil(OWN.len() as u64);
     let outcomes = OWN.into_par_iter().enumerate().with_max_len(1).map(|(index, flight)| {
         Subject::record(flight)?.damage_often(share, options.seed.wrapping_add(index as u64)).context(flight)
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
-    let mut figures = Figures::new(&LABELS);
-    figures.fact("errors", sum(|one| one.single + one.bursts));
+    let errors = sum(|one| one.single + one.bursts);
+    figures.fact("errors in bits", errors);
     figures.fact("of them single bits", sum(|one| one.single));
     figures.fact("of them bursts of 2 to 4096 bits", sum(|one| one.bursts));
-    figures.fact("noticed", sum(|one| one.single + one.bursts));
+    figures.fact("of them noticed", sum(|one| one.noticed));
     figures.fact(
         "frames lost at most, of one group",
         outcomes.iter().map(|one| one.lost_max).max().unwrap_or(0),
     );
     figures.fact("frames given out, all of them right", sum(|one| one.frames));
-    for (flight, one) in OWN.iter().zip(&outcomes) {
-        let errors = one.single + one.bursts;
-        figures.row([
-            (*flight).to_owned(),
-            one.sectors.to_string(),
-            one.groups.to_string(),
-            one.whole.to_string(),
-            errors.to_string(),
-            format!("{:.0}", one.lost as f64 / errors.max(1) as f64),
-        ]);
+    ensure!(sum(|one| one.noticed) == errors, "not all were noticed:\n{}", figures.text());
+    Ok(())
+}
+
+/// Pages and ends, of logs that were closed and of logs that were not.
+fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
+    let logs: Vec<_> =
+        OWN.into_iter().flat_map(|flight| [(flight, true), (flight, false)]).zip(1..).collect();
+    let subjects = logs
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|((flight, closed), boots)| pages::Subject::record(flight, closed, boots).context(flight));
+    let subjects = subjects.collect::<Result<Vec<_>>>()?;
+    let share = options.runs(10_800, 288).div_ceil(subjects.len() as u64);
+    let outcomes = subjects.par_iter().enumerate().with_max_len(1).map(|(index, subject)| {
+        let other = &subjects[(index + 2) % subjects.len()];
+        subject.damage_often(other, share, options.seed.wrapping_add(index as u64))
+    });
+    let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
+    let mut all = pages::Tally::default();
+    for (place, kind) in pages::Kind::ALL.into_iter().enumerate() {
+        let mut sum = pages::Tally::default();
+        outcomes.iter().for_each(|(tallies, _)| sum.add(&tallies[place].1));
+        all.add(&sum);
+        let numbers =
+            [sum.damages, sum.noticed, sum.told, sum.missed, sum.lost_max].map(|one| one.to_string());
+        let [damages, noticed, told, missed, lost] = numbers;
+        figures.row([kind.name().to_owned(), damages, noticed, told, missed, lost]);
     }
-    Ok(figures)
+    figures.fact("damaged pages and ends", all.damages);
+    figures.fact("of them noticed: `verify` does not call it good", all.noticed);
+    figures.fact("of them read as the other session, and told", all.other);
+    figures.fact("of them told: whole up to the end mark that is named, and no further", all.told);
+    figures.fact("missed, or told wrong", all.missed);
+    figures.fact("frames given out after them, all of them right", all.frames);
+    let misses: Vec<_> =
+        outcomes.iter().flat_map(|(_, misses)| misses).take(10).map(String::as_str).collect();
+    ensure!(all.missed == 0, "{}\nthe first ones:\n{}", figures.text(), misses.join("\n"));
+    ensure!(all.noticed + all.told == all.damages, "they do not add up:\n{}", figures.text());
+    Ok(())
 }
 
 #[derive(Default)]
 struct Outcome {
-    sectors: u64,
-    groups: u64,
-    whole: u64,
+    noticed: u64,
     single: u64,
     bursts: u64,
-    lost: u64,
     lost_max: u64,
     frames: u64,
 }
@@ -116,12 +155,7 @@ impl Subject {
 
     fn damage_often(self, count: u64, seed: u64) -> Result<Outcome> {
         let mut random = Random::new(seed);
-        let mut outcome = Outcome {
-            sectors: self.blocks.len() as u64,
-            groups: self.whole.groups.len() as u64,
-            whole: self.whole.frames.len() as u64,
-            ..Outcome::default()
-        };
+        let mut outcome = Outcome::default();
         for index in 0..count {
             let bit = random.below(self.blocks.len() as u64 * 8 * BLOCK as u64);
             let length = if index % 2 == 0 { 1 } else { 2 + random.below(BURST_BITS_MAX - 1) };
@@ -168,12 +202,9 @@ impl Subject {
     }
 
     fn judge(&self, damaged: &Record, touched: &BTreeSet<usize>, outcome: &mut Outcome) -> Result<()> {
-        ensure!(
-            !damaged.gaps.is_empty()
-                || damaged.summary.blocks.damaged > 0
-                || damaged.summary.blocks.foreign > 0,
-            "not noticed"
-        );
+        let blocks = &damaged.summary.blocks;
+        let is_noticed = !damaged.gaps.is_empty() || blocks.damaged > 0 || blocks.foreign > 0;
+        outcome.noticed += u64::from(is_noticed);
         // What came out is what was there, in its order; what is missing is known by its place.
         let mut missing = Vec::new();
         let mut given = damaged.frames.iter().peekable();
@@ -201,7 +232,6 @@ impl Subject {
                 damaged.gaps
             );
         }
-        outcome.lost += missing.len() as u64;
         outcome.lost_max = outcome.lost_max.max(missing.len() as u64);
         outcome.frames += damaged.frames.len() as u64;
         Ok(())

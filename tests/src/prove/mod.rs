@@ -13,6 +13,7 @@ mod hostile_gs;
 mod memory;
 mod noise;
 mod options;
+mod pages;
 mod power_cuts;
 mod record;
 mod report;
@@ -50,8 +51,8 @@ pub const CAMPAIGNS: &[Campaign] = &[
     },
     Campaign {
         name: "damage",
-        about: "bits flip anywhere in a log: each error is noticed, no wrong frame comes out, and at most one group is \
-                lost",
+        about: "bits flip anywhere in a log, pages of it go wrong, and its end goes missing: each is noticed or told for \
+                what it is, no wrong frame comes out, and at most the groups that were touched are lost",
         labels: damage::LABELS,
         run: damage::run,
     },

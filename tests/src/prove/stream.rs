@@ -73,6 +73,23 @@ impl Stream {
         Ok(both)
     }
 
+    /// So many seconds of everything and then so many of what the vehicle sends before it is armed, in turn.
+    pub(super) fn flying_and_resting(&self, seconds: &[(f64, f64)]) -> Result<Self> {
+        let armed = self.frames.iter().position(|frame| is_armed(&self.bytes[frame.clone()]));
+        let armed =
+            armed.filter(|armed| *armed > 0).context("it is never armed, or from the beginning on")?;
+        let resting = Self { bytes: self.bytes.clone(), frames: self.frames[..armed].to_vec(), ..*self };
+        let (mut bytes, mut frames) = (Vec::new(), Vec::new());
+        for (flying, rest) in seconds {
+            for part in [self.for_seconds(*flying), resting.for_seconds(*rest)] {
+                let start = bytes.len();
+                bytes.extend_from_slice(&part.bytes);
+                frames.extend(part.frames.iter().map(|frame| start + frame.start..start + frame.end));
+            }
+        }
+        Ok(Self { bytes, frames, is_signed: self.is_signed, baud: self.baud })
+    }
+
     /// How long it takes on the line, in seconds.
     pub(super) fn seconds(&self) -> f64 {
         self.bytes.len() as f64 * 10.0 / self.baud as f64

@@ -16,7 +16,7 @@ export const head = () => {
   host.append(
     el("h1", {}, name),
     el("p", { class: "dim" }, log.format === "hums"
-      ? `Session ${log.name} \u00b7 ${when} \u00b7 ${span(log.duration_s)} \u00b7 ${log.closed ? "ended in order" : "ended by power-off"}`
+      ? `Session ${log.name} \u00b7 ${when} \u00b7 ${span(log.duration_s)} \u00b7 ${log.end.words}`
       : `${log.name} \u00b7 ${when} \u00b7 ${span(log.duration_s)}`),
     el("p", { class: `verdict ${worst}`, id: "verdict" }, verdict),
   );

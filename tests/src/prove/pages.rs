@@ -1,0 +1,335 @@
+//! Whole pages of a log go wrong, and its end goes missing.
+//!
+//! A log is recorded once. Then its file is cut, pages of it are erased, zeroed, copied, exchanged or replaced by what an
+//! older session left there, or it goes on with the second half of another log; what is left is read and verified, and
+//! compared with the whole log. *Noticed* is what `hums verify` does not call good. A cut behind an end mark cannot be
+//! told from power that went there: that is *told* if `verify` says up to which mark the log is whole, and all of it is.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, ensure};
+use hums::ending::Proof;
+use hums::logs::fat::Extent;
+use hums::logs::{Log, Piece, on_card};
+use hums::summary::Overview;
+use hums::verify::{Verdict, verdict};
+use hums_blackbox::{Header, PAGE_SECTORS};
+use tempfile::TempDir;
+
+use super::card::{BLOCK, Card};
+use super::record::{Frame, Record};
+use super::stream::{FULL_RATE, Stream};
+use crate::damage::Random;
+use crate::flights::own;
+
+/// Blocks of zeros behind the last sector, as in a segment that is not full.
+const SPACE_BLOCKS: usize = 64;
+
+/// What can happen to a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    /// It ends at any byte.
+    Cut,
+    /// It ends behind any sector.
+    CutAtSector,
+    /// One page is all ones or all zeros.
+    Erased,
+    /// Everything from a page on is.
+    ErasedToTheEnd,
+    /// It goes on with the second half of another log.
+    Spliced,
+    /// One page lies in the place of another one as well.
+    Copied,
+    /// One page is there twice, and what follows lies further back.
+    Inserted,
+    /// Two pages are exchanged.
+    Swapped,
+    /// One page is what another session left there.
+    Stale,
+}
+
+impl Kind {
+    /// All of them.
+    pub(super) const ALL: [Self; 9] = [
+        Self::Cut,
+        Self::CutAtSector,
+        Self::Erased,
+        Self::ErasedToTheEnd,
+        Self::Spliced,
+        Self::Copied,
+        Self::Inserted,
+        Self::Swapped,
+        Self::Stale,
+    ];
+
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Cut => "cut at any byte",
+            Self::CutAtSector => "cut behind any sector",
+            Self::Erased => "a page erased or zeroed",
+            Self::ErasedToTheEnd => "everything from a page on erased or zeroed",
+            Self::Spliced => "spliced with another log",
+            Self::Copied => "a page in the place of another one",
+            Self::Inserted => "a page there twice",
+            Self::Swapped => "two pages exchanged",
+            Self::Stale => "a page of another session",
+        }
+    }
+}
+
+/// What became of the damages of one kind.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tally {
+    pub(super) damages: u64,
+    /// `verify` does not call it good.
+    pub(super) noticed: u64,
+    /// `verify` calls it whole up to an end mark, and it is.
+    pub(super) told: u64,
+    /// Read as the other session, because its sector is the first one.
+    pub(super) other: u64,
+    pub(super) missed: u64,
+    pub(super) lost_max: u64,
+    pub(super) frames: u64,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.damages += other.damages;
+        self.noticed += other.noticed;
+        self.told += other.told;
+        self.other += other.other;
+        self.missed += other.missed;
+        self.lost_max = self.lost_max.max(other.lost_max);
+        self.frames += other.frames;
+    }
+}
+
+/// One damage.
+struct Damage {
+    kind: Kind,
+    what: String,
+    bytes: Vec<u8>,
+    /// The sectors that are not as they were; what follows from them is lost to the end of their groups.
+    touched: Vec<usize>,
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.kind.name(), self.what)
+    }
+}
+
+/// A log that was recorded, whole.
+pub(super) struct Subject {
+    dir: TempDir,
+    /// Its sectors, and some space behind them.
+    bytes: Vec<u8>,
+    sectors: usize,
+    /// The number of each sector's group, from 0.
+    group_of: Vec<usize>,
+    whole: Record,
+}
+
+impl Subject {
+    /// Records a vehicle that flies, rests, flies and rests; `closed`: the log was ended in order, otherwise power went
+    /// while the vehicle rested. `boots` tells its session from others.
+    pub(super) fn record(flight: &str, closed: bool, boots: u32) -> Result<Self> {
+        let card = Card::new(64)?;
+        let stream = Stream::of_flight(&own(flight), FULL_RATE)?;
+        let stream = stream.flying_and_resting(&[(9.0, 1.5), (4.0, 1.5)])?;
+        let done = card.record(&stream, boots)?;
+        ensure!(done.stats.frames_lost == 0, "frames were lost");
+        let log = on_card(&card.path()).pop().context("no log")?;
+        let mut bytes = Vec::new();
+        let mut blocks = log.blocks();
+        while let Some(block) = blocks.next_block()? {
+            if Header::read(&block).is_ok() {
+                bytes.extend_from_slice(&block);
+            }
+        }
+        if !closed {
+            bytes.truncate(bytes.len() - BLOCK);
+        }
+        let sectors = bytes.len() / BLOCK;
+        bytes.resize(bytes.len() + SPACE_BLOCKS * BLOCK, 0);
+        let mut group_of = Vec::new();
+        for block in bytes.as_chunks::<BLOCK>().0.iter().take(sectors) {
+            let header = Header::read(block).ok().context("a copy among the sectors")?;
+            ensure!(header.number as usize == group_of.len(), "sector {} is out of order", header.number);
+            let begun = group_of.last().map_or(0, |group| group + usize::from(header.starts_group()));
+            group_of.push(begun);
+        }
+        let dir = tempfile::tempdir()?;
+        let mut subject = Self { dir, bytes, sectors, group_of, whole: Record::default() };
+        let log = subject.log(&subject.bytes)?;
+        let (whole, overview) = (Record::of(&log)?, Overview::verified(&log)?);
+        let expected = if closed { Verdict::Holds } else { Verdict::ToMark };
+        ensure!(verdict(&overview) == expected, "before any damage: {:?}", overview.ending());
+        ensure!(whole.summary.marks.count >= 1, "{} end marks", whole.summary.marks.count);
+        subject.whole = whole;
+        Ok(subject)
+    }
+
+    fn path(&self) -> PathBuf {
+        self.dir.path().join("00001_00.HUM")
+    }
+
+    /// These bytes as a log's file.
+    fn log(&self, bytes: &[u8]) -> Result<Log> {
+        fs::write(self.path(), bytes)?;
+        let extents = vec![Extent { start: 0, length: bytes.len() as u64 }];
+        let pieces = vec![Piece { path: self.path(), extents }];
+        Ok(Log { name: "00001".into(), files: vec!["00001_00.HUM".into()], pieces, session: None })
+    }
+
+    /// So many damages, of all kinds in turn; the first misses in words.
+    pub(super) fn damage_often(
+        &self,
+        other: &Self,
+        count: u64,
+        seed: u64,
+    ) -> Result<(Vec<(Kind, Tally)>, Vec<String>)> {
+        let mut random = Random::new(seed);
+        let mut tallies: Vec<_> = Kind::ALL.into_iter().map(|kind| (kind, Tally::default())).collect();
+        let mut misses = Vec::new();
+        for index in 0..count {
+            let place = index as usize % tallies.len();
+            let (kind, tally) = &mut tallies[place];
+            let damage = self.damage(*kind, other, &mut random);
+            tally.damages += 1;
+            if let Err(error) = self.judge(&damage, tally) {
+                tally.missed += 1;
+                misses.push(format!("{damage}: {error:#}"));
+            }
+        }
+        Ok((tallies, misses))
+    }
+
+    fn damage(&self, kind: Kind, other: &Self, random: &mut Random) -> Damage {
+        let sectors = self.sectors as u64;
+        let page = [1, 8, PAGE_SECTORS][random.below(3) as usize];
+        let pages = self.sectors.div_ceil(page) as u64;
+        let one = random.below(pages) as usize * page;
+        let two = random.below(pages) as usize * page;
+        let value = if random.chance(0.5) { 0xff } else { 0 };
+        let ends = |at: usize| (at + page).min(self.sectors);
+        let mut bytes = self.bytes.clone();
+        let mut touched: Vec<usize> = Vec::new();
+        let what = match kind {
+            Kind::Cut | Kind::CutAtSector => {
+                // Whole sectors, or within one.
+                let at = match kind {
+                    Kind::Cut => random.below(sectors * BLOCK as u64) as usize,
+                    _ => random.below(sectors) as usize * BLOCK,
+                };
+                bytes.truncate(at);
+                touched.extend(at / BLOCK..self.sectors);
+                format!("at byte {at} of {}", self.sectors * BLOCK)
+            }
+            Kind::Erased => {
+                fill(&mut bytes, one..ends(one), value);
+                touched.extend(one..ends(one));
+                format!("sectors {one} to {} are {value:#04x}", ends(one))
+            }
+            Kind::ErasedToTheEnd => {
+                fill(&mut bytes, one..self.sectors, value);
+                touched.extend(one..self.sectors);
+                format!("sectors from {one} on are {value:#04x}")
+            }
+            Kind::Spliced => {
+                let at = 1 + random.below(sectors - 1) as usize;
+                bytes.truncate(at * BLOCK);
+                bytes.extend(other.bytes.iter().skip(at * BLOCK));
+                touched.extend(at..self.sectors);
+                format!("at sector {at} of {} and {}", self.sectors, other.sectors)
+            }
+            Kind::Copied => {
+                let to = two.min(self.sectors.saturating_sub(page));
+                bytes.copy_within(one * BLOCK..ends(one) * BLOCK, to * BLOCK);
+                touched.extend(to..to + ends(one) - one);
+                format!("sectors {one} to {} in the place of {to}", ends(one))
+            }
+            Kind::Inserted => {
+                let copy = bytes[one * BLOCK..ends(one) * BLOCK].to_vec();
+                bytes.splice(two * BLOCK..two * BLOCK, copy);
+                format!("sectors {one} to {} before sector {two} as well", ends(one))
+            }
+            Kind::Swapped => {
+                let length = (ends(one) - one).min(ends(two) - two);
+                for at in 0..length * BLOCK {
+                    bytes.swap(one * BLOCK + at, two * BLOCK + at);
+                }
+                touched.extend((one..one + length).chain(two..two + length));
+                format!("{length} sectors of {one} and {two}")
+            }
+            Kind::Stale => {
+                let end = ends(one).min(other.sectors);
+                let one = one.min(end);
+                bytes[one * BLOCK..end * BLOCK].copy_from_slice(&other.bytes[one * BLOCK..end * BLOCK]);
+                touched.extend(one..end);
+                format!("sectors {one} to {end} are another session's")
+            }
+        };
+        Damage { kind, what, bytes, touched }
+    }
+
+    /// Whether what is left is told as it is.
+    fn judge(&self, damage: &Damage, tally: &mut Tally) -> Result<()> {
+        if damage.bytes == self.bytes {
+            // A page exchanged with itself.
+            tally.damages -= 1;
+            return Ok(());
+        }
+        let log = self.log(&damage.bytes)?;
+        let (read, overview) = (Record::of(&log)?, Overview::verified(&log)?);
+        let verdict = verdict(&overview);
+        tally.frames += read.frames.len() as u64;
+        if read.summary.session.is_some() && read.summary.session != self.whole.summary.session {
+            // Which of two sessions a file belongs to, its first sector tells. It is said that the other one is there.
+            ensure!(verdict == Verdict::NotProved && overview.summary.blocks.stale > 0, "not told apart");
+            tally.other += 1;
+            tally.noticed += 1;
+            return Ok(());
+        }
+        let missing = self.missing(&read.frames)?;
+        tally.lost_max = tally.lost_max.max(missing.len() as u64);
+        let touched: BTreeSet<_> = damage.touched.iter().map(|sector| self.group_of[*sector]).collect();
+        let group = |index: &usize| self.whole.groups.partition_point(|first| first <= index) - 1;
+        if let Some(lost) = missing.iter().find(|index| !touched.contains(&group(index))) {
+            anyhow::bail!("frame {lost} of group {} is lost, which was not touched", group(lost));
+        }
+        match (verdict, overview.proof) {
+            (Verdict::NotProved, _) => tally.noticed += 1,
+            (Verdict::ToMark, Proof::Mark(at, _)) => {
+                let to = at.as_millis();
+                let first = missing.first().map(|index| self.whole.frames[*index].at_ms);
+                ensure!(
+                    first.is_none_or(|first| first >= to),
+                    "whole to {to} ms is said, {first:?} is missing"
+                );
+                tally.told += 1;
+            }
+            _ => anyhow::bail!("{verdict:?} is said: {}", overview.ending()),
+        }
+        Ok(())
+    }
+
+    /// The frames that did not come out, by their index; those that did are all of the log, in their order.
+    fn missing(&self, read: &[Frame]) -> Result<Vec<usize>> {
+        let (mut missing, mut given) = (Vec::new(), read.iter().peekable());
+        for (index, frame) in self.whole.frames.iter().enumerate() {
+            if given.next_if_eq(&frame).is_none() {
+                missing.push(index);
+            }
+        }
+        ensure!(given.peek().is_none(), "a frame came out that never went in: {:?}", given.peek());
+        Ok(missing)
+    }
+}
+
+fn fill(bytes: &mut [u8], sectors: std::ops::Range<usize>, value: u8) {
+    bytes[sectors.start * BLOCK..sectors.end * BLOCK].fill(value);
+}
