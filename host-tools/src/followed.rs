@@ -5,6 +5,8 @@
 
 use std::collections::VecDeque;
 
+use hums_blackbox::record::Before;
+
 use crate::ending::Proof;
 use crate::summary::Overview;
 
@@ -20,7 +22,7 @@ pub struct Followed {
 impl Followed {
     /// Takes the next log; gives those of which nothing more will be said, in order.
     pub fn push(&mut self, mut next: Overview) -> Vec<Overview> {
-        if let Some(before) = next.contents.before.filter(|before| before.has_end()) {
+        if let Some(before) = next.contents.before.filter(Before::has_end) {
             let is_it = |log: &Overview| log.summary.session == Some(before.session);
             let between = self.is_between(before.number, &next);
             match self.held.iter_mut().rev().find(|log| is_it(log)) {

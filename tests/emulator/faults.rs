@@ -52,6 +52,10 @@ impl Log {
         &first["fields"]
     }
 
+    fn all(&self, table: &str) -> Vec<&Value> {
+        self.records.iter().filter(|row| row["record"] == table).map(|row| &row["fields"]).collect()
+    }
+
     fn has(&self, table: &str) -> bool {
         self.records.iter().any(|row| row["record"] == table)
     }
@@ -117,8 +121,10 @@ fn survives(provoke: &str, expected: &Expected) {
     let logs = logs(&recording.image());
     let [first, second] = &logs[..] else { panic!("{} logs", logs.len()) };
     assert!(!first.has("HUMS_FAULT") && first.only("HUMS_BOOT")["boots"] == 1);
-    let boot = second.only("HUMS_BOOT");
+    // The second one is written when the card is open: it knows which log was before.
+    let [boot, again] = second.all("HUMS_BOOT")[..] else { panic!("not two boot records") };
     assert_eq!((boot["boots"].as_u64(), boot["reset_name"].as_str()), (Some(2), Some(expected.cause)));
+    assert_eq!((again["before"].as_str(), again["before_number"].as_u64()), (Some("frames"), Some(1)));
 
     let fault = second.only("HUMS_FAULT");
     for (field, text) in [("kind", expected.kind), ("task", expected.task), ("message", expected.message)] {

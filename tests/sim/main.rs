@@ -10,6 +10,7 @@ mod by_arming;
 mod card_trouble;
 mod companion;
 mod downlink;
+mod ending;
 mod folders;
 mod hostile_input;
 mod live_server;

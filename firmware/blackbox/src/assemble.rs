@@ -140,7 +140,8 @@ impl Assembler {
     pub fn next(&mut self) -> Option<Step> {
         loop {
             if let Some(step) = self.out.take() {
-                return Some(self.give(step));
+                self.given(&step.header);
+                return Some(step);
             }
             if self.believed
                 && let Some(step) = self.ahead.pop_front()
@@ -153,7 +154,8 @@ impl Assembler {
                 return None;
             }
             let step = self.held.take()?;
-            return Some(self.give(step));
+            self.given(&step.header);
+            return Some(step);
         }
     }
 
@@ -241,11 +243,10 @@ impl Assembler {
         self.out = self.held.replace(step);
     }
 
-    const fn give(&mut self, step: Step) -> Step {
-        self.last_number = Some(step.header.number);
+    const fn given(&mut self, header: &Header) {
+        self.last_number = Some(header.number);
         self.counts.sectors += 1;
         self.at_last.sectors += 1;
-        step
     }
 
     /// What the blocks after the last sector were.

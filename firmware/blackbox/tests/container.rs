@@ -337,7 +337,9 @@ fn an_end_mark_says_how_many_frames_came_before_it_and_is_read_from_the_copy_in_
         if writer.partial(&mut partial) {
             sectors.push(partial);
         }
-        sectors.iter_mut().for_each(|sector| sector.seal(SESSION));
+        for sector in &mut sectors {
+            sector.seal(SESSION);
+        }
         let (mut reader, mut frames, mut last) = (Box::new(LogReader::new()), 0, None);
         let mut take = |reader: &mut LogReader| {
             while let Some(item) = reader.next() {

@@ -128,6 +128,30 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
         Record::Lifetime(life) => wear::lifetime(life),
         Record::Exceedance(exceedance) => wear::exceedance(exceedance),
         Record::Component(component) => vec![wear::component(component)],
+        Record::Keep(_) | Record::Mark(_) => extent_rows(record),
+        Record::Snapshot(snapshot) => wear::snapshot(snapshot),
+        Record::Protection(protection) => one(
+            "HUMS_PROTECTION",
+            vec![
+                ("action", text(protection.action.name())),
+                ("stage", text(protection.stage.name())),
+                ("detail", count(protection.detail)),
+                ("command", count(protection.command)),
+            ],
+        ),
+        Record::Unknown { kind, version, bytes } => one(
+            "HUMS_UNKNOWN",
+            vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],
+        ),
+        // A kind that this version of the host tools has no table for; the record itself stays in the log.
+        _ => Vec::new(),
+    }
+}
+
+/// What of the log is kept, and how far it is whole.
+fn extent_rows(record: &Record<'_>) -> Vec<Row> {
+    let one = |table, cells| vec![Row::new(table, cells)];
+    match record {
         Record::Keep(keep) => one(
             "HUMS_KEEP",
             vec![
@@ -144,21 +168,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
                 ("frames", count(mark.frames)),
             ],
         ),
-        Record::Snapshot(snapshot) => wear::snapshot(snapshot),
-        Record::Protection(protection) => one(
-            "HUMS_PROTECTION",
-            vec![
-                ("action", text(protection.action.name())),
-                ("stage", text(protection.stage.name())),
-                ("detail", count(protection.detail)),
-                ("command", count(protection.command)),
-            ],
-        ),
-        Record::Unknown { kind, version, bytes } => one(
-            "HUMS_UNKNOWN",
-            vec![("kind", count(*kind)), ("version", count(*version)), ("bytes", Cell::Hex(bytes.to_vec()))],
-        ),
-        // A kind that this version of the host tools has no table for; the record itself stays in the log.
         _ => Vec::new(),
     }
 }

@@ -308,11 +308,19 @@ impl Session {
                 (write, if index % 2 == 0 { Tear::Whole } else { Tear::by_chance(&mut random) })
             })
             .collect();
-        // Few writes are about the file system: each of them counts, whole and torn.
-        let metadata = (0..self.trace.len()).filter(|index| self.is_metadata(&self.trace[*index]));
-        let sample: Vec<_> = metadata.step_by(1 + self.trace.len() / 2_000).collect();
-        for (index, write) in sample.into_iter().enumerate().take(count as usize / 4) {
-            cuts.push((write, if index % 2 == 0 { Tear::Whole } else { Tear::by_chance(&mut random) }));
+        // Few writes are about the file system: those of the directory, and evenly chosen ones of the FAT, each of them
+        // whole and torn.
+        let all = (0..self.trace.len()).filter(|index| self.is_metadata(&self.trace[*index]));
+        let (directory, fat): (Vec<_>, Vec<_>) =
+            all.partition(|index| self.trace[*index].block == self.data_start);
+        let wanted = (count as usize / 8).max(2);
+        let evenly = |writes: &[usize]| {
+            let chosen = wanted.min(writes.len());
+            (0..chosen).map(|index| writes[index * writes.len() / chosen]).collect::<Vec<_>>()
+        };
+        for write in [evenly(&directory), evenly(&fat)].concat() {
+            cuts.push((write, Tear::Whole));
+            cuts.push((write, Tear::by_chance(&mut random)));
         }
         cuts.sort_unstable();
         cuts

@@ -33,7 +33,7 @@ use stored::{Fields, Sink};
 pub(crate) use stored::{HEAD_BYTES, Shape};
 
 // The longest records: a boot and a fault.
-const _: () = assert!(HEAD_BYTES + 6 * 4 + 4 * (1 + NAME_BYTES_MAX) + 12 + 1 <= RECORD_BYTES_MAX);
+const _: () = assert!(HEAD_BYTES + 6 * 4 + 4 * (1 + NAME_BYTES_MAX) + 13 <= RECORD_BYTES_MAX);
 const _: () =
     assert!(HEAD_BYTES + 12 * 4 + 1 + 2 * (1 + NAME_BYTES_MAX) + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
 

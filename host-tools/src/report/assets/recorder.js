@@ -15,7 +15,7 @@ export const recorderSection = () => {
       ["Records", whole(log.records)],
       ["Size", `${bytes(log.log_bytes)}; as a tlog ${bytes(log.tlog_bytes)}: ${fixed(log.ratio, 2)} times smaller`],
       ["Sectors", `${whole(log.sectors)}, ${whole(log.sectors_damaged)} damaged`],
-      ["Ending", log.end.words],
+      ["Ending", log.end?.words],
       ["Received", stats && `${whole(stats.frames_in)} frames, ${bytes(stats.bytes_in)}, of which ${bytes(stats.bytes_not_frames)} were no frame`],
       ["Queue, fullest", stats && stats.queue_bytes_capacity ? `${bytes(stats.queue_bytes_max)} of ${bytes(stats.queue_bytes_capacity)} (${fixed(stats.queue_bytes_max / stats.queue_bytes_capacity * 100, 0)} %)` : null],
       ["Card, longest stall", stats && `${whole(stats.sd_stall_ms_max)} ms`],
