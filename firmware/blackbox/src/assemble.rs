@@ -205,7 +205,15 @@ impl Assembler {
 
     /// A number that does not follow: perhaps the log goes on there.
     fn jumped(&mut self, mut step: Step) {
+        // Before anything was given out, only a log that begins at number 0 tells which sectors are in their place: lower
+        // numbers behind a ring's oldest file are left over.
+        let is_in_place = u64::from(step.header.number) + 1 == self.counts.blocks;
+        let begun = self.held.is_some() || self.last_number.is_some();
         match self.ahead.back_mut() {
+            Some(last) if last.header.number > step.header.number && !begun && !is_in_place => {
+                self.counts.superseded += 1;
+                return;
+            }
             Some(last) if last.header.number == step.header.number => {
                 self.counts.superseded += 1;
                 replace(last, &step);

@@ -319,8 +319,14 @@ fn sectors_behind_the_first_of_a_ring_are_left_over_and_not_misplaced() {
     // The segment that held the first two groups was written anew with the last one, which is shorter.
     let mut medium = blocks[first..].to_vec();
     medium.extend_from_slice(&blocks[blocks.len() - last..first]);
-    let log = read(&medium);
-    assert_eq!((log.gaps.len(), log.end.expect("end").blocks.misplaced), (0, 0));
+    // The oldest file has few sectors of its own, too.
+    let mut few = blocks[first..first + 9].to_vec();
+    few.extend_from_slice(&blocks[40..60]);
+    for medium in [medium, few] {
+        let log = read(&medium);
+        assert_eq!((log.gaps.len(), log.end.expect("end").blocks.misplaced), (0, 0));
+        assert!(!log.frames.is_empty() && !is_subsequence(&log.frames[..1], &frames[..1_000]));
+    }
 }
 
 #[test]

@@ -85,11 +85,13 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
         let other = &subjects[(index + 2) % subjects.len()];
         subject.damage_often(other, share, options.seed.wrapping_add(index as u64))
     });
-    let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
+    let outcomes: Vec<_> = outcomes.collect();
     let mut all = pages::Tally::default();
     for (place, kind) in pages::Kind::ALL.into_iter().enumerate() {
         let mut sum = pages::Tally::default();
-        outcomes.iter().for_each(|(tallies, _)| sum.add(&tallies[place].1));
+        for one in &outcomes {
+            sum.add(&one.tallies[place].1);
+        }
         all.add(&sum);
         let numbers =
             [sum.damages, sum.noticed, sum.told, sum.missed, sum.lost_max].map(|one| one.to_string());
@@ -102,8 +104,7 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
     figures.fact("of them told: whole up to the end mark that is named, and no further", all.told);
     figures.fact("missed, or told wrong", all.missed);
     figures.fact("frames given out after them, all of them right", all.frames);
-    let misses: Vec<_> =
-        outcomes.iter().flat_map(|(_, misses)| misses).take(10).map(String::as_str).collect();
+    let misses: Vec<_> = outcomes.iter().flat_map(|one| &one.misses).take(10).map(String::as_str).collect();
     ensure!(all.missed == 0, "{}\nthe first ones:\n{}", figures.text(), misses.join("\n"));
     ensure!(all.noticed + all.told == all.damages, "they do not add up:\n{}", figures.text());
     Ok(())

@@ -107,6 +107,13 @@ impl Tally {
     }
 }
 
+/// What became of the damages of one log.
+pub(super) struct Outcome {
+    pub(super) tallies: Vec<(Kind, Tally)>,
+    /// Each miss in words.
+    pub(super) misses: Vec<String>,
+}
+
 /// One damage.
 struct Damage {
     kind: Kind,
@@ -186,26 +193,21 @@ impl Subject {
     }
 
     /// So many damages, of all kinds in turn; the first misses in words.
-    pub(super) fn damage_often(
-        &self,
-        other: &Self,
-        count: u64,
-        seed: u64,
-    ) -> Result<(Vec<(Kind, Tally)>, Vec<String>)> {
+    pub(super) fn damage_often(&self, other: &Self, count: u64, seed: u64) -> Outcome {
         let mut random = Random::new(seed);
-        let mut tallies: Vec<_> = Kind::ALL.into_iter().map(|kind| (kind, Tally::default())).collect();
-        let mut misses = Vec::new();
+        let tallies = Kind::ALL.into_iter().map(|kind| (kind, Tally::default())).collect();
+        let mut outcome = Outcome { tallies, misses: Vec::new() };
         for index in 0..count {
-            let place = index as usize % tallies.len();
-            let (kind, tally) = &mut tallies[place];
+            let place = index as usize % outcome.tallies.len();
+            let (kind, tally) = &mut outcome.tallies[place];
             let damage = self.damage(*kind, other, &mut random);
             tally.damages += 1;
             if let Err(error) = self.judge(&damage, tally) {
                 tally.missed += 1;
-                misses.push(format!("{damage}: {error:#}"));
+                outcome.misses.push(format!("{damage}: {error:#}"));
             }
         }
-        Ok((tallies, misses))
+        outcome
     }
 
     fn damage(&self, kind: Kind, other: &Self, random: &mut Random) -> Damage {
