@@ -11,6 +11,7 @@ use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::logs::reader::Summary;
+use crate::plural::count;
 use crate::utc::iso8601;
 
 /// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
@@ -120,11 +121,8 @@ impl Proof {
             },
             Self::Short { sectors, frames } => {
                 let frames =
-                    frames.map_or_else(String::new, |frames| format!(", {}", count(frames.into(), "frame")));
-                format!(
-                    "{} missing at its end{frames}: the next start found them",
-                    count(sectors.into(), "sector")
-                )
+                    frames.map_or_else(String::new, |frames| format!(", {}", count(frames, "frame")));
+                format!("{} missing at its end{frames}: the next start found them", count(sectors, "sector"))
             }
         }
     }
@@ -139,11 +137,6 @@ fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
 fn moment(summary: &Summary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
     utc.map_or_else(|| format!("{:.3} s", at.as_secs_f64()), |utc| iso8601(utc / 1000 * 1000))
-}
-
-/// A number with its noun.
-pub fn count(number: u64, noun: &str) -> String {
-    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
 }
 
 /// Whether sectors of a session that began later lie in the log's files. What is left over there is older: a file is

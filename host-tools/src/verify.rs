@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
-use crate::ending::{BlocksJson, EndJson, behind_words, count, has_newer};
+use crate::ending::{BlocksJson, EndJson, behind_words, has_newer};
 use crate::followed::Followed;
 use crate::info::json::{ImageJson, images_json};
 use crate::logs::{self, find::Image};
 use crate::outcome::Outcome;
 use crate::output;
+use crate::plural::count;
 use crate::summary::Overview;
 
 /// Runs `hums verify`.
@@ -50,7 +51,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     if args.json {
         output::json(&json)?;
     } else {
-        let logs = count(json.logs.len() as u64, "session");
+        let logs = count(json.logs.len(), "session");
         let worst = if ok { worst } else { Verdict::NotProved };
         output::line(&format!("{logs}: {}", worst.words()))?;
     }

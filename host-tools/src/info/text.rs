@@ -11,8 +11,9 @@ use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
 use super::wear;
-use crate::ending::{behind_words, count, has_newer};
+use crate::ending::{behind_words, has_newer};
 use crate::logs;
+use crate::plural::count;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
 use crate::utc::iso8601;
 
@@ -183,8 +184,10 @@ fn gaps_text(text: &mut String, log: &Overview) {
         let (missing, damaged) = (summary.frames_missing, summary.blocks.damaged);
         let _ = writeln!(
             text,
-            "  gaps     {}, {missing} frames missing, {damaged} damaged sectors",
-            summary.gaps
+            "  gaps     {}, {} missing, {}",
+            summary.gaps,
+            count(missing, "frame"),
+            count(damaged, "damaged sector")
         );
     }
     for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
@@ -196,15 +199,16 @@ fn gaps_text(text: &mut String, log: &Overview) {
         let time = |at: Option<Instant>, none: &str| {
             at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
         };
-        let frames =
-            gap.frames.map_or_else(|| "an unknown number of".to_owned(), |frames| frames.to_string());
+        let frames = gap
+            .frames
+            .map_or_else(|| "an unknown number of frames".to_owned(), |frames| count(frames, "frame"));
         let _ = writeln!(
             text,
-            "    from {} to {}: {}, {} lost, {} more of no use, {frames} frames missing",
+            "    from {} to {}: {}, {} lost, {} more of no use, {frames} missing",
             time(gap.from, "the beginning"),
             time(gap.to, "the end"),
             words(gap.cause),
-            count(gap.sectors_lost.into(), "sector"),
+            count(gap.sectors_lost, "sector"),
             gap.sectors_skipped
         );
     }
