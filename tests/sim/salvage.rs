@@ -215,5 +215,5 @@ fn a_damaged_sector_is_told_as_such_on_a_card_without_a_file_system_too() {
     file.write_all_at(&[!block[100]], at * BLOCK + 100).unwrap();
     zero(&image, 0, BLOCK);
     let text = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[3]).text();
-    assert!(text.contains("1 damaged sectors") && text.contains("sectors are damaged"), "{text}");
+    assert!(text.contains("1 damaged sector") && text.contains("sectors are damaged"), "{text}");
 }
