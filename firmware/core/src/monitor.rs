@@ -124,6 +124,7 @@ impl Monitor {
     }
 
     /// Another system on the port is the vehicle from now on: nothing that was known of the one before is of it.
+    #[inline(never)] // Its new states are large: not on the stack of every observation.
     fn begin_with_another(&mut self) {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
         self.flight = Flight::grounded();

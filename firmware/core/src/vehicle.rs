@@ -171,6 +171,12 @@ impl Vehicle {
         self.heartbeat.get().is_some_and(|heartbeat| heartbeat.armed)
     }
 
+    #[inline(never)] // A whole vehicle: not on the stack of every observation.
+    fn become_another(&mut self, chosen: Option<Source>) {
+        let changes = self.changes.saturating_add(u32::from(self.source.is_some()));
+        *self = Self { source: chosen, changes, election: self.election, ..Self::unknown() };
+    }
+
     /// What kind of vehicle it is.
     pub fn kind(&self) -> VehicleKind {
         self.heartbeat.get().map_or(VehicleKind::Other, |heartbeat| heartbeat.kind)
@@ -200,8 +206,7 @@ impl Vehicle {
         let heartbeat = matches!(observation, Observation::Heartbeat(_));
         let chosen = self.election.hear(at, self.source, source, heartbeat);
         if chosen != self.source {
-            let changes = self.changes.saturating_add(u32::from(self.source.is_some()));
-            *self = Self { source: chosen, changes, election: self.election, ..Self::unknown() };
+            self.become_another(chosen);
         }
         if !self.concerns(source, observation) {
             return false;

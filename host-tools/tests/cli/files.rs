@@ -208,11 +208,14 @@ fn refused(dir: &Path, words: &[String], before: &[(String, Vec<u8>)]) {
 fn an_output_into_an_input_folder_replaces_nothing_there() {
     let dir = furnished();
     let before = contents(&dir.path().join("folder"));
-    for line in ["decode folder -o folder --format tlog,csv,parquet,thesis", "report folder -o folder/"] {
+    for line in ["decode folder -o folder --format csv,parquet,thesis", "report folder -o folder/"] {
         run(dir.path(), line, 0);
         // And again: what was made is replaced.
         run(dir.path(), line, 0);
     }
+    // A tlog that was made is a recording in the folder from then on, and so an input.
+    run(dir.path(), "decode folder -o folder --format tlog", 0);
+    run(dir.path(), "decode folder -o folder --format tlog", 2);
     let after = contents(&dir.path().join("folder"));
     assert!(before.iter().all(|file| after.contains(file)), "every input is what it was");
     assert!(after.len() > before.len() + 60);
