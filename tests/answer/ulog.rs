@@ -54,7 +54,9 @@ fn write(log: &Path, folder: &Path) {
     fs::write(folder.join("tables.json"), json!(columns).to_string()).unwrap();
     let rest = json!({ "parameters": parameters, "texts": texts, "dropouts": dropouts });
     fs::write(folder.join("rest.json"), rest.to_string()).unwrap();
-    tables.values_mut().for_each(|(_, out)| out.flush().unwrap());
+    for (_, out) in tables.values_mut() {
+        out.flush().unwrap();
+    }
 }
 
 fn bits(value: &Value<'_>) -> u64 {
