@@ -3,6 +3,7 @@
 //! joined and the intervals become twice as long: memory and page are bounded, however long the flight is.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::ops::RangeInclusive;
 
 use hums_core::time::Instant;
@@ -14,6 +15,9 @@ const INTERVALS_MAX: usize = 2048;
 const INTERVAL_MS: u64 = 50;
 /// Series at most: all that the model of a vehicle can fill.
 const SERIES_MAX: usize = 256;
+/// Filled intervals of all series together: as many as 64 series have that are full, some 5 MiB. A flying vehicle fills some
+/// forty series.
+const FILLED_MAX: usize = 64 * INTERVALS_MAX;
 
 /// The row of intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +69,8 @@ pub type Line<P> = (P, u8);
 pub struct Store<P> {
     grid: Grid,
     series: BTreeMap<Line<P>, Series>,
+    /// Intervals that have a value, of all series.
+    filled: usize,
 }
 
 /// What a series has in some of the intervals: their numbers, and the values of each in their order, a pair each.
@@ -72,7 +78,7 @@ pub type Part = (Vec<u16>, Vec<f32>);
 
 impl<P> Default for Store<P> {
     fn default() -> Self {
-        Self { grid: Grid { start_ms: None, interval_ms: INTERVAL_MS }, series: BTreeMap::new() }
+        Self { grid: Grid { start_ms: None, interval_ms: INTERVAL_MS }, series: BTreeMap::new(), filled: 0 }
     }
 }
 
@@ -106,26 +112,38 @@ impl<P: Copy + Ord> Store<P> {
         }
         let interval = self.interval(at);
         let series = self.series.entry(line).or_default();
-        let new = Extremes { low: value, high: value, rises: true };
-        series.values.entry(interval).and_modify(|extremes| *extremes = extremes.with(value)).or_insert(new);
+        match series.values.entry(interval) {
+            Entry::Occupied(mut known) => *known.get_mut() = known.get().with(value),
+            Entry::Vacant(place) => {
+                place.insert(Extremes { low: value, high: value, rises: true });
+                self.filled += 1;
+            }
+        }
     }
 
     /// The interval of a time; makes room for it first. What is before the first one counts to it.
     pub fn interval(&mut self, at: Instant) -> u16 {
         let start_ms = *self.grid.start_ms.get_or_insert(at.as_millis());
         let since_ms = at.as_millis().saturating_sub(start_ms);
-        while since_ms / self.grid.interval_ms >= INTERVALS_MAX as u64 {
-            self.grid.interval_ms = self.grid.interval_ms.saturating_mul(2);
-            for series in self.series.values_mut() {
-                let mut joined: BTreeMap<u16, Extremes> = BTreeMap::new();
-                for (interval, later) in std::mem::take(&mut series.values) {
-                    let into = joined.entry(interval / 2);
-                    into.and_modify(|extremes| *extremes = extremes.joined(later)).or_insert(later);
-                }
-                series.values = joined;
-            }
+        while since_ms / self.grid.interval_ms >= INTERVALS_MAX as u64 || self.filled >= FILLED_MAX {
+            self.join();
         }
         (since_ms / self.grid.interval_ms) as u16
+    }
+
+    /// Joins neighbours: the intervals are twice as long from then on.
+    fn join(&mut self) {
+        self.grid.interval_ms = self.grid.interval_ms.saturating_mul(2);
+        self.filled = 0;
+        for series in self.series.values_mut() {
+            let mut joined: BTreeMap<u16, Extremes> = BTreeMap::new();
+            for (interval, later) in std::mem::take(&mut series.values) {
+                let into = joined.entry(interval / 2);
+                into.and_modify(|extremes| *extremes = extremes.joined(later)).or_insert(later);
+            }
+            self.filled += joined.len();
+            series.values = joined;
+        }
     }
 
     /// The first interval's time and the intervals' length, milliseconds; `None` before the first value.
@@ -232,5 +250,26 @@ mod tests {
         let series = &store.plot(HEIGHT, 1, |_| String::new())[0];
         assert!(series.steps.iter().all(|step| usize::from(*step) < INTERVALS_MAX));
         assert_eq!(series.values.len(), 2 * series.steps.len());
+    }
+
+    #[test]
+    fn many_full_series_become_coarser_and_none_of_them_goes() {
+        let mut store = Store::default();
+        for interval in 0..INTERVALS_MAX as u64 {
+            for line in 0..=u8::MAX {
+                store.push(Instant::from_millis(interval * INTERVAL_MS), (HEIGHT, line), interval as f32);
+            }
+        }
+        let series = store.plot(HEIGHT, 1, |_| String::new());
+        assert_eq!(series.len(), SERIES_MAX);
+        let filled: usize = series.iter().map(|series| series.steps.len()).sum();
+        assert!((FILLED_MAX / 2..=FILLED_MAX).contains(&filled), "{filled}");
+        assert_eq!(filled, store.filled);
+        let last = INTERVALS_MAX as f64 - 1.0;
+        assert!(
+            series
+                .iter()
+                .all(|series| series.values.first() == Some(&0.0) && series.values.last() == Some(&last))
+        );
     }
 }

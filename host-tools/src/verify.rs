@@ -21,7 +21,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut json = VerifyJson { ok: true, images: images_json(&found.images), logs: Vec::new() };
+    let mut json = VerifyJson { ok: !found.is_cut(), images: images_json(&found.images), logs: Vec::new() };
     for image in &found.images {
         let check = file_system(image);
         json.ok &= check.failed == 0;

@@ -1,5 +1,6 @@
 //! Folders with more in them than logs: links, pipes, sockets, names that mean the same file.
 
+use std::ffi::OsString;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::os::unix::net::UnixListener;
@@ -8,8 +9,9 @@ use std::process::Command;
 use std::time::Duration;
 
 use hums_tests::child;
+use hums_tests::flights;
 use hums_tests::hostile;
-use hums_tests::program::{command, hums};
+use hums_tests::program::{LIMIT, command, hums};
 use serde_json::Value;
 
 /// Longer than it takes to look at a handful of files, on a machine that has much to do.
@@ -56,11 +58,41 @@ fn pipes_and_sockets_in_a_folder_are_passed_over_and_said() {
     }
 }
 
+/// Each command that reads recordings, with this path as its input.
+fn readers(path: &Path, out: &Path) -> Vec<Vec<OsString>> {
+    let words = |words: &[&str]| words.iter().map(OsString::from).collect::<Vec<_>>();
+    let (page, tables) = (out.join("page.html").into_os_string(), out.join("csv").into_os_string());
+    let input = path.as_os_str().to_owned();
+    vec![
+        [words(&["info"]), vec![input.clone()]].concat(),
+        [words(&["check"]), vec![input.clone()]].concat(),
+        [words(&["report", "-o"]), vec![page, input.clone()]].concat(),
+        [words(&["decode", "--format", "csv", "-o"]), vec![tables, input.clone()]].concat(),
+        [words(&["live", "--input"]), vec![input]].concat(),
+    ]
+}
+
 #[test]
-fn a_pipe_that_is_named_is_refused_with_the_way_out() {
+fn a_pipe_or_a_device_that_is_named_is_refused_by_each_command_with_the_way_out() {
     let dir = tempfile::tempdir().unwrap();
-    let pipe = dir.path().join("pipe.hum");
+    let pipe = dir.path().join("pipe.bin");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let outcome = info(&pipe).expect_clear_failure();
-    assert!(outcome.stderr.contains("copy it into a file first"), "{}", outcome.stderr);
+    for input in [pipe.as_path(), Path::new("/dev/zero")] {
+        for words in readers(input, dir.path()) {
+            let outcome = child::run(&mut command(&words), SOON).expect_clear_failure();
+            assert!(outcome.stderr.contains("copy it into a file first"), "{words:?}: {}", outcome.stderr);
+        }
+    }
+}
+
+#[test]
+fn a_pipe_beside_a_recording_is_passed_over_by_each_command_and_said() {
+    let (dir, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    fs::copy(flights::own("ap_quad_guided.tlog"), dir.path().join("flight.tlog")).unwrap();
+    assert!(Command::new("mkfifo").arg(dir.path().join("pipe.bin")).status().unwrap().success());
+    // `live` would go on.
+    for words in readers(dir.path(), out.path()).into_iter().filter(|words| words[0] != "live") {
+        let outcome = child::run(&mut command(&words), LIMIT).expect_code(&[0, 4]);
+        assert!(outcome.stderr.contains("pipe.bin: is a pipe"), "{words:?}: {}", outcome.stderr);
+    }
 }

@@ -87,10 +87,35 @@ fn logs_of_one_kind_of_message_take_little_memory_with_any_command() {
         assert_all_bounded(&log, empty);
         assert_live_bounded(&log, empty);
     }
+}
+
+#[test]
+fn a_log_of_many_unknown_ids_takes_little_memory_and_few_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
     let ids = hostile::unknown_ids(dir.path(), 60_000);
-    for command in ["info", "verify", "check"] {
-        assert_bounded(command, run(&[command, ids.to_str().unwrap()]).memory_kib_max, empty);
-    }
+    assert_all_bounded(&ids, empty);
+    assert_live_bounded(&ids, empty);
+    let out = dir.path().join("tables");
+    let words = ["decode", ids.to_str().unwrap(), "--format", "csv", "-o", out.to_str().unwrap()];
+    let said = run(&words).text();
+    assert!(said.contains("UNKNOWN.csv"), "{said}");
+    let folder = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).find(|path| path.is_dir());
+    let folder = folder.unwrap_or(out);
+    let files: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!((512..600).contains(&files.len()), "{} files", files.len());
+    // Each frame is in one table: the first 512 ids in their own, the others in order with their ids.
+    let shared = fs::read_to_string(folder.join("UNKNOWN.csv")).unwrap();
+    let ids = shared.lines().skip(1).map(|line| line.split(',').nth(4).unwrap().parse::<u32>().unwrap());
+    assert!(ids.eq(70_512..130_000), "{}", shared.lines().take(3).collect::<Vec<_>>().join("\n"));
+    assert_eq!(fs::read_to_string(folder.join("UNKNOWN_70511.csv")).unwrap().lines().count(), 2);
+}
+
+#[test]
+fn eight_vehicles_with_all_that_is_drawn_take_little_memory_live() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    assert_live_bounded(&hostile::fleet(dir.path(), 8, 110), empty);
 }
 
 #[test]

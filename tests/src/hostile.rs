@@ -72,6 +72,32 @@ pub fn unknown_ids(dir: &Path, count: u32) -> PathBuf {
     packed(dir, "unknown", &raw)
 }
 
+/// A ground station's log of so many vehicles that tell each quantity of each of twelve motors twenty times a second.
+pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
+    let (mut log, log_path) = (Vec::new(), dir.join("fleet.tlog"));
+    let mut encoders: Vec<Encoder> = (1..=vehicles).map(|system| Encoder::of(system, 1)).collect();
+    for tick in 0..seconds * 20 {
+        let value = (tick % 100) as f32;
+        let heartbeat = Packet::new(0).u8(4, 2).u8(5, 3).u8(6, 0x51).u8(7, 4).u8(8, 3);
+        let vibration = Packet::new(241).f32(8, value).f32(12, value).f32(16, value);
+        let motors = [11_030, 11_031, 11_032].map(|id| {
+            // Voltage, current, total, speed, count: two bytes for each of four, then four temperatures.
+            let numbers =
+                (0..20).fold(Packet::new(id), |packet, place| packet.u16(2 * place, 100 + tick as u16 % 100));
+            (40..44).fold(numbers, |packet, place| packet.u8(place, 30))
+        });
+        for encoder in &mut encoders {
+            for packet in [&heartbeat, &vibration].into_iter().chain(&motors) {
+                let mut buffer = [0; FRAME_BYTES_MAX];
+                log.extend_from_slice(&(1_700_000_000_000_000 + tick * 50_000).to_be_bytes());
+                log.extend_from_slice(encoder.frame(&mut buffer, packet));
+            }
+        }
+    }
+    fs::write(&log_path, log).unwrap();
+    log_path
+}
+
 /// A card of 64 MiB with a short session on it.
 fn card(dir: &Path, name: &str) -> (PathBuf, File, Layout) {
     let (recording, image) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.img")));

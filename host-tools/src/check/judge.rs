@@ -2,7 +2,8 @@
 //!
 //! The monitor is stepped every 50 ms of the recording's time, whatever the rate of what it holds: debounce and staleness
 //! follow the clock, not the number of samples. Where nothing was recorded for longer than [`SILENCE_MAX`] everything
-//! has grown stale and every debounce has run out, so what follows is left out.
+//! has grown stale and every debounce has run out, so what follows is left out. A gap of the recording itself is no silence
+//! of the vehicle: the monitor's time stands still over it ([`super::clock`]).
 
 use std::collections::BTreeMap;
 
@@ -16,6 +17,7 @@ use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
+use super::clock::Clock;
 use super::problem::{LISTED_MAX, Problem, Problems};
 use crate::source::item::{About, Gap, Item};
 use crate::source::recording::Format;
@@ -134,7 +136,7 @@ pub struct Judge {
     monitor: Box<Monitor>,
     limits: Limits,
     format: Format,
-    next: Option<Instant>,
+    clock: Clock,
     note: Instant,
     first: Option<Instant>,
     last: Instant,
@@ -161,7 +163,7 @@ impl Judge {
             monitor: Box::new(Monitor::new(limits.params)),
             limits: limits.clone(),
             format,
-            next: None,
+            clock: Clock::default(),
             note: Instant::ZERO,
             first: None,
             last: Instant::ZERO,
@@ -186,7 +188,7 @@ impl Judge {
         match item {
             Item::Observation(source, observation) => {
                 self.advance(at);
-                self.monitor.observe(at, source, observation);
+                self.monitor.observe(self.clock.monitor(at), source, observation);
             }
             Item::Epoch(epoch_us) => self.epoch_us = Some(epoch_us),
             Item::Fact(fact) => {
@@ -220,6 +222,13 @@ impl Judge {
     }
 
     fn gap(&mut self, gap: &Gap) {
+        // One that begins before the last observation is a count over the whole recording.
+        if let (Some(from), Some(to)) = (gap.from.filter(|from| *from >= self.last), gap.to)
+            && self.first.is_some()
+        {
+            self.advance(from);
+            self.clock.pause(from, to);
+        }
         self.damages += u64::from(gap.cause.is_damage());
         self.losses += u64::from(gap.cause == crate::source::item::Cause::Lost);
         if self.gaps.len() < LISTED_MAX {
@@ -231,26 +240,26 @@ impl Judge {
     fn advance(&mut self, to: Instant) {
         self.first.get_or_insert(to);
         self.last = self.last.max(to);
-        let mut next = self.next.unwrap_or(to);
-        let silence = to.since(next);
-        let pause = (silence > SILENCE_MAX).then(|| next + SILENCE_MAX);
-        while next <= to {
-            self.tick(next);
-            next = next + TICK;
-            if pause.is_some_and(|pause| next > pause && next < to) {
-                // The moment before what comes next.
-                next = to;
+        let silence = to.since(self.clock.begin(to));
+        let pause = (silence > SILENCE_MAX).then(|| self.clock.begin(to) + SILENCE_MAX);
+        while let Some(now) = self.clock.step(to) {
+            self.tick(now);
+            if pause.is_some_and(|pause| now + TICK > pause) {
+                self.clock.skip_to(to);
             }
         }
-        self.next = Some(next);
     }
 
     fn tick(&mut self, now: Instant) {
         let (link, recorder) = (LinkReading::default(), RecorderStatus::default());
+        let steps = self.clock.monitor(now);
         let Self { monitor, here, format, .. } = self;
-        monitor.tick(now, &link, &recorder, &mut |finding| {
+        monitor.tick(steps, &link, &recorder, &mut |finding| {
             if is_of(finding.check, *format) {
-                here.take(&Finding::from(finding));
+                here.take(&Finding {
+                    at: Clock::recording(now, steps, finding.at),
+                    ..Finding::from(finding)
+                });
             }
         });
         let armed = monitor.vehicle().armed();
@@ -259,18 +268,19 @@ impl Judge {
         }
         self.was_armed = armed;
         while let Some(happening) = self.monitor.take_happening() {
-            self.happening(now, happening);
+            self.happening(now, steps, happening);
         }
         if now >= self.note {
             self.note = now + NOTE_EVERY;
-            self.note_seen(now, &link, &recorder);
+            self.note_seen(steps, &link, &recorder);
         }
     }
 
-    fn happening(&mut self, now: Instant, happening: Happening) {
+    fn happening(&mut self, now: Instant, steps: Instant, happening: Happening) {
         match happening {
             Happening::TakeOff if self.flights.len() < LISTED_MAX => {
-                let from = self.monitor.flight().airborne_since().unwrap_or(now);
+                let since = self.monitor.flight().airborne_since();
+                let from = since.map_or(now, |since| Clock::recording(now, steps, since));
                 self.flights.push(Flight { from, to: now, landed: false });
             }
             Happening::Landing => self.end_flight(now, true),
@@ -325,7 +335,8 @@ impl Judge {
         let mut problems = match by {
             JudgedBy::Board => self.board,
             JudgedBy::Here => {
-                for exceedance in self.monitor.exceedances().iter(last) {
+                let steps = self.clock.monitor(last);
+                for exceedance in self.monitor.exceedances().iter(steps) {
                     self.here.peak(exceedance.check.name, exceedance.instance, exceedance.session.peak);
                 }
                 self.here
@@ -438,8 +449,8 @@ fn is_off(check: &Check, params: &Params) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use hums_core::observation::{Battery, Observation, Source};
-    use hums_core::units::{Fraction, Volts};
+    use hums_core::observation::{Battery, Esc, EscGroup, Observation, Source};
+    use hums_core::units::{Fraction, Rpm, Volts};
 
     use super::*;
     use crate::source::item::Cause;
@@ -556,6 +567,57 @@ mod tests {
             let of_link = problems.iter().filter(|problem| problem.check == "heartbeat").count();
             assert_eq!(of_link, heartbeats, "{problems:?}");
         }
+    }
+
+    fn escs(judge: &mut Judge, from_ms: u64, to_ms: u64) {
+        let esc = Some(Esc { rpm: Some(Rpm(5_000.0)), ..Esc::default() });
+        let told = Observation::Escs(EscGroup { first: 0, escs: [esc, None, None, None] });
+        for tick in from_ms / 100..to_ms / 100 {
+            let at = Instant::from_millis(tick * 100);
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
+            judge.item(at, Item::Observation(AUTOPILOT, &told));
+        }
+    }
+
+    #[test]
+    fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is_found() {
+        for (told, cause, silent) in [
+            (true, Cause::NotKept, 0),
+            (true, Cause::Lost, 0),
+            (true, Cause::Damaged, 0),
+            (false, Cause::Lost, 1),
+        ] {
+            let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+            escs(&mut judge, 0, 10_000);
+            let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
+            let gap = Gap { from, to, cause, place: None, bytes: 0, words: String::new() };
+            if told {
+                judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
+            }
+            escs(&mut judge, 30_000, 40_000);
+            // A count over the whole recording, told at its end, is no pause.
+            let whole = Gap { from: Some(Instant::ZERO), to: Some(Instant::from_millis(39_900)), ..gap };
+            judge.item(Instant::from_millis(39_900), Item::Gap(&whole));
+            let judged = judge.end();
+            let found = judged.problems.iter().filter(|problem| problem.check == "esc_silent").count();
+            assert_eq!(found, silent, "{cause:?}: {:?}", judged.findings);
+            assert_eq!(judged.span.map(|(_, last)| last.as_millis()), Some(39_900));
+        }
+    }
+
+    #[test]
+    fn findings_after_a_pause_have_the_recordings_time() {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        fly(&mut judge, 0, 10, 10, 0.9);
+        let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
+        let words = String::new();
+        let gap = Gap { from, to, cause: Cause::NotKept, place: None, bytes: 0, words };
+        judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
+        fly(&mut judge, 30, 40, 10, 0.1);
+        let found = found(&judge.end());
+        let [(check, Level::Warning, at)] = found.as_slice() else { panic!("{found:?}") };
+        assert_eq!(check, "batt_remaining");
+        assert!((32.0..33.2).contains(at), "{at}");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! [`text`] and [`json`] say what came of it.
 
 pub mod checked;
+mod clock;
 pub mod json;
 pub mod judge;
 mod overview;
@@ -35,7 +36,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
         eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
     }
-    let mut outcome = Outcome::lossy(found.damaged());
+    let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1;
     let (bar, mut table, mut failed) = (progress::logs(found.places.len()), Table::default(), 0_usize);
     side_by_side(

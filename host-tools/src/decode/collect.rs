@@ -14,6 +14,7 @@ use super::reference::Observed;
 use super::row::Row;
 use super::table::Table;
 use super::text::{push_csv_cells, push_hex, push_integer, push_json_object, push_json_text};
+use super::unknown::UnknownLines;
 use crate::logs::reader::Collect;
 use crate::loss::lost;
 use crate::mavlink::frame::{Frame, Peek, peek};
@@ -31,6 +32,8 @@ pub struct Collected<'a> {
     pub jsonl: Vec<u8>,
     /// Lines of each table.
     pub tables: BTreeMap<Table, Vec<u8>>,
+    /// Lines of frames that we have no definition of.
+    pub unknown: UnknownLines,
     /// A header for each table of the monitor's own.
     pub headers: BTreeMap<&'static str, Vec<&'static str>>,
     /// Points of the line protocol.
@@ -60,6 +63,7 @@ impl<'a> Collected<'a> {
             tlog: Vec::new(),
             jsonl: Vec::new(),
             tables: BTreeMap::new(),
+            unknown: UnknownLines::default(),
             headers: BTreeMap::new(),
             influx: Lines::default(),
             parquet: Batches::default(),
@@ -112,20 +116,31 @@ impl<'a> Collected<'a> {
     }
 
     fn csv_frame(&mut self, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
-        let out = self.tables.entry(Table::of(frame, known.is_some())).or_default();
-        let before = table_bytes(out);
-        push_times_csv(out, at, self.context.epoch_us);
-        for number in [frame.system, frame.component] {
-            out.push(b',');
-            push_integer(out, u64::from(number));
-        }
-        if let Some(payload) = known {
-            push_csv_cells(out, payload);
-        } else {
+        let epoch_us = self.context.epoch_us;
+        let head = |out: &mut Vec<u8>| {
+            push_times_csv(out, at, epoch_us);
+            for number in [frame.system, frame.component] {
+                out.push(b',');
+                push_integer(out, u64::from(number));
+            }
+        };
+        let opaque = |out: &mut Vec<u8>| {
             out.push(b',');
             push_integer(out, u64::from(frame.sequence));
             out.push(b',');
             push_hex(out, frame.payload);
+        };
+        let table = Table::of(frame, known.is_some());
+        if matches!(table, Table::Unknown(_)) {
+            self.unknown.push(frame.id, head, opaque);
+            return;
+        }
+        let out = self.tables.entry(table).or_default();
+        let before = table_bytes(out);
+        head(out);
+        match known {
+            Some(payload) => push_csv_cells(out, payload),
+            None => opaque(out),
         }
         out.push(b'\n');
         self.tables_bytes += table_bytes(out) - before;
@@ -216,6 +231,8 @@ impl Collect for Collected<'_> {
         self.tlog.len()
             + self.jsonl.len()
             + self.tables_bytes
+            // Once more where it is parted by its tables.
+            + 2 * self.unknown.held_bytes()
             + self.influx.held_bytes()
             + self.parquet.held_bytes()
             + size_of::<Observed>() * self.observed.len()

@@ -38,6 +38,7 @@ pub mod table;
 pub mod tables;
 pub mod text;
 pub mod thesis;
+pub mod unknown;
 mod wear;
 pub mod write;
 
@@ -72,7 +73,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut outcome = Outcome::lossy(found.damaged());
+    let mut outcome = Outcome::lossy(found.is_lossy());
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
         eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
     }

@@ -12,6 +12,8 @@ pub enum Table {
     Unverified(u32),
     /// Frames of an id that we have no definition of.
     Unknown(u32),
+    /// Frames of all ids without a definition that have no table of their own.
+    Unknowns,
     /// The monitor's own.
     Hums(&'static str),
 }
@@ -31,6 +33,7 @@ impl Table {
         match self {
             Self::Message(id) | Self::Unknown(id) => message_name(id).into_owned(),
             Self::Unverified(id) => format!("UNVERIFIED_{}", message_name(id)),
+            Self::Unknowns => "UNKNOWN".to_owned(),
             Self::Hums(name) => name.to_owned(),
         }
     }

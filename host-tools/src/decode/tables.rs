@@ -8,14 +8,20 @@ use anyhow::Result;
 
 use super::table::Table;
 use super::text::columns;
+use super::unknown::UnknownLines;
 use crate::files::{Folder, buffered, settle};
 
 /// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
 const OPEN_MAX: usize = 256;
 
+/// Ids without a definition that have a table of their own at most. The first ones have it; all others share one.
+pub const UNKNOWN_TABLES_MAX: usize = 512;
+
 /// The tables, some of them open.
 pub struct Tables {
     folder: Folder,
+    /// Ids without a definition that have a table of their own.
+    unknown: BTreeSet<u32>,
     open: BTreeMap<Table, BufWriter<File>>,
     /// Tables that have their header; not all of them are open.
     begun: BTreeSet<Table>,
@@ -25,7 +31,13 @@ pub struct Tables {
 impl Tables {
     /// None yet; all of them will be in this folder.
     pub fn new(folder: Folder) -> Self {
-        Self { folder, open: BTreeMap::new(), begun: BTreeSet::new(), headers: BTreeMap::new() }
+        Self {
+            folder,
+            unknown: BTreeSet::new(),
+            open: BTreeMap::new(),
+            begun: BTreeSet::new(),
+            headers: BTreeMap::new(),
+        }
     }
 
     /// The columns of the monitor's own tables.
@@ -64,6 +76,31 @@ impl Tables {
         Ok(())
     }
 
+    /// Adds frames of ids without a definition: to the id's own table, or to the one that the ids beyond
+    /// [`UNKNOWN_TABLES_MAX`] share.
+    pub fn put_unknown(&mut self, lines: &UnknownLines) -> Result<()> {
+        let (mut own, mut shared): (BTreeMap<u32, Vec<u8>>, Vec<u8>) = Default::default();
+        for line in lines.iter() {
+            if self.unknown.len() < UNKNOWN_TABLES_MAX {
+                self.unknown.insert(line.id);
+            }
+            if self.unknown.contains(&line.id) {
+                line.push(own.entry(line.id).or_default());
+            } else {
+                line.push_with_id(&mut shared);
+            }
+        }
+        for (id, lines) in own {
+            self.put(Table::Unknown(id), &lines)?;
+        }
+        if shared.is_empty() { Ok(()) } else { self.put(Table::Unknowns, &shared) }
+    }
+
+    /// Whether some ids share a table.
+    pub fn has_shared(&self) -> bool {
+        self.begun.contains(&Table::Unknowns)
+    }
+
     /// Tables so far.
     pub fn count(&self) -> usize {
         self.begun.len()
@@ -89,6 +126,9 @@ fn header(table: Table, own: &[&str]) -> String {
         }
         Table::Unverified(_) | Table::Unknown(_) => {
             names.extend(["system", "component", "sequence", "payload"].map(String::from));
+        }
+        Table::Unknowns => {
+            names.extend(["system", "component", "id", "sequence", "payload"].map(String::from));
         }
     }
     names.join(",") + "\n"

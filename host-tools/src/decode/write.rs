@@ -13,7 +13,7 @@ use super::influx::{Clock, Lines};
 use super::parquet::ParquetTables;
 use super::record::gap_row;
 use super::reference::Reference;
-use super::tables::Tables;
+use super::tables::{Tables, UNKNOWN_TABLES_MAX};
 use super::thesis::Thesis;
 use crate::files::{Folder, Inputs, Output, appended, make_parent, settle};
 use crate::logs::reader::Deliver;
@@ -182,6 +182,7 @@ impl<'a> Writers<'a> {
             for (table, lines) in &collected.tables {
                 csv.put(*table, lines)?;
             }
+            csv.put_unknown(&collected.unknown)?;
         }
         match &mut self.parquet {
             Some(parquet) => parquet.put(collected.parquet),
@@ -236,8 +237,15 @@ impl<'a> Writers<'a> {
         }
         if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
             let tables = count(csv.count() as u64, "table");
+            let shared = csv.has_shared();
             csv.finish()?;
             lines.push(format!("{}: {tables}, {rows}", dir.display()));
+            if shared {
+                lines.push(format!(
+                    "{}: the messages without a definition beyond the first {UNKNOWN_TABLES_MAX}, with their ids in a column",
+                    dir.join("UNKNOWN.csv").display()
+                ));
+            }
         }
         if let Some(thesis) = self.thesis.take() {
             let (dir, seconds) = thesis.finish()?;

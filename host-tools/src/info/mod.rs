@@ -23,7 +23,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut outcome = Outcome::lossy(found.damaged());
+    let mut outcome = Outcome::lossy(found.is_lossy());
     let mut list = None;
     if args.json {
         list = Some(output::JsonList::begin("images", &images_json(&found.images), "logs")?);

@@ -23,6 +23,8 @@ use crate::interrupt;
 
 /// Copies of the state at most; when they are this many, every second one goes.
 const COPIES_MAX: usize = 128;
+/// Vehicles in all copies together at most, some 8 KiB each: of eight vehicles there are 32 copies.
+const COPIED_MAX: usize = 256;
 /// The first distance between two.
 const COPY_EVERY: Span = Span::from_secs(5);
 /// Speeds that make sense.
@@ -113,6 +115,11 @@ impl Loaded {
     }
 }
 
+/// Vehicles in all copies together.
+fn copied(copies: &[Copy]) -> usize {
+    copies.iter().map(|copy| copy.world.crafts.len()).sum()
+}
+
 /// What else was told by then.
 fn tell(told: &[(Instant, Told)], next: &mut usize, by: Instant, world: &mut World) {
     while let Some((at, what)) = told.get(*next).filter(|(at, _)| *at <= by) {
@@ -194,7 +201,8 @@ impl Player {
             };
             let due = copies.last().is_none_or(|copy: &Copy| at.since(copy.at) >= copy_every);
             if due {
-                if copies.len() >= COPIES_MAX {
+                // Vehicles that are heard later make the later copies larger, so several rounds may be needed.
+                while copies.len() >= COPIES_MAX || copied(&copies) + world.crafts.len() > COPIED_MAX {
                     let mut odd = false;
                     copies.retain(|_| {
                         odd = !odd;

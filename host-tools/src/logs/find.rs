@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::card::{image, whole_file};
 use super::folder::directory;
-pub use super::found::{Found, Image};
+pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
 use super::places::Log;
 
@@ -19,13 +19,9 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         let before = found.logs.len();
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
         let passed_over = found.logs_more + found.repeats;
+        check_seekable(input, &about)?;
         if about.is_dir() {
             directory(input, salvage, &mut found)?;
-        } else if !is_seekable(&about) {
-            bail!(
-                "{}: is a pipe, a socket or a terminal, and a log is read from any place; copy it into a file first",
-                input.display()
-            );
         } else if found.is_known(input) {
             found.remark(format!("{}: was named or found already; it is read once", input.display()));
             continue;
@@ -51,6 +47,18 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     make_names_unique(&mut found.logs);
     found.finish();
     Ok(found)
+}
+
+/// Refuses what cannot be read from any place: a pipe may never have another end, and a terminal waits for ever. To be
+/// called before a file is opened.
+pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
+    if !about.is_dir() && !is_seekable(about) {
+        bail!(
+            "{}: is a pipe, a socket, a terminal or the like, and a log is read from any place; copy it into a file first",
+            path.display()
+        );
+    }
+    Ok(())
 }
 
 /// Whether it can be read from any place: a file, or a raw device such as a card reader's.

@@ -51,7 +51,7 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
             if depth < DEPTH_MAX && waiting.len() < WAITING_MAX {
                 waiting.push((folder, depth + 1));
             } else {
-                found.remark(format!(
+                found.leave_out(format!(
                     "{}: is not looked into: too deep, or too many folders",
                     folder.display()
                 ));
@@ -97,13 +97,13 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
         if kind.is_dir() && entries.folders.len() < WAITING_MAX {
             entries.folders.push(path);
         } else if !kind.is_file() {
-            found.remark(format!("{}: is {}, and passed over", path.display(), what(kind)));
+            found.remark(passed_over(&path, kind));
         } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Content::Log))) {
             if entries.segments < SEGMENTS_MAX {
                 entries.segments += 1;
                 entries.sessions.entry(name.session).or_default().push((name, path));
             } else {
-                found.remark(format!("{}: is left out: there are too many segments", path.display()));
+                found.leave_out(format!("{}: is left out: there are too many segments", path.display()));
             }
         } else {
             match look(&path) {
@@ -111,7 +111,7 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
                     entries.files.push(path);
                 }
                 Ok(Content::Log | Content::Image) => {
-                    found.remark(format!("{}: is left out: there are too many files", path.display()));
+                    found.leave_out(format!("{}: is left out: there are too many files", path.display()));
                 }
                 Ok(Content::Newer(version)) => {
                     found.remark(format!(
@@ -127,14 +127,16 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
     Ok(entries)
 }
 
-fn what(kind: FileType) -> &'static str {
-    if kind.is_symlink() {
-        return "a link";
-    }
-    if kind.is_dir() {
-        return "one folder too many";
-    }
-    "a pipe, a socket or a device"
+/// Says of something in a folder that it is no file.
+pub fn passed_over(path: &Path, kind: FileType) -> String {
+    let what = if kind.is_symlink() {
+        "a link"
+    } else if kind.is_dir() {
+        "one folder too many"
+    } else {
+        "a pipe, a socket or a device"
+    };
+    format!("{}: is {what}, and passed over", path.display())
 }
 
 /// A log, or an image, that happens to lie in a folder.

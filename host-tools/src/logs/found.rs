@@ -9,7 +9,7 @@ use crate::files::FileId;
 /// Logs that are kept: each takes some hundred bytes. A card of 32 GB has room for 4,096 full segments.
 pub(super) const LOGS_MAX: usize = 10_000;
 /// Remarks that are kept.
-const REMARKS_MAX: usize = 20;
+pub const REMARKS_MAX: usize = 20;
 /// Files of logs and images that are told from each other by their numbers.
 const SEEN_MAX: usize = 200_000;
 /// What was found.
@@ -26,6 +26,8 @@ pub struct Found {
     pub(super) repeats: u64,
     /// Logs beyond [`LOGS_MAX`].
     pub(super) logs_more: u64,
+    /// Files or folders were not looked into, because there were too many.
+    left_out: bool,
     /// Files that were looked at, by device and number: one that has two names is one log.
     seen: BTreeSet<FileId>,
 }
@@ -38,6 +40,12 @@ impl Found {
         } else {
             self.remarks_more += 1;
         }
+    }
+
+    /// Something was left out for want of room, and may hold a log.
+    pub(super) fn leave_out(&mut self, sentence: String) {
+        self.left_out = true;
+        self.remark(sentence);
     }
 
     /// Adds a log, as far as there is room.
@@ -78,9 +86,9 @@ impl Found {
         }
     }
 
-    /// Whether logs were left out.
+    /// Whether logs were left out, or what may hold one.
     pub fn is_cut(&self) -> bool {
-        self.logs_more > 0
+        self.left_out || self.logs_more > 0
     }
 }
 

@@ -19,6 +19,7 @@ mod scan;
 
 pub use card::on_card;
 pub use find::{Content, Found, find};
+pub use folder::passed_over;
 pub use places::{Log, Piece};
 
 impl Found {

@@ -39,7 +39,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     for remark in &found.remarks {
         eprintln!("hums: {remark}");
     }
-    let mut outcome = Outcome::lossy(found.damaged());
+    let mut outcome = Outcome::lossy(found.is_lossy());
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
         bail!("{}: is read twice for a page; give a file", place.title)
     }

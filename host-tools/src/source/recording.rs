@@ -1,7 +1,7 @@
 //! Recordings: what they are, by their content, and where they are.
 
 use std::collections::BTreeMap;
-use std::fs::{self, DirEntry};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
-use crate::logs::find::Image;
+use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::{self, Content, Log};
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
@@ -23,6 +23,8 @@ pub const RAW_BAUD: u32 = 115_200;
 const LOOK_BYTES: usize = 64 * 1024;
 /// Directories deeper than this are not walked.
 const DEPTH_MAX: usize = 16;
+/// Recordings of one folder, and folders of one folder, that are kept: each takes some hundred bytes.
+const WALKED_MAX: usize = 10_000;
 
 /// What a recording is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -249,12 +251,14 @@ pub struct Found {
     pub images: Vec<Image>,
     /// What was passed over, as sentences.
     pub remarks: Vec<String>,
+    /// There were more logs or recordings than are kept.
+    pub is_cut: bool,
 }
 
 impl Found {
-    /// Whether a card's file system is damaged.
-    pub fn damaged(&self) -> bool {
-        self.images.iter().any(|image| !image.damage.is_empty())
+    /// Whether a card's file system is damaged, or logs were left out: exit code 3.
+    pub fn is_lossy(&self) -> bool {
+        self.is_cut || self.images.iter().any(|image| !image.damage.is_empty())
     }
 
     /// Every file that any of it is in.
@@ -276,13 +280,25 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         }
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
         let before = found.places.len();
+        check_seekable(input, &about)?;
         if about.is_dir() {
-            if let Some(error) = own(input, salvage, &mut found).err().filter(|_| holds_own(input)) {
-                return Err(error);
+            let mut walk = Walk::default();
+            walk.folder(input, 0)?;
+            if let Err(error) = own(input, salvage, &mut found) {
+                if holds_own(input) {
+                    return Err(error);
+                }
+                found.remarks.append(&mut walk.remarks);
             }
-            let mut paths = Vec::new();
-            walk(input, 0, &mut paths)?;
-            found.places.extend(paths.iter().map(|path| Place::file(path)));
+            found.places.extend(walk.paths.iter().map(|path| Place::file(path)));
+            if walk.left_out > 0 {
+                found.is_cut = true;
+                found.remarks.push(format!(
+                    "{}: recordings and folders beyond {WALKED_MAX} are left out ({} of them): name fewer folders at once",
+                    input.display(),
+                    walk.left_out
+                ));
+            }
             if found.places.len() == before {
                 bail!("{}: no log and no recording is in there", input.display());
             }
@@ -341,6 +357,7 @@ fn holds_own(dir: &Path) -> bool {
 /// Adds the sessions of our own in a path.
 fn own(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let own = logs::find(std::slice::from_ref(&path.to_owned()), salvage)?;
+    found.is_cut |= own.is_cut();
     found.images.extend(own.images);
     found.remarks.extend(own.remarks);
     let single = own.logs.len() == 1 && path.is_file();
@@ -352,19 +369,75 @@ fn own(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
-/// The files of a folder, and of those in it, that are recordings other than our own logs. Links are not followed.
-fn walk(dir: &Path, depth: usize, paths: &mut Vec<PathBuf>) -> Result<()> {
-    let context = || format!("{}: cannot be read", dir.display());
-    let entries = fs::read_dir(dir).with_context(context)?.collect::<io::Result<Vec<DirEntry>>>();
-    let mut entries = entries.with_context(context)?;
-    entries.sort_by_key(DirEntry::path);
-    for entry in entries {
-        let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
-        if kind.is_dir() && depth < DEPTH_MAX {
-            walk(&path, depth + 1, paths)?;
-        } else if kind.is_file() && is_recording(&path) {
-            paths.push(path);
+/// The files of a folder, and of those in it, that are recordings other than our own logs. Links are not followed, and
+/// pipes, sockets and devices are not opened.
+#[derive(Default)]
+struct Walk {
+    paths: Vec<PathBuf>,
+    /// Recordings and folders for which there was no room.
+    left_out: u64,
+    /// The first things that are neither files nor folders, as sentences.
+    remarks: Vec<String>,
+}
+
+impl Walk {
+    /// What is neither a recording nor a folder is forgotten at once: there may be millions of files.
+    fn folder(&mut self, dir: &Path, depth: usize) -> Result<()> {
+        let context = || format!("{}: cannot be read", dir.display());
+        let mut inside: Vec<(PathBuf, bool)> = Vec::new();
+        for entry in fs::read_dir(dir).with_context(context)? {
+            let entry = entry.with_context(context)?;
+            let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
+            if !kind.is_file() && !kind.is_dir() && self.remarks.len() < REMARKS_MAX {
+                self.remarks.push(logs::passed_over(&path, kind));
+            }
+            let wanted =
+                if kind.is_dir() { depth < DEPTH_MAX } else { kind.is_file() && is_recording(&path) };
+            if !wanted {
+                continue;
+            }
+            if self.paths.len() + inside.len() < WALKED_MAX {
+                inside.push((path, kind.is_dir()));
+            } else {
+                self.left_out += 1;
+            }
         }
+        inside.sort();
+        for (path, is_folder) in inside {
+            if is_folder {
+                self.folder(&path, depth + 1)?;
+            } else {
+                self.paths.push(path);
+            }
+        }
+        Ok(())
     }
-    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_blackbox::{SECTOR_BYTES, Sector};
+
+    use super::*;
+
+    #[test]
+    fn a_folder_with_more_logs_than_are_kept_is_a_finding_with_losses() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let write = |count: u32| {
+            for session in 0..count {
+                let mut bytes = [0; SECTOR_BYTES];
+                bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+                let mut sector = Sector::from_bytes(bytes);
+                sector.seal(session);
+                fs::write(dir.path().join(format!("{session}.hum")), sector.bytes()).expect("room");
+            }
+        };
+        let found = || find(&[dir.path().to_owned()], false).expect("logs");
+        write(2);
+        assert_eq!((found().places.len(), found().is_lossy()), (2, false));
+        write(10_002);
+        let found = found();
+        assert_eq!((found.places.len(), found.is_lossy()), (10_000, true));
+        assert!(found.remarks.iter().any(|remark| remark.contains("too many files")), "{:?}", found.remarks);
+    }
 }

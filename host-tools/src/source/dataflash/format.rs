@@ -414,7 +414,8 @@ fn unit_of(name: &str, factor: Option<f64>) -> String {
     let Some(factor) = factor.filter(|factor| factor.is_finite() && *factor != 0.0) else {
         return name.to_owned();
     };
-    let is = |other: f64| (factor / other - 1.0).abs() < 1e-9;
+    // A factor may have been written in single precision: 1e-6 reads 0.0000009999999974752427 then.
+    let is = |other: f64| (factor / other - 1.0).abs() < 1e-6;
     let prefix = [(1.0, ""), (0.1, "d"), (0.01, "c"), (1e-3, "m"), (1e-6, "u"), (1e-9, "n")];
     if let Some((_, prefix)) = prefix.iter().find(|(value, _)| is(*value)) {
         return format!("{prefix}{name}");
@@ -433,6 +434,7 @@ mod tests {
     #[test]
     fn units_have_their_multipliers_as_prefixes() {
         assert_eq!(unit_of("s", Some(1e-6)), "us");
+        assert_eq!(unit_of("s", Some(f64::from(1e-6_f32))), "us");
         assert_eq!(unit_of("A.s", Some(3.6)), "mAh");
         assert_eq!(unit_of("m", Some(100.0)), "100 m");
         assert_eq!(unit_of("deg", None), "deg");

@@ -24,6 +24,9 @@ impl Tables {
     pub(super) fn of(&mut self, format: &Format, units: Vec<String>) -> Option<Arc<Table>> {
         let name = safe(&format.name);
         let columns = columns(format, units);
+        if self.count >= TABLES_MAX && !self.by_name.contains_key(&name) {
+            return None;
+        }
         let versions = self.by_name.entry(name.clone()).or_default();
         if let Some(table) = versions.iter().find(|table| table.columns == columns) {
             return Some(Arc::clone(table));

@@ -2,6 +2,7 @@
 
 mod equality;
 mod hostile;
+mod pause;
 mod writer;
 
 use anyhow::Result;

@@ -1,0 +1,105 @@
+//! The monitor's time over a recording: it goes with the recording's time, and stands still where the recording has a gap.
+//!
+//! Nothing is known of the vehicle in a gap. So no age grows over one, no debounce runs out, and nothing is counted as time
+//! in the air. After a gap of [`SETTLE`] and longer the checks are not stepped for that long, while the first values come
+//! in.
+
+use hums_core::monitor::TICK;
+use hums_core::time::{Instant, Span};
+
+/// What follows a long gap and is not judged: what is told once a second has come again by then.
+pub(super) const SETTLE: Span = Span::from_secs(1);
+
+/// The two times, side by side.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Clock {
+    /// The recording's time of the next step; `None` before the first.
+    next: Option<Instant>,
+    /// By how much the monitor's time is behind the recording's: the sum of the gaps.
+    behind: Span,
+    /// The recording's time at the end of the latest gap.
+    gap_end: Instant,
+    /// The monitor's latest time.
+    reached: Instant,
+}
+
+impl Clock {
+    /// The recording's time of the next step, which is `at` where there was none yet.
+    pub(super) fn begin(&mut self, at: Instant) -> Instant {
+        *self.next.get_or_insert(at)
+    }
+
+    /// The next step up to a time of the recording, if there is one more.
+    pub(super) fn step(&mut self, to: Instant) -> Option<Instant> {
+        let now = self.next.filter(|next| *next <= to)?;
+        self.next = Some(now + TICK);
+        Some(now)
+    }
+
+    /// The next step is at this time, if that is later: both times go on.
+    pub(super) fn skip_to(&mut self, at: Instant) {
+        self.next = self.next.max(Some(at));
+    }
+
+    /// The recording has nothing from here to there: the monitor's time stands still. What comes before was stepped.
+    pub(super) fn pause(&mut self, from: Instant, to: Instant) {
+        let length = to.since(from.max(self.gap_end));
+        let Some(next) = self.next.filter(|_| length > Span::ZERO) else { return };
+        self.behind = self.behind + length;
+        self.gap_end = to;
+        self.next = Some(next.max(to + if length >= SETTLE { SETTLE } else { TICK }));
+    }
+
+    /// The monitor's time at a time of the recording; it never falls.
+    pub(super) fn monitor(&mut self, at: Instant) -> Instant {
+        let behind = Instant::from_micros(at.as_micros().saturating_sub(self.behind.as_micros()));
+        self.reached = self.reached.max(behind);
+        self.reached
+    }
+
+    /// The recording's time of an earlier time of the monitor, seen from `now` of the recording, which is `steps` of the
+    /// monitor. Gaps between the two are not counted.
+    pub(super) fn recording(now: Instant, steps: Instant, earlier: Instant) -> Instant {
+        Instant::from_micros(now.as_micros().saturating_sub(steps.since(earlier).as_micros()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(milliseconds: u64) -> Instant {
+        Instant::from_millis(milliseconds)
+    }
+
+    fn steps(clock: &mut Clock, to: Instant) -> Vec<(u64, u64)> {
+        std::iter::from_fn(|| {
+            let now = clock.step(to)?;
+            Some((now.as_millis(), clock.monitor(now).as_millis()))
+        })
+        .collect()
+    }
+
+    #[test]
+    fn the_monitors_time_stands_still_over_a_gap_and_no_step_is_made_for_a_second_after_it() {
+        let mut clock = Clock::default();
+        clock.begin(ms(1_000));
+        assert_eq!(steps(&mut clock, ms(1_120)), [(1_000, 1_000), (1_050, 1_050), (1_100, 1_100)]);
+        clock.pause(ms(1_120), ms(21_120));
+        assert_eq!(clock.monitor(ms(21_130)), ms(1_130), "it goes on where the gap ends");
+        assert_eq!(steps(&mut clock, ms(22_110)), []);
+        assert_eq!(steps(&mut clock, ms(22_170)), [(22_120, 2_120), (22_170, 2_170)]);
+        assert_eq!(Clock::recording(ms(22_170), ms(2_170), ms(2_150)), ms(22_150));
+        clock.pause(ms(22_170), ms(22_270));
+        assert_eq!(steps(&mut clock, ms(22_330)), [(22_320, 2_220)], "a short one has no second after it");
+    }
+
+    #[test]
+    fn a_gap_within_a_gap_changes_nothing() {
+        let mut clock = Clock::default();
+        clock.begin(ms(0));
+        clock.pause(ms(0), ms(10_000));
+        clock.pause(ms(0), ms(5_000));
+        assert_eq!(steps(&mut clock, ms(11_050)), [(11_000, 1_000), (11_050, 1_050)]);
+    }
+}
