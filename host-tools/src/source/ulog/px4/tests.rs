@@ -4,8 +4,10 @@ use crate::source::ulog::testing::{Read, Writer, read};
 
 const SECOND: u64 = 1_000_000;
 
-/// A topic with messages, each with its time in seconds.
-fn log(topics: &[(&str, &str, &[(u64, Vec<u8>)])]) -> Read {
+/// A topic: its name, its fields, and its messages, each with its time in seconds.
+type Topic<'a> = (&'a str, &'a str, &'a [(u64, Vec<u8>)]);
+
+fn log(topics: &[Topic<'_>]) -> Read {
     let mut writer = Writer::new(SECOND);
     for (name, fields, _) in topics {
         writer = writer.format(&format!("{name}:uint64_t timestamp;{fields}"));
@@ -13,7 +15,7 @@ fn log(topics: &[(&str, &str, &[(u64, Vec<u8>)])]) -> Read {
     for (id, (name, ..)) in topics.iter().enumerate() {
         writer = writer.subscribe(id as u16, 0, name);
     }
-    let of = |(id, topic): (usize, &(_, _, &[(u64, Vec<u8>)]))| {
+    let of = |(id, topic): (usize, &Topic<'_>)| {
         let messages = topic.2.iter().map(move |(second, data)| (*second, id as u16, data.clone()));
         messages.collect::<Vec<_>>()
     };
