@@ -1,6 +1,6 @@
 //! Recordings: what they are, by their content, and where they are.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
+use crate::files::FileId;
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::{self, Content, Log};
 
@@ -253,12 +254,35 @@ pub struct Found {
     pub remarks: Vec<String>,
     /// There were more logs or recordings than are kept.
     pub is_cut: bool,
+    /// Files of the inputs so far, by device and number.
+    seen: BTreeSet<FileId>,
 }
 
 impl Found {
     /// Whether a card's file system is damaged, or logs were left out: exit code 3.
     pub fn is_lossy(&self) -> bool {
         self.is_cut || self.images.iter().any(|image| !image.damage.is_empty())
+    }
+
+    /// Drops what was added since there were `before` places and lies in files of earlier inputs.
+    fn drop_repeats(&mut self, before: usize) {
+        let mut inside = BTreeSet::new();
+        for place in self.places.split_off(before) {
+            let pieces =
+                place.own().into_iter().flat_map(|log| &log.pieces).map(|piece| piece.path.as_path());
+            let files: Vec<FileId> =
+                pieces.chain(place.path()).filter_map(|path| FileId::of(path).ok()).collect();
+            if !files.is_empty() && files.iter().all(|file| self.seen.contains(file)) {
+                if self.remarks.len() < REMARKS_MAX {
+                    self.remarks
+                        .push(format!("{}: was named or found already; it is read once", place.title));
+                }
+            } else {
+                self.places.push(place);
+            }
+            inside.extend(files);
+        }
+        self.seen.append(&mut inside);
     }
 
     /// Every file that any of it is in.
@@ -307,6 +331,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         } else {
             found.places.push(Place::file(input));
         }
+        found.drop_repeats(before);
         if inputs.len() > 1 {
             name_after(input, found.places.iter_mut().skip(before).filter(|place| place.own().is_some()));
         }
