@@ -60,6 +60,7 @@ struct FlightJson {
     from_s: f64,
     to_s: f64,
     landed: bool,
+    disarmed_at_m: Option<f32>,
 }
 
 #[derive(Serialize)]
@@ -120,7 +121,7 @@ const SCHEMA: &str = "hums-check";
 /// A log's object.
 pub fn line(checked: &Checked) -> serde_json::Result<String> {
     let judged = &checked.judged;
-    let utc = |at: Instant| judged.epoch_us.map(|epoch| iso8601(epoch.saturating_add(at.as_micros())));
+    let utc = |at: Instant| judged.epochs.utc_us(at).map(iso8601);
     serde_json::to_string(&LogJson {
         schema: SCHEMA,
         version: VERSION,
@@ -183,7 +184,12 @@ fn vehicle(judged: &Judged) -> Option<VehicleJson> {
 }
 
 fn flight(flight: &super::judge::Flight) -> FlightJson {
-    FlightJson { from_s: flight.from.as_secs_f64(), to_s: flight.to.as_secs_f64(), landed: flight.landed }
+    FlightJson {
+        from_s: flight.from.as_secs_f64(),
+        to_s: flight.to.as_secs_f64(),
+        landed: flight.landed,
+        disarmed_at_m: flight.disarmed_at_m,
+    }
 }
 
 fn problem(problem: &Problem, time_utc: Option<String>) -> ProblemJson<'_> {

@@ -18,6 +18,7 @@ use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
 use super::clock::Clock;
+use super::epochs::Epochs;
 use super::problem::{LISTED_MAX, Problem, Problems};
 use crate::source::item::{About, Gap, Item};
 use crate::source::recording::Format;
@@ -67,6 +68,8 @@ pub struct Flight {
     pub to: Instant,
     /// It landed.
     pub landed: bool,
+    /// It was disarmed in the air, at this height above home, m.
+    pub disarmed_at_m: Option<f32>,
 }
 
 /// What came of a recording.
@@ -78,8 +81,8 @@ pub struct Judged {
     pub monitor: Box<Monitor>,
     /// Facts besides, the last of each kind.
     pub facts: BTreeMap<About, String>,
-    /// UTC at time zero, microseconds since 1970.
-    pub epoch_us: Option<u64>,
+    /// UTC of each part of the recording.
+    pub epochs: Epochs,
     /// The first and the last time.
     pub span: Option<(Instant, Instant)>,
     /// How long it was armed.
@@ -143,13 +146,17 @@ pub struct Judge {
     seen: Vec<Seen>,
     armed: Span,
     was_armed: bool,
+    /// When it was in the air last.
+    flew_at: Option<Instant>,
+    /// When it was disarmed above home right out of the air, and how high.
+    disarmed: Option<(Instant, f32)>,
     /// What the monitor here found, and what the one on board did.
     here: Problems,
     board: Problems,
     checked_on_board: bool,
     flights: Vec<Flight>,
     facts: BTreeMap<About, String>,
-    epoch_us: Option<u64>,
+    epochs: Epochs,
     gaps: Vec<Gap>,
     damages: u64,
     losses: u64,
@@ -170,12 +177,14 @@ impl Judge {
             seen: vec![Seen::default(); VOCABULARY.len()],
             armed: Span::ZERO,
             was_armed: false,
+            flew_at: None,
+            disarmed: None,
             here: Problems::default(),
             board: Problems::default(),
             checked_on_board: false,
             flights: Vec::new(),
             facts: BTreeMap::new(),
-            epoch_us: None,
+            epochs: Epochs::default(),
             gaps: Vec::new(),
             damages: 0,
             losses: 0,
@@ -190,13 +199,16 @@ impl Judge {
                 self.advance(at);
                 self.monitor.observe(self.clock.monitor(at), source, observation);
             }
-            Item::Epoch(epoch_us) => self.epoch_us = Some(epoch_us),
+            Item::Epoch(epoch_us) => self.epochs.epoch(epoch_us),
             Item::Fact(fact) => {
                 self.facts.insert(fact.about, fact.words.to_owned());
             }
             Item::Record(told) => self.told(told),
             Item::Gap(gap) => self.gap(gap),
-            Item::Restart => self.restarts += 1,
+            Item::Restart => {
+                self.restarts += 1;
+                self.epochs.restart(at);
+            }
             Item::Frame(_)
             | Item::Parameter(_)
             | Item::Text(_)
@@ -263,6 +275,9 @@ impl Judge {
             }
         });
         let armed = monitor.vehicle().armed();
+        if monitor.flight().airborne() {
+            self.flew_at = Some(now);
+        }
         if armed && self.was_armed {
             self.armed = self.armed + TICK;
         }
@@ -270,6 +285,7 @@ impl Judge {
         while let Some(happening) = self.monitor.take_happening() {
             self.happening(now, steps, happening);
         }
+        self.watch_fall(now);
         if now >= self.note {
             self.note = now + NOTE_EVERY;
             self.note_seen(steps, &link, &recorder);
@@ -281,15 +297,51 @@ impl Judge {
             Happening::TakeOff if self.flights.len() < LISTED_MAX => {
                 let since = self.monitor.flight().airborne_since();
                 let from = since.map_or(now, |since| Clock::recording(now, steps, since));
-                self.flights.push(Flight { from, to: now, landed: false });
+                self.flights.push(Flight { from, to: now, landed: false, disarmed_at_m: None });
             }
-            Happening::Landing => self.end_flight(now, true),
+            Happening::Landing => {
+                self.end_flight(now, true);
+                self.disarmed = self.disarmed_at_m(now).map(|height_m| (now, height_m));
+            }
             _ => {}
         }
     }
 
+    /// The height above home where a flight that ends now was ended by disarming, not well after a landing.
+    fn disarmed_at_m(&self, now: Instant) -> Option<f32> {
+        /// Lower is a landing whose last metre the autopilot or its height has missed.
+        const LANDING_M: f32 = 3.0;
+        /// The autopilot says that it stands when it disarms, and its heartbeat comes at 1 Hz.
+        const SINCE_AIR: Span = Span::from_secs(2);
+        let flew = self.flew_at.is_some_and(|at| now.since(at) <= SINCE_AIR);
+        let disarmed = flew && !self.monitor.vehicle().armed();
+        self.height_m().filter(|height_m| disarmed && *height_m > LANDING_M)
+    }
+
+    /// What was disarmed above home falls if it was in the air, and stays where it is if it stands on a hill or a roof.
+    fn watch_fall(&mut self, now: Instant) {
+        const WATCHED: Span = Span::from_secs(4);
+        const FALLEN_M: f32 = 2.0;
+        let Some((at, from_m)) = self.disarmed else { return };
+        if self.height_m().is_some_and(|height_m| height_m < from_m - FALLEN_M) {
+            if let Some(flight) = self.flights.last_mut() {
+                (flight.landed, flight.disarmed_at_m) = (false, Some(from_m));
+            }
+            self.disarmed = None;
+        } else if now.since(at) > WATCHED {
+            self.disarmed = None;
+        }
+    }
+
+    /// Height above home, as it was told last.
+    fn height_m(&self) -> Option<f32> {
+        self.monitor.vehicle().global.get().map(|position| position.relative_altitude.0)
+    }
+
     fn end_flight(&mut self, at: Instant, landed: bool) {
-        if let Some(flight) = self.flights.last_mut().filter(|flight| !flight.landed) {
+        if let Some(flight) =
+            self.flights.last_mut().filter(|flight| !flight.landed && flight.disarmed_at_m.is_none())
+        {
             (flight.to, flight.landed) = (at, landed);
         }
     }
@@ -347,7 +399,7 @@ impl Judge {
             by,
             monitor: self.monitor,
             facts: self.facts,
-            epoch_us: self.epoch_us,
+            epochs: self.epochs,
             span: self.first.map(|first| (first, last)),
             armed: self.armed,
             flights: self.flights,
@@ -374,6 +426,11 @@ impl Judge {
             }
         }
         (judged, not_judged)
+    }
+
+    /// How arming is known, where the recording does not tell it.
+    fn arming(&self) -> Option<&str> {
+        self.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty())
     }
 
     fn why_not(&self, check: &Check, seen: Seen, by: JudgedBy) -> Verdict {
@@ -406,14 +463,16 @@ impl Judge {
         if is_off(check, self.monitor.params()) {
             return not("its limit is off");
         }
-        if seen.level {
-            return Verdict::Judged;
-        }
         if words.scope == Scope::Stored {
             return not("only a monitor on board knows earlier flights and parts that wear");
         }
+        if seen.level {
+            return Verdict::Judged;
+        }
         match check.when {
-            When::Armed if self.armed == Span::ZERO => not("never armed"),
+            When::Armed | When::InFlight if self.armed == Span::ZERO => {
+                not(self.arming().unwrap_or("never armed"))
+            }
             When::InFlight if self.flights.is_empty() => not("never in the air"),
             _ if seen.value => not("only for a moment in this recording"),
             _ => Verdict::NotJudged(format!("no {}", words.needs)),
@@ -428,10 +487,12 @@ enum Verdict {
     NotMeant,
 }
 
-/// Whether a check says anything in a recording of this format.
+/// Whether a check says anything in a recording of this format, judged here: one recording tells neither of earlier flights
+/// nor of parts that wear.
 fn is_of(check: &str, format: Format) -> bool {
     let scope = vocabulary(check).map(|words| words.scope);
-    !matches!(scope, Some(Scope::Recorder)) && (format == Format::Hums || scope != Some(Scope::Wire))
+    !matches!(scope, Some(Scope::Recorder | Scope::Stored))
+        && (format == Format::Hums || scope != Some(Scope::Wire))
 }
 
 /// Whether no value can be beyond the limits: they stand at the end of their range.
@@ -534,6 +595,70 @@ mod tests {
         assert_eq!(why("vibration_px4"), "");
         let named = judged.judged.len() + judged.not_judged.len();
         assert_eq!(named, VOCABULARY.iter().filter(|words| words.scope != Scope::Px4).count());
+    }
+
+    /// A flight at 30 m that is disarmed at 20 s, and falls or stays.
+    fn disarmed_high(falls: bool) -> Judged {
+        use hums_core::observation::GlobalPosition;
+        use hums_core::units::{Metres, MetresPerSecond};
+        let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+        for tick in 0..300_u64 {
+            let (at, armed) = (Instant::from_millis(tick * 100), (20..200).contains(&tick));
+            let fallen = if falls { tick.saturating_sub(200) as f32 } else { 0.0 };
+            let height = if tick < 30 { 0.0 } else { (30.0 - fallen).max(0.0) };
+            let position = Observation::GlobalPosition(GlobalPosition {
+                position: None,
+                altitude: Metres(height),
+                relative_altitude: Metres(height),
+                velocity: [MetresPerSecond(0.0); 3],
+            });
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(armed)));
+            judge.item(at, Item::Observation(AUTOPILOT, &position));
+        }
+        judge.end()
+    }
+
+    #[test]
+    fn a_vehicle_that_falls_after_it_is_disarmed_did_not_land() {
+        let flights = disarmed_high(true).flights;
+        let [flight] = flights.as_slice() else { panic!("{flights:?}") };
+        assert_eq!((flight.landed, flight.disarmed_at_m), (false, Some(30.0)));
+        let flights = disarmed_high(false).flights;
+        let [flight] = flights.as_slice() else { panic!("{flights:?}") };
+        assert_eq!((flight.landed, flight.disarmed_at_m), (true, None), "it stands on a hill");
+    }
+
+    #[test]
+    fn trends_over_flights_are_not_judged_from_one_recording() {
+        for format in [Format::DataFlash, Format::Tlog, Format::Hums] {
+            let stored = VOCABULARY.iter().filter(|words| words.scope == Scope::Stored);
+            assert!(stored.clone().count() > 3);
+            for words in stored {
+                assert!(!is_of(words.check, format), "{}", words.check);
+            }
+        }
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        fly(&mut judge, 0, 20, 10, 0.9);
+        let judged = judge.end();
+        let why = judged.not_judged.iter().find(|(check, _)| *check == "batt_resistance");
+        assert!(why.is_some_and(|(_, why)| why.contains("only a monitor on board")), "{why:?}");
+    }
+
+    #[test]
+    fn a_recording_that_does_not_tell_arming_says_so_and_not_never() {
+        use crate::source::item::Fact;
+        let words = "the log does not tell whether it was armed";
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        judge.item(Instant::ZERO, Item::Fact(Fact { about: About::Arming, words }));
+        for second in 0..20 {
+            let at = Instant::from_millis(second * 1_000);
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(false)));
+        }
+        let judged = judge.end();
+        assert!(!judged.not_judged.is_empty());
+        for (check, why) in judged.not_judged {
+            assert!(!why.contains("never"), "{check}: {why}");
+        }
     }
 
     #[test]

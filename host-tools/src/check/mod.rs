@@ -5,6 +5,7 @@
 
 pub mod checked;
 mod clock;
+mod epochs;
 pub mod json;
 pub mod judge;
 mod overview;

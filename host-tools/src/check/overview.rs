@@ -48,7 +48,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     }
     let (format, judged, summary) = judge(place, &limits, true)?;
     let mut contents = Contents::default();
-    contents.epoch_us = judged.epoch_us;
+    contents.epoch_us = judged.epochs.whole();
     count(&mut contents, format, summary);
     contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
     let mut overview = Overview {
@@ -58,7 +58,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
         format: Some(format),
         ..Overview::default()
     };
-    overview.summary.epoch_us = judged.epoch_us;
+    overview.summary.epoch_us = judged.epochs.whole();
     overview.summary.frames = contents.frames();
     overview.summary.gaps = judged.damages + judged.losses;
     (overview.summary.first, overview.summary.last) = judged.span.unzip();

@@ -28,7 +28,14 @@ pub fn screen(checked: &Checked) -> String {
     let _ = writeln!(text, "  vehicle  {}", vehicle(judged));
     let _ = writeln!(text, "  when     {}", when(judged));
     let _ = writeln!(text, "  in air   {}", in_air(judged));
-    let _ = writeln!(text, "  verdict  {}\n", verdict(judged));
+    let _ = writeln!(text, "  verdict  {}", verdict(judged));
+    for height_m in judged.flights.iter().filter_map(|flight| flight.disarmed_at_m) {
+        let _ = writeln!(
+            text,
+            "  remark   disarmed in the air, {height_m:.0} m above home: no check judges that"
+        );
+    }
+    text.push('\n');
     problems(&mut text, judged);
     not_judged(&mut text, judged);
     damage(&mut text, judged);
@@ -50,9 +57,11 @@ pub fn line(checked: &Checked) -> String {
             names.push(name);
         }
     }
+    let in_air = judged.flights.iter().any(|flight| flight.disarmed_at_m.is_some());
+    let in_air = if in_air { "; disarmed in the air" } else { "" };
     let damaged = if checked.judged.damages > 0 { "; damaged" } else { "" };
     let air = clock(flown(judged));
-    format!("{level:<8}  {air:>8}  {}  {}{damaged}", checked.name, names.join(", "))
+    format!("{level:<8}  {air:>8}  {}  {}{in_air}{damaged}", checked.name, names.join(", "))
 }
 
 /// Many logs, added up.
@@ -147,11 +156,9 @@ pub(super) fn firmware(version: u32) -> Option<String> {
 
 fn when(judged: &Judged) -> String {
     let Some((first, last)) = judged.span else { return "nothing of a vehicle is in it".to_owned() };
-    let utc = judged.epoch_us.map_or_else(
+    let utc = judged.epochs.utc_us(first).map_or_else(
         || "time of day unknown".to_owned(),
-        |epoch| {
-            iso8601(epoch.saturating_add(first.as_micros()) / 1_000_000 * 1_000_000).replace(".000000", "")
-        },
+        |utc_us| iso8601(utc_us / 1_000_000 * 1_000_000).replace(".000000", ""),
     );
     let restarts = match judged.restarts {
         0 => String::new(),
@@ -167,16 +174,24 @@ pub(super) fn flown(judged: &Judged) -> Span {
 }
 
 fn in_air(judged: &Judged) -> String {
+    let told = judged.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty());
     let armed = clock(judged.armed);
-    match judged.flights.as_slice() {
-        [] if judged.armed == Span::ZERO => "never armed".to_owned(),
+    let text = match judged.flights.as_slice() {
+        [] if judged.armed == Span::ZERO => return told.unwrap_or("never armed").to_owned(),
         [] => format!("never; armed {armed}"),
+        [flight] if flight.disarmed_at_m.is_some() => {
+            format!(
+                "{} in 1 flight, which ended by disarming in the air; armed {armed}",
+                clock(flown(judged))
+            )
+        }
         [flight] if !flight.landed => {
             format!("{} in 1 flight, which the log does not see land; armed {armed}", clock(flown(judged)))
         }
         [_] => format!("{} in 1 flight; armed {armed}", clock(flown(judged))),
         flights => format!("{} in {} flights; armed {armed}", clock(flown(judged)), flights.len()),
-    }
+    };
+    told.map_or(text.clone(), |told| format!("{text} ({told})"))
 }
 
 /// The verdict, as a line.

@@ -108,6 +108,8 @@ pub enum About {
     Frame,
     /// Who or what made the recording.
     Recorder,
+    /// How arming is known, where the recording does not tell it: a sentence. Empty where it does.
+    Arming,
 }
 
 /// The columns of the rows of one name. In one recording a name has one table for ever: a definition that changes its

@@ -48,6 +48,8 @@ pub(super) struct When {
     pub(super) boot_us: Option<u64>,
     /// Its own time is a jump that nothing confirms: the message is likely damaged.
     pub(super) doubted: bool,
+    /// It has a time of its own.
+    pub(super) timed: bool,
 }
 
 impl Clock {
@@ -82,7 +84,7 @@ impl Clock {
         };
         let Some(recorded_us) = boot_us.or_else(|| week.map(|ms| self.since_first(ms.saturating_mul(1_000))))
         else {
-            return When { at: self.now(), restarted: false, boot_us, doubted: false };
+            return When { at: self.now(), restarted: false, boot_us, doubted: false, timed: false };
         };
         if self.is_doubtful(recorded_us) {
             let agrees = self.doubted_us.is_some_and(|doubted_us| {
@@ -91,7 +93,7 @@ impl Clock {
             });
             if !agrees {
                 self.doubted_us = Some(recorded_us);
-                return When { at: self.now(), restarted: false, boot_us, doubted: true };
+                return When { at: self.now(), restarted: false, boot_us, doubted: true, timed: true };
             }
         }
         self.doubted_us = None;
@@ -102,7 +104,7 @@ impl Clock {
         let before = self.now();
         let Moment { at, restarted } = self.timeline.at(recorded_us);
         self.silence = Some(before).filter(|before| !restarted && at.since(*before) > SILENCE);
-        When { at, restarted, boot_us, doubted: false }
+        When { at, restarted, boot_us, doubted: false, timed: true }
     }
 
     /// The time of the week as time since the first one; it goes on over the week's end.

@@ -10,7 +10,7 @@ use hums_core::time::Instant;
 use super::clock::Clock;
 use super::format::{Defined, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
-use super::observe::{self, Craft, Handlers, Out, Say, State};
+use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
 use super::table::{self, Tables};
 use crate::source::item::{
     About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
@@ -150,6 +150,9 @@ pub(super) struct Session<'w> {
     epoch_us: Option<u64>,
     firmware: String,
     rows_refused: bool,
+    /// What messages with a doubted time, or with none, have changed: it holds from the next message on whose time is
+    /// known.
+    later: Option<Standing>,
 }
 
 impl<'w> Session<'w> {
@@ -172,6 +175,7 @@ impl<'w> Session<'w> {
             epoch_us: None,
             firmware: first.banner.unwrap_or_default(),
             rows_refused: false,
+            later: None,
         }
     }
 
@@ -284,7 +288,7 @@ impl<'w> Session<'w> {
 
     /// Hands on what a message says, and what the autopilot says again and again.
     fn say(&mut self, kind: u8, body: Body<'_>, take: &mut Take<'_>) -> Result<()> {
-        let Self { want, formats, state, clock, handlers, epoch_us, firmware, .. } = self;
+        let Self { want, formats, state, clock, handlers, epoch_us, firmware, later, .. } = self;
         let Some(format) = formats.get(kind) else { return Ok(()) };
         let message = Message::new(format, body);
         let week = || message.unsigned(format.field("TimeMS").or_else(|| format.field("Time"))?);
@@ -304,6 +308,9 @@ impl<'w> Session<'w> {
             let (from, to, words) = (Some(from), Some(when.at), words.to_owned());
             take(when.at, Item::Gap(&Gap { from, to, cause, place: None, bytes: 0, words }))?;
         }
+        if let Some(standing) = later.take_if(|_| !when.doubted && when.timed) {
+            state.stand(standing);
+        }
         let craft = state.craft();
         let mut result = Ok(());
         let mut said = Said { at: when.at, observations: want.observations, craft, epoch_us, firmware, take };
@@ -320,7 +327,17 @@ impl<'w> Session<'w> {
         if let Some(resolved) = handlers.of(format) {
             // A message with a time that cannot be is likely damaged; its words are kept.
             let is_said = resolved.handler.is_said;
-            if is_said || !when.doubted {
+            if is_said && (when.doubted || !when.timed) {
+                let before = state.standing();
+                state.stand(later.unwrap_or(before));
+                observe::take(state, resolved, &message, (when.at, when.boot_us), &mut out);
+                let after = state.standing();
+                // Without a time, disarming counts as of the message before it, and arming as of the next: a logger pauses
+                // in between.
+                let waits = if when.doubted { after != before } else { after.arms(&before) };
+                *later = waits.then_some(after);
+                state.stand(if waits { before } else { after });
+            } else if !when.doubted {
                 observe::take(state, resolved, &message, (when.at, when.boot_us), &mut out);
             }
             if is_timed && is_said && want.observations {
@@ -423,6 +440,7 @@ impl Said<'_, '_> {
             Say::Text(severity, words) => Item::Text(Text { source: SOURCE, severity, words }),
             Say::Mode(number) => Item::Mode(Mode { number, name: self.craft.mode_name(number) }),
             Say::Event(number, severity, words) => Item::Event(Event { number, severity, words }),
+            Say::Arming(words) => Item::Fact(Fact { about: About::Arming, words }),
             Say::Frame(words) => Item::Fact(Fact { about: About::Frame, words }),
             Say::Firmware(words) if words == self.firmware => return Ok(()),
             Say::Firmware(words) => {

@@ -5,6 +5,7 @@
 //! Sources: `LogStructure.h` of `ArduPilot`'s libraries and vehicles for the messages, `GCS_Common.cpp` and
 //! `AP_NavEKF3_Outputs.cpp` for what MAVLink makes of the same figures.
 
+mod arming;
 mod handler;
 mod motion;
 mod power;
@@ -18,7 +19,7 @@ use hums_core::time::Instant;
 
 use self::handler::{Given, Handler, Slots};
 pub(super) use self::say::{Out, Say};
-pub(super) use self::state::State;
+pub(super) use self::state::{Standing, State};
 pub(super) use self::words::Craft;
 use super::format::Format;
 use super::message::Message;

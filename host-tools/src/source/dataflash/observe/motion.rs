@@ -194,6 +194,7 @@ fn gnss(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         time(state, given, fix, out);
         if let Some(speed) = speed {
             state.ground_speed.set(given.at, speed);
+            state.speed(given.at, if fix >= FIX_3D { speed } else { 0.0 });
         }
         if fix >= FIX_3D && !state.facts.has_positions {
             position_of_gnss(state, given, &gnss, out);
@@ -389,7 +390,7 @@ fn hud(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         _ => throttle,
     });
     if let Some(throttle) = throttle {
-        state.throttle(throttle);
+        state.throttle(given.at, throttle);
     }
     let airspeed = state.airspeed.within(given.at, TOGETHER).or_else(|| given.single(2));
     out.observe(&Observation::Hud(Hud {

@@ -1,10 +1,10 @@
 //! What a log says in words and numbers of its own: parameters, texts, modes, events, errors, arming.
 
-use hums_core::observation::{AutopilotIdentity, LandedState, Observation};
+use hums_core::observation::{AutopilotIdentity, Observation};
 
 use super::handler::{Given, Handler};
 use super::say::{Out, Say};
-use super::state::State;
+use super::state::{State, version_of};
 use super::words::{self, Craft};
 
 /// `MAV_SEVERITY_INFO`: MSG does not tell how grave its words are.
@@ -33,8 +33,8 @@ pub(super) const HANDLERS: &[Handler] = &[
         ..SAID
     },
     Handler { names: &[("MODE", 0)], columns: &[&["ModeNum"], &["Mode"]], take: mode, ..SAID },
-    Handler { names: &[("ARM", 0)], columns: &[&["ArmState"]], take: arm, ..SAID },
-    Handler { names: &[("EV", 0)], columns: &[&["Id"]], take: event, ..SAID },
+    Handler { names: &[("ARM", 0)], columns: &[&["ArmState"]], is_fact: true, take: arm, ..SAID },
+    Handler { names: &[("EV", 0)], columns: &[&["Id"]], is_fact: true, take: event, ..SAID },
     Handler { names: &[("ERR", 0)], columns: &[&["Subsys"], &["ECode"]], take: error, ..SAID },
     Handler { names: &[("DSF", 0)], columns: &[&["Dp"]], take: dropped, ..SAID },
 ];
@@ -50,6 +50,10 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         "LOG_DISARMED" => facts.logs_disarmed = Some(value != 0.0),
         "RSSI_TYPE" => facts.has_rssi = number > 0,
         "AHRS_EKF_TYPE" => facts.estimator = Some(number),
+        // Of helicopters alone; the name of the firmware is a copter's.
+        "H_RSC_MODE" | "H_SV_MAN" if matches!(facts.craft, Craft::Unknown | Craft::Copter) => {
+            facts.craft = Craft::Heli;
+        }
         _ => {
             if let Some(battery) = capacity_of(&name)
                 && let Some(capacity) = facts.capacity_mah.get_mut(battery)
@@ -94,22 +98,6 @@ fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
     out.say(&Say::Firmware(words));
 }
 
-/// `ArduCopter V4.6.3 (92b0cd78)` is 4.6.3; an official release where nothing follows the numbers.
-fn version_of(words: &str) -> Option<u32> {
-    /// `FIRMWARE_VERSION_TYPE_OFFICIAL`
-    const OFFICIAL: u32 = 255;
-    let (_, version) = words::name_and_version(words)?;
-    let number = version.split(' ').next()?;
-    let (numbers, official) =
-        match number.find(|character: char| !(character.is_ascii_digit() || character == '.')) {
-            Some(at) => (number.get(..at)?, 0),
-            None => (number, OFFICIAL),
-        };
-    let mut parts = numbers.split('.').map(|part| part.parse::<u8>().unwrap_or(0));
-    let mut next = || u32::from(parts.next().unwrap_or(0));
-    Some(next() << 24 | next() << 16 | next() << 8 | official)
-}
-
 fn identify(state: &mut State, firmware: u32, out: &mut Out<'_>) {
     state.facts.version = firmware;
     out.observe(&Observation::Identity(AutopilotIdentity { firmware, uid: 0 }));
@@ -151,8 +139,8 @@ fn event(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     match number {
         10 => state.arm(true),
         11 => state.arm(false),
-        15 => state.armed = Some(true),
-        18 => state.landed = LandedState::OnGround,
+        15 => state.arming.tell(true),
+        18 => state.land(),
         28 => state.leave_ground(),
         _ => {}
     }

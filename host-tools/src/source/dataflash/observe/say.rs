@@ -18,6 +18,8 @@ pub(in crate::source::dataflash) enum Say<'a> {
     Firmware(&'a str),
     /// The airframe.
     Frame(&'a str),
+    /// How arming is known.
+    Arming(&'a str),
     /// UTC at this message, microseconds since 1970.
     Utc(u64),
     /// The autopilot's logger lost so many messages.

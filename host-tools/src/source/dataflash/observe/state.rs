@@ -7,8 +7,9 @@ use hums_core::observation::{
 use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Fraction, Metres, Volts};
 
-use super::say::Out;
-use super::words::Craft;
+use super::arming::{Arming, Word};
+use super::say::{Out, Say};
+use super::words::{Craft, name_and_version};
 
 /// How often the autopilot's state is said, which the log tells by its changes only: `HEARTBEAT` and `SYS_STATUS` come
 /// at 1 Hz or faster.
@@ -64,6 +65,10 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) version: u32,
     /// POS is logged: the estimator's own position.
     pub(super) has_positions: bool,
+    /// What the first message about arming says, where there is one in the first part of the file.
+    pub(super) first_arming: Option<bool>,
+    /// Messages about arming have come.
+    pub(super) tells_arming: bool,
 }
 
 /// What a log has told so far.
@@ -71,8 +76,8 @@ pub(in crate::source::dataflash) struct Facts {
 pub(in crate::source::dataflash) struct State {
     /// What the vehicle is.
     pub(super) facts: Facts,
-    /// Motors may turn, once that was told.
-    pub(super) armed: Option<bool>,
+    /// Motors may turn, as far as that is known.
+    pub(super) arming: Arming,
     pub(super) landed: LandedState,
     pub(super) mode: u32,
     /// Failsafes in force, a bit for each subsystem of ERR.
@@ -103,6 +108,22 @@ pub(in crate::source::dataflash) struct State {
     pub(super) utc_said: Option<Instant>,
     said_at: Option<Instant>,
     said: Option<Heartbeat>,
+    word_said: Option<Word>,
+}
+
+/// What messages of arming and of leaving the ground change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::source::dataflash) struct Standing {
+    arming: Arming,
+    landed: LandedState,
+    failsafes: u64,
+}
+
+impl Standing {
+    /// It is armed here, and was not there.
+    pub(in crate::source::dataflash) fn arms(&self, before: &Self) -> bool {
+        self.arming.armed() == Some(true) && before.arming.armed() != Some(true)
+    }
 }
 
 impl State {
@@ -115,7 +136,8 @@ impl State {
 
     /// What is known of the vehicle.
     pub(in crate::source::dataflash) fn facts(&self) -> Facts {
-        self.facts
+        let first_arming = self.facts.first_arming.or(self.arming.first_told());
+        Facts { first_arming, tells_arming: self.facts.tells_arming || first_arming.is_some(), ..self.facts }
     }
 
     /// What firmware wrote it.
@@ -127,35 +149,66 @@ impl State {
     pub(in crate::source::dataflash) fn is_firmware(&mut self, words: &str) -> bool {
         let craft = Craft::of_firmware(words);
         self.facts.craft = craft.unwrap_or(self.facts.craft);
+        if let Some(version) = version_of(words).filter(|_| craft.is_some()) {
+            self.facts.version = version;
+        }
         craft.is_some()
     }
 
     /// Whether motors may turn, as far as is known.
     pub(in crate::source::dataflash) fn is_armed(&self) -> bool {
-        self.armed == Some(true)
+        self.arming.armed() == Some(true)
     }
 
     /// Another power-on: what was so before tells nothing, but the vehicle is the same.
     pub(in crate::source::dataflash) fn restart(&mut self) {
-        *self = Self::new(self.facts);
+        *self = Self::new(Facts { first_arming: None, ..self.facts() });
     }
 
-    /// A log that is only written while armed begins armed.
+    /// What messages of arming and of leaving the ground change.
+    pub(in crate::source::dataflash) fn standing(&self) -> Standing {
+        Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes }
+    }
+
+    /// Sets what [`State::standing`] tells.
+    pub(in crate::source::dataflash) fn stand(&mut self, standing: Standing) {
+        Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes } = standing;
+    }
+
+    /// A log that is only written while armed begins armed where the first message about arming is that of disarming. A
+    /// logger also begins with an attempt to arm that fails (`AP_Logger`: `LOG_DISARMED` 0), and just before arming.
     fn begin(&mut self) {
-        self.armed = self.facts.logs_disarmed.filter(|logs| !logs).map(|_| true);
+        if self.facts.logs_disarmed == Some(false) && self.facts.first_arming == Some(false) {
+            self.arming.begin_armed();
+        }
     }
 
-    /// The vehicle is armed or disarmed. A copter tells by an event when it leaves the ground, so it stands until then.
+    /// The vehicle is armed or disarmed, as a message says. A copter tells by an event when it leaves the ground, so it
+    /// stands until then.
     pub(super) fn arm(&mut self, armed: bool) {
-        let changes = self.armed != Some(armed);
-        self.armed = Some(armed);
-        if changes && self.facts.craft.tells_landing() && self.landed != LandedState::InAir {
+        let changes = self.arming.armed() != Some(armed);
+        self.arming.tell(armed);
+        if changes && self.tells_landing() && self.landed != LandedState::InAir {
             self.landed = LandedState::OnGround;
         }
         if !armed {
             // A battery's failsafe lasts until then.
             self.failsafes = 0;
         }
+    }
+
+    /// It stands, as a message says.
+    pub(super) fn land(&mut self) {
+        if self.tells_landing() {
+            self.landed = LandedState::OnGround;
+        }
+    }
+
+    /// Whether events tell when it leaves the ground and stands again: a copter's since 3.1 (`DATA_NOT_LANDED`).
+    fn tells_landing(&self) -> bool {
+        /// Versions are bytes from the top down.
+        const SINCE: u32 = 0x0301_0000;
+        self.facts.craft.tells_landing() && (self.facts.version == 0 || self.facts.version >= SINCE)
     }
 
     /// The event comes when the motors spool up for a take-off. In the modes that climb by themselves the autopilot then
@@ -176,10 +229,26 @@ impl State {
         }
     }
 
-    /// Motors turn: a log of before arming was told.
-    pub(super) fn throttle(&mut self, throttle: f32) {
-        if self.armed.is_none() && throttle > 0.0 && !self.facts.craft.tells_arming() {
-            self.armed = Some(true);
+    /// The throttle that the autopilot gives, as a part of all: evidence of arming where nothing tells it.
+    pub(super) fn throttle(&mut self, at: Instant, throttle: f32) {
+        /// A multicopter idles on the ground below a tenth; so does an engine.
+        const IDLE: f32 = 0.1;
+        self.evidence(at, throttle > IDLE);
+    }
+
+    /// The speed over ground, m/s: a plane that is this fast flies, whatever its throttle is.
+    pub(super) fn speed(&mut self, at: Instant, speed_mps: f32) {
+        /// As `hums_core::flight` has it.
+        const FLYING_MPS: f32 = 8.0;
+        if self.facts.craft == Craft::Plane {
+            self.evidence(at, speed_mps > FLYING_MPS);
+        }
+    }
+
+    fn evidence(&mut self, at: Instant, runs: bool) {
+        // Whoever tells arming in every version is believed, unless the log is only written while armed.
+        if !self.facts.craft.tells_arming() || self.facts.logs_disarmed == Some(false) {
+            self.arming.evidence(at, runs);
         }
     }
 
@@ -192,6 +261,12 @@ impl State {
         }
         self.said_at = Some(now);
         self.said = Some(heartbeat);
+        let word = self.arming.word();
+        // What the file tells further on is not said to be unknown until then.
+        let known = word == Word::Told || (word == Word::Unknown && self.facts.tells_arming);
+        if (!known || self.word_said.is_some()) && self.word_said.replace(word) != Some(word) {
+            out.say(&Say::Arming(word.words()));
+        }
         out.observe(&Observation::Heartbeat(heartbeat));
         if self.landed != LandedState::Unknown {
             out.observe(&Observation::Landed(self.landed));
@@ -208,7 +283,7 @@ impl State {
         const ACTIVE: u8 = 4;
         const CRITICAL: u8 = 5;
         let (kind, type_number) = self.kind()?;
-        let armed = self.armed.unwrap_or(false);
+        let armed = self.is_armed();
         let stands = self.landed == LandedState::OnGround || !armed;
         let state = match (self.failsafes, stands) {
             (1.., _) => CRITICAL,
@@ -288,4 +363,20 @@ const fn copter_type(frame_class: u8) -> u8 {
         14 => 35,
         _ => 2,
     }
+}
+
+/// `ArduCopter V4.6.3 (92b0cd78)` is 4.6.3; an official release where nothing follows the numbers.
+pub(super) fn version_of(words: &str) -> Option<u32> {
+    /// `FIRMWARE_VERSION_TYPE_OFFICIAL`
+    const OFFICIAL: u32 = 255;
+    let (_, version) = name_and_version(words)?;
+    let number = version.split(' ').next()?;
+    let (numbers, official) =
+        match number.find(|character: char| !(character.is_ascii_digit() || character == '.')) {
+            Some(at) => (number.get(..at)?, 0),
+            None => (number, OFFICIAL),
+        };
+    let mut parts = numbers.split('.').map(|part| part.parse::<u8>().unwrap_or(0));
+    let mut next = || u32::from(parts.next().unwrap_or(0));
+    Some(next() << 24 | next() << 16 | next() << 8 | official)
 }

@@ -1,5 +1,6 @@
 //! Logs as they should be, as old autopilots wrote them, and as no autopilot would.
 
+mod arming;
 mod equality;
 mod hostile;
 mod pause;

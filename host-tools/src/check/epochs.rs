@@ -1,0 +1,64 @@
+//! UTC of a recording whose clock may begin again: each power-on has its own.
+
+use hums_core::time::Instant;
+
+use super::problem::LISTED_MAX;
+
+/// UTC at time zero by the clock of each part, microseconds since 1970; the parts begin with each restart of the clock.
+#[derive(Clone, Debug, Default)]
+pub struct Epochs {
+    /// Of the first part.
+    first_us: Option<u64>,
+    /// When each later part began, and its UTC.
+    later: Vec<(Instant, Option<u64>)>,
+}
+
+impl Epochs {
+    /// The part at hand tells its UTC.
+    pub(super) fn epoch(&mut self, epoch_us: u64) {
+        let part = self.later.last_mut().map_or(&mut self.first_us, |(_, epoch_us)| epoch_us);
+        *part = Some(epoch_us);
+    }
+
+    /// The clock begins again. Beyond so many restarts the time of day is not known.
+    pub(super) fn restart(&mut self, at: Instant) {
+        if self.later.len() < LISTED_MAX {
+            self.later.push((at, None));
+        } else if let Some((_, epoch_us)) = self.later.last_mut() {
+            *epoch_us = None;
+        }
+    }
+
+    /// UTC at a time of the recording, by the clock of the part that it is in.
+    pub fn utc_us(&self, at: Instant) -> Option<u64> {
+        let part = self.later.iter().rev().find(|(from, _)| *from <= at);
+        let epoch_us = part.map_or(self.first_us, |(_, epoch_us)| *epoch_us)?;
+        Some(epoch_us.saturating_add(at.as_micros()))
+    }
+
+    /// UTC at time zero where the whole recording has one clock.
+    pub fn whole(&self) -> Option<u64> {
+        self.first_us.filter(|_| self.later.is_empty())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_told_by_the_clock_of_its_own_part() {
+        let at = Instant::from_millis;
+        let mut epochs = Epochs::default();
+        epochs.epoch(1_000_000);
+        assert_eq!((epochs.utc_us(at(2_000)), epochs.whole()), (Some(3_000_000), Some(1_000_000)));
+        epochs.restart(at(10_000));
+        assert_eq!(epochs.utc_us(at(9_000)), Some(10_000_000));
+        assert_eq!((epochs.utc_us(at(10_000)), epochs.whole()), (None, None));
+        epochs.epoch(50_000_000);
+        assert_eq!(
+            (epochs.utc_us(at(9_000)), epochs.utc_us(at(11_000))),
+            (Some(10_000_000), Some(61_000_000))
+        );
+    }
+}

@@ -1,0 +1,96 @@
+//! Whether motors may turn: by what the log says of it, and by what the vehicle does where the log says nothing.
+//!
+//! Logs of today tell arming by ARM, EV and MSG. Those of planes and rovers before 2015 do not tell it at all, and what
+//! flies must have been armed: a throttle above idle, or the speed of a plane that flies, is evidence. The first message
+//! about arming ends the guessing.
+
+use hums_core::time::{Instant, Span};
+
+/// Evidence that lasts this long counts: throttle is touched for a test.
+const ARMED_AFTER: Span = Span::from_secs(2);
+/// Evidence with a pause longer than this begins again: the slowest message that it comes from is logged at 1 Hz.
+const PAUSE_MAX: Span = Span::from_millis(2_500);
+/// Without any evidence for so long it is disarmed: a plane glides, and a copter descends, with less than idle.
+const DISARMED_AFTER: Span = Span::from_secs(10);
+
+/// How arming is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Word {
+    /// Nobody knows.
+    Unknown,
+    /// From throttle and speed.
+    Evidence,
+    /// The log says it.
+    Told,
+}
+
+impl Word {
+    /// For people; empty where the log says it.
+    pub(super) const fn words(self) -> &'static str {
+        match self {
+            Self::Unknown => "the log does not tell whether it was armed",
+            Self::Evidence => "the log does not tell arming: taken from throttle and speed",
+            Self::Told => "",
+        }
+    }
+}
+
+/// Whether motors may turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Arming {
+    armed: Option<bool>,
+    /// What the first message about it said.
+    first_told: Option<bool>,
+    /// Since when and until when the evidence has lasted.
+    evidence: Option<(Instant, Instant)>,
+}
+
+impl Arming {
+    /// Whether it is armed; `None` where nobody knows.
+    pub(super) const fn armed(&self) -> Option<bool> {
+        self.armed
+    }
+
+    /// What the first message about it said.
+    pub(super) const fn first_told(&self) -> Option<bool> {
+        self.first_told
+    }
+
+    /// How it is known.
+    pub(super) const fn word(&self) -> Word {
+        match (self.first_told, self.armed) {
+            (Some(_), _) => Word::Told,
+            (None, Some(_)) => Word::Evidence,
+            (None, None) => Word::Unknown,
+        }
+    }
+
+    /// It was armed before the first message.
+    pub(super) const fn begin_armed(&mut self) {
+        (self.armed, self.first_told) = (Some(true), Some(true));
+    }
+
+    /// A message says it.
+    pub(super) fn tell(&mut self, armed: bool) {
+        self.first_told.get_or_insert(armed);
+        self.armed = Some(armed);
+    }
+
+    /// What the vehicle does at this time is evidence that it is armed, or none. It counts where no message has told.
+    pub(super) fn evidence(&mut self, at: Instant, runs: bool) {
+        if self.first_told.is_some() {
+            return;
+        }
+        let known = self.evidence;
+        if runs {
+            let since = known.filter(|(_, last)| at.since(*last) <= PAUSE_MAX).map_or(at, |(since, _)| since);
+            self.evidence = Some((since, at));
+            if at.since(since) >= ARMED_AFTER {
+                self.armed = Some(true);
+            }
+        } else if self.armed == Some(true) && known.is_some_and(|(_, last)| at.since(last) >= DISARMED_AFTER)
+        {
+            self.armed = Some(false);
+        }
+    }
+}
