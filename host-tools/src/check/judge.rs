@@ -115,6 +115,11 @@ impl Judged {
         self.monitor.vehicle()
     }
 
+    /// Whether so few checks had something to judge that nothing found is no good news: fewer than one in ten.
+    pub fn is_little(&self) -> bool {
+        self.judged.len() * 10 < self.judged.len() + self.not_judged.len()
+    }
+
     /// The worst level that was found; `None` where nothing could be judged.
     pub fn worst(&self) -> Option<Level> {
         match self.problems.first() {

@@ -10,6 +10,7 @@ pub mod json;
 pub mod judge;
 mod overview;
 pub mod problem;
+mod states;
 pub mod text;
 
 use anyhow::{Result, bail};

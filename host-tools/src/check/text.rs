@@ -11,6 +11,7 @@ use hums_core::time::{Instant, Span};
 use super::checked::Checked;
 use super::judge::{Judged, JudgedBy};
 use super::problem::Problem;
+use super::states;
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
 use crate::source::item::{About, Cause};
@@ -72,6 +73,7 @@ pub struct Table {
     checks: BTreeMap<String, (u64, u64)>,
     logs: u64,
     damaged: u64,
+    little: u64,
     flown_us: u64,
 }
 
@@ -83,6 +85,7 @@ impl Table {
         self.damaged += u64::from(judged.damages > 0);
         self.flown_us = self.flown_us.saturating_add(flown(judged).as_micros());
         let level = judged.worst().map_or("unknown", Level::name);
+        self.little += u64::from(judged.worst() == Some(Level::Ok) && judged.is_little());
         *self.levels.entry(level).or_default() += 1;
         let mut worst: BTreeMap<&str, Level> = BTreeMap::new();
         for problem in judged.problems.iter().rev() {
@@ -104,7 +107,8 @@ impl Table {
             clock(Span::from_micros(self.flown_us))
         );
         for (count, what) in [
-            (count("ok"), "nothing wrong"),
+            (count("ok").saturating_sub(self.little), "nothing wrong"),
+            (self.little, "too little in it to judge"),
             (count("warning"), "warnings"),
             (count("critical"), "critical"),
             (count("unknown"), "no vehicle in it"),
@@ -133,7 +137,11 @@ fn logs(number: u64) -> String {
 
 fn vehicle(judged: &Judged) -> String {
     let Some((source, heartbeat)) = judged.vehicle().source.zip(judged.vehicle().heartbeat.get()) else {
-        return "none was heard".to_owned();
+        let firmware = judged
+            .facts
+            .get(&About::Firmware)
+            .map(|firmware| format!("{firmware}, of which nothing was heard"));
+        return firmware.unwrap_or_else(|| "none was heard".to_owned());
     };
     let told = judged.facts.get(&About::Firmware).cloned();
     let firmware = told.unwrap_or_else(|| {
@@ -204,6 +212,9 @@ fn verdict(judged: &Judged) -> String {
     let (critical, warnings) = (count(Level::Critical), count(Level::Warning));
     let all = judged.judged.len() + judged.not_judged.len();
     match judged.worst() {
+        None if judged.gaps.iter().any(|gap| gap.cause == Cause::NoTimes) => {
+            "nothing can be said: the log has no times".to_owned()
+        }
         None => "nothing can be said: no autopilot was heard".to_owned(),
         Some(Level::Critical) if warnings > 0 => format!(
             "not fit to fly before this is cleared up: {}, {}",
@@ -216,6 +227,10 @@ fn verdict(judged: &Judged) -> String {
         Some(Level::Warning) => {
             format!("look at this before the next flight: {}", plural(warnings, "warning"))
         }
+        Some(_) if judged.is_little() => format!(
+            "too little in it to judge: {} of {all} checks had something to judge, and nothing was wrong there",
+            judged.judged.len()
+        ),
         Some(_) => format!(
             "nothing wrong in {} of {all} checks; the others had nothing to judge",
             judged.judged.len()
@@ -272,10 +287,14 @@ fn sentence(group: &[&Problem]) -> String {
         let _ = write!(text, ", {part}{plural} {}", numbers.join(", "));
     }
     let unit = if first.unit.is_empty() { String::new() } else { format!(" {}", first.unit) };
-    if first.value.is_finite() {
+    // The limit of a state is a number between two of them, which tells nobody anything.
+    let state = states::name(&first.check, first.value);
+    if let Some(state) = state {
+        let _ = write!(text, ": {state}");
+    } else if first.value.is_finite() {
         let _ = write!(text, ": {}{unit}", short(first.value));
     }
-    if first.limit.is_finite() {
+    if first.limit.is_finite() && state.is_none() {
         let _ = write!(text, " (limit {}{unit})", short(first.limit));
     }
     let _ = write!(text, ", for {}", clock(first.lasted));
@@ -320,10 +339,14 @@ fn not_judged(text: &mut String, judged: &Judged) {
 fn damage(text: &mut String, judged: &Judged) {
     let shown = judged.gaps.iter().filter(|gap| gap.cause != Cause::NotKept);
     for gap in shown.clone().take(LINES_MAX) {
-        let what = if gap.cause.is_damage() { "damaged" } else { "lost" };
+        let what = match gap.cause {
+            Cause::NoTimes => "no times",
+            cause if cause.is_damage() => "damaged",
+            _ => "lost",
+        };
         let place = gap.place.map_or_else(String::new, |place| format!("byte {place}: "));
         let at = gap.from.map_or_else(String::new, |from| format!(" {}", moment(from)));
-        let _ = writeln!(text, "  {what:<8}{at:>10}  {place}{}", gap.words);
+        let _ = writeln!(text, "  {what:<8} {at:>9}  {place}{}", gap.words);
     }
     let more = (judged.damages + judged.losses).saturating_sub(LINES_MAX as u64);
     if more > 0 {

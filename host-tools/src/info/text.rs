@@ -178,8 +178,12 @@ fn more(text: &mut String, count: u64, listed: usize) {
 
 fn gaps_text(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.summary, &log.contents);
+    // Frames and sectors are counted in logs of ours only.
+    let own = log.format.is_none();
     if summary.gaps == 0 && summary.blocks.damaged == 0 {
         text.push_str("  gaps     none\n");
+    } else if !own {
+        let _ = writeln!(text, "  gaps     {} (hums check tells where and why)", summary.gaps);
     } else {
         let (missing, damaged) = (summary.frames_missing, summary.blocks.damaged);
         let _ = writeln!(
@@ -199,6 +203,11 @@ fn gaps_text(text: &mut String, log: &Overview) {
         let time = |at: Option<Instant>, none: &str| {
             at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
         };
+        if !own {
+            let (from, to) = (time(gap.from, "the beginning"), time(gap.to, "where it is read on"));
+            let _ = writeln!(text, "    from {from} to {to}: {}", foreign_words(gap.cause));
+            continue;
+        }
         let frames = gap
             .frames
             .map_or_else(|| "an unknown number of frames".to_owned(), |frames| count(frames, "frame"));
@@ -219,6 +228,14 @@ fn gaps_text(text: &mut String, log: &Overview) {
             "  lost     {} {} between {:.3} and {:.3} s",
             loss.count, loss.what, loss.from_s, loss.to_s
         );
+    }
+}
+
+/// Why something is missing in what another program recorded.
+fn foreign_words(cause: Cause) -> &'static str {
+    match cause {
+        Cause::Missing => "the recorder lost something, and says so",
+        _ => "the file is damaged or cut short",
     }
 }
 

@@ -199,7 +199,7 @@ impl Gap {
     /// As logs of ours have it, which know neither place nor words.
     pub fn to_own(&self) -> hums_blackbox::Gap {
         let cause = match self.cause {
-            Cause::Damaged | Cause::Cut => hums_blackbox::Cause::Damaged,
+            Cause::Damaged | Cause::Cut | Cause::NoTimes => hums_blackbox::Cause::Damaged,
             Cause::Lost => hums_blackbox::Cause::Missing,
             Cause::NotKept => hums_blackbox::Cause::Disarmed,
         };
@@ -225,12 +225,14 @@ pub enum Cause {
     Lost,
     /// The recorder left it out on purpose.
     NotKept,
+    /// No message of the recording has a time: nothing in it can be put in order with the rest.
+    NoTimes,
 }
 
 impl Cause {
     /// Whether the recording has less than it should: exit code 3.
     pub const fn is_damage(self) -> bool {
-        matches!(self, Self::Damaged | Self::Cut)
+        matches!(self, Self::Damaged | Self::Cut | Self::NoTimes)
     }
 
     /// In a word, for tables and JSON.
@@ -240,6 +242,7 @@ impl Cause {
             Self::Cut => "cut",
             Self::Lost => "lost",
             Self::NotKept => "not_kept",
+            Self::NoTimes => "no_times",
         }
     }
 }

@@ -85,6 +85,11 @@ impl Reader for TlogReader {
                     now = moment.at;
                     if moment.restarted {
                         take(now, Item::Restart)?;
+                        if let Some(epoch_us) =
+                            time_us.checked_sub(now.as_micros()).filter(|_| time_us >= UTC_US_MIN)
+                        {
+                            take(now, Item::Epoch(epoch_us))?;
+                        }
                     }
                     place += TIME_BYTES as u64;
                     bytes

@@ -17,6 +17,7 @@ use super::{dataflash, ulog};
 use crate::files::FileId;
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::{self, Content, Log};
+use crate::plural::count;
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
 pub const RAW_BAUD: u32 = 115_200;
@@ -326,6 +327,13 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             if found.places.len() == before {
                 bail!("{}: no log and no recording is in there", input.display());
             }
+            // A card has other files beside its logs.
+            if walk.others > 0 && found.places.iter().skip(before).all(|place| place.own().is_none()) {
+                let files = count(walk.others, "file");
+                found
+                    .remarks
+                    .push(format!("{}: {files} passed over: no log of a known kind", input.display()));
+            }
         } else if is_own(input)? {
             own(input, salvage, &mut found)?;
         } else {
@@ -401,6 +409,8 @@ struct Walk {
     paths: Vec<PathBuf>,
     /// Recordings and folders for which there was no room.
     left_out: u64,
+    /// Files that are no recording: the logs of ours among them.
+    others: u64,
     /// The first things that are neither files nor folders, as sentences.
     remarks: Vec<String>,
 }
@@ -419,6 +429,7 @@ impl Walk {
             let wanted =
                 if kind.is_dir() { depth < DEPTH_MAX } else { kind.is_file() && is_recording(&path) };
             if !wanted {
+                self.others += u64::from(kind.is_file());
                 continue;
             }
             if self.paths.len() + inside.len() < WALKED_MAX {

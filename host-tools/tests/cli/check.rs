@@ -206,3 +206,45 @@ fn a_recording_is_decoded_without_a_log_of_ours_between() {
     };
     assert_eq!(columns(table("out")), columns(table("packed")));
 }
+
+#[test]
+fn a_folder_says_how_many_of_its_files_are_no_log() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    fs::write(dir.path().join("notes.txt"), "nothing of a vehicle").expect("written");
+    let output = run(dir.path(), "check .", 4);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("1 file passed over: no log of a known kind"), "{told}");
+}
+
+#[test]
+fn a_log_without_times_is_not_called_good_and_its_page_neither() {
+    let dir = tempfile::tempdir().expect("directory");
+    let log = "ArduCopter V3.0.1\nFMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\nFMT, 13, 4, EV, B, Id\n\
+        FMT, 1, 17, ATT, ccc, Roll,Pitch,Yaw\nEV, 10\nATT, 0.00, 0.47, 0.00\n";
+    fs::write(dir.path().join("old.log"), log).expect("written");
+    let screen = text(&run(dir.path(), "check old.log", 3));
+    assert!(screen.contains("nothing can be said: the log has no times"), "{screen}");
+    assert!(screen.contains("ArduCopter V3.0.1") && !screen.contains("never armed"), "{screen}");
+    run(dir.path(), "report old.log -o old.html", 3);
+    let info = text(&run(dir.path(), "info old.log", 3));
+    assert!(info.contains("damaged or cut short") && !info.contains("sector"), "{info}");
+}
+
+/// The same flight twice in one file: the restart in the middle is dated by the second one's own clock.
+#[test]
+fn a_problem_has_the_time_of_day_of_its_own_part_of_the_recording() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    let once = fs::read(dir.path().join("faults.tlog")).expect("the recording");
+    fs::write(dir.path().join("twice.tlog"), [&once[..], &once[..]].concat()).expect("written");
+    let checked = json(&run(dir.path(), "check --json twice.tlog", 4));
+    assert_eq!(checked["clock_restarts"], 1);
+    let problems = checked["problems"].as_array().expect("an array");
+    let reboot = problems.iter().find(|problem| problem["check"] == "autopilot_reboot").expect("a restart");
+    assert!(reboot["time_s"].as_f64().expect("a time") > 30.0, "{reboot}");
+    // To the minute: both begin at 21:42:26.
+    let (at, start) =
+        (reboot["time_utc"].as_str().expect("UTC"), checked["start_utc"].as_str().expect("UTC"));
+    assert_eq!(at[..16], start[..16]);
+}

@@ -26,7 +26,8 @@ export const findingsSection = () => {
     ], ["n", "t", "t", "", "t", "n", "n"], {
       class: "go finding", tabindex: 0, onclick: () => lookAt(f.time_s), onkeydown: (e) => e.key === "Enter" && lookAt(f.time_s),
     }))), log.findings_count > findings.length ? el("p", { class: "dim" }, `and ${whole(log.findings_count - findings.length)} more`) : null)
-    : el("p", { class: "dim" }, log.checked_by === "nobody" ? "Not checked: what recorded this ran no checks."
+    : el("p", { class: "dim" }, log.format !== "hums" && !log.vehicle ? "Nothing was judged: no autopilot was heard in this recording."
+      : log.checked_by === "nobody" ? "Not checked: what recorded this ran no checks."
       : "Every check stayed within its limits, or had nothing to look at."));
   if (log.checked_by === "hums") found.append(el("p", { class: "dim" },
     "Checked when this page was made: what recorded this ran no checks."));

@@ -8,7 +8,7 @@ export const head = () => {
   const rank = (level) => LEVELS.indexOf(level);
   const worst = findings.reduce((worst, f) => rank(f.level) > rank(worst) ? f.level : worst, "ok");
   const count = (level) => findings.filter((f) => f.level === level).length;
-  const verdict = log.checked_by === "nobody" ? "Not checked" : worst === "ok" ? "No findings"
+  const verdict = log.checked_by === "nobody" || (log.format !== "hums" && !log.vehicle) ? "Not checked" : worst === "ok" ? "No findings"
     : ["critical", "warning", "stale", "advisory"].filter(count).map((level) => `${count(level)} ${level}`).join(", ");
   const host = document.getElementById("head");
   const when = log.start_utc ? `${log.start_utc.slice(0, 10)} ${log.start_utc.slice(11, 19)} UTC` : "time of day unknown";

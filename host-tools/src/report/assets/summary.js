@@ -30,8 +30,8 @@ const tiles = () => {
     battery && battery.percent_to != null && data.flights[0].percent_from != null
       ? tile(`${of(data.flights[0].percent_from, 0)} \u2192 ${of(battery.percent_to, 0)}`, "%", "battery in flight") : null,
     tile(of(usage.vibration_max_m_s2, 1), "m/s\u00b2", "highest vibration"),
-    tile(whole(log.frames), "", "frames recorded"),
-    tile(fixed(log.ratio, 1), "\u00d7", "smaller than a tlog"));
+    log.frames ? tile(whole(log.frames), "", "frames recorded") : null,
+    log.format === "hums" && log.frames ? tile(fixed(log.ratio, 1), "\u00d7", "smaller than a tlog") : null);
 };
 
 const identity = () => facts([

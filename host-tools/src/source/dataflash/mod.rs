@@ -106,7 +106,7 @@ fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Res
             }
         }
     }
-    Ok(session.end())
+    session.end(take)
 }
 
 fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
@@ -148,7 +148,7 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         let cause = if whole { Cause::Damaged } else { Cause::Cut };
         session.gap(cause, Some(place), bytes, words, take)?;
     }
-    Ok(session.end())
+    session.end(take)
 }
 
 /// The values of a line of this type.

@@ -398,14 +398,25 @@ impl<'w> Session<'w> {
     }
 
     /// What was read.
-    pub(super) fn end(mut self) -> Summary {
+    pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
+        let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();
+        // The clock follows only what is wanted.
+        let has_time = |(kind, (count, _)): (u8, &(u64, u64))| {
+            let format = self.formats.get(kind).filter(|_| *count > 0);
+            format.is_some_and(|format| format.time.is_some() || format.name == "GPS")
+        };
+        let timed = self.clock.has_begun() || (0..=u8::MAX).zip(&self.counts).any(has_time);
+        if !timed && messages > 0 {
+            let words = format!("none of {messages} messages has a time: nothing in the log can be judged");
+            self.gap(Cause::NoTimes, None, 0, words, take)?;
+        }
         for (kind, count) in (0..=u8::MAX).zip(std::mem::take(&mut self.counts)) {
             if let Some(format) = self.formats.get(kind).filter(|_| count.0 > 0) {
                 add(&mut self.counts_before, format.name.clone(), count);
             }
         }
         let told = |(name, (count, bytes))| MessageCount { name, count, bytes };
-        Summary { messages: self.counts_before.into_iter().map(told).collect() }
+        Ok(Summary { messages: self.counts_before.into_iter().map(told).collect() })
     }
 }
 

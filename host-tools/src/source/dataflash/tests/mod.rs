@@ -139,7 +139,7 @@ fn every_format_character_is_read_with_its_scale() {
         numbers.join(" ")
     );
     assert_eq!(seen.rows[4], expected);
-    assert_eq!(seen.gaps, []);
+    assert!(seen.damage().is_empty(), "{:?}", seen.gaps);
 }
 
 #[test]
@@ -360,6 +360,20 @@ fn a_text_log_of_2013_without_any_clock_but_the_receivers_is_read() {
             (Cause::Cut, "a line of ATT with 2 of 7 values"),
         ]
     );
+}
+
+#[test]
+fn a_log_without_any_time_says_so() {
+    let log = "ArduCopter V3.0.1\n\
+        FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\n\
+        FMT, 13, 4, EV, B, Id\n\
+        FMT, 1, 17, ATT, ccc, Roll,Pitch,Yaw\n\
+        EV, 10\nATT, 0.00, 0.47, 0.00\nATT, 0.00, 0.47, 0.00\n";
+    let seen = seen(log.as_bytes());
+    let [(cause, _, 0, words)] = seen.gaps.as_slice() else { panic!("{:?}", seen.gaps) };
+    assert_eq!(*cause, Cause::NoTimes);
+    assert!(words.starts_with("none of 6 messages has a time"), "{words}");
+    assert!(cause.is_damage(), "exit code 3");
 }
 
 #[test]

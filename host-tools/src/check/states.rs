@@ -1,0 +1,52 @@
+//! Values of checks that are states and not quantities, in MAVLink's words.
+
+/// The state that a value of a check is; `None` for a check of a quantity.
+pub(super) fn name(check: &str, value: f32) -> Option<&'static str> {
+    let names: &[&str] = match check {
+        // MAV_STATE
+        "autopilot_state" => &[
+            "uninitialized",
+            "booting",
+            "calibrating",
+            "standby",
+            "active",
+            "critical",
+            "emergency",
+            "powering off",
+            "flight termination",
+        ],
+        // GPS_FIX_TYPE
+        "gps_fix" => &[
+            "no receiver",
+            "no fix",
+            "2D fix",
+            "3D fix",
+            "3D fix with DGPS",
+            "RTK float",
+            "RTK fixed",
+            "static",
+            "PPP",
+        ],
+        // GPS_JAMMING_STATE, GPS_SPOOFING_STATE
+        "gps_jamming" => &["unknown", "ok", "mitigated", "detected"],
+        "gps_spoofing" => &["unknown", "ok", "mitigated", "detected"],
+        "autopilot_reboot" => &["no", "restarted"],
+        _ => return None,
+    };
+    // What no state has is no number of one.
+    let place = (value >= 0.0 && value.fract() == 0.0).then_some(value as usize)?;
+    names.get(place).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_is_named_and_a_quantity_is_none() {
+        assert_eq!(name("autopilot_state", 5.0), Some("critical"));
+        assert_eq!(name("autopilot_state", 6.0), Some("emergency"));
+        assert_eq!((name("autopilot_state", 99.0), name("autopilot_state", f32::NAN)), (None, None));
+        assert_eq!(name("cell_voltage", 3.0), None);
+    }
+}
