@@ -28,8 +28,7 @@ pub(super) fn name(check: &str, value: f32) -> Option<&'static str> {
             "PPP",
         ],
         // GPS_JAMMING_STATE, GPS_SPOOFING_STATE
-        "gps_jamming" => &["unknown", "ok", "mitigated", "detected"],
-        "gps_spoofing" => &["unknown", "ok", "mitigated", "detected"],
+        "gps_jamming" | "gps_spoofing" => &["unknown", "ok", "mitigated", "detected"],
         "autopilot_reboot" => &["no", "restarted"],
         _ => return None,
     };

@@ -184,6 +184,9 @@ pub(super) fn flown(judged: &Judged) -> Span {
 fn in_air(judged: &Judged) -> String {
     let told = judged.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty());
     let armed = clock(judged.armed);
+    if judged.vehicle().source.is_none() {
+        return "not known".to_owned();
+    }
     let text = match judged.flights.as_slice() {
         [] if judged.armed == Span::ZERO => return told.unwrap_or("never armed").to_owned(),
         [] => format!("never; armed {armed}"),

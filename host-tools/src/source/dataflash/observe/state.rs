@@ -41,6 +41,18 @@ impl<T: Copy> Dated<T> {
     }
 }
 
+/// Where messages tell arming.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum ToldArming {
+    /// Nowhere, as far as the file is known.
+    #[default]
+    Nowhere,
+    /// In the first part of the file; the first of them says this.
+    First(bool),
+    /// Before the last power-on that the file holds.
+    Before,
+}
+
 /// What the log has told of the vehicle itself; the first part of a file is looked through for it, so that it is known
 /// from the first message on.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,10 +77,8 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) version: u32,
     /// POS is logged: the estimator's own position.
     pub(super) has_positions: bool,
-    /// What the first message about arming says, where there is one in the first part of the file.
-    pub(super) first_arming: Option<bool>,
-    /// Messages about arming have come.
-    pub(super) tells_arming: bool,
+    /// Where messages tell arming.
+    pub(super) told_arming: ToldArming,
 }
 
 /// What a log has told so far.
@@ -136,8 +146,11 @@ impl State {
 
     /// What is known of the vehicle.
     pub(in crate::source::dataflash) fn facts(&self) -> Facts {
-        let first_arming = self.facts.first_arming.or(self.arming.first_told());
-        Facts { first_arming, tells_arming: self.facts.tells_arming || first_arming.is_some(), ..self.facts }
+        let told_arming = match (self.facts.told_arming, self.arming.first_told()) {
+            (ToldArming::Nowhere, Some(armed)) => ToldArming::First(armed),
+            (known, _) => known,
+        };
+        Facts { told_arming, ..self.facts }
     }
 
     /// What firmware wrote it.
@@ -162,7 +175,11 @@ impl State {
 
     /// Another power-on: what was so before tells nothing, but the vehicle is the same.
     pub(in crate::source::dataflash) fn restart(&mut self) {
-        *self = Self::new(Facts { first_arming: None, ..self.facts() });
+        let mut facts = self.facts();
+        if facts.told_arming != ToldArming::Nowhere {
+            facts.told_arming = ToldArming::Before;
+        }
+        *self = Self::new(facts);
     }
 
     /// What messages of arming and of leaving the ground change.
@@ -178,7 +195,7 @@ impl State {
     /// A log that is only written while armed begins armed where the first message about arming is that of disarming. A
     /// logger also begins with an attempt to arm that fails (`AP_Logger`: `LOG_DISARMED` 0), and just before arming.
     fn begin(&mut self) {
-        if self.facts.logs_disarmed == Some(false) && self.facts.first_arming == Some(false) {
+        if self.facts.logs_disarmed == Some(false) && self.facts.told_arming == ToldArming::First(false) {
             self.arming.begin_armed();
         }
     }
@@ -263,7 +280,8 @@ impl State {
         self.said = Some(heartbeat);
         let word = self.arming.word();
         // What the file tells further on is not said to be unknown until then.
-        let known = word == Word::Told || (word == Word::Unknown && self.facts.tells_arming);
+        let known =
+            word == Word::Told || (word == Word::Unknown && self.facts.told_arming != ToldArming::Nowhere);
         if (!known || self.word_said.is_some()) && self.word_said.replace(word) != Some(word) {
             out.say(&Say::Arming(word.words()));
         }

@@ -1,5 +1,7 @@
 //! When a vehicle was armed: by the log's words, and by what it did where the log has none.
 
+use std::fmt::Write as _;
+
 use hums_core::observation::{LandedState, Observation};
 
 use super::writer::Writer;
@@ -95,8 +97,8 @@ fn a_plane_whose_log_has_no_word_about_arming_is_armed_while_it_flies() {
         .to_owned();
     for second in 0..70 {
         let speed = if (10..40).contains(&second) { 20.0 } else { 0.3 };
-        log +=
-            &format!("GPS, {}, 3, 9, 1.20, 44.0290459, -77.7367640, 30.0, 91.5, {speed}\n", second * 1_000);
+        let ms = second * 1_000;
+        let _ = writeln!(log, "GPS, {ms}, 3, 9, 1.20, 44.0290459, -77.7367640, 30.0, 91.5, {speed}");
     }
     let seen = seen(log.as_bytes());
     assert_eq!(changes(&seen), [(0, false), (13, true), (50, false)]);
@@ -111,7 +113,7 @@ fn a_throttle_that_is_touched_arms_nothing() {
         .to_owned();
     for tenth in 0..300 {
         let throttle = if (100..115).contains(&tenth) { 40 } else { 0 };
-        log += &format!("CTUN, {}, {throttle}\n", tenth * 100);
+        let _ = writeln!(log, "CTUN, {}, {throttle}", tenth * 100);
     }
     assert_eq!(changes(&seen(log.as_bytes())), [(0, false)]);
 }
