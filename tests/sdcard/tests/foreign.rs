@@ -183,7 +183,7 @@ fn a_card_too_small_for_fat32_is_told_and_not_touched() {
     assert_eq!(rig.command(FORMAT, [1.0, 1.0]), Some(ACCEPTED), "nobody knows its size yet");
     rig.run_to(10_000);
     assert_ne!(rig.state(), CardState::Recording);
-    rig.assert_told("card: no partition table", 0);
+    rig.assert_told("card: unpartitioned", 0);
     assert_eq!(medium.writes(), 0);
 }
 
