@@ -169,9 +169,10 @@ fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() 
             quad.escs[1].as_mut().unwrap().rpm = Some(Rpm(5_600.0));
             if now_ms >= 30_000 {
                 for esc in &mut quad.escs {
-                    match silent {
-                        true => *esc = None,
-                        false => esc.as_mut().unwrap().rpm = Some(Rpm(0.0)),
+                    if silent {
+                        *esc = None;
+                    } else if let Some(esc) = esc {
+                        esc.rpm = Some(Rpm(0.0));
                     }
                 }
             }
