@@ -16,7 +16,7 @@
 //!
 //! # Flights
 //! A flight begins with leaving the ground. It ends when the vehicle is disarmed, or when it has been on the ground for
-//! [`GROUND_LASTS`]; so a bounce and a touch-and-go are parts of one flight.
+//! eight seconds; so a bounce and a touch-and-go are parts of one flight.
 
 use crate::observation::{LandedState, VehicleKind};
 use crate::time::{Instant, Span};

@@ -26,8 +26,10 @@ use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
 use crate::flights::own;
 
-/// What a cut may cost at most.
+/// What a cut may cost at most, once the log has begun.
 const LOSS_MAX_US: u64 = 200_000;
+/// Until the log has begun: the card is opened, the session before is looked for, and the first segment is made.
+const BEGIN_MAX_US: u64 = 300_000;
 
 /// No smaller part of a block is new by itself: an entry of the FAT has four bytes, and no file system of this kind
 /// stands half of one.
@@ -360,9 +362,12 @@ impl Session {
         let out = self.out_us.filter(|(from, to)| (*from..*to).contains(&cut_us));
         let due_us = out.map_or(given_us, |(from, _)| given_us.min(from));
         let loss_us = due_us.saturating_sub(known_us);
-        outcome.loss_us_max = outcome.loss_us_max.max(loss_us);
+        let begun = known_us > 0;
+        if begun {
+            outcome.loss_us_max = outcome.loss_us_max.max(loss_us);
+        }
         ensure!(
-            loss_us <= LOSS_MAX_US,
+            loss_us <= if begun { LOSS_MAX_US } else { BEGIN_MAX_US },
             "at {cut_us} us, the last frame came at {given_us} and the last one in the log at {known_us}"
         );
         Ok(())
