@@ -26,6 +26,8 @@ use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
 use crate::flights::own;
 
+/// A directory entry.
+const ENTRY: usize = 32;
 /// What a cut may cost at most, once the log has begun.
 const LOSS_MAX_US: u64 = 200_000;
 /// Until the log has begun: the card is opened, the session before is looked for, and the first segment is made.
@@ -177,10 +179,10 @@ enum Tear {
 }
 
 impl Tear {
-    /// In the middle, or between any two words.
-    fn by_chance(random: &mut Random) -> Self {
-        let words = (BLOCK / WORD) as u64;
-        let at = if random.chance(0.5) { BLOCK / 2 } else { WORD * (1 + random.below(words - 1)) as usize };
+    /// In the middle, or between any two pieces of this size.
+    fn by_chance(random: &mut Random, piece: usize) -> Self {
+        let pieces = (BLOCK / piece) as u64;
+        let at = if random.chance(0.5) { BLOCK / 2 } else { piece * (1 + random.below(pieces - 1)) as usize };
         if random.chance(0.5) { Self::Before(at) } else { Self::From(at) }
     }
 
@@ -302,12 +304,25 @@ impl Session {
     }
 
     /// Chosen by chance: half of them torn, either way.
+    /// What of a block is old or new as a whole. A directory entry that is torn itself is a name that no system accepts
+    /// (fsck renames it); the log is found by its sectors then. That is not tried here.
+    fn piece(&self, write: usize) -> usize {
+        if self.trace.get(write).is_some_and(|write| self.is_metadata(write)) { ENTRY } else { WORD }
+    }
+
     fn choose(&self, count: u64, seed: u64) -> Vec<(usize, Tear)> {
         let mut random = Random::new(seed);
         let mut cuts: Vec<_> = (0..count)
             .map(|index| {
                 let write = random.below(self.trace.len() as u64) as usize;
-                (write, if index % 2 == 0 { Tear::Whole } else { Tear::by_chance(&mut random) })
+                (
+                    write,
+                    if index % 2 == 0 {
+                        Tear::Whole
+                    } else {
+                        Tear::by_chance(&mut random, self.piece(write))
+                    },
+                )
             })
             .collect();
         // Few writes are about the file system: those of the directory, and evenly chosen ones of the FAT, each of them
@@ -322,7 +337,7 @@ impl Session {
         };
         for write in [evenly(&directory), evenly(&fat)].concat() {
             cuts.push((write, Tear::Whole));
-            cuts.push((write, Tear::by_chance(&mut random)));
+            cuts.push((write, Tear::by_chance(&mut random, self.piece(write))));
         }
         cuts.sort_unstable();
         cuts
