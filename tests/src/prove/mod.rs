@@ -45,8 +45,8 @@ pub const CAMPAIGNS: &[Campaign] = &[
     Campaign {
         name: "power-cuts",
         about: "power goes at any block write, half of them torn, on a card that keeps what it acknowledged and in its \
-                order: the file system stays in order, earlier logs stay as they are, and the log gives the flight up to \
-                200 ms before",
+                order: the file system stays in order, earlier logs stay as they are, and the log, once it has begun, \
+                gives the flight up to 200 ms before",
         labels: power_cuts::LABELS,
         run: power_cuts::run,
     },
