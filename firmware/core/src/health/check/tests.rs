@@ -251,3 +251,10 @@ fn a_critical_value_needs_two_samples_of_its_own() {
     let samples = [(0, 50.0), (1_000, 50.0), (2_000, 70.0), (3_000, 50.0), (4_000, 70.0), (5_000, 70.0)];
     assert_eq!(hold(&slow, &samples, 6_000), [(1_000, Level::Warning), (5_000, Level::Critical)]);
 }
+
+#[test]
+fn two_bad_measurements_in_a_row_count_although_the_value_grew_stale_between_them() {
+    let sparse = Check { stale_after: Some(Span::from_secs(5)), ..CHECK };
+    let levels = hold(&sparse, &[(0, 10.0), (20_000, 170.0), (40_000, 170.0)], 42_000);
+    assert_eq!(levels.last(), Some(&(40_200, Level::Critical)), "{levels:?}");
+}
