@@ -204,8 +204,8 @@ impl State {
         // A value that was measured once and no longer is grows old like one whose message stops.
         if check.stale_after.is_some_and(|limit| self.seen.older_than(now, limit)) {
             // Measurements that were bad still count: a stream may be slower than values stay fresh.
-            let Self { level, seen, bad_samples, very_bad_samples, .. } = *self;
-            *self = Self { level, seen, bad_samples, very_bad_samples, ..Self::new() };
+            let Self { level, bad_samples, very_bad_samples, seen, .. } = *self;
+            *self = Self { level, bad_samples, very_bad_samples, seen, ..Self::new() };
             return self.go(Level::Stale, f32::NAN, f32::NAN);
         }
         self.judge(check, now, reading?.value, measured, params)
