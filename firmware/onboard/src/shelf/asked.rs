@@ -29,7 +29,7 @@ pub enum What {
     Length,
     /// Bytes from an offset on.
     Data(u32),
-    /// The checksum of the first so many bytes ([`ftp::checksum`]), at most of all; 0 is all.
+    /// The checksum of the first so many bytes (`hums_link::ftp::checksum`), at most of all; 0 is all.
     Checksum(u32),
     /// That all earlier logs are no longer offered, and make room first. Not answered.
     Erase,

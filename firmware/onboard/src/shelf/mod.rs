@@ -13,7 +13,7 @@
 //! A full card gives a segment's place to a later log. So a download asks for a log by its [`LogId`], and each answer
 //! looks at the log's first sector again: a log that was overwritten, or lies on another card, is not found any longer.
 //!
-//! A checksum is computed [`SUM_BLOCKS`] blocks at a call, between which storage writes what waits.
+//! A checksum is computed a few blocks at a call, between which storage writes what waits.
 
 mod asked;
 mod on_card;
