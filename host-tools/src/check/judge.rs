@@ -1,9 +1,9 @@
 //! The monitor of the board over a recording: the same checks, the same limits, the recording's own time.
 //!
 //! The monitor is stepped every 50 ms of the recording's time, whatever the rate of what it holds: debounce and staleness
-//! follow the clock, not the number of samples. Where nothing was recorded for longer than [`SILENCE_MAX`] everything
+//! follow the clock, not the number of samples. Where nothing was recorded for longer than `SILENCE_MAX` everything
 //! has grown stale and every debounce has run out, so what follows is left out. A gap of the recording itself is no silence
-//! of the vehicle: the monitor's time stands still over it ([`super::clock`]).
+//! of the vehicle: the monitor's time stands still over it (`super::clock`).
 
 use std::collections::BTreeMap;
 

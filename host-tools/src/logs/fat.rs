@@ -6,7 +6,7 @@
 //! Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
 //!
 //! Memory: a bit for each cluster (32 MiB for the largest volume of FAT32), 64 KiB of the FAT, and at most
-//! [`FILES_MAX`] files in [`EXTENTS_MAX`] extents: 10 MiB and 16 MiB. What is beyond is counted and told.
+//! `FILES_MAX` files in `EXTENTS_MAX` extents: 10 MiB and 16 MiB. What is beyond is counted and told.
 
 use std::fmt;
 use std::fs::File;
@@ -64,9 +64,9 @@ pub struct CardFile {
 /// What a walk over the volume found.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
-    /// The logs' segments, in directory order, up to [`FILES_MAX`]. Other files are only checked.
+    /// The logs' segments, in directory order, up to `FILES_MAX`. Other files are only checked.
     pub files: Vec<CardFile>,
-    /// What does not hold, as sentences: the first [`DAMAGE_MAX`], then one that counts the others.
+    /// What does not hold, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub damage: Vec<String>,
     /// Clusters that are allocated and belong to no file: space that is lost, not data.
     pub lost_clusters: u64,

@@ -1,8 +1,8 @@
 //! `ArduPilot`'s onboard logs (`DataFlash`), binary (`.bin`) and text (`.log`), of 2012 until today.
 //!
-//! A log describes itself: FMT messages define the others, and FMTU, UNIT and MULT tell their units. [`format`] keeps the
-//! definitions, [`binary`] and [`text`] find the messages, [`message`] reads their values, [`clock`] their times, and
-//! [`observe`] makes of them what the same autopilot says by MAVLink. The reading streams: it keeps one buffer, the
+//! A log describes itself: FMT messages define the others, and FMTU, UNIT and MULT tell their units. `format` keeps the
+//! definitions, `binary` and `text` find the messages, `message` reads their values, `clock` their times, and
+//! `observe` makes of them what the same autopilot says by MAVLink. The reading streams: it keeps one buffer, the
 //! definitions (256 at most at a time) and what a vehicle's state needs, whatever the file says.
 //!
 //! The first part of a file is looked through before it is read: the units of a message may be told after its first

@@ -20,7 +20,7 @@ pub(super) fn slots(layout: &Layout, fields: &[&str]) -> Vec<Option<Slot>> {
     fields.iter().map(slot).collect()
 }
 
-/// The fields of a message that the mapping needs, by their places in [`Topic::fields`].
+/// The fields of a message that the mapping needs, by their places in `Topic::fields`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fields<'a> {
     slots: &'a [Option<Slot>],

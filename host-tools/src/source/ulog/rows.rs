@@ -1,6 +1,6 @@
 //! The log's own rows: every field of every message under its own name, with the unit where it is known.
 //!
-//! `ULog` says no units. PX4's names end in them (`voltage_v`, `vel_m_s`), which is what [`unit`] goes by.
+//! `ULog` says no units. PX4's names end in them (`voltage_v`, `vel_m_s`), which is what `unit` goes by.
 
 use super::format::{Field, Layout, Number};
 use super::message::words;
