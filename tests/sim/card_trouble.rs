@@ -57,6 +57,14 @@ fn a_card_that_is_taken_out_and_put_back_misses_only_that_time() {
 }
 
 #[test]
+fn a_card_that_never_comes_back_holds_what_was_written_and_the_pilot_is_told() {
+    let (recording, lost) = assert_accounted(&["--card-out", "60..100000", "--card-size", "64"]);
+    assert!(lost > 0 && recording.number("frames_logged") > 0);
+    let json: serde_json::Value = serde_json::from_str(&recording.outcome.text()).unwrap();
+    assert!(json["findings"].to_string().contains("recording"), "a stopped recorder is told: {json}");
+}
+
+#[test]
 fn a_card_that_is_out_for_half_a_minute_misses_nothing() {
     let (recording, lost) = assert_accounted(&["--card-out", "100..130", "--card-size", "64"]);
     assert_eq!(lost, 0, "the queue holds that long at the rate of a telemetry port");

@@ -271,15 +271,3 @@ fn help_is_no_error() {
         assert!(help.text().contains("hums "), "{command} --help shows an example");
     }
 }
-
-#[test]
-fn a_reader_that_stops_listening_ends_it_quietly() {
-    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
-    let dir = tempfile::tempdir().unwrap();
-    let errors = dir.path().join("stderr");
-    let script = "\"$0\" info \"$1\" 2>\"$2\" | head -c 1 >/dev/null; \"$0\" --help 2>>\"$2\" | true";
-    let mut shell = std::process::Command::new("sh");
-    shell.args(["-c", script]).arg(hums_tests::program::path()).arg(recording.image()).arg(&errors);
-    hums_tests::child::run(&mut shell, hums_tests::program::LIMIT).expect_code(&[0]);
-    assert_eq!(fs::read_to_string(errors).unwrap(), "");
-}

@@ -25,11 +25,8 @@ mod salvage;
 mod second_decoder;
 mod usage;
 
-/// Said past the test harness, which would keep it to itself: what was not tested is no success.
+/// In the list of what was ignored: what was not tested is no success.
 #[cfg(not(feature = "oracle"))]
 #[test]
-fn notice_that_comparisons_with_pymavlink_are_left_out() {
-    use std::io::Write as _;
-    writeln!(std::io::stderr(), "LEFT OUT: comparisons with pymavlink; `cargo xtask test` runs them")
-        .unwrap();
-}
+#[ignore = "comparisons with pymavlink: `cargo xtask test` runs them"]
+fn comparisons_with_pymavlink() {}

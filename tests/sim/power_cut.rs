@@ -8,6 +8,9 @@ use hums_tests::program::{Decoded, Machine, Recording};
 /// Enough to meet each kind of write (data, FAT, directory) whole and torn; the long campaign is the recorder's own.
 const CUTS: usize = 50;
 
+/// What comes in the second that a log needs at most to begin, or waits in memory for its sector.
+const LOST_MAX: u64 = 100;
+
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
 
 #[test]
@@ -34,6 +37,8 @@ fn after_a_cut_at_any_write_the_card_is_in_order_and_gives_the_flight_up_to_ther
         let prefix =
             output.len() <= input.len() && output.iter().zip(&input).all(|(a, b)| a.bytes == b.bytes);
         assert!(prefix, "cut at {at}: {} frames that are no beginning of the flight", output.len());
+        assert_eq!(output.len() as u64, recording.number("frames_logged"), "cut at {at}: counted as logged");
+        assert!(recording.number("frames_lost") < LOST_MAX, "cut at {at}: more than what was in memory");
         frames_of_cuts.push(output.len());
     }
     // Cuts late in the flight keep most of it: the test would otherwise pass with empty cards.

@@ -101,16 +101,20 @@ fn the_manifest_is_what_pymavlink_finds() {
 }
 
 #[test]
-fn two_runs_are_the_same_to_the_byte() {
+fn two_runs_are_the_same_to_the_byte_and_their_counters_add_up() {
     let flight = own("px4_hil_quad_low.tlog");
-    let flags = ["--noise", "0.0005", "--seed", "7"];
+    let flags = ["--noise", "0.001", "--stall", "700@20", "--write-error", "0.001", "--seed", "5"];
     let [first, second] = [(); 2].map(|()| Recording::make(Machine::Sim, &flight, &flags));
     assert_eq!(first.outcome.text(), second.outcome.text(), "--json");
+    let gs = fs::read(first.gs()).unwrap();
     assert!(fs::read(first.image()).unwrap() == fs::read(second.image()).unwrap(), "the images differ");
-    assert!(
-        fs::read(first.gs()).unwrap() == fs::read(second.gs()).unwrap(),
-        "the ground station's bytes differ"
-    );
+    assert!(gs == fs::read(second.gs()).unwrap(), "the ground station's bytes differ");
+    assert_eq!(first.number("frames_in"), first.number("frames_logged") + first.number("frames_lost"));
+    assert_eq!(first.number("gs_bytes"), gs.len() as u64);
+    assert!(first.number("bytes_not_frames") > 0);
+    // A write begins at the latest 200 ms after the card stands still.
+    assert!((500..=750).contains(&first.number("sd_stall_ms_max")), "{}", first.number("sd_stall_ms_max"));
+    assert!(first.number("queue_bytes_max") <= first.number("queue_bytes_capacity"));
 }
 
 #[test]
