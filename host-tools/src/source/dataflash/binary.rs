@@ -9,12 +9,12 @@
 
 use std::io::{self, Read};
 
+use super::buffer::Buffer;
 use super::format::{HEADER_BYTES, Lengths};
 
 const HEAD: [u8; 2] = [0xA3, 0x95];
 /// The longest message, and the head of the one after it.
 const LOOKAHEAD_BYTES: usize = 2 * 258;
-const CHUNK_BYTES: usize = 256 * 1024;
 
 /// What comes next.
 #[derive(Debug)]
@@ -60,76 +60,43 @@ struct Skipped {
 
 /// A reader of messages.
 pub(super) struct Binary<R> {
-    input: R,
-    buffer: Vec<u8>,
-    /// Where in the buffer the reading stands.
-    at: usize,
-    /// Where in the file the buffer begins.
-    base: u64,
-    ended: bool,
+    buffer: Buffer<R>,
     skipped: Option<Skipped>,
 }
 
 impl<R: Read> Binary<R> {
     /// Reads from `input`.
     pub(super) fn new(input: R) -> Self {
-        Self { input, buffer: Vec::new(), at: 0, base: 0, ended: false, skipped: None }
+        Self { buffer: Buffer::new(input), skipped: None }
     }
 
     /// The first bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
-        self.fill(bytes)?;
-        Ok(&self.buffer)
+        self.buffer.window(bytes)
     }
 
     /// How far the reading is, in bytes.
     pub(super) fn place(&self) -> u64 {
-        self.base + self.at as u64
-    }
-
-    fn rest(&self) -> &[u8] {
-        self.buffer.get(self.at..).unwrap_or_default()
-    }
-
-    /// Sees to it that so many bytes are there, or all that there are.
-    fn fill(&mut self, wanted: usize) -> io::Result<()> {
-        if self.ended || self.rest().len() >= wanted {
-            return Ok(());
-        }
-        self.buffer.drain(..self.at);
-        self.base += self.at as u64;
-        self.at = 0;
-        while self.buffer.len() < wanted && !self.ended {
-            let old = self.buffer.len();
-            self.buffer.resize(old + CHUNK_BYTES, 0);
-            let got = crate::source::stream::read_some(
-                &mut self.input,
-                self.buffer.get_mut(old..).unwrap_or_default(),
-            );
-            self.buffer.truncate(old + *got.as_ref().unwrap_or(&0));
-            self.ended = got? == 0;
-        }
-        Ok(())
+        self.buffer.place()
     }
 
     /// The next message, or what was skipped before it; `None` at the end. `lengths` learns which of two lengths of a
     /// type is the right one.
     pub(super) fn next(&mut self, lengths: &mut Lengths) -> io::Result<Option<Piece<'_>>> {
         loop {
-            self.fill(LOOKAHEAD_BYTES)?;
-            let rest = self.rest();
+            self.buffer.fill(LOOKAHEAD_BYTES)?;
+            let rest = self.buffer.rest();
             if rest.is_empty() {
                 let end = self.skipped.take().map(|skipped| Piece::Damage(skipped.told(true)));
                 return Ok(end);
             }
-            match look(rest, self.ended, lengths) {
+            match look(rest, self.buffer.ended(), lengths) {
                 Look::Message(length) => {
                     if let Some(skipped) = self.skipped.take() {
                         return Ok(Some(Piece::Damage(skipped.told(false))));
                     }
-                    let (start, place) = (self.at, self.place());
-                    self.at += length;
-                    let bytes = self.buffer.get(start..self.at).unwrap_or_default();
+                    let place = self.place();
+                    let bytes = self.buffer.take(length);
                     let kind = bytes.get(2).copied().unwrap_or_default();
                     let payload = bytes.get(HEADER_BYTES..).unwrap_or_default();
                     return Ok(Some(Piece::Message { kind, payload, place }));
@@ -141,7 +108,7 @@ impl<R: Read> Binary<R> {
 
     fn skip(&mut self, bytes: usize, undefined: Option<u8>, cut: Option<u8>) {
         let place = self.place();
-        let gone = self.buffer.get(self.at..self.at + bytes).unwrap_or_default();
+        let gone = self.buffer.take(bytes);
         let first = gone.first().copied();
         let only = first.filter(|first| gone.iter().all(|byte| byte == first));
         let new = Skipped { place, bytes: bytes as u64, only, undefined, cut };
@@ -153,7 +120,6 @@ impl<R: Read> Binary<R> {
                 ..before
             },
         });
-        self.at += bytes;
     }
 }
 

@@ -9,6 +9,7 @@
 //! rows, and what vehicle it is after its first observations.
 
 mod binary;
+mod buffer;
 mod clock;
 mod format;
 mod message;

@@ -5,8 +5,9 @@
 use std::borrow::Cow;
 use std::io::{self, Read};
 
+use super::buffer::Buffer;
+
 const LINE_BYTES_MAX: usize = 64 * 1024;
-const CHUNK_BYTES: usize = 256 * 1024;
 
 /// One line, without its end.
 #[derive(Debug)]
@@ -22,51 +23,23 @@ pub(super) struct Line<'a> {
 }
 
 /// A reader of lines.
-pub(super) struct Lines<R> {
-    input: R,
-    buffer: Vec<u8>,
-    at: usize,
-    base: u64,
-    ended: bool,
-}
+pub(super) struct Lines<R>(Buffer<R>);
 
 impl<R: Read> Lines<R> {
     /// Reads from `input`.
     pub(super) fn new(input: R) -> Self {
-        Self { input, buffer: Vec::new(), at: 0, base: 0, ended: false }
+        Self(Buffer::new(input))
     }
 
     /// The first bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
-        self.fill(bytes)?;
-        Ok(&self.buffer)
-    }
-
-    fn fill(&mut self, wanted: usize) -> io::Result<()> {
-        let have = self.buffer.len() - self.at;
-        if self.ended || have >= wanted {
-            return Ok(());
-        }
-        self.buffer.drain(..self.at);
-        self.base += self.at as u64;
-        self.at = 0;
-        while self.buffer.len() < wanted && !self.ended {
-            let old = self.buffer.len();
-            self.buffer.resize(old + CHUNK_BYTES, 0);
-            let got = crate::source::stream::read_some(
-                &mut self.input,
-                self.buffer.get_mut(old..).unwrap_or_default(),
-            );
-            self.buffer.truncate(old + *got.as_ref().unwrap_or(&0));
-            self.ended = got? == 0;
-        }
-        Ok(())
+        self.0.window(bytes)
     }
 
     /// The next line; `None` at the end.
     pub(super) fn next(&mut self) -> io::Result<Option<Line<'_>>> {
-        self.fill(LINE_BYTES_MAX)?;
-        let rest = self.buffer.get(self.at..).unwrap_or_default();
+        self.0.fill(LINE_BYTES_MAX)?;
+        let rest = self.0.rest();
         if rest.is_empty() {
             return Ok(None);
         }
@@ -74,9 +47,8 @@ impl<R: Read> Lines<R> {
         let end = searched.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
         let length = end.unwrap_or(searched.len());
         let next = length + usize::from(end.is_some());
-        let place = self.base + self.at as u64;
-        self.at += next;
-        let line = rest.get(..length).unwrap_or_default();
+        let place = self.0.place();
+        let line = self.0.take(next).get(..length).unwrap_or_default();
         let words = std::str::from_utf8(line).map_or_else(
             |_| line.iter().map(|byte| char::from(*byte)).collect::<String>().into(),
             Cow::Borrowed,
@@ -127,6 +99,6 @@ mod tests {
             assert!(line.words.len() <= LINE_BYTES_MAX);
             count += 1;
         }
-        assert_eq!((count, lines.buffer.capacity() < 4 * CHUNK_BYTES), (64, true));
+        assert_eq!((count, lines.0.capacity() < 1 << 20), (64, true));
     }
 }

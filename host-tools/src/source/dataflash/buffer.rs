@@ -1,0 +1,76 @@
+//! A file's bytes, some of them at a time: what both forms of a log are read through.
+
+use std::io::{self, Read};
+
+use crate::source::stream::read_some;
+
+const CHUNK_BYTES: usize = 256 * 1024;
+
+/// The part of a file that is read, and where in it the reading stands.
+pub(super) struct Buffer<R> {
+    input: R,
+    bytes: Vec<u8>,
+    /// Where in the buffer the reading stands.
+    at: usize,
+    /// Where in the file the buffer begins.
+    base: u64,
+    ended: bool,
+}
+
+impl<R: Read> Buffer<R> {
+    pub(super) fn new(input: R) -> Self {
+        Self { input, bytes: Vec::new(), at: 0, base: 0, ended: false }
+    }
+
+    /// The first bytes, without reading on.
+    pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
+        self.fill(bytes)?;
+        Ok(&self.bytes)
+    }
+
+    /// How far the reading is, in bytes.
+    pub(super) fn place(&self) -> u64 {
+        self.base + self.at as u64
+    }
+
+    /// Whether nothing follows what is here.
+    pub(super) const fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// What is here and not read yet.
+    pub(super) fn rest(&self) -> &[u8] {
+        self.bytes.get(self.at..).unwrap_or_default()
+    }
+
+    /// The next bytes, which are read then.
+    pub(super) fn take(&mut self, bytes: usize) -> &[u8] {
+        let start = self.at;
+        self.at += bytes;
+        self.bytes.get(start..self.at).unwrap_or_default()
+    }
+
+    /// Sees to it that so many bytes are there, or all that there are.
+    pub(super) fn fill(&mut self, wanted: usize) -> io::Result<()> {
+        if self.ended || self.rest().len() >= wanted {
+            return Ok(());
+        }
+        self.bytes.drain(..self.at);
+        self.base += self.at as u64;
+        self.at = 0;
+        while self.bytes.len() < wanted && !self.ended {
+            let old = self.bytes.len();
+            self.bytes.resize(old + CHUNK_BYTES, 0);
+            let got = read_some(&mut self.input, self.bytes.get_mut(old..).unwrap_or_default());
+            self.bytes.truncate(old + *got.as_ref().unwrap_or(&0));
+            self.ended = got? == 0;
+        }
+        Ok(())
+    }
+
+    /// Bytes that it takes.
+    #[cfg(test)]
+    pub(super) fn capacity(&self) -> usize {
+        self.bytes.capacity()
+    }
+}
