@@ -1,7 +1,8 @@
 //! Ctrl-C and SIGTERM end a run that would go on for ever in good order: what waits is written, the log is closed and
 //! the results are printed. A second one ends the program at once. SIGTERM is what `systemctl stop` and `docker stop` send.
 //!
-//! SIGHUP keeps its default, so that `nohup` works.
+//! SIGHUP keeps its default, so that `nohup` works. SIGXFSZ, which a file beyond the limit of `ulimit -f` sends, is only
+//! noted: then the write fails with an error that names the file.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -29,6 +30,13 @@ pub fn watch() {
         }
         requested
     });
+}
+
+/// From now on a file that grows beyond the process's limit is an error of the write, and not the end of the program.
+pub fn no_end_by_file_size() {
+    #[cfg(unix)]
+    // Without a handler the signal ends the program, as before.
+    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
 /// Whether the user, or the system, asked to end.

@@ -15,6 +15,7 @@ pub mod interrupt;
 pub mod live;
 pub mod logs;
 pub mod loss;
+pub mod made;
 pub mod mavlink;
 pub mod names;
 pub mod outcome;
@@ -45,6 +46,7 @@ use outcome::Outcome;
 
 /// Runs the program with these arguments (the first is the program's own name).
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    interrupt::no_end_by_file_size();
     match Cli::try_parse_from(arguments) {
         Ok(cli) => outcome::exit_code(command(&cli.command)),
         Err(error) => {

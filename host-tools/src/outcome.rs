@@ -8,7 +8,10 @@
 //! | 3 | done, but the log has losses or damage: all that could be read was read |
 //! | 4 | done, the log is whole, and `hums check` found something wrong with the vehicle |
 
+use std::error::Error as StdError;
 use std::fmt;
+use std::io;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// The end of a run that did what it was asked.
@@ -45,7 +48,7 @@ impl fmt::Display for Usage {
     }
 }
 
-impl std::error::Error for Usage {}
+impl StdError for Usage {}
 
 /// A usage error with this message.
 pub fn usage(message: impl Into<String>) -> anyhow::Error {
@@ -62,15 +65,78 @@ impl fmt::Display for ReaderGone {
     }
 }
 
-impl std::error::Error for ReaderGone {}
+impl StdError for ReaderGone {}
 
-/// Whether an error is that, however deep: a writer of standard output has it inside its `io::Error`.
-fn is_reader_gone(error: &anyhow::Error) -> bool {
-    let inner = |cause: &(dyn std::error::Error + 'static)| {
-        let error = cause.downcast_ref::<std::io::Error>().and_then(std::io::Error::get_ref);
-        cause.is::<ReaderGone>() || error.is_some_and(<dyn std::error::Error + Send + Sync>::is::<ReaderGone>)
-    };
-    error.chain().any(inner)
+/// A file is there already under an output's name, and has other content: it was not replaced.
+#[derive(Debug)]
+pub struct Differs(pub PathBuf);
+
+impl fmt::Display for Differs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: is there already with other content, and was not replaced; name another output, move it away, or \
+             say --replace",
+            self.0.display()
+        )
+    }
+}
+
+impl StdError for Differs {}
+
+/// Outputs that were there with other content, of a command that has several: the others are written all the same.
+#[derive(Debug, Default)]
+pub struct Kept {
+    last: Option<anyhow::Error>,
+    count: u64,
+}
+
+impl Kept {
+    /// Hands on a result, but for [`Differs`]: that is told by [`Self::end`], or at once where it is not the only one.
+    pub fn pass<T>(&mut self, result: anyhow::Result<T>) -> anyhow::Result<Option<T>> {
+        match result {
+            Ok(value) => Ok(Some(value)),
+            Err(error) if differs(&error).is_some() => {
+                self.tell();
+                self.count += 1;
+                self.last = Some(error);
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Says the latest.
+    fn tell(&mut self) {
+        if let Some(differs) = self.last.take().as_ref().and_then(differs) {
+            eprintln!("hums: {differs}");
+        }
+    }
+
+    /// All is done: an error where outputs were kept.
+    pub fn end(mut self) -> anyhow::Result<()> {
+        if self.count > 1 {
+            self.tell();
+            anyhow::bail!(
+                "{} outputs were there already with other content, and were not replaced",
+                self.count
+            );
+        }
+        self.last.map_or(Ok(()), Err)
+    }
+}
+
+/// What says [`Differs`] in an error.
+pub fn differs(error: &anyhow::Error) -> Option<&Differs> {
+    find(error)
+}
+
+/// An error of this type, however deep: a writer has it inside its `io::Error`.
+fn find<E: StdError + 'static>(error: &anyhow::Error) -> Option<&E> {
+    error.chain().find_map(|cause| {
+        let inner = || cause.downcast_ref::<io::Error>()?.get_ref()?.downcast_ref();
+        cause.downcast_ref().or_else(inner)
+    })
 }
 
 /// Says on standard error what went wrong, and gives the exit code.
@@ -79,9 +145,13 @@ pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Losses) => ExitCode::from(3),
         Ok(Outcome::Findings) => ExitCode::from(4),
-        Err(error) if is_reader_gone(&error) => ExitCode::SUCCESS,
+        Err(error) if find::<ReaderGone>(&error).is_some() => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("hums: {error:#}");
+            match differs(&error) {
+                // What it was met at says nothing more.
+                Some(differs) => eprintln!("hums: {differs}"),
+                None => eprintln!("hums: {error:#}"),
+            }
             ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }
     }
@@ -97,7 +167,8 @@ mod tests {
     fn a_reader_that_has_gone_is_found_under_what_else_is_said() {
         let gone = || std::io::Error::other(ReaderGone);
         let told: anyhow::Result<()> = Err(gone()).context("--gs: cannot be written");
-        assert!(is_reader_gone(&told.expect_err("an error")) && is_reader_gone(&ReaderGone.into()));
-        assert!(!is_reader_gone(&std::io::Error::other("full").into()));
+        let is_gone = |error: anyhow::Error| find::<ReaderGone>(&error).is_some();
+        assert!(is_gone(told.expect_err("an error")) && is_gone(ReaderGone.into()));
+        assert!(!is_gone(std::io::Error::other("full").into()));
     }
 }

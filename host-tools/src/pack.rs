@@ -12,6 +12,7 @@ use hums_link::{Check, Framer};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write};
+use crate::made;
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::plural::count;
@@ -28,11 +29,11 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
             args.input
         )));
     }
-    let mut inputs = Inputs::none();
+    let mut inputs = Inputs::none().replacing(args.replace);
     inputs.add_endpoint(&args.input);
     let mut source = source::open(&args.input, Timing { line_rate: None })?;
     let context = || cannot_write(&args.output);
-    let mut packer = Packer::new(Output::create(&args.output, &inputs)?);
+    let mut packer = Packer::new(Output::create(&args.output, &inputs, &made::LOG)?);
     let mut last_us = 0;
     while let Some(chunk) = source.next().with_context(|| format!("{}: cannot be read", args.input))? {
         if packer.started.is_none() {

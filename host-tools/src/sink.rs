@@ -10,6 +10,7 @@ use anyhow::{Context as _, Result};
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output};
+use crate::made;
 use crate::output::Stdout;
 
 /// How long the reader waits before it looks whether anybody still listens.
@@ -82,7 +83,7 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
     let heard = Heard::nobody();
     match endpoint {
         Endpoint::File(path) => {
-            let file = SinkFile(Arc::new(Mutex::new(Output::create(path, inputs)?)));
+            let file = SinkFile(Arc::new(Mutex::new(Output::create(path, inputs, &made::RAW)?)));
             Ok(Ground { writer: Box::new(file.clone()), heard, file: Some(file) })
         }
         Endpoint::Standard => {

@@ -48,9 +48,8 @@ fn two_flights_add_up_in_the_store_whatever_card_is_in_the_slot() {
 
 #[test]
 fn a_run_without_a_store_begins_anew() {
-    let dir = tempfile::tempdir().unwrap();
     let recording = Recording::make(Machine::Sim, &own(FLIGHT), &[]);
-    assert!(records(&recording.image(), dir.path()).contains("the store is new"));
+    assert!(records(&recording.image()).contains("the store is new"));
 }
 
 #[test]
@@ -98,7 +97,7 @@ fn power_that_goes_at_any_moment_of_a_flight_costs_two_minutes_of_it_at_most() {
             let at = (100 + random.below(blocks)).to_string();
             let flags = ["--store", store.to_str().unwrap(), "--cut-after-writes", &at];
             let recording = Recording::attempt(Machine::Sim, &own(flight), &flags).expect_code(&[0, 3]);
-            let text = records(&recording.image(), dir.path());
+            let text = records(&recording.image());
             let event =
                 |name: &str| text.lines().find(|line| line.contains("HUMS_EVENT") && line.contains(name));
             let Some(take_off_s) = event("\"take_off\"").map(time_s) else { continue };
@@ -172,7 +171,7 @@ fn a_component_that_a_command_says_is_replaced_begins_anew_and_that_is_recorded(
         fly(&store, &flags).expect_code(&[0])
     };
     let recording = run(["--gs-input".into(), path("gs.tlog").display().to_string()]);
-    let text = records(&recording.image(), dir.path());
+    let text = records(&recording.image());
     let replaced: Vec<&str> = text
         .lines()
         .filter(|line| {
@@ -256,7 +255,7 @@ fn flash_with_something_else_in_it_is_recorded_and_told_and_the_flight_counts() 
     fs::write(&store, vec![0x5A; 32_768]).unwrap();
     let recording = fly(&store, &[]).expect_code(&[0]);
     let text = "HUMS: store unreadable, counters begin anew";
-    assert!(records(&recording.image(), dir.path()).contains(text));
+    assert!(records(&recording.image()).contains(text));
     let gs = fs::read(recording.gs()).unwrap();
     assert!(gs.windows(text.len()).any(|window| window == text.as_bytes()), "the ground station is not told");
     assert_eq!(Stored::read(&store).lifetime().boots, 1);
@@ -267,10 +266,7 @@ fn flash_with_something_else_in_it_is_recorded_and_told_and_the_flight_counts() 
 }
 
 /// All records of a card, as text.
-fn records(image: &Path, dir: &Path) -> String {
-    let out = dir.join("records.jsonl");
-    let [decode, image, to, out_name] =
-        ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
-    hums([decode, image, to, out_name, "--format".as_ref(), "jsonl".as_ref()]).expect_code(&[0, 3]);
-    fs::read_to_string(out).unwrap()
+fn records(image: &Path) -> String {
+    let jsonl = ["-o", "-", "--format", "jsonl"].map(AsRef::as_ref);
+    hums(["decode".as_ref(), image.as_os_str()].into_iter().chain(jsonl)).expect_code(&[0, 3]).text()
 }

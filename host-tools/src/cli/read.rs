@@ -8,9 +8,9 @@ use crate::endpoint::Endpoint;
 use crate::utc::When;
 
 const DECODE_EXAMPLES: &str = "Examples:
-  hums decode card.img -o flight.tlog --format tlog
+  hums decode card.img -o 00001.tlog --format tlog
   hums decode card.img -o out --format tlog,csv,jsonl
-  hums decode cards/ -o out --format csv --message ATTITUDE --message GPS_RAW_INT
+  hums decode cards/ -o some --format csv --message ATTITUDE --message GPS_RAW_INT
   hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
   hums decode cards/ -o fleet --format parquet
   hums decode card.img -o - --format influx | curl --data-binary @- http://localhost:8428/write
@@ -19,7 +19,8 @@ Where files go: -o names the file where there is one log and one format of a sin
 it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
 OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
-No input is ever written over, and an output is the old one until the new one is whole.
+No input is ever written over. What is there already is left as it is: if it is the same as what would be written, all is
+well; if not, the command fails. With --replace it is replaced, when all of the new one is there.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
 /// `hums decode`
@@ -38,7 +39,7 @@ pub struct Decode {
     /// What to write, several with commas
     #[arg(long, value_enum, value_delimiter = ',', required = true)]
     pub format: Vec<Format>,
-    /// Leave out what is earlier: seconds since the session's start, or UTC as 2026-11-21T10:13:42Z
+    /// Leave out what is earlier: seconds since the start of the log, or UTC as 2026-11-21T10:13:42Z
     #[arg(long, value_name = "T")]
     pub from: Option<When>,
     /// Leave out what is later
@@ -47,6 +48,9 @@ pub struct Decode {
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
+    /// Replace an output that is there already and has other content: a file of the same format, or tables of `hums decode`
+    #[arg(long)]
+    pub replace: bool,
 }
 
 /// What to write.
@@ -112,7 +116,7 @@ const REPORT_EXAMPLES: &str = "Examples:
   hums report card.img -o report.html
   hums report card.img -o pages/
   hums report card.img --session 00001 -o report.html
-  hums report flight.tlog -o report.html
+  hums report flight.tlog -o flight.html
 
 With a directory for -o each session gets a page, named after log, box and session; otherwise the newest gets one. The page compares with
 the sessions before on the same card.";
@@ -130,6 +134,9 @@ pub struct Report {
     /// Only this session, by the name that `hums info` gives
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
+    /// Replace a page that is there already and has other content
+    #[arg(long)]
+    pub replace: bool,
 }
 
 const PACK_EXAMPLES: &str = "Examples:
@@ -146,4 +153,7 @@ pub struct Pack {
     /// The log file to write
     #[arg(short, long, value_name = "LOG")]
     pub output: PathBuf,
+    /// Replace a log that is there already and has other content
+    #[arg(long)]
+    pub replace: bool,
 }

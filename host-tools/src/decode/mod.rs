@@ -12,8 +12,8 @@
 //! A log is read once (twice where its vehicle must be known first); its groups are turned to text and columns in
 //! parallel and written in order. Several logs go side by side, few enough that memory stays bounded.
 //!
-//! A log's files are named after its session ([`naming`]), and no other session's files are ever written over. Folders of
-//! tables are replaced whole or not at all ([`crate::files::Folder`]).
+//! A log's files are named after its session ([`naming`]). What is there already is compared, and replaced only where the
+//! user says so ([`crate::files`]).
 //!
 //! Recordings that are no logs of ours ([`recorded`]) become the same formats, an autopilot's log with its own tables.
 //!
@@ -40,6 +40,7 @@ pub mod text;
 pub mod thesis;
 pub mod unknown;
 mod wear;
+mod works;
 pub mod write;
 
 use std::collections::BTreeSet;
@@ -50,10 +51,10 @@ use anyhow::{Result, bail};
 use hums_core::time::Instant;
 
 use crate::cli;
-use crate::files::{Folder, Held, Inputs, says_directory};
+use crate::files::{Folder, Inputs, appended};
 use crate::logs::reader::{self, Summary};
-use crate::outcome::{Outcome, usage as usage_error};
-use crate::plural::count;
+use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
+use crate::plural::{count, noun};
 use crate::source::recording::{Place, find};
 use crate::{output, progress};
 use collect::Collected;
@@ -61,25 +62,69 @@ use context::{Context, Formats};
 use destination::Destination;
 use identity::Identity;
 use influx::Tags;
-use naming::{Named, Traits};
+use naming::Named;
 use selection::Selection;
 use side_by_side::side_by_side;
-use write::{Writers, Written};
+use works::{Work, Works, check_forms};
+use write::Writers;
 
 /// Runs `hums decode`.
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let formats = Formats::new(&args.format);
-    let found = find(&args.inputs, args.salvage)?;
-    for remark in &found.remarks {
+    let (given, remarks) = naming::without_made(&args.inputs);
+    let found = find(&given, args.salvage)?;
+    for remark in remarks.iter().chain(&found.remarks) {
         eprintln!("hums: {remark}");
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
         eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
     }
+    if found.places.is_empty() {
+        eprintln!("hums: no log is in there, so nothing was written");
+    }
+    let mut inputs =
+        Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
+    let Works { works, earlier } =
+        Works::of(&found.places, |name| appended(&args.output.join(name), "tlog"))?;
+    for (made, of) in &earlier {
+        eprintln!("hums: {}: is what this command makes of {of}, and is not read", made.display());
+        inputs.compare_only(made);
+    }
+    let standard_output = check_output(args, works.len(), formats)?;
+    let native = check_forms(&works, formats)?;
+    let selection = Selection::new(args, native)?;
+    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs: works.len() };
+    let taken = Mutex::new(BTreeSet::new());
+    let mut written = works.is_empty();
+    let mut kept = Kept::default();
+    side_by_side(
+        &works,
+        |work| task.decode(work, &works, &taken),
+        |done| {
+            let Some(done) = kept.pass(done)? else {
+                written = true;
+                return Ok(());
+            };
+            done.remarks.iter().for_each(|remark| eprintln!("hums: {remark}"));
+            outcome = outcome.and(done.outcome);
+            written |= done.written;
+            done.lines.iter().try_for_each(|line| output::line(line))
+        },
+    )?;
+    kept.end()?;
+    if !written {
+        bail!("nothing is within --from and --to, so nothing was written");
+    }
+    Ok(outcome)
+}
+
+/// Whether the output is standard output; an error where what is asked for does not go there, or into the file that it
+/// names.
+fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<bool> {
     let standard_output = args.output == Path::new("-");
-    if standard_output && (found.places.len() != 1 || !formats.is_single_file()) {
-        let why = match found.places.len() {
+    if standard_output && (logs != 1 || !formats.is_single_file()) {
+        let why = match logs {
             1 => "these formats are more than that".to_owned(),
             count => format!("there are {count} logs"),
         };
@@ -88,88 +133,14 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
              name a file or a directory"
         )));
     }
-    let one_file = found.places.len() == 1 && formats.is_single_file();
+    let one_file = logs == 1 && formats.is_single_file();
     if args.output.is_file() && !one_file {
         return Err(usage_error(format!(
             "-o {}: is a file, but tables, several formats and several logs need a directory; name one, or a new name",
             args.output.display()
         )));
     }
-    if found.places.is_empty() {
-        eprintln!("hums: no log is in there, so nothing was written");
-    }
-    let mut inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
-    if !one_file || says_directory(&args.output) {
-        inputs = inputs.without_folders();
-    }
-    let logs = found.places.len();
-    let native = check_forms(&found.places, formats)?;
-    let selection = Selection::new(args, native)?;
-    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
-    let works = works(&found.places)?;
-    let taken = Mutex::new(BTreeSet::new());
-    let mut written = works.is_empty();
-    side_by_side(
-        &works,
-        |work| task.decode(work, &works, &taken),
-        |done| {
-            let done = done?;
-            done.remarks.iter().for_each(|remark| eprintln!("hums: {remark}"));
-            outcome = outcome.and(done.outcome);
-            written |= done.written;
-            done.lines.iter().try_for_each(|line| output::line(line))
-        },
-    )?;
-    if !written {
-        bail!("nothing is within --from and --to, so nothing was written");
-    }
-    Ok(outcome)
-}
-
-/// Whether any of these has messages of its own instead of MAVLink's; an error where one cannot become what is asked for.
-fn check_forms(places: &[Place], formats: Formats) -> Result<bool> {
-    let mut native = false;
-    for place in places.iter().filter(|place| place.own().is_none()) {
-        if place.is_standard() {
-            return Err(usage_error("-: a recording is read twice here; give a file"));
-        }
-        let format = place.open()?.format;
-        if !format.is_of_link() {
-            native = true;
-            if formats.tlog {
-                return Err(usage_error(format!(
-                    "{}: is an {}, which has no MAVLink frames for a tlog; --format csv, jsonl or parquet has all of it",
-                    place.title,
-                    format.words()
-                )));
-            }
-        }
-    }
-    Ok(native)
-}
-
-/// A log, and what its files are called.
-struct Work<'a> {
-    log: &'a Place,
-    traits: Traits,
-    named: Named,
-}
-
-/// The logs with their names.
-fn works(logs: &[Place]) -> Result<Vec<Work<'_>>> {
-    let mut traits = Vec::new();
-    // A log that cannot be read is named all the same: reading it says why.
-    side_by_side(
-        logs,
-        |log| Traits::of(log).unwrap_or_default(),
-        |found| {
-            traits.push(found);
-            Ok(())
-        },
-    )?;
-    let logs: Vec<(&Place, Traits)> = logs.iter().zip(traits).collect();
-    let names = naming::names(&logs);
-    Ok(logs.into_iter().zip(names).map(|((log, traits), named)| Work { log, traits, named }).collect())
+    Ok(standard_output)
 }
 
 /// What to do with each log.
@@ -235,29 +206,29 @@ impl Task<'_> {
             }
             parquet = Some(dir);
         }
-        let (mut summary, mut written) = self.write(log, name, &context, parquet.as_deref())?;
-        if summary.epoch_us != context.epoch_us && !self.standard_output {
+        let mut read = self.read(log, name, &context, parquet.as_deref());
+        if let Some(epoch_us) = self.better_epoch(log, &context, &read)? {
             // Only its last group knew better: all of it again, with that.
-            context.epoch_us = summary.epoch_us;
-            (summary, written) = self.write(log, name, &context, parquet.as_deref())?;
+            drop(read);
+            context.epoch_us = epoch_us;
+            read = self.read(log, name, &context, parquet.as_deref());
         }
-        let Some(written) = written else {
+        let (summary, writers) = read?;
+        if writers.is_empty() && context.selection.has_limits() {
             remarks.push(nothing_of(log, &summary));
             return Ok(Done { outcome: Outcome::Done, written: false, lines: Vec::new(), remarks });
-        };
+        }
+        let written = writers.finish()?;
         let lossy = summary.gaps > 0 || summary.blocks.damaged > 0 || written.losses > 0;
         if lossy {
             remarks.push(format!(
-                "{}: {}, {} missing, {}, {} lost while recording",
+                "{}: {}, {} missing, {}, {} or {} lost while recording",
                 log.name,
                 count(summary.gaps, "gap"),
                 count(summary.frames_missing, "frame"),
                 count(summary.blocks.damaged, "damaged sector"),
-                if written.losses == 1 {
-                    "1 frame or record".to_owned()
-                } else {
-                    format!("{} frames or records", written.losses)
-                }
+                count(written.losses, "frame"),
+                noun(written.losses, "record")
             ));
         }
         let lines = if self.standard_output { Vec::new() } else { written.lines };
@@ -291,14 +262,32 @@ impl Task<'_> {
         Ok(context)
     }
 
-    /// Reads a log and writes its files; none where nothing of it is in the time that was asked for.
-    fn write(
+    /// UTC at power-on as a reading has found it, where that is not what the log's files were begun with. A reading that
+    /// ended because the files there differ may have ended for just that.
+    #[expect(clippy::option_option, reason = "it may be known now that nobody told it")]
+    fn better_epoch(
+        &self,
+        place: &Place,
+        context: &Context,
+        read: &Result<(Summary, Writers<'_>)>,
+    ) -> Result<Option<Option<u64>>> {
+        let epoch_us = match (read, place.own()) {
+            _ if self.standard_output => return Ok(None),
+            (Ok((summary, _)), _) => summary.epoch_us,
+            (Err(error), Some(log)) if differs(error).is_some() => reader::epoch(log)?,
+            _ => return Ok(None),
+        };
+        Ok(Some(epoch_us).filter(|epoch_us| *epoch_us != context.epoch_us))
+    }
+
+    /// Reads a log into its files, which are not whole yet.
+    fn read<'a>(
         &self,
         place: &Place,
         name: &str,
-        context: &Context,
+        context: &'a Context,
         parquet: Option<&Path>,
-    ) -> Result<(Summary, Option<Written>)> {
+    ) -> Result<(Summary, Writers<'a>)> {
         let destination = if self.standard_output {
             Destination::Standard
         } else {
@@ -315,10 +304,7 @@ impl Task<'_> {
             }
             None => recorded::read(place, context, &mut writers)?,
         };
-        if writers.is_empty() && context.selection.has_limits() {
-            return Ok((summary, None));
-        }
-        Ok((summary, Some(writers.finish()?)))
+        Ok((summary, writers))
     }
 }
 
@@ -343,10 +329,9 @@ fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32, stamp: &str) -> Pa
         }
         PathBuf::from(name)
     };
-    let held = |path: &PathBuf| Folder::held(path, stamp);
-    let own = (1..).map(numbered).take_while(|path| held(path) != Held::Nothing);
-    let mut own = own.filter(|path| held(path) == Held::TheSame);
-    let is_free = |path: &PathBuf| held(path) == Held::Nothing && !taken.contains(path);
+    let own = (1..).map(numbered).take_while(|path| !Folder::is_free(path));
+    let mut own = own.filter(|path| Folder::made_of(path).is_some_and(|made_of| made_of == stamp));
+    let is_free = |path: &PathBuf| Folder::is_free(path) && !taken.contains(path);
     let free = || (nth..u32::MAX).map(numbered).find(is_free);
     let claimed = own.next().or_else(free).unwrap_or_else(|| dir.to_owned());
     taken.insert(claimed.clone());

@@ -3,16 +3,14 @@
 //! that its sectors name. What is not known is left out: a packed log has no board.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use hums_blackbox::{Entry, GroupDecoder, Record, Step};
 use hums_recorder::LogName;
 use sha2::{Digest as _, Sha256};
 
-use crate::files::{add_ends, short};
+use crate::files::{Folder, add_ends, digest, short};
 use crate::logs::Log;
 use crate::logs::groups::Groups;
 use crate::source::recording::Place;
@@ -110,6 +108,39 @@ pub fn names(logs: &[(&Place, Traits)]) -> Vec<Named> {
     logs.iter().enumerate().map(name).collect()
 }
 
+/// Inputs without those that `hums decode` and `hums report` make and that are no recordings, and what is said of them:
+/// a second `hums decode * -o .` is given the outputs of the first. An input alone is what the user means.
+pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
+    let (made, others): (Vec<&PathBuf>, Vec<&PathBuf>) = inputs.iter().partition(|input| is_made(input));
+    if others.is_empty() {
+        return (inputs.to_vec(), Vec::new());
+    }
+    let remark =
+        |path: &&PathBuf| format!("{}: was made by hums of a recording, and is passed over", path.display());
+    (others.into_iter().cloned().collect(), made.iter().map(remark).collect())
+}
+
+/// Whether a file or a folder has a name, or a folder a stamp, as our outputs that are no recordings have.
+fn is_made(path: &Path) -> bool {
+    let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
+    if path.is_dir() {
+        return Folder::made_of(path).is_some() || name.starts_with("vehicle=");
+    }
+    let endings = [".tlog.gaps.csv", ".jsonl", ".lp", ".html"];
+    endings.iter().filter_map(|ending| name.strip_suffix(ending)).any(|stem| {
+        // A further log of a session has a number behind it.
+        let numbered = stem.rsplit_once('-').filter(|(_, number)| number.parse::<u32>().is_ok());
+        std::iter::once(stem).chain(numbered.map(|(stem, _)| stem)).any(ends_with_identity)
+    })
+}
+
+/// Whether a name ends with a session's number, `-s1a2b3c4d`, or with that of a recording's content, `-r1a2b3c4d`.
+fn ends_with_identity(stem: &str) -> bool {
+    let last = stem.rsplit_once('-').map_or("", |(_, last)| last);
+    let digits = last.strip_prefix(['s', 'r']).unwrap_or_default();
+    digits.len() == 8 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+}
+
 /// The name of files that are made of a recording, which is no log of ours: its own name, and what is in it.
 pub fn of_recording(path: &Path) -> Result<String> {
     let name = path.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy());
@@ -120,16 +151,8 @@ pub fn of_recording(path: &Path) -> Result<String> {
 
 /// Of all bytes of a file.
 fn fingerprint(path: &Path) -> Result<[u8; 16]> {
-    let context = || format!("{}: cannot be read", path.display());
-    let mut file = File::open(path).with_context(context)?;
-    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 64 * 1024]);
-    loop {
-        match file.read(&mut buffer).with_context(context)? {
-            0 => break,
-            got => hash.update(buffer.get(..got).unwrap_or_default()),
-        }
-    }
-    Ok(hash.finalize().first_chunk().copied().unwrap_or_default())
+    let digest = digest(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    Ok(digest.first_chunk().copied().unwrap_or_default())
 }
 
 /// What a log is called without its identity: its number on the card, or the name of its file.
@@ -162,6 +185,18 @@ fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn outputs_are_known_by_their_names_and_recordings_are_not_taken_for_them() {
+        for made in ["00001-box3f-s1a2b3c4d.jsonl", "log-s1a2b3c4d-2.lp", "a.tlog-r00112233.tlog.gaps.csv"] {
+            assert!(is_made(Path::new(made)), "{made}");
+        }
+        for other in
+            ["log-s1a2b3c4d.hum", "log-s1a2b3c4d.tlog", "log-s1a2b3c4.jsonl", "notes.jsonl", "x.html"]
+        {
+            assert!(!is_made(Path::new(other)), "{other}");
+        }
+    }
 
     #[test]
     fn copies_are_known_and_other_logs_of_a_session_get_other_names() {

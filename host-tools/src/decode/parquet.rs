@@ -16,7 +16,6 @@
 use std::cmp::Reverse;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -35,7 +34,7 @@ use super::columns::{Column, TextColumn, cell_array, cell_data_type};
 use super::field_names::free_name;
 use super::row::Row;
 use super::table::Table;
-use crate::files::{Folder, cannot_write};
+use crate::files::{Folder, FolderFile, cannot_write};
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
 
@@ -281,7 +280,7 @@ pub struct ParquetTables {
 
 struct TableFile {
     path: PathBuf,
-    writer: ArrowWriter<File>,
+    writer: ArrowWriter<FolderFile>,
     pending: Vec<RecordBatch>,
     pending_bytes: usize,
     /// Columns of the row groups written.
@@ -423,6 +422,8 @@ impl TableFile {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use arrow_array::cast::AsArray as _;
     use arrow_array::types::Float64Type;
     use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -452,7 +453,8 @@ mod tests {
         let dir = tempfile::tempdir().expect("a directory");
         let decode = |limits| {
             let path = dir.path().join("session=s1");
-            let folder = Folder::create(&path, &Inputs::none(), "a session").expect("a folder");
+            let inputs = Inputs::none().replacing(true);
+            let folder = Folder::create(&path, &inputs, "a session").expect("a folder");
             let mut tables = ParquetTables::new(folder, &[]);
             tables.limits = limits;
             for second in 0..2000_u32 {

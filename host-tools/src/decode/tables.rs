@@ -1,7 +1,6 @@
 //! The CSV tables of one log: a folder of files, of which only some are open at once.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::io::{BufWriter, Write as _};
 
 use anyhow::Result;
@@ -9,7 +8,7 @@ use anyhow::Result;
 use super::table::Table;
 use super::text::columns;
 use super::unknown::UnknownLines;
-use crate::files::{Folder, buffered, settle};
+use crate::files::{Folder, FolderFile, buffered, settle};
 
 /// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
 const OPEN_MAX: usize = 256;
@@ -22,7 +21,7 @@ pub struct Tables {
     folder: Folder,
     /// Ids without a definition that have a table of their own.
     unknown: BTreeSet<u32>,
-    open: BTreeMap<Table, BufWriter<File>>,
+    open: BTreeMap<Table, BufWriter<FolderFile>>,
     /// Tables that have their header; not all of them are open.
     begun: BTreeSet<Table>,
     headers: BTreeMap<&'static str, Vec<&'static str>>,

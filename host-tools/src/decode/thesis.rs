@@ -7,7 +7,6 @@
 //! Seconds in which the vehicle was not heard, or that fell into a gap of the log, have no row: the flight time jumps,
 //! and `gaps.csv` names the gaps.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
@@ -18,7 +17,7 @@ use hums_core::time::{Instant, Span};
 
 use super::reference::{MOTORS, Quantity, Reference};
 use super::selection::Selection;
-use crate::files::{Folder, buffered, settle};
+use crate::files::{Folder, FolderFile, buffered, settle};
 use crate::mavlink::values::Scalar;
 
 /// A vehicle that was not heard for so long tells nothing about this second.
@@ -39,7 +38,7 @@ const GAPS: &str = "From [s]; To [s]; Cause; Frames missing";
 /// The tables of one log, open.
 pub struct Thesis {
     folder: Folder,
-    tables: [(BufWriter<File>, PathBuf); 5],
+    tables: [(BufWriter<FolderFile>, PathBuf); 5],
     reference: Reference,
     selection: Selection,
     epoch_us: Option<u64>,
@@ -52,7 +51,7 @@ pub struct Thesis {
 impl Thesis {
     /// Makes the tables in a folder.
     pub fn new(folder: Folder, selection: Selection, epoch_us: Option<u64>) -> Result<Self> {
-        let table = |name: &str, header: &str| -> Result<(BufWriter<File>, PathBuf)> {
+        let table = |name: &str, header: &str| -> Result<(BufWriter<FolderFile>, PathBuf)> {
             let path = folder.path().join(name);
             let mut file = buffered(folder.file(name)?);
             settle(writeln!(file, "{header}"), &path)?;

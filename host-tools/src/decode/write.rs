@@ -1,6 +1,6 @@
 //! The files of the output formats.
 
-use std::io::{BufRead as _, BufReader, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -15,10 +15,17 @@ use super::record::gap_row;
 use super::reference::Reference;
 use super::tables::{Tables, UNKNOWN_TABLES_MAX};
 use super::thesis::Thesis;
-use crate::files::{Folder, Inputs, Output, appended, make_parent, settle};
+use crate::files::{Folder, Inputs, Kind, Output, appended, make_parent, settle};
 use crate::logs::reader::Deliver;
+use crate::made;
 use crate::output::Stdout;
 use crate::plural::count;
+
+/// A table of gaps beside a tlog.
+const GAPS: Kind = Kind {
+    words: "a table of gaps of hums decode",
+    is: |start| start.strip_prefix(gaps_header().as_bytes()).is_some_and(|rest| rest.starts_with(b"\n")),
+};
 
 /// A single file, open.
 enum Single {
@@ -27,19 +34,19 @@ enum Single {
 }
 
 impl Single {
-    fn open(destination: &Destination, extension: &str, inputs: &Inputs) -> Result<Self> {
+    fn open(destination: &Destination, extension: &str, inputs: &Inputs, kind: &Kind) -> Result<Self> {
         match destination.path(extension) {
             None => {
                 inputs.refuse_standard_output()?;
                 Ok(Self::Standard(BufWriter::new(Stdout::new())))
             }
-            Some(path) => Self::file(&path, inputs),
+            Some(path) => Self::file(&path, inputs, kind),
         }
     }
 
-    fn file(path: &Path, inputs: &Inputs) -> Result<Self> {
+    fn file(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<Self> {
         make_parent(path)?;
-        Ok(Self::File(Output::create(path, inputs)?))
+        Ok(Self::File(Output::create(path, inputs, kind)?))
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
@@ -120,11 +127,12 @@ impl<'a> Writers<'a> {
     /// Opens what is sure to be written; tables are opened when they get their first row.
     pub fn new(context: &'a Context, destination: Destination, parquet: Option<PathBuf>) -> Result<Self> {
         let (formats, inputs) = (context.formats, &context.inputs);
-        let open = |wanted: bool, extension| {
-            wanted.then(|| Single::open(&destination, extension, inputs)).transpose()
+        let open = |wanted: bool, extension, kind| {
+            wanted.then(|| Single::open(&destination, extension, inputs, kind)).transpose()
         };
-        let (tlog, jsonl) = (open(formats.tlog, "tlog")?, open(formats.jsonl, "jsonl")?);
-        let influx = open(formats.influx, "lp")?.map(|file| Influx {
+        let tlog = open(formats.tlog, "tlog", &made::TLOG)?;
+        let jsonl = open(formats.jsonl, "jsonl", &made::JSONL)?;
+        let influx = open(formats.influx, "lp", &made::LINES)?.map(|file| Influx {
             file,
             messages: Clock::default(),
             quantities: Clock::default(),
@@ -198,7 +206,7 @@ impl<'a> Writers<'a> {
         let path = appended(&path, "gaps.csv");
         let file = match &mut self.gaps {
             Some(file) => file,
-            none => none.insert(Single::file(&path, &self.context.inputs)?),
+            none => none.insert(Single::file(&path, &self.context.inputs, &GAPS)?),
         };
         let mut line = Vec::new();
         if first {
@@ -225,15 +233,13 @@ impl<'a> Writers<'a> {
         let mut lines = Vec::new();
         let frames = count(self.frames, "frame");
         let rows = format!("{frames}, {}", count(self.records, "record"));
-        let tlog = self.destination.path("tlog").filter(|_| self.tlog.is_some());
+        self.check_earlier_gaps()?;
         let singles = [self.tlog.take(), self.jsonl.take(), self.influx.take().map(|influx| influx.file)];
         for file in singles.into_iter().flatten() {
             lines.push(format!("{}: {frames}", file.finish()?.display()));
         }
-        match (self.gaps.take(), tlog) {
-            (Some(file), _) => lines.push(format!("{}: gaps", file.finish()?.display())),
-            (None, Some(tlog)) => self.remove_earlier_gaps(&appended(&tlog, "gaps.csv"))?,
-            (None, None) => {}
+        if let Some(file) = self.gaps.take() {
+            lines.push(format!("{}: gaps", file.finish()?.display()));
         }
         if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
             let tables = count(csv.count() as u64, "table");
@@ -259,13 +265,14 @@ impl<'a> Writers<'a> {
     }
 
     /// Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
-    fn remove_earlier_gaps(&self, path: &Path) -> Result<()> {
-        let is_ours = |path: &Path| {
-            let mut first = String::new();
-            let read = std::fs::File::open(path).and_then(|file| BufReader::new(file).read_line(&mut first));
-            read.is_ok() && first.trim_end() == gaps_header()
-        };
-        if path.is_file() && is_ours(path) { Output::remove(path, &self.context.inputs) } else { Ok(()) }
+    fn check_earlier_gaps(&self) -> Result<()> {
+        let Some(tlog) = self.destination.path("tlog").filter(|_| self.tlog.is_some()) else { return Ok(()) };
+        let path = appended(&tlog, "gaps.csv");
+        if self.gaps.is_some() || !path.exists() {
+            return Ok(());
+        }
+        Output::check_new(&path, &self.context.inputs, &GAPS)?;
+        Output::remove(&path, &self.context.inputs)
     }
 }
 

@@ -1,7 +1,8 @@
 //! `hums demo`: a recorded flight is recorded by the firmware (in the emulator, where there is one), the card is
 //! decoded, what came of it is summed up, and the dashboard plays the card.
 
-use std::fs;
+mod earlier;
+
 use std::io::IsTerminal as _;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use anyhow::{Result, bail};
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
-use crate::files::{Folder, Inputs, Output, make_directory};
+use crate::files::{Inputs, make_directory};
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output::line;
@@ -21,9 +22,6 @@ use crate::{decode, info, live, report};
 /// The flight that is shown, inside the source tree: a whole flight of a PX4 quadcopter.
 const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
 
-/// The file that says that a directory is a demo's.
-const MARK: &str = ".hums-demo";
-
 /// Where `hums live` serves its page as well.
 const PORT: u16 = 8080;
 
@@ -31,12 +29,13 @@ const PORT: u16 = 8080;
 pub fn run(args: &cli::Demo) -> Result<Outcome> {
     let flight = flight(args)?;
     make_directory(&args.dir)?;
-    let card = args.dir.join("card.img");
-    let gs = args.dir.join("ground-station.bin");
-    let decoded = args.dir.join("decoded");
-    let page = args.dir.join("report.html");
+    let [card, gs, decoded, page] =
+        [earlier::CARD, earlier::GROUND_STATION, earlier::DECODED, earlier::REPORT]
+            .map(|name| args.dir.join(name));
+    let mut inputs = Inputs::none();
+    inputs.add_endpoint(&flight);
     // Each demo begins with an empty card.
-    remove_earlier(&flight, &args.dir, &decoded, &[&card, &gs, &page])?;
+    let place = earlier::Place::clear(&args.dir, &inputs)?;
     line(&format!("1. {flight} goes in at the autopilot UART"))?;
     let recorded = record(&flight, &card, &gs)?;
     line("")?;
@@ -49,9 +48,13 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         from: None,
         to: None,
         message: Vec::new(),
+        replace: false,
     };
     let read = decode::run(&arguments)?;
-    report::run(&cli::Report { inputs: vec![card.clone()], output: page.clone(), session: None })?;
+    let page_of =
+        cli::Report { inputs: vec![card.clone()], output: page.clone(), session: None, replace: false };
+    report::run(&page_of)?;
+    place.note()?;
     line("")?;
     line("3. what it says of the flight")?;
     for log in &logs::find(std::slice::from_ref(&card), false)?.logs {
@@ -77,35 +80,6 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     line("5. the dashboard plays it, until Ctrl-C, at")?;
     dashboard(&card)?;
     Ok(outcome)
-}
-
-/// Removes what an earlier demo made in this directory. A file of such a name that no demo made stays, and ends this one:
-/// it may be somebody's card.
-fn remove_earlier(flight: &Endpoint, dir: &Path, decoded: &Path, made: &[&PathBuf]) -> Result<()> {
-    let mut inputs = Inputs::none();
-    inputs.add_endpoint(flight);
-    let mark = dir.join(MARK);
-    let there = made.iter().find(|path| path.exists()).map(|path| path.as_path());
-    if let Some(there) = there.or_else(|| decoded.exists().then_some(decoded))
-        && !mark.is_file()
-    {
-        bail!(
-            "{}: is there already, and no demo made it; name another directory with --dir",
-            there.display()
-        );
-    }
-    for path in made.iter().filter(|path| path.exists()) {
-        Output::remove(path, &inputs)?;
-    }
-    let entries = fs::read_dir(decoded).into_iter().flatten().flatten();
-    for path in entries.map(|entry| entry.path()) {
-        if path.is_dir() {
-            Folder::remove(&path)?;
-        } else {
-            Output::remove(&path, &inputs)?;
-        }
-    }
-    Output::create(&mark, &inputs)?.finish()
 }
 
 /// Whoever calls this from a script waits for its end.
@@ -166,6 +140,7 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         params: None,
         speed: None,
         json: false,
+        replace: false,
         faults: FaultFlags::default(),
     };
     let here = |why: &anyhow::Error| -> Result<Outcome> {

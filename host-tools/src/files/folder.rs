@@ -1,13 +1,16 @@
 //! A folder of output files that belong together: a session's tables. It is made beside its place and takes its name
 //! when all of it is there, so that there are the old tables, the new ones, or none, and never some of both.
 //!
-//! A file `.hums` in it (its stamp) says what it was made of. Only a folder of the same stamp is replaced, and only
-//! where nothing lies in it but files that this program makes.
+//! Its [stamp](super::stamp) says what it was made of and which files are ours. A folder that is there is compared with
+//! what would be written, file by file; only with `--replace` is it replaced, and only where nothing lies in it but
+//! what its stamp names.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write as _};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 
@@ -15,76 +18,86 @@ use super::identity::without_links;
 use super::inputs::Inputs;
 use super::part::{is_written, lock, part_of, sync_folder_of};
 use super::paths::{cannot_write, make_parent, settle};
+use super::stamp::{STAMP, Stamp};
+use super::there::There;
+use crate::outcome::Differs;
 
-/// The name of the stamp's file.
-const STAMP: &str = ".hums";
-/// What a folder may hold besides.
+/// What a folder may hold that a killed run has left.
 const EXTENSIONS: [&str; 2] = ["csv", "parquet"];
 /// Files that are synced at once: each waits for the disk, and nearly all of it together.
 const SYNCS_AT_ONCE: usize = 8;
-
-/// What a place holds already.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Held {
-    /// Nothing.
-    Nothing,
-    /// What an earlier run made of the same.
-    TheSame,
-    /// Something else.
-    Other,
-}
 
 /// A folder that is written.
 #[derive(Debug)]
 pub struct Folder {
     /// As the user named it.
     path: PathBuf,
+    made_of: String,
+    /// The files so far, and how many bytes each has.
+    files: Mutex<BTreeMap<String, Arc<AtomicU64>>>,
+    to: To,
+}
+
+#[derive(Debug)]
+enum To {
+    Part(Part),
+    /// The one that is there is compared.
+    There,
+}
+
+/// What becomes the folder when it is whole.
+#[derive(Debug)]
+struct Part {
+    path: PathBuf,
     /// Without links.
     target: PathBuf,
-    part: PathBuf,
-    stamp: String,
-    /// Holds the lock.
-    lock: Option<File>,
+    /// Whether it takes the place of another one.
+    replaces: bool,
+    /// The stamp's file, which holds the lock.
+    stamp: Option<File>,
+}
+
+/// A file of the folder: written, or compared with the one that is there.
+#[derive(Debug)]
+pub struct FolderFile {
+    to: FileTo,
+    bytes: Arc<AtomicU64>,
+}
+
+#[derive(Debug)]
+enum FileTo {
+    File(File),
+    There(There),
 }
 
 impl Folder {
-    /// Begins a folder, which replaces one of the same stamp only.
-    pub fn create(path: &Path, inputs: &Inputs, stamp: &str) -> Result<Self> {
+    /// Begins a folder. `made_of` is a line for its stamp.
+    pub fn create(path: &Path, inputs: &Inputs, made_of: &str) -> Result<Self> {
         inputs.refuse(path)?;
         make_parent(path)?;
         let target = without_links(path).with_context(|| cannot_write(path))?;
-        may_be_replaced(path, stamp)?;
-        let part = part_of(&target)?;
-        if part.exists() {
-            is_written(&part.join(STAMP), path)?;
-            remove_ours(&part).with_context(|| cannot_write(&part))?;
-        }
         restore(&target)?;
-        fs::create_dir(&part).with_context(|| cannot_write(path))?;
-        let mut folder = Self { path: path.to_owned(), target, part, stamp: stamp.to_owned(), lock: None };
-        let file = File::options().write(true).create_new(true).open(folder.part.join(STAMP));
-        let mut file = file.with_context(|| cannot_write(path))?;
-        lock(&file, path)?;
-        settle(writeln!(file, "{stamp}"), path)?;
-        folder.lock = Some(file);
-        Ok(folder)
+        let to = if Self::is_free(path) {
+            To::Part(Part::begin(path, target, false)?)
+        } else if may_be_replaced(path, inputs)? {
+            To::Part(Part::begin(path, target, true)?)
+        } else {
+            To::There
+        };
+        Ok(Self { path: path.to_owned(), made_of: made_of.to_owned(), files: Mutex::default(), to })
     }
 
-    /// What is at a place, for something of this stamp.
-    pub fn held(path: &Path, stamp: &str) -> Held {
-        match stamp_of(path) {
-            Some(held) if held == stamp => Held::TheSame,
-            None if is_free(path) => Held::Nothing,
-            _ => Held::Other,
+    /// Whether nothing is there, or an empty folder.
+    pub fn is_free(path: &Path) -> bool {
+        match fs::read_dir(path) {
+            Ok(mut entries) => entries.next().is_none(),
+            Err(error) => error.kind() == io::ErrorKind::NotFound,
         }
     }
 
-    /// Removes a folder that this program made, whatever it was made of. One with other files in it stays.
-    pub fn remove(path: &Path) -> Result<()> {
-        if stamp_of(path).is_none() {
-            bail!("{}: was not made by hums and is not removed", path.display());
-        }
-        remove_ours(path).with_context(|| format!("{}: cannot be removed", path.display()))
+    /// What the tables in a folder were made of, where they are ours.
+    pub fn made_of(path: &Path) -> Option<String> {
+        Stamp::of(path).map(|stamp| stamp.made_of)
     }
 
     /// The folder's path, as the user named it.
@@ -93,111 +106,189 @@ impl Folder {
     }
 
     /// A new file in it.
-    pub fn file(&self, name: &str) -> Result<File> {
-        let file = File::options().write(true).create_new(true).open(self.part.join(name));
-        file.with_context(|| cannot_write(&self.path.join(name)))
+    pub fn file(&self, name: &str) -> Result<FolderFile> {
+        let bytes = Arc::default();
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), Arc::clone(&bytes));
+        let to = match &self.to {
+            To::Part(part) => {
+                let file = File::options().write(true).create_new(true).open(part.path.join(name));
+                FileTo::File(file.with_context(|| cannot_write(&self.path.join(name)))?)
+            }
+            To::There => FileTo::There(self.there(name, 0)?),
+        };
+        Ok(FolderFile { to, bytes })
     }
 
     /// A file in it, to go on with at its end.
-    pub fn file_again(&self, name: &str) -> Result<File> {
-        let file = File::options().append(true).open(self.part.join(name));
-        file.with_context(|| cannot_write(&self.path.join(name)))
+    pub fn file_again(&self, name: &str) -> Result<FolderFile> {
+        let files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes = files.get(name).map(Arc::clone).unwrap_or_default();
+        let to = match &self.to {
+            To::Part(part) => {
+                let file = File::options().append(true).open(part.path.join(name));
+                FileTo::File(file.with_context(|| cannot_write(&self.path.join(name)))?)
+            }
+            To::There => FileTo::There(self.there(name, bytes.load(Ordering::Relaxed))?),
+        };
+        Ok(FolderFile { to, bytes })
+    }
+
+    /// The file of this name in the folder that is there, from a byte on.
+    fn there(&self, name: &str, at: u64) -> Result<There> {
+        let path = self.path.join(name);
+        match There::open(&path, at) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Err(Differs(self.path.clone()).into()),
+            opened => opened.with_context(|| format!("{}: cannot be read", path.display())),
+        }
     }
 
     /// All files are there and closed: the folder takes its name.
-    pub fn finish(mut self) -> Result<()> {
-        let done = sync_all(&self.part)
-            .with_context(|| cannot_write(&self.path))
-            // Again: somebody may have put something there meanwhile.
-            .and_then(|()| may_be_replaced(&self.path, &self.stamp))
-            .and_then(|()| {
-                // An open file keeps Windows from renaming its folder.
-                self.lock = None;
-                put_in_place(&self.part, &self.target, exchange).with_context(|| cannot_write(&self.path))
-            });
-        if done.is_ok() {
-            sync_folder_of(&self.target);
-            self.part = PathBuf::new();
+    pub fn finish(self) -> Result<()> {
+        let files = self.files.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match self.to {
+            To::There => is_all_there(&self.path, &files),
+            To::Part(mut part) => {
+                let stamp = Stamp { made_of: self.made_of, files: files.into_keys().collect() };
+                part.finish(&self.path, &stamp)
+            }
         }
-        done
     }
 }
 
-impl Drop for Folder {
+/// Whether the folder that is there has these files with so many bytes, whose content was compared, and no others of ours.
+fn is_all_there(path: &Path, files: &BTreeMap<String, Arc<AtomicU64>>) -> Result<()> {
+    let stamp = Stamp::of(path).unwrap_or_default();
+    let is_whole = |(name, bytes): (&String, &Arc<AtomicU64>)| {
+        fs::metadata(path.join(name)).is_ok_and(|about| about.len() == bytes.load(Ordering::Relaxed))
+    };
+    if stamp.files.iter().eq(files.keys()) && files.iter().all(is_whole) {
+        return Ok(());
+    }
+    Err(Differs(path.to_owned()).into())
+}
+
+impl Part {
+    fn begin(path: &Path, target: PathBuf, replaces: bool) -> Result<Self> {
+        let part = part_of(&target)?;
+        if part.exists() || part.is_symlink() {
+            is_written(&part.join(STAMP), path)?;
+            remove_part(&part).with_context(|| cannot_write(&part))?;
+        }
+        fs::create_dir(&part).with_context(|| cannot_write(path))?;
+        let mut part = Self { path: part, target, replaces, stamp: None };
+        let stamp = File::options().write(true).create_new(true).open(part.path.join(STAMP));
+        let stamp = stamp.with_context(|| cannot_write(path))?;
+        lock(&stamp, path)?;
+        part.stamp = Some(stamp);
+        Ok(part)
+    }
+
+    fn finish(&mut self, path: &Path, stamp: &Stamp) -> Result<()> {
+        if let Some(file) = &self.stamp {
+            settle(stamp.write(file), path)?;
+        }
+        sync_all(&self.path).with_context(|| cannot_write(path))?;
+        // Again: somebody may have put something there meanwhile.
+        if self.replaces {
+            check_ours(path)?;
+        } else if !Folder::is_free(path) {
+            return Err(Differs(path.to_owned()).into());
+        }
+        // An open file keeps Windows from renaming its folder.
+        self.stamp = None;
+        put_in_place(&self.path, &self.target, exchange).with_context(|| cannot_write(path))?;
+        sync_folder_of(&self.target);
+        self.path = PathBuf::new();
+        Ok(())
+    }
+}
+
+impl Drop for Part {
     fn drop(&mut self) {
-        if !self.part.as_os_str().is_empty() {
+        if !self.path.as_os_str().is_empty() {
             // Where it cannot be removed, the next run does.
-            let _ = remove_ours(&self.part);
+            let _ = remove_part(&self.path);
         }
     }
 }
 
-/// The stamp of a folder.
-fn stamp_of(folder: &Path) -> Option<String> {
-    /// A stamp is a short line.
-    const BYTES_MAX: u64 = 4096;
-    let path = folder.join(STAMP);
-    fs::symlink_metadata(&path).ok().filter(|about| about.is_file() && about.len() <= BYTES_MAX)?;
-    Some(fs::read_to_string(path).ok()?.trim_end().to_owned())
-}
+impl Write for FolderFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = match &mut self.to {
+            FileTo::File(file) => file.write(bytes)?,
+            FileTo::There(there) => there.compare(bytes).map(|()| bytes.len())?,
+        };
+        self.bytes.fetch_add(written as u64, Ordering::Relaxed);
+        Ok(written)
+    }
 
-/// Whether nothing is there, or an empty folder.
-fn is_free(path: &Path) -> bool {
-    match fs::read_dir(path) {
-        Ok(mut entries) => entries.next().is_none(),
-        Err(error) => error.kind() == io::ErrorKind::NotFound,
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.to {
+            FileTo::File(file) => file.flush(),
+            FileTo::There(_) => Ok(()),
+        }
     }
 }
 
-/// Says why a folder may not be replaced, and what to do.
-fn may_be_replaced(path: &Path, stamp: &str) -> Result<()> {
+/// Whether what is there may be replaced; otherwise it may be compared. An error where it is neither.
+fn may_be_replaced(path: &Path, inputs: &Inputs) -> Result<bool> {
     let shown = path.display();
     if path.is_file() {
         bail!("{shown}: is a file, and a directory is needed there; name another output");
     }
-    match Folder::held(path, stamp) {
-        Held::Nothing => Ok(()),
-        Held::Other if stamp_of(path).is_some() => {
-            bail!(
-                "{shown}: has what was made of another recording, and nothing is mixed; name another output with -o, \
-                 or remove that folder"
-            )
-        }
-        Held::Other => {
-            bail!("{shown}: is there already and was not made by this command; name another output with -o")
-        }
-        Held::TheSame => match foreign(path).with_context(|| cannot_write(path))? {
-            Some(name) => bail!(
-                "{shown}: has {name}, which hums did not make, and is not replaced; move that file, or name another \
-                 output with -o"
-            ),
-            None => Ok(()),
-        },
+    if Stamp::of(path).is_none() {
+        bail!("{shown}: is there already and was not made by this command; name another output with -o");
+    }
+    if !inputs.may_replace(path) {
+        return Ok(false);
+    }
+    check_ours(path)?;
+    Ok(true)
+}
+
+/// Refuses a folder with files in it that we did not make.
+fn check_ours(path: &Path) -> Result<()> {
+    let stamp = Stamp::of(path).unwrap_or_default();
+    match stamp.foreign(path).with_context(|| cannot_write(path))? {
+        Some(name) => bail!(
+            "{}: has {name}, which hums did not make, and is not replaced; move that file, or name another output \
+             with -o",
+            path.display()
+        ),
+        None => Ok(()),
     }
 }
 
-/// The first entry of a folder that is none of ours.
-fn foreign(folder: &Path) -> io::Result<Option<String>> {
+/// Removes a folder that has our files only.
+fn remove_ours(folder: &Path) -> io::Result<()> {
+    let stamp = Stamp::of(folder).unwrap_or_default();
+    match stamp.foreign(folder)? {
+        Some(name) => Err(io::Error::other(format!("{name} in it was not made by hums"))),
+        None => remove_all(folder),
+    }
+}
+
+/// Removes what a run has left that was killed or has failed: its stamp names no file yet.
+fn remove_part(folder: &Path) -> io::Result<()> {
+    if folder.is_symlink() {
+        return fs::remove_file(folder);
+    }
+    if Stamp::of(folder).is_some_and(|stamp| !stamp.files.is_empty()) {
+        return remove_ours(folder);
+    }
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
         let ours =
             name == STAMP || EXTENSIONS.iter().any(|extension| name.ends_with(&format!(".{extension}")));
         if !ours || !entry.file_type()?.is_file() {
-            return Ok(Some(name));
+            return Err(io::Error::other(format!("{name} in it was not made by hums")));
         }
     }
-    Ok(None)
+    remove_all(folder)
 }
 
-/// Removes a folder that has our files only.
-pub(super) fn remove_ours(folder: &Path) -> io::Result<()> {
-    if folder.is_symlink() {
-        return fs::remove_file(folder);
-    }
-    if let Some(name) = foreign(folder)? {
-        return Err(io::Error::other(format!("{name} in it was not made by hums")));
-    }
+fn remove_all(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         fs::remove_file(entry?.path())?;
     }
@@ -228,7 +319,7 @@ pub(super) fn put_in_place(
     target: &Path,
     exchange: impl Fn(&Path, &Path) -> bool,
 ) -> io::Result<()> {
-    if is_free(target) {
+    if Folder::is_free(target) {
         // Windows does not rename over an empty folder.
         let _ = fs::remove_dir(target);
         return fs::rename(part, target);
@@ -278,7 +369,7 @@ fn sync_all(folder: &Path) -> io::Result<()> {
 }
 
 /// A file of a folder with room for a group's lines of a busy message; there may be some hundred of these.
-pub fn buffered(file: File) -> BufWriter<File> {
+pub fn buffered(table: FolderFile) -> BufWriter<FolderFile> {
     const BUFFER_BYTES: usize = 16 * 1024;
-    BufWriter::with_capacity(BUFFER_BYTES, file)
+    BufWriter::with_capacity(BUFFER_BYTES, table)
 }

@@ -1,12 +1,12 @@
-//! What a command reads: no output may be one of these.
+//! What a command reads, which no output may be, and whether its outputs may replace what is there.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Result;
 
-use super::identity::{FileId, without_links};
+use super::identity::FileId;
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
 
@@ -14,7 +14,10 @@ use crate::outcome::usage;
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     files: BTreeMap<FileId, String>,
-    folders: BTreeMap<FileId, PathBuf>,
+    /// What an earlier run of the same command made, named as an input.
+    compared: BTreeSet<FileId>,
+    /// `--replace`
+    replace: bool,
 }
 
 impl Inputs {
@@ -30,25 +33,35 @@ impl Inputs {
         inputs
     }
 
-    /// The same without the input folders: for outputs that the command names itself, after the session that is in them.
-    /// An earlier run's may be replaced, wherever they lie.
-    pub fn without_folders(&self) -> Self {
-        Self { files: self.files.clone(), folders: BTreeMap::new() }
+    /// The same where the command line says whether outputs may replace what is there with other content.
+    #[must_use]
+    pub fn replacing(mut self, replace: bool) -> Self {
+        self.replace = replace;
+        self
     }
 
-    /// Adds a file or a folder. One that cannot be looked at is none: whoever opens it says so.
+    /// An input that is not read, because the command made it earlier and makes it again: it is compared with what is
+    /// made now, and never replaced.
+    pub fn compare_only(&mut self, path: &Path) {
+        if let Ok(id) = FileId::of(path) {
+            self.files.remove(&id);
+            self.compared.insert(id);
+        }
+    }
+
+    /// Whether what is at `path` may be replaced with other content.
+    pub(super) fn may_replace(&self, path: &Path) -> bool {
+        self.replace && FileId::of(path).is_ok_and(|id| !self.compared.contains(&id))
+    }
+
+    /// Adds a file. One that cannot be looked at is none: whoever opens it says so. A folder is none either (what is
+    /// read of it is named file by file), and a device such as `/dev/null` may be read and written.
     pub fn add(&mut self, path: &Path) {
         let Ok(id) = FileId::of(path) else { return };
-        match fs::metadata(path) {
-            Ok(about) if about.is_dir() => {
-                self.folders.insert(id, path.to_owned());
-            }
-            // A device such as /dev/null may be read and written.
-            Ok(about) if !about.is_file() => {}
-            _ => {
-                self.files.insert(id, path.display().to_string());
-            }
+        if fs::metadata(path).is_ok_and(|about| !about.is_file()) {
+            return;
         }
+        self.files.insert(id, path.display().to_string());
     }
 
     /// Adds what an endpoint reads, where that is a file.
@@ -64,30 +77,16 @@ impl Inputs {
         }
     }
 
-    /// Refuses an output that is an input, and one that would replace a file inside an input folder.
+    /// Refuses an output that is an input.
     pub fn refuse(&self, output: &Path) -> Result<()> {
         let shown = output.display();
         let Ok(id) = FileId::of(output) else { return Ok(()) };
-        if let Some(input) = self.files.get(&id) {
-            let which = if *input == shown.to_string() {
-                String::new()
-            } else {
-                format!(", the same file as {input}")
-            };
-            return Err(usage(format!(
-                "{shown}: is an input of this command{which}; nothing was written; name another output"
-            )));
-        }
-        if output.is_file()
-            && let Some(folder) = self.folder_around(output)
-        {
-            return Err(usage(format!(
-                "{shown}: is there already, and lies in the input folder {}, in which nothing is replaced; name \
-                 another output",
-                folder.display()
-            )));
-        }
-        Ok(())
+        let Some(input) = self.files.get(&id) else { return Ok(()) };
+        let which =
+            if *input == shown.to_string() { String::new() } else { format!(", the same file as {input}") };
+        Err(usage(format!(
+            "{shown}: is an input of this command{which}; nothing was written; name another output"
+        )))
     }
 
     /// Refuses standard output where it leads into an input.
@@ -98,15 +97,5 @@ impl Inputs {
             }
             None => Ok(()),
         }
-    }
-
-    /// The input folder that a path lies in, if any.
-    pub fn folder_around(&self, path: &Path) -> Option<&PathBuf> {
-        if self.folders.is_empty() {
-            return None;
-        }
-        let path = without_links(path).ok()?;
-        let path = path.canonicalize().or_else(|_| std::path::absolute(&path)).ok()?;
-        path.ancestors().skip(1).find_map(|folder| self.folders.get(&FileId::of(folder).ok()?))
     }
 }

@@ -1,6 +1,7 @@
-//! The files that commands write. [`Output`] is the one thing in this program that makes, empties or renames a file
-//! of the user's. It never touches an input ([`Inputs`]), and a file of its name is either the old one or the
-//! whole new one, whatever happens while it is written.
+//! The files that commands write. [`Output`] and [`Folder`] are the only things in this program that make, empty or
+//! rename files of the user's. They never touch an input ([`Inputs`]). A file that is there is never replaced by other
+//! content, unless the user says `--replace`; then it is the old one or the whole new one, whatever happens while it
+//! is written.
 //!
 //! Two kinds of files are updated in place by design and are not made here: a simulated card's image (`--sd`) and the
 //! simulated board's flash (`--store`). A test in `host-tools/tests/cli/files.rs` holds every other file to this module.
@@ -9,17 +10,23 @@ mod ends;
 mod folder;
 mod identity;
 mod inputs;
+mod kind;
 mod output;
 mod part;
 mod paths;
+mod stamp;
+mod there;
 
-pub use ends::{add_ends, short};
-pub use folder::{Folder, Held, buffered};
+pub use ends::{add_ends, digest, short};
+pub use folder::{Folder, FolderFile, buffered};
 pub use identity::FileId;
 pub use inputs::Inputs;
+pub use kind::Kind;
 pub use output::Output;
 pub use part::{PART, is_part};
-pub use paths::{appended, cannot_write, inside, make_directory, make_parent, says_directory, settle};
+pub use paths::{
+    appended, cannot_write, inside, make_directory, make_parent, remove_if_empty, says_directory, settle,
+};
 
 #[cfg(test)]
 mod tests;

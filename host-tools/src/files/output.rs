@@ -8,22 +8,34 @@ use anyhow::{Context as _, Result, bail};
 
 use super::identity::without_links;
 use super::inputs::Inputs;
-use super::part::{lock, part_of, remove_stale, sync_folder_of};
+use super::kind::Kind;
+use super::part::{lock, part_of, remove_stale, rename_new, sync_folder_of};
 use super::paths::{cannot_write, settle};
-use crate::outcome::usage;
+use super::there::{Likeness, There, likeness};
+use crate::outcome::{Differs, usage};
 
 /// Room for a group's lines of a busy message.
 const BUFFER_BYTES: usize = 16 * 1024;
 
 /// A file that is written. It has its name from [`Output::finish`] on; until then, and after a kill, a full disk or an
-/// error, there is the old file of this name or none. What is no regular file (a FIFO, `/dev/null`, `/dev/stdout`) is
-/// written as it is.
+/// error, there is the old file of this name or none.
+///
+/// A file that is there and has a byte in it is never replaced by other content, unless the user says so: what is
+/// written is compared with it, and the first byte that differs is an error ([`Differs`]). What is no regular file (a
+/// FIFO, `/dev/null`, `/dev/stdout`) is written as it is.
 #[derive(Debug)]
 pub struct Output {
-    file: BufWriter<File>,
+    to: BufWriter<To>,
     /// As the user named it.
     path: PathBuf,
     part: Option<Part>,
+}
+
+/// Where the bytes go.
+#[derive(Debug)]
+enum To {
+    File(File),
+    There(There),
 }
 
 /// What becomes the file when it is whole.
@@ -32,35 +44,64 @@ struct Part {
     path: PathBuf,
     /// Without links: a link to the file stays a link.
     target: PathBuf,
-    /// Of the file that it replaces.
+    /// Of the file that it replaces; none where it replaces nothing.
     permissions: Option<Permissions>,
-    /// Whether it stays when it is dropped before it is whole.
-    stays: bool,
+    /// An earlier run may have begun it: it may replace what is its own beginning, and stays when it is dropped.
+    resumed: bool,
+}
+
+/// What an output may find at its place.
+enum Place {
+    /// Nothing, or a file that it may replace.
+    Free(Part),
+    /// A file with something in it.
+    Taken,
+    /// No regular file.
+    Stream,
 }
 
 impl Output {
-    /// Begins a file, which is none of the inputs. Its folder must be there.
-    pub fn create(path: &Path, inputs: &Inputs) -> Result<Self> {
-        let Some(part) = Part::of(path, inputs)? else { return Self::direct(path) };
-        remove_stale(&part.path, path)?;
-        let file = File::options().write(true).create_new(true).open(&part.path);
-        Self::begin(file.with_context(|| cannot_write(path))?, path, part)
+    /// Begins a file, which is none of the inputs. Its folder must be there. `kind` is what the command makes.
+    pub fn create(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<Self> {
+        match Part::of(path, inputs, kind)? {
+            Place::Free(part) => Self::begin(path, part),
+            Place::Taken => {
+                let there =
+                    There::open(path, 0).with_context(|| format!("{}: cannot be read", path.display()));
+                Ok(Self::new(To::There(there?), path, None))
+            }
+            Place::Stream => Self::direct(path),
+        }
+    }
+
+    /// Refuses a file that is there with something in it: for what a run makes beside changing something else, where
+    /// comparing would come too late.
+    pub fn check_new(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<()> {
+        match Part::of(path, inputs, kind)? {
+            Place::Taken => Err(Differs(path.to_owned()).into()),
+            Place::Free(_) | Place::Stream => Ok(()),
+        }
     }
 
     /// Goes on with what an earlier run has left of a file, and says how many bytes that is. Dropped before its end it
-    /// stays for the next one. Only for regular files.
-    pub fn resume(path: &Path, inputs: &Inputs) -> Result<(Self, u64)> {
-        let Some(mut part) = Part::of(path, inputs)? else {
-            bail!("{}: is no regular file, and what was begun cannot go on in it", path.display());
-        };
-        part.stays = true;
+    /// stays for the next one. In the end it replaces a file that is its beginning, and no other. Only for regular files.
+    pub fn resume(path: &Path) -> Result<(Self, u64)> {
+        let target = without_links(path).with_context(|| cannot_write(path))?;
+        if let Ok(about) = fs::metadata(path) {
+            check(path, &about)?;
+            if !about.is_file() || is_stream(path) {
+                bail!("{}: is no regular file, and what was begun cannot go on in it", path.display());
+            }
+        }
+        let part = Part { path: part_of(&target)?, target, permissions: None, resumed: true };
         if part.path.is_symlink() {
             fs::remove_file(&part.path).with_context(|| cannot_write(path))?;
         }
         let file = File::options().read(true).append(true).create(true).open(&part.path);
         let file = file.with_context(|| cannot_write(path))?;
         let bytes = file.metadata().with_context(|| cannot_write(path))?.len();
-        Ok((Self::begin(file, path, part)?, bytes))
+        lock(&file, path)?;
+        Ok((Self::new(To::File(file), path, Some(part)), bytes))
     }
 
     /// Removes a file that an earlier run made, and that is no input.
@@ -69,16 +110,22 @@ impl Output {
         fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))
     }
 
-    fn begin(file: File, path: &Path, part: Part) -> Result<Self> {
+    fn new(to: To, path: &Path, part: Option<Part>) -> Self {
+        Self { to: BufWriter::with_capacity(BUFFER_BYTES, to), path: path.to_owned(), part }
+    }
+
+    fn begin(path: &Path, part: Part) -> Result<Self> {
+        remove_stale(&part.path, path)?;
+        let file = File::options().write(true).create_new(true).open(&part.path);
+        let file = file.with_context(|| cannot_write(path))?;
         lock(&file, path)?;
-        let file = BufWriter::with_capacity(BUFFER_BYTES, file);
-        Ok(Self { file, path: path.to_owned(), part: Some(part) })
+        Ok(Self::new(To::File(file), path, Some(part)))
     }
 
     /// What is no regular file is written as it is. Appending does no harm where it leads to a regular file after all.
     fn direct(path: &Path) -> Result<Self> {
         let file = File::options().append(true).open(path).with_context(|| cannot_write(path))?;
-        Ok(Self { file: BufWriter::with_capacity(BUFFER_BYTES, file), path: path.to_owned(), part: None })
+        Ok(Self::new(To::File(file), path, None))
     }
 
     /// The file's path, as the user named it.
@@ -93,23 +140,25 @@ impl Output {
 
     /// Throws away what was written, or what an earlier run has left: the file begins anew.
     pub fn begin_anew(&mut self) -> Result<()> {
-        settle(self.file.flush().and_then(|()| self.file.get_ref().set_len(0)), &self.path)
+        let emptied = self.to.flush().and_then(|()| match self.to.get_ref() {
+            To::File(file) => file.set_len(0),
+            To::There(_) => Ok(()),
+        });
+        settle(emptied, &self.path)
     }
 
     /// The file is whole: from here on it has its name. Nothing can be written after that.
     pub fn finish(&mut self) -> Result<()> {
-        settle(self.file.flush(), &self.path)?;
-        let Some(part) = self.part.take() else { return Ok(()) };
-        let rename = || {
-            if let Some(permissions) = part.permissions.clone() {
-                self.file.get_ref().set_permissions(permissions)?;
-            }
-            self.file.get_ref().sync_all()?;
-            fs::rename(&part.path, &part.target)
+        settle(self.to.flush(), &self.path)?;
+        let file = match self.to.get_mut() {
+            To::There(there) => return settle(there.end(), &self.path),
+            To::File(file) => file,
         };
-        if let Err(error) = rename() {
+        let Some(part) = self.part.take() else { return Ok(()) };
+        let placed = file.sync_all().and_then(|()| part.place(file));
+        if let Err(error) = placed {
             part.abandon();
-            return Err(error).with_context(|| cannot_write(&self.path));
+            return settle(Err(error), &self.path);
         }
         sync_folder_of(&part.target);
         Ok(())
@@ -118,11 +167,27 @@ impl Output {
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
+        self.to.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
+        self.to.flush()
+    }
+}
+
+impl Write for To {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::There(there) => there.compare(bytes).map(|()| bytes.len()),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::There(_) => Ok(()),
+        }
     }
 }
 
@@ -135,34 +200,65 @@ impl Drop for Output {
 }
 
 impl Part {
-    /// The part of a file that is to be written; `None` where it is no regular file.
-    fn of(path: &Path, inputs: &Inputs) -> Result<Option<Self>> {
+    /// The part of a file that is to be written.
+    fn of(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<Place> {
         inputs.refuse(path)?;
         let target = without_links(path).with_context(|| cannot_write(path))?;
+        let part = |target: PathBuf, permissions| -> Result<Place> {
+            Ok(Place::Free(Self { path: part_of(&target)?, target, permissions, resumed: false }))
+        };
         let about = match fs::metadata(path) {
-            Ok(about) => Some(about),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            Ok(about) => about,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(target, None),
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
-        if let Some(about) = &about {
-            check(path, about)?;
-            if !about.is_file() || is_stream(path) {
-                return Ok(None);
-            }
+        check(path, &about)?;
+        if !about.is_file() || is_stream(path) {
+            return Ok(Place::Stream);
         }
-        let permissions = about.map(|about| about.permissions());
-        Ok(Some(Self { path: part_of(&target)?, target, permissions, stays: false }))
+        if about.len() > 0 {
+            if !inputs.may_replace(path) {
+                return Ok(Place::Taken);
+            }
+            check_kind(path, kind)?;
+        }
+        if about.permissions().readonly() {
+            bail!("{}: is read-only; make it writable or name another output", path.display());
+        }
+        part(target, Some(about.permissions()))
     }
 
-    fn abandon(self) {
-        if !self.stays {
+    /// Gives it its name.
+    fn place(&self, file: &File) -> io::Result<()> {
+        if let Some(permissions) = &self.permissions {
+            file.set_permissions(permissions.clone())?;
+            return fs::rename(&self.path, &self.target);
+        }
+        match rename_new(&self.path, &self.target) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            done => return done,
+        }
+        // Somebody has put something there meanwhile; or an earlier run has, what is gone on with.
+        let permissions = fs::metadata(&self.target)?.permissions();
+        match likeness(&self.target, &self.path)? {
+            Likeness::Equal => fs::remove_file(&self.path),
+            Likeness::Beginning if self.resumed => {
+                file.set_permissions(permissions)?;
+                fs::rename(&self.path, &self.target)
+            }
+            _ => Err(io::Error::other(Differs(self.target.clone()))),
+        }
+    }
+
+    fn abandon(&self) {
+        if !self.resumed {
             // Where it cannot be removed either, the next run does.
-            let _ = fs::remove_file(self.path);
+            let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// What is there already may be written over, or written to.
+/// What is there already may be written to.
 fn check(path: &Path, about: &Metadata) -> Result<()> {
     let shown = path.display();
     if about.is_dir() {
@@ -171,10 +267,19 @@ fn check(path: &Path, about: &Metadata) -> Result<()> {
     if is_block_device(about) {
         return Err(usage(format!("{shown}: is a disk or a card, and hums writes files only; name a file")));
     }
-    if about.is_file() && about.permissions().readonly() {
-        bail!("{shown}: is read-only; make it writable or name another output");
-    }
     Ok(())
+}
+
+/// What is replaced is of the kind that the command makes: a slip of the finger is not enough to lose a card's image.
+fn check_kind(path: &Path, kind: &Kind) -> Result<()> {
+    if kind.has(path).with_context(|| format!("{}: cannot be read", path.display()))? {
+        return Ok(());
+    }
+    bail!(
+        "{}: is there already, and is not {}, so --replace does not replace it; name another output, or move it away",
+        path.display(),
+        kind.words
+    )
 }
 
 /// `/dev/stdout` and its like are what the shell opened, also where that is a regular file.

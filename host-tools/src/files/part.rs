@@ -55,7 +55,32 @@ pub(super) fn remove_stale(part: &Path, target: &Path) -> Result<()> {
     std::fs::remove_file(part).with_context(|| cannot_write(part))
 }
 
-/// The same for a folder, whose lock is on its stamp.
+/// Renames a file to a name that nothing has; [`io::ErrorKind::AlreadyExists`] where something has it.
+#[cfg(target_os = "linux")]
+pub(super) fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    use rustix::io::Errno;
+    match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
+        // A file system that cannot do that in one step.
+        Err(Errno::INVAL | Errno::NOSYS) => rename_if_free(from, to),
+        done => Ok(done?),
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(super) fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
+    rename_if_free(from, to)
+}
+
+/// The same in two steps.
+fn rename_if_free(from: &Path, to: &Path) -> io::Result<()> {
+    if std::fs::symlink_metadata(to).is_ok() {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
+    std::fs::rename(from, to)
+}
+
+/// Refuses a folder that another run is writing: its lock is on its stamp.
 pub(super) fn is_written(stamp: &Path, target: &Path) -> Result<()> {
     match File::open(stamp) {
         Ok(file) => lock(&file, target),

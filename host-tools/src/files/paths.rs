@@ -14,6 +14,12 @@ pub fn make_directory(dir: &Path) -> Result<()> {
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
+/// Removes a directory, if nothing is in it.
+pub fn remove_if_empty(dir: &Path) {
+    // One with something in it stays.
+    let _ = fs::remove_dir(dir);
+}
+
 /// Makes the directory that a file is to lie in, unless it is there.
 pub fn make_parent(path: &Path) -> Result<()> {
     match path.parent().filter(|dir| !dir.as_os_str().is_empty()) {

@@ -19,23 +19,85 @@ fn names(dir: &Path) -> Vec<String> {
     names
 }
 
+/// What this module's files are taken for.
+const ANY: Kind = Kind { words: "text", is: |start| start.is_ascii() };
+
+fn create(path: &Path) -> anyhow::Result<Output> {
+    Output::create(path, &Inputs::none(), &ANY)
+}
+
+/// Writes it whole; the error's words where that fails.
+fn write(path: &Path, inputs: &Inputs, text: &str) -> Result<(), String> {
+    let write = || -> anyhow::Result<()> {
+        let mut output = Output::create(path, inputs, &ANY)?;
+        settle(output.write_all(text.as_bytes()), path)?;
+        output.finish()
+    };
+    write().map_err(|error| format!("{error:#}"))
+}
+
 #[test]
 fn a_file_is_the_old_one_until_the_new_one_is_whole() {
     let dir = furnished();
     let path = dir.path().join("old");
-    let mut output = Output::create(&path, &Inputs::none()).expect("created");
+    let replacing = Inputs::none().replacing(true);
+    let mut output = Output::create(&path, &replacing, &ANY).expect("created");
     output.write_all(&vec![b'x'; 100_000]).expect("written");
     assert_eq!(fs::read(&path).expect("there"), b"what was there");
     drop(output);
     assert_eq!(names(dir.path()), ["old"], "what was dropped before its end leaves nothing");
     assert_eq!(fs::read(&path).expect("there"), b"what was there");
-    let mut output = Output::create(&path, &Inputs::none()).expect("created");
-    output.write_all(b"new").expect("written");
-    output.finish().expect("whole");
+    write(&path, &replacing, "new").expect("whole");
+    assert_eq!((names(dir.path()), fs::read(&path).expect("there")), (vec!["old".into()], b"new".to_vec()));
+}
+
+#[test]
+fn a_file_with_other_content_is_replaced_only_where_the_user_says_so_and_it_is_of_its_kind() {
+    let dir = furnished();
+    let path = dir.path().join("old");
+    write(&path, &Inputs::none(), "what was there").expect("the same");
+    for other in ["what", "what was there, and more", "What was there"] {
+        let refused = write(&path, &Inputs::none(), other).expect_err(other);
+        assert!(refused.contains("is there already with other content") && refused.contains("--replace"));
+    }
+    let mut output = create(&path).expect("compared");
+    let early =
+        output.write_all(&vec![b'x'; 100_000]).expect_err("at the first difference, and not at the end");
+    assert!(early.to_string().contains("is there already with other content"), "{early}");
+    drop(output);
     assert_eq!(
         (names(dir.path()), fs::read(&path).expect("there")),
-        (vec!["old".to_owned()], b"new".to_vec())
+        (vec!["old".into()], b"what was there".to_vec())
     );
+    // An empty file is none.
+    fs::write(dir.path().join("empty"), "").expect("written");
+    write(&dir.path().join("empty"), &Inputs::none(), "new").expect("whole");
+    fs::write(&path, [0xff; 10]).expect("written");
+    let refused = write(&path, &Inputs::none().replacing(true), "new").expect_err("of another kind");
+    assert!(refused.contains("is not text, so --replace does not replace it"), "{refused}");
+    // An input that the command makes again is not replaced, whatever the flags.
+    fs::write(&path, "text").expect("written");
+    let mut inputs = Inputs::of([&path]).replacing(true);
+    inputs.compare_only(&path);
+    write(&path, &inputs, "text").expect("the same");
+    write(&path, &inputs, "another").expect_err("it is an input");
+    assert_eq!(fs::read(&path).expect("there"), b"text");
+}
+
+#[test]
+fn what_somebody_else_puts_there_while_a_file_is_written_stays() {
+    let dir = furnished();
+    let path = dir.path().join("new");
+    for theirs in ["theirs", "ours", ""] {
+        let _ = fs::remove_file(&path);
+        let mut output = create(&path).expect("created");
+        output.write_all(b"ours").expect("written");
+        fs::write(&path, theirs).expect("written");
+        assert_eq!(output.finish().is_ok(), theirs == "ours", "{theirs:?}");
+        drop(output);
+        assert_eq!(fs::read_to_string(&path).expect("there"), theirs);
+        assert_eq!(names(dir.path()), ["new", "old"]);
+    }
 }
 
 #[test]
@@ -43,8 +105,8 @@ fn what_a_killed_run_has_left_is_in_nobodys_way_and_two_runs_do_not_mix() {
     let dir = furnished();
     let path = dir.path().join("new");
     fs::write(dir.path().join(".new.hums-part"), [b'x'; 1000]).expect("written");
-    let mut first = Output::create(&path, &Inputs::none()).expect("created");
-    let second = Output::create(&path, &Inputs::none()).expect_err("somebody writes it").to_string();
+    let mut first = create(&path).expect("created");
+    let second = create(&path).expect_err("somebody writes it").to_string();
     assert!(second.contains("another run of hums is writing it"), "{second}");
     first.write_all(b"first").expect("written");
     first.finish().expect("whole");
@@ -56,22 +118,28 @@ fn what_a_killed_run_has_left_is_in_nobodys_way_and_two_runs_do_not_mix() {
 fn what_was_begun_goes_on_and_can_begin_anew() {
     let dir = furnished();
     let path = dir.path().join("log");
-    let (mut output, bytes) = Output::resume(&path, &Inputs::none()).expect("created");
+    let (mut output, bytes) = Output::resume(&path).expect("created");
     assert_eq!(bytes, 0);
     output.write_all(b"one").expect("written");
     drop(output);
-    let (mut output, bytes) = Output::resume(&path, &Inputs::none()).expect("goes on");
+    let (mut output, bytes) = Output::resume(&path).expect("goes on");
     assert_eq!((bytes, fs::read(output.part()).expect("there")), (3, b"one".to_vec()));
     output.write_all(b"two").expect("written");
     output.finish().expect("whole");
     assert_eq!(fs::read(&path).expect("there"), b"onetwo");
-    let (mut output, bytes) = Output::resume(&path, &Inputs::none()).expect("created");
+    let (mut output, bytes) = Output::resume(&path).expect("created");
     assert_eq!(bytes, 0);
     output.write_all(b"wrong").expect("written");
     output.begin_anew().expect("emptied");
-    output.write_all(b"right").expect("written");
+    output.write_all(b"onetwothree").expect("written");
     output.finish().expect("whole");
-    assert_eq!(fs::read(&path).expect("there"), b"right");
+    assert_eq!(fs::read(&path).expect("there"), b"onetwothree", "what was there was its beginning");
+    let (mut output, _) = Output::resume(&path).expect("created");
+    output.write_all(b"another, and longer").expect("written");
+    output.finish().expect_err("what is there is no beginning of it");
+    drop(output);
+    assert_eq!(names(dir.path()), [".log.hums-part", "log", "old"]);
+    assert_eq!(fs::read(&path).expect("there"), b"onetwothree");
 }
 
 #[test]
@@ -82,9 +150,8 @@ fn a_link_stays_a_link_and_permissions_stay() {
     let old = dir.path().join("old");
     fs::set_permissions(&old, fs::Permissions::from_mode(0o640)).expect("set");
     symlink("old", dir.path().join("link")).expect("a link");
-    let mut output = Output::create(&dir.path().join("link"), &Inputs::none()).expect("created");
-    output.write_all(b"new").expect("written");
-    output.finish().expect("whole");
+    write(&dir.path().join("link"), &Inputs::none(), "new").expect_err("a link to what is there");
+    write(&dir.path().join("link"), &Inputs::none().replacing(true), "new").expect("whole");
     assert!(dir.path().join("link").is_symlink());
     assert_eq!(fs::read(&old).expect("there"), b"new");
     assert_eq!(fs::metadata(&old).expect("there").permissions().mode() & 0o777, 0o640);
@@ -104,32 +171,35 @@ fn an_output_that_is_an_input_is_refused_in_every_spelling() {
     let inputs = Inputs::of([at("link"), at("nothing yet")]);
     for name in ["old", "link", "link of a link", "hard", "./old", "folder/../old", "dangling", "nothing yet"]
     {
-        let refused = Output::create(&at(name), &inputs).expect_err(name).to_string();
+        let refused = Output::create(&at(name), &inputs, &ANY).expect_err(name).to_string();
         assert!(refused.contains("is an input of this command"), "{name}: {refused}");
     }
-    let folder = Inputs::of([dir.path()]);
-    let refused = Output::create(&at("hard"), &folder).expect_err("in the folder").to_string();
-    assert!(refused.contains("lies in the input folder"), "{refused}");
-    Output::create(&at("new"), &folder).expect("nothing is replaced");
     assert_eq!(fs::read(at("old")).expect("there"), b"what was there");
 }
 
 #[test]
 #[cfg(unix)]
 fn what_is_no_regular_file_is_written_as_it_is() {
-    let mut output = Output::create(Path::new("/dev/null"), &Inputs::none()).expect("opened");
+    let mut output = create(Path::new("/dev/null")).expect("opened");
     output.write_all(b"gone").expect("written");
     output.finish().expect("whole");
     assert!(!Path::new("/dev/null").is_file());
-    let dir = Output::create(Path::new("/"), &Inputs::none()).expect_err("a directory").to_string();
+    let dir = create(Path::new("/")).expect_err("a directory").to_string();
     assert!(dir.contains("is a directory"), "{dir}");
 }
 
 /// A folder with one table of this text.
-fn made(path: &Path, stamp: &str, text: &str) {
-    let folder = Folder::create(path, &Inputs::none(), stamp).expect("begun");
-    folder.file("T.csv").expect("a file").write_all(text.as_bytes()).expect("written");
-    folder.finish().expect("whole");
+fn make(path: &Path, inputs: &Inputs, text: &str) -> Result<(), String> {
+    let make = || -> anyhow::Result<()> {
+        let folder = Folder::create(path, inputs, "of a recording")?;
+        settle(folder.file("T.csv")?.write_all(text.as_bytes()), path)?;
+        folder.finish()
+    };
+    make().map_err(|error| format!("{error:#}"))
+}
+
+fn made(path: &Path, text: &str) {
+    make(path, &Inputs::none(), text).expect("made");
 }
 
 fn table(path: &Path) -> String {
@@ -137,47 +207,75 @@ fn table(path: &Path) -> String {
 }
 
 #[test]
-fn a_folder_replaces_its_own_and_nothing_else() {
+fn a_folder_with_other_tables_is_replaced_only_where_the_user_says_so() {
     let dir = furnished();
     let path = dir.path().join("session");
-    made(&path, "one", "first");
-    let dropped = Folder::create(&path, &Inputs::none(), "one").expect("begun");
+    let replacing = Inputs::none().replacing(true);
+    made(&path, "first");
+    made(&path, "first");
+    let before = fs::read(path.join(".hums")).expect("a stamp");
+    for other in ["firs", "first, and more", "First"] {
+        let refused = make(&path, &Inputs::none(), other).expect_err(other);
+        assert!(refused.contains("is there already with other content"), "{refused}");
+    }
+    // One table more than there is, and one less.
+    let more = Folder::create(&path, &Inputs::none(), "of a recording").expect("compared");
+    assert!(more.file("U.csv").is_err());
+    let less = Folder::create(&path, &Inputs::none(), "of a recording").expect("compared");
+    assert!(less.finish().is_err());
+    let dropped = Folder::create(&path, &replacing, "of a recording").expect("begun");
     dropped.file("T.csv").expect("a file").write_all(b"half").expect("written");
     drop(dropped);
     assert_eq!((table(&path), names(dir.path())), ("first".to_owned(), vec!["old".into(), "session".into()]));
-    made(&path, "one", "second");
+    assert_eq!(fs::read(path.join(".hums")).expect("a stamp"), before);
+    make(&path, &replacing, "second").expect("replaced");
     assert_eq!(
         (table(&path), names(dir.path())),
         ("second".to_owned(), vec!["old".into(), "session".into()])
     );
-    let refused = Folder::create(&path, &Inputs::none(), "two").expect_err("another's").to_string();
-    assert!(refused.contains("another recording"), "{refused}");
     fs::create_dir(dir.path().join("mine")).expect("made");
-    made(&dir.path().join("mine"), "one", "an empty folder is free");
-    fs::create_dir(path.join("inner")).expect("made");
-    let refused = Folder::create(&path, &Inputs::none(), "one").expect_err("has more").to_string();
-    assert!(refused.contains("inner, which hums did not make"), "{refused}");
-    assert!(Folder::remove(&path).is_err() && path.join("inner").exists());
-    assert!(Folder::remove(dir.path()).is_err() && dir.path().join("old").exists());
-    Folder::remove(&dir.path().join("mine")).expect("removed");
-    assert_eq!(table(&path), "second");
+    made(&dir.path().join("mine"), "an empty folder is free");
+}
+
+#[test]
+fn what_is_not_named_in_the_stamp_of_a_folder_is_never_removed() {
+    let dir = furnished();
+    let path = dir.path().join("session");
+    let replacing = Inputs::none().replacing(true);
+    made(&path, "first");
+    for name in ["mine.csv", "mine.parquet", "notes.txt"] {
+        fs::write(path.join(name), "mine").expect("written");
+        let refused = make(&path, &replacing, "second").expect_err(name);
+        assert!(refused.contains(&format!("has {name}, which hums did not make")), "{refused}");
+        made(&path, "first");
+        fs::remove_file(path.join(name)).expect("it is still there");
+    }
+    // A stamp that names nothing, or is cut off, is no leave.
+    for stamp in ["of a recording\n", "of a recording\nfiles 1\nT.csv", "of a recording\nfiles 2\nT.csv\n"] {
+        fs::write(path.join(".hums"), stamp).expect("written");
+        make(&path, &replacing, "second").expect_err(stamp);
+    }
+    fs::remove_file(path.join(".hums")).expect("removed");
+    let refused = make(&path, &replacing, "second").expect_err("nobody knows whose it is");
+    assert!(refused.contains("was not made by this command"), "{refused}");
+    assert_eq!(table(&path), "first");
 }
 
 #[test]
 fn where_folders_cannot_be_swapped_two_renames_do_and_a_kill_between_them_loses_nothing() {
     let dir = furnished();
     let (path, other) = (dir.path().join("session"), dir.path().join("other"));
-    made(&path, "one", "old");
-    made(&other, "one", "new");
+    made(&path, "old");
+    made(&other, "new");
     put_in_place(&other, &path, |_, _| false).expect("renamed");
     assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
     // Killed after the first rename.
     fs::rename(&path, old_of(&path)).expect("renamed");
-    drop(Folder::create(&path, &Inputs::none(), "one").expect("begun"));
+    drop(Folder::create(&path, &Inputs::none(), "of a recording").expect("begun"));
     assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
     // Killed before the old one was removed.
-    made(&old_of(&path), "one", "old");
-    drop(Folder::create(&path, &Inputs::none(), "one").expect("begun"));
+    made(&old_of(&path), "old");
+    drop(Folder::create(&path, &Inputs::none(), "of a recording").expect("begun"));
     assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
 }
 

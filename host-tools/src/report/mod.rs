@@ -19,24 +19,26 @@ pub mod trend;
 
 use std::io::Write as _;
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
 use crate::check;
 use crate::cli;
-use crate::decode::naming::{self, Traits};
+use crate::decode::naming::{self, Traits, without_made};
 use crate::decode::side_by_side::side_by_side;
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
-use crate::outcome::{Outcome, usage};
+use crate::made;
+use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::source::recording::{Place, find};
 
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
-    let found = find(&args.inputs, false)?;
-    for remark in &found.remarks {
+    let (given, remarks) = without_made(&args.inputs);
+    let found = find(&given, false)?;
+    for remark in remarks.iter().chain(&found.remarks) {
         eprintln!("hums: {remark}");
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
@@ -44,12 +46,10 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
     let wanted = wanted(args, &found.places)?;
-    let mut inputs = Inputs::of(args.inputs.iter().map(PathBuf::as_path).chain(found.paths()));
-    if wanted.directory {
-        inputs = inputs.without_folders();
-    }
+    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     // Of each session only what later ones are compared with is kept.
     let mut earlier: Vec<trend::Session> = Vec::new();
+    let mut kept = Kept::default();
     let read = found.places.get(..=*wanted.sessions.end()).unwrap_or_default();
     side_by_side(read, check::overview, |overview| {
         let overview = overview?;
@@ -58,13 +58,11 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             // A card's sessions are one box's; what lies in a folder beside a recording may be anybody's.
             let before = if place.own().is_some() { &earlier[..] } else { &[] };
             let path = wanted.path(place)?;
-            make_parent(&path)?;
-            let mut file = Output::create(&path, &inputs)?;
             let html = page::html(&overview, &replay::Replay::of(place)?, &trend::of(&this, before))?;
-            settle(file.write_all(html.as_bytes()), &path)?;
-            file.finish()?;
-            let bytes = count(html.len() as u64, "byte");
-            output::line(&format!("{}: session {}, {bytes}", path.display(), place.name))?;
+            if kept.pass(write(&path, &html, &inputs))?.is_some() {
+                let bytes = count(html.len() as u64, "byte");
+                output::line(&format!("{}: session {}, {bytes}", path.display(), place.name))?;
+            }
             outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
         }
         earlier.push(this);
@@ -76,7 +74,15 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             found.places.len()
         );
     }
+    kept.end()?;
     Ok(outcome)
+}
+
+fn write(path: &Path, html: &str, inputs: &Inputs) -> Result<()> {
+    make_parent(path)?;
+    let mut file = Output::create(path, inputs, &made::PAGE)?;
+    settle(file.write_all(html.as_bytes()), path)?;
+    file.finish()
 }
 
 /// Which sessions get a page, and where.

@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 
 use crate::cli::Run;
 use crate::files::{Inputs, Output};
+use crate::made;
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
 
@@ -48,7 +49,7 @@ impl Arrivals {
             source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
             name: run.input.to_string(),
             waiting: VecDeque::new(),
-            tap: tap.map(|(path, inputs)| Output::create(path, inputs)).transpose()?,
+            tap: tap.map(|(path, inputs)| Output::create(path, inputs, &made::RAW)).transpose()?,
             bytes: 0,
             autopilot,
         })

@@ -6,12 +6,14 @@ use anyhow::Result;
 
 use crate::cli::Run;
 use crate::endpoint::Endpoint;
-use crate::files::Inputs;
+use crate::files::{FileId, Inputs, Output};
+use crate::made;
+use crate::outcome::usage;
 
 /// What of a run must not be written over: its inputs, and the card and the store, which are updated in place. Refuses
 /// a run of which one file is named twice.
 pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> Result<Inputs> {
-    let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(firmware));
+    let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(firmware)).replacing(run.replace);
     inputs.add_endpoint(&run.input);
     run.gs_input.iter().for_each(|input| inputs.add_endpoint(input));
     for in_place in std::iter::once(run.sd.as_path()).chain(run.store.as_deref()) {
@@ -22,10 +24,24 @@ pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> 
         Some(Endpoint::File(path)) => Some(path.as_path()),
         _ => None,
     };
-    let mut taken = inputs.clone();
     for output in gs.into_iter().chain(tap) {
-        taken.refuse(output)?;
-        taken.add(output);
+        // A run also changes the card, so that it is too late to compare while it goes on.
+        Output::check_new(output, &inputs, &made::RAW)?;
+    }
+    if let (Some(gs), Some(tap)) = (gs, tap)
+        && FileId::of(gs).ok() == FileId::of(tap).ok()
+        && !is_device(gs)
+    {
+        return Err(usage(format!(
+            "--gs {} and --tap {}: are one file; name two",
+            gs.display(),
+            tap.display()
+        )));
     }
     Ok(inputs)
+}
+
+/// Whether something is there that is neither a file nor a folder: `/dev/null` may be written by both.
+fn is_device(path: &Path) -> bool {
+    path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir())
 }

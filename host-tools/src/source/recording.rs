@@ -244,6 +244,11 @@ fn detect(start: &[u8]) -> Option<Detected> {
     }
 }
 
+/// What a file that begins with these bytes (64 KiB, or all of it) is, where it is a recording and none of our own logs.
+pub fn format_of(start: &[u8]) -> Option<Format> {
+    detect(start).map(Detected::format)
+}
+
 /// What was found.
 #[derive(Debug, Default)]
 pub struct Found {

@@ -11,7 +11,7 @@ use clap::{Arg, CommandFactory as _};
 use hums::cli::Cli;
 use tempfile::TempDir;
 
-use crate::support::{all_named, attempt, flight, frames_of, named, px4, run, text};
+use crate::support::{all_named, attempt, flight, frames_of, hums, named, px4, run, text};
 
 /// What an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -208,14 +208,13 @@ fn refused(dir: &Path, words: &[String], before: &[(String, Vec<u8>)]) {
 fn an_output_into_an_input_folder_replaces_nothing_there() {
     let dir = furnished();
     let before = contents(&dir.path().join("folder"));
-    for line in ["decode folder -o folder --format csv,parquet,thesis", "report folder -o folder/"] {
+    for line in ["decode folder -o folder --format csv,parquet,thesis,tlog", "report folder -o folder/"] {
         run(dir.path(), line, 0);
-        // And again: what was made is replaced.
+        let made = contents(&dir.path().join("folder"));
+        // And again: what is there is the same. A tlog that was made is no input, though it is a recording.
         run(dir.path(), line, 0);
+        assert_eq!(contents(&dir.path().join("folder")), made);
     }
-    // A tlog that was made is a recording in the folder from then on, and so an input.
-    run(dir.path(), "decode folder -o folder --format tlog", 0);
-    run(dir.path(), "decode folder -o folder --format tlog", 2);
     let after = contents(&dir.path().join("folder"));
     assert!(before.iter().all(|file| after.contains(file)), "every input is what it was");
     assert!(after.len() > before.len() + 60);
@@ -268,30 +267,137 @@ fn two_cards_decoded_into_one_folder_stay_apart() {
     assert_eq!(contents(&dir.path().join("one_by_one")), contents(&dir.path().join("at_once")));
 }
 
+/// Two folders, each with a log of the same name: the whole one, and one whose last half is gone.
+fn whole_and_cut() -> TempDir {
+    let dir = tempfile::tempdir().expect("directory");
+    for folder in ["whole", "cut", "one"] {
+        fs::create_dir(dir.path().join(folder)).expect("a directory");
+    }
+    run(dir.path(), "pack PX4 -o whole/log.hum", 0);
+    let log = fs::read(dir.path().join("whole/log.hum")).expect("a log");
+    fs::write(dir.path().join("cut/log.hum"), &log[..log.len() / 1024 * 512]).expect("written");
+    dir
+}
+
 #[test]
-fn a_decoding_replaces_its_own_and_refuses_anothers() {
-    let dir = two_cards();
-    run(dir.path(), "decode c1.img -o out --format csv,tlog", 0);
+fn what_is_there_is_not_replaced_by_other_content_unless_the_user_says_so() {
+    let dir = whole_and_cut();
     let out = dir.path().join("out");
-    let name = named(&out, "00001");
-    let whole = contents(&out);
-    // Fewer tables than before: none of the others stays.
-    run(dir.path(), "decode c1.img -o out --format csv,tlog --message ATTITUDE", 0);
-    assert!(!out.join(&name).join("VFR_HUD.csv").exists() && out.join(&name).join("ATTITUDE.csv").exists());
-    run(dir.path(), "decode c1.img -o out --format csv,tlog", 0);
-    assert_eq!(contents(&out), whole, "the same again");
-    // A note that somebody put there stays.
-    fs::write(out.join(&name).join("notes.txt"), "mine").expect("written");
-    let said = run(dir.path(), "decode c1.img -o out --format csv", 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("notes.txt, which hums did not make"));
-    fs::remove_file(out.join(&name).join("notes.txt")).expect("removed");
-    // Tables of another recording under this name, and a folder that is nobody's.
-    fs::write(out.join(&name).join(".hums"), "hums session s00000000 sectors 00\n").expect("written");
-    let said = run(dir.path(), "decode c1.img -o out --format csv", 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("name another output with -o"));
-    fs::remove_file(out.join(&name).join(".hums")).expect("removed");
-    run(dir.path(), "decode c1.img -o out --format csv", 1);
-    assert!(out.join(&name).join("VFR_HUD.csv").exists(), "it is still there");
+    for line in ["decode LOG -o out --format tlog,jsonl,influx,csv,thesis", "report LOG -o out/"] {
+        let line =
+            |log: &str, more: &str| format!("{} {more}", line.replace("LOG", &format!("{log}/log.hum")));
+        run(dir.path(), &line("whole", ""), 0);
+        let made = contents(&out);
+        run(dir.path(), &line("whole", ""), 0);
+        assert_eq!(contents(&out), made, "the same again");
+        let kept = |line: &str| {
+            let said = String::from_utf8_lossy(&run(dir.path(), line, 1).stderr).into_owned();
+            assert!(said.contains("is there already with other content, and was not replaced"), "{said}");
+            assert!(said.contains("--replace"), "{said}");
+            assert!(contents(&out) == made, "{line} changed something");
+        };
+        kept(&line("cut", ""));
+        if line("", "").starts_with("decode") {
+            kept(&line("whole", "--from 20"));
+            kept(&line("whole", "--message ATTITUDE"));
+        }
+        // Each format by itself, so that none hides behind another.
+        for format in ["tlog", "jsonl", "influx", "csv", "thesis"] {
+            if line("", "").starts_with("decode") {
+                kept(&format!("decode cut/log.hum -o out --format {format}"));
+            }
+        }
+        run(dir.path(), &line("cut", "--replace"), 0);
+        assert_ne!(contents(&out), made);
+        run(dir.path(), &line("whole", "--replace"), 0);
+        assert_eq!(contents(&out), made, "no table of the others is left");
+    }
+    // Parquet tables of two parts of a session lie side by side.
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 0);
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --message ATTITUDE", 1);
+    run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 0);
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 0);
+    assert_eq!(parquet_sessions(&dir.path().join("fleet")).len(), 2);
+    // A table of the user's own stays, and so does the folder that it is in.
+    let tables = out.join(named(&out, "log"));
+    fs::write(tables.join("mine.csv"), "mine").expect("written");
+    let before = contents(&out);
+    run(dir.path(), "decode whole/log.hum -o out --format csv", 0);
+    let said = run(dir.path(), "decode cut/log.hum -o out --format csv --replace", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("mine.csv, which hums did not make"));
+    assert_eq!(contents(&out), before);
+}
+
+#[test]
+fn a_slip_in_the_name_of_an_output_costs_no_recording_with_any_flag() {
+    let dir = furnished();
+    run(dir.path(), "sim --input PX4 --sd card.img --card-size 64", 0);
+    let at = |name: &str| dir.path().join(name);
+    fs::write(at("spool"), b"HUMSPOOL and what waits").expect("written");
+    fs::write(at("thesis.txt"), "months of work").expect("written");
+    fs::write(at("flight.ulg"), b"ULog\x01\x12\x35\x01 and so on").expect("written");
+    let before = contents(dir.path());
+    for line in [
+        "decode folder/log.hum -o OUT --format tlog",
+        "decode folder/log.hum -o OUT --format jsonl",
+        "decode folder/log.hum -o OUT --format influx",
+        "report folder/log.hum -o OUT",
+        "pack folder/flight.tlog -o OUT",
+        "sim --input folder/flight.tlog --sd new.img --gs OUT",
+        "sim --input folder/flight.tlog --sd new.img --tap OUT",
+    ] {
+        for name in ["card.img", "spool", "thesis.txt", "flight.ulg", "hums.elf", "flight.tlog", "log.hum"] {
+            for flag in ["", "--replace"] {
+                let same = line.starts_with("pack") && name == "log.hum"
+                    || line.ends_with("tlog") && name == "flight.tlog";
+                if same {
+                    continue;
+                }
+                let line = format!("{} {flag}", line.replace("OUT", name));
+                run(dir.path(), &line, 1);
+                assert!(contents(dir.path()) == before, "{line}");
+            }
+        }
+    }
+    // What the command makes itself it replaces.
+    for (line, name) in [
+        ("decode folder/log.hum -o OUT --format tlog --to 20", "flight.tlog"),
+        ("sim --input folder/flight.tlog --sd new.img --gs OUT", "gs"),
+    ] {
+        let line = line.replace("OUT", name);
+        fs::write(at("gs"), frames_of(&px4())[..50].concat()).expect("written");
+        run(dir.path(), &line, 1);
+        run(dir.path(), &format!("{line} --replace"), 0);
+    }
+    let said = run(dir.path(), "sim --input PX4 --sd new.img --gs both --tap ./both", 2);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("are one file"));
+}
+
+#[test]
+fn a_command_with_all_files_of_a_folder_can_be_called_again() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::copy(px4(), dir.path().join("flight.tlog")).expect("a copy");
+    run(dir.path(), "pack flight.tlog -o log.hum", 0);
+    for line in ["decode * -o . --format tlog,csv,jsonl,influx,parquet,thesis", "report * -o ./"] {
+        // As a shell puts it there: without what begins with a dot.
+        let all = || -> String {
+            let entries = fs::read_dir(dir.path()).expect("a directory");
+            let names =
+                entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
+            let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
+            names.sort();
+            line.replace('*', &names.join(" "))
+        };
+        run(dir.path(), &all(), 0);
+        let made = contents(dir.path());
+        let said = String::from_utf8_lossy(&run(dir.path(), &all(), 0).stderr).into_owned();
+        assert!(said.contains("and is passed over"), "{said}");
+        assert!(line.starts_with("report") || said.contains("is what this command makes of"), "{said}");
+        assert!(line.starts_with("report") || contents(dir.path()) == made);
+        // An output that was changed is not replaced, and no input either.
+        run(dir.path(), &format!("{} --replace", all()), 0);
+        assert!(line.starts_with("report") || contents(dir.path()) == made);
+    }
 }
 
 #[test]
@@ -302,11 +408,18 @@ fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
     let mut damaged = log.clone();
     damaged[150 * 512 + 100] ^= 4;
     fs::write(dir.path().join("log.hum"), damaged).expect("written");
-    run(dir.path(), "decode log.hum -o back.tlog --format tlog", 3);
-    assert!(dir.path().join("back.tlog.gaps.csv").exists());
+    let line = "decode log.hum -o back.tlog --format tlog";
+    run(dir.path(), line, 3);
+    run(dir.path(), line, 3);
+    let gaps = dir.path().join("back.tlog.gaps.csv");
+    assert!(gaps.exists());
     fs::write(dir.path().join("log.hum"), log).expect("written");
-    run(dir.path(), "decode log.hum -o back.tlog --format tlog", 0);
-    assert!(!dir.path().join("back.tlog.gaps.csv").exists());
+    run(dir.path(), line, 1);
+    fs::remove_file(dir.path().join("back.tlog")).expect("removed");
+    run(dir.path(), line, 1);
+    assert!(gaps.exists() && !dir.path().join("back.tlog").exists());
+    run(dir.path(), &format!("{line} --replace"), 0);
+    assert!(!gaps.exists());
 }
 
 #[test]
@@ -338,25 +451,34 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
     run(dir.path(), "pack PX4 -o log.hum", 0);
     let program = env!("CARGO_BIN_EXE_hums");
     let tlog = px4().display().to_string();
-    for (line, output) in [
-        ("decode log.hum -o old --format tlog", "old"),
-        ("decode log.hum -o old --format jsonl", "old"),
-        ("report log.hum -o old", "old"),
-        ("pack PX4 -o old", "old"),
-        ("decode log.hum -o new/ --format tlog", "new"),
-        ("decode log.hum -o new --format csv", "new"),
-        ("decode log.hum -o new --format thesis", "new"),
-        ("decode log.hum -o new --format parquet", "new"),
+    fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..4000]).expect("written");
+    for (before, line, output) in [
+        (
+            "decode log.hum -o old --format tlog --message HEARTBEAT",
+            "decode log.hum -o old --format tlog",
+            "old",
+        ),
+        ("decode log.hum -o old --format jsonl --to 0.1", "decode log.hum -o old --format jsonl", "old"),
+        ("report few.tlog -o old", "report log.hum -o old", "old"),
+        ("pack few.tlog -o old", "pack PX4 -o old", "old"),
+        ("", "decode log.hum -o new/ --format tlog", "new"),
+        ("", "decode log.hum -o new --format csv", "new"),
+        ("", "decode log.hum -o new --format thesis", "new"),
+        ("", "decode log.hum -o new --format parquet", "new"),
     ] {
-        fs::write(dir.path().join("old"), "what was there").expect("written");
+        let _ = fs::remove_file(dir.path().join("old"));
+        if !before.is_empty() {
+            attempt(dir.path(), before);
+        }
+        let old = fs::read(dir.path().join("old")).unwrap_or_default();
         // No file may be longer than 20 KiB: a write beyond that fails as on a full disk.
-        let limited = format!("trap '' XFSZ; ulimit -f 20; exec {program} {}", line.replace("PX4", &tlog));
+        let limited = format!("ulimit -f 20; exec {program} {} --replace", line.replace("PX4", &tlog));
         let output_of = Command::new("bash").args(["-c", &limited]).current_dir(dir.path()).output();
         let ended = output_of.expect("it runs");
         let said = String::from_utf8_lossy(&ended.stderr);
         assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
         assert!(said.contains("cannot be written"), "{line}: {said}");
-        assert_eq!(fs::read(dir.path().join("old")).expect("there"), b"what was there", "{line}");
+        assert_eq!(fs::read(dir.path().join("old")).unwrap_or_default(), old, "{line}");
         assert_eq!(parts(dir.path()), Vec::<String>::new(), "{line}");
         if output == "new" {
             let left =
@@ -381,9 +503,10 @@ fn until(what: &str, is: impl Fn() -> bool) {
 fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     let dir = tempfile::tempdir().expect("directory");
     let (old, part) = (dir.path().join("old.hum"), dir.path().join(".old.hum.hums-part"));
-    fs::write(&old, "what was there").expect("written");
+    run(dir.path(), &format!("pack {} -o old.hum", flight("ap_quad_guided.tlog").display()), 0);
+    let before = fs::read(&old).expect("there");
     let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
-        .args(["pack", "-", "-o", "old.hum"])
+        .args(["pack", "-", "-o", "old.hum", "--replace"])
         .current_dir(dir.path())
         .stdin(Stdio::piped())
         .spawn()
@@ -393,13 +516,13 @@ fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
     until("it writes", || part.metadata().is_ok_and(|about| about.len() > 10_000));
     // While it is written nobody else writes it.
-    let said = run(dir.path(), "pack PX4 -o old.hum", 1);
+    let said = run(dir.path(), "pack PX4 -o old.hum --replace", 1);
     assert!(String::from_utf8_lossy(&said.stderr).contains("another run of hums is writing it"));
     program.kill().expect("it is ours");
     program.wait().expect("it is ours");
-    assert_eq!(fs::read(&old).expect("there"), b"what was there");
+    assert_eq!(fs::read(&old).expect("there"), before);
     assert!(part.exists());
-    run(dir.path(), "pack PX4 -o old.hum", 0);
+    run(dir.path(), "pack PX4 -o old.hum --replace", 0);
     assert!(!part.exists());
     run(dir.path(), "verify old.hum", 0);
 }
@@ -420,7 +543,7 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
     let mut killed = 0;
     for after_ms in (0..60).step_by(6) {
         let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
-            .args(["decode", "log.hum", "-o", "out", "--format", "csv,parquet"])
+            .args(["decode", "log.hum", "-o", "out", "--format", "csv,parquet", "--replace"])
             .current_dir(dir.path())
             .stdout(Stdio::null())
             .spawn()
@@ -439,17 +562,55 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
         }
     }
     assert!(killed > 0);
-    run(dir.path(), "decode log.hum -o out --format csv,parquet", 0);
+    run(dir.path(), "decode log.hum -o out --format csv,parquet --replace", 0);
     assert_eq!(contents(&out), whole, "and nothing of the killed runs is left");
 }
 
 #[test]
-fn a_demo_removes_nobodys_card() {
+fn a_demo_removes_what_a_demo_made_and_nothing_else() {
     let dir = tempfile::tempdir().expect("directory");
-    fs::write(dir.path().join("card.img"), "evidence").expect("written");
-    let said = run(dir.path(), "demo --input PX4 --dir . --dashboard never", 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("no demo made it"));
-    assert_eq!(fs::read(dir.path().join("card.img")).expect("there"), b"evidence");
+    let at = |name: &str| dir.path().join(name);
+    let demo = |code: i32| -> String {
+        let input = px4().display().to_string();
+        let words = ["demo", "--input", &input, "--dir", ".", "--dashboard", "never"];
+        // Without a path there is no emulator.
+        let ended = hums().current_dir(dir.path()).env("PATH", "").args(words).output().expect("it runs");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(code), "{said}");
+        said
+    };
+    for name in ["card.img", "report.html"] {
+        fs::write(at(name), "evidence").expect("written");
+        assert!(demo(1).contains("no demo made it"));
+        assert_eq!(fs::read(at(name)).expect("there"), b"evidence");
+        fs::remove_file(at(name)).expect("removed");
+    }
+    demo(0);
+    let made = contents(dir.path());
+    // What the user puts beside it stays.
+    let tables = at("decoded").join(named(&at("decoded"), "00001"));
+    for path in [at("mine.tlog"), at("decoded/mine.csv")] {
+        fs::write(path, "mine").expect("written");
+    }
+    demo(0);
+    for path in [at("mine.tlog"), at("decoded/mine.csv")] {
+        assert_eq!(fs::read(&path).expect("there"), b"mine");
+        fs::remove_file(path).expect("removed");
+    }
+    assert!(contents(dir.path()) == made, "a demo is the same again");
+    // What was changed, or put among the tables, ends it before anything is removed.
+    for (path, why) in [
+        (tables.join("mine.csv"), "is among the demo's tables"),
+        (tables.join("HEARTBEAT.csv"), "was changed since the demo made it"),
+        (at("card.img"), "was changed since the demo made it"),
+    ] {
+        let was = fs::read(&path).ok();
+        fs::write(&path, "evidence").expect("written");
+        let before = contents(dir.path());
+        assert!(demo(1).contains(why), "{}", path.display());
+        assert!(contents(dir.path()) == before, "{}", path.display());
+        was.map_or_else(|| fs::remove_file(&path), |was| fs::write(&path, was)).expect("as it was");
+    }
 }
 
 /// Where files may be made, emptied, renamed or removed besides `files/`, and why.

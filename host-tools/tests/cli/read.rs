@@ -16,8 +16,8 @@ fn a_packed_recording_comes_back_frame_for_frame() {
     let dir = tempfile::tempdir().expect("directory");
     for name in ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"] {
         let input = flight(name);
-        run(dir.path(), &format!("pack {} -o log.hum", input.display()), 0);
-        run(dir.path(), "decode log.hum -o back.tlog --format tlog", 0);
+        run(dir.path(), &format!("pack {} -o log.hum --replace", input.display()), 0);
+        run(dir.path(), "decode log.hum -o back.tlog --format tlog --replace", 0);
         assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&input), "{name}");
     }
 }
@@ -166,7 +166,7 @@ fn a_cut_log_gives_what_it_has() {
     for length in [512, 700, 32 * 512, 65 * 512 + 1, log.len() / 2, log.len() - 512] {
         fs::write(dir.path().join("cut.hum"), &log[..length]).expect("written");
         let code = if length % 512 == 0 { 0 } else { 3 };
-        run(dir.path(), "decode cut.hum -o cut.tlog --format tlog", code);
+        run(dir.path(), "decode cut.hum -o cut.tlog --format tlog --replace", code);
         let back = frames_of(&dir.path().join("cut.tlog"));
         assert!(frames_of(&px4()).starts_with(&back), "{length} bytes");
         assert!(back.len() * 3 > length / 512 * 10, "{length} bytes: {} frames", back.len());

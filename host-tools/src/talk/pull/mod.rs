@@ -17,7 +17,7 @@ use self::compare::{Likeness, compare};
 use self::ftp::Ftp;
 use super::Client;
 use crate::cli;
-use crate::files::{Inputs, Output, make_directory, settle};
+use crate::files::{Output, make_directory, settle};
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output::Stdout;
@@ -64,7 +64,7 @@ fn pull(ftp: &mut Ftp, name: &str, path: &Path) -> Result<bool> {
         eprintln!("hums: {name}: is there already");
         return Ok(false);
     }
-    let (mut file, _) = Output::resume(path, &Inputs::none())?;
+    let (mut file, _) = Output::resume(path)?;
     let mut have = begun(ftp, name, &mut file, length)?;
     if let There::Beginning(bytes) = there
         && have < bytes

@@ -1,0 +1,67 @@
+//! The file `.hums` of a folder of tables: what they were made of, and which files are ours.
+//!
+//! ```text
+//! hums session s1a2b3c4d sectors 00112233445566778899aabbccddeeff
+//! files 2
+//! ATTITUDE.csv
+//! HEARTBEAT.csv
+//! ```
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::Path;
+
+/// The name of the file.
+pub(super) const STAMP: &str = ".hums";
+/// A stamp is a line and some hundred names.
+const BYTES_MAX: u64 = 4 << 20;
+
+/// What a stamp says.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Stamp {
+    /// What the tables were made of, a line.
+    pub(super) made_of: String,
+    /// The names of the files that were made; none while the folder is being made, or where the stamp is cut off.
+    pub(super) files: BTreeSet<String>,
+}
+
+impl Stamp {
+    /// That of a folder, if it has one.
+    pub(super) fn of(folder: &Path) -> Option<Self> {
+        let path = folder.join(STAMP);
+        fs::symlink_metadata(&path).ok().filter(|about| about.is_file() && about.len() <= BYTES_MAX)?;
+        let text = fs::read_to_string(path).ok()?;
+        let mut lines = text.lines();
+        let made_of = lines.next().unwrap_or_default().to_owned();
+        let count: Option<usize> = lines.next().and_then(|line| line.strip_prefix("files ")?.parse().ok());
+        let mut files: BTreeSet<String> = lines.map(str::to_owned).collect();
+        if count != Some(files.len()) || !text.ends_with('\n') {
+            files.clear();
+        }
+        Some(Self { made_of, files })
+    }
+
+    /// Writes it.
+    pub(super) fn write(&self, mut file: &File) -> io::Result<()> {
+        let mut text = format!("{}\nfiles {}\n", self.made_of, self.files.len());
+        for name in &self.files {
+            text.push_str(name);
+            text.push('\n');
+        }
+        file.write_all(text.as_bytes())
+    }
+
+    /// The first entry of the folder that we did not make.
+    pub(super) fn foreign(&self, folder: &Path) -> io::Result<Option<String>> {
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let ours = name == STAMP || self.files.contains(&name);
+            if !ours || !entry.file_type()?.is_file() {
+                return Ok(Some(name));
+            }
+        }
+        Ok(None)
+    }
+}
