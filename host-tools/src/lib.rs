@@ -29,6 +29,7 @@ pub mod run;
 pub mod series;
 pub mod sink;
 pub mod source;
+pub mod states;
 pub mod statustext;
 pub mod summary;
 pub mod talk;

@@ -42,6 +42,9 @@ cargo xtask COMMAND
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise;
                                  all of them (hours) make docs/proof.md
+  prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]
+                                 faults found and false alarms, on the labelled flights of the repository and of folders;
+                                 --write makes docs/diagnosis.md
   prove emulator                 the recordings of HUMS_FLIGHTS through the firmware in the emulator
   firmware [--board BOARD]       build the firmware: f405 (the default) or f429, which are real, or emulated
   bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, instructions; how fast logs are checked

@@ -1,7 +1,7 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; what is left of them is `docs/proof.md`.
 //!
-//! The campaigns themselves are in the tests' crate; this builds them and sees to what they need. One part is no
-//! campaign: `emulator` flies the recordings of `HUMS_FLIGHTS` through the firmware in the emulator, which takes minutes,
+//! The campaigns themselves are in the tests' crate; this builds them and sees to what they need. Two parts are no
+//! campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `emulator` flies the recordings of `HUMS_FLIGHTS` through the firmware in the emulator, which takes minutes,
 //! and compares with this PC.
 
 use anyhow::{Result, bail};
@@ -15,10 +15,14 @@ use crate::shell::Shell;
 /// What the campaigns look at cards with.
 pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 
-/// The part that is no campaign.
+/// The part that needs the emulator.
 const EMULATOR: &str = "emulator";
 
-/// Runs the campaigns with these arguments: names, `--short`, `--seed N`, `--runs N`; or the emulator's part.
+/// The part that looks at no card.
+const DIAGNOSIS: &str = "diagnosis";
+
+/// Runs the campaigns with these arguments: names, `--short`, `--seed N`, `--runs N`; or `diagnosis` with its own; or the
+/// emulator's part.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     if arguments.iter().any(|argument| argument == EMULATOR) {
         if arguments.len() > 1 {
@@ -26,7 +30,8 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
         }
         return further_recordings();
     }
-    let mut needs = NEEDS.to_vec();
+    let is_diagnosis = arguments.first().is_some_and(|first| first == DIAGNOSIS);
+    let mut needs = if is_diagnosis { Vec::new() } else { NEEDS.to_vec() };
     needs.push(Need::Linker);
     setup::ensure(&needs, false).require_all()?;
     let run = ["run", "--release", "--quiet", "--package=hums-tests", "--bin", "prove", "--"];

@@ -16,6 +16,7 @@ use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
+use hums_link::sequence::Sequences;
 
 use super::clock::Clock;
 use super::epochs::Epochs;
@@ -36,6 +37,16 @@ pub enum JudgedBy {
     Board,
     /// This program.
     Here,
+}
+
+/// Where a recording was heard.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Heard {
+    /// Nobody knows: what tells of the wire is not judged.
+    #[default]
+    Somewhere,
+    /// At the monitor's own place, the autopilot's telemetry port: silence and lost frames are those of its wire.
+    OnTheWire,
 }
 
 /// Whose limits count.
@@ -144,6 +155,8 @@ pub struct Judge {
     monitor: Box<Monitor>,
     limits: Limits,
     format: Format,
+    /// The sequence numbers of the frames, where the recording was heard on the monitor's wire.
+    wire: Option<Sequences>,
     clock: Clock,
     note: Instant,
     first: Option<Instant>,
@@ -175,6 +188,7 @@ impl Judge {
             monitor: Box::new(Monitor::new(limits.params)),
             limits: limits.clone(),
             format,
+            wire: None,
             clock: Clock::default(),
             note: Instant::ZERO,
             first: None,
@@ -197,6 +211,12 @@ impl Judge {
         }
     }
 
+    /// With a recording that was heard there.
+    #[must_use]
+    pub fn heard(self, heard: Heard) -> Self {
+        Self { wire: (heard == Heard::OnTheWire).then(Sequences::new), ..self }
+    }
+
     /// Takes the next item.
     pub fn item(&mut self, at: Instant, item: Item<'_>) {
         match item {
@@ -213,6 +233,13 @@ impl Judge {
             Item::Restart => {
                 self.restarts += 1;
                 self.epochs.restart(at);
+            }
+            Item::Frame(frame) if self.wire.is_some() => {
+                self.advance(at);
+                let at = self.clock.monitor(at);
+                if let Some(wire) = &mut self.wire {
+                    wire.frame(at, frame);
+                }
             }
             Item::Frame(_)
             | Item::Parameter(_)
@@ -268,11 +295,11 @@ impl Judge {
     }
 
     fn tick(&mut self, now: Instant) {
-        let (link, recorder) = (LinkReading::default(), RecorderStatus::default());
         let steps = self.clock.monitor(now);
-        let Self { monitor, here, format, .. } = self;
+        let (link, recorder) = (self.link(steps), RecorderStatus::default());
+        let Self { monitor, here, format, wire, .. } = self;
         monitor.tick(steps, &link, &recorder, &mut |finding| {
-            if is_of(finding.check, *format) {
+            if is_of(finding.check, *format, wire.is_some()) {
                 here.take(&Finding {
                     at: Clock::recording(now, steps, finding.at),
                     ..Finding::from(finding)
@@ -295,6 +322,12 @@ impl Judge {
             self.note = now + NOTE_EVERY;
             self.note_seen(steps, &link, &recorder);
         }
+    }
+
+    /// What is lost of the vehicle's frames, where that is known.
+    fn link(&mut self, steps: Instant) -> LinkReading {
+        let source = self.monitor.vehicle().source;
+        self.wire.as_mut().map_or_else(LinkReading::default, |wire| wire.reading(steps, source))
     }
 
     fn happening(&mut self, now: Instant, steps: Instant, happening: Happening) {
@@ -383,7 +416,7 @@ impl Judge {
         }
         let given = !self.limits.given.is_empty();
         let by = if self.checked_on_board && !given { JudgedBy::Board } else { JudgedBy::Here };
-        if !self.checked_on_board {
+        if !self.checked_on_board && self.wire.is_none() {
             // Nobody knows where it was heard: a packed recording may be that of a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
         }
@@ -454,7 +487,7 @@ impl Judge {
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
             Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
             _ if autopilot.is_none() => return not("no heartbeat of an autopilot"),
-            Scope::Wire | Scope::Recorder => {
+            Scope::Wire | Scope::Recorder if words.scope == Scope::Recorder || self.wire.is_none() => {
                 return not(match (words.scope, self.format.is_of_link()) {
                     (Scope::Recorder, _) => "no monitor recorded this",
                     (_, true) => {
@@ -494,10 +527,10 @@ enum Verdict {
 
 /// Whether a check says anything in a recording of this format, judged here: one recording tells neither of earlier flights
 /// nor of parts that wear.
-fn is_of(check: &str, format: Format) -> bool {
+fn is_of(check: &str, format: Format, on_the_wire: bool) -> bool {
     let scope = vocabulary(check).map(|words| words.scope);
     !matches!(scope, Some(Scope::Recorder | Scope::Stored))
-        && (format == Format::Hums || scope != Some(Scope::Wire))
+        && (format == Format::Hums || on_the_wire || scope != Some(Scope::Wire))
 }
 
 /// Whether no value can be beyond the limits: they stand at the end of their range.
@@ -639,7 +672,7 @@ mod tests {
             let stored = VOCABULARY.iter().filter(|words| words.scope == Scope::Stored);
             assert!(stored.clone().count() > 3);
             for words in stored {
-                assert!(!is_of(words.check, format), "{}", words.check);
+                assert!(!is_of(words.check, format, false), "{}", words.check);
             }
         }
         let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
@@ -681,6 +714,48 @@ mod tests {
         let judged = judge.end();
         assert_eq!((judged.worst(), judged.damages), (None, 1));
         assert!(judged.judged.is_empty(), "{:?}", judged.judged);
+    }
+
+    /// Heartbeats at 10 Hz, of which so many in a hundred are lost on the wire after 20 s, and none from 40 to 48 s.
+    fn link_faults(heard: Heard) -> Judged {
+        use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+        use hums_link::{Frame, messages};
+        let mut judge = Judge::new(&Limits::default(), Format::Tlog).heard(heard);
+        let mut encoder = Encoder::of(AUTOPILOT.system, AUTOPILOT.component);
+        for tick in 0..600_u64 {
+            encoder.set_sequence(tick as u8);
+            let mut buffer = [0; FRAME_BYTES_MAX];
+            let frame = Frame::parse(encoder.frame(&mut buffer, &messages::heartbeat(4))).expect("ours");
+            if (200..400).contains(&tick) && tick % 5 == 0 || (400..480).contains(&tick) {
+                continue;
+            }
+            let at = Instant::from_millis(tick * 100);
+            judge.item(at, Item::Frame(&frame));
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
+        }
+        judge.end()
+    }
+
+    #[test]
+    fn the_wire_is_judged_where_the_recording_was_heard_at_the_monitors_own_place() {
+        let judged = link_faults(Heard::OnTheWire);
+        let first = |check: &str| {
+            let finding = judged.findings.iter().find(|finding| finding.check == check);
+            finding.map(|finding| (finding.level, finding.at.as_secs_f64()))
+        };
+        let Some((Level::Warning | Level::Critical, at)) = first("frames_lost") else {
+            panic!("{:?}", judged.findings)
+        };
+        assert!((20.0..26.0).contains(&at), "{at}");
+        let Some((Level::Warning, at)) = first("heartbeat") else { panic!("{:?}", judged.findings) };
+        assert!((41.9..42.1).contains(&at), "{at}");
+        assert!(judged.judged.contains(&"frames_lost"), "{:?}", judged.judged);
+        let judged = link_faults(Heard::Somewhere);
+        assert!(
+            judged.findings.iter().all(|finding| finding.check != "frames_lost"),
+            "{:?}",
+            judged.findings
+        );
     }
 
     #[test]

@@ -10,7 +10,6 @@ pub mod json;
 pub mod judge;
 mod overview;
 pub mod problem;
-mod states;
 pub mod text;
 
 use anyhow::{Result, bail};
@@ -25,7 +24,7 @@ use crate::progress;
 use crate::run::params;
 use crate::source::recording::{Place, find};
 use checked::Checked;
-use judge::Limits;
+use judge::{Heard, Limits};
 use text::Table;
 
 /// Runs `hums check`.
@@ -43,7 +42,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     let (bar, mut table, mut failed) = (progress::logs(found.places.len()), Table::default(), 0_usize);
     side_by_side(
         &found.places,
-        |place| (place.title.clone(), check(place, &limits, !many)),
+        |place| (place.title.clone(), judged(place, &limits, Heard::Somewhere, !many)),
         |(name, checked)| {
             bar.inc(1);
             match checked {
@@ -82,8 +81,12 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     }
 }
 
-/// Judges one recording.
-fn check(place: &Place, limits: &Limits, shows: bool) -> Result<Checked> {
-    let (format, judged, _) = overview::judge(place, limits, shows)?;
+/// Judges one recording, as `hums check` does.
+pub fn recording(place: &Place, limits: &Limits, heard: Heard) -> Result<Checked> {
+    judged(place, limits, heard, false)
+}
+
+fn judged(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Checked> {
+    let (format, judged, _) = overview::judge(place, limits, heard, shows)?;
     Ok(Checked { name: place.title.clone(), format, judged })
 }

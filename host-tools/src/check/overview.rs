@@ -7,7 +7,7 @@ use anyhow::Result;
 use hums_blackbox::record::Vehicle;
 use hums_core::Monitor;
 
-use super::judge::{Judge, Judged, Limits};
+use super::judge::{Heard, Judge, Judged, Limits};
 use crate::names::counter_name;
 use crate::progress;
 use crate::source::item::{Gap, Summary, Want};
@@ -18,12 +18,18 @@ use crate::summary::{Contents, ExceedanceLine, FindingLine, MessageCount, Overvi
 const LOOK_EVERY: u32 = 4_096;
 
 /// Judges a recording; `shows` how far it is.
-pub(super) fn judge(place: &Place, limits: &Limits, shows: bool) -> Result<(Format, Judged, Summary)> {
+pub(super) fn judge(
+    place: &Place,
+    limits: &Limits,
+    heard: Heard,
+    shows: bool,
+) -> Result<(Format, Judged, Summary)> {
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
     let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
-    let (mut judge, mut items) = (Judge::new(limits, format), 0_u32);
-    let summary = recording.read(Want { observations: true, ..Want::default() }, &mut |at, item| {
+    let (mut judge, mut items) = (Judge::new(limits, format).heard(heard), 0_u32);
+    let want = Want { observations: true, frames: heard == Heard::OnTheWire, ..Want::default() };
+    let summary = recording.read(want, &mut |at, item| {
         judge.item(at, item);
         items = items.wrapping_add(1);
         if items.is_multiple_of(LOOK_EVERY) {
@@ -41,12 +47,12 @@ pub fn overview(place: &Place) -> Result<Overview> {
     if let Some(log) = place.own() {
         let mut overview = Overview::of(log)?;
         if !overview.contents.is_checked() && overview.contents.frames() > 0 {
-            let (_, judged, _) = judge(place, &limits, true)?;
+            let (_, judged, _) = judge(place, &limits, Heard::Somewhere, true)?;
             fill(&mut overview.contents, judged);
         }
         return Ok(overview);
     }
-    let (format, judged, summary) = judge(place, &limits, true)?;
+    let (format, judged, summary) = judge(place, &limits, Heard::Somewhere, true)?;
     let mut contents = Contents::default();
     contents.epoch_us = judged.epochs.whole();
     count(&mut contents, format, summary);

@@ -11,10 +11,10 @@ use hums_core::time::{Instant, Span};
 use super::checked::Checked;
 use super::judge::{Judged, JudgedBy};
 use super::problem::Problem;
-use super::states;
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
 use crate::source::item::{About, Cause};
+use crate::states;
 use crate::utc::iso8601;
 
 /// Problems that are shown with their words; the rest gets a line.

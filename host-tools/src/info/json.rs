@@ -7,6 +7,7 @@ use crate::ending::{BlocksJson, EndJson};
 use crate::logs;
 use crate::names::{autopilot_name, type_name};
 use crate::source::recording::Format;
+use crate::states;
 use crate::summary::{Contents, Overview};
 use crate::utc::iso8601;
 
@@ -136,6 +137,8 @@ struct FindingJson {
     time_utc: Option<String>,
     /// `null` where the input stopped.
     value: Option<f32>,
+    /// The state that the value is, where it is no quantity.
+    state: Option<&'static str>,
     limit: Option<f32>,
     unit: String,
 }
@@ -320,6 +323,7 @@ fn findings(log: &Overview) -> Vec<FindingJson> {
         time_s: finding.at.as_secs_f64(),
         time_utc: log.utc_us(finding.at).map(iso8601),
         value: finite(finding.value),
+        state: states::name(&finding.check, finding.value),
         limit: finite(finding.limit),
         unit: finding.unit.clone(),
     };

@@ -14,6 +14,7 @@ use super::wear;
 use crate::ending::{behind_words, has_newer};
 use crate::logs;
 use crate::plural::count;
+use crate::states;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
 use crate::utc::iso8601;
 
@@ -148,12 +149,17 @@ fn sentence(finding: &FindingLine) -> String {
         _ => format!(" {}", u16::from(*instance) + 1),
     };
     let mut sentence = format!("{subsystem}: {words}{number}");
-    if let Some(value) = finite(*value) {
-        let _ = write!(sentence, ", {} {unit}", short(value.into()));
-        sentence.truncate(sentence.trim_end().len());
-    }
-    if let Some(limit) = finite(*limit) {
-        let _ = write!(sentence, " (limit {})", short(limit.into()));
+    // The limit of a state is a number between two of them.
+    if let Some(state) = states::name(check, *value) {
+        let _ = write!(sentence, ", {state}");
+    } else {
+        if let Some(value) = finite(*value) {
+            let _ = write!(sentence, ", {} {unit}", short(value.into()));
+            sentence.truncate(sentence.trim_end().len());
+        }
+        if let Some(limit) = finite(*limit) {
+            let _ = write!(sentence, " (limit {})", short(limit.into()));
+        }
     }
     let _ = write!(sentence, "; was {previous} [{check}]");
     sentence
@@ -282,5 +288,31 @@ fn messages_text(text: &mut String, log: &Overview) {
     let other = contents.other_messages;
     if other.frames > 0 {
         let _ = writeln!(text, "    {:<36} {:>10} {:>20}", "ids beyond these", other.frames, other.bytes);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::time::Instant;
+
+    use super::*;
+
+    #[test]
+    fn a_state_has_its_name_and_a_quantity_its_limit() {
+        let finding = |check: &str, value, limit, unit: &str| FindingLine {
+            at: Instant::ZERO,
+            subsystem: "computer",
+            check: check.to_owned(),
+            instance: 0,
+            level: "critical",
+            previous: "ok",
+            value,
+            limit,
+            unit: unit.to_owned(),
+        };
+        let state = sentence(&finding("autopilot_state", 6.0, 4.5, ""));
+        assert_eq!(state, "computer: autopilot failsafe, emergency; was ok [autopilot_state]");
+        let load = sentence(&finding("load", 97.0, 95.0, "%"));
+        assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
     }
 }

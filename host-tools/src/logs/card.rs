@@ -22,7 +22,8 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     Ok(Log { name: stem, files: vec![path.display().to_string()], pieces: vec![piece], session: None })
 }
 
-pub(super) fn is_card(path: &Path) -> Result<bool> {
+/// Whether the file system of a card can be read there.
+pub fn is_card(path: &Path) -> Result<bool> {
     let device = ReadOnlyImage::new(File::open(path)?)?;
     Ok(Layout::read(&device).is_ok())
 }

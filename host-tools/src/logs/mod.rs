@@ -17,7 +17,7 @@ pub mod places;
 pub mod reader;
 mod scan;
 
-pub use card::on_card;
+pub use card::{is_card, on_card};
 pub use find::{Content, Found, find};
 pub use folder::passed_over;
 pub use places::{Log, Piece};

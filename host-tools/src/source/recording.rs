@@ -28,6 +28,10 @@ const DEPTH_MAX: usize = 16;
 /// Recordings of one folder, and folders of one folder, that are kept: each takes some hundred bytes.
 const WALKED_MAX: usize = 10_000;
 
+/// What is read besides logs of ours, for messages: the end of a sentence.
+const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
+                     each also as .gz";
+
 /// What a recording is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Format {
@@ -174,10 +178,7 @@ impl Recording {
             if start.is_empty() {
                 bail!("{name}: is empty");
             }
-            bail!(
-                "{name}: is neither a log of HUMS, a card or its image, nor a recording that this program knows: a tlog, raw \
-                 MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), each also as .gz"
-            );
+            bail!("{name}: is neither a log of HUMS, a card or its image, nor {KNOWN}");
         };
         let progress = input.progress();
         let reader: Box<dyn Reader> = match format {
@@ -340,7 +341,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
                     .push(format!("{}: {files} passed over: no log of a known kind", input.display()));
             }
         } else if is_own(input)? {
-            own(input, salvage, &mut found)?;
+            own(input, salvage, &mut found).map_err(|error| not_known(input, error))?;
         } else {
             found.places.push(Place::file(input));
         }
@@ -381,6 +382,15 @@ fn is_own(path: &Path) -> Result<bool> {
         Content::Image => !is_recording(path),
         Content::Mavlink | Content::Empty | Content::Other => false,
     })
+}
+
+/// A large file of anything may be a card whose first blocks are gone. That nothing was found on it is no news to whoever named
+/// something else by mistake.
+fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
+    if matches!(logs::find::look(path), Ok(Content::Image)) && !logs::is_card(path).unwrap_or(true) {
+        return error.context(format!("{}: is no log of HUMS, and not {KNOWN}; as a card", path.display()));
+    }
+    error
 }
 
 fn is_recording(path: &Path) -> bool {

@@ -7,9 +7,13 @@ use hums_link::encode::COMPONENT;
 use hums_link::packet::Fields;
 use hums_link::{Check, Frame, observe};
 
-use super::item::{Item, Mode, Parameter, Take, Text, Want};
+use super::dataflash::is_firmware;
+use super::item::{About, Fact, Item, Mode, Parameter, Take, Text, Want};
 use crate::mavlink::ids::{PARAM_VALUE, STATUSTEXT};
 use crate::statustext::{self, Texts};
+
+/// `MAV_COMP_ID_AUTOPILOT1`
+const AUTOPILOT: u8 = 1;
 
 /// Turns frames into items, in their order.
 #[derive(Debug, Default)]
@@ -64,11 +68,19 @@ fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::
     let mut result = Ok(());
     make(&mut |text| {
         if result.is_ok() {
-            let said = Text { source: text.source, severity: text.severity, words: &text.words };
-            result = take(text.at, Item::Text(said));
+            result = hand_text(&text, take);
         }
     });
     result
+}
+
+/// `ArduPilot` says what firmware it is as a text, when a ground station asks for its parameters (`send_banner`).
+fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
+    let words = text.words.as_str();
+    if text.source.component == AUTOPILOT && is_firmware(words) {
+        take(text.at, Item::Fact(Fact { about: About::Firmware, words }))?;
+    }
+    take(text.at, Item::Text(Text { source: text.source, severity: text.severity, words }))
 }
 
 /// `PARAM_VALUE`. An integer is the bits of the float at PX4, and a number like any other at ArduPilot
@@ -83,4 +95,40 @@ fn parameter(at: Instant, frame: &Frame<'_>, autopilot: Autopilot, take: &mut Ta
     let bits = autopilot == Autopilot::Px4 && payload[24] == INT32;
     let value = if bits { f64::from(value.to_bits().cast_signed()) } else { f64::from(value) };
     take(at, Item::Parameter(Parameter { name, value }))
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+    use hums_link::messages;
+    use hums_link::text::Severity;
+
+    use super::*;
+
+    /// The firmware that these words of a component tell.
+    fn firmware(component: u8, words: &str) -> Option<String> {
+        let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
+        let bytes = encoder.frame(&mut buffer, &messages::status_text(Severity::Info, words));
+        let frame = Frame::parse(bytes).expect("a frame of ours");
+        let (mut said, mut firmware) = (Said::default(), None);
+        let mut take = |_: Instant, item: Item<'_>| {
+            if let Item::Fact(Fact { about: About::Firmware, words }) = item {
+                firmware = Some(words.to_owned());
+            }
+            Ok(())
+        };
+        said.frame(Instant::ZERO, &frame, Want::default(), &mut take).expect("no error");
+        said.end(&mut take).expect("no error");
+        firmware
+    }
+
+    #[test]
+    fn the_firmware_of_a_tlog_is_what_the_autopilot_says_it_is() {
+        assert_eq!(
+            firmware(1, "ArduCopter V4.6.3 (3fc7011a)").as_deref(),
+            Some("ArduCopter V4.6.3 (3fc7011a)")
+        );
+        assert_eq!(firmware(1, "EKF3 IMU0 is using GPS"), None);
+        assert_eq!(firmware(191, "ArduCopter V4.6.3 (3fc7011a)"), None, "who is no autopilot tells nothing");
+    }
 }

@@ -7,27 +7,46 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use hums_tests::flights::root;
+use hums_tests::prove::diagnosis::{self, DIAGNOSIS, Flights};
 use hums_tests::prove::{CAMPAIGNS, Campaign, Counting, Options, Part, Provenance, write_report};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-const USAGE: &str = "prove [NAME...] [--short] [--seed N] [--runs N] [--no-report] [--list]";
+const USAGE: &str = "prove [NAME...] [--short] [--seed N] [--runs N] [--no-report] [--list]
+prove diagnosis [FOLDER]... [--unseen FOLDER]... [--short] [--write]";
 
 fn main() -> ExitCode {
-    match Arguments::parse(std::env::args().skip(1)) {
-        Ok(arguments) => match run(&arguments) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(error) => {
-                eprintln!("error: {error:#}");
-                ExitCode::FAILURE
-            }
-        },
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let run = match words.split_first() {
+        Some((first, rest)) if first == DIAGNOSIS => Flights::parse(rest).map(|flights| judge(&flights)),
+        _ => Arguments::parse(words.into_iter()).map(|arguments| run(&arguments)),
+    };
+    match run {
+        Ok(result) => ended(result),
         Err(error) => {
             eprintln!("{error}\n{USAGE}");
             ExitCode::from(2)
         }
     }
+}
+
+fn ended(result: Result<()>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Judges flights, and says what came of it.
+fn judge(flights: &Flights) -> Result<()> {
+    let start = Instant::now();
+    let text = diagnosis::run(flights, || commit("docs/diagnosis.md"))?;
+    println!("{DIAGNOSIS} took {:.1} s\n{text}", start.elapsed().as_secs_f64());
+    Ok(())
 }
 
 struct Arguments {
@@ -71,13 +90,19 @@ fn run(arguments: &Arguments) -> Result<()> {
         for campaign in chosen {
             println!("{:<12} {}", campaign.name, campaign.about);
         }
+        if all {
+            println!("{DIAGNOSIS:<12} {}", diagnosis::ABOUT);
+        }
         return Ok(());
     }
     let options = &arguments.options;
     // Only all of them in their long form, with their own number of cases, are the document.
     let is_whole = all && !options.short && options.runs.is_none() && arguments.report;
-    let commit = if is_whole { Some(commit()?) } else { None };
+    let commit = if is_whole { Some(commit("docs/proof.md")?) } else { None };
     let parts = chosen.into_iter().map(|campaign| prove(campaign, options)).collect::<Result<Vec<_>>>()?;
+    if all && options.short {
+        judge(&Flights::short())?;
+    }
     if let Some(commit) = commit {
         let path: PathBuf = root().join("docs/proof.md");
         write_report(&path, &parts, &Provenance { commit, seed: options.seed })?;
@@ -96,7 +121,7 @@ fn prove(campaign: &'static Campaign, options: &Options) -> Result<Part> {
 }
 
 /// The commit that was built. A document of changed files would be of no commit.
-fn commit() -> Result<String> {
+fn commit(document: &str) -> Result<String> {
     let git = |arguments: &[&str]| -> Result<String> {
         let output = Command::new("git").current_dir(root()).args(arguments).output().context("git")?;
         if !output.status.success() {
@@ -105,11 +130,11 @@ fn commit() -> Result<String> {
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
-    let changed: Vec<&str> = changed.lines().filter(|line| !line.ends_with("docs/proof.md")).collect();
+    let changed: Vec<&str> = changed.lines().filter(|line| !line.ends_with(document)).collect();
     if !changed.is_empty() {
         bail!(
-            "docs/proof.md names the commit that it is of, and these files differ from it: {}; commit them, or run with \
-             --no-report",
+            "{document} names the commit that it is of, and these files differ from it: {}; commit them, or run without \
+             writing it (--no-report; diagnosis writes it with --write only)",
             changed.join(", ")
         );
     }

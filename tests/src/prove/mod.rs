@@ -7,6 +7,7 @@
 
 mod card;
 mod damage;
+pub mod diagnosis;
 mod endurance;
 mod figures;
 mod hostile_gs;

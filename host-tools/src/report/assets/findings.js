@@ -8,8 +8,9 @@ import { cells, rows, section } from "./layout.js";
 import { words } from "./text.js";
 import { zoom } from "./view.js";
 
-const value = (f) => f.value == null ? "" : `${Number(f.value.toPrecision(5))} ${f.unit}`;
-const limit = (f) => f.limit == null ? "" : `${Number(f.limit.toPrecision(5))} ${f.unit}`;
+const value = (f) => f.state ?? (f.value == null ? "" : `${Number(f.value.toPrecision(5))} ${f.unit}`);
+// The limit of a state is a number between two of them.
+const limit = (f) => f.limit == null || f.state ? "" : `${Number(f.limit.toPrecision(5))} ${f.unit}`;
 const lookAt = (at) => {
   const half = Math.max(15, (end - start) / 20);
   zoom(at - half, at + half);

@@ -27,6 +27,7 @@ use anyhow::{Context as _, Result, bail};
 use self::binary::{Binary, Damage, Piece};
 use self::format::{FMT_TYPE, HEADER_BYTES};
 use self::message::Body;
+pub(super) use self::observe::is_firmware;
 use self::session::{First, Session};
 use self::text::{Line, Lines};
 use super::input::Input;

@@ -21,6 +21,7 @@ use self::handler::{Given, Handler, Slots};
 pub(super) use self::say::{Out, Say};
 pub(super) use self::state::{Standing, State};
 pub(super) use self::words::Craft;
+pub(in crate::source) use self::words::is_firmware;
 use super::format::Format;
 use super::message::Message;
 

@@ -86,6 +86,11 @@ impl Craft {
     }
 }
 
+/// Whether these words are the name and the version of a firmware of `ArduPilot`, as it says them when it starts.
+pub(in crate::source) fn is_firmware(words: &str) -> bool {
+    Craft::of_firmware(words).is_some()
+}
+
 /// The name and the version of a firmware; Rover's had a small v.
 pub(super) fn name_and_version(words: &str) -> Option<(&str, &str)> {
     let (name, version) = words.split_once(' ')?;

@@ -56,7 +56,7 @@ fn is_of_vehicle((check, _, level, _): &Change) -> bool {
 
 fn assert_equal(flight: &str, at_least: usize) {
     let (own, begins_s) = findings(&format!("bin/{flight}.bin.gz"));
-    let (told, _) = findings(&format!("{flight}.tlog"));
+    let (told, _) = findings(&format!("{flight}.tlog.gz"));
     let told: Vec<Change> =
         told.into_iter().filter(|change| is_of_vehicle(change) && change.3 >= begins_s).collect();
     let mut own: Vec<Change> = own.into_iter().filter(is_of_vehicle).collect();

@@ -1,7 +1,7 @@
 //! Values of checks that are states and not quantities, in MAVLink's words.
 
 /// The state that a value of a check is; `None` for a check of a quantity.
-pub(super) fn name(check: &str, value: f32) -> Option<&'static str> {
+pub fn name(check: &str, value: f32) -> Option<&'static str> {
     let names: &[&str] = match check {
         // MAV_STATE
         "autopilot_state" => &[

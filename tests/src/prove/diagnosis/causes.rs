@@ -1,0 +1,92 @@
+//! Which checks name the cause of which class of fault.
+//!
+//! A check names a cause where a pilot or a mechanic who reads its text knows what to look at. What only says that
+//! something is wrong (a failsafe, "a sensor is unhealthy", a large variance of the estimator) tells of a fault, and names
+//! none. The table is the judge's own: no monitor and no check knows it, or the labels.
+
+/// A class of faults, with the checks that name its cause.
+#[derive(Debug)]
+pub(super) struct Class {
+    /// As in `labels.json`.
+    pub(super) name: &'static str,
+    /// What it is, for the document.
+    pub(super) about: &'static str,
+    /// The checks that name the cause; none where no check does yet.
+    pub(super) checks: &'static [&'static str],
+}
+
+/// All classes.
+pub(super) const CLASSES: &[Class] = &[
+    Class {
+        name: "propulsion",
+        about: "motors, propellers, ESCs, control surfaces",
+        checks: &[
+            "esc_silent",
+            "esc_temperature",
+            "esc_failure",
+            "esc_errors",
+            "motor_loss",
+            "motor_imbalance",
+            // They tell people to look at propellers and motors first.
+            "vibration",
+            "vibration_px4",
+        ],
+    },
+    Class {
+        name: "power",
+        about: "batteries and supplies",
+        checks: &[
+            "batt_remaining",
+            "cell_voltage",
+            "cell_deviation",
+            "cell_dev_lasting",
+            "batt_fault",
+            "batt_temperature",
+            "rail_5v_low",
+            "rail_5v_high",
+        ],
+    },
+    Class {
+        name: "gnss",
+        about: "satellite navigation",
+        checks: &["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix", "gps_jamming", "gps_spoofing"],
+    },
+    Class { name: "compass", about: "compasses", checks: &[] },
+    Class { name: "barometer", about: "barometers", checks: &[] },
+    Class { name: "inertial", about: "accelerometers, gyros, airspeed", checks: &[] },
+    Class { name: "vibration", about: "vibration", checks: &["vibration", "vibration_px4", "clipping"] },
+    Class { name: "attitude", about: "loss of attitude", checks: &["roll", "pitch"] },
+    Class { name: "crash", about: "disarmed in the air, falls, impacts", checks: &[] },
+    Class { name: "link", about: "links of the autopilot", checks: &["heartbeat", "frames_lost"] },
+    Class { name: "rc", about: "remote control", checks: &["rc_rssi"] },
+    Class {
+        name: "computer",
+        about: "computers on board",
+        checks: &["load", "mcu_temperature", "autopilot_reboot"],
+    },
+    Class { name: "weather", about: "wind and gusts, which are no fault", checks: &[] },
+    Class { name: "nominal", about: "nothing wrong", checks: &[] },
+];
+
+/// The class of this name.
+pub(super) fn of(class: &str) -> Option<&'static Class> {
+    CLASSES.iter().find(|one| one.name == class)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use hums_core::health::vocabulary;
+
+    use super::*;
+
+    #[test]
+    fn classes_are_known_once_and_name_checks_that_there_are() {
+        let names: BTreeSet<&str> = CLASSES.iter().map(|class| class.name).collect();
+        assert_eq!(names.len(), CLASSES.len());
+        for check in CLASSES.iter().flat_map(|class| class.checks) {
+            assert!(vocabulary(check).is_some(), "there is no check {check}");
+        }
+    }
+}

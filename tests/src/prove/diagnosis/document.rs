@@ -1,0 +1,140 @@
+//! What was found, as `docs/diagnosis.md`: one page for users, written whole by one run on one commit.
+
+use super::alarms::{self, BY_CHECK, COUNTS, FALSE, UNLABELLED, UNLABELLED_BY_CHECK};
+use super::faults::{self, BY_CLASS, EACH, FOUND};
+use super::judged::Judged;
+use super::rates::hours;
+use super::sets::Known;
+use super::table::Form;
+
+/// What stands before the tables.
+pub(super) const HEAD: &str = "\
+# Diagnosis: what the box finds, how fast, and how often it is wrong
+
+`cargo xtask prove diagnosis` judges recorded flights whose faults are known, with the monitor of the board (as `hums check`
+does, with default limits), and prints these tables; with `--write` it writes this page. `cargo xtask test` judges the
+flights of the repository and fails when fewer faults are found or more false alarms come than before.
+
+* `cargo xtask prove diagnosis FOLDER` judges the flights of a folder too: those of every `labels.json` in and below it, or, where
+  there is none, all recordings as flights of which nothing is known. `--unseen FOLDER` is for flights that were flown after the
+  limits had been frozen. `HUMS_FLIGHTS` names a folder of further recordings.
+* [labels.json](../tests/labelled/README.md) says what was done to a flight and when. No label and none of these flights enters the
+  code of a check. Which checks name the cause of which class of fault is a table of the judge's own
+  (`tests/src/prove/diagnosis/causes.rs`).
+* A figure is as good as its flights. Those marked \"known\" were known to whoever chose the limits: they show that nothing got
+  worse. The figures that count are those of flights that were not, and of real recordings.
+";
+
+/// What no table shows.
+const CANNOT: &str = "\
+* A simulator has no loose screws, no worn bearings, no water and no wrong propeller. A fault there begins at once and is the only
+  one. What the box finds on real vehicles is not known from these flights.
+* What has no message cannot be found. PX4 sends texts (STATUSTEXT) only where a ground station is on the link. ArduPilot's
+  simulator has ESC speeds that follow the command, so a weak motor hardly shows, and a barometer without noise.
+* What is compared with earlier flights (wear, trends) is not judged here: each recording is one flight of a vehicle that the box
+  has not seen before.
+* What a check reads must be on the autopilot's port at the rate that the box asks for. Logs of ground stations have less.
+
+These faults were not told:
+";
+
+const SETS: Form = Form {
+    title: "On which data",
+    about: "Hours are simulated time for flights of a simulator. \"Known\" says whether whoever chose the limits knew the flights.",
+    columns: &[
+        "flights",
+        "recordings",
+        "with a fault",
+        "hours recorded",
+        "hours in the air without a fault",
+        "labels",
+        "known",
+    ],
+};
+
+const NOT_SEEN: &str = "## What it cannot see";
+
+fn sets(sets: &[Judged]) -> Vec<Vec<String>> {
+    let row = |judged: &Judged| {
+        let sum = |of: fn(&super::outcome::Outcome) -> f64| judged.outcomes.iter().map(of).sum::<f64>();
+        let faults = judged.outcomes.iter().filter(|one| one.fault.is_some()).count();
+        let known = match judged.known {
+            Known::Yes => "known, used for tuning",
+            Known::No => "not known: flown after the limits were frozen",
+            Known::Seen => "findings seen, no limit fitted to them",
+        };
+        vec![
+            judged.name.clone(),
+            judged.outcomes.len().to_string(),
+            faults.to_string(),
+            hours(sum(|one| one.recorded_s)),
+            hours(sum(|one| one.air_s)),
+            if judged.is_labelled { "yes" } else { "none" }.to_owned(),
+            known.to_owned(),
+        ]
+    };
+    sets.iter().map(row).collect()
+}
+
+/// The sections, in order.
+pub(super) fn text(judged: &[Judged]) -> String {
+    let missed = faults::missed(judged);
+    let missed = if missed.is_empty() { vec!["* none of those above".to_owned()] } else { missed };
+    let mut counts = COUNTS.section(&alarms::counts(judged));
+    let wrong = alarms::wrong_counts(judged);
+    if !wrong.is_empty() {
+        counts = format!("{counts}\nWrong are:\n\n{}\n", wrong.join("\n"));
+    }
+    [
+        SETS.section(&sets(judged)),
+        FOUND.section(&faults::found(judged)),
+        BY_CLASS.section(&faults::by_class(judged)),
+        FALSE.section(&alarms::by_vehicle(judged, true)),
+        BY_CHECK.section(&alarms::by_check(judged, true)),
+        UNLABELLED.section(&alarms::by_vehicle(judged, false)),
+        UNLABELLED_BY_CHECK.section(&alarms::by_check(judged, false)),
+        counts,
+        format!("{NOT_SEEN}\n\n{CANNOT}\n{}\n", missed.join("\n")),
+        EACH.section(&faults::each(judged)),
+    ]
+    .join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::flights::root;
+
+    /// The lines that are the same in each run, in order.
+    fn labels() -> Vec<String> {
+        let form = |form: &Form| form.lines();
+        let forms = [&SETS, &FOUND, &BY_CLASS, &FALSE, &BY_CHECK, &UNLABELLED, &UNLABELLED_BY_CHECK, &COUNTS];
+        let mut labels: Vec<String> = forms.into_iter().flat_map(form).collect();
+        labels.push(NOT_SEEN.to_owned());
+        labels.extend(EACH.lines());
+        labels
+    }
+
+    fn found(text: &str) -> Vec<String> {
+        let lines: Vec<&str> = text.lines().collect();
+        let is_label = |place: usize| {
+            let next = lines.get(place + 1).is_some_and(|next| next.starts_with("|---"));
+            lines[place].starts_with("## ") || next
+        };
+        (0..lines.len()).filter(|place| is_label(*place)).map(|place| lines[place].to_owned()).collect()
+    }
+
+    #[test]
+    fn the_document_is_of_the_tables_that_the_judge_prints() {
+        let text = fs::read_to_string(root().join("docs/diagnosis.md")).unwrap();
+        assert!(
+            text.starts_with(HEAD),
+            "docs/diagnosis.md has another beginning: `cargo xtask prove diagnosis --write`"
+        );
+        assert_eq!(found(&text), labels(), "`cargo xtask prove diagnosis --write` writes docs/diagnosis.md");
+        assert!(text.contains(CANNOT), "what it cannot see");
+        assert_eq!(text.lines().filter(|line| line.starts_with("Commit ")).count(), 1, "one commit");
+    }
+}

@@ -1,0 +1,126 @@
+//! `labels.json`: what is known of flights whose faults were put in on purpose.
+//!
+//! The file is a list with an object for each flight. Seconds count from the recording's first frame.
+//!
+//! | field | meaning |
+//! |---|---|
+//! | `file` | the recording, in the folder of `labels.json` |
+//! | `vehicle` | autopilot first, frame last: `ArduCopter 4.6.3 quad` |
+//! | `what` | what was done |
+//! | `class` | the class of the fault: one of [`super::causes::CLASSES`] |
+//! | `fault_s` | when the fault began; null where nothing was wrong in the whole flight |
+//! | `end_s` | when the fault ended or the flight was over: nothing is counted after it |
+//! | `visible` | whether the messages show the fault at all |
+//! | `autopilot_texts` | what the autopilot said: second, `MAV_SEVERITY`, text |
+//! | `flights` | from and to of each time in the air; with it, `landings` and `crash_s` (null: none) |
+//!
+//! Other fields are passed over. Without `flights`, the flight takes no part in the count of flights, landings and mishaps.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context as _, Result, ensure};
+use serde::Deserialize;
+
+use super::causes;
+
+/// The name of the file.
+pub(super) const FILE: &str = "labels.json";
+
+/// What is known of one flight.
+#[derive(Clone, Debug, Deserialize)]
+pub(super) struct Label {
+    pub(super) file: String,
+    pub(super) vehicle: String,
+    pub(super) what: String,
+    pub(super) class: String,
+    pub(super) fault_s: Option<f64>,
+    pub(super) end_s: f64,
+    pub(super) visible: bool,
+    #[serde(default)]
+    pub(super) autopilot_texts: Vec<(f64, u8, String)>,
+    pub(super) flights: Option<Vec<(f64, f64)>>,
+    #[serde(default)]
+    pub(super) landings: u64,
+    #[serde(default)]
+    pub(super) crash_s: Option<f64>,
+}
+
+/// The labels of a folder, in their order.
+pub(super) fn read(folder: &Path) -> Result<Vec<Label>> {
+    let path = folder.join(FILE);
+    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    parse(&text).with_context(|| path.display().to_string())
+}
+
+fn parse(text: &str) -> Result<Vec<Label>> {
+    let labels: Vec<Label> = serde_json::from_str(text)?;
+    for label in &labels {
+        label.check().with_context(|| format!("the entry of {}", label.file))?;
+    }
+    Ok(labels)
+}
+
+impl Label {
+    fn check(&self) -> Result<()> {
+        ensure!(!self.file.is_empty() && !self.file.contains(['/', '\\']), "file: a name without a folder");
+        ensure!(causes::of(&self.class).is_some(), "class: {} is none of the known classes", self.class);
+        ensure!(self.vehicle.contains(' '), "vehicle: the autopilot first and the frame last");
+        ensure!(self.end_s > 0.0, "end_s: {} is not after the beginning", self.end_s);
+        if let Some(fault_s) = self.fault_s {
+            ensure!((0.0..self.end_s).contains(&fault_s), "fault_s: {fault_s} is not between 0 and end_s");
+        }
+        for (from_s, to_s) in self.flights.iter().flatten() {
+            ensure!(*from_s >= 0.0 && to_s > from_s, "flights: {from_s} to {to_s} is no time");
+        }
+        Ok(())
+    }
+
+    /// The autopilot and the frame, without its version: `ArduCopter quad`.
+    pub(super) fn group(&self) -> String {
+        let mut words = self.vehicle.split_whitespace();
+        let first = words.next().unwrap_or_default();
+        words.next_back().map_or_else(|| first.to_owned(), |last| format!("{first} {last}"))
+    }
+
+    /// The autopilot's first text of `MAV_SEVERITY_WARNING` or worse after the fault: seconds after it, and the text.
+    pub(super) fn autopilot_said(&self) -> Option<(f64, &str)> {
+        const WARNING: u8 = 4;
+        let fault_s = self.fault_s?;
+        let after = |(at_s, severity, _): &&(f64, u8, String)| *severity <= WARNING && *at_s >= fault_s;
+        let (at_s, _, text) = self.autopilot_texts.iter().find(after)?;
+        Some((at_s - fault_s, text))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLIGHT: &str = r#"{"file": "f.tlog", "vehicle": "PX4 1.17 SIH quad", "what": "GPS dead", "class": "gnss",
+        "armed_s": 3, "fault_s": 20.5, "end_s": 60, "visible": true,
+        "autopilot_texts": [[10, 2, "before"], [21, 6, "for information"], [25.5, 4, "GPS lost"]]"#;
+
+    #[test]
+    fn a_flight_is_read_with_what_the_autopilot_said_of_its_fault() {
+        let labels = parse(&format!("[{FLIGHT}}}]")).unwrap();
+        let [label] = labels.as_slice() else { panic!("{labels:?}") };
+        assert_eq!(label.group(), "PX4 quad");
+        assert_eq!(label.autopilot_said(), Some((5.0, "GPS lost")));
+        assert!(label.flights.is_none(), "no truth of its flights");
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_its_flight() {
+        for (from, to) in [
+            ("\"gnss\"", "\"gns\""),
+            ("f.tlog", "../f.tlog"),
+            ("20.5", "61"),
+            ("\"armed_s\": 3", "\"flights\": [[9, 4]]"),
+        ] {
+            let text = format!("[{FLIGHT}}}]").replace(from, to);
+            let error = format!("{:#}", parse(&text).unwrap_err());
+            assert!(error.contains("f.tlog"), "{error}");
+        }
+    }
+}

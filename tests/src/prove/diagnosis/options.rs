@@ -1,0 +1,64 @@
+//! What is asked for on the command line.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, bail};
+
+use super::sets::Known;
+
+/// What is judged, and what becomes of it.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Flights {
+    /// Folders of flights besides those of the repository.
+    pub(super) folders: Vec<(PathBuf, Known)>,
+    /// The flights of the repository alone, with limits for what comes out.
+    pub(super) short: bool,
+    /// Write `docs/diagnosis.md`.
+    pub(super) write: bool,
+}
+
+impl Flights {
+    /// The short form.
+    pub fn short() -> Self {
+        Self { short: true, ..Self::default() }
+    }
+
+    /// Of the words of a command line.
+    pub fn parse(words: &[String]) -> Result<Self> {
+        let (mut options, mut words) = (Self::default(), words.iter());
+        while let Some(word) = words.next() {
+            match word.as_str() {
+                "--short" => options.short = true,
+                "--write" => options.write = true,
+                "--unseen" => {
+                    let folder = words.next().context("--unseen wants a folder")?;
+                    options.folders.push((folder.into(), Known::No));
+                }
+                other if other.starts_with('-') => bail!("diagnosis takes no {other}"),
+                folder => options.folders.push((folder.into(), Known::Yes)),
+            }
+        }
+        if options.short && (options.write || !options.folders.is_empty()) {
+            bail!("--short is of the repository's flights alone and writes nothing");
+        }
+        Ok(options)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(line: &str) -> Result<Flights> {
+        Flights::parse(&line.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn folders_are_known_to_whoever_chose_the_limits_unless_it_is_said_otherwise() {
+        let folders = parse("dev --unseen frozen --write").unwrap().folders;
+        assert_eq!(folders, [("dev".into(), Known::Yes), ("frozen".into(), Known::No)]);
+        for line in ["--unseen", "--unsen frozen", "--short --write", "--short dev"] {
+            assert!(parse(line).is_err(), "{line}");
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! One flight, judged: what the monitor said while nothing was wrong, and what it said of the fault.
+
+use anyhow::Result;
+use hums::check::judge::{Flight, Heard, Judged, Limits};
+use hums::names::{autopilot_name, counter_name, type_name};
+use hums::source::recording::Place;
+use hums_core::health::Level;
+
+use super::causes;
+use super::labels::Label;
+
+/// What is said so soon after a landing was in the air: an alarm waits for its debounce.
+const AFTER_LANDING_S: f64 = 3.0;
+
+/// A level rose to a warning or to critical: what a pilot is told.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Alarm {
+    pub(super) check: String,
+    pub(super) level: Level,
+    /// Since the recording's first frame.
+    pub(super) at_s: f64,
+}
+
+/// An alarm while nothing was wrong.
+#[derive(Clone, Debug)]
+pub(super) struct False {
+    pub(super) alarm: Alarm,
+    pub(super) in_air: bool,
+}
+
+/// What came of a fault.
+#[derive(Clone, Debug)]
+pub(super) struct Fault {
+    /// Whether the messages show it at all.
+    pub(super) visible: bool,
+    /// The first alarm after it; its time counts from the fault.
+    pub(super) told: Option<Alarm>,
+    /// The first alarm that names its cause.
+    pub(super) named: Option<Alarm>,
+    /// What the autopilot itself said first: seconds after the fault, and its text.
+    pub(super) autopilot: Option<(f64, String)>,
+}
+
+/// Flights, landings and mishaps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Counts {
+    pub(super) flights: u64,
+    pub(super) landings: u64,
+    pub(super) mishaps: u64,
+}
+
+/// What came of one flight.
+#[derive(Clone, Debug)]
+pub(super) struct Outcome {
+    pub(super) file: String,
+    /// Autopilot and frame.
+    pub(super) vehicle: String,
+    pub(super) autopilot: String,
+    pub(super) class: &'static str,
+    pub(super) what: String,
+    /// Recorded time.
+    pub(super) recorded_s: f64,
+    /// Time in the air, and on the ground, in which nothing was wrong.
+    pub(super) air_s: f64,
+    pub(super) ground_s: f64,
+    pub(super) alarms: Vec<False>,
+    pub(super) fault: Option<Fault>,
+    /// What is true and what was counted; none where the truth is not known.
+    pub(super) counts: Option<(Counts, Counts)>,
+}
+
+/// Judges one flight.
+pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
+    // The labelled flights were recorded on a telemetry port; of the others nobody knows.
+    let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
+    let judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
+    Ok(of(&judged, &place.name, label))
+}
+
+fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
+    let recorded_s = judged.span.map_or(0.0, |(_, last)| last.as_secs_f64());
+    let alarms = alarms(judged);
+    let quiet_s = label.and_then(|label| label.fault_s).unwrap_or(recorded_s);
+    let air = match label.and_then(|label| label.flights.clone()) {
+        Some(flights) => flights,
+        None => judged.flights.iter().map(span_s).collect(),
+    };
+    let air_s =
+        air.iter().map(|(from_s, to_s)| (to_s.min(quiet_s) - from_s).max(0.0)).fold(0.0, |sum, s| sum + s);
+    let is_in_air =
+        |at_s: f64| air.iter().any(|(from_s, to_s)| (*from_s..=to_s + AFTER_LANDING_S).contains(&at_s));
+    let false_ones = alarms.iter().filter(|alarm| alarm.at_s < quiet_s);
+    let class = label.and_then(|label| causes::of(&label.class));
+    let heartbeat = judged.vehicle().heartbeat.get();
+    let autopilot = heartbeat.map_or_else(|| "unknown".to_owned(), |it| autopilot_name(it.autopilot_number));
+    let vehicle_type = heartbeat.map_or_else(String::new, |it| type_name(it.type_number));
+    Outcome {
+        file: label.map_or(name, |label| &label.file).to_owned(),
+        vehicle: label.map_or_else(|| format!("{autopilot} {vehicle_type}"), Label::group),
+        autopilot,
+        class: class.map_or("", |class| class.name),
+        what: label.map_or_else(String::new, |label| label.what.clone()),
+        recorded_s,
+        air_s,
+        ground_s: (quiet_s.min(recorded_s) - air_s).max(0.0),
+        alarms: false_ones
+            .map(|alarm| False { alarm: alarm.clone(), in_air: is_in_air(alarm.at_s) })
+            .collect(),
+        fault: label.and_then(|label| fault(&alarms, label)),
+        counts: label.and_then(|label| Some((truth(label)?, counted(judged)))),
+    }
+}
+
+fn span_s(flight: &Flight) -> (f64, f64) {
+    (flight.from.as_secs_f64(), flight.to.as_secs_f64())
+}
+
+/// How bad a level is to a pilot; what is stale or good is no alarm.
+const fn rank(level: Level) -> u8 {
+    match level {
+        Level::Critical => 2,
+        Level::Warning => 1,
+        Level::Ok | Level::Advisory | Level::Stale => 0,
+    }
+}
+
+fn alarms(judged: &Judged) -> Vec<Alarm> {
+    let rises = judged.findings.iter().filter(|finding| rank(finding.level) > rank(finding.previous));
+    rises
+        .map(|finding| Alarm {
+            check: finding.check.clone(),
+            level: finding.level,
+            at_s: finding.at.as_secs_f64(),
+        })
+        .collect()
+}
+
+fn fault(alarms: &[Alarm], label: &Label) -> Option<Fault> {
+    let fault_s = label.fault_s?;
+    let names = causes::of(&label.class).map_or(&[][..], |class| class.checks);
+    let mut after = alarms.iter().filter(|alarm| (fault_s..=label.end_s).contains(&alarm.at_s));
+    let since = |alarm: &Alarm| Alarm { at_s: alarm.at_s - fault_s, ..alarm.clone() };
+    Some(Fault {
+        visible: label.visible,
+        told: after.clone().next().map(since),
+        named: after.find(|alarm| names.contains(&alarm.check.as_str())).map(since),
+        autopilot: label.autopilot_said().map(|(delay_s, text)| (delay_s, text.to_owned())),
+    })
+}
+
+fn truth(label: &Label) -> Option<Counts> {
+    let flights = label.flights.as_ref()?.len() as u64;
+    Some(Counts { flights, landings: label.landings, mishaps: u64::from(label.crash_s.is_some()) })
+}
+
+/// What the odometer counted.
+fn counted(judged: &Judged) -> Counts {
+    let mut counts = Counts::default();
+    judged.monitor.for_each_counter(|number, value| match counter_name(number).as_str() {
+        "flights" => counts.flights = value as u64,
+        "landings" => counts.landings = value as u64,
+        "mishaps" => counts.mishaps = value as u64,
+        _ => {}
+    });
+    counts
+}

@@ -1,0 +1,113 @@
+//! The flights that are judged: the labelled ones of the repository, folders that are given, recordings of `HUMS_FLIGHTS`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use hums::source::recording::{Place, find};
+
+use super::labels::{self, FILE, Label};
+use super::options::Flights;
+use crate::flights;
+
+/// How deep folders are looked through for labels.
+const DEPTH_MAX: usize = 4;
+
+/// Whether the flights were known when the limits were chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Known {
+    /// They were, or might have been.
+    Yes,
+    /// They were flown after the limits had been frozen.
+    No,
+    /// Nobody labelled them, and no limit was fitted to them; but their findings have been seen.
+    Seen,
+}
+
+/// Flights that are counted together.
+#[derive(Debug)]
+pub(super) struct Set {
+    /// What tables call it.
+    pub(super) name: String,
+    pub(super) known: Known,
+    /// In the order of their labels or their names; those without a label are recordings of which nothing is known.
+    pub(super) flights: Vec<(Place, Option<Label>)>,
+}
+
+impl Set {
+    pub(super) fn is_labelled(&self) -> bool {
+        self.flights.iter().any(|(_, label)| label.is_some())
+    }
+}
+
+/// All sets that are asked for, those with labels first.
+pub(super) fn find_all(options: &Flights) -> Result<Vec<Set>> {
+    let mut sets = vec![
+        repository("labelled, ArduPilot", "tests/labelled")?,
+        repository("labelled, PX4", "tests/labelled/px4")?,
+        repository("first recordings", "tests/flights")?,
+    ];
+    for (folder, known) in &options.folders {
+        sets.push(given(folder, *known)?);
+    }
+    if options.short {
+        return Ok(sets);
+    }
+    let unlabelled = flights::more().into_iter().filter(|path| !has_labels_beside(path));
+    let flights: Vec<_> = unlabelled.map(|path| (Place::file(&path), None)).collect();
+    if !flights.is_empty() {
+        sets.push(Set { name: "further recordings".to_owned(), known: Known::Seen, flights });
+    }
+    sets.sort_by_key(|set| !set.is_labelled());
+    Ok(sets)
+}
+
+fn repository(name: &str, folder: &str) -> Result<Set> {
+    let flights = labelled(&flights::root().join(folder))?;
+    Ok(Set { name: name.to_owned(), known: Known::Yes, flights })
+}
+
+fn has_labels_beside(path: &Path) -> bool {
+    path.parent().is_some_and(|folder| folder.join(FILE).is_file())
+}
+
+/// A folder that the user names: the flights of every `labels.json` in and below it, or all its recordings.
+fn given(folder: &Path, known: Known) -> Result<Set> {
+    let mut found = Vec::new();
+    below(folder, 0, &mut found)?;
+    found.sort();
+    let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let name = name.file_name().map_or_else(|| "given".into(), |name| name.to_string_lossy().into_owned());
+    let mut flights = Vec::new();
+    for folder in &found {
+        flights.append(&mut labelled(folder)?);
+    }
+    if found.is_empty() {
+        let recordings = find(&[folder.to_owned()], false)?;
+        flights = recordings.places.into_iter().map(|place| (place, None)).collect();
+    }
+    if flights.is_empty() {
+        bail!("{}: no flight is in there", folder.display());
+    }
+    Ok(Set { name, known, flights })
+}
+
+/// Folders with labels.
+fn below(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<()> {
+    if folder.join(FILE).is_file() {
+        found.push(folder.to_owned());
+    }
+    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    for entry in entries {
+        let path = entry.with_context(|| folder.display().to_string())?.path();
+        if path.is_dir() && depth < DEPTH_MAX {
+            below(&path, depth + 1, found)?;
+        }
+    }
+    Ok(())
+}
+
+fn labelled(folder: &Path) -> Result<Vec<(Place, Option<Label>)>> {
+    let labels = labels::read(folder)?;
+    Ok(labels.into_iter().map(|label| (Place::file(&folder.join(&label.file)), Some(label))).collect())
+}
