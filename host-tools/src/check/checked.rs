@@ -1,6 +1,6 @@
 //! A recording and what came of it.
 
-use super::judge::Judged;
+use super::judged::Judged;
 use crate::outcome::Outcome;
 use crate::source::recording::Format;
 

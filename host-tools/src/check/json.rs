@@ -5,7 +5,8 @@ use hums_core::time::Instant;
 use serde::Serialize;
 
 use super::checked::Checked;
-use super::judge::{Judged, JudgedBy};
+use super::flights::Flight;
+use super::judged::{Judged, JudgedBy};
 use super::problem::Problem;
 use super::text::{firmware, flown};
 use crate::names::{autopilot_name, type_name};
@@ -183,7 +184,7 @@ fn vehicle(judged: &Judged) -> Option<VehicleJson> {
     })
 }
 
-fn flight(flight: &super::judge::Flight) -> FlightJson {
+fn flight(flight: &Flight) -> FlightJson {
     FlightJson {
         from_s: flight.from.as_secs_f64(),
         to_s: flight.to.as_secs_f64(),

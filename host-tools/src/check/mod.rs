@@ -1,13 +1,16 @@
 //! `hums check`: what is wrong with a flight, from any log.
 //!
-//! [`judge`] runs the monitor of the board over the stream of a recording; [`problem`] puts its findings together;
-//! [`text`] and [`json`] say what came of it.
+//! [`judge`] runs the monitor of the board over the stream of a recording; [`problem`] puts its findings together, [`flights`]
+//! its flights; [`judged`] is what came of it, which [`text`] and [`json`] say.
 
 pub mod checked;
 mod clock;
+mod coverage;
 mod epochs;
+pub mod flights;
 pub mod json;
 pub mod judge;
+pub mod judged;
 mod overview;
 pub mod problem;
 pub mod text;

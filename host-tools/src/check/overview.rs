@@ -7,7 +7,8 @@ use anyhow::Result;
 use hums_blackbox::record::Vehicle;
 use hums_core::Monitor;
 
-use super::judge::{Heard, Judge, Judged, Limits};
+use super::judge::{Heard, Judge, Limits};
+use super::judged::Judged;
 use crate::names::counter_name;
 use crate::progress;
 use crate::source::item::{Gap, Summary, Want};

@@ -9,7 +9,7 @@ use hums_core::health::{Level, vocabulary};
 use hums_core::time::{Instant, Span};
 
 use super::checked::Checked;
-use super::judge::{Judged, JudgedBy};
+use super::judged::{Judged, JudgedBy};
 use super::problem::Problem;
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;

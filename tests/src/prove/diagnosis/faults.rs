@@ -50,7 +50,7 @@ pub(super) const BY_CLASS: Form = Form {
 pub(super) const EACH: Form = Form {
     title: "Each fault",
     about: "Seconds after the fault: the first alarm, the first one that names the cause, and the autopilot's own first text of \
-            severity warning or worse. Weather and flights without a fault are in the next tables.",
+            severity warning or worse.",
     columns: &["flight", "vehicle", "class", "fault", "told", "cause named", "autopilot's own text"],
 };
 

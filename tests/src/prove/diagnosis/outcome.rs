@@ -1,7 +1,9 @@
 //! One flight, judged: what the monitor said while nothing was wrong, and what it said of the fault.
 
 use anyhow::Result;
-use hums::check::judge::{Flight, Heard, Judged, Limits};
+use hums::check::flights::Flight;
+use hums::check::judge::{Heard, Limits};
+use hums::check::judged::Judged;
 use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::Place;
 use hums_core::health::Level;

@@ -1,0 +1,171 @@
+//! Which checks had something to judge in a recording, and why the others had not.
+
+use hums_core::Monitor;
+use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
+use hums_core::observation::{Autopilot, Heartbeat};
+use hums_core::params::{Param, Params};
+use hums_core::status::{LinkReading, RecorderStatus};
+use hums_core::time::{Instant, Span};
+
+use super::judged::JudgedBy;
+
+/// How often it is noted.
+const NOTE_EVERY: Span = Span::from_millis(500);
+
+/// What a check had to judge.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    /// It had a value.
+    value: bool,
+    /// It had a level.
+    level: bool,
+}
+
+/// What each check had to judge.
+#[derive(Debug)]
+pub(super) struct Coverage {
+    /// In the order of the checks.
+    seen: Vec<Seen>,
+    next: Instant,
+}
+
+/// Checks that had something to judge, and those that had not, with the reason.
+pub(super) type Lists = (Vec<&'static str>, Vec<(&'static str, String)>);
+
+impl Coverage {
+    /// Nothing yet.
+    pub(super) fn new() -> Self {
+        Self { seen: vec![Seen::default(); VOCABULARY.len()], next: Instant::ZERO }
+    }
+
+    /// Notes which checks have a value, and which have a level, now and then; `steps` is the monitor's own time.
+    pub(super) fn note(
+        &mut self,
+        now: Instant,
+        steps: Instant,
+        monitor: &Monitor,
+        link: &LinkReading,
+        recorder: &RecorderStatus,
+    ) {
+        if now < self.next {
+            return;
+        }
+        self.next = now + NOTE_EVERY;
+        if monitor.vehicle().source.is_none() {
+            return;
+        }
+        let inputs = monitor.inputs(steps, link, recorder);
+        for (seen, check) in self.seen.iter_mut().zip(checks()).filter(|(seen, _)| !seen.value) {
+            seen.value = (0..check.instances).any(|instance| {
+                (check.read)(&inputs, instance).is_some_and(|reading| reading.value.is_finite())
+            });
+        }
+        if self.seen.iter().all(|seen| seen.level) {
+            return;
+        }
+        for (check, ..) in monitor.health().levels().filter(|(.., level)| *level != Level::Stale) {
+            let place = checks().position(|known| std::ptr::eq(known, check));
+            if let Some(seen) = place.and_then(|place| self.seen.get_mut(place)) {
+                seen.level = true;
+            }
+        }
+    }
+
+    /// Which checks had something to judge, and why the others had not. Checks that are made for another autopilot are in neither
+    /// list.
+    pub(super) fn lists(&self, recording: &Recording<'_>) -> Lists {
+        let (mut judged, mut not_judged) = (Vec::new(), Vec::new());
+        for (check, seen) in checks().zip(&self.seen) {
+            match recording.why_not(check, *seen) {
+                Verdict::Judged => judged.push(check.name),
+                Verdict::NotJudged(why) => not_judged.push((check.name, why)),
+                Verdict::NotMeant => {}
+            }
+        }
+        (judged, not_judged)
+    }
+}
+
+/// What is known of a recording at its end.
+pub(super) struct Recording<'a> {
+    pub(super) by: JudgedBy,
+    pub(super) monitor: &'a Monitor,
+    /// It holds what came over a link.
+    pub(super) is_of_link: bool,
+    /// It was heard on the monitor's own wire.
+    pub(super) on_the_wire: bool,
+    /// How long it was armed.
+    pub(super) armed: Span,
+    /// Why it is not known whether it was armed, where the recording does not tell it.
+    pub(super) arming: Option<&'a str>,
+    /// It was in the air.
+    pub(super) flew: bool,
+}
+
+enum Verdict {
+    Judged,
+    NotJudged(String),
+    /// It is made for another autopilot, or for parts that nobody registered.
+    NotMeant,
+}
+
+impl Recording<'_> {
+    fn why_not(&self, check: &Check, seen: Seen) -> Verdict {
+        let Some(words) = vocabulary(check.name) else { return Verdict::NotMeant };
+        let autopilot = self.monitor.vehicle().heartbeat.get().map(|Heartbeat { autopilot, .. }| *autopilot);
+        let not = |why: &str| Verdict::NotJudged(why.to_owned());
+        if self.by == JudgedBy::Board && matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored)
+        {
+            // The board had its own wire and card; what it had stored is not in the log.
+            return if words.scope == Scope::Stored && !seen.level {
+                Verdict::NotMeant
+            } else {
+                Verdict::Judged
+            };
+        }
+        match words.scope {
+            Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
+            Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
+            _ if autopilot.is_none() => return not("no heartbeat of an autopilot"),
+            Scope::Recorder => return not("no monitor recorded this"),
+            Scope::Wire if !self.on_the_wire => {
+                return not(if self.is_of_link {
+                    "this tells of the link to whoever recorded it, not of the autopilot's own wire"
+                } else {
+                    "the autopilot recorded this itself, without a link"
+                });
+            }
+            _ => {}
+        }
+        if is_off(check, self.monitor.params()) {
+            return not("its limit is off");
+        }
+        if words.scope == Scope::Stored {
+            return not("only a monitor on board knows earlier flights and parts that wear");
+        }
+        if seen.level {
+            return Verdict::Judged;
+        }
+        match check.when {
+            When::Armed | When::InFlight if self.armed == Span::ZERO => {
+                not(self.arming.unwrap_or("never armed"))
+            }
+            When::InFlight if !self.flew => not("never in the air"),
+            _ if seen.value => not("only for a moment in this recording"),
+            _ => Verdict::NotJudged(format!("no {}", words.needs)),
+        }
+    }
+}
+
+/// Whether no value can be beyond the limits: they stand at the end of their range.
+fn is_off(check: &Check, params: &Params) -> bool {
+    let off = |param: Param| {
+        let (limit, spec) = (params.get(param), param.spec());
+        limit.is_nan()
+            || match check.side {
+                Side::Above => limit >= spec.max,
+                Side::Below => limit <= spec.min,
+            }
+    };
+    [check.warn, check.critical].into_iter().flatten().all(off)
+}

@@ -1,0 +1,299 @@
+//! The judge, on recordings made for the purpose.
+
+use hums_core::health::{Level, VOCABULARY};
+use hums_core::observation::{Autopilot, Battery, Esc, EscGroup, Heartbeat, Observation, Source};
+use hums_core::params::Param;
+use hums_core::units::{Fraction, Rpm, Volts};
+
+use super::*;
+use crate::source::item::Cause;
+
+const AUTOPILOT: Source = Source { system: 1, component: 1 };
+
+fn heartbeat(armed: bool) -> Observation {
+    let autopilot = Autopilot::ArduPilot;
+    Observation::Heartbeat(Heartbeat { autopilot, armed, state: 4, ..Heartbeat::default() })
+}
+
+fn battery(remaining: f32) -> Observation {
+    let (voltage, remaining) = (Some(Volts(12.0)), Some(Fraction(remaining)));
+    Observation::Battery(Battery { voltage, remaining, ..Battery::default() })
+}
+
+/// Heartbeats and battery levels, so many a second, from this second to that.
+fn fly(judge: &mut Judge, from_s: u64, to_s: u64, per_s: u64, remaining: f32) {
+    for tick in from_s * per_s..to_s * per_s {
+        let at = Instant::from_micros(tick * 1_000_000 / per_s);
+        judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
+        judge.item(at, Item::Observation(AUTOPILOT, &battery(remaining)));
+    }
+}
+
+fn found(judged: &Judged) -> Vec<(String, Level, f64)> {
+    let line = |finding: &Finding| (finding.check.clone(), finding.level, finding.at.as_secs_f64());
+    judged.findings.iter().map(line).collect()
+}
+
+#[test]
+fn debounce_follows_the_recordings_time_and_not_the_number_of_samples() {
+    for per_s in [1, 10, 400] {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        fly(&mut judge, 100, 110, per_s, 0.5);
+        fly(&mut judge, 110, 120, per_s, 0.1);
+        let found = found(&judge.end());
+        let [(check, Level::Warning, at)] = found.as_slice() else { panic!("{per_s}: {found:?}") };
+        assert_eq!(check, "batt_remaining");
+        assert!((at - 112.0).abs() < 0.11, "{per_s} samples a second: {at}");
+    }
+}
+
+#[test]
+fn a_gap_of_hours_is_not_stepped_through_and_what_was_known_is_stale_after_it() {
+    let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+    fly(&mut judge, 0, 20, 10, 0.1);
+    let years = 3 * 365 * 24 * 3_600;
+    let wall = std::time::Instant::now();
+    fly(&mut judge, years, years + 10, 10, 0.1);
+    assert!(wall.elapsed().as_secs() < 5, "three years are not stepped through");
+    let judged = judge.end();
+    let levels: Vec<Level> = judged
+        .findings
+        .iter()
+        .filter(|finding| finding.check == "batt_remaining")
+        .map(|finding| finding.level)
+        .collect();
+    assert_eq!(levels, [Level::Warning, Level::Stale, Level::Warning]);
+    let [problem] = judged.problems.as_slice() else { panic!("{:?}", judged.problems) };
+    assert_eq!((problem.times, problem.lasting), (2, true));
+    assert!(problem.lasted < Span::from_secs(50), "{:?}", problem.lasted);
+}
+
+#[test]
+fn each_check_is_judged_or_says_why_not() {
+    let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+    fly(&mut judge, 0, 20, 10, 0.9);
+    let judged = judge.end();
+    assert!(judged.judged.contains(&"batt_remaining"), "{:?}", judged.judged);
+    let why = |check: &str| {
+        let reason = judged.not_judged.iter().find(|(name, _)| *name == check);
+        reason.map_or("", |(_, why)| why.as_str())
+    };
+    assert_eq!(why("esc_silent"), "no ESC telemetry");
+    assert_eq!(why("ekf_variance"), "never in the air");
+    assert_eq!(why("frames_lost"), "the autopilot recorded this itself, without a link");
+    assert_eq!(why("record_lost"), "no monitor recorded this");
+    assert_eq!(why("rc_rssi"), "its limit is off");
+    // PX4's are not meant for ArduPilot.
+    assert_eq!(why("vibration_px4"), "");
+    let named = judged.judged.len() + judged.not_judged.len();
+    assert_eq!(named, VOCABULARY.iter().filter(|words| words.scope != Scope::Px4).count());
+}
+
+/// A flight at 30 m that is disarmed at 20 s, and falls or stays.
+fn disarmed_high(falls: bool) -> Judged {
+    use hums_core::observation::GlobalPosition;
+    use hums_core::units::{Metres, MetresPerSecond};
+    let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+    for tick in 0..300_u64 {
+        let (at, armed) = (Instant::from_millis(tick * 100), (20..200).contains(&tick));
+        let fallen = if falls { tick.saturating_sub(200) as f32 } else { 0.0 };
+        let height = if tick < 30 { 0.0 } else { (30.0 - fallen).max(0.0) };
+        let position = Observation::GlobalPosition(GlobalPosition {
+            position: None,
+            altitude: Metres(height),
+            relative_altitude: Metres(height),
+            velocity: [MetresPerSecond(0.0); 3],
+        });
+        judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(armed)));
+        judge.item(at, Item::Observation(AUTOPILOT, &position));
+    }
+    judge.end()
+}
+
+#[test]
+fn a_vehicle_that_falls_after_it_is_disarmed_did_not_land() {
+    let flights = disarmed_high(true).flights;
+    let [flight] = flights.as_slice() else { panic!("{flights:?}") };
+    assert_eq!((flight.landed, flight.disarmed_at_m), (false, Some(30.0)));
+    let flights = disarmed_high(false).flights;
+    let [flight] = flights.as_slice() else { panic!("{flights:?}") };
+    assert_eq!((flight.landed, flight.disarmed_at_m), (true, None), "it stands on a hill");
+}
+
+#[test]
+fn trends_over_flights_are_not_judged_from_one_recording() {
+    for format in [Format::DataFlash, Format::Tlog, Format::Hums] {
+        let stored = VOCABULARY.iter().filter(|words| words.scope == Scope::Stored);
+        assert!(stored.clone().count() > 3);
+        for words in stored {
+            assert!(!is_of(words.check, format, false), "{}", words.check);
+        }
+    }
+    let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+    fly(&mut judge, 0, 20, 10, 0.9);
+    let judged = judge.end();
+    let why = judged.not_judged.iter().find(|(check, _)| *check == "batt_resistance");
+    assert!(why.is_some_and(|(_, why)| why.contains("only a monitor on board")), "{why:?}");
+}
+
+#[test]
+fn a_recording_that_does_not_tell_arming_says_so_and_not_never() {
+    use crate::source::item::Fact;
+    let words = "the log does not tell whether it was armed";
+    let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+    judge.item(Instant::ZERO, Item::Fact(Fact { about: About::Arming, words }));
+    for second in 0..20 {
+        let at = Instant::from_millis(second * 1_000);
+        judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(false)));
+    }
+    let judged = judge.end();
+    assert!(!judged.not_judged.is_empty());
+    for (check, why) in judged.not_judged {
+        assert!(!why.contains("never"), "{check}: {why}");
+    }
+}
+
+#[test]
+fn nothing_of_a_vehicle_is_no_good_news() {
+    let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+    let gap =
+        Gap { from: None, to: None, cause: Cause::Cut, place: Some(7), bytes: 3, words: "cut".to_owned() };
+    judge.item(Instant::ZERO, Item::Gap(&gap));
+    let judged = judge.end();
+    assert_eq!((judged.worst(), judged.damages), (None, 1));
+    assert!(judged.judged.is_empty(), "{:?}", judged.judged);
+}
+
+/// Heartbeats at 10 Hz, of which so many in a hundred are lost on the wire after 20 s, and none from 40 to 48 s.
+fn link_faults(heard: Heard) -> Judged {
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+    use hums_link::{Frame, messages};
+    let mut judge = Judge::new(&Limits::default(), Format::Tlog).heard(heard);
+    let mut encoder = Encoder::of(AUTOPILOT.system, AUTOPILOT.component);
+    for tick in 0..600_u64 {
+        encoder.set_sequence(tick as u8);
+        let mut buffer = [0; FRAME_BYTES_MAX];
+        let frame = Frame::parse(encoder.frame(&mut buffer, &messages::heartbeat(4))).expect("ours");
+        if (200..400).contains(&tick) && tick % 5 == 0 || (400..480).contains(&tick) {
+            continue;
+        }
+        let at = Instant::from_millis(tick * 100);
+        judge.item(at, Item::Frame(&frame));
+        judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
+    }
+    judge.end()
+}
+
+#[test]
+fn the_wire_is_judged_where_the_recording_was_heard_at_the_monitors_own_place() {
+    let judged = link_faults(Heard::OnTheWire);
+    let first = |check: &str| {
+        let finding = judged.findings.iter().find(|finding| finding.check == check);
+        finding.map(|finding| (finding.level, finding.at.as_secs_f64()))
+    };
+    let Some((Level::Warning | Level::Critical, at)) = first("frames_lost") else {
+        panic!("{:?}", judged.findings)
+    };
+    assert!((20.0..26.0).contains(&at), "{at}");
+    let Some((Level::Warning, at)) = first("heartbeat") else { panic!("{:?}", judged.findings) };
+    assert!((41.9..42.1).contains(&at), "{at}");
+    assert!(judged.judged.contains(&"frames_lost"), "{:?}", judged.judged);
+    let judged = link_faults(Heard::Somewhere);
+    assert!(judged.findings.iter().all(|finding| finding.check != "frames_lost"), "{:?}", judged.findings);
+}
+
+#[test]
+fn silence_of_a_link_is_no_finding_where_nobody_knows_which_link_it_was() {
+    for (checked, heartbeats) in [(false, 0), (true, 1)] {
+        let given = [(Param::BatRemWarn.spec(), 15.0)];
+        let mut judge = Judge::new(&Limits::new(&given), Format::Hums);
+        if checked {
+            judge.item(Instant::ZERO, Item::Record(&Told::Checked));
+        }
+        fly(&mut judge, 0, 10, 10, 0.9);
+        fly(&mut judge, 30, 40, 10, 0.9);
+        let problems = judge.end().problems;
+        let of_link = problems.iter().filter(|problem| problem.check == "heartbeat").count();
+        assert_eq!(of_link, heartbeats, "{problems:?}");
+    }
+}
+
+fn escs(judge: &mut Judge, from_ms: u64, to_ms: u64) {
+    let esc = Some(Esc { rpm: Some(Rpm(5_000.0)), ..Esc::default() });
+    let told = Observation::Escs(EscGroup { first: 0, escs: [esc, None, None, None] });
+    for tick in from_ms / 100..to_ms / 100 {
+        let at = Instant::from_millis(tick * 100);
+        judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
+        judge.item(at, Item::Observation(AUTOPILOT, &told));
+    }
+}
+
+#[test]
+fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is_found() {
+    for (told, cause, silent) in [
+        (true, Cause::NotKept, 0),
+        (true, Cause::Lost, 0),
+        (true, Cause::Damaged, 0),
+        (false, Cause::Lost, 1),
+    ] {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        escs(&mut judge, 0, 10_000);
+        let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
+        let gap = Gap { from, to, cause, place: None, bytes: 0, words: String::new() };
+        if told {
+            judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
+        }
+        escs(&mut judge, 30_000, 40_000);
+        // A count over the whole recording, told at its end, is no pause.
+        let whole = Gap { from: Some(Instant::ZERO), to: Some(Instant::from_millis(39_900)), ..gap };
+        judge.item(Instant::from_millis(39_900), Item::Gap(&whole));
+        let judged = judge.end();
+        let found = judged.problems.iter().filter(|problem| problem.check == "esc_silent").count();
+        assert_eq!(found, silent, "{cause:?}: {:?}", judged.findings);
+        assert_eq!(judged.span.map(|(_, last)| last.as_millis()), Some(39_900));
+    }
+}
+
+#[test]
+fn findings_after_a_pause_have_the_recordings_time() {
+    let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+    fly(&mut judge, 0, 10, 10, 0.9);
+    let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
+    let words = String::new();
+    let gap = Gap { from, to, cause: Cause::NotKept, place: None, bytes: 0, words };
+    judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
+    fly(&mut judge, 30, 40, 10, 0.1);
+    let found = found(&judge.end());
+    let [(check, Level::Warning, at)] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!(check, "batt_remaining");
+    assert!((32.0..33.2).contains(at), "{at}");
+}
+
+#[test]
+fn what_the_board_found_counts_unless_other_limits_are_asked_for() {
+    let finding = Finding {
+        at: Instant::from_millis(7_000),
+        subsystem: hums_core::health::Subsystem::Recorder,
+        check: "card_stall".to_owned(),
+        instance: 0,
+        level: Level::Critical,
+        previous: Level::Ok,
+        value: 3000.0,
+        limit: 2500.0,
+        unit: "ms".to_owned(),
+    };
+    let spec = Param::BatRemWarn.spec();
+    for (given, by, check) in
+        [(vec![], JudgedBy::Board, "card_stall"), (vec![(spec, 95.0)], JudgedBy::Here, "batt_remaining")]
+    {
+        let mut judge = Judge::new(&Limits::new(&given), Format::Hums);
+        judge.item(Instant::ZERO, Item::Record(&Told::Checked));
+        let other = Told::Parameter { name: spec.name.to_owned(), value: 1.0, start: true };
+        judge.item(Instant::ZERO, Item::Record(&other));
+        fly(&mut judge, 0, 10, 10, 0.9);
+        judge.item(Instant::from_millis(7_000), Item::Record(&Told::Finding(Box::new(finding.clone()))));
+        let judged = judge.end();
+        assert_eq!(judged.by, by);
+        assert_eq!(judged.problems.iter().map(|problem| problem.check.as_str()).collect::<Vec<_>>(), [check]);
+    }
+}

@@ -1,0 +1,81 @@
+//! What came of a recording that was judged.
+
+use std::collections::BTreeMap;
+
+use hums_core::Monitor;
+use hums_core::health::Level;
+use hums_core::time::{Instant, Span};
+use hums_core::vehicle::Vehicle;
+
+use super::epochs::Epochs;
+use super::flights::Flight;
+use super::problem::Problem;
+use crate::source::item::{About, Gap};
+use crate::source::told::Finding;
+
+/// Who judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JudgedBy {
+    /// The monitor on board: its findings are in the log.
+    Board,
+    /// This program.
+    Here,
+}
+
+/// What came of a recording.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// Who judged.
+    pub by: JudgedBy,
+    /// The monitor as it was at the end: the vehicle, its usage, what it exceeded.
+    pub monitor: Box<Monitor>,
+    /// Facts besides, the last of each kind.
+    pub facts: BTreeMap<About, String>,
+    /// UTC of each part of the recording.
+    pub epochs: Epochs,
+    /// The first and the last time.
+    pub span: Option<(Instant, Instant)>,
+    /// How long it was armed.
+    pub armed: Span,
+    /// Flights, in order.
+    pub flights: Vec<Flight>,
+    /// Changes of level, in order, up to [`super::problem::LISTED_MAX`].
+    pub findings: Vec<Finding>,
+    /// How many there are.
+    pub findings_count: u64,
+    /// What was wrong, worst first.
+    pub problems: Vec<Problem>,
+    /// Checks that had something to judge.
+    pub judged: Vec<&'static str>,
+    /// Checks that had not, with the reason. Checks that are made for another autopilot are in neither list.
+    pub not_judged: Vec<(&'static str, String)>,
+    /// What is missing, in order, up to [`super::problem::LISTED_MAX`].
+    pub gaps: Vec<Gap>,
+    /// How many gaps are damage.
+    pub damages: u64,
+    /// How many gaps are what the recorder lost while it recorded.
+    pub losses: u64,
+    /// How often the recording's clock began again.
+    pub restarts: u64,
+}
+
+impl Judged {
+    /// The vehicle, as it was known at the end.
+    pub fn vehicle(&self) -> &Vehicle {
+        self.monitor.vehicle()
+    }
+
+    /// Whether so few checks had something to judge that nothing found is no good news: fewer than one in ten.
+    pub fn is_little(&self) -> bool {
+        self.judged.len() * 10 < self.judged.len() + self.not_judged.len()
+    }
+
+    /// The worst level that was found; `None` where nothing could be judged.
+    pub fn worst(&self) -> Option<Level> {
+        match self.problems.first() {
+            Some(problem) => Some(problem.level),
+            None if self.vehicle().source.is_none() => None,
+            None => Some(Level::Ok),
+        }
+    }
+}
