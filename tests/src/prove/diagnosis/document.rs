@@ -3,8 +3,8 @@
 use super::alarms::{self, BY_CHECK, COUNTS, FALSE, UNLABELLED, UNLABELLED_BY_CHECK};
 use super::faults::{self, BY_CLASS, EACH, FOUND};
 use super::judged::Judged;
+use super::options::Known;
 use super::rates::hours;
-use super::sets::Known;
 use super::table::Form;
 
 /// What stands before the tables.

@@ -3,8 +3,9 @@
 use anyhow::{Context as _, Result};
 use rayon::prelude::*;
 
+use super::options::Known;
 use super::outcome::{Outcome, judge};
-use super::sets::{Known, Set};
+use super::sets::Set;
 
 /// What came of the flights of one set, in their order.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! The judge of the diagnosis: what the monitor finds of known faults, how fast, and how often it alarms for nothing.
 //!
-//! Flights are recordings with labels ([`labels`]), kept apart in sets by who knew them when the limits were chosen ([`sets`]).
-//! Each is judged by the monitor as `hums check` runs it ([`outcome`]); what comes of all of them are the tables of
-//! `docs/diagnosis.md` ([`document`]). It is no campaign of `docs/proof.md`: those try what is promised, and this one measures
+//! Flights are recordings with labels (`labels`), kept apart in sets by who knew them when the limits were chosen (`sets`).
+//! Each is judged by the monitor as `hums check` runs it (`outcome`); what comes of all of them are the tables of
+//! `docs/diagnosis.md` (`document`). It is no campaign of `docs/proof.md`: those try what is promised, and this one measures
 //! what is not perfect.
 
 mod alarms;

@@ -4,7 +4,16 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};
 
-use super::sets::Known;
+/// Whether the flights were known when the limits were chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Known {
+    /// They were, or might have been.
+    Yes,
+    /// They were flown after the limits had been frozen.
+    No,
+    /// Nobody labelled them, and no limit was fitted to them; but their findings have been seen.
+    Seen,
+}
 
 /// What is judged, and what becomes of it.
 #[derive(Debug, Default, PartialEq, Eq)]

@@ -7,22 +7,11 @@ use anyhow::{Context as _, Result, bail};
 use hums::source::recording::{Place, find};
 
 use super::labels::{self, FILE, Label};
-use super::options::Flights;
+use super::options::{Flights, Known};
 use crate::flights;
 
 /// How deep folders are looked through for labels.
 const DEPTH_MAX: usize = 4;
-
-/// Whether the flights were known when the limits were chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Known {
-    /// They were, or might have been.
-    Yes,
-    /// They were flown after the limits had been frozen.
-    No,
-    /// Nobody labelled them, and no limit was fitted to them; but their findings have been seen.
-    Seen,
-}
 
 /// Flights that are counted together.
 #[derive(Debug)]
