@@ -75,6 +75,10 @@ pub fn event_name(number: u8) -> &'static str {
         12 => "by_link",
         13 => "other_vehicle",
         14 => "flight_resumed",
+        15 => "mishap",
+        16 => "mishap_down",
+        17 => "mishap_over",
+        18 => "mishap_on_bench",
         _ => "other",
     }
 }

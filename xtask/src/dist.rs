@@ -82,8 +82,9 @@ impl Release {
         let tree = tree.canonicalize()?;
         let flags = [(&tree, "/hums"), (&cargo_home, "/cargo")]
             .map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()))
-            // Not separated by spaces: a folder may have one in its name.
-            .join("\u{1f}");
+            // Not separated by spaces: a folder may have one in its name. They take the place of those of .cargo/config.toml.
+            .join("\u{1f}")
+            + "\u{1f}--cfg\u{1f}sha2_backend_soft=\"compact\"";
         Ok(Self { tree, commit: commit.to_owned(), flags })
     }
 

@@ -1,9 +1,10 @@
-//! What the raw messages do not say by themselves: cell count and cell voltage, silence of an ESC against its own rhythm,
-//! imbalance of motors in steady flight, clips since take-off, load factor.
+//! What the raw messages do not say by themselves: cell voltage, silence of an ESC against its own rhythm,
+//! imbalance of motors in steady flight, clips of late, load factor.
 
+use crate::cells::Cells;
 use crate::flight::{Flight, FlightEvent};
 use crate::latest::{Latest, Reading};
-use crate::observation::{Battery, CELLS_MAX, EscGroup, MOTORS_MAX, Observation};
+use crate::observation::{Battery, EscGroup, MOTORS_MAX, Observation};
 use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
@@ -12,8 +13,6 @@ use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const GRAVITY: f32 = 9.806_65;
-/// A full lithium polymer cell has 4.2 V, a high-voltage one 4.35 V: a pack of n cells never shows more than this a cell.
-const CELL_FULL_V: f32 = 4.4;
 /// A motor that never turned faster is not fitted.
 const TURNING_RPM: f32 = 100.0;
 /// An ESC is silent when it misses this many of its own intervals.
@@ -44,12 +43,15 @@ struct MotorTrack {
 /// The memory of derived quantities.
 #[derive(Clone, Copy, Debug)]
 pub struct Derived {
-    highest_pack_v: [f32; BATTERIES_MAX],
+    cells: Cells,
     resistance: [Resistance; BATTERIES_MAX],
     motors: [MotorTrack; MOTORS_MAX],
     load_factor: Latest<f32>,
+    /// When anything at all was heard of the vehicle.
+    heard: Option<Instant>,
     had_fix: [bool; RECEIVERS_MAX],
-    clips_at_takeoff: Option<u32>,
+    clips: Lately,
+    clips_known: bool,
     frames_lost: Lately,
     write_errors: Lately,
 }
@@ -92,19 +94,22 @@ impl Derived {
         const MOTOR: MotorTrack =
             MotorTrack { errors: None, interval_s: 0.0, last: None, highest_rpm: 0.0, smooth_rpm: 0.0 };
         Self {
-            highest_pack_v: [0.0; BATTERIES_MAX],
+            cells: Cells::new(),
             resistance: [Resistance::new(); BATTERIES_MAX],
             motors: [MOTOR; MOTORS_MAX],
             load_factor: Latest::nothing(),
+            heard: None,
             had_fix: [false; RECEIVERS_MAX],
-            clips_at_takeoff: None,
+            clips: Lately::NONE,
+            clips_known: false,
             frames_lost: Lately::NONE,
             write_errors: Lately::NONE,
         }
     }
 
     /// Takes an observation that the vehicle took.
-    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
+    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
+        self.heard = Some(at);
         match observation {
             Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
                 if let Some([x, y, z]) = imu.acceleration {
@@ -118,12 +123,13 @@ impl Derived {
                 }
             }
             Observation::Battery(battery) => {
-                self.take_voltages(vehicle);
+                self.take_voltages(vehicle, flight);
                 if let Some(index) = vehicle.told_battery {
                     self.resistance[index].take(battery);
                 }
             }
-            Observation::SystemStatus(_) => self.take_voltages(vehicle),
+            Observation::SystemStatus(_) => self.take_voltages(vehicle, flight),
+            Observation::Parameter(place, value) => self.cells.take_setting(*place, *value),
             Observation::Escs(group) => {
                 let first = usize::from(group.first);
                 self.take_errors(at, group);
@@ -135,12 +141,24 @@ impl Derived {
         }
     }
 
-    fn take_voltages(&mut self, vehicle: &Vehicle) {
-        for (battery, highest) in self.highest_pack_v.iter_mut().enumerate() {
-            if let Some(pack_v) = pack_v(vehicle, battery).filter(|pack_v| pack_v.is_finite()) {
-                *highest = highest.max(pack_v);
+    fn take_voltages(&mut self, vehicle: &Vehicle, flight: &Flight) {
+        let armed = vehicle.armed();
+        for battery in 0..BATTERIES_MAX {
+            if let Some(pack_v) = pack_v(vehicle, battery) {
+                let id = vehicle.batteries[battery].get().map_or(0, |known| known.id);
+                self.cells.take_voltage(battery, id, pack_v, !armed || flight.stands(), armed);
             }
         }
+    }
+
+    /// Cells of the batteries.
+    pub(crate) const fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// Cells of the batteries, to be told more.
+    pub(crate) const fn cells_mut(&mut self) -> &mut Cells {
+        &mut self.cells
     }
 
     fn take_errors(&mut self, at: Instant, group: &EscGroup) {
@@ -182,11 +200,13 @@ impl Derived {
         event: Option<FlightEvent>,
         recorder: &RecorderStatus,
     ) {
-        match event {
-            Some(FlightEvent::TakeOff | FlightEvent::Resumed) => self.clips_at_takeoff = clips(vehicle),
-            Some(FlightEvent::Landing) => self.clips_at_takeoff = None,
-            None => {}
+        let clips = clips(vehicle).map_or(0, u64::from);
+        // What was clipped before this flight, or before the autopilot's restart, is not of this flight.
+        if event.is_some() || clips < self.clips.count || !self.clips_known {
+            self.clips_known = vehicle.vibration.get().is_some();
+            self.clips = Lately { count: clips, rose_at: None, before: clips };
         }
+        self.clips.take(now, clips);
         self.frames_lost.take(now, recorder.frames_lost);
         self.write_errors.take(now, recorder.write_errors);
     }
@@ -216,7 +236,7 @@ impl Derived {
         Some(errors.per_minute() as f32)
     }
 
-    /// Cells of a battery: set, reported, or found from the highest voltage seen. 0 while nothing is known.
+    /// Cells of a battery: set, reported, or found ([`crate::cells`]). 0 where that is not known.
     pub(crate) fn cell_count(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> u8 {
         let set = params.get(Param::BatCells) as u8;
         if set > 0 {
@@ -227,8 +247,7 @@ impl Derived {
         if reported > 1 {
             return reported as u8;
         }
-        let highest = self.highest_pack_v.get(battery).copied().unwrap_or(0.0);
-        libm::ceilf(highest / CELL_FULL_V).clamp(0.0, CELLS_MAX as f32) as u8
+        self.cells.of(battery)
     }
 
     /// The lowest cell's voltage where cells are measured, the pack's share of it otherwise.
@@ -250,15 +269,17 @@ impl Derived {
         Reading::new(at, lowest.or_else(share))
     }
 
-    /// Seconds since an ESC last told speed or current, once it has missed some of its own intervals; 0 before.
+    /// Seconds since an ESC last told speed or current, once it has missed some of its own intervals; 0 before. Up to when the
+    /// vehicle was heard last: a link that is silent says nothing about an ESC.
     pub(crate) fn esc_silence(&self, now: Instant, motor: u8) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor))?;
-        let silence_s = now.since(track.last?).as_secs_f32();
+        let silence_s = self.heard?.since(track.last?).as_secs_f32();
         let missed = track.interval_s > 0.0 && silence_s > INTERVALS_MISSED * track.interval_s;
         Some(Reading { at: now, value: if missed { silence_s } else { 0.0 } })
     }
 
-    /// How far a motor's speed is from the mean of the others, in percent of it, in steady flight.
+    /// How far a motor's speed is from the middle one of all, in percent of it, in steady flight; 0 for all but the motor that is
+    /// furthest from it: where one is lost the others turn as they must to make up for it.
     pub(crate) fn motor_imbalance(
         &self,
         now: Instant,
@@ -267,12 +288,31 @@ impl Derived {
         motor: u8,
     ) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
-        let mean = self.mean_of_others(motor)?;
-        let compares = vehicle.is_multicopter() && self.motors_told(now, mean);
+        let middle = self.middle_speed()?;
+        let compares = vehicle.is_multicopter() && self.motors_told(now, middle);
         if !compares || !Self::is_steady(now, vehicle, flight) {
             return None;
         }
-        Reading::new(track.last, Some((track.smooth_rpm - mean).abs() / mean * 100.0))
+        let departure = |track: &MotorTrack| (track.smooth_rpm - middle).abs();
+        let others = self.motors.iter().enumerate().filter(|(_, other)| other.highest_rpm > TURNING_RPM);
+        let furthest = others.rev().map(|(number, other)| (number, departure(other)));
+        let furthest = furthest.reduce(|first, other| if other.1 >= first.1 { other } else { first })?.0;
+        let percent = departure(track) / middle * 100.0;
+        Reading::new(track.last, Some(if furthest == usize::from(motor) { percent } else { 0.0 }))
+    }
+
+    /// The middle one of the speeds of all motors that are fitted (of an even number the lower one of the two); `None` while they
+    /// do not turn.
+    fn middle_speed(&self) -> Option<f32> {
+        let speeds = || {
+            self.motors.iter().filter(|track| track.highest_rpm > TURNING_RPM).map(|track| track.smooth_rpm)
+        };
+        let half = speeds().count() / 2;
+        let is_middle = |speed: &f32| {
+            speeds().filter(|other| other < speed).count() <= half.saturating_sub(1)
+                && speeds().filter(|other| other > speed).count() <= half
+        };
+        speeds().find(is_middle).filter(|speed| *speed >= TURNING_RPM)
     }
 
     /// Whether all motors that are fitted were told of just now, and turn as in flight: speeds that are held, or zeros of ESCs
@@ -312,10 +352,10 @@ impl Derived {
         (count > 0 && mean >= TURNING_RPM).then_some(mean)
     }
 
-    /// Clipped samples since take-off, the worst accelerometer.
+    /// Clipped samples of the worst accelerometer in this flight, since ten seconds went by without any.
     pub(crate) fn clips(&self, vehicle: &Vehicle) -> Option<Reading> {
-        let since = clips(vehicle)?.saturating_sub(self.clips_at_takeoff?);
-        Reading::new(vehicle.vibration.at(), Some(since as f32))
+        clips(vehicle)?;
+        Reading::new(vehicle.vibration.at(), Some(self.clips.lately()))
     }
 
     /// Magnitude of the specific force in units of gravity: 1 at rest and in steady flight.

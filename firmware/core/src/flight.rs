@@ -20,7 +20,7 @@
 
 use crate::observation::{LandedState, VehicleKind};
 use crate::time::{Instant, Span};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
 const TAKEOFF_HEIGHT_M: f32 = 1.0;
 const LANDED_HEIGHT_M: f32 = 0.5;
@@ -37,8 +37,6 @@ const LANDING_DEBOUNCE: Span = Span::from_secs(2);
 const WORD_DEBOUNCE: Span = Span::from_millis(600);
 /// On the ground, still armed, for so long: the flight is over. A plane rolls on from a touch-and-go within this.
 const GROUND_LASTS: Span = Span::from_secs(8);
-/// `EXTENDED_SYS_STATE` comes at 1 Hz or faster where it comes at all.
-pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
 /// Positions and speeds older than this decide nothing.
 const MOTION_AGE: Span = Span::from_secs(3);
 
@@ -132,6 +130,33 @@ impl Flight {
     /// When it left the ground last, while it is in the air.
     pub const fn airborne_since(&self) -> Option<Instant> {
         self.airborne_since
+    }
+
+    /// Whether a flight has begun and not ended: in the air, or on the ground for a moment.
+    pub const fn is_open(&self) -> bool {
+        self.flew_at.is_some()
+    }
+
+    /// Whether it is known to stand on the ground.
+    pub(crate) const fn stands(&self) -> bool {
+        self.seen_on_ground && !self.is_open()
+    }
+
+    /// A step in which nothing changes: a mishap goes on, and what the vehicle says of itself means little.
+    pub(crate) fn stay(&mut self, now: Instant) {
+        self.changing_since = None;
+        if self.is_open() {
+            self.flew_at = Some(now);
+        }
+    }
+
+    /// A step of a vehicle that is down for good, until it is armed again: the flight is over.
+    pub(crate) fn end(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
+        self.note_arming(now, vehicle);
+        let open = self.is_open();
+        self.seen_on_ground = true;
+        (self.airborne_since, self.flew_at, self.changing_since) = (None, None, None);
+        open.then_some(FlightEvent::Landing)
     }
 
     /// One step, at least every 50 ms.
@@ -283,7 +308,7 @@ pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::{GlobalPosition, Heartbeat, Observation, Source};
+    use crate::observation::{GlobalPosition, Heartbeat, Observation, Source, VtolState};
     use crate::units::Metres;
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
@@ -347,7 +372,7 @@ mod tests {
                 let now = Instant::from_millis(now_ms);
                 vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
                 if now_ms % 500 == 0 {
-                    vehicle.observe(now, AUTOPILOT, &Observation::Landed(*landed));
+                    vehicle.observe(now, AUTOPILOT, &Observation::Landed(*landed, VtolState::Unknown));
                 }
                 events.extend(flight.step(now, &vehicle).map(|event| (now_ms, event)));
                 now_ms += 50;
@@ -393,7 +418,7 @@ mod tests {
             let global = GlobalPosition { relative_altitude: Metres(height_m), ..GlobalPosition::default() };
             vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
             if (5_000..20_000).contains(&now_ms) {
-                vehicle.observe(now, AUTOPILOT, &Observation::Landed(LandedState::InAir));
+                vehicle.observe(now, AUTOPILOT, &Observation::Landed(LandedState::InAir, VtolState::Unknown));
             }
             events.extend(flight.step(now, &vehicle));
         }

@@ -1,7 +1,7 @@
 //! What happened besides findings: to be recorded, and told where a pilot should hear of it.
 
 use crate::flight::Phase;
-use crate::protect;
+use crate::{mishap, protect};
 
 /// Something that happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,10 @@ pub enum Happening {
     OtherAirframe,
     /// Another system on the autopilot's port is the vehicle from now on.
     OtherVehicle,
+    /// How many cells the vehicle's battery has is not known: no alarm comes from the voltage of its cells.
+    CellsUnknown,
+    /// A mishap began, ended, or was seen on the bench.
+    Mishap(mishap::Change),
     /// A step of the protective action.
     Protect(protect::Step),
 }

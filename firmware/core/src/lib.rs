@@ -4,6 +4,7 @@
 
 pub mod baseline;
 mod bytes;
+pub mod cells;
 pub mod component;
 pub mod derived;
 pub mod election;
@@ -14,6 +15,7 @@ pub mod happening;
 pub mod health;
 mod latest;
 pub mod lifetime;
+pub mod mishap;
 pub mod monitor;
 pub mod observation;
 pub mod params;

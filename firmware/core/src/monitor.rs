@@ -4,6 +4,7 @@ mod components;
 mod stored;
 
 use crate::baseline::{Baselines, Quantity};
+use crate::cells;
 use crate::component::{COMPONENTS_MAX, Component, Kind};
 use crate::derived::Derived;
 use crate::exposure::Exposure;
@@ -11,8 +12,10 @@ use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
 use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
+use crate::latest::Latest;
 use crate::lifetime::{Airframe, ItemKey, Lifetime, Saving};
-use crate::observation::{Observation, Source};
+use crate::mishap::{Change, Fate, Mishap};
+use crate::observation::{Feeds, Observation, Source};
 use crate::params::Params;
 use crate::protect::{Protect, Request, Situation};
 use crate::snapshot::{Snapshot, Snapshots};
@@ -31,6 +34,7 @@ pub struct Monitor {
     params: Params,
     vehicle: Vehicle,
     flight: Flight,
+    mishap: Mishap,
     derived: Derived,
     health: Health,
     usage: Usage,
@@ -49,6 +53,7 @@ pub struct Monitor {
     saving: Saving,
     happenings: Happenings,
     before_tick: Before,
+    cells_told: bool,
 }
 
 /// What was so at the last tick.
@@ -78,6 +83,9 @@ impl Before {
 /// A phase that does not last this long is not told: speeds cross their limits back and forth.
 const PHASE_LASTS: Span = Span::from_secs(1);
 
+/// By then the autopilot's parameters have been asked for: where cells are not known now, they will not be.
+const CELLS_COME: Span = Span::from_secs(45);
+
 /// `AUTOPILOT_VERSION` is asked for and answered long before: whoever has said no unique id by then says none.
 const UID_COMES: Span = Span::from_secs(60);
 
@@ -90,6 +98,7 @@ impl Monitor {
             params,
             vehicle: Vehicle::unknown(),
             flight: Flight::grounded(),
+            mishap: Mishap::new(),
             derived: Derived::new(),
             health: Health::new(),
             usage: Usage::new(),
@@ -106,6 +115,7 @@ impl Monitor {
             saving: Saving::new(),
             happenings: Happenings::new(),
             before_tick: Before::NOTHING,
+            cells_told: false,
         }
     }
 
@@ -118,7 +128,8 @@ impl Monitor {
         if !known {
             return false;
         }
-        self.derived.observe(at, &self.vehicle, observation);
+        self.mishap.observe(at, &self.vehicle, observation, &self.params);
+        self.derived.observe(at, &self.vehicle, &self.flight, observation);
         self.usage.observe(at, &self.vehicle, &self.flight, &self.derived, observation);
         true
     }
@@ -128,6 +139,7 @@ impl Monitor {
     fn begin_with_another(&mut self) {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
         self.flight = Flight::grounded();
+        self.mishap = Mishap::new();
         self.derived = Derived::new();
         self.health = Health::new();
         self.protect = Protect::new();
@@ -142,11 +154,7 @@ impl Monitor {
         recorder: &RecorderStatus,
         findings: &mut impl FnMut(&Finding),
     ) {
-        let event = self.flight.step(now, &self.vehicle).map(|event| match event {
-            // A recording that begins in the air: nobody has counted this flight yet.
-            FlightEvent::Resumed if !self.has_open_flight() => FlightEvent::TakeOff,
-            event => event,
-        });
+        let event = self.step_flight(now);
         self.derived.step(now, &self.vehicle, event, recorder);
         self.step_trends(now, event);
         self.usage.step(now, &self.vehicle, &self.flight, event, &self.params);
@@ -155,6 +163,7 @@ impl Monitor {
             now,
             vehicle: &self.vehicle,
             flight: &self.flight,
+            mishap: &self.mishap,
             derived: &self.derived,
             link,
             recorder,
@@ -175,6 +184,7 @@ impl Monitor {
         }
         self.exposure.step(now, &self.vehicle, self.usage.current_a());
         self.step_protect(now, event);
+        self.step_cells(now);
         self.step_life(now, event);
         self.step_happenings(now, event);
     }
@@ -190,6 +200,7 @@ impl Monitor {
             now,
             vehicle: &self.vehicle,
             flight: &self.flight,
+            mishap: &self.mishap,
             derived: &self.derived,
             link,
             recorder,
@@ -200,10 +211,34 @@ impl Monitor {
         }
     }
 
+    /// The flight's own step, unless a mishap decides.
+    fn step_flight(&mut self, now: Instant) -> Option<FlightEvent> {
+        let Self { vehicle, flight, mishap, usage, params, happenings, .. } = self;
+        if let Some(change) = mishap.step(now, vehicle, flight, params) {
+            if change == Change::Down {
+                usage.count_mishap(mishap.touch_mps());
+            }
+            happenings.push(Happening::Mishap(change));
+        }
+        let event = match mishap.fate() {
+            Fate::Own => flight.step(now, vehicle),
+            Fate::Over => flight.end(now, vehicle),
+            Fate::Held => {
+                flight.stay(now);
+                None
+            }
+        };
+        match event {
+            // A recording that begins in the air: nobody has counted this flight yet.
+            Some(FlightEvent::Resumed) if !self.has_open_flight() => Some(FlightEvent::TakeOff),
+            event => event,
+        }
+    }
+
     /// Whether the stored life has a flight that began and did not end: we were restarted in the air.
     fn has_open_flight(&self) -> bool {
         let count = |counter| self.before.totals.raw(counter);
-        count(UsageCounter::Flights) > count(UsageCounter::Landings)
+        count(UsageCounter::Flights) > count(UsageCounter::Landings) + count(UsageCounter::Mishaps)
     }
 
     fn step_trends(&mut self, now: Instant, event: Option<FlightEvent>) {
@@ -233,9 +268,35 @@ impl Monitor {
         self.wear_next = (self.wear_next + 1) % COMPONENTS_MAX as u8;
     }
 
+    /// Keeps the cells that are known for the next power-on, and tells once where they are not.
+    fn step_cells(&mut self, now: Instant) {
+        let Self { vehicle, derived, params, before, saving, happenings, cells_told, .. } = self;
+        for (battery, kept) in before.cells.iter_mut().enumerate() {
+            let count = derived.cell_count(vehicle, battery, params);
+            if count > 0 && count != *kept && vehicle.is_settled(now) {
+                *kept = count;
+                saving.hurry(ItemKey::Lifetime);
+            }
+            let known = vehicle.batteries.get(battery).and_then(Latest::get);
+            let counts = known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle);
+            let unknown = count == 0 && counts && derived.cells().has_voltage(battery);
+            if unknown && !*cells_told && vehicle.known_for(now) >= CELLS_COME {
+                *cells_told = true;
+                happenings.push(Happening::CellsUnknown);
+            }
+        }
+    }
+
+    /// A parameter of the autopilot that a recording tells by its name; what is no business of ours is left.
+    pub fn learn_parameter(&mut self, name: &str, value: f32) {
+        if let Some(place) = cells::known(name) {
+            self.derived.cells_mut().take_setting(place, value);
+        }
+    }
+
     fn step_protect(&mut self, now: Instant, event: Option<FlightEvent>) {
-        let Self { vehicle, flight, health, params, protect, happenings, .. } = self;
-        let situation = Situation { now, vehicle, flight, health, params };
+        let Self { vehicle, flight, mishap, health, params, protect, happenings, .. } = self;
+        let situation = Situation { now, vehicle, flight, mishap: mishap.is_going(), health, params };
         if let Some(step) = protect.step(&situation, event) {
             happenings.push(Happening::Protect(step));
         }
@@ -331,6 +392,11 @@ impl Monitor {
         &self.flight
     }
 
+    /// Mishaps.
+    pub const fn mishap(&self) -> &Mishap {
+        &self.mishap
+    }
+
     /// Levels and roll-ups.
     pub const fn health(&self) -> &Health {
         &self.health
@@ -366,6 +432,7 @@ impl Monitor {
             airframe: self.before.airframe,
             boots: self.boots(),
             sessions: self.before.sessions.saturating_add(u32::from(self.heard())),
+            cells: self.before.cells,
             totals: self.before.totals.join(&self.usage.totals()),
         }
     }

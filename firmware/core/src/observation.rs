@@ -163,6 +163,8 @@ pub struct Attitude {
     pub pitch: Radians,
     /// From north, clockwise.
     pub yaw: Radians,
+    /// Angular rates about the body's axes, where they are told.
+    pub rates: Option<[RadiansPerSecond; 3]>,
     /// Milliseconds since the autopilot's boot. Every autopilot sends it here; `SYSTEM_TIME` only some do.
     pub boot_ms: Option<u32>,
 }
@@ -262,6 +264,9 @@ pub struct Battery {
     pub lithium: bool,
     /// What it feeds.
     pub feeds: Feeds,
+    /// What the autopilot calls it: `MAV_BATTERY_CHARGE_STATE` (0 not said, 1 ok, 2 low, 3 critical, 4 emergency, 5 failed,
+    /// 6 unhealthy, 7 charging).
+    pub charge: u8,
 }
 
 /// What a battery feeds: `MAV_BATTERY_FUNCTION`.
@@ -290,6 +295,7 @@ impl Default for Battery {
             faults: 0,
             lithium: true,
             feeds: Feeds::Vehicle,
+            charge: 0,
         }
     }
 }
@@ -425,6 +431,20 @@ pub enum LandedState {
     Landing,
 }
 
+/// What a VTOL flies on: `MAV_VTOL_STATE` of `EXTENDED_SYS_STATE`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VtolState {
+    /// Not said, or no VTOL.
+    #[default]
+    Unknown,
+    /// On its way from rotors to wings or back.
+    Transition,
+    /// On rotors.
+    Hover,
+    /// On wings.
+    Forward,
+}
+
 /// The autopilot's processor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Processor {
@@ -500,7 +520,7 @@ pub enum Observation {
     /// `RPM` (two sensors), `RAW_RPM`
     SpeedSensors([Option<SpeedSensor>; 2]),
     /// `EXTENDED_SYS_STATE`
-    Landed(LandedState),
+    Landed(LandedState, VtolState),
     /// `MCU_STATUS`
     Processor(Processor),
     /// `AUTOPILOT_VERSION`
@@ -511,6 +531,8 @@ pub enum Observation {
     MissionReached(u16),
     /// `COMMAND_ACK`
     CommandAck(CommandAck),
+    /// `PARAM_VALUE` of a parameter that is in [`crate::cells::KNOWN`], by its place there, and its value.
+    Parameter(u8, f32),
     /// `FLIGHT_INFORMATION`: the number of the flight and its take-off, milliseconds since boot (0 not yet).
     FlightInformation {
         /// The flight's unique number.

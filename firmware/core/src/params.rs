@@ -6,15 +6,20 @@
 pub struct ParamSpec {
     /// At most 16 characters: what `PARAM_VALUE` carries.
     pub name: &'static str,
-    /// The unit of value, default and range.
-    pub unit: &'static str,
     /// Used until it is set.
     pub default: f32,
     /// The smallest value that is accepted.
     pub min: f32,
     /// The largest value that is accepted.
     pub max: f32,
-    /// Where the default comes from.
+}
+
+/// What people read of a parameter: apart, because the firmware has no use for it and the table would link it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParamWords {
+    /// The unit of value, default and range.
+    pub unit: &'static str,
+    /// What it is, where the default comes from.
     pub source: &'static str,
 }
 
@@ -35,9 +40,12 @@ macro_rules! params {
         /// All parameters, in the order of [`Param`].
         pub const TABLE: &[ParamSpec] = &[
             $(ParamSpec {
-                name: $name, unit: $unit, default: $default, min: $min, max: $max, source: $source,
+                name: $name, default: $default, min: $min, max: $max,
             },)*
         ];
+
+        /// What people read of all parameters, in the same order.
+        pub const WORDS: &[ParamWords] = &[$(ParamWords { unit: $unit, source: $source },)*];
 
         /// The values of all parameters, and which of them are still to be saved.
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +67,7 @@ macro_rules! params {
 params! {
     BatRemWarn "BAT_REM_WARN" "%" 15.0 0.0 100.0 "PX4 commander, COM_LOW_BAT (BAT_LOW_THR 15 %)";
     BatRemCrit "BAT_REM_CRIT" "%" 7.0 0.0 100.0 "PX4 commander, BAT_CRIT_THR 7 %";
-    BatCells "BAT_CELLS" "" 0.0 0.0 14.0 "0: reported, or found from the highest voltage seen";
+    BatCells "BAT_CELLS" "" 0.0 0.0 24.0 "0: reported, of the autopilot's parameters, or of the voltage at rest where it fits one count only";
     CellVoltWarn "CELL_VOLT_WARN" "V" 3.6 0.0 4.5 "common LiPo practice";
     CellVoltCrit "CELL_VOLT_CRIT" "V" 3.5 0.0 4.5 "common LiPo practice";
     CellDevWarn "CELL_DEV_WARN" "V" 0.07 0.0 2.0 "AirData: 0.07 V for 10 s";
@@ -79,21 +87,21 @@ params! {
     VibeCrit "VIBE_CRIT" "m/s2" 60.0 0.0 500.0 "ArduPilot vibration guide";
     VibePx4Warn "VIBE_PX4_WARN" "m/s2" 4.905 0.0 500.0 "PX4 Flight Review: accelerometer metric, yellow";
     VibePx4Crit "VIBE_PX4_CRIT" "m/s2" 9.81 0.0 500.0 "PX4 Flight Review: accelerometer metric, red";
-    ClipWarn "CLIP_WARN" "" 1.0 1.0 100_000.0 "ArduPilot vibration guide: clipping should not rise";
-    ClipCrit "CLIP_CRIT" "" 100.0 1.0 100_000.0 "ArduPilot vibration guide: more than 100 a flight";
+    ClipWarn "CLIP_WARN" "" 10.0 1.0 100_000.0 "samples without ten calm seconds between: one or a few are a gust or a touch";
+    ClipCrit "CLIP_CRIT" "" 100.0 1.0 100_000.0 "ArduPilot vibration guide: more than 100";
     LoadFacWarn "LOAD_FAC_WARN" "g" 2.5 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
     LoadFacCrit "LOAD_FAC_CRIT" "g" 4.0 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
     EkfVarWarn "EKF_VAR_WARN" "" 0.5 0.0 10.0 "ArduPilot EKF failsafe, half way";
     EkfVarCrit "EKF_VAR_CRIT" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8 on two of three";
     EkfRatioWarn "EKF_RATIO_WARN" "" 0.5 0.0 10.0 "PX4 innovation test ratio, half way";
     EkfRatioCrit "EKF_RATIO_CRIT" "" 1.0 0.0 10.0 "PX4: a ratio above 1 rejects the sensor";
-    GpsSatsWarn "GPS_SATS_WARN" "" 12.0 0.0 60.0 "PX4 Flight Review guide";
-    GpsHdopWarn "GPS_HDOP_WARN" "" 1.5 0.0 50.0 "PX4 Flight Review guide";
-    GpsHaccWarn "GPS_HACC_WARN" "m" 1.0 0.0 100.0 "PX4 Flight Review guide";
+    GpsSatsWarn "GPS_SATS_WARN" "" 6.0 0.0 60.0 "PX4 EKF2_REQ_NSATS 6: fewer are not flown with";
+    GpsHdopWarn "GPS_HDOP_WARN" "" 2.5 0.0 50.0 "PX4 EKF2_REQ_PDOP 2.5";
+    GpsHaccWarn "GPS_HACC_WARN" "m" 3.0 0.0 100.0 "PX4 EKF2_REQ_EPH 3 m";
     GpsFixCrit "GPS_FIX_CRIT" "" 3.0 0.0 6.0 "less than a 3D fix in flight";
-    LinkAgeWarn "LINK_AGE_WARN" "s" 2.0 0.5 60.0 "MAVLink heartbeat protocol";
+    LinkAgeWarn "LINK_AGE_WARN" "s" 3.5 0.5 60.0 "ArduPilot sends none for up to 3 s while it calibrates at its start";
     LinkAgeCrit "LINK_AGE_CRIT" "s" 5.0 0.5 60.0 "MAVLink heartbeat protocol: 4 to 5 missed";
-    LinkLossWarn "LINK_LOSS_WARN" "%" 1.0 0.0 100.0 "frames lost on the autopilot's port";
+    LinkLossWarn "LINK_LOSS_WARN" "%" 2.0 0.0 100.0 "frames lost on the autopilot's port";
     LinkLossCrit "LINK_LOSS_CRIT" "%" 5.0 0.0 100.0 "frames lost on the autopilot's port";
     RcRssiWarn "RC_RSSI_WARN" "" 0.0 0.0 254.0 "device scale; 0 is off";
     RcRssiCrit "RC_RSSI_CRIT" "" 0.0 0.0 254.0 "device scale; 0 is off";
@@ -208,6 +216,13 @@ params! {
     RecMode "REC_MODE" "" 0.0 0.0 1.0 "as PX4 SDLOG_MODE and ArduPilot LOG_DISARMED: 0 from power-on, 1 by arming";
     RecBefore "REC_BEFORE" "s" 30.0 5.0 120.0 "by arming: what is kept of the time before";
     RecAfter "REC_AFTER" "s" 15.0 0.0 600.0 "by arming: ArduPilot records 15 s on after disarming (HAL_LOGGER_ARM_PERSIST)";
+    MisFallTime "MIS_FALL_TIME" "s" 0.3 0.1 5.0 "a fall of half a metre, below 0.3 g";
+    MisImpact "MIS_IMPACT" "g" 3.0 1.5 50.0 "a shock; landings at 2 m/s and less stay below";
+    MisTumble "MIS_TUMBLE" "deg/s" 300.0 60.0 3000.0 "above the rates that angle modes fly with (PX4 220, ArduPilot 200)";
+    MisDisarm "MIS_DISARM_H" "m" 3.0 0.5 100.0 "height above home from which a disarming is watched";
+    BatStateWarn "BAT_STATE_WARN" "" 0.5 0.0 3.0 "1: the autopilot calls it low or unhealthy, by its own thresholds";
+    BatStateCrit "BAT_STATE_CRIT" "" 1.5 0.0 3.0 "2: the autopilot calls it critical, an emergency or failed";
+    MisSink "MIS_SINK" "m/s" 6.0 1.0 50.0 "above the fastest descent that PX4 (4) and ArduPilot (5) can be set to";
 }
 
 impl Param {
@@ -219,6 +234,11 @@ impl Param {
     /// What is known of it but its value.
     pub const fn spec(self) -> &'static ParamSpec {
         &TABLE[self as usize]
+    }
+
+    /// What people read of it.
+    pub const fn words(self) -> &'static ParamWords {
+        &WORDS[self as usize]
     }
 }
 

@@ -18,13 +18,13 @@ use core::fmt::Write as _;
 
 use heapless::String;
 
-use crate::flight::{Flight, FlightEvent, LANDED_STATE_AGE, Phase};
+use crate::flight::{Flight, FlightEvent, Phase};
 use crate::health::{Health, Level, Subsystem};
 use crate::latest::Latest;
 use crate::observation::{Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
-use crate::vehicle::{BATTERIES_MAX, Vehicle};
+use crate::vehicle::{BATTERIES_MAX, LANDED_STATE_AGE, Vehicle};
 
 /// Bytes of a text that a ground station shows to the pilot as it comes: those of one `STATUSTEXT`.
 pub const TEXT_BYTES_MAX: usize = 50;
@@ -231,13 +231,18 @@ pub(crate) struct Situation<'a> {
     pub(crate) now: Instant,
     pub(crate) vehicle: &'a Vehicle,
     pub(crate) flight: &'a Flight,
+    /// It falls, tumbles or lies: no command helps.
+    pub(crate) mishap: bool,
     pub(crate) health: &'a Health,
     pub(crate) params: &'a Params,
 }
 
 impl Situation<'_> {
     fn flies(&self) -> bool {
-        self.flight.airborne() && self.vehicle.armed() && self.vehicle.kind() != VehicleKind::Surface
+        self.flight.airborne()
+            && !self.mishap
+            && self.vehicle.armed()
+            && self.vehicle.kind() != VehicleKind::Surface
     }
 }
 
@@ -388,7 +393,7 @@ fn concerned(vehicle: &Vehicle, health: &Health, params: &Params) -> bool {
     let chosen = params.get(Param::ProtCheck) as u8;
     health.levels().any(|(check, instance, level)| {
         let concerned = match chosen.checked_sub(1) {
-            None => matches!(check.name, "batt_remaining" | "cell_voltage"),
+            None => matches!(check.name, "batt_remaining" | "cell_voltage" | "batt_state"),
             Some(subsystem) => Subsystem::from_number(subsystem) == Some(check.subsystem),
         };
         let battery = vehicle.batteries.get(usize::from(instance)).and_then(Latest::get);

@@ -2,44 +2,61 @@
 //!
 //! 64 bits of microseconds last 584,000 years, so nothing here wraps.
 
+use core::fmt;
+use core::num::NonZeroU64;
 use core::ops::Add;
 
-/// A point in time: microseconds since the monitor's power-on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Instant(u64);
+/// A point in time: microseconds since the monitor's power-on. Kept one higher, so that one that may be missing takes no more
+/// room: the monitor has more than a hundred of them.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Instant(NonZeroU64);
+
+const _: () = assert!(size_of::<Option<Instant>>() == size_of::<Instant>());
+
+impl Default for Instant {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+impl fmt::Debug for Instant {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_tuple("Instant").field(&self.as_micros()).finish()
+    }
+}
 
 impl Instant {
     /// Power-on.
-    pub const ZERO: Self = Self(0);
+    pub const ZERO: Self = Self(NonZeroU64::MIN);
 
-    /// From microseconds since power-on.
+    /// From microseconds since power-on; the last one of 64 bits is taken for the one before it.
     pub const fn from_micros(micros: u64) -> Self {
-        Self(micros)
+        Self(NonZeroU64::MIN.saturating_add(micros))
     }
 
     /// From milliseconds since power-on.
     pub const fn from_millis(millis: u64) -> Self {
-        Self(millis.saturating_mul(1_000))
+        Self::from_micros(millis.saturating_mul(1_000))
     }
 
     /// Microseconds since power-on.
     pub const fn as_micros(self) -> u64 {
-        self.0
+        self.0.get() - 1
     }
 
     /// Whole milliseconds since power-on, rounded down.
     pub const fn as_millis(self) -> u64 {
-        self.0 / 1_000
+        self.as_micros() / 1_000
     }
 
     /// Seconds since power-on; exact to a microsecond for the first 285 years.
     pub fn as_secs_f64(self) -> f64 {
-        self.0 as f64 / 1e6
+        self.as_micros() as f64 / 1e6
     }
 
     /// The span from `earlier` to here; zero where `earlier` is the later one.
     pub const fn since(self, earlier: Self) -> Span {
-        Span(self.0.saturating_sub(earlier.0))
+        Span(self.0.get().saturating_sub(earlier.0.get()))
     }
 }
 

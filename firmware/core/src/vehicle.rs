@@ -10,7 +10,7 @@ use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
     GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
     Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio,
-    VehicleKind, Vibration, VibrationScale,
+    VehicleKind, Vibration, VibrationScale, VtolState,
 };
 use crate::time::{Instant, Span};
 
@@ -20,6 +20,8 @@ pub const BATTERIES_MAX: usize = 4;
 pub const RECEIVERS_MAX: usize = 2;
 /// How long after an autopilot's first heartbeat its boot time is told.
 const RESTART_SHOWS: Span = Span::from_secs(3);
+/// `EXTENDED_SYS_STATE` comes at 1 Hz or faster where it comes at all.
+pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
 /// A boot time that falls by more than this is a reboot, not reordering.
 const REBOOT_MS: u32 = 3_000;
 /// A fall from here is the end of the counter's range.
@@ -85,6 +87,8 @@ pub struct Vehicle {
     pub engine: Latest<Engine>,
     /// The autopilot's word on flying.
     pub landed: Latest<LandedState>,
+    /// What a VTOL flies on, as old as `landed`.
+    pub vtol: VtolState,
     /// The autopilot's processor.
     pub processor: Latest<Processor>,
     /// The autopilot's identity.
@@ -152,6 +156,7 @@ impl Vehicle {
             }; MOTORS_MAX],
             engine: Latest::nothing(),
             landed: Latest::nothing(),
+            vtol: VtolState::Unknown,
             processor: Latest::nothing(),
             identity: Latest::nothing(),
             command_ack: Latest::nothing(),
@@ -189,6 +194,30 @@ impl Vehicle {
         self.heartbeat
             .get()
             .is_some_and(|heartbeat| matches!(heartbeat.type_number, 2 | 13 | 14 | 15 | 29 | 35))
+    }
+
+    /// Whether it hangs on its rotors now (`Some(false)`: it flies on wings); `None` where nobody knows. Of a VTOL its own word
+    /// counts, and its speed where it says none: between the two it may be either.
+    pub fn hovers(&self, now: Instant) -> Option<bool> {
+        const WINGS_MPS: f32 = 12.0;
+        const ROTORS_MPS: f32 = 6.0;
+        match self.kind() {
+            VehicleKind::Rotorcraft => Some(true),
+            VehicleKind::Plane => Some(false),
+            VehicleKind::Vtol => match (self.vtol, self.landed.within(now, LANDED_STATE_AGE)) {
+                (VtolState::Hover, Some(_)) => Some(true),
+                (VtolState::Forward, Some(_)) => Some(false),
+                (VtolState::Transition, Some(_)) => None,
+                _ => {
+                    let hud = self.hud.within(now, LANDED_STATE_AGE)?;
+                    let speed_mps = hud.airspeed.into_iter().chain(hud.groundspeed).map(|speed| speed.0);
+                    let speed_mps = speed_mps.reduce(f32::max)?;
+                    let between = (ROTORS_MPS..WINGS_MPS).contains(&speed_mps);
+                    (!between).then_some(speed_mps < ROTORS_MPS)
+                }
+            },
+            VehicleKind::Surface | VehicleKind::Other => None,
+        }
     }
 
     /// Whether this is surely the vehicle: no other one takes its place for as long as it is heard.
@@ -258,13 +287,17 @@ impl Vehicle {
             Observation::Vibration(vibration) => self.take_vibration(at, vibration),
             Observation::Escs(group) => self.take_escs(at, &group),
             Observation::Engine(engine) => self.engine.set(at, engine),
-            Observation::Landed(landed) => self.landed.set(at, landed),
+            Observation::Landed(landed, vtol) => {
+                self.landed.set(at, landed);
+                self.vtol = vtol;
+            }
             Observation::Processor(processor) => self.processor.set(at, processor),
             Observation::Identity(identity) => self.identity.set(at, identity),
             Observation::CommandAck(ack) => self.command_ack.set(at, ack),
             Observation::MissionReached(item) => self.mission_reached.set(at, item),
             Observation::SpeedSensors(_)
             | Observation::MissionCurrent(_)
+            | Observation::Parameter(..)
             | Observation::FlightInformation { .. } => {}
         }
     }

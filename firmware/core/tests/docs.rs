@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use hums_core::exposure;
 use hums_core::health::{Check, Side, VOCABULARY, When, checks};
-use hums_core::params::{Param, Params, TABLE};
+use hums_core::params::{Param, Params, TABLE, WORDS};
 use hums_core::time::Span;
 use hums_core::usage::UsageCounter;
 
@@ -20,6 +20,7 @@ const INPUTS: &[(&str, &str)] = &[
         "cell_voltage",
         "BATTERY_STATUS: the lowest cell, or the pack by its cells; SYS_STATUS likewise; armed and lithium",
     ),
+    ("batt_state", "BATTERY_STATUS: charge_state; 1 low or unhealthy, 2 critical, emergency or failed"),
     ("cell_deviation", "BATTERY_STATUS: highest less lowest cell"),
     ("cell_dev_lasting", "BATTERY_STATUS: the same for a minute"),
     ("batt_resistance", "BATTERY_STATUS: slope of voltage over current, against its baseline"),
@@ -43,7 +44,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("engine_due", "components of kind engine"),
     ("vibration", "VIBRATION of ArduPilot: the worst axis"),
     ("vibration_px4", "VIBRATION of PX4: the accelerometer metric"),
-    ("clipping", "VIBRATION: clipped samples since take-off"),
+    ("clipping", "VIBRATION: clipped samples of a flight, since ten seconds without any"),
     ("load_factor", "SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity"),
     ("vibration_trend", "VIBRATION in steady flight, above its baseline"),
     ("airframe_due", "components of kind airframe, other"),
@@ -75,6 +76,20 @@ const INPUTS: &[(&str, &str)] = &[
     ("card_errors", "our recorder: block writes that the card refused, ten seconds"),
     ("card_room", "our recorder: the share of the card that logs can have"),
     ("card_due", "components of kind card"),
+    (
+        "free_fall",
+        "RAW_IMU, SCALED_IMU, HIGHRES_IMU: specific force below 0.3 g, with the throttle of VFR_HUD; on rotors",
+    ),
+    (
+        "impact",
+        "the same: a shock, with the speed of GLOBAL_POSITION_INT breaking off or the vehicle on its side, then stillness",
+    ),
+    ("tumbling", "ATTITUDE, or the inertial messages: body rates for 0.5 s, on wings for 1.5 s"),
+    ("disarmed_in_air", "HEARTBEAT: disarmed out of a flight, and then it falls, sinks or glides"),
+    (
+        "sinking",
+        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; on rotors",
+    ),
 ];
 
 fn path(name: &str) -> PathBuf {
@@ -102,12 +117,12 @@ fn the_parameters_are_documented_as_they_are() {
         ground station over MAVLink, and kept over power-off. A change is recorded with who made it and applies at once.\n\n\
         | name | unit | default | range | what it is, where the default comes from |\n|---|---|---|---|---|\n"
         .to_owned();
-    for spec in TABLE {
-        let (unit, default) = (spec.unit, number(spec.default));
+    for (spec, words) in TABLE.iter().zip(WORDS) {
+        let (unit, default) = (words.unit, number(spec.default));
         let _ = writeln!(
             text,
             "| {} | {unit} | {default} | {} to {} | {} |",
-            spec.name, spec.min, spec.max, spec.source
+            spec.name, spec.min, spec.max, words.source
         );
     }
     assert_is("parameters.md", &text);
@@ -136,7 +151,7 @@ fn row(check: &Check) -> String {
         When::Armed => "armed",
         When::InFlight => "in flight",
     };
-    let source = check.critical.or(check.warn).map_or("", |param| TABLE[param as usize].source);
+    let source = check.critical.or(check.warn).map_or("", |param| param.words().source);
     format!(
         "| {} | {} | {input} | {when} | {side} | {} | {} | {} | {}, {} | {} | {} | {source} |",
         check.subsystem.name(),

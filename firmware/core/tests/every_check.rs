@@ -55,13 +55,18 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 51] = [
+const FAULTS: [(&str, u8, Level, Fault); 54] = [
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
         more.push(Observation::Battery(Battery { id: 1, remaining, ..Battery::default() }));
     }),
     ("cell_voltage", 0, Level::Critical, |quad, _| quad.battery.voltage = Some(Volts(13.2))),
+    ("batt_state", 0, Level::Warning, |quad, _| quad.battery.charge = 2),
+    ("batt_state", 0, Level::Critical, |quad, _| quad.battery.charge = 3),
+    ("batt_state", 1, Level::Critical, |_, more| {
+        more.push(Observation::Battery(Battery { id: 1, charge: 4, ..Battery::default() }));
+    }),
     ("cell_deviation", 0, Level::Critical, |quad, _| cells(quad, 3.7)),
     ("cell_dev_lasting", 0, Level::Critical, |quad, _| cells(quad, 3.8)),
     ("batt_fault", 0, Level::Warning, |quad, _| quad.battery.faults = 4),
@@ -109,12 +114,12 @@ const FAULTS: [(&str, u8, Level, Fault); 51] = [
         quad.estimator.scale = EstimatorScale::TestRatio;
         quad.estimator.velocity = Some(1.5);
     }),
-    ("gps_satellites", 0, Level::Warning, |quad, _| quad.gnss.satellites = Some(6)),
+    ("gps_satellites", 0, Level::Warning, |quad, _| quad.gnss.satellites = Some(5)),
     ("gps_satellites", 1, Level::Warning, |_, more| {
-        more.push(Observation::Gnss(Gnss { instance: 1, fix: 3, satellites: Some(6), ..Gnss::default() }));
+        more.push(Observation::Gnss(Gnss { instance: 1, fix: 3, satellites: Some(5), ..Gnss::default() }));
     }),
-    ("gps_hdop", 0, Level::Warning, |quad, _| quad.gnss.hdop = Some(2.5)),
-    ("gps_accuracy", 0, Level::Warning, |quad, _| quad.gnss.accuracy = Some(Metres(3.0))),
+    ("gps_hdop", 0, Level::Warning, |quad, _| quad.gnss.hdop = Some(3.0)),
+    ("gps_accuracy", 0, Level::Warning, |quad, _| quad.gnss.accuracy = Some(Metres(4.0))),
     ("gps_fix", 0, Level::Critical, |quad, _| quad.gnss.fix = 1),
     ("gps_jamming", 0, Level::Critical, |quad, _| quad.integrity.jamming = 3),
     ("gps_spoofing", 0, Level::Critical, |quad, _| quad.integrity.spoofing = 3),
@@ -148,8 +153,8 @@ const FAULTS: [(&str, u8, Level, Fault); 51] = [
 ];
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
-/// `trends.rs`.
-const ELSEWHERE: [&str; 8] = [
+/// `trends.rs`, mishaps in `mishap.rs`.
+const ELSEWHERE: [&str; 13] = [
     "esc_silent",
     "esc_errors",
     "heartbeat",
@@ -158,6 +163,11 @@ const ELSEWHERE: [&str; 8] = [
     "motor_trend",
     "throttle_trend",
     "vibration_trend",
+    "free_fall",
+    "impact",
+    "tumbling",
+    "disarmed_in_air",
+    "sinking",
 ];
 
 /// What is due, and the kind of component (`CMP1_KIND`) that is.
@@ -321,7 +331,8 @@ fn what_a_check_says_is_its_own() {
 
 #[test]
 fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
-    let flags = ["batt_fault", "esc_failure", "autopilot_reboot", "autopilot_state", "sensors"];
+    let flags =
+        ["batt_fault", "esc_failure", "autopilot_reboot", "autopilot_state", "sensors", "disarmed_in_air"];
     for check in checks() {
         let due = DUE.iter().any(|(name, _)| *name == check.name);
         assert_eq!(check.alarm_only, due || flags.contains(&check.name), "{}", check.name);

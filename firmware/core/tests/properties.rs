@@ -8,7 +8,7 @@ use hums_core::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CommandAck, Engine, Esc, EscGroup,
     Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState,
     LocalPosition, Observation, Processor, RadioControl, Rails, Source, SpeedSensor, SystemStatus,
-    SystemTime, TelemetryRadio, VehicleKind, Vibration, VibrationScale,
+    SystemTime, TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState,
 };
 use hums_core::params::{Params, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
@@ -126,6 +126,7 @@ impl Random {
             faults: self.u32(),
             lithium: self.below(4) != 0,
             feeds: hums_core::observation::Feeds::Vehicle,
+            charge: self.pick(&[0, 0, 0, 1, 2, 3, 255]) * u8::from(self.values == Values::Any),
         }
     }
 
@@ -199,7 +200,8 @@ impl Random {
             9 => Observation::ImuAndAir(self.imu(), self.air()),
             10 => {
                 let [roll, pitch, yaw] = self.vector(Radians);
-                Observation::Attitude(Attitude { roll, pitch, yaw, boot_ms: self.maybe(Self::u32) })
+                let rates = self.maybe(|random| random.vector(RadiansPerSecond));
+                Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: self.maybe(Self::u32) })
             }
             11 => Observation::LocalPosition(LocalPosition {
                 position: self.vector(Metres),
@@ -263,7 +265,10 @@ impl Random {
             24 => Observation::SpeedSensors([(); 2].map(|()| {
                 self.maybe(|random| SpeedSensor { index: random.next() as u8, rpm: Rpm(random.f32()) })
             })),
-            25 => Observation::Landed(self.pick(&[Unknown, OnGround, InAir, TakingOff, Landing])),
+            25 => Observation::Landed(
+                self.pick(&[Unknown, OnGround, InAir, TakingOff, Landing]),
+                self.pick(&[VtolState::Unknown, VtolState::Hover, VtolState::Forward, VtolState::Transition]),
+            ),
             _ => Observation::Processor(Processor {
                 temperature: self.float(Celsius),
                 voltage: self.float(Volts),
@@ -272,7 +277,8 @@ impl Random {
     }
 
     fn rare(&mut self) -> Observation {
-        match self.below(4) {
+        match self.below(5) {
+            4 => Observation::Parameter(self.below(20) as u8, self.f32()),
             0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.u32() }),
             1 => Observation::CommandAck(CommandAck {
                 target: None,
@@ -445,10 +451,10 @@ fn what_is_said_to_be_unknown_is_never_ok() {
             };
             monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
             let landed = if now_ms > 2_000 { LandedState::InAir } else { LandedState::OnGround };
-            monitor.observe(now, AUTOPILOT, &Observation::Landed(landed));
+            monitor.observe(now, AUTOPILOT, &Observation::Landed(landed, VtolState::Unknown));
             for _ in 0..3 {
                 let observation = random.observation();
-                let known = matches!(observation, Observation::Heartbeat(_) | Observation::Landed(_));
+                let known = matches!(observation, Observation::Heartbeat(_) | Observation::Landed(..));
                 if !known {
                     monitor.observe(now, AUTOPILOT, &observation);
                 }

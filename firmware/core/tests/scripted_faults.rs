@@ -192,7 +192,7 @@ fn vibration() {
 #[test]
 fn a_turn_too_tight() {
     let findings = fly(|_, quad| quad.acceleration_down = -45.0);
-    found(&findings, "load_factor", 0, Level::Critical, 100, &[]);
+    found(&findings, "load_factor", 0, Level::Critical, 500, &[]);
 }
 
 #[test]

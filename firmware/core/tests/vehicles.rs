@@ -8,7 +8,9 @@ use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::health::Finding;
 use hums_core::lifetime::{Airframe, ItemKey, Lifetime};
-use hums_core::observation::{AutopilotIdentity, Heartbeat, Observation, Source, VehicleKind};
+use hums_core::observation::{
+    AutopilotIdentity, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind, VtolState,
+};
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
@@ -157,6 +159,69 @@ fn restarted(armed: bool) -> Vec<&'static str> {
 fn an_autopilot_that_restarts_on_the_ground_is_counted_and_one_that_restarts_armed_is_an_alarm() {
     assert!(restarted(false).is_empty());
     assert!(!restarted(true).is_empty());
+}
+
+#[test]
+fn a_vtol_that_hovers_is_judged_as_what_hangs_on_rotors_and_on_its_wings_it_banks_as_it_needs() {
+    for (vtol, expected) in [
+        (VtolState::Hover, vec!["roll"]),
+        (VtolState::Forward, vec![]),
+        (VtolState::Transition, vec![]),
+        (VtolState::Unknown, vec![]),
+    ] {
+        let mut monitor = Monitor::new(Params::defaults());
+        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+            let kind = VehicleKind::Vtol;
+            let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+            let mut vehicle = Quad { kind, type_number: 22, landed, vtol, ..Quad::healthy() };
+            if (20_000..25_000).contains(&now_ms) {
+                vehicle.roll = 1.2;
+            }
+            vec![(AUTOPILOT, vehicle.says(now_ms))]
+        });
+        let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
+        checks.dedup();
+        assert_eq!(checks, expected, "{vtol:?}");
+    }
+}
+
+#[test]
+fn a_hexacopter_with_one_dead_motor_has_one_motor_named() {
+    for dead in 0..6 {
+        let mut monitor = Monitor::new(Params::defaults());
+        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+            let mut hexa = Quad { type_number: 13, ..Quad::healthy() };
+            let esc = hexa.escs[0].unwrap();
+            // The others make up for it, the one opposite less than its neighbours.
+            let rpm = |motor: usize| match (motor + 6 - dead) % 6 {
+                _ if now_ms < 20_000 => 5_000.0,
+                0 => 0.0,
+                3 => 4_200.0,
+                1 | 5 => 6_600.0,
+                _ => 5_900.0,
+            };
+            hexa.escs = [0, 1, 2, 3].map(|motor| Some(Esc { rpm: Some(Rpm(rpm(motor))), ..esc }));
+            let more = [4, 5].map(|motor| Some(Esc { rpm: Some(Rpm(rpm(motor))), ..esc }));
+            let mut said = hexa.says(now_ms);
+            said.push(Observation::Escs(EscGroup { first: 4, escs: [more[0], more[1], None, None] }));
+            vec![(AUTOPILOT, said)]
+        });
+        let mut named: Vec<_> = findings.iter().map(|finding| (finding.check, finding.instance)).collect();
+        named.dedup();
+        assert_eq!(named, [("motor_imbalance", dead as u8)], "{findings:?}");
+    }
+}
+
+#[test]
+fn a_link_that_is_silent_is_told_as_such_and_not_as_silent_escs() {
+    let mut monitor = Monitor::new(Params::defaults());
+    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let silent = (20_000..24_500).contains(&now_ms);
+        vec![(AUTOPILOT, if silent { Vec::new() } else { Quad::healthy().says(now_ms) })]
+    });
+    let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
+    checks.dedup();
+    assert_eq!(checks, ["heartbeat"], "{findings:?}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Asking the autopilot for the messages that the checks need, and for who it is.
+//! Asking the autopilot for the messages that the checks need, for who it is, and for its parameters that tell of batteries.
 //!
 //! # How
 //! First we listen for [`LISTEN`]: what already comes often enough is not asked for, so that nothing is ever made
@@ -8,9 +8,13 @@
 //! it never has. A message that is refused is not asked for again until the autopilot reboots. An ArduPilot that never
 //! answers such commands, or knows none, is asked for whole groups with `REQUEST_DATA_STREAM`.
 //!
+//! Parameters are asked for after the messages, each once or twice after the vehicle is heard first or has rebooted. One that the
+//! autopilot does not have is not answered, and that says nothing of it.
+//!
 //! # How much
 //! What is asked for takes at most [`SHARE`] percent of the port's line, and all intervals are stretched until it does.
 
+use hums_core::cells::{self, KNOWN};
 use hums_core::observation::{Autopilot, Source};
 use hums_core::time::{Instant, Span};
 
@@ -111,6 +115,8 @@ struct Asked {
 enum What {
     Interval(usize),
     Identity,
+    /// The place of a parameter in [`KNOWN`].
+    Parameter(usize),
 }
 
 /// What we ask of the autopilot.
@@ -128,6 +134,8 @@ pub struct Asking {
     /// It knows no intervals: the next group to ask for, or how many there are when all are.
     groups: Option<usize>,
     identity: Message,
+    /// Parameters that were not told yet, a bit each by their place.
+    parameters: u16,
 }
 
 impl Default for Asking {
@@ -165,6 +173,7 @@ impl Asking {
             deaf: 0,
             groups: None,
             identity: NONE,
+            parameters: (1 << KNOWN.len()) - 1,
         }
     }
 
@@ -176,12 +185,23 @@ impl Asking {
         }
     }
 
+    /// The autopilot told a parameter's value.
+    pub fn told(&mut self, name: &str) {
+        if let Some(place) = cells::known(name) {
+            self.parameters &= !(1 << place);
+            if self.asked.is_some_and(|asked| asked.what == What::Parameter(usize::from(place))) {
+                (self.asked, self.deaf) = (None, 0);
+            }
+        }
+    }
+
     /// The autopilot answered a command.
     pub fn answered(&mut self, command: u16, result: u8) {
         let Some(asked) = self.asked else { return };
         let (expected, message) = match asked.what {
             What::Interval(index) => (SET_MESSAGE_INTERVAL, &mut self.messages[index]),
             What::Identity => (REQUEST_MESSAGE, &mut self.identity),
+            What::Parameter(_) => return,
         };
         if command != expected || result == IN_PROGRESS {
             return;
@@ -260,7 +280,10 @@ impl Asking {
                 return;
             }
             self.asked = None;
-            self.deaf = self.deaf.saturating_add(TRIES);
+            match asked.what {
+                What::Parameter(place) => self.parameters &= !(1 << place),
+                What::Interval(_) | What::Identity => self.deaf = self.deaf.saturating_add(TRIES),
+            }
         }
         if let Some(group) = self.groups {
             if let Some((stream, rate)) = GROUPS.get(group) {
@@ -269,26 +292,45 @@ impl Asking {
                 if send(&messages::request_data_stream(*stream, rate, system, component)) {
                     self.groups = Some(group + 1);
                 }
+                return;
             }
-            return;
-        }
-        if known.autopilot == Autopilot::ArduPilot && (self.deaf >= DEAF || self.knows_no_intervals()) {
+        } else if known.autopilot == Autopilot::ArduPilot && (self.deaf >= DEAF || self.knows_no_intervals())
+        {
             self.groups = Some(0);
             return;
         }
-        let next = if self.identity.due {
-            Some(What::Identity)
-        } else {
-            self.messages.iter().position(|message| message.due).map(What::Interval)
-        };
-        let Some(what) = next else { return };
+        let Some(what) = self.next(known) else { return };
         if send(&packet(what, known)) {
             match what {
                 What::Identity => self.identity.due = false,
                 What::Interval(index) => self.messages[index].due = false,
+                What::Parameter(_) => {}
             }
-            self.asked = Some(Asked { what, at: now, tries: 1 });
+            // One that it does not have is asked for once more, and not twice.
+            let tries = if matches!(what, What::Parameter(_)) { TRIES - 1 } else { 1 };
+            self.asked = Some(Asked { what, at: now, tries });
         }
+    }
+
+    /// What is asked for next. One that knows no intervals is asked for parameters only.
+    fn next(&self, known: &Known) -> Option<What> {
+        let commands = || {
+            let interval = self.messages.iter().position(|message| message.due).map(What::Interval);
+            if self.identity.due { Some(What::Identity) } else { interval }
+        };
+        let command = self.groups.is_none().then(commands).flatten();
+        command.or_else(|| self.parameter(known).map(What::Parameter))
+    }
+
+    /// The next parameter that this autopilot may have, once the rates were looked at.
+    fn parameter(&self, known: &Known) -> Option<usize> {
+        let px4 = match known.autopilot {
+            Autopilot::Px4 => true,
+            Autopilot::ArduPilot => false,
+            Autopilot::Other => return None,
+        };
+        let due = |place: &usize| self.parameters >> place & 1 == 1 && KNOWN[*place].0 == px4;
+        (0..KNOWN.len()).find(due).filter(|_| self.window == ROUND)
     }
 
     /// Everything that any autopilot has was refused.
@@ -324,6 +366,7 @@ fn packet(what: What, known: &Known) -> Packet {
         What::Identity => {
             messages::command_long(REQUEST_MESSAGE, &[AUTOPILOT_VERSION as f32], system, component)
         }
+        What::Parameter(place) => messages::param_request_read(KNOWN[place].1, system, component),
     }
 }
 

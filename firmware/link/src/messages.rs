@@ -35,6 +35,11 @@ pub fn named_int(now: Instant, name: &str, value: i32) -> Packet {
     Packet::new(252).u32(0, now.as_millis() as u32).u32(4, value as u32).text(8, 10, name)
 }
 
+/// `PARAM_REQUEST_READ`, by its name
+pub(crate) fn param_request_read(name: &str, system: u8, component: u8) -> Packet {
+    Packet::new(20).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name)
+}
+
 /// `PARAM_VALUE`
 pub fn param_value(name: &str, value: f32, index: u16, count: u16) -> Packet {
     Packet::new(22).f32(0, value).u16(4, count).u16(6, index).text(8, 16, name).u8(24, REAL32)
@@ -109,6 +114,7 @@ mod tests {
             named_float(Instant::from_millis(1), "HUMS_LEVEL", 1.0),
             named_int(Instant::from_millis(1), "HUMS_STATE", -1),
             param_value(name, 1.0, 1, 2),
+            param_request_read(name, 1, 1),
             command_ack(512, 3, 255, 190),
             command_long(511, &[1.0; 9], 1, 1),
             request_data_stream(1, 4, 1, 1),

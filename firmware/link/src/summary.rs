@@ -319,7 +319,7 @@ enum Told {
 const OVERALL: &str = "HUMS_LEVEL";
 
 /// What is told in turn, by the name that a ground station plots it by.
-const VALUES_TOLD: [(&str, Told); 16] = [
+const VALUES_TOLD: [(&str, Told); 17] = [
     ("L_POWER", Told::Level(Subsystem::Power)),
     ("L_PROPULS", Told::Level(Subsystem::Propulsion)),
     ("L_ENGINE", Told::Level(Subsystem::Engine)),
@@ -329,6 +329,7 @@ const VALUES_TOLD: [(&str, Told); 16] = [
     ("L_COMPUT", Told::Level(Subsystem::Computer)),
     ("L_ATTITU", Told::Level(Subsystem::Attitude)),
     ("L_RECORD", Told::Level(Subsystem::Recorder)),
+    ("L_MISHAP", Told::Level(Subsystem::Mishap)),
     ("FLT_TIME_S", Told::Usage(UsageCounter::Flight)),
     ("FLIGHTS", Told::Usage(UsageCounter::Flights)),
     ("DIST_M", Told::Usage(UsageCounter::Distance)),

@@ -1,7 +1,9 @@
 //! Texts of our own that are no findings: recorded at once, and told to the ground station when its budget allows. Those
-//! of the protective action are as urgent as a critical finding: the pilot has seconds to cancel it.
+//! of the protective action and of a mishap are as urgent as a critical finding: the pilot has seconds to cancel the one, and
+//! the box may have no more than that to tell where the other was.
 
 use hums_blackbox::record::{Note, Record};
+use hums_core::mishap::{Change, Report};
 use hums_core::protect::Step;
 use hums_core::time::{Instant, Span};
 use hums_link::messages;
@@ -26,6 +28,8 @@ pub(crate) enum Notice {
     Text(u8, &'static str),
     /// A step of the protective action.
     Protection(Step),
+    /// A mishap began or ended.
+    Mishap(Report),
     /// We were restarted: why, and in which task, if it was one.
     Restarted(&'static str, Option<&'static str>),
 }
@@ -59,17 +63,17 @@ impl Notices {
         }
     }
 
-    /// Tells what the protective action does, before whatever else waits.
-    pub(crate) fn announce(&mut self, step: Step) {
+    /// Tells what is as urgent as the protective action or a mishap, before whatever else waits.
+    pub(crate) fn announce(&mut self, notice: Notice) {
         let Self(notices) = self;
-        let is_text = |notice: &Notice| !matches!(notice, Notice::Protection(_));
+        let is_text = |notice: &Notice| !matches!(notice, Notice::Protection(_) | Notice::Mishap(_));
         if notices.is_full() {
             // One less urgent, or the oldest: the record has them all.
             notices.remove(if notices.last().is_some_and(is_text) { WAITING_MAX - 1 } else { 0 });
         }
         let place = notices.iter().position(is_text).unwrap_or(notices.len());
         // There is room.
-        let _ = notices.insert(place, Notice::Protection(step));
+        let _ = notices.insert(place, notice);
     }
 
     /// Tells what waits, as far as the budget allows. Nobody knows whose companion we are before the vehicle is known.
@@ -108,6 +112,12 @@ impl Notice {
                 let (severity, text) = step.text();
                 let severity = if severity <= 2 { Severity::Critical } else { Severity::Notice };
                 (Class::Critical, messages::status_text(severity, &text))
+            }
+            Self::Mishap(report) => {
+                let flies = report.change == Change::FliesOn;
+                let severity = if flies { Severity::Notice } else { Severity::Critical };
+                let text = Text::new(format_args!("HUMS: {}", report.text()));
+                (Class::Critical, messages::status_text(severity, text.as_str()))
             }
         }
     }

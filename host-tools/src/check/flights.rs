@@ -1,7 +1,8 @@
-//! The flights of a recording: from take-off to landing, or to where it was disarmed in the air.
+//! The flights of a recording: from take-off to landing, or to where a mishap ended it.
 
 use hums_core::Monitor;
-use hums_core::time::{Instant, Span};
+use hums_core::mishap::{Change, Kind};
+use hums_core::time::Instant;
 
 use super::problem::LISTED_MAX;
 
@@ -22,10 +23,8 @@ pub struct Flight {
 #[derive(Debug, Default)]
 pub(super) struct Flights {
     list: Vec<Flight>,
-    /// When it was in the air last.
-    flew_at: Option<Instant>,
-    /// When it was disarmed above home right out of the air, and how high.
-    disarmed: Option<(Instant, f32)>,
+    /// The flight that ends next ends by a mishap.
+    crashed: bool,
 }
 
 impl Flights {
@@ -36,18 +35,23 @@ impl Flights {
         }
     }
 
-    /// The flight is over: it is back on the ground, or disarmed.
-    pub(super) fn landing(&mut self, now: Instant, monitor: &Monitor) {
-        self.end_flight(now, true);
-        self.disarmed = self.disarmed_at_m(now, monitor).map(|height_m| (now, height_m));
+    /// The flight is over: it is back on the ground, or disarmed, or a mishap ended it.
+    pub(super) fn landing(&mut self, now: Instant) {
+        let crashed = std::mem::take(&mut self.crashed);
+        self.end_flight(now, !crashed);
     }
 
-    /// One step of the monitor.
-    pub(super) fn step(&mut self, now: Instant, monitor: &Monitor) {
-        if monitor.flight().airborne() {
-            self.flew_at = Some(now);
+    /// A mishap began or ended.
+    pub(super) fn mishap(&mut self, change: Change, monitor: &Monitor) {
+        match change {
+            Change::Began(Kind::Disarmed) => {
+                if let Some(flight) = self.list.last_mut() {
+                    flight.disarmed_at_m = Some(f32::from(monitor.mishap().height_m()));
+                }
+            }
+            Change::Down => self.crashed = true,
+            Change::Began(_) | Change::FliesOn | Change::OnBench(_) => {}
         }
-        self.watch_fall(now, monitor);
     }
 
     /// The recording has ended.
@@ -58,42 +62,9 @@ impl Flights {
         self.list
     }
 
-    /// The height above home where a flight that ends now was ended by disarming, not well after a landing.
-    fn disarmed_at_m(&self, now: Instant, monitor: &Monitor) -> Option<f32> {
-        /// Lower is a landing whose last metre the autopilot or its height has missed.
-        const LANDING_M: f32 = 3.0;
-        /// The autopilot says that it stands when it disarms, and its heartbeat comes at 1 Hz.
-        const SINCE_AIR: Span = Span::from_secs(2);
-        let flew = self.flew_at.is_some_and(|at| now.since(at) <= SINCE_AIR);
-        let disarmed = flew && !monitor.vehicle().armed();
-        height_m(monitor).filter(|height_m| disarmed && *height_m > LANDING_M)
-    }
-
-    /// What was disarmed above home falls if it was in the air, and stays where it is if it stands on a hill or a roof.
-    fn watch_fall(&mut self, now: Instant, monitor: &Monitor) {
-        const WATCHED: Span = Span::from_secs(4);
-        const FALLEN_M: f32 = 2.0;
-        let Some((at, from_m)) = self.disarmed else { return };
-        if height_m(monitor).is_some_and(|height_m| height_m < from_m - FALLEN_M) {
-            if let Some(flight) = self.list.last_mut() {
-                (flight.landed, flight.disarmed_at_m) = (false, Some(from_m));
-            }
-            self.disarmed = None;
-        } else if now.since(at) > WATCHED {
-            self.disarmed = None;
-        }
-    }
-
     fn end_flight(&mut self, at: Instant, landed: bool) {
-        if let Some(flight) =
-            self.list.last_mut().filter(|flight| !flight.landed && flight.disarmed_at_m.is_none())
-        {
+        if let Some(flight) = self.list.last_mut().filter(|flight| !flight.landed) {
             (flight.to, flight.landed) = (at, landed);
         }
     }
-}
-
-/// Height above home, as it was told last.
-fn height_m(monitor: &Monitor) -> Option<f32> {
-    monitor.vehicle().global.get().map(|position| position.relative_altitude.0)
 }

@@ -143,12 +143,10 @@ impl Judge {
                     wire.frame(at, frame);
                 }
             }
-            Item::Frame(_)
-            | Item::Parameter(_)
-            | Item::Text(_)
-            | Item::Mode(_)
-            | Item::Event(_)
-            | Item::Row(_) => {}
+            Item::Parameter(parameter) => {
+                self.monitor.learn_parameter(parameter.name, parameter.value as f32);
+            }
+            Item::Frame(_) | Item::Text(_) | Item::Mode(_) | Item::Event(_) | Item::Row(_) => {}
         }
     }
 
@@ -209,7 +207,6 @@ impl Judge {
             }
         });
         let armed = monitor.vehicle().armed();
-        self.flights.step(now, &self.monitor);
         if armed && self.was_armed {
             self.armed = self.armed + TICK;
         }
@@ -221,7 +218,8 @@ impl Judge {
                     let from = since.map_or(now, |since| Clock::recording(now, steps, since));
                     self.flights.take_off(now, from);
                 }
-                Happening::Landing => self.flights.landing(now, &self.monitor),
+                Happening::Landing => self.flights.landing(now),
+                Happening::Mishap(change) => self.flights.mishap(change, &self.monitor),
                 _ => {}
             }
         }

@@ -112,7 +112,7 @@ impl Companion {
     /// As the page takes it; `None` where there never was one.
     pub fn json(&self, now: Instant) -> Option<CompanionJson> {
         let heard = self.heard.filter(|_| self.named)?;
-        let names = |levels: [Level; 9]| levels.into_iter().map(Level::name).collect();
+        let names = |levels: [Level; Subsystem::ALL.len()]| levels.into_iter().map(Level::name).collect();
         Some(CompanionJson {
             heard_ms: now.since(heard).as_millis(),
             gone: !self.present(now),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use hums_core::params::{ParamError, ParamSpec, Params, TABLE};
+use hums_core::params::{Param, ParamError, ParamSpec, Params};
 use hums_link::param_line::{self, Line};
 
 use crate::outcome::usage;
@@ -35,14 +35,15 @@ fn parameter(line: &str) -> Result<Option<(&'static ParamSpec, f32)>, String> {
         Line::Set(name, value) => (name, value),
         Line::Wrong => return Err("wants NAME VALUE, for instance CELL_VOLT_WARN 3.6".to_owned()),
     };
-    let Some(spec) = TABLE.iter().find(|spec| spec.name == name) else {
+    let Some(param) = Param::find(name) else {
         return Err(format!("there is no parameter {name}"));
     };
     let number = value.parse().ok().filter(|number| {
         // The table itself decides.
         !matches!(Params::defaults().set(name, *number), Err(ParamError::OutOfRange { .. }))
     });
-    let ParamSpec { min, max, unit, .. } = spec;
+    let (spec, unit) = (param.spec(), param.words().unit);
+    let ParamSpec { min, max, .. } = spec;
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     number
         .map(|number| Some((spec, number)))

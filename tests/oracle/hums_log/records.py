@@ -9,14 +9,15 @@ from coder import Distribution
 MOMENTS = ["start", "periodic", "end"]
 LEVELS = ["ok", "advisory", "warning", "critical", "stale"]
 SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude",
-              "recorder"]
+              "recorder", "mishap"]
 LOSSES = ["uart_overrun", "bytes_not_frames", "damaged_frames", "queue_full", "card", "records"]
 EVENTS = ["", "armed", "disarmed", "take_off", "landing", "snapshot", "card_in", "card_out", "critical", "phase",
-          "autopilot_reboot", "other_airframe", "by_link", "other_vehicle", "flight_resumed"]
+          "autopilot_reboot", "other_airframe", "by_link", "other_vehicle", "flight_resumed",
+          "mishap", "mishap_down", "mishap_over", "mishap_on_bench"]
 SOURCES = ["unknown", "SYSTEM_TIME", "recording", "GNSS"]
 FAULTS = ["unknown", "panic", "hard_fault", "watchdog"]
 FOUND = ["unknown", "nothing", "sectors", "frames", "unreadable"]
-RESTING = ["unknown", "disarmed", "landed"]
+RESTING = ["unknown", "disarmed", "landed", "mishap"]
 STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_not_frames", "bytes_logged",
               "blocks_written", "queue_bytes_max", "queue_bytes_capacity", "sd_stall_ms_max", "gs_frames",
               "gs_bytes", "frame_queue_bytes_max", "frame_queue_bytes_capacity", "gs_queue_bytes_max",

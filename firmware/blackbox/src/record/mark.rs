@@ -9,6 +9,8 @@ pub enum Resting {
     Disarmed = 1,
     /// The vehicle landed.
     Landed = 2,
+    /// A mishap began, or ended with the vehicle down.
+    Mishap = 3,
 }
 
 impl Resting {
@@ -17,6 +19,7 @@ impl Resting {
         match self {
             Self::Disarmed => "disarmed",
             Self::Landed => "landed",
+            Self::Mishap => "mishap",
         }
     }
 
@@ -25,6 +28,7 @@ impl Resting {
         match self {
             Self::Disarmed => "disarming",
             Self::Landed => "landing",
+            Self::Mishap => "mishap",
         }
     }
 }
@@ -53,6 +57,7 @@ impl Mark {
         let why = match fields.u8() {
             1 => Resting::Disarmed,
             2 => Resting::Landed,
+            3 => Resting::Mishap,
             _ => return None,
         };
         Some(Self { why, sector: fields.u32(), frames: fields.u32() })

@@ -1,4 +1,4 @@
-//! Roll and pitch of what hangs on rotors. A plane banks as it needs to, and a VTOL is one of both at a time.
+//! Roll and pitch of what hangs on rotors. A plane banks as it needs to, and so does a VTOL while it flies on its wings.
 
 use super::check::{Check, Side, When};
 use super::common::STALE;
@@ -40,9 +40,12 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians) -> Option<Reading> {
-    if inputs.vehicle.kind() != VehicleKind::Rotorcraft {
+    if !matches!(inputs.vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
         return None;
     }
+    // On wings, and between both, no angle is too much.
+    let judged = inputs.vehicle.hovers(inputs.now) == Some(true);
     let slot = &inputs.vehicle.attitude;
-    Reading::new(slot.at(), slot.get().map(|attitude| angle(attitude).0.to_degrees().abs()))
+    let degrees = |attitude: &Attitude| angle(attitude).0.to_degrees().abs();
+    Reading::new(slot.at(), slot.get().map(|attitude| if judged { degrees(attitude) } else { 0.0 }))
 }

@@ -230,6 +230,11 @@ impl State {
         }
     }
 
+    /// The same as it was before a step, but for when its value was measured.
+    pub(super) const fn seen_as(self, later: &Self) -> Self {
+        Self { seen: later.seen, ..self }
+    }
+
     /// After a step, where levels may fall.
     pub(super) const fn release(&mut self, change: Option<Change>) -> Option<Change> {
         self.held = None;

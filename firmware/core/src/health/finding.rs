@@ -68,11 +68,13 @@ pub enum Subsystem {
     Attitude = 7,
     /// This monitor: its card, its queues, its own losses.
     Recorder = 8,
+    /// Falls, impacts, tumbling: what ends a flight otherwise than by landing.
+    Mishap = 9,
 }
 
 impl Subsystem {
     /// All subsystems, by number.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Power,
         Self::Propulsion,
         Self::Engine,
@@ -82,6 +84,7 @@ impl Subsystem {
         Self::Computer,
         Self::Attitude,
         Self::Recorder,
+        Self::Mishap,
     ];
 
     /// The name that logs, JSON and reports use.
@@ -96,6 +99,7 @@ impl Subsystem {
             Self::Computer => "computer",
             Self::Attitude => "attitude",
             Self::Recorder => "recorder",
+            Self::Mishap => "mishap",
         }
     }
 
@@ -155,6 +159,7 @@ mod tests {
             "computer",
             "attitude",
             "recorder",
+            "mishap",
         ];
         for number in 0..=u8::MAX {
             let subsystem = Subsystem::from_number(number);

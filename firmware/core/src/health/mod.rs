@@ -12,6 +12,7 @@ pub mod exceedance;
 pub mod finding;
 mod inputs;
 mod link;
+mod mishap;
 mod navigation;
 mod power;
 mod propulsion;
@@ -27,9 +28,12 @@ pub use tables::{checks, instances, words};
 pub use vocabulary::{Scope, VOCABULARY, Words, vocabulary};
 
 use crate::params::Param;
+use crate::time::Span;
 use exceedance::Exceedances;
 use tables::STATES;
 
+/// A vehicle that has not been heard for so long is silent.
+const SILENT: Span = Span::from_secs(5);
 /// Subsystems that every vehicle has, in the air and on the ground.
 pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsystem::Computer];
 
@@ -61,15 +65,24 @@ impl Health {
         findings: &mut impl FnMut(&Finding),
     ) {
         let latched = inputs.params.get(Param::Latch) >= 0.5 && inputs.vehicle.armed();
+        let quiet = inputs.mishap.is_going();
+        let heard = inputs.vehicle.heartbeat.within(inputs.now, SILENT).is_some();
         for (place, check, instance, state) in self.each_mut() {
+            let quiet = quiet && check.when != When::Always;
             let applies = match check.when {
                 When::Always => true,
+                _ if quiet => true,
                 When::Armed => inputs.vehicle.armed(),
                 When::InFlight => inputs.flight.airborne(),
             };
             let reading = (check.read)(inputs, instance);
             let before = *state;
             let change = state.step(check, inputs.now, reading, applies, inputs.params);
+            if quiet && (heard || change.is_none_or(|change| change.level != Level::Stale)) {
+                // It would only echo the mishap: it stays as it was, unless the vehicle falls silent.
+                *state = before.seen_as(state);
+                continue;
+            }
             let change = if latched { state.hold(&before, change) } else { state.release(change) };
             let Some(change) = change else {
                 if let (Some(Level::Warning | Level::Critical), Some(reading)) = (state.level(), reading) {

@@ -112,6 +112,27 @@ pub(super) const CHECKS: &[Check] = &[
         ..BATTERY
     },
     Check {
+        name: "batt_state",
+        words: "autopilot: battery low",
+        unit: "",
+        side: Side::Above,
+        warn: Some(Param::BatStateWarn),
+        critical: Some(Param::BatStateCrit),
+        hysteresis: 0.0,
+        read: |inputs, battery| {
+            let slot = inputs.vehicle.batteries.get(usize::from(battery))?;
+            let value = match slot.get()?.charge {
+                1 | 7 => 0.0,
+                2 | 6 => 1.0,
+                3..=5 => 2.0,
+                _ => return None,
+            };
+            Reading::new(slot.at(), Some(value))
+        },
+        when: When::Armed,
+        ..BATTERY
+    },
+    Check {
         name: "rail_5v_low",
         words: "5 V rail low",
         unit: "V",

@@ -59,8 +59,9 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::LoadFacWarn),
         critical: Some(Param::LoadFacCrit),
         hysteresis: 0.2,
-        debounce_warn: Span::from_millis(100),
-        debounce_critical: Span::from_millis(100),
+        // What lasts is a manoeuvre; a shock or vibration does not, and an impact is a mishap.
+        debounce_warn: Span::from_millis(500),
+        debounce_critical: Span::from_millis(500),
         when: When::InFlight,
         read: |inputs, _| inputs.derived.load_factor(),
         ..VIBRATION

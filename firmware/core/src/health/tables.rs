@@ -1,9 +1,9 @@
 //! All checks: each subsystem's table is in a file of its own.
 
 use super::check::Check;
-use super::{attitude, computer, engine, link, navigation, power, propulsion, recorder, structure};
+use super::{attitude, computer, engine, link, mishap, navigation, power, propulsion, recorder, structure};
 
-pub(super) const TABLES: [&[Check]; 9] = [
+pub(super) const TABLES: [&[Check]; 10] = [
     power::CHECKS,
     propulsion::CHECKS,
     engine::CHECKS,
@@ -13,6 +13,7 @@ pub(super) const TABLES: [&[Check]; 9] = [
     computer::CHECKS,
     attitude::CHECKS,
     recorder::CHECKS,
+    mishap::CHECKS,
 ];
 
 /// States that all checks together have: one for each instance.

@@ -77,6 +77,8 @@ vocabulary! {
     "The battery reported a fault of its own."; "Do not use the battery until its fault is known.";
     "batt_temperature" Vehicle "battery temperature", "battery", needs "battery temperature";
     "The battery was too hot."; "Let it cool before charging; look for a high load or a damaged cell.";
+    "batt_state" Vehicle "battery by the autopilot's thresholds", "battery", needs "charge state of a battery";
+    "The autopilot called the battery low by its own thresholds."; "Land earlier; check the pack and the thresholds.";
     "rail_5v_low" Vehicle "5 V supply, low", "", needs "voltage of the 5 V supply";
     "The autopilot's 5 V supply was too low: it can restart in flight.";
     "Check the power module and its wiring; take loads off the 5 V supply.";
@@ -193,6 +195,19 @@ vocabulary! {
     "Other files take the card's room."; "Copy them elsewhere, then remove them.";
     "card_due" Stored "card life", "", needs "card registered with the monitor on board";
     "The card has reached the end of its life."; "Copy its logs, replace it, and tell the monitor.";
+
+    "free_fall" Vehicle "free fall", "", needs "acceleration of a vehicle on rotors";
+    "Nothing carried the vehicle though its throttle asked for thrust.";
+    "Inspect the vehicle; look for lost power, ESCs or propellers in the seconds before.";
+    "impact" Vehicle "impact", "", needs "acceleration";
+    "The vehicle hit the ground or something else."; "Do not fly until the whole vehicle is inspected.";
+    "tumbling" Vehicle "tumbling", "", needs "body rates";
+    "The vehicle turned over and over: it was out of control.";
+    "Do not fly until motors, propellers and sensors are checked.";
+    "disarmed_in_air" Vehicle "disarmed in the air", "", needs "arming";
+    "The vehicle was disarmed in the air, and fell."; "Look for who or what disarmed it; inspect the vehicle.";
+    "sinking" Vehicle "sinking", "", needs "climb rate of a vehicle on rotors";
+    "The vehicle sank fast without being told to."; "Look for lost thrust, an empty battery or a wrong height.";
 }
 
 #[cfg(test)]

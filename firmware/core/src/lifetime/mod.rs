@@ -25,6 +25,7 @@ use crate::component::{COMPONENTS_MAX, Component};
 use crate::exposure::Exposure;
 use crate::health::exceedance::Exceedances;
 use crate::usage::{Form, Totals, UsageCounter};
+use crate::vehicle::BATTERIES_MAX;
 
 /// The longest item. Each has its own length.
 pub const ITEM_BYTES_MAX: usize = 512;
@@ -151,19 +152,23 @@ pub struct Lifetime {
     pub boots: u32,
     /// Power-ons in which the airframe was heard.
     pub sessions: u32,
+    /// Cells of its batteries as they were known last; 0 not known. They confirm, and prove nothing.
+    pub cells: [u8; BATTERIES_MAX],
     /// Every counter of usage.
     pub totals: Totals,
 }
 
-/// Counters of version 1: the first of [`UsageCounter::ALL`]. A later version's are appended after the motors.
+/// Counters of version 1: the first of [`UsageCounter::ALL`]. A later version's are appended at the item's end.
 const COUNTERS_V1: usize = 32;
-const VERSION: u8 = 1;
+/// Version 2 appends the counters that came since.
+const VERSION: u8 = 2;
 
 impl Lifetime {
     /// Length of the stored form: version, system id, unique id, boots, sessions, counters in the order of
-    /// [`UsageCounter::ALL`] as their [`Form`] says, then seconds (tenths, u32) and revolutions (f64) of each motor.
+    /// [`UsageCounter::ALL`] as their [`Form`] says, then seconds (tenths, u32) and revolutions (f64) of each motor, then (since version 2) the
+    /// counters after the first 32, and the cells of each battery.
     pub const BYTES: usize = {
-        let mut bytes = 1 + 1 + 8 + 4 + 4 + crate::observation::MOTORS_MAX * (4 + 8);
+        let mut bytes = 1 + 1 + 8 + 4 + 4 + crate::observation::MOTORS_MAX * (4 + 8) + BATTERIES_MAX;
         let mut place = 0;
         while place < UsageCounter::ALL.len() {
             bytes += UsageCounter::ALL[place].form().bytes();
@@ -174,7 +179,13 @@ impl Lifetime {
 
     /// Nothing lived yet.
     pub const fn new() -> Self {
-        Self { airframe: Airframe { system: 0, uid: 0 }, boots: 0, sessions: 0, totals: Totals::nothing() }
+        Self {
+            airframe: Airframe { system: 0, uid: 0 },
+            boots: 0,
+            sessions: 0,
+            cells: [0; BATTERIES_MAX],
+            totals: Totals::nothing(),
+        }
     }
 
     /// Writes the stored form.
@@ -187,13 +198,18 @@ impl Lifetime {
         for motor in &self.totals.motors {
             put.u32(tenths(motor.seconds)).f64(motor.revolutions);
         }
+        for counter in &UsageCounter::ALL[COUNTERS_V1..] {
+            put_counter(&mut put, counter.form(), self.totals.raw(*counter));
+        }
+        put.bytes(&self.cells);
     }
 
     /// Reads the stored form, of this version or a later one.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut take = Take::new(stored);
         let mut lifetime = Self::new();
-        if take.u8()? < VERSION {
+        let version = take.u8()?;
+        if version == 0 {
             return Err(Unreadable);
         }
         lifetime.airframe = Airframe { system: take.u8()?, uid: take.u64()? };
@@ -205,6 +221,13 @@ impl Lifetime {
         for motor in &mut lifetime.totals.motors {
             motor.seconds = f64::from(take.u32()?) / 10.0;
             motor.revolutions = amount(take.f64()?);
+        }
+        for counter in UsageCounter::ALL[COUNTERS_V1..].iter().filter(|_| version >= VERSION) {
+            let value = take_counter(&mut take, counter.form())?;
+            lifetime.totals.set(*counter, value);
+        }
+        if version >= VERSION {
+            lifetime.cells = take.array()?;
         }
         Ok(lifetime)
     }
@@ -238,7 +261,9 @@ fn take_counter(take: &mut Take<'_>, form: Form) -> Result<f64, Unreadable> {
 mod tests {
     use super::*;
 
-    const _: () = assert!(UsageCounter::ALL.len() == COUNTERS_V1, "a later version appends its counters");
+    /// What version 2 appends: a later version appends its own.
+    const V2_BYTES: usize = 4 + BATTERIES_MAX;
+    const _: () = assert!(UsageCounter::ALL.len() == COUNTERS_V1 + 1, "a later version appends its counters");
 
     /// 10,000 hours of hard work.
     fn old() -> Lifetime {
@@ -246,6 +271,7 @@ mod tests {
             airframe: Airframe { system: 3, uid: 0x0102_0304_0506_0708 },
             boots: 40_000,
             sessions: 39_000,
+            cells: [6, 3, 0, 0],
             ..Lifetime::new()
         };
         for counter in UsageCounter::ALL {
@@ -278,10 +304,19 @@ mod tests {
     fn the_stored_layout_of_version_1_stays_what_it_is() {
         let mut stored = [0; Lifetime::BYTES];
         old().encode(&mut stored);
-        assert_eq!(stored.len(), 306);
+        assert_eq!(stored.len(), 306 + V2_BYTES);
+        assert_eq!(stored[0], 2);
+        stored[0] = 1;
+        let stored = &stored[..306];
         assert_eq!(stored[..14], [1, 3, 8, 7, 6, 5, 4, 3, 2, 1, 0x40, 0x9C, 0, 0]);
         let sum = stored.iter().fold(0_u32, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)));
         assert_eq!(sum, 1_761_518_064, "a published layout never changes");
+        let mut read = Lifetime::decode(stored).expect("version 1 reads");
+        assert!(read.totals.raw(UsageCounter::Mishaps) <= 0.0, "what it did not know is not counted");
+        assert_eq!(read.cells, [0; BATTERIES_MAX]);
+        read.totals.set(UsageCounter::Mishaps, 123_456.0);
+        read.cells = old().cells;
+        assert_eq!(read, old());
     }
 
     #[test]
@@ -289,7 +324,7 @@ mod tests {
         let mut stored = [0xEE; Lifetime::BYTES + 9];
         let (known, _) = stored.split_first_chunk_mut().expect("long enough");
         old().encode(known);
-        stored[0] = 2;
+        stored[0] = 3;
         assert_eq!(Lifetime::decode(&stored), Ok(old()));
         for cut in 0..Lifetime::BYTES {
             assert_eq!(Lifetime::decode(&stored[..cut]), Err(Unreadable), "{cut}");

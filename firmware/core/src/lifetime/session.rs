@@ -10,7 +10,8 @@
 //! [`UsageCounter::ALL`], times in tenths of a second, counts and half cycles as variable-length numbers (LEB128),
 //! amounts and extremes as f32; motors, how many of them, and of each tenths of a second and whole revolutions (u32,
 //! variable length); batteries, how many, and the cycles of each (f32); time in ranges, a bit for each range that was
-//! entered (5 bytes), and of these tenths of a second, variable length.
+//! entered (5 bytes), and of these tenths of a second, variable length. Version 2 appends the counters that came since, as the
+//! others.
 //!
 //! Of a quad with four ESCs after half an hour that is some 155 bytes; at most [`Session::BYTES_MAX`].
 
@@ -21,7 +22,7 @@ use crate::observation::MOTORS_MAX;
 use crate::usage::{Form, Totals, UsageCounter, Wear};
 use crate::vehicle::BATTERIES_MAX;
 
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 /// Bytes of a variable-length number of 32 bits.
 const VARIABLE_MAX: usize = 5;
 const RANGES: usize = BINS * Quantity::ALL.len();
@@ -48,7 +49,7 @@ impl Session {
     pub const BYTES_MAX: usize = {
         let mut bytes = 1 + 4 + 1;
         let mut place = 0;
-        while place < COUNTERS_V1 {
+        while place < UsageCounter::ALL.len() {
             bytes += match UsageCounter::ALL[place].form() {
                 Form::Tenths | Form::Count | Form::Halves => VARIABLE_MAX,
                 Form::Amount | Form::Highest | Form::Lowest => 4,
@@ -89,15 +90,8 @@ impl Session {
     pub fn encode(&self, out: &mut [u8]) -> usize {
         let mut put = Put::new(out);
         put.u8(VERSION).u32(self.boots).u8(u8::from(self.heard));
-        for counter in &UsageCounter::ALL[..COUNTERS_V1] {
-            let value = self.totals.raw(*counter);
-            match counter.form() {
-                Form::Tenths => put.variable(tenths(value)),
-                Form::Count => put.variable(value as u32),
-                Form::Halves => put.variable((2.0 * value) as u32),
-                Form::Amount | Form::Highest | Form::Lowest => put.f32(value as f32),
-            };
-        }
+        let (first, later) = UsageCounter::ALL.split_at(COUNTERS_V1);
+        self.put_counters(first, &mut put);
         let motors = &self.totals.motors;
         let used = motors.iter().rposition(|motor| motor.seconds > 0.0).map_or(0, |last| last + 1);
         put.u8(used as u8);
@@ -117,29 +111,33 @@ impl Session {
         for tenths in self.exposure.iter().flatten().filter(|tenths| **tenths > 0) {
             put.variable(*tenths);
         }
+        self.put_counters(later, &mut put);
         put.len()
+    }
+
+    fn put_counters(&self, counters: &[UsageCounter], put: &mut Put<'_>) {
+        for counter in counters {
+            let value = self.totals.raw(*counter);
+            match counter.form() {
+                Form::Tenths => put.variable(tenths(value)),
+                Form::Count => put.variable(value as u32),
+                Form::Halves => put.variable((2.0 * value) as u32),
+                Form::Amount | Form::Highest | Form::Lowest => put.f32(value as f32),
+            };
+        }
     }
 
     /// Reads the stored form, of this version or a later one.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut take = Take::new(stored);
-        if take.u8()? < VERSION {
+        let version = take.u8()?;
+        if version == 0 {
             return Err(Unreadable);
         }
         let (boots, heard) = (take.u32()?, take.u8()? != 0);
         let mut totals = Totals::nothing();
-        for counter in &UsageCounter::ALL[..COUNTERS_V1] {
-            let value = match counter.form() {
-                Form::Tenths => f64::from(take.variable()?) / 10.0,
-                Form::Count => f64::from(take.variable()?),
-                Form::Halves => f64::from(take.variable()?) / 2.0,
-                Form::Amount | Form::Highest => amount(f64::from(take.f32()?)),
-                Form::Lowest => {
-                    Some(f64::from(take.f32()?)).filter(|value| *value >= 0.0).unwrap_or(f64::INFINITY)
-                }
-            };
-            totals.set(*counter, value);
-        }
+        let (first, later) = UsageCounter::ALL.split_at(COUNTERS_V1);
+        take_counters(first, &mut totals, &mut take)?;
         let used = usize::from(take.u8()?);
         for motor in totals.motors.get_mut(..used).ok_or(Unreadable)? {
             motor.seconds = f64::from(take.variable()?) / 10.0;
@@ -157,8 +155,31 @@ impl Session {
                 *tenths = take.variable()?;
             }
         }
+        if version >= VERSION {
+            take_counters(later, &mut totals, &mut take)?;
+        }
         Ok(Self { boots, heard, totals, battery_cycles, exposure })
     }
+}
+
+fn take_counters(
+    counters: &[UsageCounter],
+    totals: &mut Totals,
+    take: &mut Take<'_>,
+) -> Result<(), Unreadable> {
+    for counter in counters {
+        let value = match counter.form() {
+            Form::Tenths => f64::from(take.variable()?) / 10.0,
+            Form::Count => f64::from(take.variable()?),
+            Form::Halves => f64::from(take.variable()?) / 2.0,
+            Form::Amount | Form::Highest => amount(f64::from(take.f32()?)),
+            Form::Lowest => {
+                Some(f64::from(take.f32()?)).filter(|value| *value >= 0.0).unwrap_or(f64::INFINITY)
+            }
+        };
+        totals.set(*counter, value);
+    }
+    Ok(())
 }
 
 const _: () = assert!(Session::BYTES_MAX <= ITEM_BYTES_MAX);
@@ -205,11 +226,17 @@ mod tests {
         let length = half_an_hour().encode(&mut stored);
         assert_eq!(Session::decode(&stored[..length]), Ok(half_an_hour()));
         assert!(length <= Session::BYTES_TYPICAL, "{length}");
-        let sum = stored.iter().fold(0_u32, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)));
-        assert_eq!(sum, 2_790_154_667, "a published layout never changes");
         for cut in 0..length {
             assert_eq!(Session::decode(&stored[..cut]), Err(Unreadable), "{cut}");
         }
+        // Version 1 lacks the last counter, one byte here and five at most.
+        (stored[0], stored[length - 1]) = (1, 0);
+        let first = &stored[..Session::BYTES_MAX - VARIABLE_MAX];
+        let sum = first.iter().fold(0_u32, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)));
+        assert_eq!(sum, 2_790_154_667, "a published layout never changes");
+        let mut read = Session::decode(&stored[..length - 1]).expect("version 1 reads");
+        read.totals.set(UsageCounter::Mishaps, 1.0);
+        assert_eq!(read, half_an_hour());
     }
 
     #[test]

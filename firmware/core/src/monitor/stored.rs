@@ -14,7 +14,12 @@ impl Monitor {
     /// [`ItemKey::Session`] once and last. One that cannot be read is as if there were none.
     pub fn restore(&mut self, key: ItemKey, stored: &[u8]) -> Result<(), Unreadable> {
         match key {
-            ItemKey::Lifetime => self.before = Lifetime::decode(stored)?,
+            ItemKey::Lifetime => {
+                self.before = Lifetime::decode(stored)?;
+                for (battery, count) in self.before.cells.into_iter().enumerate() {
+                    self.derived.cells_mut().remember(battery, count);
+                }
+            }
             ItemKey::Baselines => self.baselines = Baselines::decode(stored)?,
             ItemKey::Exceedances => self.exceedances = Exceedances::decode(stored)?,
             ItemKey::Exposure => self.exposure = Exposure::decode(stored)?,

@@ -147,6 +147,8 @@ counters! {
     LoadCycles5 = 35 Halves "load_cycles_from_3_g";
     /// Ranges from 4 g.
     LoadCycles6 = 36 Halves "load_cycles_from_4_g";
+    /// Flights that a mishap ended.
+    Mishaps = 18 Count "mishaps";
 }
 
 /// Counters one a motor: run time in seconds from this number on, motor by motor.

@@ -49,6 +49,8 @@ pub struct Usage {
     totals: Totals,
     touchdown: Touchdown,
     airborne: bool,
+    /// The flight that ends now ends by a mishap.
+    crashed: bool,
     /// The hardest touch of this flight.
     touched_mps: f32,
     capacity_ah: f32,
@@ -79,6 +81,7 @@ impl Usage {
             totals: Totals::nothing(),
             touchdown: Touchdown::new(),
             airborne: false,
+            crashed: false,
             touched_mps: 0.0,
             capacity_ah: 0.0,
             battery_cycles: [0.0; BATTERIES_MAX],
@@ -198,11 +201,21 @@ impl Usage {
     /// The flight is over.
     fn land(&mut self, params: &Params) {
         let touched_mps = core::mem::take(&mut self.touched_mps);
-        self.totals.add(UsageCounter::Landings, 1.0);
+        let ended =
+            if core::mem::take(&mut self.crashed) { UsageCounter::Mishaps } else { UsageCounter::Landings };
+        self.totals.add(ended, 1.0);
         self.totals.extend(UsageCounter::TouchdownMax, f64::from(touched_mps));
         if touched_mps >= params.get(Param::HardLanding) {
             self.totals.add(UsageCounter::HardLandings, 1.0);
         }
+    }
+
+    /// The flight ends now by a mishap, in which it touched with so many m/s: that is no landing.
+    pub(crate) fn count_mishap(&mut self, touch_mps: f32) {
+        self.crashed = true;
+        self.touched_mps = self.touched_mps.max(touch_mps);
+        // What the estimate of a vehicle that lies says of speeds is no touch.
+        (self.touchdown, self.airborne) = (Touchdown::new(), false);
     }
 
     fn note_touch(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {

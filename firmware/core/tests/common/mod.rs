@@ -4,7 +4,7 @@
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss,
     GnssIntegrity, Heartbeat, Hud, Imu, LandedState, Observation, Source, SystemStatus, SystemTime,
-    VehicleKind, Vibration,
+    VehicleKind, Vibration, VtolState,
 };
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::units::{
@@ -43,6 +43,8 @@ pub struct Quad {
     pub climb: f32,
     /// `EXTENDED_SYS_STATE`, where it is sent.
     pub landed: Option<LandedState>,
+    /// What a VTOL flies on.
+    pub vtol: VtolState,
     /// Metres above home before the flight, for its first two seconds.
     pub start_height: f32,
 }
@@ -103,6 +105,7 @@ impl Quad {
             type_number: 2,
             climb: -0.1,
             landed: None,
+            vtol: VtolState::Unknown,
             start_height: 0.0,
         }
     }
@@ -148,7 +151,7 @@ impl Quad {
         if now_ms.is_multiple_of(500) {
             said.push(Observation::Heartbeat(heartbeat));
             said.push(Observation::SystemTime(SystemTime { boot_ms, utc_micros: None }));
-            said.extend(self.landed.map(Observation::Landed));
+            said.extend(self.landed.map(|landed| Observation::Landed(landed, self.vtol)));
         }
         said
     }

@@ -18,6 +18,10 @@ struct Script {
     reboots: u32,
     identified: bool,
     baud: u32,
+    /// Parameters that it has.
+    parameters: Vec<&'static str>,
+    /// Names of parameters that it was asked for, and when.
+    parameters_asked: Vec<(u64, String)>,
     /// What it was asked: when in ms, command (or stream with the highest bit), first parameter.
     asked: Vec<(u64, u16, u32)>,
 }
@@ -60,6 +64,15 @@ impl Script {
             self.asked.push((now_ms, 0x8000 | u16::from(stream), rate));
             if stream == 10 {
                 self.streams.push((30, rate));
+            }
+            return;
+        }
+        if packet.id() == 20 {
+            let name = fields.text(4, 16).expect("a name");
+            assert_eq!((fields.u16(0), fields.u8(2), fields.u8(3)), (u16::MAX, 1, 1));
+            self.parameters_asked.push((now_ms, name.to_owned()));
+            if self.parameters.contains(&name) {
+                asking.told(name);
             }
             return;
         }
@@ -159,6 +172,56 @@ fn a_slow_line_is_not_asked_for_more_than_it_carries() {
     let bytes = |id: u32| WANTED.iter().find(|wanted| wanted.0 == id).map_or(0, |wanted| u32::from(wanted.3));
     let all: u32 = px4.streams.iter().map(|(id, hz)| hz * bytes(*id)).sum();
     assert!(px4.streams.len() > 10 && all <= 19_200 / 10, "{all} bytes a second: {:?}", px4.streams);
+}
+
+#[test]
+fn parameters_of_batteries_are_asked_for_after_the_messages_by_name_once_or_twice() {
+    for (autopilot, has, foreign) in [
+        (Autopilot::ArduPilot, "BATT_LOW_VOLT", "BAT1_N_CELLS"),
+        (Autopilot::Px4, "BAT1_N_CELLS", "BATT_LOW_VOLT"),
+    ] {
+        let mut script = Script { parameters: vec![has], ..Script::new(autopilot) };
+        let mut asking = Asking::new();
+        script.run(&mut asking, 0, 600);
+        let count = |name: &str| script.parameters_asked.iter().filter(|(_, asked)| asked == name).count();
+        assert_eq!((count(has), count(foreign)), (1, 0), "{autopilot:?}");
+        for (_, name, ..) in
+            KNOWN.iter().filter(|(px4, name, ..)| (autopilot == Autopilot::Px4) == *px4 && *name != has)
+        {
+            assert_eq!(count(name), 2, "{name}: it does not have it");
+        }
+        let last_message =
+            script.asked.iter().filter(|(at_ms, ..)| *at_ms < 60_000).map(|(at_ms, ..)| *at_ms).max();
+        assert!(
+            script.parameters_asked[0].0 > last_message.expect("asked") - 1_000,
+            "{:?}",
+            script.parameters_asked
+        );
+        script.parameters_asked.clear();
+        script.reboots = 1;
+        script.run(&mut asking, 600, 700);
+        assert!(!script.parameters_asked.is_empty(), "it may have been set anew");
+    }
+    let mut other = Script::new(Autopilot::Other);
+    other.run(&mut Asking::new(), 0, 120);
+    assert!(other.parameters_asked.is_empty());
+}
+
+#[test]
+fn parameters_that_somebody_else_asked_for_are_not_asked_for_and_old_autopilots_are() {
+    let mut asking = Asking::new();
+    let mut copter = Script::new(Autopilot::ArduPilot);
+    copter.run(&mut asking, 0, 1);
+    for (_, name, ..) in KNOWN {
+        asking.told(name);
+    }
+    asking.told("SOMETHING_ELSE");
+    copter.run(&mut asking, 1, 120);
+    assert!(copter.parameters_asked.is_empty(), "{:?}", copter.parameters_asked);
+    let mut old =
+        Script { deaf: true, parameters: vec!["BATT_LOW_VOLT"], ..Script::new(Autopilot::ArduPilot) };
+    old.run(&mut Asking::new(), 0, 120);
+    assert!(old.parameters_asked.iter().any(|(_, name)| name == "BATT_LOW_VOLT"));
 }
 
 #[test]

@@ -150,7 +150,9 @@ pub(super) fn air(payload: &[u8]) -> Option<Air> {
 pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
     let attitude = read::<ap::ATTITUDE_DATA>(payload, &[])?;
     let [roll, pitch, yaw] = vector([attitude.roll, attitude.pitch, attitude.yaw])?.map(Radians);
-    Some(Attitude { roll, pitch, yaw, boot_ms: Some(attitude.time_boot_ms) })
+    let rates = vector([attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed]);
+    let rates = rates.map(|rates| rates.map(RadiansPerSecond));
+    Some(Attitude { roll, pitch, yaw, rates, boot_ms: Some(attitude.time_boot_ms) })
 }
 
 pub(super) fn local_position(payload: &[u8]) -> Option<LocalPosition> {

@@ -42,6 +42,7 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
             4 => Feeds::Payload,
             _ => Feeds::Vehicle,
         },
+        charge: Fields(payload).u8(40),
     })
 }
 

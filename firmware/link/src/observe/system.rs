@@ -1,8 +1,9 @@
 //! The autopilot itself, its links, its words.
 
+use hums_core::cells;
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, Processor, RadioControl,
-    Source, SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
+    Source, SystemStatus, SystemTime, TelemetryRadio, VehicleKind, VtolState,
 };
 use hums_core::units::{Celsius, Fraction};
 use mavlink::dialects::ardupilotmega as ap;
@@ -88,15 +89,22 @@ pub(super) fn identity(payload: &[u8]) -> Option<AutopilotIdentity> {
     Some(AutopilotIdentity { firmware: version.flight_sw_version, uid: version.uid })
 }
 
-pub(super) fn landed(payload: &[u8]) -> LandedState {
-    // Two bytes, both enumerations; the vehicle's state is the second.
-    match Fields(payload).u8(1) {
+pub(super) fn landed(payload: &[u8]) -> Observation {
+    // Two bytes, both enumerations: MAV_VTOL_STATE, MAV_LANDED_STATE.
+    let vtol = match Fields(payload).u8(0) {
+        1 | 2 => VtolState::Transition,
+        3 => VtolState::Hover,
+        4 => VtolState::Forward,
+        _ => VtolState::Unknown,
+    };
+    let landed = match Fields(payload).u8(1) {
         1 => LandedState::OnGround,
         2 => LandedState::InAir,
         3 => LandedState::TakingOff,
         4 => LandedState::Landing,
         _ => LandedState::Unknown,
-    }
+    };
+    Observation::Landed(landed, vtol)
 }
 
 /// The fields are named utc and hold the time since boot; 0 is not yet.
@@ -104,6 +112,17 @@ pub(super) fn flight_information(payload: &[u8]) -> Option<Observation> {
     let information = read::<ap::FLIGHT_INFORMATION_DATA>(payload, &[])?;
     let takeoff_boot_ms = (information.takeoff_time_utc / 1_000).min(u64::from(u32::MAX)) as u32;
     Some(Observation::FlightInformation { flight: information.flight_uuid, takeoff_boot_ms })
+}
+
+/// A parameter that says something of the batteries' cells. PX4 sends an integer's bits, `ArduPilot` its value: no parameter of
+/// these is as small as the bits of a small integer are as a number.
+pub(super) fn parameter(payload: &[u8]) -> Option<Observation> {
+    let fields = Fields(payload);
+    let place = cells::known(fields.text(8, 16)?)?;
+    let value = f32::from_bits(fields.u32(0));
+    let bits = value.to_bits();
+    let value = if (1..1 << 16).contains(&bits) { bits as f32 } else { value };
+    Some(Observation::Parameter(place, value))
 }
 
 /// Read as it is: the list of commands grows faster than any definition.

@@ -1,5 +1,7 @@
 //! The traps, one by one. Payloads are built by the typed encoders.
-use hums_core::observation::{Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind};
+use hums_core::observation::{
+    Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
+};
 use hums_core::units::{Amperes, Celsius, Fraction, MetresPerSecond2, Volts};
 use mavlink::dialects::ardupilotmega as ap;
 use mavlink::{MavlinkVersion, MessageData};
@@ -188,9 +190,32 @@ fn ardupilot_escs_come_in_hundredths_and_the_second_message_begins_at_motor_4() 
 }
 
 #[test]
+fn a_parameter_of_the_batteries_is_read_in_either_autopilots_coding() {
+    let value = |name: &str, value: f32, kind: u8| {
+        let mut payload = [0; 25];
+        payload[..4].copy_from_slice(&value.to_le_bytes());
+        payload[8..8 + name.len()].copy_from_slice(name.as_bytes());
+        payload[24] = kind;
+        by_id(22, &payload)
+    };
+    let place = |name| hums_core::cells::known(name).expect("known");
+    let low = Some(Observation::Parameter(place("BATT_LOW_VOLT"), 21.6));
+    assert_eq!(value("BATT_LOW_VOLT", 21.6, 9), low);
+    // PX4 sends an INT32's bits, ArduPilot its value.
+    let cells = Some(Observation::Parameter(place("BAT1_N_CELLS"), 6.0));
+    assert_eq!(value("BAT1_N_CELLS", f32::from_bits(6), 6), cells);
+    assert_eq!(value("BAT1_N_CELLS", 6.0, 6), cells);
+    assert_eq!(value("WPNAV_SPEED", 500.0, 9), None);
+}
+
+#[test]
 fn landed_state_is_the_second_byte() {
-    assert_eq!(by_id(245, &[3, 1]), Some(Observation::Landed(LandedState::OnGround)));
-    assert_eq!(by_id(245, &[2]), Some(Observation::Landed(LandedState::Unknown)), "trimmed: undefined");
+    assert_eq!(by_id(245, &[3, 1]), Some(Observation::Landed(LandedState::OnGround, VtolState::Hover)));
+    assert_eq!(
+        by_id(245, &[2]),
+        Some(Observation::Landed(LandedState::Unknown, VtolState::Transition)),
+        "trimmed: undefined"
+    );
 }
 
 #[test]
@@ -203,8 +228,8 @@ fn unverified_frames_are_not_observed() {
     assert!(observe(&Frame::parse(&other).expect("a frame")).is_none());
 }
 
-const USED: [u32; 36] = [
-    0, 1, 2, 24, 26, 27, 29, 30, 32, 33, 42, 46, 65, 74, 77, 105, 109, 116, 124, 125, 129, 147, 148, 193,
+const USED: [u32; 37] = [
+    0, 1, 2, 22, 24, 26, 27, 29, 30, 32, 33, 42, 46, 65, 74, 77, 105, 109, 116, 124, 125, 129, 147, 148, 193,
     225, 226, 230, 241, 245, 253, 264, 290, 291, 339, 441, 11_030,
 ];
 

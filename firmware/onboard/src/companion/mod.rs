@@ -142,6 +142,11 @@ impl Companion {
     ) {
         if book.monitor.vehicle().source == Some(frame.source()) {
             self.asking.seen(frame.id());
+            if frame.id() == 22
+                && let Some(name) = Fields(frame.payload()).text(8, 16)
+            {
+                self.asking.told(name);
+            }
             if frame.id() == 77 {
                 let fields = Fields(frame.payload());
                 let target = (fields.u8(8), fields.u8(9));

@@ -1,16 +1,19 @@
-//! What happened, into the record: take-off and landing, phases of flight, snapshots around critical findings, the
+//! What happened, into the record: take-off and landing, phases of flight, mishaps, snapshots around critical findings, the
 //! protective action.
 
 use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Resting, Snapshot, SnapshotValues};
 use hums_core::happening::Happening;
+use hums_core::mishap::Change;
 use hums_core::time::Instant;
 
 use super::marks::Marks;
 use crate::journal::Logbook;
-use crate::notices::Notices;
+use crate::notices::{Notice, Notices};
 use crate::queues::SectorsIn;
 use crate::records::Recorded;
 
+/// `MAV_SEVERITY_WARNING`
+const WARNING: u8 = 4;
 /// The number of the event that marks a critical finding. The others are in [`record`].
 pub(super) const CRITICAL: u8 = 8;
 
@@ -36,7 +39,16 @@ pub(super) fn record(
             Happening::OtherVehicle => (13, "another system on the port is the vehicle"),
             Happening::Protect(step) => {
                 book.journal.record(now, &Record::Protection(Protection::new(&step)), sectors);
-                notices.announce(step);
+                notices.announce(Notice::Protection(step));
+                continue;
+            }
+            Happening::CellsUnknown => {
+                let text = "HUMS: cells not known, set BAT_CELLS";
+                notices.note(now, WARNING, text, &mut book.journal, sectors);
+                continue;
+            }
+            Happening::Mishap(change) => {
+                mishap(now, change, book, notices, marks, sectors);
                 continue;
             }
         };
@@ -57,4 +69,29 @@ pub(super) fn record(
         let mut values = SnapshotValues::default();
         journal.record(now, &Record::Snapshot(Snapshot::new(&snapshot, &mut values)), sectors);
     }
+}
+
+/// Marks the log, tells the ground station where, and lets everything go to the card at once.
+fn mishap(
+    now: Instant,
+    change: Change,
+    book: &mut Logbook<'_>,
+    notices: &mut Notices,
+    marks: &mut Marks,
+    sectors: &mut SectorsIn,
+) {
+    let number = match change {
+        Change::Began(_) => 15,
+        Change::Down => 16,
+        Change::FliesOn => 17,
+        Change::OnBench(kind) => {
+            let event = Event { number: 18, text: kind.name() };
+            book.journal.record(now, &Record::Event(event), sectors);
+            return;
+        }
+    };
+    let report = book.monitor.mishap().report(change);
+    book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
+    notices.announce(Notice::Mishap(report));
+    marks.at_once(Resting::Mishap);
 }

@@ -1,7 +1,8 @@
 //! End marks: when the vehicle comes to rest, a mark says that the log is whole up to there, and goes to the card at once.
 //!
 //! A mark is a record of some ten bytes, and costs one write of the sector in progress, in its place. At most one is
-//! written in [`APART`], so that a vehicle that is armed and disarmed all the time makes less than a kilobyte a minute.
+//! written in [`APART`], so that a vehicle that is armed and disarmed all the time makes less than a kilobyte a minute. That of a
+//! mishap does not wait: there is one for each.
 
 use hums_blackbox::SectorSink as _;
 use hums_blackbox::record::Resting;
@@ -30,6 +31,11 @@ impl Marks {
     /// The vehicle rests.
     pub(super) const fn rests(&mut self, why: Resting) {
         self.due = Some(why);
+    }
+
+    /// Something happened after which the next moment may be the last: what is known now goes to the card at once.
+    pub(super) const fn at_once(&mut self, why: Resting) {
+        (self.due, self.at) = (Some(why), None);
     }
 
     /// The vehicle is armed or takes off: a mark from before says nothing of what comes now.

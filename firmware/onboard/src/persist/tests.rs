@@ -11,7 +11,7 @@ use super::{Calm, Handover, Mailbox, StoreStatus};
 use hums_core::Monitor;
 use hums_core::lifetime::{ItemKey, Room};
 use hums_core::observation::{
-    Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind,
+    Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
 use hums_core::time::Instant;
@@ -134,7 +134,7 @@ fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover
     let heartbeat = Heartbeat { armed: flies, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
     monitor.observe(now, source, &Observation::Heartbeat(heartbeat));
     let landed = if flies { LandedState::InAir } else { LandedState::OnGround };
-    monitor.observe(now, source, &Observation::Landed(landed));
+    monitor.observe(now, source, &Observation::Landed(landed, VtolState::Unknown));
     let current = Some(Amperes(if flies { 20.0 } else { 0.5 }));
     let temperature = Some(Celsius(30.0 + (second / 60 % 60) as f32));
     let battery = Battery { voltage: Some(Volts(15.0)), current, temperature, ..Battery::default() };

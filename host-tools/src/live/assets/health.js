@@ -5,7 +5,7 @@ import { say, attribute, toggle, panel } from "./dom.js";
 import { el } from "./elements.js";
 import { fixed, whole, clock, age } from "./shown.js";
 
-const SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude", "recorder"];
+const SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude", "recorder", "mishap"];
 
 export const board = () => {
   const rows = SUBSYSTEMS.map((name) => {

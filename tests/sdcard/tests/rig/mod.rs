@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use embedded_sdmmc::Block;
-use hums_blackbox::record::Boot;
+use hums_blackbox::record::{Boot, Record, Resting};
 use hums_blackbox::{Gap, Item, LogReader, Writer};
 use hums_core::Monitor;
 use hums_core::health::Level;
@@ -49,6 +49,7 @@ pub struct Rig {
     tick_at: Instant,
     frames: u32,
     heartbeats: u32,
+    said: u32,
 }
 
 /// What a card holds in the end.
@@ -60,6 +61,9 @@ pub struct Found {
     pub gaps: Vec<Gap>,
     pub sessions: usize,
     pub segments: usize,
+    /// Numbers and texts of events, and why there are end marks.
+    pub events: Vec<(u8, String)>,
+    pub marks: Vec<Resting>,
 }
 
 impl Rig {
@@ -89,6 +93,7 @@ impl Rig {
             tick_at: Instant::ZERO + TICK,
             frames: 0,
             heartbeats: 0,
+            said: 0,
             slot,
         };
         rig.monitoring.start(Instant::ZERO, &mut rig.ends.sectors_in);
@@ -197,6 +202,12 @@ impl Rig {
         while self.ends.autopilot_out.take(&mut bytes).is_some() {}
     }
 
+    /// The autopilot says something.
+    pub fn say(&mut self, id: u32, payload: &[u8]) {
+        self.said += 1;
+        self.give(id, payload, true);
+    }
+
     /// A ground station sends a command; its answer.
     pub fn command(&mut self, command: u16, params: [f32; 2]) -> Option<u8> {
         let mut payload: Vec<u8> = params.iter().flat_map(|param| param.to_le_bytes()).collect();
@@ -256,7 +267,7 @@ impl Rig {
         let lost = refused.max(card_lost) + left;
         let found: Vec<Found> = cards.iter().map(|medium| read(medium)).collect();
         let on_cards: u64 = found.iter().map(|found| found.all_frames).sum();
-        let sent = u64::from(self.frames + self.heartbeats);
+        let sent = u64::from(self.frames + self.heartbeats + self.said);
         // On the first of two cards a copy of a sector in progress may hold what is counted as lost for the second.
         let twice = 10 * (cards.len() as u64 - 1);
         let accounted = on_cards + lost;
@@ -290,7 +301,10 @@ fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
     // CRC-16/MCRF4XX over all but the first byte, and a byte that stands for the definition.
     let seed = match id {
         0 => 50,
+        30 => 39,
+        33 => 104,
         76 => 152,
+        245 => 130,
         _ => 0,
     };
     let crc = bytes[1..].iter().chain([&seed]).fold(0xFFFF_u16, |crc, byte| {
@@ -347,6 +361,10 @@ fn take(reader: &mut LogReader, found: &mut Found) {
                 }
             }
             Item::Gap(gap) => found.gaps.push(gap),
+            Item::Record { record: Record::Event(event), .. } => {
+                found.events.push((event.number, event.text.to_owned()));
+            }
+            Item::Record { record: Record::Mark(mark), .. } => found.marks.push(mark.why),
             Item::Record { .. } | Item::End(_) => {}
         }
     }

@@ -142,7 +142,9 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     // 0 to 360 degrees in the log, -180 to 180 in ATTITUDE.
     let yaw = (yaw + 180.0).rem_euclid(360.0) - 180.0;
     let [roll, pitch, yaw] = [roll, pitch, yaw].map(|degrees| Radians(degrees.to_radians()));
-    out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, boot_ms: boot_ms(given) }));
+    // Rates are in IMU.
+    let rates = None;
+    out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }
 
 fn boot_ms(given: &Given<'_>) -> Option<u32> {

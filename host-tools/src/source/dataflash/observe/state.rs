@@ -2,7 +2,7 @@
 //! log's, and some of them are told by nothing but events.
 
 use hums_core::observation::{
-    Autopilot, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus, VehicleKind,
+    Autopilot, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus, VehicleKind, VtolState,
 };
 use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Fraction, Metres, Volts};
@@ -287,7 +287,7 @@ impl State {
         }
         out.observe(&Observation::Heartbeat(heartbeat));
         if self.landed != LandedState::Unknown {
-            out.observe(&Observation::Landed(self.landed));
+            out.observe(&Observation::Landed(self.landed, VtolState::Unknown));
         }
         if let Some(status) = self.status(now) {
             out.observe(&Observation::SystemStatus(status));

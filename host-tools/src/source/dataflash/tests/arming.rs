@@ -130,7 +130,7 @@ fn a_copter_of_before_3_1_whose_events_do_not_tell_that_it_flies_does_not_stand_
         )
     };
     let stands = |seen: &Seen| {
-        seen.find(|seen| matches!(seen, Observation::Landed(LandedState::OnGround)).then_some(())).len()
+        seen.find(|seen| matches!(seen, Observation::Landed(LandedState::OnGround, _)).then_some(())).len()
     };
     assert_eq!(stands(&seen(log("V3.0.1").as_bytes())), 0);
     assert!(stands(&seen(log("V3.1").as_bytes())) > 0);

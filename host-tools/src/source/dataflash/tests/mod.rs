@@ -306,7 +306,7 @@ fn a_copter_of_today_arms_leaves_the_ground_and_lands() {
     changes.dedup();
     assert_eq!(changes, [(kind, false, 0), (kind, false, 4), (kind, true, 4), (kind, false, 4)]);
     let mut landed = seen.find(|seen| match seen {
-        Observation::Landed(landed) => Some(*landed),
+        Observation::Landed(landed, _) => Some(*landed),
         _ => None,
     });
     landed.dedup();

@@ -202,6 +202,8 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
         roll: Radians(roll),
         pitch: Radians(pitch),
         yaw: Radians(yaw),
+        // They are in vehicle_angular_velocity and in sensor_combined.
+        rates: None,
         boot_ms: Some((said.recorded_us / 1_000) as u32),
     }));
 }

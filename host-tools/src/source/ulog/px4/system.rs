@@ -2,7 +2,7 @@
 
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, RadioControl, SpeedSensor,
-    SystemTime, TelemetryRadio, VehicleKind,
+    SystemTime, TelemetryRadio, VehicleKind, VtolState,
 };
 use hums_core::units::Rpm;
 
@@ -367,7 +367,7 @@ impl Px4 {
 
     fn landed(&mut self) {
         if let Some(landed) = self.system.landed() {
-            self.observe(Observation::Landed(landed));
+            self.observe(Observation::Landed(landed, VtolState::Unknown));
         }
     }
 

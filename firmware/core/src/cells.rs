@@ -1,0 +1,329 @@
+//! How many cells in series a battery has. A wrong count is worse than none: it hides an empty pack, or calls a good one
+//! empty. So a count is known, or it is not; then nothing follows from the voltage of a cell, and the pilot is told what to set.
+//!
+//! In this order:
+//! 1. the setting `BAT_CELLS`;
+//! 2. the cells that the battery reports one by one;
+//! 3. the autopilot's parameters, as far as the measured voltage does not contradict them;
+//! 4. the highest voltage since power-on, of a pack at rest, where only one count fits it: 3.5 to 4.4 V a cell;
+//! 5. the count of earlier flights, where it is one of several that fit. Packs are swapped: what does not fit is not believed.
+//!
+//! A pack is another one when its voltage falls by a third while the vehicle is disarmed.
+
+use crate::vehicle::BATTERIES_MAX;
+
+/// Cells of one battery at most.
+pub const COUNT_MAX: usize = 24;
+/// Batteries of which autopilots have parameters.
+const SET_MAX: usize = 2;
+/// No cell shows more: a full one has 4.2 V, a high-voltage one 4.35 V.
+const CELL_HIGHEST_V: f32 = 4.4;
+/// A pack at rest that is flown with has more than this a cell: lithium polymer is nearly empty there, lithium ion below half.
+const CELL_RESTING_V: f32 = 3.5;
+/// A cell has this at least: nearly empty, and under load.
+const CELL_EMPTY_V: f32 = 3.0;
+const CELL_LOADED_V: f32 = 2.8;
+/// A pack whose voltage falls below this part of its highest, disarmed, is another one.
+const ANOTHER: f32 = 0.7;
+/// Below this nothing is plugged in.
+const PLUGGED_V: f32 = 2.5;
+/// `ArduPilot`'s `BATT_LOW_VOLT` as delivered says nothing of the pack.
+const LOW_AS_DELIVERED_V: f32 = 10.5;
+
+/// What a parameter of the autopilot says of a battery.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Setting {
+    /// How many cells.
+    Count = 0,
+    /// The pack's voltage when it is full.
+    Full = 1,
+    /// When it is empty.
+    Empty = 2,
+    /// When it is low.
+    Low = 3,
+    /// When it is critical.
+    Critical = 4,
+}
+
+const SETTINGS: usize = 5;
+
+/// What a cell has at these settings, V: from, to.
+const CELL_V: [(f32, f32); SETTINGS] = [(0.0, 0.0), (4.08, 4.4), (2.7, 3.75), (3.25, 3.8), (2.9, 3.7)];
+
+/// A parameter of the autopilot that says something of a battery's cells: who has it, its name, of which battery, and what.
+pub type Known = (bool, &'static str, u8, Setting);
+
+/// All of them; `true`: PX4's.
+pub const KNOWN: [Known; 13] = [
+    (true, "BAT1_N_CELLS", 0, Setting::Count),
+    (true, "BAT2_N_CELLS", 1, Setting::Count),
+    (true, "BAT_N_CELLS", 0, Setting::Count),
+    (false, "MOT_BAT_VOLT_MAX", 0, Setting::Full),
+    (false, "MOT_BAT_VOLT_MIN", 0, Setting::Empty),
+    (false, "Q_M_BAT_VOLT_MAX", 0, Setting::Full),
+    (false, "Q_M_BAT_VOLT_MIN", 0, Setting::Empty),
+    (false, "FWD_BAT_VOLT_MAX", 0, Setting::Full),
+    (false, "FWD_BAT_VOLT_MIN", 0, Setting::Empty),
+    (false, "BATT_LOW_VOLT", 0, Setting::Low),
+    (false, "BATT_CRT_VOLT", 0, Setting::Critical),
+    (false, "BATT2_LOW_VOLT", 1, Setting::Low),
+    (false, "BATT2_CRT_VOLT", 1, Setting::Critical),
+];
+
+/// The place in [`KNOWN`] of a parameter's name.
+pub fn known(name: &str) -> Option<u8> {
+    KNOWN.iter().position(|(_, known, ..)| *known == name).map(|place| place as u8)
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Pack {
+    highest_v: f32,
+    /// Which of the autopilot's: its parameters go by that, and not by the order in which batteries were heard.
+    id: u8,
+    /// The highest voltage, or part of it, was measured at rest.
+    rested: bool,
+    /// Of earlier flights; 0 for none.
+    before: u8,
+    /// 0: not known.
+    count: u8,
+}
+
+/// What is known of the cells of all batteries.
+#[derive(Clone, Copy, Debug)]
+pub struct Cells {
+    packs: [Pack; BATTERIES_MAX],
+    /// By the battery's id and [`Setting`]; 0: not told, or not set.
+    settings: [[f32; SETTINGS]; SET_MAX],
+}
+
+/// Counts as a set of bits: bit n stands for n cells.
+type Counts = u32;
+
+fn counts(volts: f32, from_v: f32, to_v: f32) -> Counts {
+    let fits = |count: &usize| (from_v..=to_v).contains(&(volts / *count as f32));
+    (1..=COUNT_MAX).filter(fits).fold(0, |counts, count| counts | 1 << count)
+}
+
+impl Cells {
+    pub(crate) const fn new() -> Self {
+        const PACK: Pack = Pack { highest_v: 0.0, id: 0, rested: false, before: 0, count: 0 };
+        Self { packs: [PACK; BATTERIES_MAX], settings: [[0.0; SETTINGS]; SET_MAX] }
+    }
+
+    /// The voltage of the battery at a place, with its id; `rests`: the vehicle stands; `armed`: motors may turn.
+    pub(crate) fn take_voltage(&mut self, battery: usize, id: u8, pack_v: f32, rests: bool, armed: bool) {
+        let Some(pack) = self.packs.get_mut(battery).filter(|_| pack_v.is_finite() && pack_v > PLUGGED_V)
+        else {
+            return;
+        };
+        if !armed && pack_v < ANOTHER * pack.highest_v {
+            *pack = Pack { highest_v: 0.0, rested: false, count: 0, ..*pack };
+        }
+        let rested = pack.rested || rests;
+        if pack_v > pack.highest_v || rested != pack.rested || id != pack.id {
+            (pack.highest_v, pack.rested, pack.id) = (pack.highest_v.max(pack_v), rested, id);
+            self.count(battery);
+        }
+    }
+
+    /// The autopilot told the value of a parameter of [`KNOWN`].
+    pub(crate) fn take_setting(&mut self, place: u8, value: f32) {
+        let Some((_, _, battery, setting)) = KNOWN.get(usize::from(place)) else { return };
+        let Some(of) = self.settings.get_mut(usize::from(*battery)) else { return };
+        let as_delivered = *setting == Setting::Low && (value - LOW_AS_DELIVERED_V).abs() < 0.01;
+        let is_said = value.is_finite() && value > 0.0 && !as_delivered;
+        of[*setting as usize] = if is_said { value } else { 0.0 };
+        (0..BATTERIES_MAX).for_each(|place| self.count(place));
+    }
+
+    /// The count of earlier flights.
+    pub(crate) fn remember(&mut self, battery: usize, count: u8) {
+        if let Some(pack) = self.packs.get_mut(battery) {
+            pack.before = if usize::from(count) <= COUNT_MAX { count } else { 0 };
+            self.count(battery);
+        }
+    }
+
+    /// What the parameters leave of these counts; what contradicts all of them is not believed.
+    fn by_settings(&self, id: u8, possible: Counts) -> (Counts, bool) {
+        let Some(settings) = self.settings.get(usize::from(id)) else { return (possible, false) };
+        let (mut left, mut said) = (possible, false);
+        for ((value, (from_v, to_v)), setting) in settings.iter().zip(CELL_V).zip(0..) {
+            let fitting = match setting {
+                _ if *value == 0.0 => continue,
+                0 if *value <= COUNT_MAX as f32 => 1 << *value as u32,
+                0 => 0,
+                _ => counts(*value, from_v, to_v),
+            };
+            if left & fitting != 0 {
+                (left, said) = (left & fitting, true);
+            }
+        }
+        (left, said)
+    }
+
+    fn count(&mut self, battery: usize) {
+        let Some(Pack { highest_v, id, rested, before, .. }) = self.packs.get(battery).copied() else {
+            return;
+        };
+        let lowest_v = if rested { CELL_EMPTY_V } else { CELL_LOADED_V };
+        let (by_settings, said) = self.by_settings(id, counts(highest_v, lowest_v, CELL_HIGHEST_V));
+        let resting = counts(highest_v, CELL_RESTING_V, CELL_HIGHEST_V);
+        // A voltage in flight alone says too little: a full pack's sags like an empty one's.
+        let left = match by_settings & resting {
+            both if rested && both != 0 => both,
+            _ if said || !rested => by_settings,
+            _ => resting,
+        };
+        let is_sure = left.is_power_of_two() && (said || rested);
+        let confirmed = before > 0 && left >> before & 1 == 1;
+        if let Some(pack) = self.packs.get_mut(battery) {
+            pack.count = match (is_sure, confirmed) {
+                (true, _) => left.trailing_zeros() as u8,
+                (false, true) => before,
+                (false, false) => 0,
+            };
+        }
+    }
+
+    /// How many; 0 where it is not known.
+    pub(crate) fn of(&self, battery: usize) -> u8 {
+        self.packs.get(battery).map_or(0, |pack| pack.count)
+    }
+
+    /// Whether a voltage was heard of this battery.
+    pub(crate) fn has_voltage(&self, battery: usize) -> bool {
+        self.packs.get(battery).is_some_and(|pack| pack.highest_v > 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOW: u8 = 9;
+    const CRITICAL: u8 = 10;
+    const FULL: u8 = 3;
+    const EMPTY: u8 = 4;
+
+    fn plugged(pack_v: f32) -> Cells {
+        let mut cells = Cells::new();
+        cells.take_voltage(0, 0, pack_v, true, false);
+        cells
+    }
+
+    #[test]
+    fn the_voltage_alone_never_gives_a_wrong_count_from_3_5_v_to_4_4_v_a_cell() {
+        for count in 1..=COUNT_MAX {
+            for cell_cv in 351..440 {
+                let cells = plugged(count as f32 * cell_cv as f32 / 100.0);
+                assert!(
+                    [0, count as u8].contains(&cells.of(0)),
+                    "{count} cells at {cell_cv}: {}",
+                    cells.of(0)
+                );
+            }
+        }
+        // What is common is known without any help.
+        for (pack_v, count) in
+            [(4.2, 1), (3.8, 1), (8.4, 2), (12.6, 3), (11.4, 3), (16.8, 4), (15.2, 4), (17.4, 4)]
+        {
+            assert_eq!(plugged(pack_v).of(0), count, "{pack_v}");
+        }
+        for pack_v in [25.2, 30.4, 50.4, 58.8] {
+            assert_eq!(plugged(pack_v).of(0), 0, "{pack_v} V may be of several");
+        }
+    }
+
+    #[test]
+    fn with_the_autopilots_parameters_every_pack_of_every_chemistry_is_known_full_and_half_full() {
+        // Full, half full; full, empty, low and critical as set: lithium polymer, lithium ion, high voltage.
+        let chemistries = [
+            ([4.2, 3.8], [4.2, 3.3, 3.6, 3.4]),
+            ([4.2, 3.6], [4.2, 3.0, 3.3, 3.1]),
+            ([4.35, 3.85], [4.35, 3.4, 3.6, 3.5]),
+        ];
+        for count in 1..=14 {
+            let n = count as f32;
+            for (levels, [full, empty, low, critical]) in chemistries {
+                for level in levels {
+                    let mut px4 = plugged(n * level);
+                    px4.take_setting(0, n);
+                    assert_eq!(px4.of(0), count as u8, "PX4, {count} cells at {level}");
+                    let mut ardupilot = plugged(n * level);
+                    for (place, value) in [(LOW, low), (CRITICAL, critical), (FULL, full), (EMPTY, empty)] {
+                        ardupilot.take_setting(place, n * value);
+                        let known = ardupilot.of(0);
+                        assert!([0, count as u8].contains(&known), "{count} cells at {level}: {known}");
+                    }
+                    assert_eq!(ardupilot.of(0), count as u8, "ArduPilot, {count} cells at {level}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_parameter_that_the_voltage_contradicts_is_not_believed() {
+        let mut cells = plugged(16.8);
+        cells.take_setting(FULL, 25.2);
+        assert_eq!(cells.of(0), 4, "a 4S in place of a 6S");
+        let mut delivered = plugged(25.2);
+        delivered.take_setting(LOW, 10.5);
+        assert_eq!(delivered.of(0), 0, "as delivered it says nothing");
+        let mut none = plugged(15.2);
+        for place in 0..KNOWN.len() as u8 {
+            none.take_setting(place, 0.0);
+            none.take_setting(place, f32::NAN);
+        }
+        assert_eq!(none.of(0), 4);
+    }
+
+    #[test]
+    fn a_stored_count_only_confirms() {
+        let mut cells = plugged(25.2);
+        cells.remember(0, 6);
+        assert_eq!(cells.of(0), 6);
+        let mut swapped = plugged(16.8);
+        swapped.remember(0, 6);
+        assert_eq!(swapped.of(0), 4, "a 4S after a 6S is no dead 6S");
+        let mut unfit = plugged(30.4);
+        unfit.remember(0, 6);
+        assert_eq!(unfit.of(0), 0);
+    }
+
+    #[test]
+    fn a_pack_that_is_swapped_while_the_autopilot_is_powered_is_counted_anew() {
+        let mut cells = plugged(25.2);
+        cells.take_setting(FULL, 25.2);
+        assert_eq!(cells.of(0), 6);
+        cells.take_voltage(0, 0, 0.3, true, false);
+        cells.take_voltage(0, 0, 16.8, true, false);
+        assert_eq!(cells.of(0), 4);
+        // In flight the same is an empty pack.
+        let mut flown = plugged(16.8);
+        flown.take_voltage(0, 0, 11.0, false, true);
+        assert_eq!(flown.of(0), 4);
+    }
+
+    #[test]
+    fn a_box_that_starts_in_the_air_believes_no_voltage_alone() {
+        let mut cells = Cells::new();
+        cells.take_voltage(0, 0, 20.4, false, true);
+        assert_eq!(cells.of(0), 0, "5 full or 6 half empty");
+        cells.remember(0, 6);
+        assert_eq!(cells.of(0), 6);
+        cells.remember(0, 0);
+        cells.take_setting(0, 6.0);
+        assert_eq!(cells.of(0), 6);
+    }
+
+    #[test]
+    fn two_batteries_are_counted_each_by_itself() {
+        let mut cells = plugged(25.2);
+        cells.take_voltage(1, 1, 12.6, true, false);
+        cells.take_setting(1, 3.0);
+        cells.take_setting(0, 6.0);
+        assert_eq!((cells.of(0), cells.of(1), cells.of(2), cells.of(9)), (6, 3, 0, 0));
+    }
+}

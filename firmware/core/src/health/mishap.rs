@@ -1,0 +1,64 @@
+//! Mishaps: what [`crate::mishap`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
+//! on.
+
+use super::check::{Check, Side, When};
+use super::common::STALE;
+use super::finding::Subsystem;
+use crate::mishap::Kind;
+use crate::params::Param;
+use crate::time::Span;
+
+const FREE_FALL: Check = Check {
+    name: Kind::FreeFall.name(),
+    words: "mishap: free fall",
+    subsystem: Subsystem::Mishap,
+    unit: "s",
+    side: Side::Above,
+    warn: None,
+    critical: Some(Param::MisFallTime),
+    hysteresis: 0.0,
+    debounce_warn: Span::ZERO,
+    debounce_critical: Span::ZERO,
+    when: When::Always,
+    stale_after: STALE,
+    instances: 1,
+    alarm_only: false,
+    read: |inputs, _| inputs.mishap.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
+};
+
+pub(super) const CHECKS: &[Check] = &[
+    FREE_FALL,
+    Check {
+        name: Kind::Impact.name(),
+        words: "mishap: impact",
+        unit: "g",
+        critical: Some(Param::MisImpact),
+        read: |inputs, _| inputs.mishap.reading(Kind::Impact, inputs.now, inputs.vehicle),
+        ..FREE_FALL
+    },
+    Check {
+        name: Kind::Tumbling.name(),
+        words: "mishap: tumbling",
+        unit: "deg/s",
+        critical: Some(Param::MisTumble),
+        read: |inputs, _| inputs.mishap.reading(Kind::Tumbling, inputs.now, inputs.vehicle),
+        ..FREE_FALL
+    },
+    Check {
+        name: Kind::Disarmed.name(),
+        words: "mishap: disarmed in air",
+        unit: "m",
+        alarm_only: true,
+        critical: Some(Param::MisDisarm),
+        read: |inputs, _| inputs.mishap.reading(Kind::Disarmed, inputs.now, inputs.vehicle),
+        ..FREE_FALL
+    },
+    Check {
+        name: Kind::Sinking.name(),
+        words: "mishap: sinking",
+        unit: "m/s",
+        critical: Some(Param::MisSink),
+        read: |inputs, _| inputs.mishap.reading(Kind::Sinking, inputs.now, inputs.vehicle),
+        ..FREE_FALL
+    },
+];

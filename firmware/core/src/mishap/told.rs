@@ -1,0 +1,118 @@
+//! What is told of a mishap: what, where, and in which words.
+
+use core::fmt::Write as _;
+
+use heapless::String;
+
+use crate::flight::height_m;
+use crate::time::Instant;
+use crate::vehicle::Vehicle;
+
+/// What was seen. The numbers are those of the checks in their table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// Nothing carries the vehicle; in seconds.
+    FreeFall = 0,
+    /// It hit something; load factor in g.
+    Impact = 1,
+    /// It turns over and over; in degrees a second.
+    Tumbling = 2,
+    /// It was disarmed in the air; height above home in metres.
+    Disarmed = 3,
+    /// It sinks without being told to; in m/s.
+    Sinking = 4,
+}
+
+impl Kind {
+    /// How many there are.
+    pub(super) const COUNT: usize = 5;
+
+    /// The name of its check.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::FreeFall => "free_fall",
+            Self::Impact => "impact",
+            Self::Tumbling => "tumbling",
+            Self::Disarmed => "disarmed_in_air",
+            Self::Sinking => "sinking",
+        }
+    }
+}
+
+/// A place that can be told: 1e-7 degrees, and metres above home.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// Latitude and longitude in 1e-7 degrees, north and east positive; `None` where it is not known.
+    pub position: Option<(i32, i32)>,
+    /// Above home.
+    pub height_m: i16,
+}
+
+impl Place {
+    pub(super) fn of(now: Instant, vehicle: &Vehicle) -> Self {
+        let e7 = |degrees: f64| (degrees * 1e7) as i32;
+        let global = vehicle.global.get().and_then(|global| global.position);
+        let position = global.map(|position| (e7(position.latitude_deg), e7(position.longitude_deg)));
+        Self { position, height_m: height_m(now, vehicle).unwrap_or(0.0) as i16 }
+    }
+}
+
+/// A mishap begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// It was seen in a flight.
+    Began(Kind),
+    /// The vehicle is down.
+    Down,
+    /// It flies on.
+    FliesOn,
+    /// It was seen, but not in a flight.
+    OnBench(Kind),
+}
+
+/// What the ground is told of a mishap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// What happened.
+    pub change: Change,
+    /// Where.
+    pub place: Place,
+    /// How fast it touched, tenths of a metre a second.
+    pub touch: u16,
+}
+
+/// Characters of [`Report::text`]: with `HUMS: ` before it, it is one `STATUSTEXT`.
+const TEXT_MAX: usize = 44;
+
+impl Report {
+    /// What the ground is told, after our name: what and where.
+    pub fn text(&self) -> String<TEXT_MAX> {
+        let mut text = String::new();
+        let Self { change, place, touch } = self;
+        let words = match change {
+            Change::Began(_) => "mishap at",
+            Change::Down => "down at",
+            Change::FliesOn => return String::try_from("mishap over, it flies on").unwrap_or_default(),
+            Change::OnBench(kind) => return String::try_from(kind.name()).unwrap_or_default(),
+        };
+        let degrees = |e7: i32| {
+            let micros = e7 / 10;
+            let sign = if micros < 0 { "-" } else { "" };
+            (sign, micros.unsigned_abs() / 1_000_000, micros.unsigned_abs() % 1_000_000)
+        };
+        // Cut where it does not fit, which a test rules out.
+        let _ = match place.position {
+            Some((latitude, longitude)) => {
+                let ((south, lat, lat_e6), (west, lon, lon_e6)) = (degrees(latitude), degrees(longitude));
+                write!(text, "{words} {south}{lat}.{lat_e6:06},{west}{lon}.{lon_e6:06}")
+            }
+            None => write!(text, "{words} unknown place"),
+        };
+        let _ = match change {
+            Change::Down => write!(text, " {}.{} m/s", touch / 10, touch % 10),
+            _ => write!(text, " {} m", place.height_m),
+        };
+        text
+    }
+}

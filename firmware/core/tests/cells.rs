@@ -1,0 +1,142 @@
+//! Cells of batteries, from the autopilot's word to an alarm: what is not known gives none, and is told.
+#![expect(clippy::unwrap_used, reason = "that is how a test fails")]
+
+mod common;
+
+use common::{AUTOPILOT, Quad};
+use hums_core::Monitor;
+use hums_core::happening::Happening;
+use hums_core::health::{Finding, Level};
+use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Lifetime};
+use hums_core::observation::{Battery, Feeds, Observation};
+use hums_core::params::{Param, Params};
+use hums_core::status::LinkReading;
+use hums_core::time::Instant;
+use hums_core::units::{Amperes, Volts};
+
+/// The pack is under load and empty from here on.
+const EMPTY_MS: u64 = 60_000;
+
+#[derive(Default)]
+struct Outcome {
+    findings: Vec<Finding>,
+    told_ms: Vec<u64>,
+    requests: usize,
+}
+
+impl Outcome {
+    fn cells(&self) -> Vec<(u8, Level)> {
+        let mine = self.findings.iter().filter(|finding| finding.check == "cell_voltage");
+        mine.map(|finding| (finding.instance, finding.level)).collect()
+    }
+}
+
+/// A hundred seconds with a pack that has so many volts at rest, and then so many.
+fn fly(monitor: &mut Monitor, resting_v: f32, empty_v: f32, more: &[Observation]) -> Outcome {
+    let mut outcome = Outcome::default();
+    for now_ms in (0..100_000).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        let mut quad = Quad::healthy();
+        quad.battery.voltage = Some(Volts(if now_ms < EMPTY_MS { resting_v } else { empty_v }));
+        if now_ms.is_multiple_of(100) {
+            for observation in quad.says(now_ms).iter().chain(more) {
+                monitor.observe(now, AUTOPILOT, observation);
+            }
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &quad.recorder, &mut |finding| outcome.findings.push(*finding));
+        while let Some(happening) = monitor.take_happening() {
+            if happening == Happening::CellsUnknown {
+                outcome.told_ms.push(now_ms);
+            }
+        }
+        outcome.requests += usize::from(monitor.take_request().is_some());
+    }
+    outcome
+}
+
+fn protected() -> Params {
+    let mut params = Params::defaults();
+    params.set("PROT_ACTION", 2.0).unwrap();
+    params
+}
+
+fn setting(name: &str, value: f32) -> Observation {
+    Observation::Parameter(hums_core::cells::known(name).unwrap(), value)
+}
+
+#[test]
+fn a_pack_whose_cells_are_not_known_gives_no_alarm_and_no_action_and_is_told_once() {
+    let outcome = fly(&mut Monitor::new(protected()), 25.2, 18.0, &[]);
+    assert!(outcome.cells().is_empty(), "6 or 7: {:?}", outcome.findings);
+    assert_eq!(outcome.requests, 0);
+    assert!(matches!(outcome.told_ms[..], [45_000..47_000]), "{:?}", outcome.told_ms);
+}
+
+#[test]
+fn what_the_autopilot_the_setting_or_an_earlier_flight_tells_makes_it_known() {
+    let told: [&[Observation]; 4] = [
+        &[setting("BAT1_N_CELLS", 6.0)],
+        &[setting("MOT_BAT_VOLT_MAX", 25.2)],
+        &[setting("BATT_LOW_VOLT", 21.6), setting("BATT_CRT_VOLT", 20.4)],
+        &[setting("MOT_BAT_VOLT_MIN", 19.8), setting("BATT_LOW_VOLT", 21.6)],
+    ];
+    for more in told {
+        let outcome = fly(&mut Monitor::new(protected()), 25.2, 18.0, more);
+        assert_eq!(outcome.cells(), [(0, Level::Critical)], "{more:?}");
+        assert!(outcome.told_ms.is_empty() && outcome.requests > 0, "{more:?}");
+    }
+    let mut set = protected();
+    set.set("BAT_CELLS", 6.0).unwrap();
+    assert_eq!(fly(&mut Monitor::new(set), 25.2, 18.0, &[]).cells(), [(0, Level::Critical)]);
+    let mut monitor = Monitor::new(protected());
+    let life = Lifetime { cells: [6, 0, 0, 0], ..Lifetime::new() };
+    let mut stored = [0; Lifetime::BYTES];
+    life.encode(&mut stored);
+    monitor.restore(ItemKey::Lifetime, &stored).unwrap();
+    assert_eq!(fly(&mut monitor, 25.2, 18.0, &[]).cells(), [(0, Level::Critical)]);
+}
+
+#[test]
+fn a_count_is_kept_for_the_next_power_on_and_only_confirms() {
+    let mut monitor = Monitor::new(Params::defaults());
+    fly(&mut monitor, 25.2, 22.0, &[setting("BAT1_N_CELLS", 6.0)]);
+    let mut item = [0; ITEM_BYTES_MAX];
+    let length = monitor.encode_item(ItemKey::Lifetime, &mut item);
+    let mut next = Monitor::new(Params::defaults());
+    next.restore(ItemKey::Lifetime, &item[..length]).unwrap();
+    // A 4S in place of the 6S is no dead 6S: 3.9 V a cell.
+    let outcome = fly(&mut next, 16.8, 15.6, &[]);
+    assert!(outcome.findings.is_empty() && outcome.told_ms.is_empty(), "{:?}", outcome.findings);
+}
+
+#[test]
+fn a_payloads_pack_of_unknown_cells_is_no_news_and_two_packs_are_judged_each_by_its_own() {
+    let payload = Battery {
+        id: 3,
+        voltage: Some(Volts(25.2)),
+        current: Some(Amperes(1.0)),
+        feeds: Feeds::Payload,
+        ..Battery::default()
+    };
+    let outcome = fly(&mut Monitor::new(protected()), 16.8, 15.6, &[Observation::Battery(payload)]);
+    assert!(outcome.told_ms.is_empty() && outcome.findings.is_empty(), "{:?}", outcome.findings);
+    let second = Battery { id: 1, voltage: Some(Volts(10.2)), ..Battery::default() };
+    let outcome = fly(&mut Monitor::new(Params::defaults()), 16.8, 15.6, &[Observation::Battery(second)]);
+    // 10.2 V are 3.4 V a cell of three, or 5.1 V of two, or 2.55 V of four; below 3.5 V at rest it fits none.
+    assert!(outcome.cells().is_empty(), "{:?}", outcome.cells());
+    let second = [Observation::Battery(second), setting("BATT2_LOW_VOLT", 10.8)];
+    let outcome = fly(&mut Monitor::new(Params::defaults()), 16.8, 15.6, &second);
+    // It was heard first, before the vehicle's heartbeat let the other one count: places go by that, parameters by the id.
+    assert_eq!(outcome.cells(), [(0, Level::Critical)]);
+}
+
+#[test]
+fn what_the_autopilot_calls_low_is_low_without_any_count() {
+    let mut monitor = Monitor::new(Params::defaults());
+    let low = Battery { voltage: Some(Volts(21.0)), charge: 2, ..Battery::default() };
+    let outcome = fly(&mut monitor, 25.2, 21.0, &[Observation::Battery(low)]);
+    let found: Vec<_> = outcome.findings.iter().map(|finding| (finding.check, finding.level)).collect();
+    assert_eq!(found, [("batt_state", Level::Warning)]);
+    assert!(monitor.params().get(Param::BatCells) == 0.0);
+}

@@ -1,0 +1,60 @@
+//! A mishap: what is known goes to the card at once, because the next moment may be the last.
+
+mod rig;
+
+use hums_blackbox::record::Resting;
+use hums_recorder::CardState;
+use hums_sdcard::{Kind, MS, Medium, Model};
+use rig::{Rig, read};
+
+const MIB: u32 = 2_048;
+/// `ATTITUDE`, `GLOBAL_POSITION_INT`, `EXTENDED_SYS_STATE`
+const ATTITUDE: u32 = 30;
+const POSITION: u32 = 33;
+const LANDED: u32 = 245;
+
+/// What an autopilot says in a tenth of a second: in the air at 30 m, turning at `rate`.
+fn say(rig: &mut Rig, rate: f32) {
+    let mut attitude = vec![0; 16];
+    attitude.extend(rate.to_le_bytes());
+    attitude.extend([0; 8]);
+    rig.say(ATTITUDE, &attitude);
+    let mut position = vec![0; 4];
+    for field in [473_977_420_i32, 85_455_940, 500_000, 30_000] {
+        position.extend(field.to_le_bytes());
+    }
+    position.extend([0; 8]);
+    rig.say(POSITION, &position);
+    // MAV_LANDED_STATE_IN_AIR
+    rig.say(LANDED, &[0, 2]);
+    let now_ms = rig.slot.now_ns() / MS;
+    rig.run_to(now_ms + 100);
+}
+
+#[test]
+fn a_mishap_is_on_the_card_within_200_ms_and_told_with_its_place() {
+    let medium = Medium::formatted(64 * MIB);
+    let mut rig = Rig::new(Model::new(Kind::Sdhc, medium.clone()));
+    rig.armed = true;
+    rig.run_to(10_000);
+    rig.assert_state(CardState::Recording);
+    for _ in 0..50 {
+        say(&mut rig, 0.1);
+    }
+    assert!(!rig.was_told("mishap", 0), "{:?}", rig.texts);
+    while !rig.was_told("mishap", 0) {
+        say(&mut rig, 15.0);
+        assert!(rig.slot.now_ns() / MS < 17_000, "not told: {:?}", rig.texts);
+    }
+    rig.assert_told("HUMS: mishap at 47.397742,8.545594 30 m", 0);
+    let told = rig.texts.iter().find(|(_, text)| text.contains("mishap")).expect("told").0;
+    // The power goes.
+    rig.run_to(told.as_millis() + 200);
+    let found = read(&medium);
+    let event = found.events.iter().find(|(number, _)| *number == 15);
+    assert_eq!(event.map(|(_, text)| text.as_str()), Some("mishap at 47.397742,8.545594 30 m"));
+    assert_eq!(found.marks, [Resting::Mishap]);
+    rig.run_to(told.as_millis() + 1_000);
+    rig.assert_told("mishap: tumbling", 0);
+    rig.finish_whole(&medium);
+}
