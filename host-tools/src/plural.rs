@@ -7,6 +7,11 @@ pub fn count(number: impl TryInto<u64>, thing: &str) -> String {
     format!("{number} {}", noun(number, thing))
 }
 
+/// A count with its thing and the verb: `1 point is`, `2 points are`.
+pub fn are(number: u64, thing: &str) -> String {
+    format!("{} {}", count(number, thing), if number == 1 { "is" } else { "are" })
+}
+
 /// The thing alone, in the form that the number asks for.
 pub fn noun(number: u64, thing: &str) -> String {
     if number == 1 {

@@ -42,7 +42,8 @@ impl SinkFile {
 
     fn with<T>(&self, act: impl FnOnce(&mut Output) -> io::Result<T>) -> io::Result<T> {
         let mut file = self.0.lock().map_err(|_| io::Error::other("a thread that wrote it has failed"))?;
-        act(&mut file)
+        let done = act(&mut file);
+        done.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", file.path().display())))
     }
 }
 

@@ -132,7 +132,7 @@ fn what_waits_outlives_a_kill_and_is_written_by_the_next_run() {
     let points: u64 = database.measurements().iter().map(|measurement| database.points(measurement)).sum();
     assert!(written > 10_000, "{words}");
     assert_eq!(points, written, "points that are there");
-    assert!(spool.metadata().unwrap().len() < 100, "its room is given back");
+    assert!(spool.metadata().unwrap().len() < 600, "its room is given back");
 }
 
 #[test]

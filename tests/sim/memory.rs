@@ -119,6 +119,33 @@ fn eight_vehicles_with_all_that_is_drawn_take_little_memory_live() {
 }
 
 #[test]
+fn what_is_recorded_and_packed_and_a_cards_image_take_little_memory_with_any_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let tlog = hostile::fleet(dir.path(), 8, 110).display().to_string();
+    let raw = hostile::raw_heartbeats(dir.path(), 600_000).display().to_string();
+    for (number, input) in [&tlog, &raw].into_iter().enumerate() {
+        let image = at(&format!("{number}.img"));
+        let [log, gs, tap] = ["hum", "gs", "tap"].map(|name| at(&format!("{number}.{name}")));
+        let sim = ["sim", "--json", "--input", input, "--sd", &image, "--gs", &gs, "--tap", &tap];
+        for words in [&["pack", input, "-o", &log][..], &sim] {
+            assert_bounded(&words.join(" "), run(words).memory_kib_max, empty);
+        }
+        assert_all_bounded(Path::new(&image), empty);
+    }
+}
+
+/// Ten million are tried by hand (5 GB): `HUMS_SESSIONS=10000000`.
+#[test]
+fn a_log_of_very_many_sessions_takes_little_memory_with_any_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    let count = std::env::var("HUMS_SESSIONS").map_or(100_000, |count| count.parse().unwrap());
+    assert_all_bounded(&hostile::starts(dir.path(), count), empty);
+}
+
+#[test]
 fn cards_full_of_entries_or_sessions_take_little_memory() {
     let dir = tempfile::tempdir().unwrap();
     let empty = empty_run(dir.path());

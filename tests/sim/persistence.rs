@@ -252,7 +252,15 @@ fn a_parameter_file_that_is_wrong_is_told_with_line_and_range_and_leaves_nothing
 fn flash_with_something_else_in_it_is_recorded_and_told_and_the_flight_counts() {
     let dir = tempfile::tempdir().unwrap();
     let store = dir.path().join("store.bin");
-    fs::write(&store, vec![0x5A; 32_768]).unwrap();
+    let mut spoiled = vec![0x5A; 32_768];
+    // Some other file of that length is refused, and left as it is.
+    fs::write(&store, &spoiled).unwrap();
+    let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
+    assert!(outcome.stderr.contains("is no store, though it has the length of one"), "{}", outcome.stderr);
+    assert_eq!(fs::read(&store).unwrap(), spoiled);
+    // A store that was spoiled but for its magic.
+    spoiled[..4].copy_from_slice(b"1TSH");
+    fs::write(&store, spoiled).unwrap();
     let recording = fly(&store, &[]).expect_code(&[0]);
     let text = "HUMS: store unreadable, counters begin anew";
     assert!(records(&recording.image()).contains(text));

@@ -92,9 +92,15 @@ fn two_cards_are_never_made_into_one_log() {
     let told = pull(&first, &apart, &[LOG]).expect_code(&[0]).stderr;
     assert!(told.contains("is there already"), "{told}");
 
-    // The same length, and one byte that is another one.
+    // All of it, and something behind it.
     let log = apart.join(LOG);
     let mut spoiled = fs::read(&log).unwrap();
+    fs::write(&log, [&spoiled[..], &[0; 5]].concat()).unwrap();
+    let told = pull(&first, &apart, &[LOG]).expect_code(&[1]).stderr;
+    assert!(told.contains("begins as the board's log, and has 5 bytes more than that has"), "{told}");
+    assert_eq!(fs::read(&log).unwrap().len(), spoiled.len() + 5);
+
+    // The same length, and one byte that is another one.
     let middle = spoiled.len() / 2;
     spoiled[middle] ^= 1;
     fs::write(&log, &spoiled).unwrap();

@@ -1,7 +1,7 @@
 //! Inputs that are made to take memory: well-formed, and far larger inside than outside.
 
 use std::fs::{self, File};
-use std::io::{Seek as _, SeekFrom, Write as _};
+use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use hums::card::ReadOnlyImage;
@@ -28,6 +28,27 @@ fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
         .expect_code(&[0]);
     fs::remove_file(recording).unwrap();
     log
+}
+
+/// A file of so many sectors, each the beginning of a session of its own.
+pub fn starts(dir: &Path, count: u32) -> PathBuf {
+    let first = fs::read(heartbeats(dir, 100)).unwrap();
+    let mut sector = Sector::from_bytes(*first.first_chunk::<SECTOR_BYTES>().unwrap());
+    let path = dir.join("starts.hum");
+    let mut file = BufWriter::new(File::create(&path).unwrap());
+    for session in 0..count {
+        sector.seal(1_000_000 + session);
+        file.write_all(sector.bytes()).unwrap();
+    }
+    file.flush().unwrap();
+    path
+}
+
+/// The same heartbeat so many times, as a port's bytes.
+pub fn raw_heartbeats(dir: &Path, count: usize) -> PathBuf {
+    let path = dir.join("heartbeats.raw");
+    fs::write(&path, HEARTBEAT.repeat(count)).unwrap();
+    path
 }
 
 /// The same heartbeat so many times: 200 bytes of the log are 30,000 frames.

@@ -215,7 +215,7 @@ impl Task<'_> {
         }
         let (summary, writers) = read?;
         if writers.is_empty() && context.selection.has_limits() {
-            remarks.push(nothing_of(log, &summary));
+            remarks.push(nothing_of(log, &summary, &context.selection));
             return Ok(Done { outcome: Outcome::Done, written: false, lines: Vec::new(), remarks });
         }
         let written = writers.finish()?;
@@ -245,7 +245,9 @@ impl Task<'_> {
             ..Context::default()
         };
         let Some(log) = work.log.own() else {
-            context.identity = recorded::identity(work.log)?;
+            let (identity, start) = recorded::identity(work.log)?;
+            context.identity = identity;
+            context.selection = context.selection.starting_at(start);
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
             context.epoch_us = context.identity.epoch_us;
             return Ok(context);
@@ -309,10 +311,10 @@ impl Task<'_> {
 }
 
 /// Says that nothing of a log is in the time that was asked for, and what time it has.
-fn nothing_of(log: &Place, summary: &Summary) -> String {
-    let seconds = |at: Option<Instant>| at.map_or(0.0, Instant::as_secs_f64);
+fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
+    let seconds = |at: Option<Instant>| at.map_or(0.0, |at| selection.seconds(at));
     format!(
-        "{}: nothing of it is within --from and --to: it goes from {:.3} s to {:.3} s",
+        "{}: nothing of it is within --from and --to: it goes from {:.3} s to {:.3} s since its start",
         log.name,
         seconds(summary.first),
         seconds(summary.last)

@@ -30,12 +30,15 @@ const PART_ITEMS: u32 = 4_096;
 /// has more of them is not made by an autopilot; its further tables are left out, and counted.
 const NAMES_BYTES_MAX: usize = 4 << 20;
 
-/// Who flew and when; and UTC at time zero. The recording is read through for it.
-pub fn identity(place: &Place) -> Result<Identity> {
+/// Who flew and when, and UTC at time zero; and the time of the first entry, by the recording's clock. The recording is
+/// read through for it.
+pub fn identity(place: &Place) -> Result<(Identity, Instant)> {
     let (mut epoch_us, mut first, mut system, mut uid) = (None, None, None, None);
+    let mut start = None;
     let mut hash = Sha256::new();
     let want = Want { observations: true, ..Want::default() };
     place.open()?.read(want, &mut |at, item| {
+        start.get_or_insert(at);
         match item {
             Item::Epoch(epoch) => epoch_us = Some(epoch),
             Item::Observation(source, observation) => {
@@ -62,7 +65,7 @@ pub fn identity(place: &Place) -> Result<Identity> {
     // No recorder gave it a number: the times in it are its own.
     let number: [u8; 4] = hash.finalize().first_chunk().copied().unwrap_or_default();
     let session = format!("r{:08x}", u32::from_be_bytes(number));
-    Ok(Identity { vehicle, date, session, epoch_us })
+    Ok((Identity { vehicle, date, session, epoch_us }, start.unwrap_or(Instant::ZERO)))
 }
 
 /// Reads a recording into the writers.
@@ -84,6 +87,11 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
     let mut part = Part { context, collected: Collected::new(context), items: 0, tables: BTreeMap::new() };
     let mut summary = Summary::default();
     recording.read(want, &mut |at, item| {
+        if matches!(item, Item::Frame(_) | Item::Row(_) | Item::Observation(..)) {
+            // Of all that there is, wanted or not.
+            summary.first = summary.first.or(Some(at));
+            summary.last = summary.last.max(Some(at));
+        }
         match item {
             Item::Frame(frame) => {
                 let verified = frame.check() == Check::Verified;
@@ -103,8 +111,6 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
             }
             _ => return Ok(()),
         }
-        summary.first = summary.first.or(Some(at));
-        summary.last = summary.last.max(Some(at));
         part.items += 1;
         if part.items >= PART_ITEMS {
             bar.set_position(seen.taken());

@@ -94,6 +94,8 @@ pub struct Writers<'a> {
     gaps: Option<Single>,
     frames: u64,
     records: u64,
+    /// JSON's.
+    objects: u64,
     losses: u64,
 }
 
@@ -104,6 +106,8 @@ struct Influx {
     quantities: Clock,
     reference: Reference,
     points: Vec<u8>,
+    /// Points so far.
+    count: u64,
 }
 
 impl Influx {
@@ -119,6 +123,7 @@ impl Influx {
             }
         }
         self.quantities.write(&lines, context.epoch_us, &mut self.points);
+        self.count += lines_of(&self.points);
         self.file.write(&self.points)
     }
 }
@@ -138,6 +143,7 @@ impl<'a> Writers<'a> {
             quantities: Clock::default(),
             reference: Reference::new(),
             points: Vec::new(),
+            count: 0,
         });
         let folder = |wanted: bool, path: Option<PathBuf>| -> Result<Option<Folder>> {
             let path = path.filter(|_| wanted);
@@ -164,6 +170,7 @@ impl<'a> Writers<'a> {
             gaps: None,
             frames: 0,
             records: 0,
+            objects: 0,
             losses: 0,
         })
     }
@@ -172,6 +179,7 @@ impl<'a> Writers<'a> {
         self.frames += collected.frames;
         self.records += collected.records;
         self.losses += collected.losses;
+        self.objects += lines_of(&collected.jsonl);
         for (file, bytes) in [(&mut self.tlog, &collected.tlog), (&mut self.jsonl, &collected.jsonl)] {
             if let Some(file) = file {
                 file.write(bytes)?;
@@ -232,11 +240,21 @@ impl<'a> Writers<'a> {
     pub fn finish(mut self) -> Result<Written> {
         let mut lines = Vec::new();
         let frames = count(self.frames, "frame");
-        let rows = format!("{frames}, {}", count(self.records, "record"));
+        let rows = if self.frames == 0 {
+            count(self.records, "row")
+        } else {
+            format!("{frames}, {}", count(self.records, "record"))
+        };
         self.check_earlier_gaps()?;
-        let singles = [self.tlog.take(), self.jsonl.take(), self.influx.take().map(|influx| influx.file)];
-        for file in singles.into_iter().flatten() {
-            lines.push(format!("{}: {frames}", file.finish()?.display()));
+        let objects = count(self.objects, "object");
+        let mut singles = vec![(self.tlog.take(), frames), (self.jsonl.take(), objects)];
+        if let Some(Influx { file, count: points, .. }) = self.influx.take() {
+            singles.push((Some(file), count(points, "point")));
+        }
+        for (file, what) in singles {
+            if let Some(file) = file {
+                lines.push(format!("{}: {what}", file.finish()?.display()));
+            }
         }
         if let Some(file) = self.gaps.take() {
             lines.push(format!("{}: gaps", file.finish()?.display()));
@@ -274,6 +292,10 @@ impl<'a> Writers<'a> {
         Output::check_new(&path, &self.context.inputs, &GAPS)?;
         Output::remove(&path, &self.context.inputs)
     }
+}
+
+fn lines_of(text: &[u8]) -> u64 {
+    text.iter().filter(|byte| **byte == b'\n').count() as u64
 }
 
 /// The first line of a table of gaps beside a tlog.

@@ -23,7 +23,7 @@ pub use identity::FileId;
 pub use inputs::Inputs;
 pub use kind::Kind;
 pub use output::Output;
-pub use part::{PART, is_part};
+pub use part::{PART, is_part, lock_in_place, make_in_place};
 pub use paths::{
     appended, cannot_write, inside, make_directory, make_parent, remove_if_empty, says_directory, settle,
 };

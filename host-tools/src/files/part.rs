@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
+use super::identity::without_links;
 use super::paths::cannot_write;
 
 /// How the name of a file ends that is not whole yet.
@@ -41,6 +42,32 @@ pub(super) fn lock(file: &File, target: &Path) -> Result<()> {
             )
         }
     }
+}
+
+/// Takes the lock of a file that is updated in place, for as long as it is open: two runs that write one card or one
+/// store would leave neither's. Only on Unix: a lock on Windows would also keep the same run from reading it.
+pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
+    if cfg!(unix) && matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+        bail!("{}: another run of hums is using it; wait for its end, or name another file", path.display());
+    }
+    Ok(())
+}
+
+/// Makes a file that has its name only once `fill` has filled it, and gives it, locked, for reading and writing. A run
+/// that is killed before leaves nothing of this name.
+pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Result<File> {
+    let target = without_links(path).with_context(|| cannot_write(path))?;
+    let part = part_of(&target)?;
+    remove_stale(&part, path)?;
+    let file = File::options().read(true).write(true).create_new(true).open(&part);
+    let file = file.with_context(|| cannot_write(path))?;
+    lock(&file, path)?;
+    let made = fill(&file).and_then(|()| rename_new(&part, &target).with_context(|| cannot_write(path)));
+    if made.is_err() {
+        // Where it cannot be removed, the next run does.
+        let _ = std::fs::remove_file(&part);
+    }
+    made.map(|()| file)
 }
 
 /// Removes a file that a killed run has left, unless somebody writes it.

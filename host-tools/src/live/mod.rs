@@ -34,7 +34,7 @@ pub mod values;
 pub mod world;
 
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -56,7 +56,7 @@ use crate::files::Inputs;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
 use crate::output;
-use crate::plural::count;
+use crate::plural::{are, count};
 
 /// Runs `hums live`.
 pub fn run(args: &cli::Live) -> Result<Outcome> {
@@ -118,7 +118,7 @@ fn follow(
 }
 
 /// The database, and the file of what waits for it.
-fn database(args: &cli::Live) -> Result<Option<(Influx, PathBuf)>> {
+fn database(args: &cli::Live) -> Result<Option<(Influx, Waiting)>> {
     let Some(url) = &args.influx else {
         if args.token.is_some() || args.org.is_some() || args.spool.is_some() {
             return Err(usage(
@@ -134,6 +134,16 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, PathBuf)>> {
     let limit = args.spool_limit.saturating_mul(1024 * 1024);
     let spool = influx::place::open(args.spool.as_deref(), &target, limit, &inputs)?;
     let path = spool.path().to_owned();
+    let damage = spool.damage();
+    if damage.bytes > 0 {
+        eprintln!(
+            "hums: {}: of an earlier run, and lost: {} of batches that were cut off or are damaged, with {} as far as \
+             that is known",
+            path.display(),
+            count(damage.bytes, "byte"),
+            count(damage.points, "point")
+        );
+    }
     if spool.points() > 0 {
         eprintln!(
             "hums: of an earlier run, and written first: {} in {}",
@@ -145,32 +155,45 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, PathBuf)>> {
     // As good as unique among the sessions of one vehicle, and in their order.
     let session = format!("s{:08x}", now.as_secs() as u32);
     let influx = Influx::start(target, session, spool, !args.input.is_live())?;
-    Ok(Some((influx, path)))
+    Ok(Some((influx, Waiting { path, is_damaged: damage.bytes > 0 })))
 }
 
-fn finish(influx: Influx, spool: &Path) -> Outcome {
+/// The file of what waits for the database.
+struct Waiting {
+    path: PathBuf,
+    /// An earlier run has left what cannot be read.
+    is_damaged: bool,
+}
+
+fn finish(influx: Influx, spool: &Waiting) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
     eprintln!("{} written", count(figures.written, "point"));
     if missing > 0 {
         let why = if figures.trouble.is_empty() { String::new() } else { format!(": {}", figures.trouble) };
-        let are = if missing == 1 { "is" } else { "are" };
-        eprintln!("{} {are} not in the database{why}", count(missing, "point"));
+        eprintln!("{} not in the database{why}", are(missing, "point"));
         if figures.rejected > 0 {
             eprintln!("  {} refused by the database: {}", figures.rejected, figures.refusal);
         }
         if figures.lost > 0 {
-            eprintln!("  {} lost for want of room", figures.lost);
+            eprintln!("  {} lost: for want of room, or with what an earlier run left damaged", figures.lost);
         }
         if figures.stored > 0 {
             eprintln!(
                 "  {} wait in {}: the next `hums live` with this database writes them",
                 figures.stored,
-                spool.display()
+                spool.path.display()
             );
         }
+        let unsaved = figures.waiting.saturating_sub(figures.stored);
+        if unsaved > 0 {
+            eprintln!("  {unsaved} waited in memory only, and are lost");
+        }
     }
-    Outcome::lossy(missing > 0)
+    if !figures.disk.is_empty() {
+        eprintln!("{}: {}", spool.path.display(), figures.disk);
+    }
+    Outcome::lossy(missing > 0 || spool.is_damaged || !figures.disk.is_empty())
 }
 
 fn listen(text: &str) -> Result<(TcpListener, SocketAddr)> {

@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::cli::Run;
-use crate::files::{Inputs, Output};
+use crate::files::{Inputs, Output, settle};
 use crate::made;
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
@@ -64,7 +64,7 @@ impl Arrivals {
         let Some(chunk) = self.source.next().with_context(context)? else { return Ok(None) };
         self.bytes += chunk.bytes.len() as u64;
         if let Some(tap) = &mut self.tap {
-            tap.write_all(&chunk.bytes).context("--tap: cannot be written")?;
+            settle(tap.write_all(&chunk.bytes), tap.path()).context("--tap")?;
         }
         if chunk.bytes.len() <= CHUNK_BYTES_MAX {
             return Ok(Some(chunk));

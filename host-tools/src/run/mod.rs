@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 
-use crate::card::image::{self, Found};
+use crate::card::image;
 use crate::card::{Faults, SimCard};
 use crate::cli::{Run, Speed};
 use crate::endpoint::Endpoint;
@@ -111,27 +111,22 @@ fn pace(run: &Run) -> Result<(Speed, bool)> {
 
 /// Makes the card image where it is missing, and gives it for reading and writing.
 fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
-    let (file, found) = image::open_or_make(path, size_mib)?;
-    let bytes = file.metadata().map_or(u64::MAX, |about| about.len());
-    if bytes < image::SIZE_MIB_MIN << 20 {
-        // What a recorder does with such a card is worth a run, too.
-        eprintln!(
-            "hums: {}: is no image of an SD card: {bytes} bytes, and a FAT32 card has {} MiB at least; nothing can be \
-             recorded on it",
-            path.display(),
-            image::SIZE_MIB_MIN
-        );
-    }
-    if found == Found::Made {
-        let context = || format!("{}: cannot be formatted", path.display());
+    let context = || format!("{}: cannot be formatted", path.display());
+    let file = image::open_or_make(path, size_mib, |file| {
         let card =
             SimCard::new(file.try_clone().with_context(context)?, Faults::default()).with_context(context)?;
         // A run is repeatable to the byte, the volume's number included.
         let volume_id = (seed as u32).wrapping_mul(0x9e37_79b9) ^ 0x4855_4d53;
-        if let Err(error) = hums_recorder::format::format(&card, volume_id) {
+        hums_recorder::format::format(&card, volume_id).map_err(|error| {
             let why = card.take_image_error().map_or_else(|| format!("{error:?}"), |error| error.to_string());
-            return Err(anyhow::anyhow!("{}: cannot be formatted: {why}", path.display()));
-        }
+            anyhow::anyhow!("{}: {why}", context())
+        })
+    })?;
+    // What a recorder does with such a card is worth a run, too.
+    if let Some(trouble) =
+        image::trouble(&file).with_context(|| format!("{}: cannot be read", path.display()))?
+    {
+        eprintln!("hums: {}: {trouble}", path.display());
     }
     Ok(file)
 }

@@ -9,8 +9,10 @@ use std::rc::Rc;
 use anyhow::{Context, Result, anyhow, bail};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use hums_core::params::ParamSpec;
-use hums_store::sim::SimFlash;
+use hums_store::sim::{SimFlash, is_store};
 use hums_store::{Key, Store, param_value};
+
+use crate::files::lock_in_place;
 
 /// A sector of the board's flash.
 const SECTOR: usize = 16 * 1024;
@@ -36,7 +38,10 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
         }
     }
     match flash.take_error() {
-        Some(error) => Err(error).context("--store: cannot be written"),
+        Some(error) => {
+            let path = path.unwrap_or(Path::new(""));
+            Err(error).with_context(|| format!("--store {}: cannot be written", path.display()))
+        }
         None => Ok(flash),
     }
 }
@@ -49,10 +54,14 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
     let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
     let mut file = file.with_context(context)?;
+    lock_in_place(&file, path)?;
     let mut bytes = Vec::new();
     Read::by_ref(&mut file).take(BYTES as u64 + 1).read_to_end(&mut bytes).with_context(context)?;
     if !bytes.is_empty() && bytes.len() != BYTES {
         bail!("--store {}: is no store, which has {BYTES} bytes; name a new file", path.display());
+    }
+    if !bytes.is_empty() && !is_store::<SECTOR>(&bytes) {
+        bail!("--store {}: is no store, though it has the length of one; name a new file", path.display());
     }
     Ok((bytes, Some(file)))
 }

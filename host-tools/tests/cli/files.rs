@@ -431,7 +431,8 @@ fn a_time_in_which_there_is_nothing_is_told_and_nothing_is_written() {
         let output = run(dir.path(), &line, 1);
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(
-            said.contains("log: nothing of it is within --from and --to: it goes from 0.000 s to "),
+            said.contains("log: nothing of it is within --from and --to: it goes from 0.000 s to ")
+                && said.contains(" s since its start"),
             "{said}"
         );
         assert!(text(&output).is_empty());
@@ -491,7 +492,7 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
 
 /// Waits until something is so.
 #[track_caller]
-fn until(what: &str, is: impl Fn() -> bool) {
+pub(crate) fn until(what: &str, is: impl Fn() -> bool) {
     let limit = Instant::now() + Duration::from_secs(30);
     while !is() {
         assert!(Instant::now() < limit, "{what}");

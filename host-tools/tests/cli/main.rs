@@ -4,6 +4,7 @@
 mod check;
 mod files;
 mod help;
+mod in_place;
 mod read;
 mod record;
 mod support;

@@ -31,7 +31,7 @@ impl Card {
     /// A formatted card of this size.
     pub(super) fn new(mib: u64) -> Result<Self> {
         let dir = tempfile::tempdir()?;
-        let (file, _) = open_or_make(&dir.path().join("card.img"), Some(mib))?;
+        let file = open_or_make(&dir.path().join("card.img"), Some(mib), |_| Ok(()))?;
         let device = SimCard::new(file.try_clone()?, Faults::default())?;
         hums_recorder::format::format(&device, 0x4855_4d53).map_err(|error| anyhow!("format: {error:?}"))?;
         Ok(Self { dir, file, partition: None })

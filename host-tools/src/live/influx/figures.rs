@@ -19,6 +19,8 @@ pub struct Figures {
     pub refusal: String,
     /// They made room in a full file, or neither it nor memory took them.
     pub lost: u64,
+    /// Why points did not go into the file at some time; empty where all did.
+    pub disk: String,
     /// What the database said last when it did not take a batch; empty while all is well.
     pub trouble: String,
 }

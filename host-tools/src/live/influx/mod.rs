@@ -235,8 +235,9 @@ mod tests {
     /// Flies these packets past; gives the lines that the database would get, the last ones by the end.
     fn fly(packets: &[Packet], know: bool) -> Vec<String> {
         let dir = tempfile::tempdir().expect("a folder");
+        let database = Target::new("http://h", None, None, "hums").expect("an address").database();
         let spool =
-            Spool::open(&dir.path().join("spool"), 1 << 20).expect("a file").expect("nobody else has it");
+            Spool::open(&dir.path().join("spool"), 1 << 20, &database).expect("a file").expect("free");
         let queue = Arc::new(Queue::new(spool, false));
         let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");
         let mut encoder = Encoder::of(1, 1);

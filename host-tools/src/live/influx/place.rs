@@ -8,10 +8,9 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use sha2::{Digest as _, Sha256};
 
 use super::spool::Spool;
-use super::target::Target;
+use super::target::{Database, Target};
 use crate::files::{Inputs, make_directory};
 use crate::outcome::usage;
 
@@ -22,7 +21,7 @@ const FILES_MAX: usize = 8;
 pub fn open(named: Option<&Path>, target: &Target, limit: u64, inputs: &Inputs) -> Result<Spool> {
     if let Some(path) = named {
         inputs.refuse(path)?;
-        return Spool::open(path, limit)?
+        return Spool::open(path, limit, &target.database())?
             .with_context(|| format!("--spool {}: another hums uses it; name another file", path.display()));
     }
     let folder =
@@ -34,8 +33,8 @@ pub fn open(named: Option<&Path>, target: &Target, limit: u64, inputs: &Inputs) 
     for number in 1..=FILES_MAX {
         let path = folder.join(name(target, number));
         match &mut own {
-            None => own = Spool::open(&path, limit)?,
-            Some(own) if path.exists() => adopt(own, &path, limit)?,
+            None => own = Spool::open(&path, limit, &target.database())?,
+            Some(own) if path.exists() => adopt(own, &path, limit, &target.database())?,
             Some(_) => {}
         }
     }
@@ -45,9 +44,10 @@ pub fn open(named: Option<&Path>, target: &Target, limit: u64, inputs: &Inputs) 
 }
 
 /// Takes over what a program has left that no longer runs.
-fn adopt(own: &mut Spool, path: &Path, limit: u64) -> Result<()> {
-    let Some(mut left) = Spool::open(path, limit)? else { return Ok(()) };
+fn adopt(own: &mut Spool, path: &Path, limit: u64, database: &Database) -> Result<()> {
+    let Some(mut left) = Spool::open(path, limit, database)? else { return Ok(()) };
     let context = || format!("{}: cannot be read", path.display());
+    own.lose(left.damage());
     while let Some(batch) = left.oldest().with_context(context)? {
         if !own.has_room(&batch) {
             // It waits for a start with more room.
@@ -72,8 +72,7 @@ fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
 }
 
 fn name(target: &Target, number: usize) -> String {
-    let hash = Sha256::digest(target.write.as_bytes());
-    let database = hash.first_chunk().map_or(0, |first| u64::from_be_bytes(*first));
+    let database = target.database().number;
     let suffix = if number == 1 { String::new() } else { format!("-{number}") };
     format!("influx-{database:016x}{suffix}.spool")
 }
@@ -103,16 +102,18 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let (first, second) = (dir.path().join("a"), dir.path().join("b"));
         let batch = |number: u64| Batch { text: format!("m v={number}\n").into_bytes(), points: 1 };
-        let mut own = Spool::open(&first, 10_000).expect("a file").expect("free");
-        let mut left = Spool::open(&second, 10_000).expect("a file").expect("free");
+        let database = Target::new("http://h", None, None, "hums").expect("an address").database();
+        let open = |path: &Path| Spool::open(path, 10_000, &database).expect("a file").expect("free");
+        let mut own = open(&first);
+        let mut left = open(&second);
         own.put(&batch(1)).expect("room");
         left.put(&batch(2)).expect("room");
-        adopt(&mut own, &second, 10_000).expect("it is left alone");
+        adopt(&mut own, &second, 10_000, &database).expect("it is left alone");
         assert_eq!(own.points(), 1, "it is in use");
         drop(left);
-        adopt(&mut own, &second, 10_000).expect("it is read");
+        adopt(&mut own, &second, 10_000, &database).expect("it is read");
         assert_eq!(own.points(), 2);
-        let left = Spool::open(&second, 10_000).expect("a file").expect("free");
+        let left = open(&second);
         assert!(left.is_empty());
     }
 

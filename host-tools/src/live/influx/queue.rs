@@ -61,14 +61,9 @@ struct InHand {
 impl Queue {
     /// With what waits in the file already.
     pub fn new(spool: Spool, patient: bool) -> Self {
-        let inner = Inner {
-            spool,
-            memory: VecDeque::new(),
-            memory_bytes: 0,
-            in_hand: None,
-            figures: Figures::default(),
-            closed: None,
-        };
+        let figures = Figures { lost: spool.damage().points, ..Figures::default() };
+        let inner =
+            Inner { spool, memory: VecDeque::new(), memory_bytes: 0, in_hand: None, figures, closed: None };
         Self { inner: Mutex::new(inner), changed: Condvar::new(), memory_bytes_max: MEMORY_BYTES, patient }
     }
 
@@ -161,7 +156,10 @@ impl Inner {
         if self.memory.is_empty() {
             match self.spool.put(&batch) {
                 Ok(lost) => return self.lose_oldest(lost),
-                Err(error) => self.figures.trouble = format!("points do not fit on the disk: {error}"),
+                Err(error) => {
+                    self.figures.disk = format!("points did not fit on the disk: {error}");
+                    self.figures.trouble.clone_from(&self.figures.disk);
+                }
             }
         }
         if self.memory_bytes + batch.text.len() <= memory_bytes_max {
@@ -224,6 +222,7 @@ impl Inner {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::live::influx::target::Database;
 
     fn batch(number: u64) -> Batch {
         Batch { text: format!("m value={number} {number}\n").repeat(100).into_bytes(), points: 100 }
@@ -234,8 +233,8 @@ mod tests {
     }
 
     fn queue(dir: &tempfile::TempDir, limit: u64) -> Queue {
-        let spool =
-            Spool::open(&dir.path().join("spool"), limit).expect("a file").expect("nobody else has it");
+        let database = Database { number: 1, name: "http://h".to_owned() };
+        let spool = Spool::open(&dir.path().join("spool"), limit, &database).expect("a file").expect("free");
         Queue::new(spool, false)
     }
 
@@ -293,6 +292,22 @@ mod tests {
         let figures = queue.figures();
         assert_eq!((figures.written + figures.lost, figures.waiting), (2_000, 0), "{figures:?}");
         assert_eq!(last, Some(batch(19)), "the newest is there");
+    }
+
+    #[test]
+    fn a_disk_that_takes_nothing_is_told_until_the_end_and_memory_takes_what_it_can() {
+        let dir = tempfile::tempdir().expect("a folder");
+        // No batch fits into a file of this size, as none fits on a full disk.
+        let mut queue = queue(&dir, 100);
+        queue.memory_bytes_max = 3 * batch(0).text.len();
+        (0..4).for_each(|number| queue.put(batch(number)));
+        let figures = queue.figures();
+        assert_eq!((figures.waiting, figures.stored, figures.lost), (300, 0, 100));
+        assert!(figures.disk.contains("did not fit on the disk"), "{figures:?}");
+        queue.take().expect("it waits");
+        queue.done(all());
+        let figures = queue.figures();
+        assert!(figures.trouble.is_empty() && !figures.disk.is_empty(), "all is well now: {figures:?}");
     }
 
     #[test]

@@ -8,23 +8,30 @@
 //!
 //! ```text
 //! header  "HUMSPOOL"  version u32  0 u32  ring's size u64  position of the oldest u64
+//!         the database's number u64  its address, zeros up to 512 bytes
 //! record  length u32  points u32  position u64  CRC-32 u32  0 u32  lines
 //! ```
+//! Points go to the database that they were made for and to no other: a file that has points for another one is refused.
+//!
 //! Numbers are little-endian. Nothing is synced to the disk: a kill loses nothing, a PC that loses its power what its
 //! system had not written yet.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{self, Read, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use crc::{CRC_32_ISCSI, Crc};
 
 use super::batch::Batch;
+use super::target::Database;
+use crate::plural::are;
 
 const MAGIC: &[u8; 8] = b"HUMSPOOL";
-const VERSION: u32 = 1;
-const HEADER_BYTES: u64 = 32;
+const VERSION: u32 = 2;
+const HEADER_BYTES: u64 = 512;
+/// Where the database's address begins.
+const NAME_AT: usize = 40;
 const RECORD_BYTES: usize = 24;
 /// Of all records of all files that we write.
 const BATCH_BYTES_MAX: usize = 64 * 1024 * 1024;
@@ -44,6 +51,17 @@ pub struct Spool {
     points: u64,
     /// Batches that are no longer there.
     removed: u64,
+    database: Database,
+    damage: Damage,
+}
+
+/// What of an earlier program's points cannot be read any more.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Damage {
+    /// Points, as far as their number is known.
+    pub points: u64,
+    /// Bytes of batches that are not whole or not sound.
+    pub bytes: u64,
 }
 
 /// A record's head.
@@ -60,8 +78,9 @@ impl Head {
 }
 
 impl Spool {
-    /// Opens or makes the file, with room for `limit` bytes; `None` while another program has it.
-    pub fn open(path: &Path, limit: u64) -> Result<Option<Self>> {
+    /// Opens or makes the file, with room for `limit` bytes; `None` while another program has it. An error where it has
+    /// points for another database.
+    pub fn open(path: &Path, limit: u64, database: &Database) -> Result<Option<Self>> {
         let context = || format!("{}: cannot be used for points that wait", path.display());
         let mut options = OpenOptions::new();
         let file = options.read(true).write(true).create(true).truncate(false).open(path);
@@ -72,7 +91,18 @@ impl Spool {
             Err(TryLockError::Error(error)) => return Err(error).with_context(context),
         }
         let path = path.to_owned();
-        let mut spool = Self { file, path, size: limit, limit, oldest: 0, end: 0, points: 0, removed: 0 };
+        let mut spool = Self {
+            file,
+            path,
+            size: limit,
+            limit,
+            oldest: 0,
+            end: 0,
+            points: 0,
+            removed: 0,
+            database: database.clone(),
+            damage: Damage::default(),
+        };
         spool.begin().with_context(context)?;
         Ok(Some(spool))
     }
@@ -84,12 +114,19 @@ impl Spool {
             return Ok(self.reset()?);
         }
         let mut header = [0; HEADER_BYTES as usize];
-        let read = self.file.seek(SeekFrom::Start(0)).and_then(|_| self.file.read_exact(&mut header));
-        if read.is_err() || !header.starts_with(MAGIC) {
+        self.file.seek(SeekFrom::Start(0))?;
+        Read::by_ref(&mut self.file)
+            .take(HEADER_BYTES)
+            .read_exact(header.get_mut(..bytes.min(HEADER_BYTES) as usize).unwrap_or_default())?;
+        if !header.starts_with(MAGIC) {
             bail!("it is another file; name one that is not there yet");
         }
+        if bytes < HEADER_BYTES {
+            // Its making was cut off, or it is an empty one of an earlier version.
+            return Ok(self.reset()?);
+        }
         if u32_at(&header, 8) != VERSION {
-            bail!("it is of another version of this program");
+            bail!("it is of another version of this program; move it away, or name another file");
         }
         (self.size, self.oldest) = (u64_at(&header, 16), u64_at(&header, 24));
         self.end = self.oldest;
@@ -101,7 +138,43 @@ impl Spool {
             self.end += head.bytes();
             self.points += u64::from(head.points);
         }
+        if !self.is_empty() && u64_at(&header, 32) != self.database.number {
+            let name = header.get(NAME_AT..).unwrap_or_default().split(|byte| *byte == 0).next();
+            bail!(
+                "{} in it for another database, {}: write these there first, or name another file",
+                are(self.points, "point"),
+                String::from_utf8_lossy(name.unwrap_or_default())
+            );
+        }
+        self.find_damage(bytes)?;
         if self.is_empty() { Ok(self.reset()?) } else { Ok(()) }
+    }
+
+    /// What lies behind the last sound record and was one: of a file whose ring has not begun anew, any byte; otherwise
+    /// what has the beginning of a record of this position.
+    fn find_damage(&mut self, file_bytes: u64) -> io::Result<()> {
+        let mut at = self.end;
+        while let Some(head) = self.head(at)? {
+            self.damage.points += u64::from(head.points);
+            at += head.bytes();
+        }
+        self.damage.bytes = at - self.end;
+        if self.end < self.size {
+            self.damage.bytes = file_bytes.saturating_sub(HEADER_BYTES + self.end);
+            self.file.set_len(HEADER_BYTES + self.end)?;
+        }
+        Ok(())
+    }
+
+    /// What an earlier program has left here and cannot be read.
+    pub const fn damage(&self) -> Damage {
+        self.damage
+    }
+
+    /// The same of a file whose points come to this one.
+    pub const fn lose(&mut self, damage: Damage) {
+        self.damage.points += damage.points;
+        self.damage.bytes += damage.bytes;
     }
 
     /// Where it is.
@@ -156,7 +229,13 @@ impl Spool {
         bytes.extend(CRC.checksum(&batch.text).to_le_bytes());
         bytes.extend([0; 4]);
         bytes.extend(&batch.text);
-        self.write_ring(self.end, &bytes)?;
+        if let Err(error) = self.write_ring(self.end, &bytes) {
+            if self.end < self.size {
+                // A part of a record is none, and would look like a lost one later. Where that fails too, it does.
+                let _ = self.file.set_len(HEADER_BYTES + self.end);
+            }
+            return Err(error);
+        }
         self.end += head.bytes();
         self.points += batch.points;
         Ok(lost)
@@ -204,7 +283,9 @@ impl Spool {
         header[..8].copy_from_slice(MAGIC);
         header[8..12].copy_from_slice(&VERSION.to_le_bytes());
         header[16..24].copy_from_slice(&self.size.to_le_bytes());
-        header[24..].copy_from_slice(&self.oldest.to_le_bytes());
+        header[24..32].copy_from_slice(&self.oldest.to_le_bytes());
+        header[32..NAME_AT].copy_from_slice(&self.database.number.to_le_bytes());
+        header.iter_mut().skip(NAME_AT).zip(self.database.name.bytes()).for_each(|(to, from)| *to = from);
         self.file.seek(SeekFrom::Start(0))?;
         self.file.write_all(&header)
     }
@@ -286,8 +367,32 @@ mod tests {
         }
     }
 
+    fn database(number: u64) -> Database {
+        Database { number, name: format!("http://{number}/write") }
+    }
+
     fn open(path: &Path, limit: u64) -> Spool {
-        Spool::open(path, limit).expect("a file").expect("nobody else has it")
+        Spool::open(path, limit, &database(1)).expect("a file").expect("nobody else has it")
+    }
+
+    #[test]
+    fn points_for_another_database_are_not_given_to_this_one() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("spool");
+        open(&path, 3_000).put(&batch(0)).expect("room");
+        let before = std::fs::read(&path).expect("a file");
+        let refused = format!("{:#}", Spool::open(&path, 3_000, &database(2)).expect_err("another database"));
+        assert!(refused.contains("20 points are in it for another database, http://1/write"), "{refused}");
+        assert!(refused.contains("name another file"), "{refused}");
+        assert_eq!(std::fs::read(&path).expect("a file"), before);
+        drain(&mut open(&path, 3_000));
+        // An empty one is anybody's; so is one whose making was cut off.
+        let mut other = Spool::open(&path, 3_000, &database(2)).expect("a file").expect("free");
+        other.put(&batch(0)).expect("room");
+        drop(other);
+        assert!(Spool::open(&path, 3_000, &database(1)).is_err());
+        std::fs::write(&path, MAGIC).expect("room");
+        assert!(open(&path, 3_000).is_empty());
     }
 
     fn drain(spool: &mut Spool) -> Vec<Batch> {
@@ -348,13 +453,25 @@ mod tests {
         for cut in [1, 30, last - RECORD_BYTES + 3, last - 1] {
             std::fs::write(&path, &whole[..whole.len() - cut]).expect("room");
             let mut spool = open(&path, 100_000);
+            // Of a record with its head its points are known.
+            let points = if last - cut < RECORD_BYTES { 0 } else { batch(4).points };
+            assert_eq!(spool.damage(), Damage { points, bytes: (last - cut) as u64 }, "{cut} bytes less");
             assert_eq!(drain(&mut spool), (0..4).map(batch).collect::<Vec<_>>(), "{cut} bytes less");
+            drop(spool);
+            assert_eq!(open(&path, 100_000).damage(), Damage::default(), "it is told once");
         }
         let mut spoiled = whole.clone();
         let at = whole.len() - 10;
         spoiled[at] ^= 1;
         std::fs::write(&path, spoiled).expect("room");
+        assert_eq!(open(&path, 100_000).damage(), Damage { points: batch(4).points, bytes: last as u64 });
         assert_eq!(drain(&mut open(&path, 100_000)).len(), 4);
+        // One in the middle: those behind it are not reached either.
+        let mut spoiled = whole;
+        spoiled[HEADER_BYTES as usize + RECORD_BYTES + 5] ^= 1;
+        std::fs::write(&path, spoiled).expect("room");
+        let points: u64 = (0..5).map(|number| batch(number).points).sum();
+        assert_eq!(open(&path, 100_000).damage().points, points);
     }
 
     #[test]
@@ -363,12 +480,12 @@ mod tests {
         let path = dir.path().join("thesis.txt");
         for text in ["months of work, and much longer than a header is", "short"] {
             std::fs::write(&path, text).expect("room");
-            assert!(Spool::open(&path, 3_000).is_err());
+            assert!(Spool::open(&path, 3_000, &database(1)).is_err());
             assert_eq!(std::fs::read_to_string(&path).expect("a file"), text);
         }
         let path = dir.path().join("spool");
         let first = open(&path, 3_000);
-        assert!(Spool::open(&path, 3_000).expect("a file").is_none());
+        assert!(Spool::open(&path, 3_000, &database(1)).expect("a file").is_none());
         drop(first);
         open(&path, 3_000);
     }

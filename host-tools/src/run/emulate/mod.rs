@@ -43,11 +43,11 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
     // The board's flash is a file in any case; without --store it ends with the run.
     let store = run.store.clone().unwrap_or_else(|| dir.path().join("store"));
-    let mut arrivals = Arrivals::open(run, None, || {
-        prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
-        store::open(Some(&store), &params).map(drop)
-    })?
-    .0;
+    // Open, so that no other run uses them.
+    let (mut arrivals, _in_use) = Arrivals::open(run, None, || {
+        let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
+        Ok((card, store::open(Some(&store), &params)?))
+    })?;
     let earlier = logs::on_card(&run.sd).len();
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();

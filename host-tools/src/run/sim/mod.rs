@@ -76,7 +76,8 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         bail!("{}: {error}", run.sd.display());
     }
     if let Some(error) = flash.take_error() {
-        bail!("--store: {error}");
+        let store = run.store.as_deref().unwrap_or(Path::new(""));
+        bail!("--store {}: {error}", store.display());
     }
     world.gs.flush().context("--gs: cannot be written")?;
     ground.finish()?;

@@ -21,6 +21,7 @@ use crate::files::{Output, make_directory, settle};
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output::Stdout;
+use crate::plural::count;
 use crate::summary::Overview;
 
 /// Bursts without an answer after which the board is taken for gone.
@@ -110,6 +111,12 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
         return Ok(There::Nothing);
     }
     match compare(ftp, name, path, bytes.min(length))? {
+        Likeness::Same | Likeness::SameEnds if about.len() > u64::from(length) => bail!(
+            "{} begins as the board's log, and has {} more than that has; it is left as it is: move it away, or name \
+             another directory with -o",
+            path.display(),
+            count(about.len() - u64::from(length), "byte")
+        ),
         Likeness::Same if bytes < length => Ok(There::Beginning(bytes)),
         Likeness::Same => Ok(There::Whole),
         // Not proved: it comes once more, and takes the place of what is there when it is whole.
@@ -195,8 +202,8 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
             (overview.summary.gaps, "gaps"),
             (overview.contents.bad_frames, "frames that fail their checksum"),
         ];
-        for (count, what) in wrong.into_iter().filter(|(count, _)| *count > 0) {
-            eprintln!("hums: {name}: {what}: {count}; `hums verify` says more");
+        for (number, what) in wrong.into_iter().filter(|(number, _)| *number > 0) {
+            eprintln!("hums: {name}: {what}: {number}; `hums verify` says more");
             outcome = Outcome::Losses;
         }
     }

@@ -1,0 +1,84 @@
+//! What is updated in place (a card's image, a store), and what recordings' times and counts are called.
+
+use std::fs;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use crate::support::{px4, recorded, run, text};
+
+#[test]
+fn two_runs_do_not_use_one_card_or_one_store() {
+    let dir = recorded();
+    let mut first = Command::new(env!("CARGO_BIN_EXE_hums"))
+        .args(["sim", "--input", "-", "--sd", "card.img", "--store", "store", "--gs", "gs"])
+        .current_dir(dir.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("it runs");
+    let tlog = fs::read(px4()).expect("a recording");
+    let mut input = first.stdin.take().expect("it is piped");
+    input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
+    crate::files::until("it records", || dir.path().join(".gs.hums-part").exists());
+    for line in ["sim --input PX4 --sd card.img", "sim --input PX4 --sd new.img --store store"] {
+        let said = run(dir.path(), line, 1);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(said.contains("another run of hums is using it; wait for its end"), "{said}");
+    }
+    drop(input);
+    assert!(first.wait().expect("it is ours").success());
+    run(dir.path(), "sim --input PX4 --sd card.img --store store", 0);
+    run(dir.path(), "verify card.img", 0);
+}
+
+#[test]
+fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
+    let dir = tempfile::tempdir().expect("directory");
+    let image = dir.path().join("card.img");
+    // No file may be longer than 1 MiB: the image cannot be made.
+    let program = env!("CARGO_BIN_EXE_hums");
+    let limited = format!("ulimit -f 1024; exec {program} sim --input {} --sd card.img", px4().display());
+    let ended =
+        Command::new("bash").args(["-c", &limited]).current_dir(dir.path()).output().expect("it runs");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("card.img: cannot have"), "{said}");
+    assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 0, "nothing is left");
+    // What a killed run has left is in nobody's way.
+    fs::write(dir.path().join(".card.img.hums-part"), [0; 512]).expect("written");
+    run(dir.path(), "sim --input PX4 --sd card.img", 0);
+    assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 1);
+    // One that a run of an earlier version left, which was killed while it made it.
+    fs::File::create(&image).and_then(|file| file.set_len(64 << 20)).expect("made");
+    let said = run(dir.path(), "sim --input PX4 --sd card.img", 3);
+    let said = String::from_utf8_lossy(&said.stderr);
+    assert!(
+        said.contains("card.img: has no partition table (MBR), so that nothing can be recorded on it"),
+        "{said}"
+    );
+    assert!(said.contains("name an image of a card, or a new file"), "{said}");
+}
+
+/// A text log of ArduPilot that begins five minutes after the autopilot's power-on: eleven messages, one a second.
+fn late_log() -> String {
+    let formats = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 129, 23, ATT, Qff, TimeUS,Roll,Pitch\n";
+    (0..11).fold(formats.to_owned(), |log, second| {
+        log + &format!("ATT, {}, {second}.5, 2.0\n", (300 + second) * 1_000_000)
+    })
+}
+
+#[test]
+fn times_of_an_autopilots_log_count_from_its_start_and_what_was_written_is_counted() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("late.log"), late_log()).expect("written");
+    let rows = |flags: &str| {
+        let line = format!("decode late.log -o - --format jsonl --message ATT {flags}");
+        text(&run(dir.path(), &line, 0)).lines().filter(|line| line.contains("\"ATT\"")).count()
+    };
+    assert_eq!([rows(""), rows("--from 5"), rows("--to 2"), rows("--from 2 --to 4")], [11, 6, 3, 3]);
+    let said = run(dir.path(), "decode late.log -o - --format jsonl --from 300", 1);
+    let said = String::from_utf8_lossy(&said.stderr);
+    assert!(said.contains("it goes from 0.000 s to 10.000 s since its start"), "{said}");
+    let said = text(&run(dir.path(), "decode late.log -o out/ --format jsonl,csv --message ATT", 0));
+    assert!(said.contains(".jsonl: 11 objects") && said.contains(": 1 table, 11 rows"), "{said}");
+}
