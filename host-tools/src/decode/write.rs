@@ -295,7 +295,8 @@ impl<'a> Writers<'a> {
 }
 
 fn lines_of(text: &[u8]) -> u64 {
-    text.iter().filter(|byte| **byte == b'\n').count() as u64
+    // What follows the last line's end is none.
+    text.split(|byte| *byte == b'\n').count() as u64 - 1
 }
 
 /// The first line of a table of gaps beside a tlog.

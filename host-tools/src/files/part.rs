@@ -63,6 +63,10 @@ pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Res
     let file = file.with_context(|| cannot_write(path))?;
     lock(&file, path)?;
     let made = fill(&file).and_then(|()| rename_new(&part, &target).with_context(|| cannot_write(path)));
+    if !cfg!(unix) {
+        // As `lock_in_place` has it.
+        let _ = file.unlock();
+    }
     if made.is_err() {
         // Where it cannot be removed, the next run does.
         let _ = std::fs::remove_file(&part);
