@@ -26,6 +26,8 @@ const MOTORS_TOLD: Span = Span::from_secs(1);
 const FLYING_PART: f32 = 0.2;
 /// Time constant of the motor speeds that are compared.
 const MOTOR_SMOOTHING_S: f32 = 1.0;
+/// A link on which nothing at all came for so long was silent.
+const SILENCE: Span = Span::from_millis(300);
 /// How long a loss of frames stays a warning.
 const LOSS_MEMORY: Span = Span::from_secs(10);
 
@@ -49,6 +51,10 @@ pub struct Derived {
     load_factor: Latest<f32>,
     /// When anything at all was heard of the vehicle.
     heard: Option<Instant>,
+    /// When it was heard again after a silence.
+    resumed: Instant,
+    /// The motor whose speed is furthest from the others'.
+    furthest: u8,
     had_fix: [bool; RECEIVERS_MAX],
     clips: Lately,
     clips_known: bool,
@@ -99,6 +105,8 @@ impl Derived {
             motors: [MOTOR; MOTORS_MAX],
             load_factor: Latest::nothing(),
             heard: None,
+            resumed: Instant::ZERO,
+            furthest: 0,
             had_fix: [false; RECEIVERS_MAX],
             clips: Lately::NONE,
             clips_known: false,
@@ -109,6 +117,9 @@ impl Derived {
 
     /// Takes an observation that the vehicle took.
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
+        if self.heard.is_none_or(|heard| at.since(heard) > SILENCE) {
+            self.resumed = at;
+        }
         self.heard = Some(at);
         match observation {
             Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
@@ -207,6 +218,7 @@ impl Derived {
             self.clips = Lately { count: clips, rose_at: None, before: clips };
         }
         self.clips.take(now, clips);
+        self.find_furthest();
         self.frames_lost.take(now, recorder.frames_lost);
         self.write_errors.take(now, recorder.write_errors);
     }
@@ -273,7 +285,7 @@ impl Derived {
     /// vehicle was heard last: a link that is silent says nothing about an ESC.
     pub(crate) fn esc_silence(&self, now: Instant, motor: u8) -> Option<Reading> {
         let track = self.motors.get(usize::from(motor))?;
-        let silence_s = self.heard?.since(track.last?).as_secs_f32();
+        let silence_s = self.heard?.since(track.last?.max(self.resumed)).as_secs_f32();
         let missed = track.interval_s > 0.0 && silence_s > INTERVALS_MISSED * track.interval_s;
         Some(Reading { at: now, value: if missed { silence_s } else { 0.0 } })
     }
@@ -293,12 +305,26 @@ impl Derived {
         if !compares || !Self::is_steady(now, vehicle, flight) {
             return None;
         }
-        let departure = |track: &MotorTrack| (track.smooth_rpm - middle).abs();
-        let others = self.motors.iter().enumerate().filter(|(_, other)| other.highest_rpm > TURNING_RPM);
-        let furthest = others.rev().map(|(number, other)| (number, departure(other)));
-        let furthest = furthest.reduce(|first, other| if other.1 >= first.1 { other } else { first })?.0;
-        let percent = departure(track) / middle * 100.0;
-        Reading::new(track.last, Some(if furthest == usize::from(motor) { percent } else { 0.0 }))
+        let named = usize::from(self.furthest) == usize::from(motor);
+        Reading::new(
+            track.last,
+            Some(if named { (track.smooth_rpm - middle).abs() / middle * 100.0 } else { 0.0 }),
+        )
+    }
+
+    /// Which motor is furthest from the middle one. It stays the one that was found first until another is twice as far: where one
+    /// is lost, others follow.
+    fn find_furthest(&mut self) {
+        let Some(middle) = self.middle_speed() else { return };
+        let departure = |track: &MotorTrack| {
+            if track.highest_rpm > TURNING_RPM { (track.smooth_rpm - middle).abs() } else { 0.0 }
+        };
+        let mut least = 2.0 * self.motors.get(usize::from(self.furthest)).map_or(0.0, departure);
+        for (number, track) in (0..).zip(&self.motors) {
+            if departure(track) > least {
+                (self.furthest, least) = (number, departure(track));
+            }
+        }
     }
 
     /// The middle one of the speeds of all motors that are fitted (of an even number the lower one of the two); `None` while they

@@ -267,8 +267,13 @@ impl Mishap {
         self.uncarried.take(at, load_g < UNCARRIED_G && self.doubt.is_some());
         if load_g > params.get(Param::MisImpact) {
             let before = self.shock.filter(|shock| at.since(shock.at) <= BREAKS_OFF);
-            let shock =
-                before.unwrap_or(Shock { at, load_g, speed_mps: self.speed.greatest(), stopped: false });
+            let shock = before.unwrap_or(Shock {
+                at,
+                load_g,
+                speed_mps: self.speed.greatest(),
+                sink_mps: self.sink.greatest(),
+                stopped: false,
+            });
             self.shock = Some(Shock { load_g: shock.load_g.max(load_g), ..shock });
             if matches!(self.state, State::Going(_)) {
                 self.see(at, Kind::Impact, load_g);
@@ -359,7 +364,6 @@ impl Mishap {
         match (self.state, seen) {
             (State::Quiet, Some(kind)) if flight.is_open() => {
                 self.state = State::Going(now);
-                self.touch_mps = 0.0;
                 let mut place = Place::of(now, vehicle);
                 if let (Kind::Disarmed, Some(doubt)) = (kind, self.doubt.take()) {
                     place.height_m = doubt.height_m as i16;
@@ -461,7 +465,7 @@ impl Mishap {
             || (on_rotors(now, vehicle) && is_tilted(vehicle));
         let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
         if hit && rests && self.is_idle(now, vehicle) {
-            self.touch_mps = self.touch_mps.max(self.sink.greatest());
+            self.touch_mps = self.touch_mps.max(shock.sink_mps);
             self.see(now, Kind::Impact, shock.load_g);
             self.shock = None;
         }

@@ -321,8 +321,9 @@ fn sinking_is_a_mishap_where_the_autopilot_flies_and_not_where_the_pilot_asks_fo
 #[test]
 fn an_impact_is_a_shock_a_speed_that_breaks_off_and_then_stillness() {
     let crash: Script = |ms, quad, motion| {
-        motion.ground_mps = 18.0;
+        (motion.ground_mps, quad.climb) = (18.0, -3.0);
         if ms >= 1_000 {
+            quad.climb = 0.0;
             motion.load_g = if ms < 1_100 { 8.0 } else { 1.0 };
             (motion.ground_mps, quad.throttle, quad.height, motion.rates) = (0.0, 0.0, 0.5, [0.0; 3]);
         }
@@ -331,6 +332,7 @@ fn an_impact_is_a_shock_a_speed_that_breaks_off_and_then_stillness() {
         let outcome = fly(&on_wings(of), crash);
         assert_eq!(outcome.told(), ["impact"], "{of:?}");
         assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}");
+        assert_eq!(outcome.reports[0].touch, 30, "{of:?}: as it sank before the shock");
     }
     // A shock alone: a gust, a bird, a hard manoeuvre.
     for of in ROTORS {

@@ -64,6 +64,8 @@ pub(super) struct Shock {
     pub(super) load_g: f32,
     /// The speed just before it.
     pub(super) speed_mps: f32,
+    /// The sink just before it.
+    pub(super) sink_mps: f32,
     /// The speed broke off.
     pub(super) stopped: bool,
 }
