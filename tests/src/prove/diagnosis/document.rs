@@ -5,6 +5,7 @@ use super::faults::{self, BY_CLASS, EACH, FOUND};
 use super::judged::Judged;
 use super::options::Known;
 use super::rates::hours;
+use super::summary;
 use super::table::Form;
 
 /// What stands before the tables.
@@ -86,6 +87,7 @@ pub(super) fn text(judged: &[Judged]) -> String {
         counts = format!("{counts}\nWrong are:\n\n{}\n", wrong.join("\n"));
     }
     [
+        summary::section(judged),
         SETS.section(&sets(judged)),
         FOUND.section(&faults::found(judged)),
         BY_CLASS.section(&faults::by_class(judged)),
@@ -111,7 +113,8 @@ mod tests {
     fn labels() -> Vec<String> {
         let form = |form: &Form| form.lines();
         let forms = [&SETS, &FOUND, &BY_CLASS, &FALSE, &BY_CHECK, &UNLABELLED, &UNLABELLED_BY_CHECK, &COUNTS];
-        let mut labels: Vec<String> = forms.into_iter().flat_map(form).collect();
+        let mut labels = vec![summary::TITLE.to_owned()];
+        labels.extend(forms.into_iter().flat_map(form));
         labels.push(NOT_SEEN.to_owned());
         labels.extend(EACH.lines());
         labels

@@ -17,6 +17,7 @@ mod outcome;
 mod rates;
 mod sets;
 mod short;
+mod summary;
 mod table;
 
 use std::fs;

@@ -166,3 +166,46 @@ fn counted(judged: &Judged) -> Counts {
     });
     counts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn alarm(check: &str, level: Level, at_s: f64) -> Alarm {
+        Alarm { check: check.to_owned(), level, at_s }
+    }
+
+    fn label(class: &str) -> Label {
+        let text = format!(
+            r#"{{"file": "f", "vehicle": "PX4 quad", "what": "", "class": "{class}", "fault_s": 60, "end_s": 90, "visible": true}}"#
+        );
+        serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn a_fault_is_told_by_what_rises_while_it_lasts_and_named_by_a_check_of_its_class() {
+        let alarms = [
+            alarm("gps_hdop", Level::Warning, 59.0),
+            alarm("sensors", Level::Warning, 62.5),
+            alarm("gps_fix", Level::Critical, 64.0),
+            alarm("batt_remaining", Level::Critical, 91.0),
+        ];
+        let gnss = fault(&alarms, &label("gnss")).unwrap();
+        assert_eq!(gnss.told, Some(alarm("sensors", Level::Warning, 2.5)));
+        assert_eq!(gnss.named, Some(alarm("gps_fix", Level::Critical, 4.0)));
+        let power = fault(&alarms, &label("power")).unwrap();
+        assert_eq!(
+            (power.told.is_some(), power.named),
+            (true, None),
+            "what comes after the end is of nothing"
+        );
+        let missed = fault(&alarms[..1], &label("gnss")).unwrap();
+        assert_eq!((missed.told, missed.named), (None, None), "what was there before is no news");
+    }
+
+    #[test]
+    fn only_what_gets_worse_is_an_alarm() {
+        let order = [Level::Ok, Level::Stale, Level::Advisory, Level::Warning, Level::Critical].map(rank);
+        assert_eq!(order, [0, 0, 0, 1, 2]);
+    }
+}

@@ -1,0 +1,67 @@
+//! The figures that count, in a few sentences: of flights that nobody knew when the limits were chosen, where there are any.
+
+use std::fmt::Write as _;
+
+use hums_core::health::Level;
+
+use super::judged::Judged;
+use super::options::Known;
+use super::outcome::{Fault, Outcome};
+use super::rates::{an_hour, hours, quantile_s, share};
+
+/// The section's heading.
+pub(super) const TITLE: &str = "## In short";
+
+/// The section.
+pub(super) fn section(sets: &[Judged]) -> String {
+    let labelled = |known| sets.iter().filter(move |set| set.is_labelled && set.known == known);
+    let (known, words) = match labelled(Known::No).next() {
+        Some(_) => (Known::No, "flown after the limits were frozen"),
+        None => (Known::Yes, "known to whoever chose the limits"),
+    };
+    let flights: Vec<&Outcome> = labelled(known).flat_map(|set| &set.outcomes).collect();
+    let further: Vec<&Outcome> =
+        sets.iter().filter(|set| !set.is_labelled).flat_map(|set| &set.outcomes).collect();
+    let mut text = format!("{TITLE}\n\n* Simulator flights, {words}: {}", found(&flights));
+    let _ = write!(text, "* In the same flights, while nothing was wrong: {}", alarms(&flights));
+    if !further.is_empty() {
+        let words = "Recordings without labels, where an alarm may be true";
+        let _ = write!(text, "* {words}: {}", alarms(&further));
+    }
+    text
+}
+
+fn found(flights: &[&Outcome]) -> String {
+    let faults: Vec<&Fault> =
+        flights.iter().filter_map(|one| one.fault.as_ref()).filter(|fault| fault.visible).collect();
+    let delays_s: Vec<f64> =
+        faults.iter().filter_map(|fault| fault.told.as_ref()).map(|alarm| alarm.at_s).collect();
+    let named = faults.iter().filter(|fault| fault.named.is_some()).count() as u64;
+    let (all, told) = (faults.len() as u64, delays_s.len() as u64);
+    let [told_share, told_least] = share(told, all);
+    let [named_share, named_least] = share(named, all);
+    format!(
+        "of {all} faults {told} were told ({told_share}, at least {told_least}), half of these within {} s and nine in ten \
+         within {} s; the cause of {named} was named ({named_share}, at least {named_least}).\n",
+        quantile_s(&delays_s, 0.5),
+        quantile_s(&delays_s, 0.9),
+    )
+}
+
+fn alarms(flights: &[&Outcome]) -> String {
+    let air_s = flights.iter().fold(0.0, |sum, one| sum + one.air_s);
+    let count = |level| {
+        let all = flights.iter().flat_map(|one| &one.alarms);
+        all.filter(|one| one.in_air && one.alarm.level == level).count() as u64
+    };
+    let words = |level| {
+        let [rate, most] = an_hour(count(level), air_s);
+        format!("{} ({rate} an hour, at most {most})", count(level))
+    };
+    format!(
+        "in {} hours in the air, warnings {}, criticals {}.\n",
+        hours(air_s),
+        words(Level::Warning),
+        words(Level::Critical)
+    )
+}
