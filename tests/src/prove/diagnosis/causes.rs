@@ -30,6 +30,7 @@ pub(super) const CLASSES: &[Class] = &[
             // They tell people to look at propellers and motors first.
             "vibration",
             "vibration_px4",
+            "free_fall",
         ],
     },
     Class {
@@ -42,6 +43,7 @@ pub(super) const CLASSES: &[Class] = &[
             "cell_dev_lasting",
             "batt_fault",
             "batt_temperature",
+            "batt_state",
             "rail_5v_low",
             "rail_5v_high",
         ],
@@ -55,8 +57,12 @@ pub(super) const CLASSES: &[Class] = &[
     Class { name: "barometer", about: "barometers", checks: &[] },
     Class { name: "inertial", about: "accelerometers, gyros, airspeed", checks: &[] },
     Class { name: "vibration", about: "vibration", checks: &["vibration", "vibration_px4", "clipping"] },
-    Class { name: "attitude", about: "loss of attitude", checks: &["roll", "pitch"] },
-    Class { name: "crash", about: "disarmed in the air, falls, impacts", checks: &[] },
+    Class { name: "attitude", about: "loss of attitude", checks: &["roll", "pitch", "tumbling"] },
+    Class {
+        name: "crash",
+        about: "disarmed in the air, falls, impacts",
+        checks: &["free_fall", "impact", "tumbling", "disarmed_in_air", "sinking"],
+    },
     Class { name: "link", about: "links of the autopilot", checks: &["heartbeat", "frames_lost"] },
     Class { name: "rc", about: "remote control", checks: &["rc_rssi"] },
     Class {
