@@ -17,8 +17,8 @@ The rules:
              4 g within a second, or was disarmed above 5 m
   landing    a flight that ended by disarming or by standing for 8 s, without a crash
 
-An entry gets none of the fields where its heights cannot be trusted: no height for 3 s in the air, or the estimator's and the
-receiver's differ by more than 8 m. Faults of a receiver are known from the estimator alone.
+An entry gets none of the fields where its heights cannot be trusted: no height for 3 s in the air, more than 8 m below the place
+of arming while armed, or the estimator's and the receiver's differ by more than 8 m. Faults of a receiver are known from the estimator alone.
 """
 
 import collections
@@ -123,6 +123,7 @@ class Flights:
             self.ground = metres if self.armed else None
             return
         above = metres - self.ground
+        self.known &= above > -DIFFER_M or not self.armed
         if self.compares and self.began is not None and None not in (self.receiver, self.receiver_ground):
             self.known &= abs((self.receiver - self.receiver_ground) - above) < DIFFER_M
         if self.armed and self.began is None and self.crash_s is None:
