@@ -30,12 +30,6 @@ pub fn screen(checked: &Checked) -> String {
     let _ = writeln!(text, "  when     {}", when(judged));
     let _ = writeln!(text, "  in air   {}", in_air(judged));
     let _ = writeln!(text, "  verdict  {}", verdict(judged));
-    for height_m in judged.flights.iter().filter_map(|flight| flight.disarmed_at_m) {
-        let _ = writeln!(
-            text,
-            "  remark   disarmed in the air, {height_m:.0} m above home: no check judges that"
-        );
-    }
     text.push('\n');
     problems(&mut text, judged);
     not_judged(&mut text, judged);
@@ -58,11 +52,9 @@ pub fn line(checked: &Checked) -> String {
             names.push(name);
         }
     }
-    let in_air = judged.flights.iter().any(|flight| flight.disarmed_at_m.is_some());
-    let in_air = if in_air { "; disarmed in the air" } else { "" };
     let damaged = if checked.judged.damages > 0 { "; damaged" } else { "" };
     let air = clock(flown(judged));
-    format!("{level:<8}  {air:>8}  {}  {}{in_air}{damaged}", checked.name, names.join(", "))
+    format!("{level:<8}  {air:>8}  {}  {}{damaged}", checked.name, names.join(", "))
 }
 
 /// Many logs, added up.
