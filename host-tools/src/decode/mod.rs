@@ -51,6 +51,7 @@ use anyhow::{Result, bail};
 use hums_core::time::Instant;
 
 use crate::cli;
+use crate::ending::has_newer;
 use crate::files::{Folder, Inputs, appended};
 use crate::logs::reader::{self, Summary};
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
@@ -219,18 +220,9 @@ impl Task<'_> {
             return Ok(Done { outcome: Outcome::Done, written: false, lines: Vec::new(), remarks });
         }
         let written = writers.finish()?;
-        let lossy = summary.gaps > 0 || summary.blocks.damaged > 0 || written.losses > 0;
-        if lossy {
-            remarks.push(format!(
-                "{}: {}, {} missing, {}, {} or {} lost while recording",
-                log.name,
-                count(summary.gaps, "gap"),
-                count(summary.frames_missing, "frame"),
-                count(summary.blocks.damaged, "damaged sector"),
-                count(written.losses, "frame"),
-                noun(written.losses, "record")
-            ));
-        }
+        let before = remarks.len();
+        remarks.extend(losses_of(log, &summary, written.losses));
+        let lossy = remarks.len() > before;
         let lines = if self.standard_output { Vec::new() } else { written.lines };
         Ok(Done { outcome: Outcome::lossy(lossy), written: true, lines, remarks })
     }
@@ -308,6 +300,32 @@ impl Task<'_> {
         };
         Ok((summary, writers))
     }
+}
+
+/// What is missing of a log, as sentences: none where it is all there. `losses` is what its recorder has lost.
+fn losses_of(log: &Place, summary: &Summary, losses: u64) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if summary.gaps > 0 || summary.blocks.damaged > 0 || losses > 0 {
+        remarks.push(format!(
+            "{}: {}, {} missing, {}, {} or {} lost while recording",
+            log.name,
+            count(summary.gaps, "gap"),
+            count(summary.frames_missing, "frame"),
+            count(summary.blocks.damaged, "damaged sector"),
+            count(losses, "frame"),
+            noun(losses, "record")
+        ));
+    }
+    // Leftovers of earlier sessions are usual in a card's files; a later session is another log, joined to this one.
+    if has_newer(summary) {
+        remarks.push(format!(
+            "{}: {} of other sessions, of which one began later, are not decoded: logs were joined into one file; \
+             give each by itself",
+            log.name,
+            count(summary.blocks.stale, "sector")
+        ));
+    }
+    remarks
 }
 
 /// Says that nothing of a log is in the time that was asked for, and what time it has.

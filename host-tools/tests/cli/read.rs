@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use crate::support::{flight, frames, frames_of, json, named, px4, recorded, run, text};
+use crate::support::{attempt, flight, frames, frames_of, json, named, px4, recorded, run, text};
 
 /// A packed log of the PX4 flight.
 fn packed(dir: &Path) {
@@ -20,6 +20,26 @@ fn a_packed_recording_comes_back_frame_for_frame() {
         run(dir.path(), "decode log.hum -o back.tlog --format tlog --replace", 0);
         assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&input), "{name}");
     }
+}
+
+#[test]
+fn a_second_log_that_was_joined_to_the_first_one_is_told_and_not_silently_left_out() {
+    let dir = tempfile::tempdir().expect("directory");
+    let logs = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"].map(|name| {
+        run(dir.path(), &format!("pack {} -o log.hum --replace", flight(name).display()), 0);
+        fs::read(dir.path().join("log.hum")).expect("a log")
+    });
+    // In one of both orders the second one is the later.
+    let [one, other] = &logs;
+    let told = [[&one[..], other], [&other[..], one]].map(|joined| {
+        fs::write(dir.path().join("joined.hum"), joined.concat()).expect("written");
+        let ended = attempt(dir.path(), "decode joined.hum -o - --format tlog");
+        (
+            ended.status.code(),
+            String::from_utf8_lossy(&ended.stderr).contains("logs were joined into one file"),
+        )
+    });
+    assert!(told.contains(&(Some(3), true)), "{told:?}");
 }
 
 #[test]
