@@ -184,7 +184,10 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         let mut room = self.room;
         let found = self.manager()?.device(|gate| room.find(gate, clusters));
         self.room = room;
-        found?;
+        if found? {
+            // The library may remember a block of the FAT as it was.
+            self.reopen()?;
+        }
         let manager = self.manager()?;
         manager.device(|gate| gate.begin());
         let file = manager.open_file_in_dir(self.root, short_name(name)?, Mode::ReadWriteCreate)?;

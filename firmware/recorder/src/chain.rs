@@ -9,7 +9,7 @@ use crate::gate::{Gate, GateError};
 use crate::layout::Layout;
 
 /// FAT entries of a block.
-const ENTRIES: u32 = 128;
+pub(crate) const ENTRIES: u32 = 128;
 
 /// A walk along one file's chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,7 +99,7 @@ fn read_fat<D: BlockDevice>(gate: &Gate<'_, D>, fat_block: u32) -> Result<Block,
 }
 
 /// What the FAT block of this cluster says comes after it.
-fn entry(block: &Block, cluster: u32) -> u32 {
+pub(crate) fn entry(block: &Block, cluster: u32) -> u32 {
     let at = (cluster % ENTRIES * 4) as usize;
     let entry = block.get(at..at + 4).and_then(|entry| entry.try_into().ok());
     entry.map_or(0, u32::from_le_bytes) & 0x0FFF_FFFF

@@ -3,7 +3,8 @@
 //! **Order of metadata.** The library writes FAT blocks and directory entries as it goes, and a cut between two of them
 //! leaves a chain longer than its file, or a file without a chain. Within a transaction the gate holds these blocks
 //! back; [`Gate::commit`] then writes FAT blocks first and directory entries last. Every cut then leaves the old
-//! directory, and at worst clusters that no file uses. Outside a transaction metadata cannot be written at all.
+//! directory, and at worst clusters that no file uses. Outside a transaction the library cannot write metadata at all; the
+//! recorder itself writes there to chain a log's lost clusters again (`claims`).
 //!
 //! **Allocation without data.** The library allocates by writing; while [`Gate::discard_data`] is on, what it writes
 //! into clusters goes nowhere, so a segment of 8 MiB costs its FAT blocks and no more. What an earlier file left in
@@ -131,6 +132,11 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     /// Lets the next operation read at most `blocks` blocks.
     pub(crate) fn allow_reads(&self, blocks: u32) {
         self.reads_left.set(blocks);
+    }
+
+    /// How many blocks the operation may still read.
+    pub(crate) const fn reads_left(&self) -> u32 {
+        self.reads_left.get()
     }
 
     /// Holds metadata back from now on.

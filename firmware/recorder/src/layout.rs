@@ -37,6 +37,8 @@ pub struct Layout {
     pub cluster_blocks: u32,
     /// How many clusters there are; they are numbered from 2.
     pub clusters: u32,
+    /// The root directory's first cluster.
+    pub root: u32,
     /// The number that formatting gave the volume.
     pub volume_id: u32,
 }
@@ -124,6 +126,7 @@ impl Layout {
             data_start: start + data,
             cluster_blocks,
             clusters,
+            root,
             volume_id: u32_at(67),
         })
     }

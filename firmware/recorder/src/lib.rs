@@ -22,6 +22,7 @@
 pub mod card;
 mod card_error;
 mod chain;
+mod claims;
 pub mod format;
 mod gate;
 pub mod layout;

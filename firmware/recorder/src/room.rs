@@ -3,11 +3,15 @@
 use embedded_sdmmc::{Block, BlockDevice, BlockIdx};
 
 use crate::card_error::CardError;
+use crate::chain::ENTRIES;
+use crate::claims::chain_again;
 use crate::gate::{Gate, GateError};
 
 /// FAT blocks that are looked through for one new segment beside its own: 64 ms of a usual card. All of a large card's FAT takes
 /// seconds, and frames wait meanwhile.
 const SEARCH_BLOCKS: u32 = 128;
+/// FAT blocks, beside a segment's own, of which lost chains of logs are looked for with one walk over the directory.
+const CLAIM_BLOCKS: u32 = 8;
 
 /// The search for free clusters, which goes on from segment to segment, and what is known of how many there are.
 #[derive(Clone, Copy, Debug)]
@@ -50,12 +54,13 @@ impl Room {
     }
 
     /// Fails with [`CardError::Full`] unless that many clusters were found free. Asked before a segment is made, so
-    /// that one that does not fit leaves no half of a chain behind.
+    /// that one that does not fit leaves no half of a chain behind. Whether the FAT was changed meanwhile: what logs claim
+    /// of it is chained again before anything of it counts as free.
     pub(crate) fn find<D: BlockDevice>(
         &mut self,
         gate: &Gate<'_, D>,
         wanted: u32,
-    ) -> Result<(), CardError<D::Error>> {
+    ) -> Result<bool, CardError<D::Error>> {
         if wanted >= self.too_many {
             return Err(CardError::Full);
         }
@@ -64,13 +69,23 @@ impl Room {
             Some(next) => next,
             None => hint(gate)? / ENTRIES,
         };
+        let (mut changed, mut looked_to) = (false, 0);
         for _ in 0..SEARCH_BLOCKS + wanted / ENTRIES {
             next %= fat_blocks;
-            self.found += free_in_block(gate, next)?;
+            let mut free = free_in_block(gate, next)?;
+            if free > 0 && (next >= looked_to || next == 0) {
+                let blocks = (CLAIM_BLOCKS + wanted / ENTRIES).min(fat_blocks - next);
+                if chain_again(gate, next, blocks)? {
+                    changed = true;
+                    free = free_in_block(gate, next)?;
+                }
+                looked_to = next + blocks;
+            }
+            self.found += free;
             if self.found >= wanted {
                 // This block may have some left for the next segment. What is counted changes under the count.
                 *self = Self { next: Some(next), too_many: self.too_many, ..Self::new() };
-                return Ok(());
+                return Ok(changed);
             }
             next += 1;
             self.next = Some(next);
@@ -91,9 +106,6 @@ fn hint<D: BlockDevice>(gate: &Gate<'_, D>) -> Result<u32, GateError<D::Error>> 
     let hint = block[0].get(492..496).and_then(|hint| hint.try_into().ok()).map_or(0, u32::from_le_bytes);
     Ok(if hint < gate.layout().clusters + 2 { hint } else { 0 })
 }
-
-/// FAT entries of a block.
-const ENTRIES: u32 = 128;
 
 /// Free clusters that one block of the FAT tells of.
 fn free_in_block<D: BlockDevice>(gate: &Gate<'_, D>, index: u32) -> Result<u32, GateError<D::Error>> {

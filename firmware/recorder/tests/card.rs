@@ -297,3 +297,90 @@ fn a_card_too_small_for_fat32_is_not_formatted() {
     assert!(card.journal.borrow().is_empty());
     format(&MemCard::new(BLOCKS_MIN), 1).expect("the smallest card");
 }
+
+/// Where the card layer's formatting puts the FAT.
+const FAT_START: u32 = 2048 + 32;
+
+/// Changes one block of a card.
+fn change(device: &MemCard, at: u32, change: impl FnOnce(&mut [u8; 512])) {
+    change(device.blocks.borrow_mut().entry(at).or_insert([0; 512]));
+}
+
+/// The search for room begins at the first cluster again.
+fn forget_hint(device: &MemCard) {
+    change(device, 2048 + 1, |info| info[488..496].fill(0xFF));
+}
+
+#[test]
+fn a_log_whose_fat_was_lost_is_chained_again_and_not_written_over() {
+    // All of it, its beginning, its middle and its end, in blocks of the FAT.
+    for lost in [0..17, 0..5, 5..9, 12..17] {
+        let device = MemCard::formatted(64 * MIB_BLOCKS);
+        let status = CardStatus::new();
+        let mut card = mount(&device, &status);
+        card.create(FIRST, 1 << 20).expect("there is room");
+        for index in 0..2048 {
+            card.write(index, &[pattern(index)]).expect("in place");
+        }
+        drop(card);
+        for at in lost.clone() {
+            // The first three entries are the media, the flags and the root directory.
+            change(&device, FAT_START + at, |block| block[if at == 0 { 12 } else { 0 }..].fill(0));
+        }
+        forget_hint(&device);
+        let mut card = mount(&device, &status);
+        card.create(SECOND, 1 << 20).expect("there is room");
+        for index in 0..2048 {
+            card.write(index, &[pattern(9999)]).expect("in place");
+        }
+        let mut segment = card.segment(FIRST).expect("it is there");
+        let mut block = Block::new();
+        // Where the FAT goes on behind what was lost, only the place of the link to there is not known.
+        let blocks = if lost.end == 17 { 2048 } else { lost.end * 128 - 3 };
+        for index in 0..blocks {
+            card.read(&mut segment, index, &mut block).expect("it reads");
+            assert_eq!(block.contents, pattern(index).contents, "block {index}, lost {lost:?}");
+        }
+    }
+}
+
+#[test]
+fn free_clusters_that_no_log_lost_are_taken() {
+    let third = LogName { session: 3, segment: 0 };
+    let fourth = LogName { session: 4, segment: 0 };
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 1 << 20).expect("there is room");
+    card.create(SECOND, 1 << 20).expect("there is room");
+    drop(card);
+    // Another computer deletes the first log: its clusters, 3 to 2050, are free.
+    let free = |from: u32, to: u32| {
+        for cluster in from..to {
+            let at = cluster as usize % 128 * 4;
+            change(&device, FAT_START + cluster / 128, |block| block[at..at + 4].fill(0));
+        }
+    };
+    let root =
+        *device.blocks.borrow().iter().find(|(_, block)| block.starts_with(&FIRST.short())).expect("root").0;
+    free(3, 2051);
+    change(&device, root, |block| block[0] = 0xE5);
+    forget_hint(&device);
+    let mut card = mount(&device, &status);
+    // The third log lies in the first one's place and behind the second one.
+    card.create(third, 3 << 19).expect("there is room");
+    drop(card);
+    free(2051, 4099);
+    change(&device, root, |block| block[32] = 0xE5);
+    forget_hint(&device);
+    device.journal.borrow_mut().clear();
+    let mut card = mount(&device, &status);
+    card.create(fourth, 1 << 20).expect("there is room");
+    card.write(0, &[pattern(4)]).expect("in place");
+    let first_block = device.journal.borrow().last().expect("written").0;
+    let data_start = root;
+    assert_eq!(first_block, data_start + 2051 - 2, "in the second log's place");
+    let mut segment = card.segment(third).expect("it is there");
+    let mut block = Block::new();
+    card.read(&mut segment, 3071, &mut block).expect("its chain is as it was");
+}
