@@ -344,7 +344,9 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     let first = first.expect("a sector was written");
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
     let reads = device.reads.get() - reads_before;
-    assert!(reads < 400, "{reads} blocks were read");
+    // Of them some 80 are the FAT of the session before, which is followed once on its way to room for the next one: clusters
+    // of a block, as on this small card, take 64 times the FAT that those of a large card take.
+    assert!(reads < 500, "{reads} blocks were read");
     for page in (1..all.len() as u32 / 8 - 1).step_by(3) {
         device.blocks.replace(whole.clone());
         for at in 8 * page..8 * page + 8 {

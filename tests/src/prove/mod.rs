@@ -52,6 +52,14 @@ pub const CAMPAIGNS: &[Campaign] = &[
         run: power_cuts::run,
     },
     Campaign {
+        name: "careless-cards",
+        about: "power goes at a card that keeps its last blocks in no order, has lost one that it acknowledged, or spoils the \
+                page around the last one: earlier sessions lose nothing beyond the groups that were spoiled; what is not told, and \
+                what the next power-on writes over, is counted",
+        labels: power_cuts::careless::LABELS,
+        run: power_cuts::careless::run,
+    },
+    Campaign {
         name: "damage",
         about: "bits flip anywhere in a log, pages of it go wrong, and its end goes missing: each is noticed or told for \
                 what it is, no wrong frame comes out, and at most the groups that were touched are lost",

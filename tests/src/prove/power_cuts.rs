@@ -5,6 +5,8 @@
 //! cuts as are wanted from one recording, each exactly what the card would hold. What is decoded is compared with the
 //! frames that went in, one by one and in order, and with when each arrived.
 
+pub(super) mod careless;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context as _, Result, ensure};
