@@ -83,6 +83,11 @@ impl Sector {
         self.bytes[2] & PARTIAL != 0
     }
 
+    /// Makes it a copy of a sector in progress, or the sector itself; to be sealed after that.
+    pub const fn set_partial(&mut self, partial: bool) {
+        self.bytes[2] = self.bytes[2] & !PARTIAL | if partial { PARTIAL } else { 0 };
+    }
+
     /// Whether a group, and with it a place where reading can start, begins here.
     pub const fn starts_group(&self) -> bool {
         self.bytes[2] & SINCE_FIRST == 0

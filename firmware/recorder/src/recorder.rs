@@ -3,6 +3,7 @@
 //! A sector with number `n` belongs at block `n - base` of the open segment. A segment is left for the next one at the
 //! first group that no longer fits, so that each file can be read by itself. A *partial* sector (one still in progress)
 //! is written alternately at its own place and at the next one, so that a torn write never takes the older copy with it.
+//! Where the newest copy lies at the sector's own place, the whole sector is first written as a copy at the next one.
 //!
 //! Of what a disarmed vehicle sends, when it is recorded by arming, only the last while is kept: small segments in a
 //! ring, of which the oldest is renamed and written anew once those after it hold enough. The monitor says when
@@ -179,12 +180,16 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.status.count_write_errors(self.slot.take_retries());
     }
 
-    /// With nothing to write: counts a little further how much room there is on the card.
+    /// With nothing to write: looks for where the session before ended, once the session has a sector on the card, and counts
+    /// a little further how much room there is on the card.
     pub fn idle(&mut self) {
+        let Some(card) = self.slot.card() else { return };
+        if self.segments.has_sector() {
+            self.segments.look_before(card);
+        }
         if self.room_known {
             return;
         }
-        let Some(card) = self.slot.card() else { return };
         match card.count_room() {
             Ok(None) => {}
             Ok(room) => {
@@ -260,14 +265,17 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
         let mut at = number.wrapping_sub(*log.base.get_or_insert(number));
         let blocks = self.mounted()?.open_blocks();
+        let has_next = at + 1 < blocks;
         let count = if first.is_partial() {
-            if log.partial_further && at + 1 < blocks {
-                at += 1;
-            }
-            log.partial_further = !log.partial_further;
+            let further = log.partial_further && has_next;
+            at += u32::from(further);
+            (log.partial_further, log.copy_in_place) = (!log.partial_further, !further);
             1
         } else {
-            log.partial_further = true;
+            if log.copy_in_place && has_next {
+                self.write_copy(log.session, at + 1)?;
+            }
+            (log.partial_further, log.copy_in_place) = (true, false);
             self.count_in_row(number, (blocks - at) as usize)
         };
         let written = self.write_sealed(&log, at, count)?;
@@ -275,6 +283,18 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.segments.log = Some(log);
         self.drop_written(written);
         Ok(())
+    }
+
+    /// Writes the first sector that waits as a partial copy, at the place after its own: a torn write at its own place then
+    /// takes nothing with it.
+    #[inline(never)]
+    fn write_copy(&mut self, session: u32, at: u32) -> Result<(), CardError<D::Error>> {
+        let mut batch = self.held.batch.borrow_mut();
+        let block = batch.get_mut(..1).ok_or(CardError::NotOpen)?;
+        mark(block, Some(session));
+        let written = self.mounted().and_then(|card| card.write(at, block));
+        mark(block, None);
+        written.map(|_| ())
     }
 
     fn write_sealed(&mut self, log: &Log, at: u32, count: usize) -> Result<usize, CardError<D::Error>> {
@@ -354,6 +374,17 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     fn tell(&self, error: &CardError<D::Error>) {
         self.status.set_state(trouble::state::<D>(error));
+    }
+}
+
+/// Makes the block's sector a partial copy for this session, or the sector itself again.
+#[inline(never)]
+fn mark(block: &mut [Block], session: Option<u32>) {
+    for block in block {
+        let mut sector = sector_of(block);
+        sector.set_partial(session.is_some());
+        sector.seal(session.unwrap_or_default());
+        block.contents = *sector.bytes();
     }
 }
 

@@ -208,6 +208,32 @@ fn a_torn_partial_never_takes_the_older_copy_with_it() {
     assert_eq!(stored(&device).len(), 2, "the newest copy and the one before");
 }
 
+/// The sector that is whole now is written at its own place; where the newest copy lies there, it is elsewhere too by then.
+#[test]
+fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
+    for copies in 1..5_u64 {
+        let device = MemCard::formatted(64 * MIB_BLOCKS);
+        let status = CardStatus::new();
+        let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
+        let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
+        let mut frames = 0;
+        for copy in 0..copies {
+            writer.frame(Instant::from_millis(copy), &[0xFD; 30], false, &mut sink).expect("there is room");
+            let mut partial = Sector::zeroed();
+            assert!(writer.partial(&mut partial));
+            frames = partial.frames();
+            assert_eq!(put(&mut recorder, Instant::ZERO, &partial), Written::Done);
+        }
+        writer.finish(&mut sink);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sink.0[0]), Written::Done);
+        assert_eq!(numbers(&device), [0], "the sector itself is whole");
+        let torn = device.journal.borrow().last().expect("a write").0;
+        device.blocks.borrow_mut().get_mut(&torn).expect("written")[256..].fill(0);
+        let left = stored(&device).into_iter().map(|(.., header)| header.frames).max();
+        assert!(left >= Some(frames), "{copies} copies: {left:?} of {frames} frames");
+    }
+}
+
 /// What waited while the card stood still is written with few commands.
 #[test]
 fn sectors_that_wait_together_are_written_together() {
@@ -323,7 +349,8 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let expected =
             Before { found: Found::Frames, number: 1, session, sectors: written.len() as u32, frames };
         assert_eq!(before, expected, "{count} frames");
-        // Nothing was written by the start after it: the same is found behind its empty segment.
+        // A start whose power goes before its first sector: the same is found behind its empty segment.
+        assert!(Recorder::new(device.clone(), &CardStatus::new(), held(), 9).ready(Instant::ZERO));
         let again = found_at_next_start(&device);
         assert_eq!((again.session, again.sectors), (session, written.len() as u32));
     }
@@ -365,10 +392,65 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
 }
 
-/// What a recorder that starts now says of the session before.
-fn found_at_next_start(device: &MemCard) -> Before {
+/// Looking for the session before takes a while in which nothing is written: the session's first sector does not wait.
+#[test]
+fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let all = sectors(2_000);
+    let earlier = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &earlier, held(), 7);
+    for sector in &all {
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+    }
+    drop(recorder);
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
     assert!(recorder.ready(Instant::ZERO));
+    recorder.idle();
+    assert_eq!(status.take_before(), None, "there is no sector yet");
+    assert_eq!(put(&mut recorder, Instant::ZERO, &all[0]), Written::Done);
+    assert_eq!(status.take_before(), None, "whatever waits is written first");
+    recorder.idle();
+    let before = status.take_before().expect("it was looked for");
+    assert_eq!((before.number, before.sectors), (1, all.len() as u32));
+    recorder.idle();
+    assert_eq!(status.take_before(), None, "told once");
+}
+
+#[test]
+fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card =
+        Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+    card.create(LogName { session: 5, segment: 0 }, (card.layout().data_bytes() - 1_024) as u32)
+        .expect("it fits");
+    let all = sectors(200);
+    for (at, sector) in (0..).zip(&all) {
+        let mut sealed = *sector;
+        sealed.seal(0x55);
+        let mut block = Block::new();
+        block.contents = *sealed.bytes();
+        card.write(at, &[block]).expect("in place");
+    }
+    drop(card);
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
+    for sector in &all {
+        assert_eq!(put(&mut recorder, Instant::ZERO, sector), Written::Done);
+        recorder.idle();
+    }
+    assert!(stored(&device).iter().all(|(name, ..)| name.session == 6), "it made room");
+    let before = status.take_before().expect("it was looked for");
+    assert_eq!((before.number, before.session, before.sectors), (5, 0x55, all.len() as u32));
+}
+
+/// What a recorder that starts now says of the session before; the card stays as it is.
+fn found_at_next_start(device: &MemCard) -> Before {
+    let whole = device.blocks.borrow().clone();
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(1)[0]), Written::Done);
+    recorder.idle();
+    device.blocks.replace(whole);
     status.take_before().expect("it was looked for")
 }

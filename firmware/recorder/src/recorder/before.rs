@@ -1,4 +1,4 @@
-//! Where the session before this one ended: looked for once, when a card is opened and before anything is written to it.
+//! Where the session before this one ended: looked for once for each card, when the session has its first sector on it.
 //!
 //! A segment is allocated whole and written from its beginning, so its last sector is found by bisection: some sixty
 //! reads of a segment of 8 MiB, and as many again at most to count the frames of its last group. That is 0.1 s of a usual
@@ -18,10 +18,8 @@ const PROBE_BLOCKS: u32 = 9;
 const SEGMENTS_MAX: u32 = 3;
 
 /// What the newest log on the card, whose last segment is `newest`, ended with.
-// Not within its caller: what it takes of the stack is not to lie below what makes a segment.
-#[inline(never)]
-pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: Option<LogName>) -> Before {
-    let Some(mut name) = newest else { return Before { found: Found::Nothing, ..Before::default() } };
+pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: LogName) -> Before {
+    let mut name = newest;
     let unreadable = Before { found: Found::Unreadable, number: name.session, ..Before::default() };
     for _ in 0..SEGMENTS_MAX {
         match end_of(card, name) {

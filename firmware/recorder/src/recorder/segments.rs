@@ -1,5 +1,6 @@
 //! Which segment is written: the session's next one, made where there is room and else in the place of the oldest.
 
+use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};
 use hums_core::time::Instant;
 
@@ -26,6 +27,8 @@ pub(super) struct Log {
     pub(super) base: Option<u32>,
     /// Where the next partial sector goes: at its own place, or one further.
     pub(super) partial_further: bool,
+    /// The newest partial copy lies at the place of its sector, which would be written over it.
+    pub(super) copy_in_place: bool,
 }
 
 /// The session's segments on whatever card is there.
@@ -36,11 +39,13 @@ pub(super) struct Segments<'a> {
     pub(super) log: Option<Log>,
     /// The segments of a disarmed vehicle.
     pub(super) ring: Ring,
+    /// The newest segment that was on the card before the session, until it was looked at.
+    earlier: Option<LogName>,
 }
 
 impl<'a> Segments<'a> {
     pub(super) const fn new(status: &'a CardStatus, entropy: u32) -> Self {
-        Self { status, entropy, log: None, ring: Ring::new() }
+        Self { status, entropy, log: None, ring: Ring::new(), earlier: None }
     }
 
     /// A number for a card that is formatted now.
@@ -61,12 +66,15 @@ impl<'a> Segments<'a> {
         let log = if let Some(log) = resumed {
             log
         } else {
-            self.status.set_before(&before::look(card, newest));
+            self.earlier = newest;
+            if newest.is_none() {
+                self.status.set_before(&Before { found: Found::Nothing, ..Before::default() });
+            }
             let name = newest.map_or(Some(LogName { session: 1, segment: 0 }), LogName::next_session);
             // The numbers end at 99,999; the last session number then goes on with its segments.
             let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
             let session = mix(mix(volume_id, name.session), self.entropy);
-            Log { name, session, volume_id, base: None, partial_further: true }
+            Log { name, session, volume_id, base: None, partial_further: true, copy_in_place: false }
         };
         let before = self.log.replace(log);
         self.ring.clear();
@@ -79,6 +87,22 @@ impl<'a> Segments<'a> {
             self.status.want_group();
         }
         Ok(before.is_some_and(|before| before.session != log.session))
+    }
+
+    /// Looks for where the session before ended, once for each card, and tells it. This takes 0.1 s of a usual card, in which
+    /// nothing is written: so it waits until the session has its first sector on the card, or takes the place of an
+    /// older segment.
+    // Not within its callers: what it takes of the stack is not to lie below what makes a segment.
+    #[inline(never)]
+    pub(super) fn look_before<D: CardDevice>(&mut self, card: &Card<'_, D>) {
+        if let Some(newest) = self.earlier.take() {
+            self.status.set_before(&before::look(card, newest));
+        }
+    }
+
+    /// Whether the open segment has a sector.
+    pub(super) fn has_sector(&self) -> bool {
+        self.log.is_some_and(|log| log.base.is_some())
     }
 
     /// Opens the one after it.
@@ -110,6 +134,7 @@ impl<'a> Segments<'a> {
             log.name = name;
             log.base = None;
             log.partial_further = true;
+            log.copy_in_place = false;
         }
         self.ring.begin(name, now);
         self.status.begin_segment(name.session, overwrote);
@@ -154,6 +179,7 @@ impl<'a> Segments<'a> {
                 Err(error) => return Err(error),
             }
             if let Some(oldest) = survey(card, name)?.oldest {
+                self.look_before(card);
                 self.ring.forget(oldest.name);
                 card.recycle(&oldest, name)?;
                 return Ok(true);
