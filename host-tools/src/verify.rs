@@ -130,10 +130,7 @@ struct Check {
 
 fn file_system(image: &Image) -> Check {
     let mut detail = image.damage.clone();
-    if image.lost_clusters > 0 {
-        // What a cut leaves behind by design: space, no data.
-        detail.push(format!("{} clusters belong to no file (lost space, no data)", image.lost_clusters));
-    }
+    detail.extend(image.lost_words());
     Check { name: "file system", checked: 1, failed: image.damage.len() as u64, detail: detail.join("; ") }
 }
 

@@ -79,16 +79,49 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
             fs::copy(recording.image(), &image).unwrap();
             wreck(&image);
             eprintln!("{name}: {what}");
-            // An empty directory is no damage that can be seen: the card then says that it is empty.
-            let code = if what.contains("directory") { 0 } else { 3 };
-            let info = json("info", &image, &[], code);
+            // An empty directory tells that the card is empty; the FAT, and what lies there, tell otherwise.
+            let info = json("info", &image, &[], 3);
+            assert_ne!(info["images"][0]["damage"], serde_json::json!([]), "{what}");
             assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{what}: {info}");
             assert_eq!(info["logs"][0]["gaps_count"], 0, "{what}: the log itself is whole");
-            json("verify", &image, &[], code);
-            let decoded = Decoded::of(&image, &[code]);
+            json("verify", &image, &[], 3);
+            let decoded = Decoded::of(&image, &[3]);
             frames::assert_same(&input, &decoded.frames(&manifest.seeds), &stream);
         }
     }
+}
+
+/// The entry of a log is lost, its clusters are not free: nobody deleted it.
+#[test]
+fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
+    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
+    let image = recording.image();
+    record_more(&image, &own("ap_quad_guided.tlog"));
+    let mut content = fs::read(&image).unwrap();
+    let entry = content.windows(11).position(|name| name == b"00001_00HUM").unwrap();
+    content[entry] = 0xe5;
+    fs::write(&image, &content).unwrap();
+    let info = json("info", &image, &[], 3);
+    assert_eq!(info["logs"].as_array().unwrap().len(), 2, "{info}");
+    assert!(info["images"][0]["damage"][0].as_str().unwrap().contains("belong to no file"), "{info}");
+    assert_eq!(json("verify", &image, &[], 3)["logs"].as_array().unwrap().len(), 2);
+}
+
+/// The card was formatted on a PC: its file system is in order and empty, and may have known of more than is left.
+#[test]
+fn a_card_that_was_formatted_gives_its_logs_and_says_so() {
+    let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
+    let image = recording.image();
+    let Places { fat, data, cluster_bytes, .. } = places(&image);
+    zero(&image, fat, data + cluster_bytes);
+    // The media, the flags and the root directory.
+    let head = [0x0fff_fff8_u32, 0x0fff_ffff, 0x0fff_ffff].map(u32::to_le_bytes).concat();
+    File::options().write(true).open(&image).unwrap().write_all_at(&head, fat).unwrap();
+    let info = json("info", &image, &[], 3);
+    assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{info}");
+    let told = serde_json::json!(["its file system knows of no log, and sectors of logs are there"]);
+    assert_eq!(info["images"][0]["damage"], told);
+    assert_eq!(info["logs"][0]["gaps_count"], 0, "{info}");
 }
 
 #[test]

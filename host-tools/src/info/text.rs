@@ -30,8 +30,8 @@ pub fn image_text(image: &logs::find::Image) -> String {
     if image.scanned {
         text.push_str("\n  the logs were found by looking at every block");
     }
-    if image.lost_clusters > 0 {
-        let _ = write!(text, "\n  {} clusters belong to no file (lost space, no data)", image.lost_clusters);
+    if let Some(words) = image.lost_words() {
+        let _ = write!(text, "\n  {words}");
     }
     text
 }

@@ -5,10 +5,11 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
+use hums_blackbox::Header;
 use hums_recorder::layout::Layout;
 
 use super::fat::{CardFile, Extent, Volume};
-use super::found::{Found, Image};
+use super::found::{Found, Image, belong};
 use super::places::{Log, Piece};
 use super::scan::{Scan, scan};
 use crate::card::{ReadOnlyImage, length};
@@ -50,10 +51,17 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
             let walk = Volume::new(&file, layout).and_then(Volume::walk).with_context(context)?;
             about.damage = walk.damage;
             about.lost_clusters = walk.lost_clusters;
+            if about.damage.is_empty() && !salvage && has_sector(path, walk.lost)? {
+                let clusters = belong(walk.lost_clusters);
+                about.damage.push(format!(
+                    "{clusters}, with sectors of logs in them: an entry of a directory is lost"
+                ));
+            }
             found.add(sessions_of(path, &walk.files));
         }
         Err(error) => about.damage.push(error.to_string()),
     }
+    let is_in_order = about.damage.is_empty();
     // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead.
     if salvage || found.logs.len() == before || !about.damage.is_empty() {
         found.logs.truncate(before);
@@ -72,10 +80,30 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
             );
         }
         about.scanned = !logs.is_empty();
+        if about.scanned && is_in_order && !salvage {
+            about.damage.push("its file system knows of no log, and sectors of logs are there".to_owned());
+        }
         found.add(logs);
     }
     found.images.push(about);
     Ok(())
+}
+
+/// Whether there is a sector of a log here.
+fn has_sector(path: &Path, extents: Vec<Extent>) -> Result<bool> {
+    let lost = Log {
+        name: String::new(),
+        files: Vec::new(),
+        pieces: vec![Piece { path: path.to_owned(), extents }],
+        session: None,
+    };
+    let mut blocks = lost.blocks();
+    while let Some(block) = blocks.next_block()? {
+        if Header::read(&block).is_ok() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {

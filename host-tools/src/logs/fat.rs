@@ -68,8 +68,10 @@ pub struct Walk {
     pub files: Vec<CardFile>,
     /// What does not hold, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub damage: Vec<String>,
-    /// Clusters that are allocated and belong to no file: space that is lost, not data.
+    /// Clusters that are allocated and belong to no file: room that a cut left behind, or a file whose entry is lost.
     pub lost_clusters: u64,
+    /// Where they lie, as far as there is room to keep it.
+    pub lost: Vec<Extent>,
 }
 
 /// Something that blocks can be read from at any place: an image file, a raw device, memory.
@@ -304,9 +306,20 @@ impl<'a, I: ReadAt> Volume<'a, I> {
             // 0x0ffffff7 marks a bad cluster.
             if !used && !matches!(self.entry(cluster)?, 0 | 0x0fff_fff7) {
                 self.walk.lost_clusters += 1;
+                self.keep_lost(cluster);
             }
         }
         Ok(())
+    }
+
+    fn keep_lost(&mut self, cluster: u32) {
+        let (start, length) = (self.place(cluster), self.cluster_bytes());
+        let held = self.extents + self.walk.lost.len();
+        match self.walk.lost.last_mut() {
+            Some(last) if last.start + last.length == start => last.length += length,
+            _ if held < EXTENTS_MAX => self.walk.lost.push(Extent { start, length }),
+            _ => {}
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::places::Log;
 use crate::files::FileId;
+use crate::plural::count;
 
 /// Logs that are kept: each takes some hundred bytes. A card of 32 GB has room for 4,096 full segments.
 pub(super) const LOGS_MAX: usize = 10_000;
@@ -103,4 +104,20 @@ pub struct Image {
     pub lost_clusters: u64,
     /// The logs were found by looking at every block, because the file system could not tell.
     pub scanned: bool,
+}
+
+impl Image {
+    /// What there is to say of clusters that belong to no file.
+    pub fn lost_words(&self) -> Option<String> {
+        // Where the file system is in order they were looked at, and hold no sector of a log.
+        let what = if self.damage.is_empty() && !self.scanned { " (lost space, no data)" } else { "" };
+        let number = Some(self.lost_clusters).filter(|number| *number > 0)?;
+        Some(format!("{}{what}", belong(number)))
+    }
+}
+
+/// So many clusters belong to no file.
+pub(super) fn belong(clusters: u64) -> String {
+    let verb = if clusters == 1 { "belongs" } else { "belong" };
+    format!("{} {verb} to no file", count(clusters, "cluster"))
 }
