@@ -60,6 +60,8 @@ pub(crate) struct SdCard {
     busy_until_ns: u64,
     was_busy: bool,
     transfer: Transfer,
+    /// The block that is being programmed while it is busy, and what it held before.
+    programmed: Option<(u32, [u8; 512])>,
     noise: u32,
 }
 
@@ -80,6 +82,7 @@ impl SdCard {
             busy_until_ns: 0,
             was_busy: false,
             transfer: Transfer::None,
+            programmed: None,
             noise: 1,
         }
     }
@@ -120,6 +123,13 @@ impl SdCard {
         }
         if matches!(self.transfer, Transfer::Write { block: Some(_), .. }) {
             wrong("deselected within a block".to_owned());
+        }
+    }
+
+    /// Its power goes: of a block that is being programmed only the first half is new.
+    pub(crate) fn power_off(&self, now_ns: u64) {
+        if let Some((at, before)) = self.programmed.filter(|_| self.is_busy(now_ns)) {
+            self.model.medium.patch(at, 256, &before[256..]);
         }
     }
 
@@ -320,6 +330,7 @@ impl SdCard {
         let model = &mut self.model;
         let is_damaged = model.has(now_ns, |fault| fault == Fault::DamagedWrite).is_some();
         let is_locked = model.locked.0 || model.locked.1;
+        self.programmed = None;
         let (mut response, mut busy_ns) = (0xE5, if *many { model.write_ns.1 } else { model.write_ns.0 });
         if *failed || !is_whole || is_damaged {
             (response, busy_ns, *failed) = (0xEB, 0, true);
@@ -333,6 +344,7 @@ impl SdCard {
             if model.has(now_ns, |fault| fault == Fault::NotProgrammed).is_some() {
                 self.status |= STATUS_ERROR;
             } else if let Ok(data) = data.try_into() {
+                self.programmed = Some((*at, model.medium.get(*at)));
                 model.medium.set(*at, data);
             }
             if let Some(Fault::Busy(ns)) = model.has(now_ns, |fault| matches!(fault, Fault::Busy(_))) {

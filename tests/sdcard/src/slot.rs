@@ -16,11 +16,11 @@ use crate::model::Model;
 /// What happens to the card in the slot.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// It is pulled.
+    /// It is pulled, and loses its power: a block that it is programming is torn.
     Pull,
     /// A card is put in.
     Insert(Model),
-    /// It loses contact for a moment, and with it its power.
+    /// It loses contact for a moment, and with it its power, as when it is pulled.
     Bounce,
 }
 
@@ -143,6 +143,9 @@ impl Slot {
 
 impl Inner {
     fn happen(&mut self, event: Event) {
+        if let (Some(card), Event::Pull | Event::Bounce) = (&self.card, &event) {
+            card.power_off(self.now_ns);
+        }
         match event {
             Event::Pull => self.card = None,
             Event::Insert(model) => self.card = Some(SdCard::new(model)),

@@ -3,6 +3,7 @@
 
 mod rig;
 
+use hums_blackbox::{Header, NotASector};
 use hums_core::health::Level;
 use hums_core::time::Span;
 use hums_recorder::CardState;
@@ -232,24 +233,37 @@ fn a_card_that_is_out_for_longer_than_the_queue_lasts_loses_counted_frames() {
     assert!(found.frames.last().is_some_and(|last| *last > 2_600), "it went on");
 }
 
-/// Pulled at any byte of what recording does, and put back two seconds later.
+/// Pulled at bytes spread over all of what the card is asked, from its first command on, and put back two seconds later.
+/// A block that is being programmed then is torn.
 #[test]
 fn a_card_that_is_pulled_at_any_byte_misses_nothing() {
-    let clean = recording(sdhc(&medium()));
-    let before = clean.slot.counts().bytes;
-    for step in 0..60 {
+    const PULLS: u64 = 60;
+    let mut clean = Rig::new(sdhc(&medium()));
+    clean.run_to(20_000);
+    let bytes = clean.slot.counts().bytes;
+    let mut torn = 0;
+    for step in 0..PULLS {
         let medium = medium();
-        let mut rig = recording(sdhc(&medium));
-        rig.slot.at_byte(before + step * 37, Event::Pull);
+        let mut rig = Rig::new(sdhc(&medium));
+        // Not at the same place of each command.
+        rig.slot.at_byte(bytes * step / PULLS + step * 37 % 512, Event::Pull);
         while rig.slot.has_card() {
             rig.run_to(rig.slot.now_ns() / MS + 10);
         }
+        torn += u64::from(damaged(&medium) > 0);
         rig.slot.at(rig.slot.now_ns() + 2 * S, Event::Insert(sdhc(&medium)));
         rig.run_to(rig.slot.now_ns() / MS + 8_000);
         rig.assert_state(CardState::Recording);
         let (found, lost) = rig.finish(&[&medium]);
         assert_eq!((lost, found[0].gaps.len()), (0, 0), "step {step}");
     }
+    assert!((3..PULLS).contains(&torn), "{torn} of {PULLS} pulls tore a sector");
+}
+
+/// Sectors that are torn.
+fn damaged(medium: &Medium) -> usize {
+    let is_damaged = |block: &&[u8; 512]| matches!(Header::read(block), Err(NotASector::Damaged));
+    medium.content().values().filter(is_damaged).count()
 }
 
 #[test]
