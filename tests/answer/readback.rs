@@ -1,4 +1,4 @@
-//! Every field of every message in every format, as pymavlink reads it from the recording.
+//! Every field and the times of every message in every format, as pymavlink and the tlog's own times have them.
 
 use std::path::Path;
 
@@ -25,6 +25,12 @@ fn compare(recording: &Path) {
     assert!(values["csv"].as_u64().unwrap() > 4 * found["messages"].as_u64().unwrap(), "{name}: {found}");
     for format in ["jsonl", "parquet", "influx"] {
         assert_eq!(values[format], values["csv"], "{name}: {format} has other values than csv");
+    }
+    for format in ["csv", "jsonl", "parquet", "influx"] {
+        assert_eq!(
+            found["times"][format], found["messages"],
+            "{name}: not each time in {format} was compared"
+        );
     }
     // Besides its frames, the line protocol has the reference system's quantities.
     assert!(found["points"].as_u64() > found["messages"].as_u64(), "{name}: {found}");

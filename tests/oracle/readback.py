@@ -5,11 +5,15 @@ usage: readback.py DIALECT.py RECORDING OUT INFLUXD        prints JSON
 
 OUT is the folder of one log, decoded as csv, jsonl, influx and parquet. The readers are Python's csv and json, pyarrow,
 and InfluxDB (INFLUXD is the program), which takes every point of the line protocol and is asked for them again.
-A number may differ from pymavlink's by nothing at all: each format prints what reads back as the same number.
+A number may differ from pymavlink's by nothing at all: each format prints what reads back as the same number. Times are
+compared with those before the frames of a tlog: seconds since the first one, to the millisecond, and UTC, which is the
+first one's and these seconds. A raw recording has no times: its bytes come as on a line at 115,200 baud, up to 32 of them
+at once, and no UTC is known.
 """
 
 import collections
 import csv
+import datetime
 import glob
 import json
 import math
@@ -31,8 +35,38 @@ from manifest import Reader, frame_at, is_tlog, load_dialect
 csv.field_size_limit(1 << 24)
 
 
-def messages_of(data, dialect):
-    """Each verified message in order."""
+SECOND_US, DAY_US = 1_000_000, 86_400_000_000
+# Bytes a second of a raw recording, and how much later than its last byte a frame may come.
+RAW_BYTES_S, RAW_LATE_US = 11_520, 32 * SECOND_US // 11_520
+EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
+
+
+class Arrival:
+    """When frames came, in microseconds since the first one. A PC's clock may be set while it records: after a step back
+    of more than a second, or forward of more than a day, time goes on from where it was; it never falls."""
+
+    def __init__(self):
+        self.first = self.last = None
+        self.at = 0
+        self.late = 0
+
+    def byte(self, place):
+        """Of a raw recording: so many bytes came."""
+        self.at, self.late = place * SECOND_US // RAW_BYTES_S, RAW_LATE_US
+
+    def entry(self, time_us):
+        if self.first is None:
+            self.first = self.last = time_us
+        step = time_us - self.last
+        if -SECOND_US <= step < 0:
+            return
+        if 0 <= step <= DAY_US:
+            self.at += step
+        self.last = time_us
+
+
+def messages_of(data, dialect, arrival):
+    """Each verified message in order; `arrival` tells when it came."""
     reader, at, tlog = Reader(dialect), 0, is_tlog(data)
     skip = 8 if tlog else 0
     while at + skip < len(data):
@@ -42,12 +76,16 @@ def messages_of(data, dialect):
             continue
         length, message_id = found
         frame = data[at + skip:at + skip + length]
+        if tlog:
+            arrival.entry(int.from_bytes(data[at:at + 8], "big"))
         if message_id in dialect.mavlink_map:
             try:
                 message = reader.mav.decode(bytearray(frame))
             except dialect.MAVError:
                 message = None
             if message is not None and message.get_msgId() == message_id:
+                if not tlog:
+                    arrival.byte(at + length)
                 yield message
                 at += skip + length
                 continue
@@ -84,8 +122,11 @@ def same_number(kind, expected, found):
 class Comparison:
     """Counts what was compared, and keeps the first differences."""
 
-    def __init__(self):
+    def __init__(self, arrival):
+        """`first_us` is UTC of the first frame, in microseconds since 1970; None where the recording has no times."""
+        self.first_us, self.late = arrival.first, arrival.late
         self.values = collections.Counter()
+        self.times = collections.Counter()
         self.differences = []
 
     def check(self, form, where, kind, expected, found):
@@ -102,9 +143,37 @@ class Comparison:
         else:
             self.check(form, where, kind, expected, get(None))
 
+    def time(self, form, name, message, boot_s, utc_us):
+        """Both times of a message: seconds since the first frame, and UTC in microseconds or None."""
+        self.times[form] += 1
+        boot_us = round(float(boot_s) * SECOND_US)
+        expected = None if self.first_us is None else self.first_us + boot_us
+        in_order = boot_us % 1000 == 0 and self.in_time(boot_us - message["at"]) and utc_us == expected
+        if not in_order and len(self.differences) < 20:
+            self.differences.append(
+                f"{form} {name}: came {message['at']} us after {self.first_us}, became {boot_s} s, {utc_us}")
+
+    def in_time(self, late_us):
+        """Within the millisecond that times are given to, or as late as bytes that come together make it."""
+        return -1000 < late_us < 1000 + self.late
+
+    def point_time(self, name, message, ns):
+        """The time of a point: UTC, or the time since the first frame; points of one millisecond are moved apart."""
+        self.times["influx"] += 1
+        came = (self.first_us or 0) + message["at"]
+        if not self.in_time(ns / 1000 - came) and len(self.differences) < 20:
+            self.differences.append(f"influx {name}: came at {came} us, became {ns} ns")
+
     def equal(self, what, expected, found):
         if expected != found and len(self.differences) < 20:
             self.differences.append(f"{what}: {expected!r} became {found!r}")
+
+
+def micros_of(text):
+    """UTC as text, in microseconds since 1970; None where there is none."""
+    if not text:
+        return None
+    return (datetime.datetime.fromisoformat(text.replace("Z", "+00:00")) - EPOCH) // datetime.timedelta(microseconds=1)
 
 
 def text_of(cell):
@@ -134,6 +203,7 @@ def compare_csv(out, expected, comparison):
             for row, message in zip(rows, messages):
                 count += 1
                 comparison.equal(f"csv {name} sender", message["sender"], (int(row[2]), int(row[3])))
+                comparison.time("csv", name, message, row[0], micros_of(row[1]))
                 for field, (kind, value) in message["fields"].items():
                     def get(index, field=field, kind=kind, row=row):
                         text = row[columns[field, index]]
@@ -156,6 +226,7 @@ def compare_jsonl(out, expected, comparison):
             message = next(waiting.get(name, iter(())), None)
             if message is None:
                 continue
+            comparison.time("jsonl", name, message, entry["time_boot"], micros_of(entry["time_utc"]))
             for field, (kind, value) in message["fields"].items():
                 def get(index, field=field, kind=kind, entry=entry):
                     found = entry["fields"][field] if index is None else entry["fields"][field][index]
@@ -170,7 +241,9 @@ def compare_parquet(out, expected, comparison):
         table = pyarrow.parquet.ParquetFile(out["parquet"][name]).read()
         comparison.equal(f"parquet {name} rows", len(messages), table.num_rows)
         columns = {column: table.column(column).to_pylist() for column in table.column_names}
+        utc = table.column("utc").cast("int64").to_pylist()
         for row, message in enumerate(messages):
+            comparison.time("parquet", name, message, columns["boot_s"][row], utc[row])
             for field, (kind, value) in message["fields"].items():
                 column = columns.get(f"{field}_field") or columns[field]
                 def get(index, column=column, row=row):
@@ -264,6 +337,7 @@ def compare_measurement(influx, name, count, messages, comparison):
     rows = series[0]["values"] if series else []
     comparison.equal(f"influx {name} points", count, len(rows))
     for row, message in zip(rows, messages or []):
+        comparison.point_time(name, message, row[columns["time"]])
         for field, (kind, value) in message["fields"].items():
             def get(index, field=field, kind=kind, row=row):
                 name = f"{field}_field" if field in ("time", "vehicle", "session", "system", "component") else field
@@ -288,8 +362,10 @@ def main():
     with open(sys.argv[2], "rb") as file:
         data = file.read()
     expected = collections.defaultdict(list)
-    for message in messages_of(data, dialect):
+    arrival = Arrival()
+    for message in messages_of(data, dialect, arrival):
         expected[message.get_type()].append({
+            "at": arrival.at,
             "sender": (message.get_srcSystem(), message.get_srcComponent()),
             "fields": fields_of(message),
         })
@@ -302,7 +378,7 @@ def main():
         "influx": one("*.lp"),
         "parquet": {os.path.basename(path).removesuffix(".parquet"): path for path in parquet},
     }
-    comparison = Comparison()
+    comparison = Comparison(arrival)
     compare_csv(out, expected, comparison)
     compare_jsonl(out, expected, comparison)
     compare_parquet(out, expected, comparison)
@@ -311,6 +387,7 @@ def main():
         "messages": sum(map(len, expected.values())),
         "types": len(expected),
         "values": comparison.values,
+        "times": comparison.times,
         "points": points,
         "differences": comparison.differences,
     }))
