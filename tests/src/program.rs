@@ -132,6 +132,16 @@ impl Recording {
         self.json()[name].as_u64().unwrap_or_else(|| panic!("--json has no number {name}: {}", self.json()))
     }
 
+    /// The monitor's own records on the card, in order, with their times.
+    #[track_caller]
+    pub fn records(&self) -> Vec<Value> {
+        let image = self.image();
+        let mut command = command(["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()]);
+        let text = child::run(command.args(["--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
+        let records = text.lines().filter(|line| line.contains("\"record\":"));
+        records.map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+    }
+
     /// Everything on the card, decoded; the exit code is one of `codes`.
     #[track_caller]
     pub fn decode(&self, codes: &[i32]) -> Decoded {
