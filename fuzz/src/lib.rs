@@ -1,10 +1,11 @@
 //! Fuzz targets: what must hold for any bytes that somebody gives to a reader.
 //!
-//! A target is a function of bytes that panics where something does not hold. Two things run it:
+//! A target is a function of bytes that panics where something does not hold. Three things run it:
 //!
 //! | what | when | inputs |
 //! |---|---|---|
 //! | `fuzz/tests/corpus.rs` | each `cargo xtask test` | the corpus, and some hundred mutations of it: the same ones each time |
+//! | the campaign `mutations` | `cargo xtask prove` | 400 times as many mutations, from another seed |
 //! | libFuzzer (`fuzz/libfuzzer`) | `cargo xtask fuzz` | mutations that follow the code's branches, five minutes a target; needs nightly Rust and cargo-fuzz, and no test runs it |
 //!
 //! # To add a target

@@ -65,8 +65,10 @@ fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (
     params.set("GS_BUDGET", budget as f32).unwrap();
     let board = Board { card: &card, params: &params, key: None };
     let mut sent = Vec::new();
-    let outcome = run(&board, chunks(recording, ask), |at_us, bytes| {
-        sent.push(Sent { at_us, bytes: bytes.to_vec() });
+    let outcome = run(&board, chunks(recording, ask), |side, at_us, bytes| {
+        if side == Side::Ground {
+            sent.push(Sent { at_us, bytes: bytes.to_vec() });
+        }
     });
     (outcome.unwrap(), sent)
 }

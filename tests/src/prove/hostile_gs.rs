@@ -1,6 +1,6 @@
 //! A ground station that means no good, for a day.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use anyhow::{Context as _, Result, ensure};
 use hums::card::Faults;
@@ -8,17 +8,19 @@ use hums::logs::on_card;
 use hums::rng::Rng;
 use hums::run::sim::both_ports::{Board, Outcome, Side, run as power_on};
 use hums::source::Chunk;
-use hums_core::params::{Params, TABLE};
+use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Instant;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::frame::{Check, Frame};
 use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal};
+use hums_recorder::{CardStatus, HeldBlocks};
 
 use super::card::Card;
 use super::figures::{Figures, Labels};
 use super::options::Options;
 use super::record::Record;
-use super::stream::Stream;
+use super::stream::{FULL_RATE, Stream};
 use crate::flights::{OWN, own};
 
 /// 10 kB/s of the vehicle; the flights in turn.
@@ -33,6 +35,15 @@ const KEY: [u8; 32] = [0x5a; 32];
 const BUDGET: u32 = 1_000;
 /// The most that anybody may set.
 const BUDGET_MAX: u32 = 5_000;
+const AP_BUDGET_MAX: u32 = 10_000;
+
+/// Earlier sessions on the card, and how long each is in seconds.
+const EARLIER: u32 = 3;
+const EARLIER_S: f64 = 3.0;
+/// What the box sends the autopilot by itself: HEARTBEAT, `REQUEST_DATA_STREAM` and `COMMAND_LONG`, of the latter these.
+const OWN_IDS: [u32; 3] = [0, 66, 76];
+const OWN_COMMANDS: [u16; 2] = [511, 512];
+const COMPONENT: u8 = 191;
 
 /// What it prints.
 pub(super) const LABELS: Labels = Labels {
@@ -41,12 +52,18 @@ pub(super) const LABELS: Labels = Labels {
         "without a key: hostile bytes, MB",
         "without a key: frames of the vehicle, lost",
         "without a key: bytes to the ground station in any second at most, of",
+        "without a key: bytes to the autopilot in any second at most, of",
+        "without a key: frames to the autopilot, of them such as the box sends by itself",
         "without a key: parameters changed",
+        "without a key: earlier logs, of them marked as erased, of them unreadable",
         "without a key: sector queue at most, of",
         "with a key: hostile bytes, MB",
         "with a key: frames of the vehicle, lost",
         "with a key: bytes to the ground station in any second at most, of",
+        "with a key: bytes to the autopilot in any second at most, of",
+        "with a key: frames to the autopilot, of them such as the box sends by itself",
         "with a key: parameters changed",
+        "with a key: earlier logs, of them marked as erased, of them unreadable",
         "with a key: sector queue at most, of",
     ],
     columns: &[],
@@ -68,7 +85,19 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
             format!("{name}: bytes to the ground station in any second at most, of"),
             format!("{}, {}", half.fullest, half.budget),
         );
+        figures.fact(
+            format!("{name}: bytes to the autopilot in any second at most, of"),
+            format!("{}, {}", half.to_autopilot.window.fullest, half.autopilot_budget),
+        );
+        figures.fact(
+            format!("{name}: frames to the autopilot, of them such as the box sends by itself"),
+            format!("{}, {}", half.to_autopilot.frames, half.to_autopilot.own),
+        );
         figures.fact(format!("{name}: parameters changed"), half.changed);
+        figures.fact(
+            format!("{name}: earlier logs, of them marked as erased, of them unreadable"),
+            format!("{EARLIER}, {}, 0", half.erased),
+        );
         figures.fact(
             format!("{name}: sector queue at most, of"),
             format!(
@@ -85,50 +114,141 @@ struct Half {
     hostile_bytes: u64,
     fullest: usize,
     budget: u32,
+    to_autopilot: ToAutopilot,
+    autopilot_budget: u32,
     changed: usize,
+    /// Logs of earlier sessions that are marked as erased.
+    erased: usize,
+}
+
+/// What reached the autopilot.
+#[derive(Default)]
+struct ToAutopilot {
+    window: Window,
+    frames: u64,
+    /// Of them those of the kinds that the box sends by itself, in its own name.
+    own: u64,
+}
+
+impl ToAutopilot {
+    fn add(&mut self, at_us: u64, frame: &[u8]) {
+        self.window.add(at_us, frame.len());
+        self.frames += 1;
+        let Some(frame) = Frame::again(frame, Check::Verified) else { return };
+        let payload = frame.payload();
+        let command = payload.get(28..30).map_or(0, |at| u16::from_le_bytes([at[0], at[1]]));
+        let is_own = frame.component() == COMPONENT
+            && OWN_IDS.contains(&frame.id())
+            && (frame.id() != 76 || OWN_COMMANDS.contains(&command));
+        self.own += u64::from(is_own);
+    }
+}
+
+/// The frames of each log of the earlier sessions, and how many logs of the card are marked as erased.
+fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
+    let mut frames = BTreeMap::new();
+    for log in on_card(&card.path()).into_iter().take(EARLIER as usize) {
+        let hashes = Record::of(&log)?.frames.iter().map(|frame| frame.hash).collect();
+        frames.insert(log.name, hashes);
+    }
+    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let mounted = hums_recorder::Card::mount(card.device(Faults::default())?, &status, &held);
+    let mut erased = 0;
+    let mounted = mounted.map_err(|(_, error)| anyhow::anyhow!("the card: {error}"))?;
+    mounted.logs(|log| erased += usize::from(log.hidden)).map_err(|error| anyhow::anyhow!("{error}"))?;
+    Ok((frames, erased))
 }
 
 fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half> {
     let open = |flight: &&str| Stream::of_flight(&own(flight), BAUD);
     let streams = OWN.iter().map(open).collect::<Result<Vec<_>>>()?;
     let mut card = Card::new(256)?;
-    let device = card.device(Faults::default())?;
-    let mut params = Params::defaults();
-    let set = |params: &mut Params, name: &str, value: f32| {
-        params.set(name, value).map_err(|_| anyhow::anyhow!("{name}"))
-    };
-    set(&mut params, "GS_BUDGET", BUDGET as f32)?;
-    if key.is_some() {
-        set(&mut params, "GS_SIGN", 2.0)?;
-        set(&mut params, "AP_SIGN", 2.0)?;
+    let earlier = Stream::of_flight(&own(OWN[0]), FULL_RATE)?.for_seconds(EARLIER_S);
+    for boots in 1..=EARLIER {
+        card.record(&earlier, boots)?;
     }
-    let budget = if key.is_some() { BUDGET } else { BUDGET_MAX };
+    let (logs_before, _) = logs_of(&card)?;
+    ensure!(logs_before.values().all(|frames| frames.len() > 100), "an earlier session is empty");
+    let device = card.device(Faults::default())?;
+    let params = params(key.is_some())?;
     let mut hostile = Hostile::new(options.seed ^ u64::from(key.is_some()));
-    let mut window = Window::default();
+    let (mut window, mut to_autopilot) = (Window::default(), ToAutopilot::default());
     let board = Board { card: &device, params: &params, key };
-    let outcome = power_on(&board, both_sides(&streams, seconds, &mut hostile), |at_us, frame| {
-        window.add(at_us, frame.len());
-    })?;
+    let outcome =
+        power_on(&board, both_sides(&streams, seconds, &mut hostile), |side, at_us, frame| match side {
+            Side::Ground => window.add(at_us, frame.len()),
+            Side::Autopilot => to_autopilot.add(at_us, frame),
+        })?;
     card.check()?;
-
-    let stats = outcome.done.stats;
-    ensure!(window.fullest <= budget as usize, "{} bytes in a second of {budget}", window.fullest);
-    ensure!(stats.frames_lost + outcome.done.frames_left == 0, "{} frames lost", stats.frames_lost);
+    let (logs, erased) = logs_of(&card)?;
+    ensure!(logs == logs_before, "an earlier log is not what it was");
     let changed =
         params.iter().zip(outcome.params.iter()).filter(|(a, b)| a.1.to_bits() != b.1.to_bits()).count();
-    if key.is_some() {
-        ensure!(changed == 0, "{changed} parameters were changed without the key");
-        // Nobody stopped it for a moment, and none of it is a frame that the vehicle did not send.
-        ensure!(stats.frames_logged == stats.frames_in, "{} of {}", stats.frames_logged, stats.frames_in);
-        let path = card.path();
-        let logs = on_card(&path);
-        let record = Record::of(logs.last().context("no log")?)?;
-        let holes = record.gaps.iter().filter(|(_, gap)| gap.from.is_some()).count();
-        ensure!(holes == 0, "{holes} holes in the log");
+    let keyed = key.is_some();
+    let half = Half {
+        outcome,
+        hostile_bytes: hostile.bytes,
+        fullest: window.fullest,
+        budget: if keyed { BUDGET } else { BUDGET_MAX },
+        to_autopilot,
+        autopilot_budget: if keyed { params.get(Param::ApBudget) as u32 } else { AP_BUDGET_MAX },
+        changed,
+        erased,
+    };
+    half.judge()?;
+    if keyed {
+        half.judge_with_key(&card)?;
     } else {
         ensure!(changed > 0, "the attack never got through: it shows nothing");
     }
-    Ok(Half { outcome, hostile_bytes: hostile.bytes, fullest: window.fullest, budget, changed })
+    Ok(half)
+}
+
+/// The board's parameters; with a key nothing is answered that is not signed.
+fn params(keyed: bool) -> Result<Params> {
+    let mut params = Params::defaults();
+    let mut set = |name: &str, value: f32| {
+        params.set(name, value).map_err(|error| anyhow::anyhow!("{name}: {error:?}"))
+    };
+    set("GS_BUDGET", BUDGET as f32)?;
+    if keyed {
+        set("GS_SIGN", 2.0)?;
+        set("AP_SIGN", 2.0)?;
+    }
+    Ok(params)
+}
+
+impl Half {
+    /// What holds with and without a key.
+    fn judge(&self) -> Result<()> {
+        let (stats, left) = (self.outcome.done.stats, self.outcome.done.frames_left);
+        ensure!(
+            self.fullest <= self.budget as usize,
+            "{} bytes in a second of {}",
+            self.fullest,
+            self.budget
+        );
+        let (fullest, budget) = (self.to_autopilot.window.fullest, self.autopilot_budget);
+        ensure!(fullest <= budget as usize, "{fullest} bytes to the autopilot in a second of {budget}");
+        ensure!(stats.frames_lost + left == 0, "{} frames lost", stats.frames_lost);
+        Ok(())
+    }
+
+    /// What holds with one.
+    fn judge_with_key(&self, card: &Card) -> Result<()> {
+        let Self { changed, erased, to_autopilot: ToAutopilot { frames, own, .. }, .. } = self;
+        ensure!(*changed == 0, "{changed} parameters were changed without the key");
+        ensure!(*erased == 0, "{erased} logs were marked as erased without the key");
+        ensure!(frames == own && *own > 0, "{own} of {frames} frames to the autopilot are the box's own");
+        // Nobody stopped it for a moment, and none of it is a frame that the vehicle did not send.
+        let stats = self.outcome.done.stats;
+        ensure!(stats.frames_logged == stats.frames_in, "{} of {}", stats.frames_logged, stats.frames_in);
+        let logs = on_card(&card.path());
+        let record = Record::of(logs.last().context("no log")?)?;
+        let holes = record.gaps.iter().filter(|(_, gap)| gap.from.is_some()).count();
+        ensure!(holes == 0, "{holes} holes in the log");
+        Ok(())
+    }
 }
 
 /// The fullest second at a port.
@@ -232,11 +352,15 @@ impl Hostile {
                 at_target(Packet::new(23).f32(0, value).bytes(6, &name).u8(22, 9), 4)
             }
             5 => {
-                let commands = [400, 401, 511, 512, 519, 520, 2510, 2511, 31_010, 31_011, 246];
-                let known = commands[self.below(11) as usize];
+                let commands = [400, 401, 511, 512, 519, 520, 526, 2510, 2511, 31_010, 31_011, 246];
+                let known = commands[self.below(12) as usize];
                 let command = if self.rng.chance(0.7) { known } else { self.rng.next_u64() as u16 };
                 let first = if self.rng.chance(0.5) { self.below(400) as f32 } else { self.value() };
-                at_target(Packet::new(75 + self.below(2) as u32).f32(0, first).u16(28, command), 30)
+                let id = 75 + self.below(2) as u32;
+                // As the box wants it for formatting, often enough.
+                let (first, second) =
+                    if command == 526 && self.rng.chance(0.5) { (1.0, 1.0) } else { (first, 0.0) };
+                at_target(Packet::new(id).f32(0, first).f32(4, second).u16(28, command), 30)
             }
             6 => at_target(Packet::new(117).u16(0, self.rng.next_u64() as u16).u16(2, u16::MAX), 4),
             7 => {

@@ -12,6 +12,7 @@ mod endurance;
 mod figures;
 mod hostile_gs;
 mod memory;
+mod mutations;
 mod noise;
 mod options;
 mod pages;
@@ -81,8 +82,9 @@ pub const CAMPAIGNS: &[Campaign] = &[
     Campaign {
         name: "hostile-gs",
         about: "24 hours of a ground station that sends noise, floods, forged and malformed frames at full rate: no panic, \
-                no frame of the vehicle is lost, no second has more bytes than the budget; where a key is asked for, no \
-                parameter is changed and the record has no hole",
+                no frame of the vehicle is lost, no second has more bytes than the budget at either port, earlier logs stay \
+                readable; where a key is asked for, no parameter is changed, no log is marked as erased, the record has no \
+                hole, and the autopilot gets nothing but what the box sends by itself",
         labels: hostile_gs::LABELS,
         run: hostile_gs::run,
     },
@@ -92,5 +94,12 @@ pub const CAMPAIGNS: &[Campaign] = &[
                 make a false frame, with a checksum that fits, over it",
         labels: noise::LABELS,
         run: noise::run,
+    },
+    Campaign {
+        name: "mutations",
+        about: "each reader gets inputs of its corpus with one to eight changes, and noise: none panics, and what must hold for \
+                any bytes (fuzz/src) holds",
+        labels: mutations::LABELS,
+        run: mutations::run,
     },
 ];

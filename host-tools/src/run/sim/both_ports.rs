@@ -50,13 +50,13 @@ pub struct Outcome {
     pub params: Params,
 }
 
-/// Gives both ports their bytes in time until there are none, and `told` each frame that begins to leave the ground
-/// station's port, with the time of the chunk before which that was. To know it to a millisecond, give a chunk, which
+/// Gives both ports their bytes in time until there are none, and `told` each frame that begins to leave one of them, with
+/// its port and the time of the chunk before which that was. To know it to a millisecond, give a chunk, which
 /// may be empty, each millisecond.
 pub fn run(
     board: &Board<'_>,
     chunks: impl IntoIterator<Item = (Side, Chunk)>,
-    mut told: impl FnMut(u64, &[u8]),
+    mut told: impl FnMut(Side, u64, &[u8]),
 ) -> Result<Outcome> {
     let mut memory = Memory::new(board.params);
     let flash = store::open(None, &[])?;
@@ -64,8 +64,9 @@ pub fn run(
         let (mut store, _) = Store::mount(flash.clone()).map_err(|error| anyhow!("the store: {error:?}"))?;
         store.save(Key::item(ITEM_KEY), &key).map_err(|error| anyhow!("the store: {error:?}"))?;
     }
-    let port = Frames::default();
-    let (mut findings, mut gs, mut autopilot) = (Vec::new(), port.clone(), io::sink());
+    let ports = [(Side::Ground, Frames::default()), (Side::Autopilot, Frames::default())];
+    let [mut gs, mut autopilot] = ports.clone().map(|(_, frames)| frames);
+    let mut findings = Vec::new();
     let outside = Outside {
         card: board.card,
         flash: &flash,
@@ -82,7 +83,9 @@ pub fn run(
             Side::Autopilot => pipeline.arrive(&chunk)?,
             Side::Ground => pipeline.hear(&chunk)?,
         };
-        port.take().iter().for_each(|frame| told(chunk.at_us, frame));
+        for (side, port) in &ports {
+            port.take().iter().for_each(|frame| told(*side, chunk.at_us, frame));
+        }
     }
     let frames_left = pipeline.finish()?;
     let (stats, params) = (pipeline.stats(), pipeline.params());

@@ -43,6 +43,8 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { flight: PX4, card_mib: 300, ..SHORT },
     Scenario { seconds: 10.0, ..BY_ARMING },
 ];
+/// Cases that are told in words.
+const NOTES_MAX: usize = 40;
 /// Scenarios of the short form.
 const SCENARIOS_SHORT: usize = 2;
 
@@ -82,9 +84,12 @@ pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
         Subject::record(scenario).and_then(|subject| subject.cut_often(share, seed)).with_context(what)
     });
     let mut tallies = [Tally::default(); Fault::ALL.len()];
+    let mut notes = Vec::new();
     for outcome in outcomes.collect::<Result<Vec<_>>>()? {
-        tallies.iter_mut().zip(outcome).for_each(|(sum, one)| sum.add(&one));
+        tallies.iter_mut().zip(outcome.tallies).for_each(|(sum, one)| sum.add(&one));
+        notes.extend(outcome.notes);
     }
+    notes.iter().take(NOTES_MAX).for_each(|note| eprintln!("careless-cards: {note}"));
     let mut all = Tally::default();
     tallies.iter().for_each(|one| all.add(one));
     let mut figures = Figures::new(&LABELS);
@@ -183,6 +188,13 @@ impl Tally {
     }
 }
 
+/// What came of the cuts of one session.
+struct Outcome {
+    tallies: [Tally; Fault::ALL.len()],
+    /// What nothing told, and what was written over, in words.
+    notes: Vec<String>,
+}
+
 type Blocks = BTreeMap<u32, [u8; BLOCK]>;
 
 /// A sector of an earlier session.
@@ -204,6 +216,8 @@ struct Subject {
     next: Stream,
     /// What the card would hold if it did nothing wrong, where that differs from what it held before.
     now: Blocks,
+    name: &'static str,
+    notes: Vec<String>,
 }
 
 impl Subject {
@@ -223,7 +237,7 @@ impl Subject {
         }
         ensure!(kept.is_empty() == (scenario.earlier == 0), "{} sectors of earlier sessions", kept.len());
         let next = Stream::of_flight(&own(GUIDED), FULL_RATE)?.for_seconds(NEXT_S);
-        Ok(Self { session, kept, frames, next, now: Blocks::new() })
+        Ok(Self { session, kept, frames, next, now: Blocks::new(), name: scenario.name, notes: Vec::new() })
     }
 
     /// Chosen by chance, half of them where the file system is written.
@@ -249,7 +263,7 @@ impl Subject {
         cuts
     }
 
-    fn cut_often(mut self, count: u64, seed: u64) -> Result<[Tally; Fault::ALL.len()]> {
+    fn cut_often(mut self, count: u64, seed: u64) -> Result<Outcome> {
         let mut random = Random::new(seed);
         let mut tallies = [Tally::default(); Fault::ALL.len()];
         let mut done = 0;
@@ -263,13 +277,22 @@ impl Subject {
             for (block, bytes) in &wrong {
                 self.session.card.write_block(*block, bytes)?;
             }
-            let what = || format!("cut at write {cut}, {fault:?}");
-            let written = self.look(&wrong, &mut tallies[fault as usize]).with_context(what)?;
+            let what = format!("{}: cut at write {cut}, {fault:?}", self.name);
+            let tally = &mut tallies[fault as usize];
+            let before = *tally;
+            let written = self.look(&wrong, tally).with_context(|| what.clone())?;
+            if tally.untold > before.untold {
+                self.notes.push(format!("{what}: less of an earlier session, and nothing tells"));
+            }
+            if tally.written_over > before.written_over {
+                let sectors = tally.written_over - before.written_over;
+                self.notes.push(format!("{what}: {sectors} readable sectors were written over"));
+            }
             for block in wrong.keys().chain(&written) {
                 self.session.card.write_block(*block, &self.at(*block, &Blocks::new()))?;
             }
         }
-        Ok(tallies)
+        Ok(Outcome { tallies, notes: self.notes })
     }
 
     /// What a block holds: what the fault made of it, or what it should hold.

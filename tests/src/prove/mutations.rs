@@ -1,0 +1,47 @@
+//! Mutations of inputs for the readers: the fuzz targets of `hums-fuzz` on stable Rust, in a long round.
+//!
+//! Each target takes any bytes for what its reader would get, and asserts what must hold. A short round of the same
+//! mutations with another seed is a test of `hums-fuzz`.
+
+use anyhow::{Context as _, Result, bail};
+use hums_fuzz::{TARGETS, Target, mutate};
+use rayon::prelude::*;
+
+use super::figures::{Figures, Labels};
+use super::options::Options;
+
+/// The long round is so many times that of the test, which takes half a second a target.
+const LONG: u64 = 400;
+/// The short round is so many times shorter than that of the test.
+const SHORT: u64 = 5;
+
+/// What it prints.
+pub(super) const LABELS: Labels = Labels {
+    facts: &["readers", "inputs tried", "inputs that broke a reader"],
+    columns: &["reader", "inputs"],
+};
+
+pub(super) fn run(options: &Options) -> Result<Figures> {
+    // The test has the seed 1.
+    let seed = options.seed.wrapping_add(1);
+    let outcomes = TARGETS.par_iter().with_max_len(1).map(|target| try_often(target, options, seed));
+    let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
+    let mut figures = Figures::new(&LABELS);
+    figures.fact("readers", outcomes.len());
+    figures.fact("inputs tried", outcomes.iter().sum::<u64>());
+    // The first one ends the campaign with an error.
+    figures.fact("inputs that broke a reader", 0);
+    for (target, tried) in TARGETS.iter().zip(outcomes) {
+        figures.row([target.name.to_owned(), tried.to_string()]);
+    }
+    Ok(figures)
+}
+
+/// How many inputs were tried.
+fn try_often(target: &'static Target, options: &Options, seed: u64) -> Result<u64> {
+    let rounds = options.runs(LONG * target.rounds, target.rounds / SHORT);
+    match mutate::run(target, seed, |mutations| mutations < rounds).context(target.name)? {
+        Ok(tried) => Ok(tried),
+        Err(broken) => bail!("{}: {} breaks it", broken.target, broken.path.display()),
+    }
+}
