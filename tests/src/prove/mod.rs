@@ -55,8 +55,8 @@ pub const CAMPAIGNS: &[Campaign] = &[
     Campaign {
         name: "careless-cards",
         about: "power goes at a card that keeps its last blocks in no order, has lost one that it acknowledged, or spoils the \
-                page around the last one: earlier sessions lose nothing beyond the groups that were spoiled; what is not told, and \
-                what the next power-on writes over, is counted",
+                page around the last one: earlier sessions lose nothing beyond the groups that were spoiled, and each loss is \
+                told; what the next power-on writes over is counted",
         labels: power_cuts::careless::LABELS,
         run: power_cuts::careless::run,
     },
