@@ -91,7 +91,9 @@ pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
     }
     notes.iter().take(NOTES_MAX).for_each(|note| eprintln!("careless-cards: {note}"));
     let mut all = Tally::default();
-    tallies.iter().for_each(|one| all.add(one));
+    for one in &tallies {
+        all.add(one);
+    }
     let mut figures = Figures::new(&LABELS);
     let [cuts, complaints, spoiled, less, beyond, recorded, said_why, renamed, over] = LABELS.facts else {
         unreachable!("nine facts")
