@@ -40,8 +40,9 @@ const AP_BUDGET_MAX: u32 = 10_000;
 /// Earlier sessions on the card, and how long each is in seconds.
 const EARLIER: u32 = 3;
 const EARLIER_S: f64 = 3.0;
-/// What the box sends the autopilot by itself: HEARTBEAT, `REQUEST_DATA_STREAM` and `COMMAND_LONG`, of the latter these.
-const OWN_IDS: [u32; 3] = [0, 66, 76];
+/// What the box sends the autopilot by itself (docs/safety.md): HEARTBEAT, `PARAM_REQUEST_READ`, `REQUEST_DATA_STREAM` and
+/// `COMMAND_LONG`, of the latter these.
+const OWN_IDS: [u32; 4] = [0, 20, 66, 76];
 const OWN_COMMANDS: [u16; 2] = [511, 512];
 const COMPONENT: u8 = 191;
 
