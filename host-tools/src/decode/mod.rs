@@ -222,6 +222,13 @@ impl Task<'_> {
         let written = writers.finish()?;
         let before = remarks.len();
         remarks.extend(losses_of(log, &summary, written.losses));
+        if written.rows_left_out > 0 {
+            remarks.push(format!(
+                "{}: {} left out: the names of its tables take more room than any autopilot's",
+                log.name,
+                count(written.rows_left_out, "row")
+            ));
+        }
         let lossy = remarks.len() > before;
         let lines = if self.standard_output { Vec::new() } else { written.lines };
         Ok(Done { outcome: Outcome::lossy(lossy), written: true, lines, remarks })

@@ -84,7 +84,7 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
         names => Rows::Named(names),
     };
     let want = Want { frames: format.is_of_link(), observations: formats.influx || formats.thesis, rows };
-    let mut part = Part { context, collected: Collected::new(context), items: 0, tables: BTreeMap::new() };
+    let mut part = Part::new(context);
     let mut summary = Summary::default();
     recording.read(want, &mut |at, item| {
         if matches!(item, Item::Frame(_) | Item::Row(_) | Item::Observation(..)) {
@@ -119,6 +119,7 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
         Ok(())
     })?;
     writers.group(part.take())?;
+    writers.leave_out(part.rows_left_out);
     bar.finish_and_clear();
     summary.epoch_us = context.epoch_us;
     Ok(summary)
@@ -131,11 +132,17 @@ struct Part<'a> {
     items: u32,
     /// The names of tables that were seen, and of their columns with units; none where there was no room for them.
     tables: BTreeMap<String, Option<Names>>,
+    rows_left_out: u64,
 }
 
 type Names = (&'static str, Vec<&'static str>);
 
 impl<'a> Part<'a> {
+    fn new(context: &'a Context) -> Self {
+        let collected = Collected::new(context);
+        Self { context, collected, items: 0, tables: BTreeMap::new(), rows_left_out: 0 }
+    }
+
     fn take(&mut self) -> Collected<'a> {
         self.items = 0;
         std::mem::replace(&mut self.collected, Collected::new(self.context))
@@ -145,7 +152,10 @@ impl<'a> Part<'a> {
         if !self.tables.contains_key(&table.name) {
             self.tables.insert(table.name.clone(), names(table));
         }
-        let Some(Some((name, columns))) = self.tables.get(&table.name) else { return };
+        let Some(Some((name, columns))) = self.tables.get(&table.name) else {
+            self.rows_left_out += 1;
+            return;
+        };
         let kinds = table.columns.iter().map(|column| column.kind);
         let cells = columns.iter().zip(kinds).zip(values);
         let cells = cells.map(|((name, kind), value)| (*name, cell(kind, *value))).collect();

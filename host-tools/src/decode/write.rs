@@ -78,6 +78,8 @@ pub struct Written {
     pub lines: Vec<String>,
     /// What the log says was lost while recording.
     pub losses: u64,
+    /// Rows of tables for whose names there was no room.
+    pub rows_left_out: u64,
 }
 
 /// The open files of one log.
@@ -97,6 +99,7 @@ pub struct Writers<'a> {
     /// JSON's.
     objects: u64,
     losses: u64,
+    rows_left_out: u64,
 }
 
 /// The line protocol's file, and what only can be told in order.
@@ -172,7 +175,13 @@ impl<'a> Writers<'a> {
             records: 0,
             objects: 0,
             losses: 0,
+            rows_left_out: 0,
         })
+    }
+
+    /// Counts rows that could not be written.
+    pub fn leave_out(&mut self, rows: u64) {
+        self.rows_left_out += rows;
     }
 
     fn put(&mut self, collected: Collected<'_>) -> Result<()> {
@@ -279,7 +288,7 @@ impl<'a> Writers<'a> {
             let (dir, tables) = parquet.finish()?;
             lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
         }
-        Ok(Written { lines, losses: self.losses })
+        Ok(Written { lines, losses: self.losses, rows_left_out: self.rows_left_out })
     }
 
     /// Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.

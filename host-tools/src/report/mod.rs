@@ -70,7 +70,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     })?;
     if *wanted.sessions.start() > 0 && args.session.is_none() {
         eprintln!(
-            "hums: this is the newest of {} sessions; -o DIR/ writes a page for each, --session NAME one of them",
+            "hums: this is the last one of {}; -o DIR/ writes a page for each, --session NAME one of them",
             found.places.len()
         );
     }
