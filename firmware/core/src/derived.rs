@@ -26,8 +26,14 @@ const MOTORS_TOLD: Span = Span::from_secs(1);
 const FLYING_PART: f32 = 0.2;
 /// Time constant of the motor speeds that are compared.
 const MOTOR_SMOOTHING_S: f32 = 1.0;
-/// A link on which nothing at all came for so long was silent.
-const SILENCE: Span = Span::from_millis(300);
+/// A link on which nothing at all came for so long was silent, unless it often is: streams of one a second have such pauses.
+const SILENCE_S: f32 = 0.3;
+/// So many times the longest pause of late are no pause as usual.
+const SILENCE_PAUSES: f32 = 3.0;
+/// A pause counts as this at most, s; with each observation the longest one is this part shorter, so that after some hundred
+/// it is forgotten.
+const PAUSE_MAX_S: f32 = 1.0;
+const PAUSE_FADES: f32 = 1.0 / 64.0;
 /// How long a loss of frames stays a warning.
 const LOSS_MEMORY: Span = Span::from_secs(10);
 
@@ -53,6 +59,8 @@ pub struct Derived {
     heard: Option<Instant>,
     /// When it was heard again after a silence.
     resumed: Instant,
+    /// The longest pause of late between two observations, s.
+    pause_s: f32,
     /// The motor whose speed is furthest from the others'.
     furthest: u8,
     had_fix: [bool; RECEIVERS_MAX],
@@ -106,6 +114,7 @@ impl Derived {
             load_factor: Latest::nothing(),
             heard: None,
             resumed: Instant::ZERO,
+            pause_s: 0.0,
             furthest: 0,
             had_fix: [false; RECEIVERS_MAX],
             clips: Lately::NONE,
@@ -115,12 +124,20 @@ impl Derived {
         }
     }
 
-    /// Takes an observation that the vehicle took.
-    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
-        if self.heard.is_none_or(|heard| at.since(heard) > SILENCE) {
+    /// Something was heard: after a silence of the link, or as usual.
+    fn hear(&mut self, at: Instant) {
+        let pause_s = self.heard.map(|heard| at.since(heard).as_secs_f32());
+        if pause_s.is_none_or(|pause_s| pause_s > SILENCE_S.max(SILENCE_PAUSES * self.pause_s)) {
             self.resumed = at;
         }
+        let pause_s = pause_s.unwrap_or(0.0).min(PAUSE_MAX_S);
+        self.pause_s = pause_s.max(self.pause_s * (1.0 - PAUSE_FADES));
         self.heard = Some(at);
+    }
+
+    /// Takes an observation that the vehicle took.
+    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
+        self.hear(at);
         match observation {
             Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
                 if let Some([x, y, z]) = imu.acceleration {

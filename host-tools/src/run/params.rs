@@ -81,7 +81,7 @@ mod tests {
             ("CELL_VOLT_WARN 9", "CELL_VOLT_WARN takes 0 to 4.5 V, not 9"),
             ("CELL_VOLT_WARN nan", "CELL_VOLT_WARN takes 0 to 4.5 V, not nan"),
             ("CELL_VOLT_WARN high", "CELL_VOLT_WARN takes 0 to 4.5 V, not high"),
-            ("BAT_CELLS 99", "BAT_CELLS takes 0 to 14, not 99"),
+            ("BAT_CELLS 99", "BAT_CELLS takes 0 to 24, not 99"),
             ("cell_volt_warn 3.5", "there is no parameter cell_volt_warn"),
             ("1 191 NO_SUCH 1 9", "there is no parameter NO_SUCH"),
         ] {
