@@ -235,6 +235,8 @@ fn the_faults_that_show_in_the_telemetry_of_the_faulty_flight_are_found() {
         ("cell_voltage", Level::Critical, 260.7, 260.9),
         // Two heartbeats, one a second, say so.
         ("autopilot_state", Level::Critical, 266.5, 267.5),
+        // The autopilot calls the battery low.
+        ("batt_state", Level::Warning, 267.8, 268.5),
         ("sensors", Level::Warning, 267.8, 268.5),
     ];
     assert_eq!(alarms.len(), expected.len(), "{alarms:?}");
