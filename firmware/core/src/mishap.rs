@@ -1,11 +1,11 @@
 //! Mishaps: the vehicle falls, hits something, tumbles, is disarmed in the air, or sinks without being told to.
 //!
 //! A detector of its own, because the checks' gates (in flight, armed, steady) drop them in the very second that matters. It
-//! watches each inertial sample while the vehicle is armed, and for [`WATCHED`] afterwards.
+//! watches each inertial sample while the vehicle is armed, and for 10 s afterwards.
 //!
 //! | kind | what is seen | where |
 //! |---|---|---|
-//! | free fall | specific force below [`FALL_G`] for `MIS_FALL_TIME`, and the throttle asks for thrust | on rotors |
+//! | free fall | specific force below 0.3 g for `MIS_FALL_TIME`, and the throttle asks for thrust | on rotors |
 //! | impact | a shock above `MIS_IMPACT`, and the speed breaks off or the vehicle lies on its side; then it is still | everywhere |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
 //! | disarmed in the air | disarmed above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |

@@ -1,7 +1,7 @@
 //! `hums check`: what is wrong with a flight, from any log.
 //!
 //! [`judge`] runs the monitor of the board over the stream of a recording; [`problem`] puts its findings together, [`flights`]
-//! its flights; [`judged`] is what came of it, which [`text`] and [`json`] say.
+//! its flights; [`judged`](mod@judged) is what came of it, which [`text`] and [`json`] say.
 
 pub mod checked;
 mod clock;

@@ -156,11 +156,8 @@ impl Running {
     fn stop(&mut self) {
         // POSIX has the program; the system call would need unsafe code or one more library.
         let group = format!("-{}", self.child.id());
-        let signal = |signal| Shell::new("kill").args([signal, "--", group.as_str()]).ask();
-        let _ = signal("-TERM");
+        let _ = Shell::new("kill").args(["-TERM", "--", &group]).ask();
         let _ = self.child.wait();
-        // An emulator that still waits for its first connection does not hear TERM.
-        let _ = signal("-KILL");
     }
 }
 
