@@ -28,7 +28,9 @@ pub const LINES: Kind = Kind {
         let line = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
         let tags = String::from_utf8_lossy(line);
         let tags = tags.split(' ').next().unwrap_or_default();
-        [",session=", ",vehicle="].iter().all(|tag| tags.contains(tag))
+        // A spool has such lines too, behind a head that is no text.
+        let is_text = line.iter().all(|byte| *byte >= b' ');
+        is_text && [",session=", ",vehicle="].iter().all(|tag| tags.contains(tag))
     },
 };
 

@@ -3,7 +3,7 @@
 
 use std::io::Write;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use hums_blackbox::record::{Clock, Loss, Lost, Note};
 use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
 use hums_core::time::Instant;
@@ -43,6 +43,9 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         last_us = chunk.at_us;
     }
     let (done, mut file) = packer.finish(last_us).with_context(context)?;
+    if done.frames == 0 {
+        bail!("{}: has no MAVLink frame, so nothing was written; hums check says what a file is", args.input);
+    }
     file.finish()?;
     if let Some(remark) = source.remark() {
         eprintln!("hums: {}: {remark}", args.input);

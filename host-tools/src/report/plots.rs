@@ -59,13 +59,14 @@ pub enum Plot {
 pub type About = (Plot, &'static str, &'static str, &'static str, u8, fn(u8) -> String);
 
 fn named(names: &[&str], line: u8) -> String {
-    names.get(usize::from(line)).map_or_else(|| format!("{}", line + 1), |name| (*name).to_owned())
+    names.get(usize::from(line)).map_or_else(|| format!("{}", u16::from(line) + 1), |name| (*name).to_owned())
 }
 
 /// The plots, in the order of the page.
 pub fn about(autopilot: Autopilot) -> Vec<About> {
-    let motor = |line: u8| format!("Motor {}", line + 1);
-    let battery = |line: u8| if line == 0 { "Battery".into() } else { format!("Battery {}", line + 1) };
+    let motor = |line: u8| format!("Motor {}", u16::from(line) + 1);
+    let battery =
+        |line: u8| if line == 0 { "Battery".into() } else { format!("Battery {}", u16::from(line) + 1) };
     let px4 = autopilot == Autopilot::Px4;
     let axes: fn(u8) -> String = if px4 {
         |line| named(&["Coning", "Gyro, high frequency", "Accelerometer, high frequency"], line)
@@ -79,7 +80,7 @@ pub fn about(autopilot: Autopilot) -> Vec<About> {
         (Plot::Vertical, "Motion", "Climb rate", "m/s", 2, |_| "Climb".into()),
         (Plot::Attitude, "Motion", "Attitude", "\u{b0}", 1, |line| named(&["Roll", "Pitch"], line)),
         (Plot::PackVolts, "Battery", "Voltage", "V", 3, battery),
-        (Plot::CellVolts, "Battery", "Cells", "V", 3, |line| format!("Cell {}", line + 1)),
+        (Plot::CellVolts, "Battery", "Cells", "V", 3, |line| format!("Cell {}", u16::from(line) + 1)),
         (Plot::PackAmperes, "Battery", "Current", "A", 2, battery),
         (Plot::PackPercent, "Battery", "Remaining", "%", 0, battery),
         (Plot::MotorRpm, "Motors", "Speed", "rpm", 0, motor),
@@ -87,13 +88,15 @@ pub fn about(autopilot: Autopilot) -> Vec<About> {
         (Plot::MotorVolts, "Motors", "Voltage", "V", 2, motor),
         (Plot::MotorCelsius, "Motors", "ESC temperature", "\u{b0}C", 1, motor),
         (Plot::EscErrors, "Motors", "ESC errors", "count", 0, motor),
-        (Plot::SpeedSensors, "Motors", "Speed sensors", "rpm", 0, |line| format!("Sensor {}", line + 1)),
+        (Plot::SpeedSensors, "Motors", "Speed sensors", "rpm", 0, |line| {
+            format!("Sensor {}", u16::from(line) + 1)
+        }),
         (Plot::Engine, "Motors", "Engine", "", 1, |line| {
             named(&["Speed (rpm)", "Load (%)", "Fuel flow", "Cylinder head (\u{b0}C)"], line)
         }),
         (Plot::Vibration, "Structure", "Vibration", vibration, 3, axes),
         (Plot::Clips, "Structure", "Clipped samples", "count", 0, |line| {
-            format!("Accelerometer {}", line + 1)
+            format!("Accelerometer {}", u16::from(line) + 1)
         }),
         (Plot::Estimator, "Navigation", "Estimator", estimator, 3, |line| {
             named(&["Velocity", "Horizontal position", "Vertical position", "Compass"], line)
@@ -127,4 +130,17 @@ pub fn about(autopilot: Autopilot) -> Vec<About> {
         }),
         (Plot::Load, "Computer", "Autopilot load", "%", 1, |_| "Load".into()),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_that_nothing_has_is_named_all_the_same() {
+        for (_, _, title, _, _, name) in about(Autopilot::ArduPilot).into_iter().chain(about(Autopilot::Px4))
+        {
+            assert!(!name(u8::MAX).is_empty(), "{title}");
+        }
+    }
 }

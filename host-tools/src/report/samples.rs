@@ -51,10 +51,13 @@ impl Samples {
             Observation::Hud(hud) => push(Plot::Speed, 1, hud.airspeed.map(|speed| speed.0)),
             Observation::Gnss(gnss) => {
                 let receiver = gnss.instance;
-                push(Plot::Satellites, 2 * receiver, gnss.satellites.map(f32::from));
-                push(Plot::Satellites, 2 * receiver + 1, Some(f32::from(gnss.fix)));
-                push(Plot::Dilution, 2 * receiver, gnss.hdop);
-                push(Plot::Dilution, 2 * receiver + 1, gnss.accuracy.map(|accuracy| accuracy.0));
+                // Two lines for each receiver; a damaged log may name one that nobody has.
+                let line = receiver.saturating_mul(2);
+                let other = line.saturating_add(1);
+                push(Plot::Satellites, line, gnss.satellites.map(f32::from));
+                push(Plot::Satellites, other, Some(f32::from(gnss.fix)));
+                push(Plot::Dilution, line, gnss.hdop);
+                push(Plot::Dilution, other, gnss.accuracy.map(|accuracy| accuracy.0));
                 if receiver == 0 {
                     push(Plot::Speed, 2, gnss.speed.map(|speed| speed.0));
                 }

@@ -43,6 +43,15 @@ fn a_second_log_that_was_joined_to_the_first_one_is_told_and_not_silently_left_o
 }
 
 #[test]
+fn what_has_no_frame_is_not_packed() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("text"), "no frame in here\n".repeat(500)).expect("written");
+    let output = run(dir.path(), "pack text -o out.hum", 1);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("no MAVLink frame"));
+    assert!(!dir.path().join("out.hum").exists());
+}
+
+#[test]
 fn recorded_times_come_back_to_the_millisecond() {
     let dir = tempfile::tempdir().expect("directory");
     packed(dir.path());
