@@ -67,8 +67,8 @@ pub fn seconds_to_micros(seconds: f64) -> Option<u64> {
 /// A point in time on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum When {
-    /// Microseconds since the session's start.
-    SinceStart(u64),
+    /// Microseconds of the log's own time, as its tables have it.
+    Seconds(u64),
     /// Microseconds since 1970.
     Utc(u64),
 }
@@ -78,7 +78,7 @@ impl std::str::FromStr for When {
 
     fn from_str(text: &str) -> Result<Self, String> {
         if let Some(micros) = parse_seconds(text) {
-            return Ok(Self::SinceStart(micros));
+            return Ok(Self::Seconds(micros));
         }
         let instant: Result<jiff::Timestamp, _> = text.parse();
         match instant.map(|instant| u64::try_from(instant.as_microsecond())) {
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn both_forms_of_a_time() {
-        assert_eq!("12.5".parse(), Ok(When::SinceStart(12_500_000)));
+        assert_eq!("12.5".parse(), Ok(When::Seconds(12_500_000)));
         assert_eq!("1970-01-01T00:00:01.5Z".parse(), Ok(When::Utc(1_500_000)));
         assert_eq!("1970-01-01T02:00:00+02:00".parse(), Ok(When::Utc(0)));
         for text in ["", "yesterday", "-5", "1960-01-01T00:00:00Z"] {

@@ -1,10 +1,14 @@
 //! What outlives power and resets, with the firmware itself.
 
 use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use hums_core::usage::UsageCounter;
 use hums_tests::flights::own;
-use hums_tests::program::{Machine, Recording};
+use hums_tests::program::{Machine, Recording, command, firmware};
 use hums_tests::store::Stored;
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
@@ -43,4 +47,34 @@ fn power_that_goes_for_a_moment_begins_another_session_on_both_machines() {
         assert_eq!(recording.number("frames_in"), 16_645, "{machine:?}");
         assert_eq!(Stored::read(&store).lifetime().boots, 3, "{machine:?}");
     }
+}
+
+/// The programs that work in a folder below this one.
+fn working_below(folder: &Path) -> Vec<PathBuf> {
+    let processes = fs::read_dir("/proc").unwrap().filter_map(Result::ok);
+    let folders = processes.filter_map(|process| fs::read_link(process.path().join("cwd")).ok());
+    folders.filter(|working| working.starts_with(folder)).collect()
+}
+
+/// Until `is_so`, a minute at most.
+#[track_caller]
+fn wait_until(what: &str, is_so: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_so() {
+        assert!(start.elapsed() < Duration::from_mins(1), "{what}");
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_run_that_is_killed_leaves_no_emulator_behind() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut run = command(["emulate", "--firmware"]);
+    run.arg(firmware()).arg("--input").arg(own(FLIGHT)).arg("--sd").arg(dir.path().join("card.img"));
+    run.env("TMPDIR", dir.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut run = run.spawn().unwrap();
+    wait_until("no emulator was started", || !working_below(dir.path()).is_empty());
+    run.kill().unwrap();
+    run.wait().unwrap();
+    wait_until("the emulator goes on", || working_below(dir.path()).is_empty());
 }

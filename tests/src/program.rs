@@ -39,8 +39,11 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
-/// The firmware of the emulated board: `HUMS_FIRMWARE` names it, otherwise it is where xtask leaves it.
-fn firmware() -> PathBuf {
+/// The image of the firmware of the emulated board: `HUMS_FIRMWARE` names it, otherwise it is where xtask leaves it.
+///
+/// # Panics
+/// If it is not there.
+pub fn firmware() -> PathBuf {
     let built = || root().join("target/firmware/hums-emulated.elf");
     let path = std::env::var_os("HUMS_FIRMWARE").map_or_else(built, PathBuf::from);
     assert!(path.is_file(), "{} is missing: `cargo xtask firmware --board emulated`", path.display());

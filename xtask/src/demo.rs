@@ -63,10 +63,10 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     if !emulated && !options.pc {
         eprintln!("\nNo emulator here (what to type is above): the same pipeline runs on this PC instead.\n");
     }
-    // First the firmware: its last part is one core's work, beside which the program is built.
-    let (image, program) = std::thread::scope(|scope| {
+    // Both at once: the last part of each build is one core's work.
+    let (program, image) = std::thread::scope(|scope| {
         let firmware = scope.spawn(|| emulated.then(|| firmware::build(Board::Emulated)).transpose());
-        (firmware.join(), hums::build())
+        (hums::build(), firmware.join())
     });
     program?;
     let Ok(image) = image else { bail!("the build of the firmware panicked") };

@@ -39,7 +39,7 @@ pub struct Decode {
     /// What to write, several with commas
     #[arg(long, value_enum, value_delimiter = ',', required = true)]
     pub format: Vec<Format>,
-    /// Leave out what is earlier: seconds since the start of the log, or UTC as 2026-11-21T10:13:42Z
+    /// Leave out what is earlier: seconds as the tables have them, or UTC as 2026-11-21T10:13:42Z
     #[arg(long, value_name = "T")]
     pub from: Option<When>,
     /// Leave out what is later

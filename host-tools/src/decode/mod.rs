@@ -216,7 +216,7 @@ impl Task<'_> {
         }
         let (summary, writers) = read?;
         if writers.is_empty() && context.selection.has_limits() {
-            remarks.push(nothing_of(log, &summary, &context.selection));
+            remarks.push(nothing_of(log, &summary));
             return Ok(Done { outcome: Outcome::Done, written: false, lines: Vec::new(), remarks });
         }
         let written = writers.finish()?;
@@ -244,9 +244,7 @@ impl Task<'_> {
             ..Context::default()
         };
         let Some(log) = work.log.own() else {
-            let (identity, start) = recorded::identity(work.log)?;
-            context.identity = identity;
-            context.selection = context.selection.starting_at(start);
+            context.identity = recorded::identity(work.log)?;
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
             context.epoch_us = context.identity.epoch_us;
             return Ok(context);
@@ -336,10 +334,10 @@ fn losses_of(log: &Place, summary: &Summary, losses: u64) -> Vec<String> {
 }
 
 /// Says that nothing of a log is in the time that was asked for, and what time it has.
-fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
-    let seconds = |at: Option<Instant>| at.map_or(0.0, |at| selection.seconds(at));
+fn nothing_of(log: &Place, summary: &Summary) -> String {
+    let seconds = |at: Option<Instant>| at.map_or(0.0, |at| at.as_micros() as f64 / 1e6);
     format!(
-        "{}: nothing of it is within --from and --to: it goes from {:.3} s to {:.3} s since its start",
+        "{}: nothing of it is within --from and --to: its times go from {:.3} s to {:.3} s",
         log.name,
         seconds(summary.first),
         seconds(summary.last)

@@ -32,13 +32,11 @@ const NAMES_BYTES_MAX: usize = 4 << 20;
 
 /// Who flew and when, and UTC at time zero; and the time of the first entry, by the recording's clock. The recording is
 /// read through for it.
-pub fn identity(place: &Place) -> Result<(Identity, Instant)> {
+pub fn identity(place: &Place) -> Result<Identity> {
     let (mut epoch_us, mut first, mut system, mut uid) = (None, None, None, None);
-    let mut start = None;
     let mut hash = Sha256::new();
     let want = Want { observations: true, ..Want::default() };
     place.open()?.read(want, &mut |at, item| {
-        start.get_or_insert(at);
         match item {
             Item::Epoch(epoch) => epoch_us = Some(epoch),
             Item::Observation(source, observation) => {
@@ -65,7 +63,7 @@ pub fn identity(place: &Place) -> Result<(Identity, Instant)> {
     // No recorder gave it a number: the times in it are its own.
     let number: [u8; 4] = hash.finalize().first_chunk().copied().unwrap_or_default();
     let session = format!("r{:08x}", u32::from_be_bytes(number));
-    Ok((Identity { vehicle, date, session, epoch_us }, start.unwrap_or(Instant::ZERO)))
+    Ok(Identity { vehicle, date, session, epoch_us })
 }
 
 /// Reads a recording into the writers.

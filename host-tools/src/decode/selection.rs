@@ -19,8 +19,6 @@ pub struct Selection {
     ids: Vec<u32>,
     /// The names as they were given: those of other messages than MAVLink's.
     names: Vec<String>,
-    /// The time at which the log starts, by its own clock: seconds count from there.
-    start: Instant,
 }
 
 impl Selection {
@@ -30,18 +28,7 @@ impl Selection {
         // A name of its own is no id: none at all is not every one.
         let other = |id: Result<u32>| id.or_else(|error| if native { Ok(u32::MAX) } else { Err(error) });
         let ids = ids.map(other).collect::<Result<_>>()?;
-        Ok(Self { from: args.from, to: args.to, ids, names: args.message.clone(), start: Instant::ZERO })
-    }
-
-    /// The same for a log that starts at this time of its clock.
-    #[must_use]
-    pub fn starting_at(self, start: Instant) -> Self {
-        Self { start, ..self }
-    }
-
-    /// Seconds of a time since the log's start.
-    pub fn seconds(&self, at: Instant) -> f64 {
-        at.since(self.start).as_micros() as f64 / 1e6
+        Ok(Self { from: args.from, to: args.to, ids, names: args.message.clone() })
     }
 
     /// The names of the messages that are wanted; none: all.
@@ -58,7 +45,7 @@ impl Selection {
     pub fn check_without_utc(&self, log: &str) -> Result<()> {
         if [self.from, self.to].iter().any(|when| matches!(when, Some(When::Utc(_)))) {
             return Err(usage(format!(
-                "{log}: the time of day is not known in this log; give --from and --to as seconds since its start"
+                "{log}: the time of day is not known in this log; give --from and --to as seconds of its own time, as its tables have them"
             )));
         }
         Ok(())
@@ -76,24 +63,24 @@ impl Selection {
     }
 
     fn is_before(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        self.from.and_then(|from| self.compare(at, from, epoch_us)).is_some_and(Ordering::is_lt)
+        self.from.and_then(|from| compare(at, from, epoch_us)).is_some_and(Ordering::is_lt)
     }
 
     fn is_after(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        self.to.and_then(|to| self.compare(at, to, epoch_us)).is_some_and(Ordering::is_gt)
-    }
-
-    /// How a time lies to a limit; `None` where one is UTC and the other cannot be.
-    fn compare(&self, at: Instant, limit: When, epoch_us: Option<u64>) -> Option<Ordering> {
-        match limit {
-            When::SinceStart(limit) => Some(at.since(self.start).as_micros().cmp(&limit)),
-            When::Utc(limit) => Some(epoch_us?.saturating_add(at.as_micros()).cmp(&limit)),
-        }
+        self.to.and_then(|to| compare(at, to, epoch_us)).is_some_and(Ordering::is_gt)
     }
 
     /// Whether frames of this message are wanted.
     pub fn has_id(&self, id: u32) -> bool {
         self.ids.is_empty() || self.ids.contains(&id)
+    }
+}
+
+/// How a time lies to a limit; `None` where one is UTC and the other cannot be.
+fn compare(at: Instant, limit: When, epoch_us: Option<u64>) -> Option<Ordering> {
+    match limit {
+        When::Seconds(limit) => Some(at.as_micros().cmp(&limit)),
+        When::Utc(limit) => Some(epoch_us?.saturating_add(at.as_micros()).cmp(&limit)),
     }
 }
 

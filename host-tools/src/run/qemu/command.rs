@@ -9,6 +9,8 @@ use anyhow::{Context, Result, bail};
 
 /// The emulator's program.
 pub(super) const PROGRAM: &str = "qemu-system-arm";
+/// Starts a program that is to be killed when its parent ends.
+const SETPRIV: &str = "/usr/bin/setpriv";
 /// The first version that models this chip's memory.
 const VERSION_MIN: u32 = 8;
 
@@ -62,7 +64,7 @@ pub(super) fn command(start: &Arguments<'_>, dir: &Path) -> Command {
     for argument in start.more.iter().chain(start.costs.then(|| "cost=1".to_owned()).iter()) {
         let _ = write!(arguments, " \"{argument}\"");
     }
-    let mut command = Command::new(PROGRAM);
+    let mut command = program();
     command
         .args(["-M", "netduinoplus2", "-nodefaults", "-display", "none", "-monitor", "none", "-kernel"])
         .arg(start.firmware)
@@ -75,6 +77,17 @@ pub(super) fn command(start: &Arguments<'_>, dir: &Path) -> Command {
         .args(if start.costs { &["-icount", "shift=3"][..] } else { &[] })
         // Ctrl-C is for this program, which then lets the firmware close its log.
         .process_group(0);
+    command
+}
+
+/// The emulator, which ends with this program however that ends: a killed one cannot end it. (`prctl` itself would need
+/// unsafe code; util-linux has the program, and where it is not there, a killed run leaves its emulator waiting.)
+fn program() -> Command {
+    if !Path::new(SETPRIV).exists() {
+        return Command::new(PROGRAM);
+    }
+    let mut command = Command::new(SETPRIV);
+    command.args(["--pdeathsig", "KILL", "--", PROGRAM]);
     command
 }
 

@@ -40,7 +40,13 @@ pub(super) const TOPICS: &[Topic] = &[
         fields: &["baro_pressure_pa", "ambient_temperature", "baro_temp_celcius", "baro_alt_meter"],
         take: air,
     },
-    Topic { name: "vehicle_attitude", instances: 1, every_us: FAST_US, fields: &["q"], take: attitude },
+    Topic {
+        name: "vehicle_attitude",
+        instances: 1,
+        every_us: FAST_US,
+        fields: &["q", "rollspeed", "pitchspeed", "yawspeed"],
+        take: attitude,
+    },
     Topic {
         name: "vehicle_local_position",
         instances: 1,
@@ -198,12 +204,16 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
     let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
     let pitch = (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin();
     let yaw = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
+    // Until v1.9 the rates are in it, later in vehicle_angular_velocity. PX4 makes its ATTITUDE from the same.
+    let rates = match [1, 2, 3].map(|field| said.fields.finite(field)) {
+        [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+        _ => px4.motion.rate,
+    };
     px4.observe(Observation::Attitude(Attitude {
         roll: Radians(roll),
         pitch: Radians(pitch),
         yaw: Radians(yaw),
-        // They are in vehicle_angular_velocity and in sensor_combined.
-        rates: None,
+        rates: rates.map(|rates| rates.map(RadiansPerSecond)),
         boot_ms: Some((said.recorded_us / 1_000) as u32),
     }));
 }

@@ -163,3 +163,23 @@ fn an_attitude_is_that_of_its_quaternion_and_fast_topics_are_thinned() {
         "{attitudes:?}"
     );
 }
+
+#[test]
+fn the_rates_of_an_attitude_are_its_own_or_those_of_the_gyros() {
+    let attitude = [1.0, 0.0, 0.0, 0.0];
+    let old =
+        "vehicle_attitude:uint64_t timestamp;float rollspeed;float pitchspeed;float yawspeed;float[4] q;";
+    let log = Writer::new(SECOND).format(old).subscribe(0, 0, "vehicle_attitude");
+    let log = log.data(0, 2 * SECOND, &floats(&[&[5.5, -6.5, 7.5], &attitude[..]].concat()));
+    let attitudes = observations(&read(&log.bytes), "Attitude(");
+    assert!(attitudes[0].contains("RadiansPerSecond(5.5), RadiansPerSecond(-6.5)"), "{attitudes:?}");
+
+    let log = Writer::new(SECOND)
+        .format("vehicle_attitude:uint64_t timestamp;float[4] q;")
+        .format("vehicle_angular_velocity:uint64_t timestamp;float[3] xyz;")
+        .subscribe(0, 0, "vehicle_attitude")
+        .subscribe(1, 0, "vehicle_angular_velocity");
+    let log = log.data(1, 2 * SECOND, &floats(&[5.5, -6.5, 7.5])).data(0, 2 * SECOND, &floats(&attitude));
+    let attitudes = observations(&read(&log.bytes), "Attitude(");
+    assert!(attitudes[0].contains("RadiansPerSecond(5.5), RadiansPerSecond(-6.5)"), "{attitudes:?}");
+}
