@@ -52,9 +52,22 @@ pub fn line(checked: &Checked) -> String {
             names.push(name);
         }
     }
-    let damaged = if checked.judged.damages > 0 { "; damaged" } else { "" };
+    let found = names.join(", ");
+    let what: Vec<&str> =
+        [found.as_str(), state(judged)].into_iter().filter(|words| !words.is_empty()).collect();
     let air = clock(flown(judged));
-    format!("{level:<8}  {air:>8}  {}  {}{damaged}", checked.name, names.join(", "))
+    format!("{level:<8}  {air:>8}  {}  {}", checked.name, what.join("; ")).trim_end().to_owned()
+}
+
+/// What is wrong with the recording itself. An autopilot's log is cut in the middle of a message wherever its power goes
+/// before it closes the log: that is not the same as damage inside of it.
+fn state(judged: &Judged) -> &'static str {
+    let mut damages = judged.gaps.iter().filter(|gap| gap.cause.is_damage());
+    match judged.damages {
+        0 => "",
+        _ if damages.all(|gap| gap.cause == Cause::Cut) => "cut at its end",
+        _ => "damaged",
+    }
 }
 
 /// Many logs, added up.
@@ -65,6 +78,7 @@ pub struct Table {
     checks: BTreeMap<String, (u64, u64)>,
     logs: u64,
     damaged: u64,
+    cut: u64,
     little: u64,
     flown_us: u64,
 }
@@ -74,7 +88,8 @@ impl Table {
     pub fn add(&mut self, checked: &Checked) {
         let judged = &checked.judged;
         self.logs += 1;
-        self.damaged += u64::from(judged.damages > 0);
+        self.damaged += u64::from(state(judged) == "damaged");
+        self.cut += u64::from(state(judged) == "cut at its end");
         self.flown_us = self.flown_us.saturating_add(flown(judged).as_micros());
         let level = judged.worst().map_or("unknown", Level::name);
         self.little += u64::from(judged.worst() == Some(Level::Ok) && judged.is_little());
@@ -105,6 +120,7 @@ impl Table {
             (count("critical"), "critical"),
             (count("unknown"), "no vehicle in it"),
             (self.damaged, "damaged (counted above too)"),
+            (self.cut, "cut at their end (counted above too)"),
             (failed as u64, "could not be read"),
         ] {
             if count > 0 {
@@ -336,6 +352,7 @@ fn damage(text: &mut String, judged: &Judged) {
     for gap in shown.clone().take(LINES_MAX) {
         let what = match gap.cause {
             Cause::NoTimes => "no times",
+            Cause::Cut => "cut",
             cause if cause.is_damage() => "damaged",
             _ => "lost",
         };

@@ -95,8 +95,13 @@ impl Reader for TlogReader {
                     bytes
                 }
                 Record::Noise(bytes) => {
-                    let words = format!("of no record of the tlog: {}", count(bytes.len(), "byte"));
-                    take(now, Item::Gap(&gap(now, Cause::Damaged, place, bytes.len(), words)))?;
+                    let (cause, what) = if self.records.is_cut(&bytes) {
+                        (Cause::Cut, "a record that the end cuts off")
+                    } else {
+                        (Cause::Damaged, "of no record of the tlog")
+                    };
+                    let words = format!("{what}: {}", count(bytes.len(), "byte"));
+                    take(now, Item::Gap(&gap(now, cause, place, bytes.len(), words)))?;
                     bytes
                 }
             };

@@ -57,6 +57,15 @@ impl<R: Read> Records<R> {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
+    /// Whether the input ended with these bytes, which were the last that came, in the middle of a record.
+    pub(super) fn is_cut(&self, noise: &[u8]) -> bool {
+        let frame = noise.get(TIME_BYTES..).filter(|frame| !frame.is_empty());
+        self.ended
+            && self.rest().is_empty()
+            && noise.first() == Some(&0)
+            && frame.is_none_or(|frame| matches!(peek(frame), Peek::Short))
+    }
+
     fn fill(&mut self) -> io::Result<()> {
         if self.ended || self.rest().len() >= LOOKAHEAD_BYTES {
             return Ok(());

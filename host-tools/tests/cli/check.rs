@@ -100,6 +100,17 @@ fn damage_is_said_with_its_place_and_wins_over_findings() {
     let place = checked["gaps"][0]["place"].as_u64().expect("a place");
     assert!((999_600..1_000_200).contains(&place), "{place}");
     assert!(text(&run(dir.path(), "check hit.tlog", 3)).contains("damaged"));
+
+    // A log whose recorder lost its power ends within a message: that is told as what it is.
+    fs::write(dir.path().join("cut.tlog"), &bytes[..999_001]).expect("written");
+    assert!(text(&run(dir.path(), "check cut.tlog", 3)).contains("\n  cut  "));
+    let both = text(&run(dir.path(), "check hit.tlog cut.tlog", 3));
+    let line = |name: &str| both.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();
+    assert!(
+        line("hit.tlog").ends_with("; damaged") && line("cut.tlog").ends_with("cut at its end"),
+        "{both}"
+    );
+    assert!(both.contains("1  damaged (") && both.contains("1  cut at their end ("), "{both}");
 }
 
 #[test]
