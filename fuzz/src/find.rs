@@ -64,9 +64,9 @@ fn look(path: &Path, salvage: bool) {
     assert_eq!(names.len(), found.logs.len(), "names are unique");
     for log in &found.logs {
         let overview = Overview::verified(log).expect("it can be read");
-        let blocks = overview.summary.blocks;
+        let blocks = overview.ending.summary.blocks;
         assert_eq!(blocks.blocks, log.bytes().div_ceil(512), "each block is accounted for");
         assert!(log.bytes() <= length);
-        assert!(overview.contents.frames() <= overview.summary.frames);
+        assert!(overview.contents.frames() <= overview.ending.summary.frames);
     }
 }

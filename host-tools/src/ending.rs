@@ -10,8 +10,11 @@ use hums_blackbox::record::{Before, Found, Resting};
 use hums_core::time::Instant;
 use serde::Serialize;
 
+use crate::hex::hex;
+use crate::logs::Log;
 use crate::logs::reader::Summary;
-use crate::plural::count;
+use crate::logs::strangers::{Others, Strange};
+use crate::plural::{are, count, noun};
 use crate::utc::iso8601;
 
 /// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
@@ -89,6 +92,9 @@ impl Proof {
         let moment = |at| moment(summary, at);
         match self {
             Self::Closed => "ended in order".to_owned(),
+            Self::NextStart(None) if summary.session.is_none() => {
+                "nothing was written into it, as the next start found".to_owned()
+            }
             Self::NextStart(None) => "whole to its end, as the next start found it".to_owned(),
             Self::NextStart(Some(moved)) => format!(
                 "whole to its end, as the next start found it; armed or in the air since {} when power went: what was \
@@ -128,6 +134,137 @@ impl Proof {
     }
 }
 
+/// Files of a log that are named one by one.
+const NAMED_MAX: usize = 3;
+
+/// A log that was read: what tells whether it is whole, for every command alike.
+#[derive(Clone, Debug, Default)]
+pub struct Ending {
+    /// Its name.
+    pub name: String,
+    /// The files that hold it.
+    pub files: Vec<String>,
+    /// What the reader saw.
+    pub summary: Summary,
+    /// What is known of its end.
+    pub proof: Proof,
+    /// The number of a log that was recorded on the card just before this one and is not there.
+    pub gone_before: Option<u32>,
+}
+
+impl Ending {
+    /// A log by itself; [`crate::followed`] adds what later ones tell of it.
+    pub fn of(log: &Log, summary: Summary) -> Self {
+        let proof = Proof::of(&summary, None);
+        Self { name: log.name.clone(), files: log.files.clone(), summary, proof, gone_before: None }
+    }
+
+    /// How the log ends, as a part of a sentence.
+    pub fn words(&self) -> String {
+        self.proof.words(&self.summary)
+    }
+
+    /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark.
+    pub fn is_proved(&self) -> bool {
+        self.unproved().is_empty()
+    }
+
+    /// Why it is not, as parts of sentences: what is lost or damaged, what is not proved, what of its files is not the log's.
+    pub fn unproved(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        let (summary, blocks) = (&self.summary, &self.summary.blocks);
+        let lost = summary.marks.lost;
+        if summary.gaps > 0 || blocks.damaged > 0 || lost > 0 {
+            all.push(format!(
+                "{}, {} missing, {}, {} or {} lost while recording",
+                count(summary.gaps, "gap"),
+                count(summary.frames_missing, "frame"),
+                count(blocks.damaged, "damaged sector"),
+                count(lost, "frame"),
+                noun(lost, "record")
+            ));
+        }
+        if blocks.misplaced > 0 {
+            all.push(format!("{} there twice, or where others belong", are(blocks.misplaced, "sector")));
+        }
+        if summary.marks.wrong > 0 {
+            all.push(format!(
+                "{} of another number of frames than were read",
+                count(summary.marks.wrong, "end mark")
+            ));
+        }
+        if !self.proof.holds() && summary.session.is_some() {
+            all.push(self.words());
+        }
+        all.extend(self.strange());
+        all.extend(self.newer());
+        all.extend(
+            self.gone_before.map(|number| {
+                format!("session {number:05}, which was recorded just before it, is not there")
+            }),
+        );
+        all
+    }
+
+    /// What of its files is not the log's.
+    pub fn strange(&self) -> Vec<String> {
+        // A file that the next start found empty was made when the power went.
+        let told = |strange: &&Strange| !(strange.hollow && self.proof == Proof::NextStart(None));
+        let told: Vec<_> = self.summary.strange.iter().filter(told).collect();
+        let mut all: Vec<_> =
+            told.iter().take(NAMED_MAX).map(|strange| self.strange_words(strange)).collect();
+        if told.len() > NAMED_MAX {
+            all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
+        }
+        all
+    }
+
+    fn strange_words(&self, strange: &Strange) -> String {
+        let file = self.files.get(strange.file).map_or("a file", String::as_str);
+        match strange.others {
+            None => format!("{file} has the name of a segment and holds nothing of ours"),
+            Some(others) if strange.hollow => format!(
+                "{file} has the name of a segment of this log and holds {}{}",
+                count(others.sectors, "sector"),
+                of_whom(&others)
+            ),
+            Some(others) => format!(
+                "sectors {} to {} of {file} are{}: logs were joined into one file, or it was made where a deleted log \
+                 lay; only this log is read: give each by itself",
+                others.first,
+                others.last,
+                of_whom(&others)
+            ),
+        }
+    }
+
+    /// Sectors of a session that began later lie where a recycled file may have older ones.
+    fn newer(&self) -> Option<String> {
+        let told = self.summary.strange.iter().any(|strange| strange.others.is_some());
+        (self.has_newer() && !told).then(|| {
+            format!(
+                "{} of other sessions, of which one began later: logs were joined into one file; only this log is \
+                 read: give each by itself",
+                are(self.summary.blocks.stale, "sector")
+            )
+        })
+    }
+
+    /// Whether sectors of a session that began later lie in the log's files. What is left over there is older: a file is
+    /// only ever overwritten by a newer session. Where the log's end is proved, the other one's clock was wrong.
+    pub fn has_newer(&self) -> bool {
+        let both = self.summary.other_epoch_us.zip(self.summary.epoch_us);
+        !self.proof.is_whole() && both.is_some_and(|(other, own)| other > own.saturating_add(EPOCH_SLACK_US))
+    }
+}
+
+/// Whose sectors they are.
+fn of_whom(others: &Others) -> String {
+    let board = others.board.map_or_else(String::new, |board| format!("box {}, ", hex(&board)));
+    let several = if others.several { ", and of more" } else { "" };
+    format!(" of another session ({board}session {:08x}{several})", others.session)
+}
+
 /// From a time to the log's last entry.
 fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
     summary.last.map(|last| last.since(at).as_micros() as f64 / 1e6)
@@ -137,13 +274,6 @@ fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
 fn moment(summary: &Summary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
     utc.map_or_else(|| format!("{:.3} s", at.as_secs_f64()), |utc| iso8601(utc / 1000 * 1000))
-}
-
-/// Whether sectors of a session that began later lie in the log's files. What is left over there is older: a file is
-/// only ever overwritten by a newer session.
-pub fn has_newer(summary: &Summary) -> bool {
-    let both = summary.other_epoch_us.zip(summary.epoch_us);
-    both.is_some_and(|(other, own)| other > own.saturating_add(EPOCH_SLACK_US))
 }
 
 /// What lies behind the last sector, in words; empty where nothing does.
@@ -186,6 +316,8 @@ pub struct EndJson {
     behind: BlocksJson,
     /// Sectors of a session that began later lie in it.
     newer_session: bool,
+    /// Why the log is not called whole, as sentences; none where it is.
+    not_proved: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -197,7 +329,8 @@ struct MarkJson {
 
 impl EndJson {
     /// The end of this log.
-    pub fn new(proof: Proof, summary: &Summary) -> Self {
+    pub fn new(ending: &Ending) -> Self {
+        let (proof, summary) = (ending.proof, &ending.summary);
         let (sectors_missing, frames_missing) = match proof {
             Proof::Short { sectors, frames } => (sectors, frames),
             _ => (0, Some(0)),
@@ -218,7 +351,8 @@ impl EndJson {
             sectors_missing,
             frames_missing,
             behind: BlocksJson::new(&summary.behind),
-            newer_session: has_newer(summary),
+            newer_session: ending.has_newer(),
+            not_proved: ending.unproved(),
         }
     }
 }

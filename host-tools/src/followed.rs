@@ -7,30 +7,39 @@ use std::collections::VecDeque;
 
 use hums_blackbox::record::Before;
 
-use crate::ending::Proof;
-use crate::summary::Overview;
+use crate::ending::{Ending, Proof};
 
-/// Logs held back at most.
-const HELD_MAX: usize = 4;
+/// Logs held back at most; so many after a log may say something of its end.
+pub const HELD_MAX: usize = 4;
 
-/// Holds logs back for as long as a later one may say something of their end.
-#[derive(Debug, Default)]
-pub struct Followed {
-    held: VecDeque<Overview>,
+/// What is made of a log that was read.
+pub trait Logged {
+    /// What is known of its end, where it is a log of ours.
+    fn ending(&mut self) -> Option<&mut Ending>;
 }
 
-impl Followed {
+/// Holds logs back for as long as a later one may say something of their end.
+#[derive(Debug)]
+pub struct Followed<T> {
+    held: VecDeque<T>,
+}
+
+impl<T> Default for Followed<T> {
+    fn default() -> Self {
+        Self { held: VecDeque::new() }
+    }
+}
+
+impl<T: Logged> Followed<T> {
     /// Takes the next log; gives those of which nothing more will be said, in order.
-    pub fn push(&mut self, mut next: Overview) -> Vec<Overview> {
-        if let Some(before) = next.contents.before.filter(Before::has_end) {
-            let is_it = |log: &Overview| log.summary.session == Some(before.session);
-            let between = self.is_between(before.number, &next);
-            match self.held.iter_mut().rev().find(|log| is_it(log)) {
-                Some(log) => log.proof = Proof::of(&log.summary, Some(&before)),
-                None => next.gone_before = Some(before.number).filter(|_| between),
+    pub fn push(&mut self, mut next: T) -> Vec<T> {
+        let mut has_sectors = false;
+        if let Some(ending) = next.ending() {
+            has_sectors = ending.summary.session.is_some();
+            if let Some(before) = ending.summary.marks.before.filter(Before::has_end) {
+                self.tell(&before, ending);
             }
         }
-        let has_sectors = next.summary.session.is_some();
         self.held.push_back(next);
         // Only the newest that has sectors can be what the next start found.
         let keep = if has_sectors { 1 } else { HELD_MAX };
@@ -39,17 +48,35 @@ impl Followed {
     }
 
     /// There are no more logs.
-    pub fn finish(self) -> impl Iterator<Item = Overview> {
+    pub fn finish(self) -> impl Iterator<Item = T> {
         self.held.into_iter()
     }
 
-    /// Whether a log of this number would lie between the last one and `next` on the same card.
-    fn is_between(&self, number: u32, next: &Overview) -> bool {
-        let last = self.held.back().map(|log| place(&log.name));
-        last.is_some_and(|(card, last)| {
-            let (card_next, next) = place(&next.name);
-            card == card_next && last.zip(next).is_some_and(|(last, next)| last < number && number < next)
-        })
+    /// What the start of `next` found of the log before it.
+    fn tell(&mut self, before: &Before, next: &mut Ending) {
+        let (card, number) = place(&next.name);
+        let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(Logged::ending).collect();
+        // A log of this number is or would be between the one before and the next, on the same card.
+        let is_between = |name: &str, between: u32| {
+            let (other, last) = place(name);
+            card == other && number.zip(last).is_some_and(|(next, last)| last < between && between < next)
+        };
+        let last = held.last().map(|log| log.name.clone());
+        match held.iter_mut().rev().find(|log| log.summary.session == Some(before.session)) {
+            Some(log) => log.proof = Proof::of(&log.summary, Some(before)),
+            None => {
+                next.gone_before =
+                    Some(before.number).filter(|number| last.is_some_and(|last| is_between(&last, *number)));
+            }
+        }
+        // The start looked at each file from the newest on until it found a sector.
+        for log in held.into_iter().filter(|log| log.summary.session.is_none()) {
+            let (other, empty) = place(&log.name);
+            let is_after = |empty: u32| before.number < empty && number.is_some_and(|next| empty < next);
+            if card == other && empty.is_some_and(is_after) {
+                log.proof = Proof::NextStart(None);
+            }
+        }
     }
 }
 

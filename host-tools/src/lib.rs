@@ -10,6 +10,7 @@ pub mod ending;
 pub mod endpoint;
 pub mod files;
 pub mod followed;
+pub mod hex;
 pub mod info;
 pub mod interrupt;
 pub mod live;

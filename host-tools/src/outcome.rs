@@ -11,7 +11,7 @@
 use std::error::Error as StdError;
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The end of a run that did what it was asked.
@@ -69,15 +69,38 @@ impl StdError for ReaderGone {}
 
 /// A file is there already under an output's name, and has other content: it was not replaced.
 #[derive(Debug)]
-pub struct Differs(pub PathBuf);
+pub struct Differs {
+    path: PathBuf,
+    /// Why it was not replaced though the user said so.
+    original: bool,
+}
+
+impl Differs {
+    /// Nobody said `--replace`.
+    pub fn new(path: &Path) -> Self {
+        Self { path: path.to_owned(), original: false }
+    }
+
+    /// It may be an original, or was made of another input.
+    pub fn original(path: &Path) -> Self {
+        Self { path: path.to_owned(), original: true }
+    }
+}
 
 impl fmt::Display for Differs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let path = self.path.display();
+        if self.original {
+            return write!(
+                f,
+                "{path}: is there already with other content, and nothing tells that hums made it of the same input: it \
+                 may be an original, and --replace does not replace it; name another output, or move it away"
+            );
+        }
         write!(
             f,
-            "{}: is there already with other content, and was not replaced; name another output, move it away, or \
-             say --replace",
-            self.0.display()
+            "{path}: is there already with other content, and was not replaced; name another output, move it away, or \
+             say --replace"
         )
     }
 }

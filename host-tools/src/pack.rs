@@ -33,14 +33,18 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     inputs.add_endpoint(&args.input);
     let mut source = source::open(&args.input, Timing { line_rate: None })?;
     let context = || cannot_write(&args.output);
-    let mut packer = Packer::new(Output::create(&args.output, &inputs, &made::LOG)?);
+    let read = || format!("{}: cannot be read", args.input);
+    // What waits for its first byte, as a pipe may for ever, leaves nothing behind.
+    let mut next = source.next().with_context(read)?;
+    let (session, utc_us) = (session_of(source.utc_start_us()), source.utc_start_us());
+    let of = format!("s{session:08x}");
+    let mut packer = Packer::new(Output::create(&args.output, &inputs, &made::LOG, Some(&of))?, session);
+    packer.start(utc_us).with_context(context)?;
     let mut last_us = 0;
-    while let Some(chunk) = source.next().with_context(|| format!("{}: cannot be read", args.input))? {
-        if packer.started.is_none() {
-            packer.start(source.utc_start_us()).with_context(context)?;
-        }
+    while let Some(chunk) = next {
         packer.chunk(chunk.at_us, &chunk.bytes, source.has_records()).with_context(context)?;
         last_us = chunk.at_us;
+        next = source.next().with_context(read)?;
     }
     let (done, mut file) = packer.finish(last_us).with_context(context)?;
     if done.frames == 0 {
@@ -64,6 +68,13 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         eprintln!("hums: of no frame, and only counted: {bytes} of the recording");
     }
     Ok(Outcome::Done)
+}
+
+/// The session's number by the recording's first time: a log packed twice is the same to the byte, and two recordings do
+/// not look like parts of one session.
+fn session_of(utc_us: Option<u64>) -> u32 {
+    let utc = utc_us.unwrap_or(0);
+    ((utc ^ (utc >> 32)) as u32) | 1
 }
 
 /// What packing did.
@@ -95,22 +106,19 @@ struct Packer<W> {
     writer: Box<Writer>,
     framer: Framer,
     finished: Finished,
-    /// The session's number, once the first byte came: a log packed twice is the same to the byte.
-    started: Option<u32>,
+    /// The session's number.
+    session: u32,
     log_bytes: u64,
 }
 
 impl<W: Write> Packer<W> {
-    fn new(file: W) -> Self {
+    fn new(file: W, session: u32) -> Self {
         let (writer, framer) = (Box::new(Writer::new()), Framer::new());
-        Self { file, writer, framer, finished: Finished::default(), started: None, log_bytes: 0 }
+        Self { file, writer, framer, finished: Finished::default(), session, log_bytes: 0 }
     }
 
     fn start(&mut self, utc_us: Option<u64>) -> Result<()> {
-        // Two recordings should not look like parts of one session: their first times differ.
-        let utc = utc_us.unwrap_or(0);
-        self.started = Some(((utc ^ (utc >> 32)) as u32) | 1);
-        let note = Record::Note(Note { severity: 6, text: "packed on a PC by hums pack" });
+        let note = Record::Note(Note { severity: 6, text: made::PACKED });
         self.record(Instant::ZERO, &note)?;
         if let Some(utc_micros) = utc_us {
             let clock = Clock { boot: Instant::ZERO, utc_micros, source: FROM_RECORDING };
@@ -167,7 +175,7 @@ impl<W: Write> Packer<W> {
 
     fn write_out(&mut self) -> Result<()> {
         for mut sector in self.finished.0.drain(..) {
-            sector.seal(self.started.unwrap_or(1));
+            sector.seal(self.session);
             self.file.write_all(sector.bytes())?;
             self.log_bytes += sector.bytes().len() as u64;
         }

@@ -2,13 +2,6 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::logs::Log;
-
-/// A bar over the log's bytes, on a terminal only.
-pub fn bar(log: &Log) -> ProgressBar {
-    bytes(Some(log.bytes()), &log.name)
-}
-
 /// A bar over so many bytes, on a terminal only; none where nobody knows how many.
 pub fn bytes(total: Option<u64>, name: &str) -> ProgressBar {
     let Some(total) = total else { return ProgressBar::hidden() };

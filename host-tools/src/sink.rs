@@ -84,7 +84,7 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
     let heard = Heard::nobody();
     match endpoint {
         Endpoint::File(path) => {
-            let file = SinkFile(Arc::new(Mutex::new(Output::create(path, inputs, &made::RAW)?)));
+            let file = SinkFile(Arc::new(Mutex::new(Output::create(path, inputs, &made::RAW, None)?)));
             Ok(Ground { writer: Box::new(file.clone()), heard, file: Some(file) })
         }
         Endpoint::Standard => {

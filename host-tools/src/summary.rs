@@ -3,18 +3,19 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use hums_blackbox::record::{Before, Found, Loss, Moment, Stats, Vehicle, Why};
+use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Entry, Gap, Record};
 use hums_core::component::Figures;
 use hums_core::health::exceedance::Crossings;
 use hums_core::time::Instant;
 
-use crate::ending::{Proof, has_newer};
+use crate::ending::Ending;
+use crate::followed::Logged;
 use crate::logs::Log;
-use crate::logs::reader::{Collect, Deliver, Summary, read};
-use crate::loss::lost;
+use crate::logs::reader::{Collect, Deliver, read};
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::{counter_name, message_name};
+use crate::plural::count;
 use crate::progress;
 use crate::source::item;
 use crate::source::recording::Format;
@@ -139,8 +140,6 @@ pub struct Contents {
     pub records: u64,
     /// The first boot record.
     pub boot: Option<BootLine>,
-    /// The session before on the card, as its last boot record found it.
-    pub before: Option<Before>,
     /// The last vehicle record.
     pub vehicle: Option<Vehicle>,
     /// UTC at power-on, microseconds since 1970.
@@ -161,8 +160,6 @@ pub struct Contents {
     pub components: BTreeMap<u8, ComponentLine>,
     /// Losses by what was lost: how many, the first and the last time.
     pub losses: BTreeMap<&'static str, Loss>,
-    /// What of these counts as lost by the recorder.
-    pub lost: u64,
     /// The recorder's last statistics.
     pub stats: Option<Stats>,
     /// Gaps, in order, up to [`LISTED_MAX`].
@@ -245,8 +242,6 @@ impl Contents {
         self.records += 1;
         match record {
             Record::Boot(boot) => {
-                self.before =
-                    Some(boot.before).filter(|before| before.found != Found::Unknown).or(self.before);
                 self.boot.get_or_insert_with(|| BootLine {
                     version: boot.version.to_owned(),
                     git: boot.git.to_owned(),
@@ -293,10 +288,7 @@ impl Contents {
                 };
                 self.components.insert(record.place.saturating_add(1), line);
             }
-            Record::Loss(loss) => {
-                self.lost += lost(loss);
-                add_loss(&mut self.losses, loss);
-            }
+            Record::Loss(loss) => add_loss(&mut self.losses, loss),
             Record::Stats(stats) => self.stats = Some(*stats),
             _ => {}
         }
@@ -331,7 +323,6 @@ impl Contents {
         }
         self.records += next.records;
         self.boot = self.boot.take().or(next.boot);
-        self.before = next.before.or(self.before);
         self.vehicle = next.vehicle.or(self.vehicle);
         self.findings_count += next.findings_count;
         let room = LISTED_MAX.saturating_sub(self.findings.len());
@@ -343,7 +334,6 @@ impl Contents {
         for loss in next.losses.values() {
             add_loss(&mut self.losses, loss);
         }
-        self.lost += next.lost;
         self.stats = next.stats.or(self.stats);
         self.not_frames += next.not_frames;
         self.bad_frames += next.bad_frames;
@@ -407,22 +397,20 @@ impl Deliver<Self> for Contents {
 /// A log, read through.
 #[derive(Clone, Debug, Default)]
 pub struct Overview {
-    /// Its name.
-    pub name: String,
+    /// What the reader saw, and what tells whether it is whole.
+    pub ending: Ending,
     /// What it is, where it is no log of ours.
     pub format: Option<Format>,
-    /// The files that hold it.
-    pub files: Vec<String>,
     /// Bytes of these files that are set aside for it.
     pub bytes_on_card: u64,
-    /// What the reader saw.
-    pub summary: Summary,
     /// What is in it.
     pub contents: Contents,
-    /// What is known of its end.
-    pub proof: Proof,
-    /// The number of a log that was recorded on the card just before this one and is not there.
-    pub gone_before: Option<u32>,
+}
+
+impl Logged for Overview {
+    fn ending(&mut self) -> Option<&mut Ending> {
+        Some(&mut self.ending)
+    }
 }
 
 impl Overview {
@@ -438,41 +426,28 @@ impl Overview {
     }
 
     fn read(log: &Log, checks: bool) -> Result<Self> {
-        let bar = progress::bar(log);
+        let bar = progress::bytes(Some(log.bytes()), &log.name);
         let new = || Contents { checks, near: vec![MessageCount::default(); NEAR], ..Contents::default() };
         let mut contents = Contents::default();
         let summary = read(log, new, &mut contents, |blocks| bar.set_position(blocks * 512))?;
         bar.finish_and_clear();
         contents.epoch_us = summary.epoch_us;
-        let files = log.files.clone();
-        let proof = Proof::of(&summary, None);
-        Ok(Self {
-            name: log.name.clone(),
-            format: None,
-            files,
-            bytes_on_card: log.bytes(),
-            summary,
-            contents,
-            proof,
-            gone_before: None,
-        })
-    }
-
-    /// Whether anything was lost or damaged.
-    pub fn is_lossy(&self) -> bool {
-        let blocks = &self.summary.blocks;
-        self.summary.gaps > 0 || blocks.damaged > 0 || blocks.misplaced > 0 || self.contents.lost > 0
+        Ok(Self { ending: Ending::of(log, summary), format: None, bytes_on_card: log.bytes(), contents })
     }
 
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark. A recording
     /// of another format has nothing that could prove its end.
     pub fn is_proved(&self) -> bool {
-        let summary = &self.summary;
-        if self.format.is_some() {
-            return !self.is_lossy();
+        self.unproved().is_empty()
+    }
+
+    /// Why it is not, as parts of sentences.
+    pub fn unproved(&self) -> Vec<String> {
+        match (self.format, self.ending.summary.gaps) {
+            (None, _) => self.ending.unproved(),
+            (Some(_), 0) => Vec::new(),
+            (Some(_), gaps) => vec![format!("{}; hums check says where", count(gaps, "damaged place"))],
         }
-        let newer = has_newer(summary) && !self.proof.is_whole();
-        !self.is_lossy() && self.proof.holds() && summary.marks.wrong == 0 && !newer
     }
 
     /// UTC at this time, where it is known.
@@ -482,17 +457,12 @@ impl Overview {
 
     /// Bytes that the log takes: its sectors, without what is set aside.
     pub fn log_bytes(&self) -> u64 {
-        self.summary.blocks.sectors * 512
+        self.ending.summary.blocks.sectors * 512
     }
 
     /// How many times smaller than the same frames as a tlog.
     pub fn ratio(&self) -> f64 {
         self.contents.tlog_bytes() as f64 / self.log_bytes().max(1) as f64
-    }
-
-    /// How the session ended, as a part of a sentence.
-    pub fn ending(&self) -> String {
-        self.proof.words(&self.summary)
     }
 
     /// Whether a group could not be read because this program is too old for it.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
-use crate::ending::{BlocksJson, EndJson, behind_words, has_newer};
+use crate::ending::{BlocksJson, EndJson, behind_words};
 use crate::followed::Followed;
 use crate::info::json::{ImageJson, images_json};
 use crate::logs::{self, find::Image};
@@ -37,7 +37,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         json.ok &= log.ok;
         worst = worst.max(log.verdict);
         if !args.json {
-            output::line(&format!("Session {} ({})", log.name, overview.files.join(", ")))?;
+            output::line(&format!("Session {} ({})", log.name, overview.ending.files.join(", ")))?;
             print(&log.checks)?;
         }
         json.logs.push(log);
@@ -136,8 +136,9 @@ fn file_system(image: &Image) -> Check {
 
 impl LogJson {
     fn new(log: &Overview) -> Self {
-        let (summary, contents) = (&log.summary, &log.contents);
-        let blocks = summary.blocks;
+        let (ending, contents) = (&log.ending, &log.contents);
+        let summary = &ending.summary;
+        let (blocks, lost) = (summary.blocks, summary.marks.lost);
         let check = |name, checked, failed, detail: String| Check { name, checked, failed, detail };
         let unverified: u64 = contents
             .messages
@@ -174,51 +175,54 @@ impl LogJson {
                 contents.times_fell + summary.times_fell,
                 String::new(),
             ),
-            check("recorder losses", contents.frames() + contents.lost, contents.lost, losses_detail(log)),
+            check("recorder losses", contents.frames() + lost, lost, losses_detail(log)),
         ];
         checks.extend(ends(log));
-        let ok = checks.iter().all(|check| check.failed == 0) && log.is_proved();
-        let end = EndJson::new(log.proof, summary);
+        let ok = checks.iter().all(|check| check.failed == 0) && ending.is_proved();
+        let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
-        let verdict = match (ok, log.proof.is_whole()) {
+        let verdict = match (ok, ending.proof.is_whole()) {
             (true, true) => Verdict::Holds,
             (true, false) => Verdict::ToMark,
             (false, _) => Verdict::NotProved,
         };
-        Self { name: log.name.clone(), ok, closed: summary.closed, end, blocks, checks, verdict }
+        Self { name: ending.name.clone(), ok, closed: summary.closed, end, blocks, checks, verdict }
     }
 }
 
 /// What the log says of its end and of its place.
-fn ends(log: &Overview) -> [Check; 4] {
-    let summary = &log.summary;
+fn ends(log: &Overview) -> [Check; 5] {
+    let ending = &log.ending;
+    let summary = &ending.summary;
     let blocks = &summary.blocks;
     let check = |name, checked, failed, detail: String| Check { name, checked, failed, detail };
-    let newer = has_newer(summary) && !log.proof.is_whole();
+    let newer = ending.has_newer();
     let behind = match (behind_words(&summary.behind), newer) {
         (words, _) if words.is_empty() => "nothing behind its last sector".to_owned(),
         (words, false) => format!("behind its last sector: {words}"),
         (words, true) => format!("behind its last sector: {words}; some are of a session that began later"),
     };
-    let gone = log.gone_before.map_or_else(String::new, |number| {
+    let gone = ending.gone_before.map_or_else(String::new, |number| {
         format!("session {number:05}, which was recorded just before it, is not there")
     });
     let twice = "sectors that are there twice, or lie where others belong".to_owned();
     let twice = if blocks.misplaced > 0 { twice } else { String::new() };
+    let strange = ending.strange();
     [
         check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, twice),
+        check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
-        check("end", 1, u64::from(!log.proof.holds() || newer), format!("{}; {behind}", log.ending())),
-        check("session before", 1, u64::from(log.gone_before.is_some()), gone),
+        check("end", 1, u64::from(!ending.proof.holds() || newer), format!("{}; {behind}", ending.words())),
+        check("session before", 1, u64::from(ending.gone_before.is_some()), gone),
     ]
 }
 
 fn gaps_detail(log: &Overview) -> String {
-    let not_kept = match log.summary.not_kept {
+    let not_kept = match log.ending.summary.not_kept {
         0 => String::new(),
         times => format!("not recorded while disarmed: {}; ", count(times, "time")),
     };
-    match log.summary.gaps {
+    match log.ending.summary.gaps {
         0 => not_kept,
         gaps => format!("{}; {not_kept}", count(gaps, "gap")),
     }
@@ -227,7 +231,7 @@ fn gaps_detail(log: &Overview) -> String {
 }
 
 fn newer(log: &Overview) -> String {
-    let other = log.summary.blocks.other_version;
+    let other = log.ending.summary.blocks.other_version;
     if other > 0 {
         return format!("{other} sectors are of a newer format version: take a newer hums");
     }

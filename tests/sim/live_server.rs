@@ -96,16 +96,17 @@ fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
 }
 
 #[test]
-fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_ends_at_once() {
+fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_ends_the_wait() {
     // Nobody listens there.
     let url = format!("http://127.0.0.1:{}", free_port());
     let recording = own("px4_hil_quad_low.tlog");
     let input = ["--input", recording.to_str().unwrap(), "--influx", &url];
-    let mut live = Live::start(&input);
+    let live = Live::start(&input);
     live.program.signal("TERM");
     std::thread::sleep(Duration::from_millis(500));
-    live.program.signal("TERM");
-    assert_eq!(live.program.end(Duration::from_secs(5)), Some(130), "the second one");
+    let (code, words) = live.terminate(Duration::from_secs(5));
+    assert_eq!(code, Some(3), "the second one: {words}");
+    assert!(words.contains("not in the database") && words.contains(" wait in "), "{words}");
 
     let live = Live::start(&input);
     let (code, words) = live.terminate(Duration::from_secs(40));

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::BLOCKS_MIN;
 
-use crate::files::{lock_in_place, make_in_place};
+use crate::files::{is_seekable, lock_in_place, make_in_place};
 use crate::outcome::usage;
 
 /// The size of an image that is made, in MiB, unless `--card-size` says otherwise.
@@ -46,6 +46,9 @@ fn open(path: &Path, about: &Metadata, size_mib: Option<u64>) -> Result<File> {
     let shown = path.display();
     if about.is_dir() {
         bail!("{shown}: is a directory; --sd takes an image file");
+    }
+    if !is_seekable(about) {
+        bail!("{shown}: is a pipe, a socket, a terminal or the like; --sd takes an image file");
     }
     if about.permissions().readonly() {
         bail!("{shown}: is read-only; make it writable or name another image");

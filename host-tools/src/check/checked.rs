@@ -1,6 +1,7 @@
 //! A recording and what came of it.
 
 use super::judged::Judged;
+use crate::ending::Ending;
 use crate::outcome::Outcome;
 use crate::source::recording::Format;
 
@@ -12,13 +13,23 @@ pub struct Checked {
     pub format: Format,
     /// What came of it.
     pub judged: Judged,
+    /// Whether it is whole, of a log of ours.
+    pub ending: Option<Ending>,
 }
 
 impl Checked {
     /// How the run ended for this one.
     pub(super) fn outcome(&self) -> Outcome {
-        let damaged = self.judged.damages > 0 || (self.format == Format::Hums && self.judged.losses > 0);
         let wrong = !self.judged.problems.is_empty();
-        Outcome::lossy(damaged).and(if wrong { Outcome::Findings } else { Outcome::Done })
+        Outcome::lossy(self.judged.damages > 0 || !self.unproved().is_empty()).and(if wrong {
+            Outcome::Findings
+        } else {
+            Outcome::Done
+        })
+    }
+
+    /// Why a log of ours is not called whole, as parts of sentences.
+    pub fn unproved(&self) -> Vec<String> {
+        self.ending.as_ref().map_or_else(Vec::new, Ending::unproved)
     }
 }

@@ -25,6 +25,7 @@ struct LogJson<'a> {
     format: &'static str,
     verdict: &'static str,
     damaged: bool,
+    not_proved: Vec<String>,
     judged_by: &'static str,
     vehicle: Option<VehicleJson>,
     start_utc: Option<String>,
@@ -130,6 +131,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         format: checked.format.name(),
         verdict: judged.worst().map_or("unknown", Level::name),
         damaged: judged.damages > 0,
+        not_proved: checked.unproved(),
         judged_by: match judged.by {
             JudgedBy::Board => "board",
             JudgedBy::Here => "hums",

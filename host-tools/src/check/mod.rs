@@ -21,6 +21,8 @@ pub use overview::overview;
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
+use crate::ending::Ending;
+use crate::followed::{Followed, Logged};
 use crate::outcome::Outcome;
 use crate::output;
 use crate::progress;
@@ -43,36 +45,41 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1;
     let (bar, mut table, mut failed) = (progress::logs(found.places.len()), Table::default(), 0_usize);
+    let mut followed = Followed::default();
+    let mut done = |Told { name, checked }: Told| match checked {
+        Ok(checked) => {
+            outcome = outcome.and(checked.outcome());
+            let text = if args.json {
+                json::line(&checked)?
+            } else if many {
+                table.add(&checked);
+                text::line(&checked)
+            } else {
+                text::screen(&checked)
+            };
+            bar.suspend(|| {
+                checked.unproved().iter().for_each(|why| eprintln!("hums: {name}: {why}"));
+                output::line(text.trim_end())
+            })
+        }
+        Err(error) => {
+            failed += 1;
+            if args.json {
+                return bar.suspend(|| output::line(&json::error(&name, &error)));
+            }
+            bar.suspend(|| eprintln!("hums: {error:#}"));
+            Ok(())
+        }
+    };
     side_by_side(
         &found.places,
-        |place| (place.title.clone(), judged(place, &limits, Heard::Somewhere, !many)),
-        |(name, checked)| {
+        |place| Told { name: place.title.clone(), checked: judged(place, &limits, Heard::Somewhere, !many) },
+        |told| {
             bar.inc(1);
-            match checked {
-                Ok(checked) => {
-                    outcome = outcome.and(checked.outcome());
-                    let text = if args.json {
-                        json::line(&checked)?
-                    } else if many {
-                        table.add(&checked);
-                        text::line(&checked)
-                    } else {
-                        text::screen(&checked)
-                    };
-                    bar.suspend(|| output::line(text.trim_end()))
-                }
-                Err(error) => {
-                    failed += 1;
-                    if args.json {
-                        bar.suspend(|| output::line(&json::error(&name, &error)))
-                    } else {
-                        bar.suspend(|| eprintln!("hums: {error:#}"));
-                        Ok(())
-                    }
-                }
-            }
+            followed.push(told).into_iter().try_for_each(&mut done)
         },
     )?;
+    followed.finish().try_for_each(&mut done)?;
     bar.finish_and_clear();
     if many && !args.json {
         output::line(&table.text(failed))?;
@@ -84,12 +91,25 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     }
 }
 
+/// A recording that was judged, or why it was not.
+struct Told {
+    name: String,
+    checked: Result<Checked>,
+}
+
+impl Logged for Told {
+    fn ending(&mut self) -> Option<&mut Ending> {
+        self.checked.as_mut().ok()?.ending.as_mut()
+    }
+}
+
 /// Judges one recording, as `hums check` does.
 pub fn recording(place: &Place, limits: &Limits, heard: Heard) -> Result<Checked> {
     judged(place, limits, heard, false)
 }
 
 fn judged(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Checked> {
-    let (format, judged, _) = overview::judge(place, limits, heard, shows)?;
-    Ok(Checked { name: place.title.clone(), format, judged })
+    let (format, judged, summary) = overview::judge(place, limits, heard, shows)?;
+    let ending = summary.ending.map(|ending| Ending { name: place.name.clone(), ..ending });
+    Ok(Checked { name: place.title.clone(), format, judged, ending })
 }

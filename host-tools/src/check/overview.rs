@@ -9,6 +9,8 @@ use hums_core::Monitor;
 
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
+use crate::ending::Ending;
+use crate::logs::reader::Summary as Read;
 use crate::names::counter_name;
 use crate::progress;
 use crate::source::item::{Gap, Summary, Want};
@@ -47,6 +49,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     let limits = Limits::default();
     if let Some(log) = place.own() {
         let mut overview = Overview::of(log)?;
+        overview.ending.name.clone_from(&place.name);
         if !overview.contents.is_checked() && overview.contents.frames() > 0 {
             let (_, judged, _) = judge(place, &limits, Heard::Somewhere, true)?;
             fill(&mut overview.contents, judged);
@@ -58,20 +61,23 @@ pub fn overview(place: &Place) -> Result<Overview> {
     contents.epoch_us = judged.epochs.whole();
     count(&mut contents, format, summary);
     contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
-    let mut overview = Overview {
-        name: place.name.clone(),
-        files: vec![place.title.clone()],
-        bytes_on_card: place.bytes(),
-        format: Some(format),
-        ..Overview::default()
+    let (first, last) = judged.span.unzip();
+    let summary = Read {
+        epoch_us: judged.epochs.whole(),
+        frames: contents.frames(),
+        gaps: judged.damages + judged.losses,
+        first,
+        last,
+        ..Read::default()
     };
-    overview.summary.epoch_us = judged.epochs.whole();
-    overview.summary.frames = contents.frames();
-    overview.summary.gaps = judged.damages + judged.losses;
-    (overview.summary.first, overview.summary.last) = judged.span.unzip();
+    let (name, files) = (place.name.clone(), vec![place.title.clone()]);
     fill(&mut contents, judged);
-    overview.contents = contents;
-    Ok(overview)
+    Ok(Overview {
+        ending: Ending { name, files, summary, ..Ending::default() },
+        format: Some(format),
+        bytes_on_card: place.bytes(),
+        contents,
+    })
 }
 
 /// Messages by their ids where they are MAVLink's, otherwise by their names.

@@ -53,8 +53,11 @@ pub fn line(checked: &Checked) -> String {
         }
     }
     let found = names.join(", ");
-    let what: Vec<&str> =
-        [found.as_str(), state(judged)].into_iter().filter(|words| !words.is_empty()).collect();
+    let state = match state(judged) {
+        "" if !checked.unproved().is_empty() => "not proved to be whole",
+        words => words,
+    };
+    let what: Vec<&str> = [found.as_str(), state].into_iter().filter(|words| !words.is_empty()).collect();
     let air = clock(flown(judged));
     format!("{level:<8}  {air:>8}  {}  {}", checked.name, what.join("; ")).trim_end().to_owned()
 }

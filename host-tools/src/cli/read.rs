@@ -20,7 +20,8 @@ it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl,
 OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
 No input is ever written over. What is there already is left as it is: if it is the same as what would be written, all is
-well; if not, the command fails. With --replace it is replaced, when all of the new one is there.
+well; if not, the command fails. With --replace it is replaced, when all of the new one is there, if hums made it of
+the same log.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
 /// `hums decode`
@@ -48,7 +49,7 @@ pub struct Decode {
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
-    /// Replace an output that is there already and has other content: a file of the same format, or tables of `hums decode`
+    /// Replace an output that is there already and has other content, where hums made it of the same log
     #[arg(long)]
     pub replace: bool,
 }
@@ -134,7 +135,7 @@ pub struct Report {
     /// Only this session, by the name that `hums info` gives
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
-    /// Replace a page that is there already and has other content
+    /// Replace a page that is there already and has other content, where it is one of the same log
     #[arg(long)]
     pub replace: bool,
 }
@@ -153,7 +154,7 @@ pub struct Pack {
     /// The log file to write
     #[arg(short, long, value_name = "LOG")]
     pub output: PathBuf,
-    /// Replace a log that is there already and has other content
+    /// Replace a log that is there already and has other content, where it was packed of the same recording
     #[arg(long)]
     pub replace: bool,
 }

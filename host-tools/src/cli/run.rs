@@ -18,7 +18,7 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
 
 Raw bytes carry no times: they come as on a line at 115,200 baud. --sd is kept: a second run adds a session to it.
-A file of --gs or --tap must be new, unless --replace is given.";
+A file of --gs or --tap must be new, or empty.";
 
 /// What `sim` and `emulate` share.
 #[derive(Args, Clone, Debug)]
@@ -47,9 +47,6 @@ pub struct Run {
     /// Print the result as one JSON object
     #[arg(long)]
     pub json: bool,
-    /// Replace files of --gs and --tap that are there already
-    #[arg(long)]
-    pub replace: bool,
     /// What to put in the way
     #[command(flatten)]
     pub faults: FaultFlags,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hums_blackbox::{Entry, Gap, Record};
+use hums_blackbox::{Entry, Gap};
 use hums_core::time::Instant;
 use hums_link::{self as link, Check, observe};
 
@@ -13,10 +13,10 @@ use super::record::{gap_row, rows};
 use super::reference::Observed;
 use super::row::Row;
 use super::table::Table;
-use super::text::{push_csv_cells, push_hex, push_integer, push_json_object, push_json_text};
+use super::text::{push_csv_cells, push_integer, push_json_object, push_json_text};
 use super::unknown::UnknownLines;
+use crate::hex::push_hex;
 use crate::logs::reader::Collect;
-use crate::loss::lost;
 use crate::mavlink::frame::{Frame, Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::names::message_name;
@@ -46,8 +46,6 @@ pub struct Collected<'a> {
     pub frames: u64,
     /// Records written.
     pub records: u64,
-    /// What the log says was lost while recording.
-    pub losses: u64,
     /// Bytes in `tables`, and what the tables themselves take.
     tables_bytes: usize,
 }
@@ -70,7 +68,6 @@ impl<'a> Collected<'a> {
             observed: Vec::new(),
             frames: 0,
             records: 0,
-            losses: 0,
             tables_bytes: 0,
         }
     }
@@ -216,9 +213,6 @@ impl<'a> Collected<'a> {
 impl Collect for Collected<'_> {
     fn entry(&mut self, entry: &Entry<'_>) {
         let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = *entry;
-        if let Entry::Record { record: Record::Loss(loss), .. } = entry {
-            self.losses += lost(loss);
-        }
         let wanted = self.context.selection.has_time(at, self.context.epoch_us);
         match entry {
             Entry::Frame { bytes, verified, .. } => self.frame(at, bytes, *verified, wanted),

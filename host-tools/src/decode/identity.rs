@@ -7,6 +7,7 @@ use hums_blackbox::{Entry, Gap, Record};
 use hums_core::observation::Observation;
 use hums_link::{Check, Frame, observe};
 
+use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, read};
 use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
@@ -33,7 +34,7 @@ impl Identity {
         let summary = read(log, Known::default, &mut known, |_| ())?;
         let system = known.recorded.map(|vehicle| vehicle.system).or(known.heard);
         let uid = known.recorded.map(|vehicle| vehicle.uid).filter(|uid| *uid != 0).or(known.uid);
-        let board = known.board.map(|uid| uid.map(|byte| format!("{byte:02x}")).concat());
+        let board = known.board.map(|uid| hex(&uid));
         let vehicle = match (uid, board, system) {
             (Some(uid), _, _) => format!("uid-{uid:016x}"),
             (None, Some(board), _) => format!("box-{board}"),

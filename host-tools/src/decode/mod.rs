@@ -51,11 +51,12 @@ use anyhow::{Result, bail};
 use hums_core::time::Instant;
 
 use crate::cli;
-use crate::ending::has_newer;
-use crate::files::{Folder, Inputs, appended};
+use crate::ending::Ending;
+use crate::files::{Folder, Inputs, appended, says_directory};
+use crate::followed::{Followed, Logged};
 use crate::logs::reader::{self, Summary};
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
-use crate::plural::{count, noun};
+use crate::plural::count;
 use crate::source::recording::{Place, find};
 use crate::{output, progress};
 use collect::Collected;
@@ -98,27 +99,32 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs: works.len() };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
-    let mut kept = Kept::default();
+    let (mut kept, mut any_kept) = (Kept::default(), false);
+    let mut followed = Followed::default();
+    let mut tell = |done: Done| {
+        outcome = outcome.and(done.outcome());
+        written |= done.written;
+        done.tell()
+    };
     side_by_side(
         &works,
         |work| task.decode(work, &works, &taken),
         |done| {
-            let Some(done) = kept.pass(done)? else {
-                written = true;
-                return Ok(());
-            };
-            done.remarks.iter().for_each(|remark| eprintln!("hums: {remark}"));
-            outcome = outcome.and(done.outcome);
-            written |= done.written;
-            done.lines.iter().try_for_each(|line| output::line(line))
+            let done = kept.pass(done)?;
+            any_kept |= done.is_none();
+            done.map_or_else(Vec::new, |done| followed.push(done)).into_iter().try_for_each(&mut tell)
         },
     )?;
+    followed.finish().try_for_each(&mut tell)?;
     kept.end()?;
-    if !written {
+    if !written && !any_kept {
         bail!("nothing is within --from and --to, so nothing was written");
     }
     Ok(outcome)
 }
+
+/// Endings of the files that are made: no folder is made of such a name by mistake.
+const FILE_NAMES: [&str; 5] = ["tlog", "jsonl", "lp", "csv", "parquet"];
 
 /// Whether the output is standard output; an error where what is asked for does not go there, or into the file that it
 /// names.
@@ -141,6 +147,15 @@ fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<boo
             args.output.display()
         )));
     }
+    let extension = args.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    let is_file_name = extension.is_some_and(|extension| FILE_NAMES.contains(&extension.as_str()));
+    if !one_file && logs > 0 && is_file_name && !says_directory(&args.output) {
+        return Err(usage_error(format!(
+            "-o {0}: is the name of a file, but tables, several formats and several logs need a directory; name one, or \
+             say {0}/",
+            args.output.display()
+        )));
+    }
     Ok(standard_output)
 }
 
@@ -156,13 +171,45 @@ struct Task<'a> {
 
 /// A log's outcome, to be told in the logs' order.
 struct Done {
+    name: String,
     outcome: Outcome,
+    /// Whether it is whole, of a log of ours.
+    ending: Option<Ending>,
     /// Whether there was anything to write.
     written: bool,
     /// What was written.
     lines: Vec<String>,
     /// What there is to say of it.
     remarks: Vec<String>,
+}
+
+impl Done {
+    /// Nothing was written of it, and nothing is said.
+    fn of(log: &Place) -> Self {
+        let (lines, remarks) = (Vec::new(), Vec::new());
+        Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, lines, remarks }
+    }
+
+    fn outcome(&self) -> Outcome {
+        let is_proved = self.ending.as_ref().is_none_or(Ending::is_proved);
+        self.outcome.and(Outcome::lossy(!is_proved))
+    }
+
+    fn tell(&self) -> Result<()> {
+        for remark in &self.remarks {
+            eprintln!("hums: {remark}");
+        }
+        for why in self.ending.iter().flat_map(Ending::unproved) {
+            eprintln!("hums: {}: {why}", self.name);
+        }
+        self.lines.iter().try_for_each(|line| output::line(line))
+    }
+}
+
+impl Logged for Done {
+    fn ending(&mut self) -> Option<&mut Ending> {
+        self.ending.as_mut()
+    }
 }
 
 impl Task<'_> {
@@ -174,12 +221,7 @@ impl Task<'_> {
             Named::Copy(of) => {
                 let of = all.get(*of).map_or("another log", |work| work.log.name.as_str());
                 let remark = format!("{}: is a copy of {of}, which is written once", log.name);
-                return Ok(Done {
-                    outcome: Outcome::Done,
-                    written: true,
-                    lines: Vec::new(),
-                    remarks: vec![remark],
-                });
+                return Ok(Done { written: true, remarks: vec![remark], ..Done::of(log) });
             }
         };
         let mut remarks = Vec::new();
@@ -217,21 +259,30 @@ impl Task<'_> {
         let (summary, writers) = read?;
         if writers.is_empty() && context.selection.has_limits() {
             remarks.push(nothing_of(log, &summary));
-            return Ok(Done { outcome: Outcome::Done, written: false, lines: Vec::new(), remarks });
+            return Ok(Done { remarks, ..Done::of(log) });
         }
         let written = writers.finish()?;
-        let before = remarks.len();
-        remarks.extend(losses_of(log, &summary, written.losses));
+        let mut outcome = Outcome::Done;
+        let ending =
+            log.own().map(|own| Ending { name: log.name.clone(), ..Ending::of(own, summary.clone()) });
+        if ending.is_none() && summary.gaps > 0 {
+            outcome = Outcome::Losses;
+            remarks.push(format!(
+                "{}: {}; hums check says where",
+                log.name,
+                count(summary.gaps, "damaged place")
+            ));
+        }
         if written.rows_left_out > 0 {
             remarks.push(format!(
                 "{}: {} left out: the names of its tables take more room than any autopilot's",
                 log.name,
                 count(written.rows_left_out, "row")
             ));
+            outcome = Outcome::Losses;
         }
-        let lossy = remarks.len() > before;
         let lines = if self.standard_output { Vec::new() } else { written.lines };
-        Ok(Done { outcome: Outcome::lossy(lossy), written: true, lines, remarks })
+        Ok(Done { outcome, ending, written: true, lines, remarks, ..Done::of(log) })
     }
 
     /// What must be known of a log before its first byte is written.
@@ -241,6 +292,7 @@ impl Task<'_> {
             selection: self.selection.clone(),
             inputs: self.inputs.clone(),
             stamp: work.traits.stamp(),
+            of: work.traits.identity(work.log),
             ..Context::default()
         };
         let Some(log) = work.log.own() else {
@@ -295,7 +347,7 @@ impl Task<'_> {
         let mut writers = Writers::new(context, destination, parquet.map(Path::to_owned))?;
         let summary = match place.own() {
             Some(log) => {
-                let bar = progress::bar(log);
+                let bar = progress::bytes(Some(log.bytes()), &log.name);
                 let new = || Collected::new(context);
                 let summary = reader::read(log, new, &mut writers, |blocks| bar.set_position(blocks * 512))?;
                 bar.finish_and_clear();
@@ -305,32 +357,6 @@ impl Task<'_> {
         };
         Ok((summary, writers))
     }
-}
-
-/// What is missing of a log, as sentences: none where it is all there. `losses` is what its recorder has lost.
-fn losses_of(log: &Place, summary: &Summary, losses: u64) -> Vec<String> {
-    let mut remarks = Vec::new();
-    if summary.gaps > 0 || summary.blocks.damaged > 0 || losses > 0 {
-        remarks.push(format!(
-            "{}: {}, {} missing, {}, {} or {} lost while recording",
-            log.name,
-            count(summary.gaps, "gap"),
-            count(summary.frames_missing, "frame"),
-            count(summary.blocks.damaged, "damaged sector"),
-            count(losses, "frame"),
-            noun(losses, "record")
-        ));
-    }
-    // Leftovers of earlier sessions are usual in a card's files; a later session is another log, joined to this one.
-    if has_newer(summary) {
-        remarks.push(format!(
-            "{}: {} of other sessions, of which one began later, are not decoded: logs were joined into one file; \
-             give each by itself",
-            log.name,
-            count(summary.blocks.stale, "sector")
-        ));
-    }
-    remarks
 }
 
 /// Says that nothing of a log is in the time that was asked for, and what time it has.

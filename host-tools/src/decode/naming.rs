@@ -6,12 +6,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use hums_blackbox::{Entry, GroupDecoder, Record, Step};
 use hums_recorder::LogName;
 use sha2::{Digest as _, Sha256};
 
 use crate::files::{Folder, add_ends, digest, short};
+use crate::hex::hex;
 use crate::logs::Log;
+use crate::logs::board::board_of;
 use crate::logs::groups::Groups;
 use crate::source::recording::Place;
 
@@ -56,19 +57,34 @@ impl Traits {
     /// The name of the log's files.
     pub fn name(&self, place: &Place) -> String {
         let Some(log) = place.own() else {
-            let named = place.path().and_then(|path| of_recording(path).ok());
-            return named.unwrap_or_else(|| place.name.clone());
+            return self
+                .identity(place)
+                .map_or_else(|| place.name.clone(), |of| format!("{}-{of}", file_name(place)));
         };
         let mut name = base(log);
         if let Some(board) = self.board {
             name.push_str("-box");
             name.push_str(&hex(&board));
         }
-        if let Some(session) = self.session {
-            name.push_str("-s");
-            name.push_str(&hex(&session.to_be_bytes()));
+        if let Some(of) = self.identity(place) {
+            name.push('-');
+            name.push_str(&of);
         }
         name
+    }
+
+    /// What the names of its files end with: the session of a log of ours, `s1a2b3c4d`; of another recording a number made
+    /// of its content, `r1a2b3c4d`.
+    pub fn identity(&self, place: &Place) -> Option<String> {
+        match (place.own(), place.path()) {
+            (Some(_), _) => self.session.map(|session| format!("s{session:08x}")),
+            (None, Some(path)) => {
+                let mut hash = Sha256::new();
+                add_ends(&mut hash, path).ok()?;
+                Some(format!("r{:08x}", short(hash)))
+            }
+            (None, None) => None,
+        }
     }
 
     /// A line for the stamp of a folder that is made of the log.
@@ -141,12 +157,10 @@ fn ends_with_identity(stem: &str) -> bool {
     digits.len() == 8 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
 
-/// The name of files that are made of a recording, which is no log of ours: its own name, and what is in it.
-pub fn of_recording(path: &Path) -> Result<String> {
-    let name = path.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy());
-    let mut hash = Sha256::new();
-    add_ends(&mut hash, path).with_context(|| format!("{}: cannot be read", path.display()))?;
-    Ok(format!("{name}-r{}", hex(&short(hash).to_be_bytes())))
+/// The name of a recording's file.
+fn file_name(place: &Place) -> String {
+    let name = place.path().and_then(Path::file_name);
+    name.map_or_else(|| "recording".to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Of all bytes of a file.
@@ -162,24 +176,6 @@ fn base(log: &Log) -> String {
     let stem = path.file_stem().map_or_else(|| "log".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let segment = LogName::from_short(stem.to_ascii_uppercase().as_bytes(), b"HUM");
     segment.map_or(stem, |segment| format!("{:05}", segment.session))
-}
-
-/// The board's unique id, by the record of its start, which is the first of a session.
-fn board_of(first: &Step) -> Option<[u8; 12]> {
-    let mut decoder = Box::new(GroupDecoder::new());
-    decoder.push(&first.header, &first.sector).ok()?;
-    while let Some(Ok(entry)) = decoder.next_entry() {
-        if let Entry::Record { record: Record::Boot(boot), .. } = entry {
-            return Some(boot.uid).filter(|uid| *uid != [0; 12]);
-        }
-    }
-    None
-}
-
-fn hex(bytes: &[u8]) -> String {
-    let mut text = Vec::new();
-    super::text::push_hex(&mut text, bytes);
-    String::from_utf8_lossy(&text).into_owned()
 }
 
 #[cfg(test)]

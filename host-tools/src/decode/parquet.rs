@@ -156,7 +156,7 @@ impl Batches {
             opaque.ids.push(frame.id);
             opaque.sequences.push(frame.sequence);
             let mut digits = Vec::new();
-            super::text::push_hex(&mut digits, frame.payload);
+            crate::hex::push_hex(&mut digits, frame.payload);
             opaque.payloads.push(&digits);
         }
     }

@@ -2,7 +2,8 @@
 
 use hums_core::time::Instant;
 
-use super::text::{push_csv_number, push_csv_text, push_hex, push_integer, push_json_number, push_json_text};
+use super::text::{push_csv_number, push_csv_text, push_integer, push_json_number, push_json_text};
+use crate::hex::push_hex;
 use crate::mavlink::values::Scalar;
 use crate::utc::push_seconds;
 

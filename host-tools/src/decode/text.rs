@@ -154,15 +154,6 @@ pub fn push_json_text(out: &mut Vec<u8>, text: &[u8]) {
     let _ = serde_json::to_writer(out, &String::from_utf8_lossy(text));
 }
 
-/// Bytes as hexadecimal digits.
-pub fn push_hex(out: &mut Vec<u8>, bytes: &[u8]) {
-    const DIGITS: &[u8; 16] = b"0123456789abcdef";
-    for byte in bytes {
-        out.push(DIGITS[usize::from(byte >> 4)]);
-        out.push(DIGITS[usize::from(byte & 15)]);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

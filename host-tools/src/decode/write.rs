@@ -15,7 +15,7 @@ use super::record::gap_row;
 use super::reference::Reference;
 use super::tables::{Tables, UNKNOWN_TABLES_MAX};
 use super::thesis::Thesis;
-use crate::files::{Folder, Inputs, Kind, Output, appended, make_parent, settle};
+use crate::files::{Folder, Kind, Origin, Output, appended, make_parent, settle};
 use crate::logs::reader::Deliver;
 use crate::made;
 use crate::output::Stdout;
@@ -25,6 +25,7 @@ use crate::plural::count;
 const GAPS: Kind = Kind {
     words: "a table of gaps of hums decode",
     is: |start| start.strip_prefix(gaps_header().as_bytes()).is_some_and(|rest| rest.starts_with(b"\n")),
+    origin: Origin::Ours,
 };
 
 /// A single file, open.
@@ -34,19 +35,19 @@ enum Single {
 }
 
 impl Single {
-    fn open(destination: &Destination, extension: &str, inputs: &Inputs, kind: &Kind) -> Result<Self> {
+    fn open(destination: &Destination, extension: &str, context: &Context, kind: &Kind) -> Result<Self> {
         match destination.path(extension) {
             None => {
-                inputs.refuse_standard_output()?;
+                context.inputs.refuse_standard_output()?;
                 Ok(Self::Standard(BufWriter::new(Stdout::new())))
             }
-            Some(path) => Self::file(&path, inputs, kind),
+            Some(path) => Self::file(&path, context, kind),
         }
     }
 
-    fn file(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<Self> {
+    fn file(path: &Path, context: &Context, kind: &Kind) -> Result<Self> {
         make_parent(path)?;
-        Ok(Self::File(Output::create(path, inputs, kind)?))
+        Ok(Self::File(Output::create(path, &context.inputs, kind, context.of.as_deref())?))
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
@@ -76,8 +77,6 @@ impl Single {
 pub struct Written {
     /// For people: each file with what is in it.
     pub lines: Vec<String>,
-    /// What the log says was lost while recording.
-    pub losses: u64,
     /// Rows of tables for whose names there was no room.
     pub rows_left_out: u64,
 }
@@ -98,7 +97,6 @@ pub struct Writers<'a> {
     records: u64,
     /// JSON's.
     objects: u64,
-    losses: u64,
     rows_left_out: u64,
 }
 
@@ -136,7 +134,7 @@ impl<'a> Writers<'a> {
     pub fn new(context: &'a Context, destination: Destination, parquet: Option<PathBuf>) -> Result<Self> {
         let (formats, inputs) = (context.formats, &context.inputs);
         let open = |wanted: bool, extension, kind| {
-            wanted.then(|| Single::open(&destination, extension, inputs, kind)).transpose()
+            wanted.then(|| Single::open(&destination, extension, context, kind)).transpose()
         };
         let tlog = open(formats.tlog, "tlog", &made::TLOG)?;
         let jsonl = open(formats.jsonl, "jsonl", &made::JSONL)?;
@@ -174,7 +172,6 @@ impl<'a> Writers<'a> {
             frames: 0,
             records: 0,
             objects: 0,
-            losses: 0,
             rows_left_out: 0,
         })
     }
@@ -187,7 +184,6 @@ impl<'a> Writers<'a> {
     fn put(&mut self, collected: Collected<'_>) -> Result<()> {
         self.frames += collected.frames;
         self.records += collected.records;
-        self.losses += collected.losses;
         self.objects += lines_of(&collected.jsonl);
         for (file, bytes) in [(&mut self.tlog, &collected.tlog), (&mut self.jsonl, &collected.jsonl)] {
             if let Some(file) = file {
@@ -223,7 +219,7 @@ impl<'a> Writers<'a> {
         let path = appended(&path, "gaps.csv");
         let file = match &mut self.gaps {
             Some(file) => file,
-            none => none.insert(Single::file(&path, &self.context.inputs, &GAPS)?),
+            none => none.insert(Single::file(&path, self.context, &GAPS)?),
         };
         let mut line = Vec::new();
         if first {
@@ -288,7 +284,7 @@ impl<'a> Writers<'a> {
             let (dir, tables) = parquet.finish()?;
             lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
         }
-        Ok(Written { lines, losses: self.losses, rows_left_out: self.rows_left_out })
+        Ok(Written { lines, rows_left_out: self.rows_left_out })
     }
 
     /// Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.

@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::files::{Inputs, Kind, Output, digest, remove_if_empty, settle};
+use crate::files::{Inputs, Kind, Origin, Output, digest, remove_if_empty, settle};
+use crate::hex::hex;
 
 /// The file that says what a demo made.
 const MARK: &str = ".hums-demo";
@@ -27,7 +28,11 @@ pub(super) const REPORT: &str = "report.html";
 pub(super) const DECODED: &str = "decoded";
 
 /// The mark: a demo replaces it.
-const KIND: Kind = Kind { words: "the mark of a demo", is: |start| start.starts_with(HEAD.as_bytes()) };
+const KIND: Kind = Kind {
+    words: "the mark of a demo",
+    is: |start| start.starts_with(HEAD.as_bytes()),
+    origin: Origin::Ours,
+};
 
 /// A demo's folder.
 pub(super) struct Place<'a> {
@@ -64,7 +69,8 @@ impl<'a> Place<'a> {
         let single = [CARD, GROUND_STATION, REPORT].map(|name| self.dir.join(name));
         let decoded = files(&self.dir.join(DECODED))?;
         let made = single.into_iter().filter(|path| path.is_file()).chain(&decoded - &self.others);
-        let mut mark = Output::create(&self.dir.join(MARK), &self.inputs.clone().replacing(true), &KIND)?;
+        let mut mark =
+            Output::create(&self.dir.join(MARK), &self.inputs.clone().replacing(true), &KIND, None)?;
         let mut text = HEAD.to_owned();
         for path in made {
             let Some(name) = path.strip_prefix(self.dir).ok().and_then(Path::to_str) else { continue };
@@ -150,5 +156,5 @@ fn files(folder: &Path) -> Result<BTreeSet<PathBuf>> {
 /// The SHA-256 of a file, as hexadecimal digits.
 fn hash(path: &Path) -> Result<String> {
     let digest = digest(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-    Ok(digest.map(|byte| format!("{byte:02x}")).concat())
+    Ok(hex(&digest))
 }

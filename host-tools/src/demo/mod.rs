@@ -140,7 +140,6 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         params: None,
         speed: None,
         json: false,
-        replace: false,
         faults: FaultFlags::default(),
     };
     let here = |why: &anyhow::Error| -> Result<Outcome> {

@@ -137,7 +137,7 @@ impl Folder {
     fn there(&self, name: &str, at: u64) -> Result<There> {
         let path = self.path.join(name);
         match There::open(&path, at) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Err(Differs(self.path.clone()).into()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Err(Differs::new(&self.path).into()),
             opened => opened.with_context(|| format!("{}: cannot be read", path.display())),
         }
     }
@@ -164,7 +164,7 @@ fn is_all_there(path: &Path, files: &BTreeMap<String, Arc<AtomicU64>>) -> Result
     if stamp.files.iter().eq(files.keys()) && files.iter().all(is_whole) {
         return Ok(());
     }
-    Err(Differs(path.to_owned()).into())
+    Err(Differs::new(path).into())
 }
 
 impl Part {
@@ -192,7 +192,7 @@ impl Part {
         if self.replaces {
             check_ours(path)?;
         } else if !Folder::is_free(path) {
-            return Err(Differs(path.to_owned()).into());
+            return Err(Differs::new(path).into());
         }
         // An open file keeps Windows from renaming its folder.
         self.stamp = None;

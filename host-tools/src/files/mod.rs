@@ -4,7 +4,7 @@
 //! is written.
 //!
 //! Two kinds of files are updated in place by design and are not made here: a simulated card's image (`--sd`) and the
-//! simulated board's flash (`--store`). A test in `host-tools/tests/cli/files.rs` holds every other file to this module.
+//! simulated board's flash (`--store`). A test in `host-tools/tests/cli/inputs.rs` holds every other file to this module.
 
 mod ends;
 mod folder;
@@ -21,11 +21,12 @@ pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
 pub use identity::FileId;
 pub use inputs::Inputs;
-pub use kind::Kind;
+pub use kind::{Kind, Origin};
 pub use output::Output;
 pub use part::{PART, is_part, lock_in_place, make_in_place};
 pub use paths::{
-    appended, cannot_write, inside, make_directory, make_parent, remove_if_empty, says_directory, settle,
+    appended, cannot_write, inside, is_seekable, make_directory, make_parent, remove_if_empty,
+    says_directory, settle,
 };
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::identity::without_links;
 use super::inputs::Inputs;
-use super::kind::Kind;
+use super::kind::{Found, Kind, Origin};
 use super::part::{lock, part_of, remove_stale, rename_new, sync_folder_of};
 use super::paths::{cannot_write, settle};
 use super::there::{Likeness, There, likeness};
@@ -46,7 +46,9 @@ struct Part {
     target: PathBuf,
     /// Of the file that it replaces; none where it replaces nothing.
     permissions: Option<Permissions>,
-    /// An earlier run may have begun it: it may replace what is its own beginning, and stays when it is dropped.
+    /// It may replace a file that is its own beginning: nothing of that is lost.
+    replaces_beginning: bool,
+    /// An earlier run may have begun it: it stays when it is dropped.
     resumed: bool,
 }
 
@@ -61,9 +63,10 @@ enum Place {
 }
 
 impl Output {
-    /// Begins a file, which is none of the inputs. Its folder must be there. `kind` is what the command makes.
-    pub fn create(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<Self> {
-        match Part::of(path, inputs, kind)? {
+    /// Begins a file, which is none of the inputs. Its folder must be there. `kind` is what the command makes, `of` the log
+    /// that it makes it of, where that has a name.
+    pub fn create(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Self> {
+        match Part::of(path, inputs, kind, of)? {
             Place::Free(part) => Self::begin(path, part),
             Place::Taken => {
                 let there =
@@ -77,8 +80,10 @@ impl Output {
     /// Refuses a file that is there with something in it: for what a run makes beside changing something else, where
     /// comparing would come too late.
     pub fn check_new(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<()> {
-        match Part::of(path, inputs, kind)? {
-            Place::Taken => Err(Differs(path.to_owned()).into()),
+        match Part::of(path, inputs, kind, None)? {
+            Place::Taken if matches!(kind.origin, Origin::Unknown) => Err(Differs::original(path).into()),
+            Place::Taken => Err(Differs::new(path).into()),
+            Place::Free(part) if part.replaces_beginning => Err(Differs::original(path).into()),
             Place::Free(_) | Place::Stream => Ok(()),
         }
     }
@@ -93,7 +98,13 @@ impl Output {
                 bail!("{}: is no regular file, and what was begun cannot go on in it", path.display());
             }
         }
-        let part = Part { path: part_of(&target)?, target, permissions: None, resumed: true };
+        let part = Part {
+            path: part_of(&target)?,
+            target,
+            permissions: None,
+            replaces_beginning: true,
+            resumed: true,
+        };
         if part.path.is_symlink() {
             fs::remove_file(&part.path).with_context(|| cannot_write(path))?;
         }
@@ -201,15 +212,16 @@ impl Drop for Output {
 
 impl Part {
     /// The part of a file that is to be written.
-    fn of(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<Place> {
+    fn of(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Place> {
         inputs.refuse(path)?;
         let target = without_links(path).with_context(|| cannot_write(path))?;
-        let part = |target: PathBuf, permissions| -> Result<Place> {
-            Ok(Place::Free(Self { path: part_of(&target)?, target, permissions, resumed: false }))
+        let part = |target: PathBuf, permissions, replaces_beginning| -> Result<Place> {
+            let path = part_of(&target)?;
+            Ok(Place::Free(Self { path, target, permissions, replaces_beginning, resumed: false }))
         };
         let about = match fs::metadata(path) {
             Ok(about) => about,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(target, None),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(target, None, false),
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
         check(path, &about)?;
@@ -220,12 +232,14 @@ impl Part {
             if !inputs.may_replace(path) {
                 return Ok(Place::Taken);
             }
-            check_kind(path, kind)?;
+            if check_kind(path, kind, of)? == Found::Kind {
+                return part(target, None, true);
+            }
         }
         if about.permissions().readonly() {
             bail!("{}: is read-only; make it writable or name another output", path.display());
         }
-        part(target, Some(about.permissions()))
+        part(target, Some(about.permissions()), false)
     }
 
     /// Gives it its name.
@@ -242,11 +256,14 @@ impl Part {
         let permissions = fs::metadata(&self.target)?.permissions();
         match likeness(&self.target, &self.path)? {
             Likeness::Equal => fs::remove_file(&self.path),
-            Likeness::Beginning if self.resumed => {
+            Likeness::Beginning if self.replaces_beginning => {
                 file.set_permissions(permissions)?;
                 fs::rename(&self.path, &self.target)
             }
-            _ => Err(io::Error::other(Differs(self.target.clone()))),
+            _ if self.replaces_beginning && !self.resumed => {
+                Err(io::Error::other(Differs::original(&self.target)))
+            }
+            _ => Err(io::Error::other(Differs::new(&self.target))),
         }
     }
 
@@ -271,9 +288,10 @@ fn check(path: &Path, about: &Metadata) -> Result<()> {
 }
 
 /// What is replaced is of the kind that the command makes: a slip of the finger is not enough to lose a card's image.
-fn check_kind(path: &Path, kind: &Kind) -> Result<()> {
-    if kind.has(path).with_context(|| format!("{}: cannot be read", path.display()))? {
-        return Ok(());
+fn check_kind(path: &Path, kind: &Kind, of: Option<&str>) -> Result<Found> {
+    let found = kind.found(path, of).with_context(|| format!("{}: cannot be read", path.display()))?;
+    if found != Found::Other {
+        return Ok(found);
     }
     bail!(
         "{}: is there already, and is not {}, so --replace does not replace it; name another output, or move it away",

@@ -20,16 +20,16 @@ fn names(dir: &Path) -> Vec<String> {
 }
 
 /// What this module's files are taken for.
-const ANY: Kind = Kind { words: "text", is: |start| start.is_ascii() };
+const ANY: Kind = Kind { words: "text", is: |start| start.is_ascii(), origin: Origin::Ours };
 
 fn create(path: &Path) -> anyhow::Result<Output> {
-    Output::create(path, &Inputs::none(), &ANY)
+    Output::create(path, &Inputs::none(), &ANY, None)
 }
 
 /// Writes it whole; the error's words where that fails.
 fn write(path: &Path, inputs: &Inputs, text: &str) -> Result<(), String> {
     let write = || -> anyhow::Result<()> {
-        let mut output = Output::create(path, inputs, &ANY)?;
+        let mut output = Output::create(path, inputs, &ANY, None)?;
         settle(output.write_all(text.as_bytes()), path)?;
         output.finish()
     };
@@ -41,7 +41,7 @@ fn a_file_is_the_old_one_until_the_new_one_is_whole() {
     let dir = furnished();
     let path = dir.path().join("old");
     let replacing = Inputs::none().replacing(true);
-    let mut output = Output::create(&path, &replacing, &ANY).expect("created");
+    let mut output = Output::create(&path, &replacing, &ANY, None).expect("created");
     output.write_all(&vec![b'x'; 100_000]).expect("written");
     assert_eq!(fs::read(&path).expect("there"), b"what was there");
     drop(output);
@@ -171,7 +171,7 @@ fn an_output_that_is_an_input_is_refused_in_every_spelling() {
     let inputs = Inputs::of([at("link"), at("nothing yet")]);
     for name in ["old", "link", "link of a link", "hard", "./old", "folder/../old", "dangling", "nothing yet"]
     {
-        let refused = Output::create(&at(name), &inputs, &ANY).expect_err(name).to_string();
+        let refused = Output::create(&at(name), &inputs, &ANY, None).expect_err(name).to_string();
         assert!(refused.contains("is an input of this command"), "{name}: {refused}");
     }
     assert_eq!(fs::read(at("old")).expect("there"), b"what was there");

@@ -1,7 +1,7 @@
 //! A file that is there already, compared with what would be written in its place.
 
-use std::fs::{self, File};
-use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::outcome::Differs;
@@ -38,46 +38,57 @@ impl There {
 
     /// Compares the next bytes; [`Differs`] inside the error where they are others.
     pub(super) fn compare(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self.next(bytes)? {
+            Likeness::Equal => Ok(()),
+            Likeness::Beginning | Likeness::Other => Err(io::Error::other(Differs::new(&self.path))),
+        }
+    }
+
+    /// How the next bytes of the file relate to these.
+    fn next(&mut self, bytes: &[u8]) -> io::Result<Likeness> {
         for bytes in bytes.chunks(BUFFER_BYTES) {
             let there = self.buffer.get_mut(..bytes.len()).unwrap_or_default();
-            match self.file.read_exact(there) {
-                Ok(()) if there == bytes => {}
-                Err(error) if error.kind() != io::ErrorKind::UnexpectedEof => return Err(error),
-                _ => return Err(io::Error::other(Differs(self.path.clone()))),
+            let mut filled = 0;
+            while let Some(rest) = there.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+                match self.file.read(rest) {
+                    Ok(0) => break,
+                    Ok(got) => filled += got,
+                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                    Err(error) => return Err(error),
+                }
+            }
+            if there.get(..filled) != bytes.get(..filled) {
+                return Ok(Likeness::Other);
+            }
+            if filled < bytes.len() {
+                return Ok(Likeness::Beginning);
             }
         }
-        Ok(())
+        Ok(Likeness::Equal)
     }
 
     /// Nothing more comes: the file must be at its end.
     pub(super) fn end(&mut self) -> io::Result<()> {
         match self.file.read(&mut [0])? {
             0 => Ok(()),
-            _ => Err(io::Error::other(Differs(self.path.clone()))),
+            _ => Err(io::Error::other(Differs::new(&self.path))),
         }
     }
 }
 
 /// How the file `there` relates to the file `new`.
 pub(super) fn likeness(there: &Path, new: &Path) -> io::Result<Likeness> {
-    let (length, length_new) = (fs::metadata(there)?.len(), fs::metadata(new)?.len());
-    if length > length_new {
-        return Ok(Likeness::Other);
-    }
-    let (mut there, mut new) = (BufReader::new(File::open(there)?), File::open(new)?.take(length));
-    let mut ours = vec![0; 64 * 1024];
-    let mut theirs = ours.clone();
+    let (mut there, mut new) = (There::open(there, 0)?, File::open(new)?);
+    let mut bytes = vec![0; 64 * 1024];
     loop {
-        let got = new.read(&mut ours)?;
-        let (Some(ours), Some(theirs)) = (ours.get(..got), theirs.get_mut(..got)) else {
-            return Ok(Likeness::Other);
-        };
-        if got == 0 {
-            return Ok(if length == length_new { Likeness::Equal } else { Likeness::Beginning });
+        let got = new.read(&mut bytes)?;
+        let bytes = bytes.get(..got).unwrap_or_default();
+        if bytes.is_empty() {
+            return Ok(if there.end().is_ok() { Likeness::Equal } else { Likeness::Other });
         }
-        there.read_exact(theirs)?;
-        if ours != theirs {
-            return Ok(Likeness::Other);
+        match there.next(bytes)? {
+            Likeness::Equal => {}
+            unlike => return Ok(unlike),
         }
     }
 }

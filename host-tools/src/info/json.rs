@@ -223,16 +223,16 @@ pub(super) fn finite(value: f32) -> Option<f32> {
 impl LogJson {
     /// A log that was read through.
     pub fn new(log: &Overview) -> Self {
-        let (summary, contents) = (&log.summary, &log.contents);
+        let (summary, contents) = (&log.ending.summary, &log.contents);
         let utc = |at: Option<Instant>| at.and_then(|at| log.utc_us(at)).map(iso8601);
         let seconds = |at: Instant| at.as_secs_f64();
         Self {
-            name: log.name.clone(),
+            name: log.ending.name.clone(),
             format: log.format.map_or("hums", Format::name),
-            files: log.files.clone(),
+            files: log.ending.files.clone(),
             session: summary.session.map(|session| format!("{session:08x}")),
             closed: summary.closed,
-            end: log.format.is_none().then(|| EndJson::new(log.proof, summary)),
+            end: log.format.is_none().then(|| EndJson::new(&log.ending)),
             start_utc: utc(summary.first),
             end_utc: utc(summary.last),
             start_s: summary.first.map(seconds),
@@ -331,7 +331,7 @@ fn findings(log: &Overview) -> Vec<FindingJson> {
 }
 
 pub(super) fn duration_s(log: &Overview) -> f64 {
-    match (log.summary.first, log.summary.last) {
+    match (log.ending.summary.first, log.ending.summary.last) {
         (Some(first), Some(last)) => last.since(first).as_micros() as f64 / 1e6,
         _ => 0.0,
     }

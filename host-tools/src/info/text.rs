@@ -11,7 +11,7 @@ use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
 use super::wear;
-use crate::ending::{behind_words, has_newer};
+use crate::ending::behind_words;
 use crate::logs;
 use crate::plural::count;
 use crate::states;
@@ -49,10 +49,10 @@ pub fn text(log: &Overview) -> String {
 }
 
 fn heading(text: &mut String, log: &Overview) {
-    let (summary, contents) = (&log.summary, &log.contents);
+    let (summary, contents) = (&log.ending.summary, &log.contents);
     let _ = match log.format {
-        Some(format) => writeln!(text, "{}: {}", log.files.join(", "), format.words()),
-        None => writeln!(text, "Session {} ({})", log.name, log.files.join(", ")),
+        Some(format) => writeln!(text, "{}: {}", log.ending.files.join(", "), format.words()),
+        None => writeln!(text, "Session {} ({})", log.ending.name, log.ending.files.join(", ")),
     };
     match (summary.first, summary.last) {
         (Some(first), Some(last)) => {
@@ -95,15 +95,19 @@ fn heading(text: &mut String, log: &Overview) {
 
 /// How it ends, and what lies behind that.
 fn ending(text: &mut String, log: &Overview) {
-    let _ = writeln!(text, "  end      {}", log.ending());
-    let behind = behind_words(&log.summary.behind);
+    let (ending, summary) = (&log.ending, &log.ending.summary);
+    let _ = writeln!(text, "  end      {}", ending.words());
+    let behind = behind_words(&summary.behind);
     if !behind.is_empty() {
         let _ = writeln!(text, "  behind   {behind}");
     }
-    if has_newer(&log.summary) && !log.proof.is_whole() {
+    if ending.has_newer() {
         text.push_str("           some of them are of a session that began later: two logs are mixed here\n");
     }
-    let (superseded, misplaced) = (log.summary.blocks.superseded, log.summary.blocks.misplaced);
+    for strange in ending.strange() {
+        let _ = writeln!(text, "  files    {strange}");
+    }
+    let (superseded, misplaced) = (summary.blocks.superseded, summary.blocks.misplaced);
     if superseded > 0 || misplaced > 0 {
         let _ = writeln!(
             text,
@@ -183,7 +187,7 @@ fn more(text: &mut String, count: u64, listed: usize) {
 }
 
 fn gaps_text(text: &mut String, log: &Overview) {
-    let (summary, contents) = (&log.summary, &log.contents);
+    let (summary, contents) = (&log.ending.summary, &log.contents);
     // Frames and sectors are counted in logs of ours only.
     let own = log.format.is_none();
     if summary.gaps == 0 && summary.blocks.damaged == 0 {

@@ -51,17 +51,28 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
             let walk = Volume::new(&file, layout).and_then(Volume::walk).with_context(context)?;
             about.damage = walk.damage;
             about.lost_clusters = walk.lost_clusters;
-            if about.damage.is_empty() && !salvage && has_sector(path, walk.lost)? {
+            if about.damage.is_empty() && has_sector(path, walk.lost)? {
                 let clusters = belong(walk.lost_clusters);
                 about.damage.push(format!(
                     "{clusters}, with sectors of logs in them: an entry of a directory is lost"
+                ));
+            }
+            // Older logs are deleted to make room; the newest one is what a card is read for.
+            let newest = walk.files.iter().map(|file| file.name.session).max();
+            if let (Some(newest), Some((deleted, place))) = (newest, walk.deleted)
+                && deleted.session > newest % 10_000
+                && has_sector(path, vec![place])?
+            {
+                about.damage.push(format!(
+                    "session {:05}, which is newer than all that are there, was deleted",
+                    newest / 10_000 * 10_000 + deleted.session
                 ));
             }
             found.add(sessions_of(path, &walk.files));
         }
         Err(error) => about.damage.push(error.to_string()),
     }
-    let is_in_order = about.damage.is_empty();
+    let knows_none = about.damage.is_empty() && found.logs.len() == before;
     // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead.
     if salvage || found.logs.len() == before || !about.damage.is_empty() {
         found.logs.truncate(before);
@@ -80,7 +91,7 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
             );
         }
         about.scanned = !logs.is_empty();
-        if about.scanned && is_in_order && !salvage {
+        if about.scanned && knows_none {
             about.damage.push("its file system knows of no log, and sectors of logs are there".to_owned());
         }
         found.add(logs);
@@ -113,9 +124,9 @@ fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     }
     let log = |(session, mut segments): (u32, Vec<&CardFile>)| {
         segments.sort_by_key(|file| file.name);
-        let extents = segments.iter().flat_map(|file| file.extents.iter().copied()).collect();
         let files = segments.iter().map(|file| file.path.clone()).collect();
-        let pieces = vec![Piece { path: path.to_owned(), extents }];
+        let piece = |file: &&CardFile| Piece { path: path.to_owned(), extents: file.extents.clone() };
+        let pieces = segments.iter().map(piece).collect();
         Log { name: format!("{session:05}"), files, pieces, session: None }
     };
     sessions.into_iter().map(log).collect()

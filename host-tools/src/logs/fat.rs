@@ -35,6 +35,8 @@ const ENTRIES_PER_BLOCK: u32 = 128;
 const END_OF_CHAIN: u32 = 0x0fff_fff8;
 const ENTRY_MASK: u32 = 0x0fff_ffff;
 
+/// The first byte of an entry whose file was deleted.
+const DELETED: u8 = 0xe5;
 const ATTRIBUTE_VOLUME: u8 = 0x08;
 const ATTRIBUTE_DIRECTORY: u8 = 0x10;
 const ATTRIBUTE_LONG_NAME: u8 = 0x0f;
@@ -72,6 +74,9 @@ pub struct Walk {
     pub lost_clusters: u64,
     /// Where they lie, as far as there is room to keep it.
     pub lost: Vec<Extent>,
+    /// The deleted segment with the highest name whose first cluster is free, and where that cluster lies. A deleted entry
+    /// has lost its name's first digit, which is taken for 0.
+    pub deleted: Option<(LogName, Extent)>,
 }
 
 /// Something that blocks can be read from at any place: an image file, a raw device, memory.
@@ -242,7 +247,7 @@ impl<'a, I: ReadAt> Volume<'a, I> {
     }
 
     /// The entries of a directory that lies here.
-    fn children(&self, extents: &[Extent], bytes_max: u64) -> io::Result<Vec<Child>> {
+    fn children(&mut self, extents: &[Extent], bytes_max: u64) -> io::Result<Vec<Child>> {
         let mut children = Vec::new();
         let mut bytes = Vec::new();
         let mut left = bytes_max;
@@ -257,12 +262,23 @@ impl<'a, I: ReadAt> Volume<'a, I> {
                     match Entry::read(entry) {
                         Some(Entry::End) => return Ok(children),
                         Some(Entry::Child(child)) => children.push(child),
+                        Some(Entry::Deleted(child)) => self.deleted(&child)?,
                         None => {}
                     }
                 }
             }
         }
         Ok(children)
+    }
+
+    /// The entry of a file that was deleted.
+    fn deleted(&mut self, child: &Child) -> io::Result<()> {
+        let Some(name) = child.segment().filter(|_| self.is_cluster(child.first)) else { return Ok(()) };
+        if self.walk.deleted.is_none_or(|(newest, _)| newest < name) && self.entry(child.first)? == 0 {
+            let place = Extent { start: self.place(child.first), length: self.cluster_bytes() };
+            self.walk.deleted = Some((name, place));
+        }
+        Ok(())
     }
 
     fn child(&mut self, child: &Child, path: &str, depth: usize) -> io::Result<()> {
@@ -361,6 +377,7 @@ impl fmt::Display for Name<'_> {
 enum Entry {
     End,
     Child(Child),
+    Deleted(Child),
 }
 
 /// An entry of a directory. A directory has up to 65,536: it is small.
@@ -373,13 +390,13 @@ struct Child {
 }
 
 impl Entry {
-    /// `None` for what is no file and no directory: deleted, long-name parts, the volume's label, `.` and `..`.
+    /// `None` for what is no file and no directory: long-name parts, the volume's label, `.` and `..`.
     fn read(entry: &[u8]) -> Option<Self> {
         let entry: &[u8; ENTRY_BYTES] = entry.try_into().ok()?;
         let attributes = entry[11];
         match entry[0] {
             0 => return Some(Self::End),
-            0xe5 | b'.' => return None,
+            b'.' => return None,
             _ if attributes & ATTRIBUTE_LONG_NAME == ATTRIBUTE_LONG_NAME
                 || attributes & ATTRIBUTE_VOLUME != 0 =>
             {
@@ -387,12 +404,18 @@ impl Entry {
             }
             _ => {}
         }
-        Some(Self::Child(Child {
-            short: *entry.first_chunk()?,
+        let is_deleted = entry[0] == DELETED;
+        let mut short: [u8; 11] = *entry.first_chunk()?;
+        if is_deleted {
+            short[0] = b'0';
+        }
+        let child = Child {
+            short,
             is_directory: attributes & ATTRIBUTE_DIRECTORY != 0,
             first: u32::from_le_bytes([entry[26], entry[27], entry[20], entry[21]]) & ENTRY_MASK,
             size: u32::from_le_bytes([entry[28], entry[29], entry[30], entry[31]]),
-        }))
+        };
+        Some(if is_deleted { Self::Deleted(child) } else { Self::Child(child) })
     }
 }
 

@@ -11,9 +11,20 @@ use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
 use super::places::Log;
+use crate::files::is_seekable;
 
-/// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says.
+/// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
+/// error where one of them has none.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
+    search(inputs, salvage, |input| bail!("{}: no log of HUMS is in there", input.display()))
+}
+
+/// The same of one folder, which may have none.
+pub fn find_in(folder: &Path, salvage: bool) -> Result<Found> {
+    search(&[folder.to_owned()], salvage, |_| Ok(()))
+}
+
+fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>) -> Result<Found> {
     let mut found = Found::default();
     for input in inputs {
         let before = found.logs.len();
@@ -32,7 +43,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             && found.logs_more + found.repeats == passed_over
             && !found.images.iter().any(|image| &image.path == input)
         {
-            bail!("{}: no log of HUMS is in there", input.display());
+            none(input)?;
         }
         if inputs.len() > 1 {
             let stem =
@@ -59,17 +70,6 @@ pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
         );
     }
     Ok(())
-}
-
-/// Whether it can be read from any place: a file, or a raw device such as a card reader's.
-fn is_seekable(about: &Metadata) -> bool {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::FileTypeExt as _;
-        about.is_file() || about.file_type().is_block_device()
-    }
-    #[cfg(not(unix))]
-    about.is_file()
 }
 
 /// A file that the user named: it must be something.

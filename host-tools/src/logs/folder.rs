@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, FileType};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use hums_recorder::LogName;
 
 use super::card::{image, is_card, whole_file};
@@ -44,7 +44,7 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
             if found.is_known(&path) {
                 found.remark(format!("{}: is the same file as another one; it is read once", path.display()));
             } else if let Err(error) = file(&path, salvage, found) {
-                found.remark(format!("{error:#}"));
+                found.leave_out(format!("{error:#}"));
             }
         }
         for folder in folders {
@@ -96,35 +96,49 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
         }
         if kind.is_dir() && entries.folders.len() < WAITING_MAX {
             entries.folders.push(path);
-        } else if !kind.is_file() {
-            found.remark(passed_over(&path, kind));
-        } else if let Some(name) = segment_name(&path).filter(|_| matches!(look(&path), Ok(Content::Log))) {
-            if entries.segments < SEGMENTS_MAX {
-                entries.segments += 1;
-                entries.sessions.entry(name.session).or_default().push((name, path));
-            } else {
-                found.leave_out(format!("{}: is left out: there are too many segments", path.display()));
-            }
+        } else if kind.is_file() {
+            entries.file(path, found);
         } else {
-            match look(&path) {
-                Ok(Content::Log | Content::Image) if entries.files.len() < LOGS_MAX => {
-                    entries.files.push(path);
-                }
-                Ok(Content::Log | Content::Image) => {
-                    found.leave_out(format!("{}: is left out: there are too many files", path.display()));
-                }
-                Ok(Content::Newer(version)) => {
-                    found.remark(format!(
-                        "{}: format version {version} is newer than this program",
-                        path.display()
-                    ));
-                }
-                Ok(_) => {}
-                Err(error) => found.remark(format!("{error:#}")),
-            }
+            found.remark(passed_over(&path, kind));
         }
     }
     Ok(entries)
+}
+
+impl Entries {
+    /// A file of a folder.
+    fn file(&mut self, path: PathBuf, found: &mut Found) {
+        let shown = path.display();
+        match (look(&path), segment_name(&path)) {
+            (Err(error), _) => found.leave_out(format!("{error:#}")),
+            (Ok(Content::Newer(version)), _) => {
+                found.leave_out(format!("{shown}: format version {version} is newer than this program"));
+            }
+            // Whatever is in it: that it holds nothing of ours is told with its log.
+            (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
+                self.segments += 1;
+                self.sessions.entry(name.session).or_default().push((name, path));
+            }
+            (Ok(_), Some(_)) => {
+                found.leave_out(format!("{shown}: is left out: there are too many segments"));
+            }
+            (Ok(Content::Log | Content::Image), None) if self.files.len() < LOGS_MAX => self.files.push(path),
+            (Ok(Content::Log | Content::Image), None) => {
+                found.leave_out(format!("{shown}: is left out: there are too many files"));
+            }
+            (Ok(_), None) if is_named_as_log(&path) => found.leave_out(nothing_of_ours(&path)),
+            (Ok(_), None) => {}
+        }
+    }
+}
+
+/// Whether its name ends as that of a log of ours does.
+fn is_named_as_log(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"))
+}
+
+fn nothing_of_ours(path: &Path) -> String {
+    format!("{}: has the name of a log and holds nothing of ours", path.display())
 }
 
 /// Says of something in a folder that it is no file.
@@ -151,6 +165,7 @@ fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
                 log.name = format!("{stem}/{}", log.name);
             }
         }
+        _ if is_named_as_log(path) => bail!(nothing_of_ours(path)),
         _ => {}
     }
     Ok(())

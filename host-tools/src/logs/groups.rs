@@ -4,6 +4,7 @@ use anyhow::Result;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
 
 use super::places::{BLOCK_BYTES, Blocks, Log};
+use super::strangers::{Strange, Strangers};
 
 /// Sectors that belong together, in order: a group, or a part of one whose beginning is missing.
 pub type Group = Vec<Step>;
@@ -21,6 +22,8 @@ pub struct Groups<'a> {
     group: Group,
     ended: bool,
     ends_short: bool,
+    /// None where the sectors of a session were searched for on a card: their places tell nothing.
+    strangers: Option<Strangers>,
 }
 
 impl<'a> Groups<'a> {
@@ -33,6 +36,7 @@ impl<'a> Groups<'a> {
             group: Vec::new(),
             ended: false,
             ends_short: log.ends_short(),
+            strangers: log.session.is_none().then(|| Strangers::new(log.pieces.len())),
         }
     }
 
@@ -61,13 +65,31 @@ impl<'a> Groups<'a> {
     fn next_block(&mut self) -> Result<()> {
         match self.blocks.next_block()? {
             Some(block) if is_empty(&block) => self.assembler.skip_empty(),
-            Some(block) => self.assembler.feed(&block),
+            Some(block) => self.feed(&block),
             None => {
                 self.ended = true;
                 self.assembler.end();
             }
         }
         Ok(())
+    }
+
+    fn feed(&mut self, block: &[u8; BLOCK_BYTES]) {
+        let before = self.assembler.counts();
+        self.assembler.feed(block);
+        let Some(strangers) = &mut self.strangers else { return };
+        let seen = self.assembler.counts().since(&before);
+        let (file, at) = self.blocks.place();
+        match seen {
+            BlockCounts { stale: 1.., .. } => strangers.other(file, at, block),
+            BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, .. } => strangers.own(file),
+            _ => {}
+        }
+    }
+
+    /// What of its files is not the log's, once all is read.
+    pub fn strange(&self) -> Vec<Strange> {
+        self.strangers.as_ref().map_or_else(Vec::new, Strangers::strange)
     }
 
     /// What was seen so far.

@@ -1,17 +1,20 @@
-//! End marks of a log, and whether the vehicle moved on after the last one.
+//! What a log's records tell of the log itself: its end marks, whether the vehicle moved on after the last one, what the
+//! recorder lost, and how the log before it on the card ended.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::Resting;
+use hums_blackbox::record::{Before, Found, Resting};
 use hums_core::time::Instant;
+
+use crate::loss::lost;
 
 /// Numbers of the events that say that the vehicle moves.
 const ARMED: u8 = 1;
 const TAKE_OFF: u8 = 3;
 
-/// What the marks of a part of a log say.
+/// What the records of a part of a log say of the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Marks {
-    /// How many there are.
+    /// How many end marks there are.
     pub count: u64,
     /// How many of them tell another count of frames than was read.
     pub wrong: u64,
@@ -19,6 +22,10 @@ pub struct Marks {
     pub last: Option<(Instant, Resting)>,
     /// The first time after it that the vehicle was armed or took off.
     pub moved: Option<Instant>,
+    /// Frames and records that the recorder says it lost.
+    pub lost: u64,
+    /// The log before on the card, as the last boot record found it.
+    pub before: Option<Before>,
 }
 
 impl Marks {
@@ -33,6 +40,8 @@ impl Marks {
             Record::Event(event) if matches!(event.number, ARMED | TAKE_OFF) => {
                 self.moved = self.moved.or(Some(at));
             }
+            Record::Loss(loss) => self.lost = self.lost.saturating_add(lost(loss)),
+            Record::Boot(boot) if boot.before.found != Found::Unknown => self.before = Some(boot.before),
             _ => {}
         }
     }
@@ -41,6 +50,8 @@ impl Marks {
     pub(super) fn add(&mut self, next: &Self) {
         self.count += next.count;
         self.wrong += next.wrong;
+        self.lost = self.lost.saturating_add(next.lost);
+        self.before = next.before.or(self.before);
         if next.last.is_some() {
             (self.last, self.moved) = (next.last, next.moved);
         } else {

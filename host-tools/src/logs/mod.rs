@@ -4,6 +4,7 @@
 //! (`00042_00.HUM`, `00042_01.HUM`, …); copied off the card the same files, in a directory; packed, one file.
 //! Whatever it was, here it is a list of places to read blocks of 512 bytes from.
 
+pub mod board;
 mod card;
 pub mod fat;
 pub mod find;
@@ -16,6 +17,7 @@ mod marks;
 pub mod places;
 pub mod reader;
 mod scan;
+pub mod strangers;
 
 pub use card::{is_card, on_card};
 pub use find::{Content, Found, find};

@@ -29,7 +29,7 @@ pub struct Log {
     pub name: String,
     /// The names of its files: on the card for a card's, on this PC otherwise.
     pub files: Vec<String>,
-    /// Where it lies, in order.
+    /// Where it lies, in order: a piece for each of its files.
     pub pieces: Vec<Piece>,
     /// What its sectors name as their session, where a scan told it; otherwise that of the first sector counts.
     pub session: Option<u32>,
@@ -49,7 +49,7 @@ impl Log {
 
     /// The blocks, in order.
     pub fn blocks(&self) -> Blocks<'_> {
-        Blocks { log: self, piece: 0, extent: 0, offset: 0, file: None, buffer: Vec::new(), at: 0 }
+        Blocks { log: self, piece: 0, extent: 0, offset: 0, begun: 0, file: None, buffer: Vec::new(), at: 0 }
     }
 }
 
@@ -60,6 +60,8 @@ pub struct Blocks<'a> {
     extent: usize,
     /// Bytes of the extent already read.
     offset: u64,
+    /// Bytes of the piece before what is in the buffer.
+    begun: u64,
     file: Option<File>,
     buffer: Vec<u8>,
     at: usize,
@@ -79,11 +81,18 @@ impl Blocks<'_> {
         }
     }
 
+    /// Where the last block lies: its piece, and its place in that, in blocks.
+    pub const fn place(&self) -> (usize, u64) {
+        (self.piece, (self.begun + self.at as u64).saturating_sub(1) / BLOCK_BYTES as u64)
+    }
+
     fn refill(&mut self) -> Result<bool> {
         loop {
             let Some(piece) = self.log.pieces.get(self.piece) else { return Ok(false) };
             let Some(extent) = piece.extents.get(self.extent) else {
                 (self.piece, self.extent, self.offset, self.file) = (self.piece + 1, 0, 0, None);
+                (self.begun, self.at) = (0, 0);
+                self.buffer.clear();
                 continue;
             };
             let length = READ_BYTES.min(extent.length.saturating_sub(self.offset));
@@ -96,6 +105,7 @@ impl Blocks<'_> {
                 Some(file) => file,
                 none => none.insert(File::open(&piece.path).with_context(context)?),
             };
+            self.begun += self.buffer.len() as u64;
             self.buffer.clear();
             self.buffer.resize((length as usize).next_multiple_of(BLOCK_BYTES), 0);
             let bytes = self.buffer.get_mut(..length as usize).unwrap_or_default();

@@ -17,6 +17,7 @@ use super::groups::{Group, Groups};
 use super::in_order::{in_order, workers};
 pub use super::marks::Marks;
 use super::places::Log;
+use super::strangers::Strange;
 
 /// Groups in work for each worker, and at most.
 const GROUPS_PER_WORKER: usize = 2;
@@ -51,7 +52,7 @@ pub trait Deliver<C> {
 }
 
 /// What was read, in all.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// The session that the sectors name.
     pub session: Option<u32>,
@@ -77,7 +78,7 @@ pub struct Summary {
     pub last: Option<Instant>,
     /// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.
     pub epoch_us: Option<u64>,
-    /// End marks and what came after the last one.
+    /// What its records tell of it: end marks, losses, the log before.
     pub marks: Marks,
     /// The number of the last sector.
     pub last_number: Option<u32>,
@@ -87,6 +88,8 @@ pub struct Summary {
     pub behind: BlockCounts,
     /// The latest power-on of another session whose sectors lie among this one's or behind it, microseconds since 1970.
     pub other_epoch_us: Option<u64>,
+    /// What of its files is not the log's.
+    pub strange: Vec<Strange>,
 }
 
 /// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
@@ -121,6 +124,7 @@ pub fn read<C: Collect>(
     summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();
+    summary.strange = groups.strange();
     Ok(summary)
 }
 

@@ -11,15 +11,18 @@ use hums_blackbox::Header;
 
 use super::fat::Extent;
 use super::places::{BLOCK_BYTES, Blocks, Log, Piece};
+use crate::progress;
 
 /// Runs of all sessions together: 16 MiB. The recorder makes a segment in a few runs.
 const RUNS_MAX: usize = 1 << 20;
+/// Blocks between two looks at the bar.
+const BLOCKS_OF_BAR: u64 = 2_048;
 /// Sessions that are kept.
 const SESSIONS_MAX: usize = 10_000;
 
 /// What a scan found.
 pub(super) struct Scan {
-    /// The sessions, by their number.
+    /// The sessions, by the place of their first sector.
     pub(super) logs: Vec<Log>,
     /// Sectors that belong to none of them, because there were too many sessions or runs.
     pub(super) left_out: u64,
@@ -94,13 +97,19 @@ pub(super) fn scan(path: &Path, length: u64) -> Result<Scan> {
     let all = Log { name: String::new(), files: Vec::new(), pieces: vec![everything], session: None };
     let mut blocks: Blocks<'_> = all.blocks();
     let mut sessions = Sessions::default();
-    let mut at = 0;
+    // A card of 128 GB takes minutes.
+    let bar = progress::bytes(Some(length), &format!("{}: looking at every block", path.display()));
+    let mut at: u64 = 0;
     while let Some(block) = blocks.next_block()? {
         if let Ok(header) = Header::read(&block) {
             sessions.sector(&header, at);
         }
         at += 1;
+        if at.is_multiple_of(BLOCKS_OF_BAR) {
+            bar.set_position(at * BLOCK_BYTES as u64);
+        }
     }
+    bar.finish_and_clear();
     sessions.make_room();
     let Sessions { runs, left_out, .. } = sessions;
     let block_bytes = BLOCK_BYTES as u64;
@@ -114,7 +123,12 @@ pub(super) fn scan(path: &Path, length: u64) -> Result<Scan> {
         let files = vec![path.display().to_string()];
         Log { name: format!("session-{session:08x}"), files, pieces: vec![piece], session: Some(session) }
     };
-    Ok(Scan { logs: runs.into_iter().map(log).collect(), left_out })
+    let mut logs: Vec<Log> = runs.into_iter().map(log).collect();
+    // As they were recorded, mostly: what a next log tells of the one before needs their order.
+    logs.sort_by_key(|log| {
+        log.pieces.first().and_then(|piece| piece.extents.first()).map(|extent| extent.start)
+    });
+    Ok(Scan { logs, left_out })
 }
 
 #[cfg(test)]

@@ -25,14 +25,16 @@ use anyhow::{Result, bail};
 
 use crate::check;
 use crate::cli;
-use crate::decode::naming::{self, Traits, without_made};
+use crate::decode::naming::{Traits, without_made};
 use crate::decode::side_by_side::side_by_side;
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
+use crate::followed::{Followed, HELD_MAX};
 use crate::made;
 use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::source::recording::{Place, find};
+use crate::summary::Overview;
 
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
@@ -40,6 +42,9 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     let found = find(&given, false)?;
     for remark in remarks.iter().chain(&found.remarks) {
         eprintln!("hums: {remark}");
+    }
+    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
+        eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
@@ -50,24 +55,34 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     // Of each session only what later ones are compared with is kept.
     let mut earlier: Vec<trend::Session> = Vec::new();
     let mut kept = Kept::default();
-    let read = found.places.get(..=*wanted.sessions.end()).unwrap_or_default();
-    side_by_side(read, check::overview, |overview| {
-        let overview = overview?;
+    // The next start on the card tells how a session ended.
+    let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
+    let mut followed = Followed::default();
+    let mut done = |overview: Overview| {
         let (index, this) = (earlier.len(), trend::Session::of(&overview));
         if let Some(place) = found.places.get(index).filter(|_| wanted.sessions.contains(&index)) {
             // A card's sessions are one box's; what lies in a folder beside a recording may be anybody's.
             let before = if place.own().is_some() { &earlier[..] } else { &[] };
-            let path = wanted.path(place)?;
-            let html = page::html(&overview, &replay::Replay::of(place)?, &trend::of(&this, before))?;
-            if kept.pass(write(&path, &html, &inputs))?.is_some() {
+            let traits = Traits::of(place)?;
+            let (path, of) = (wanted.path(place, &traits), traits.identity(place));
+            let replay = replay::Replay::of(place)?;
+            let html = page::html(&overview, &replay, &trend::of(&this, before), of.as_deref())?;
+            if kept.pass(write(&path, &html, &inputs, of.as_deref()))?.is_some() {
                 let bytes = count(html.len() as u64, "byte");
                 output::line(&format!("{}: session {}, {bytes}", path.display(), place.name))?;
             }
-            outcome = outcome.and(Outcome::lossy(overview.is_lossy()));
+            for why in overview.unproved() {
+                eprintln!("hums: {}: {why}", place.name);
+            }
+            outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
         }
         earlier.push(this);
         Ok(())
+    };
+    side_by_side(found.places.get(..end).unwrap_or_default(), check::overview, |overview| {
+        followed.push(overview?).into_iter().try_for_each(&mut done)
     })?;
+    followed.finish().try_for_each(&mut done)?;
     if *wanted.sessions.start() > 0 && args.session.is_none() {
         eprintln!(
             "hums: this is the last one of {}; -o DIR/ writes a page for each, --session NAME one of them",
@@ -78,9 +93,9 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     Ok(outcome)
 }
 
-fn write(path: &Path, html: &str, inputs: &Inputs) -> Result<()> {
+fn write(path: &Path, html: &str, inputs: &Inputs, of: Option<&str>) -> Result<()> {
     make_parent(path)?;
-    let mut file = Output::create(path, inputs, &made::PAGE)?;
+    let mut file = Output::create(path, inputs, &made::PAGE, of)?;
     settle(file.write_all(html.as_bytes()), path)?;
     file.finish()
 }
@@ -116,15 +131,11 @@ fn wanted(args: &cli::Report, logs: &[Place]) -> Result<Wanted> {
 
 impl Wanted {
     /// A page in a directory has the name that `hums decode` gives the session's files.
-    fn path(&self, place: &Place) -> Result<PathBuf> {
-        if !self.directory {
-            return Ok(self.output.clone());
+    fn path(&self, place: &Place, traits: &Traits) -> PathBuf {
+        if self.directory {
+            appended(&self.output.join(traits.name(place)), "html")
+        } else {
+            self.output.clone()
         }
-        let name = match (place.own(), place.path()) {
-            (Some(_), _) => Traits::of(place)?.name(place),
-            (None, Some(path)) => naming::of_recording(path)?,
-            (None, None) => place.name.clone(),
-        };
-        Ok(appended(&self.output.join(name), "html"))
     }
 }

@@ -92,8 +92,8 @@ impl From<&Stats> for StatsJson {
     }
 }
 
-/// A session's page.
-pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
+/// A session's page; `of` is what its name ends with: `s1a2b3c4d`.
+pub fn html(log: &Overview, replay: &Replay, trend: &Trend, of: Option<&str>) -> Result<String> {
     let data = Data {
         version: env!("CARGO_PKG_VERSION"),
         log: LogJson::new(log),
@@ -118,6 +118,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
     let mut page = TEMPLATE.to_owned();
     for (mark, text) in [
         ("{{scripts}}", hashes.join(" ").as_str()),
+        ("{{log}}", of.unwrap_or("unknown")),
         ("{{style}}", [UPLOT_STYLE, STYLE].concat().as_str()),
         ("{{uplot}}", UPLOT),
         ("{{program}}", program.as_str()),
@@ -174,7 +175,7 @@ mod tests {
     #[test]
     fn each_mark_of_the_template_stands_once() {
         let program = program();
-        for mark in ["{{scripts}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"] {
+        for mark in ["{{scripts}}", "{{log}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"] {
             assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
             assert!(!UPLOT.contains(mark) && !program.contains(mark) && !STYLE.contains(mark), "{mark}");
         }

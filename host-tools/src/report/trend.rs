@@ -60,13 +60,13 @@ pub struct Session {
 impl Session {
     /// Of a session that was read.
     pub fn of(log: &Overview) -> Self {
-        let start_utc = log.summary.first.and_then(|first| log.utc_us(first)).map(iso8601);
+        let start_utc = log.ending.summary.first.and_then(|first| log.utc_us(first)).map(iso8601);
         let vehicle = log
             .contents
             .vehicle
             .map(|vehicle| (vehicle.system, vehicle.uid, vehicle.autopilot, vehicle.vehicle_type));
         Self {
-            json: SessionJson { name: log.name.clone(), start_utc },
+            json: SessionJson { name: log.ending.name.clone(), start_utc },
             vehicle,
             values: FOLLOWED.map(|(counter, _, _, hourly)| value(log, counter, hourly)),
             worrying: worrying(log),

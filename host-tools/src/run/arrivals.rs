@@ -49,7 +49,7 @@ impl Arrivals {
             source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
             name: run.input.to_string(),
             waiting: VecDeque::new(),
-            tap: tap.map(|(path, inputs)| Output::create(path, inputs, &made::RAW)).transpose()?,
+            tap: tap.map(|(path, inputs)| Output::create(path, inputs, &made::RAW, None)).transpose()?,
             bytes: 0,
             autopilot,
         })

@@ -13,7 +13,7 @@ use crate::outcome::usage;
 /// What of a run must not be written over: its inputs, and the card and the store, which are updated in place. Refuses
 /// a run of which one file is named twice.
 pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> Result<Inputs> {
-    let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(firmware)).replacing(run.replace);
+    let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(firmware));
     inputs.add_endpoint(&run.input);
     run.gs_input.iter().for_each(|input| inputs.add_endpoint(input));
     for in_place in std::iter::once(run.sd.as_path()).chain(run.store.as_deref()) {

@@ -48,8 +48,8 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
 
 /// What the file holds, and the file for writing.
 fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
-    if path.is_dir() {
-        bail!("--store {}: is a directory; name a file", path.display());
+    if path.metadata().is_ok_and(|about| !about.is_file()) {
+        bail!("--store {}: is no file; name one", path.display());
     }
     let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
     let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);

@@ -18,6 +18,7 @@ use hums_core::time::Instant;
 use hums_link::Frame;
 
 use super::told::Told;
+use crate::ending::Ending;
 
 /// What a recording holds.
 #[derive(Clone, Copy, Debug)]
@@ -309,10 +310,12 @@ pub struct MessageCount {
 }
 
 /// What was read, in all.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct Summary {
     /// Messages by name, in order of their names, those that nobody wanted too.
     pub messages: Vec<MessageCount>,
+    /// Whether it is whole, of a log of ours.
+    pub ending: Option<Ending>,
 }
 
 /// Reads one recording, once.

@@ -48,7 +48,7 @@ impl Counts {
             |(id, &(count, bytes))| MessageCount { name: message_name(id).into_owned(), count, bytes };
         let mut messages: Vec<_> = all.map(message).collect();
         messages.sort_by(|a, b| a.name.cmp(&b.name));
-        Summary { messages }
+        Summary { messages, ending: None }
     }
 }
 

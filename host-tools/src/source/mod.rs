@@ -48,6 +48,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 
 use crate::endpoint::Endpoint;
+use crate::files::is_seekable;
 use crate::logs::{self, Content};
 use crate::outcome::usage;
 
@@ -82,12 +83,21 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
     }
     let input: Box<dyn Read + Send> = match endpoint {
         Endpoint::File(path) => {
-            let file = File::open(path).with_context(|| format!("{}: cannot be opened", path.display()))?;
-            if file.metadata()?.is_dir() {
+            let context = || format!("{}: cannot be opened", path.display());
+            let about = path.metadata().with_context(context)?;
+            if about.is_dir() {
                 bail!("{}: is a directory; give a recording (tlog or raw MAVLink bytes)", path.display());
             }
+            // Before it is opened: a pipe would wait for its other end, without a word.
+            if !is_seekable(&about) {
+                bail!(
+                    "{0}: is a pipe, a socket, a terminal or the like; copy it into a file, or name `-` and give it as \
+                     standard input: < {0}",
+                    path.display()
+                );
+            }
             refuse_our_own(path)?;
-            Box::new(file)
+            Box::new(File::open(path).with_context(context)?)
         }
         _ => Box::new(io::stdin()),
     };
@@ -104,10 +114,6 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
 
 /// What HUMS itself has recorded is full of frames, but not as they came.
 fn refuse_our_own(path: &Path) -> Result<()> {
-    // What is no file (a pipe) can be read but once.
-    if !path.is_file() {
-        return Ok(());
-    }
     let name = path.display();
     let what = match logs::find::look(path)? {
         Content::Log => "a log of HUMS",

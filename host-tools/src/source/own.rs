@@ -10,6 +10,7 @@ use super::input::Progress;
 use super::item::{Cause, Gap, Item, MessageCount, Reader, Summary, Take, Want};
 use super::said::Said;
 use super::told::Told;
+use crate::ending::Ending;
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, epoch, read};
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
@@ -43,12 +44,13 @@ impl Reader for OwnReader {
         let new =
             || Collected { frames: want.frames, observations: want.observations, ..Collected::default() };
         let progress = &self.progress;
-        read(&self.log, new, &mut hand, |blocks| {
+        let summary = read(&self.log, new, &mut hand, |blocks| {
             progress.set_taken(blocks * hums_blackbox::SECTOR_BYTES as u64);
         })?;
         hand.said.end(hand.take)?;
         let (count, bytes) = (hand.frames, hand.frame_bytes);
-        Ok(Summary { messages: vec![MessageCount { name: "frames".to_owned(), count, bytes }] })
+        let messages = vec![MessageCount { name: "frames".to_owned(), count, bytes }];
+        Ok(Summary { messages, ending: Some(Ending::of(&self.log, summary)) })
     }
 }
 

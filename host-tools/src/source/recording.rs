@@ -14,7 +14,7 @@ use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
-use crate::files::FileId;
+use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::{self, Content, Log};
 use crate::plural::count;
@@ -259,7 +259,7 @@ pub struct Found {
     pub images: Vec<Image>,
     /// What was passed over, as sentences.
     pub remarks: Vec<String>,
-    /// There were more logs or recordings than are kept.
+    /// There were more logs or recordings than are kept, or files with the name of one that hold none.
     pub is_cut: bool,
     /// Files of the inputs so far, by device and number.
     seen: BTreeSet<FileId>,
@@ -269,6 +269,19 @@ impl Found {
     /// Whether a card's file system is damaged, or logs were left out: exit code 3.
     pub fn is_lossy(&self) -> bool {
         self.is_cut || self.images.iter().any(|image| !image.damage.is_empty())
+    }
+
+    /// Adds the sessions of our own in a path.
+    fn add_own(&mut self, path: &Path, own: logs::Found) {
+        self.is_cut |= own.is_cut();
+        self.images.extend(own.images);
+        self.remarks.extend(own.remarks);
+        let single = own.logs.len() == 1 && path.is_file();
+        for log in own.logs {
+            let name =
+                if single { path.display().to_string() } else { format!("{}:{}", path.display(), log.name) };
+            self.places.push(Place::log(name, log));
+        }
     }
 
     /// Drops what was added since there were `before` places and lies in files of earlier inputs.
@@ -315,12 +328,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         if about.is_dir() {
             let mut walk = Walk::default();
             walk.folder(input, 0)?;
-            if let Err(error) = own(input, salvage, &mut found) {
-                if holds_own(input) {
-                    return Err(error);
-                }
-                found.remarks.append(&mut walk.remarks);
-            }
+            found.add_own(input, logs::find::find_in(input, salvage)?);
             found.places.extend(walk.paths.iter().map(|path| Place::file(path)));
             if walk.left_out > 0 {
                 found.is_cut = true;
@@ -330,8 +338,12 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
                     walk.left_out
                 ));
             }
+            found.is_cut |= walk.unknown > 0;
+            found.remarks.append(&mut walk.remarks);
             if found.places.len() == before {
-                bail!("{}: no log and no recording is in there", input.display());
+                let remarks: Vec<String> =
+                    found.remarks.iter().map(|remark| format!("\n  {remark}")).collect();
+                bail!("{}: no log and no recording is in there{}", input.display(), remarks.concat());
             }
             // A card has other files beside its logs.
             if walk.others > 0 && found.places.iter().skip(before).all(|place| place.own().is_none()) {
@@ -341,7 +353,9 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
                     .push(format!("{}: {files} passed over: no log of a known kind", input.display()));
             }
         } else if is_own(input)? {
-            own(input, salvage, &mut found).map_err(|error| not_known(input, error))?;
+            let own =
+                logs::find(std::slice::from_ref(input), salvage).map_err(|error| not_known(input, error))?;
+            found.add_own(input, own);
         } else {
             found.places.push(Place::file(input));
         }
@@ -398,25 +412,6 @@ fn is_recording(path: &Path) -> bool {
     start.is_some_and(|start| detect(&start).is_some())
 }
 
-fn holds_own(dir: &Path) -> bool {
-    logs::find(std::slice::from_ref(&dir.to_owned()), false).is_ok()
-}
-
-/// Adds the sessions of our own in a path.
-fn own(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
-    let own = logs::find(std::slice::from_ref(&path.to_owned()), salvage)?;
-    found.is_cut |= own.is_cut();
-    found.images.extend(own.images);
-    found.remarks.extend(own.remarks);
-    let single = own.logs.len() == 1 && path.is_file();
-    for log in own.logs {
-        let name =
-            if single { path.display().to_string() } else { format!("{}:{}", path.display(), log.name) };
-        found.places.push(Place::log(name, log));
-    }
-    Ok(())
-}
-
 /// The files of a folder, and of those in it, that are recordings other than our own logs. Links are not followed, and
 /// pipes, sockets and devices are not opened.
 #[derive(Default)]
@@ -426,7 +421,8 @@ struct Walk {
     left_out: u64,
     /// Files that are no recording: the logs of ours among them.
     others: u64,
-    /// The first things that are neither files nor folders, as sentences.
+    /// Files with the name of a recording that hold none, and the first of them as sentences.
+    unknown: u64,
     remarks: Vec<String>,
 }
 
@@ -438,13 +434,21 @@ impl Walk {
         for entry in fs::read_dir(dir).with_context(context)? {
             let entry = entry.with_context(context)?;
             let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
-            if !kind.is_file() && !kind.is_dir() && self.remarks.len() < REMARKS_MAX {
-                self.remarks.push(logs::passed_over(&path, kind));
+            if is_part(&path) {
+                // What a run of this program has not made whole is nobody's recording.
+                continue;
             }
             let wanted =
                 if kind.is_dir() { depth < DEPTH_MAX } else { kind.is_file() && is_recording(&path) };
             if !wanted {
                 self.others += u64::from(kind.is_file());
+                if kind.is_file() && is_named_as_recording(&path) {
+                    self.unknown += 1;
+                    if self.remarks.len() < REMARKS_MAX {
+                        self.remarks
+                            .push(format!("{}: has the name of a recording and holds none", path.display()));
+                    }
+                }
                 continue;
             }
             if self.paths.len() + inside.len() < WALKED_MAX {
@@ -463,6 +467,14 @@ impl Walk {
         }
         Ok(())
     }
+}
+
+/// Whether its name ends as those of recordings do that nothing else has, `.gz` or not. `.log` is the name of too much.
+fn is_named_as_recording(path: &Path) -> bool {
+    let name =
+        path.file_name().map_or_else(Default::default, |name| name.to_string_lossy().to_ascii_lowercase());
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    [".tlog", ".ulg", ".bin"].iter().any(|ending| name.ends_with(ending))
 }
 
 #[cfg(test)]

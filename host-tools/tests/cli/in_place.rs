@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use crate::support::{px4, recorded, run, text};
+use crate::support::{px4, recorded, run, text, until};
 
 #[test]
 fn two_runs_do_not_use_one_card_or_one_store() {
@@ -19,7 +19,7 @@ fn two_runs_do_not_use_one_card_or_one_store() {
     let tlog = fs::read(px4()).expect("a recording");
     let mut input = first.stdin.take().expect("it is piped");
     input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
-    crate::files::until("it records", || dir.path().join(".gs.hums-part").exists());
+    until("it records", || dir.path().join(".gs.hums-part").exists());
     for line in ["sim --input PX4 --sd card.img", "sim --input PX4 --sd new.img --store store"] {
         let said = run(dir.path(), line, 1);
         let said = String::from_utf8_lossy(&said.stderr);

@@ -2,9 +2,12 @@
 #![expect(clippy::panic, reason = "a test that cannot go on says why")]
 
 mod check;
-mod files;
+mod copied;
 mod help;
 mod in_place;
+mod inputs;
+mod killed;
 mod read;
 mod record;
+mod replace;
 mod support;

@@ -1,8 +1,10 @@
 //! What the tests of the program share.
 
 use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Output;
+use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use tempfile::TempDir;
@@ -107,4 +109,53 @@ pub(crate) fn all_named(dir: &Path, base: &str) -> Vec<String> {
     names.sort();
     names.dedup();
     names
+}
+
+/// A directory with an input of each kind, as a file, through links, and in a folder.
+pub(crate) fn furnished() -> TempDir {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = |name: &str| dir.path().join(name);
+    fs::copy(px4(), at("flight.tlog")).expect("a copy");
+    run(dir.path(), "pack flight.tlog -o log.hum", 0);
+    fs::write(at("hums.param"), "CELL_VOLT_WARN 3.6\n").expect("a file");
+    fs::write(at("key.txt"), "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff\n")
+        .expect("a file");
+    let mut elf = b"\x7fELF".to_vec();
+    elf.resize(64, 0);
+    elf[18] = 40;
+    fs::write(at("hums.elf"), elf).expect("a file");
+    fs::create_dir(at("folder")).expect("a directory");
+    for name in ["flight.tlog", "log.hum", "hums.param", "key.txt", "hums.elf"] {
+        symlink(name, at(&format!("link-{name}"))).expect("a link");
+        fs::hard_link(at(name), at(&format!("hard-{name}"))).expect("a link");
+        fs::copy(at(name), at("folder").join(name)).expect("a copy");
+    }
+    dir
+}
+
+/// Everything that a directory has, by name.
+pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    let entries = fs::read_dir(dir).expect("a directory");
+    for path in entries.map(|entry| entry.expect("an entry").path()) {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if path.is_dir() {
+            found
+                .extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            found.push((name, fs::read(&path).expect("a file")));
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Waits until something is so.
+#[track_caller]
+pub(crate) fn until(what: &str, is: impl Fn() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(30);
+    while !is() {
+        assert!(Instant::now() < limit, "{what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }

@@ -1,7 +1,7 @@
 //! Whole pages of a log go wrong, and its end goes missing.
 //!
 //! A log is recorded once. Then its file is cut, pages of it are erased, zeroed, copied, exchanged or replaced by what an
-//! older session left there, or it goes on with the second half of another log; what is left is read and verified, and
+//! older session left there, or it goes on with the second half of another log, or with all of one; what is left is read and verified, and
 //! compared with the whole log. *Noticed* is what `hums verify` does not call good. A cut behind an end mark cannot be
 //! told from power that went there: that is *told* if `verify` says up to which mark the log is whole, and all of it is.
 
@@ -41,6 +41,8 @@ pub(super) enum Kind {
     ErasedToTheEnd,
     /// It goes on with the second half of another log.
     Spliced,
+    /// All of another log follows, at once or behind some space.
+    Joined,
     /// One page lies in the place of another one as well.
     Copied,
     /// One page is there twice, and what follows lies further back.
@@ -53,12 +55,13 @@ pub(super) enum Kind {
 
 impl Kind {
     /// All of them.
-    pub(super) const ALL: [Self; 9] = [
+    pub(super) const ALL: [Self; 10] = [
         Self::Cut,
         Self::CutAtSector,
         Self::Erased,
         Self::ErasedToTheEnd,
         Self::Spliced,
+        Self::Joined,
         Self::Copied,
         Self::Inserted,
         Self::Swapped,
@@ -72,6 +75,7 @@ impl Kind {
             Self::Erased => "a page erased or zeroed",
             Self::ErasedToTheEnd => "everything from a page on erased or zeroed",
             Self::Spliced => "spliced with another log",
+            Self::Joined => "joined with all of another log",
             Self::Copied => "a page in the place of another one",
             Self::Inserted => "a page there twice",
             Self::Swapped => "two pages exchanged",
@@ -174,7 +178,7 @@ impl Subject {
         let log = subject.log(&subject.bytes)?;
         let (whole, overview) = (Record::of(&log)?, Overview::verified(&log)?);
         let expected = if closed { Verdict::Holds } else { Verdict::ToMark };
-        ensure!(verdict(&overview) == expected, "before any damage: {:?}", overview.ending());
+        ensure!(verdict(&overview) == expected, "before any damage: {:?}", overview.ending.words());
         ensure!(whole.summary.marks.count >= 1, "{} end marks", whole.summary.marks.count);
         subject.whole = whole;
         Ok(subject)
@@ -248,6 +252,7 @@ impl Subject {
                 touched.extend(at..self.sectors);
                 format!("at sector {at} of {} and {}", self.sectors, other.sectors)
             }
+            Kind::Joined => self.join(&mut bytes, other, random),
             Kind::Copied => {
                 let to = two.min(self.sectors.saturating_sub(page));
                 bytes.copy_within(one * BLOCK..ends(one) * BLOCK, to * BLOCK);
@@ -278,6 +283,14 @@ impl Subject {
         Damage { kind, what, bytes, touched }
     }
 
+    /// All of another log behind this one. Packed logs end with their last sector; files off a card have room behind it.
+    fn join(&self, bytes: &mut Vec<u8>, other: &Self, random: &mut Random) -> String {
+        let space = random.below(SPACE_BLOCKS as u64 + 1) as usize;
+        bytes.truncate((self.sectors + space) * BLOCK);
+        bytes.extend(&other.bytes);
+        format!("{} sectors behind {} and {space} blocks of zeros", other.sectors, self.sectors)
+    }
+
     /// Whether what is left is told as it is.
     fn judge(&self, damage: &Damage, tally: &mut Tally) -> Result<()> {
         if damage.bytes == self.bytes {
@@ -291,7 +304,10 @@ impl Subject {
         tally.frames += read.frames.len() as u64;
         if read.summary.session.is_some() && read.summary.session != self.whole.summary.session {
             // Which of two sessions a file belongs to, its first sector tells. It is said that the other one is there.
-            ensure!(verdict == Verdict::NotProved && overview.summary.blocks.stale > 0, "not told apart");
+            ensure!(
+                verdict == Verdict::NotProved && overview.ending.summary.blocks.stale > 0,
+                "not told apart"
+            );
             tally.other += 1;
             tally.noticed += 1;
             return Ok(());
@@ -303,7 +319,7 @@ impl Subject {
         if let Some(lost) = missing.iter().find(|index| !touched.contains(&group(index))) {
             anyhow::bail!("frame {lost} of group {} is lost, which was not touched", group(lost));
         }
-        match (verdict, overview.proof) {
+        match (verdict, overview.ending.proof) {
             (Verdict::NotProved, _) => tally.noticed += 1,
             (Verdict::ToMark, Proof::Mark(at, _)) => {
                 let to = at.as_millis();
@@ -314,7 +330,7 @@ impl Subject {
                 );
                 tally.told += 1;
             }
-            _ => anyhow::bail!("{verdict:?} is said: {}", overview.ending()),
+            _ => anyhow::bail!("{verdict:?} is said: {}", overview.ending.words()),
         }
         Ok(())
     }

@@ -14,6 +14,7 @@ pub mod target;
 pub mod writer;
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant as Wall};
 
@@ -32,6 +33,7 @@ use self::target::Target;
 use super::world::World;
 use crate::decode::influx::{Clock, Lines};
 use crate::decode::record::rows;
+use crate::interrupt;
 use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 
@@ -41,6 +43,8 @@ const BATCH_BYTES: usize = 256 * 1024;
 const BATCH_AGE: Duration = Duration::from_millis(250);
 /// How often the usage counters are written.
 const USAGE_EVERY: Span = Span::from_secs(10);
+/// How often it is looked whether it has all of them.
+const LOOK: Duration = Duration::from_millis(20);
 /// How long is waited for the database at the end.
 const LAST_WAIT: Duration = Duration::from_secs(15);
 
@@ -197,15 +201,19 @@ impl Influx {
         figures
     }
 
-    /// Gives away what is left and waits for the database, for a while; what became of all points.
+    /// Gives away what is left and waits for the database, for a while, or until the user asks again to end; what became of
+    /// all points.
     pub fn finish(mut self) -> Figures {
         self.give_away();
         let settled = self.names.end();
         self.give_settled(settled.as_ref());
         self.queue.close(Wall::now() + LAST_WAIT);
-        if let Some(writer) = self.writer.take() {
-            // A panic of the writer shows in the figures: its points still wait.
-            let _ = writer.join();
+        let again = interrupt::watch_again();
+        // A panic of the writer shows in the figures: its points still wait.
+        while self.writer.as_ref().is_some_and(|writer| !writer.is_finished())
+            && !again.load(Ordering::SeqCst)
+        {
+            std::thread::sleep(LOOK);
         }
         self.queue.figures()
     }

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant as Wall};
 use super::batch::Batch;
 use super::figures::Figures;
 use super::spool::Spool;
+use crate::interrupt;
 
 /// Half a minute of a fast link, a quarter of an hour of a usual one.
 pub const MEMORY_BYTES: usize = 16 * 1024 * 1024;
@@ -34,7 +35,7 @@ pub struct Queue {
     inner: Mutex<Inner>,
     changed: Condvar,
     memory_bytes_max: usize,
-    /// Who puts waits while the database takes what is there: for a recording, which can.
+    /// Who puts waits until there is room, also while the database is away: for a recording, which can.
     patient: bool,
 }
 
@@ -49,6 +50,7 @@ struct Inner {
     figures: Figures,
     /// No more comes; nobody waits longer than this.
     closed: Option<Wall>,
+    told_full: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -62,8 +64,15 @@ impl Queue {
     /// With what waits in the file already.
     pub fn new(spool: Spool, patient: bool) -> Self {
         let figures = Figures { lost: spool.damage().points, ..Figures::default() };
-        let inner =
-            Inner { spool, memory: VecDeque::new(), memory_bytes: 0, in_hand: None, figures, closed: None };
+        let inner = Inner {
+            spool,
+            memory: VecDeque::new(),
+            memory_bytes: 0,
+            in_hand: None,
+            figures,
+            closed: None,
+            told_full: false,
+        };
         Self { inner: Mutex::new(inner), changed: Condvar::new(), memory_bytes_max: MEMORY_BYTES, patient }
     }
 
@@ -75,10 +84,12 @@ impl Queue {
         self.changed.wait_timeout(inner, time).unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// Takes a batch. It never waits for a database that is away.
+    /// Takes a batch. Of a recording it waits for room, until the user ends the program; otherwise it waits for nothing.
     pub fn put(&self, batch: Batch) {
         let mut inner = self.lock();
-        while self.patient && !inner.spool.has_room(&batch) && !inner.spool.is_empty() && !inner.is_away() {
+        let has_room = |inner: &Inner| inner.spool.has_room(&batch) || inner.spool.is_empty();
+        while self.patient && !has_room(&inner) && inner.closed.is_none() && !interrupt::requested() {
+            inner.tell_full();
             inner = self.wait(inner, LOOK);
         }
         inner.put(batch, self.memory_bytes_max);
@@ -146,9 +157,16 @@ impl Queue {
 }
 
 impl Inner {
-    /// Whether the database does not take anything: then nobody waits for room.
-    fn is_away(&self) -> bool {
-        !self.figures.trouble.is_empty() || self.closed.is_some()
+    /// Says once that the file is full and the database takes nothing.
+    fn tell_full(&mut self) {
+        if !self.told_full && !self.figures.trouble.is_empty() {
+            self.told_full = true;
+            eprintln!(
+                "hums: {}: is full, and the database takes nothing ({}): reading the recording waits for it, until Ctrl-C",
+                self.spool.path().display(),
+                self.figures.trouble
+            );
+        }
     }
 
     fn put(&mut self, batch: Batch, memory_bytes_max: usize) {
@@ -292,6 +310,26 @@ mod tests {
         let figures = queue.figures();
         assert_eq!((figures.written + figures.lost, figures.waiting), (2_000, 0), "{figures:?}");
         assert_eq!(last, Some(batch(19)), "the newest is there");
+    }
+
+    #[test]
+    fn a_recording_waits_for_room_while_the_database_is_away_and_loses_no_point() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let queue = Queue { patient: true, ..queue(&dir, 10_000) };
+        assert!(queue.trouble("away".to_owned(), Duration::ZERO));
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(|| (0..20).for_each(|number| queue.put(batch(number))));
+            let mut taken = 0;
+            while taken < 20 {
+                queue.take().expect("it waits");
+                queue.done(all());
+                assert!(queue.trouble("away".to_owned(), Duration::from_millis(10)));
+                taken += 1;
+            }
+            reader.join().expect("it ends");
+        });
+        let figures = queue.figures();
+        assert_eq!((figures.written, figures.lost, figures.waiting), (2_000, 0, 0), "{figures:?}");
     }
 
     #[test]

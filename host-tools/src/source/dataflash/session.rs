@@ -416,7 +416,7 @@ impl<'w> Session<'w> {
             }
         }
         let told = |(name, (count, bytes))| MessageCount { name, count, bytes };
-        Ok(Summary { messages: self.counts_before.into_iter().map(told).collect() })
+        Ok(Summary { messages: self.counts_before.into_iter().map(told).collect(), ending: None })
     }
 }
 

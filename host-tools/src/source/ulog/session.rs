@@ -181,7 +181,7 @@ impl<'a, 'b> Session<'a, 'b> {
             self.gap(Cause::Cut, Some(place), 0, words)?;
         }
         self.tell_facts()?;
-        Ok(Summary { messages: self.subscriptions.counts() })
+        Ok(Summary { messages: self.subscriptions.counts(), ending: None })
     }
 
     fn tell(&mut self, item: Item<'_>) -> Result<()> {

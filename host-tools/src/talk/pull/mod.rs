@@ -194,12 +194,12 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     for log in &found.logs {
         let overview = Overview::verified(log)?;
-        let blocks = overview.summary.blocks;
+        let blocks = overview.ending.summary.blocks;
         let wrong = [
             (blocks.damaged, "damaged sectors"),
             (blocks.stale, "sectors of another session"),
             (blocks.foreign, "blocks that are no sectors"),
-            (overview.summary.gaps, "gaps"),
+            (overview.ending.summary.gaps, "gaps"),
             (overview.contents.bad_frames, "frames that fail their checksum"),
         ];
         for (number, what) in wrong.into_iter().filter(|(number, _)| *number > 0) {

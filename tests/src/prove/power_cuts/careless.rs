@@ -494,8 +494,8 @@ fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
     }
     overviews.extend(followed.finish());
     let told = |log: &Overview| {
-        let is_it = log.summary.session.is_some_and(|session| less.contains(&session));
-        log.gone_before.is_some() || is_it && verdict(log) == Verdict::NotProved
+        let is_it = log.ending.summary.session.is_some_and(|session| less.contains(&session));
+        log.ending.gone_before.is_some() || is_it && verdict(log) == Verdict::NotProved
     };
     Ok(overviews.iter().any(told))
 }

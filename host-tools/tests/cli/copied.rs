@@ -1,0 +1,274 @@
+//! What was copied off cards: files that hold nothing of their log, logs that were joined, logs that are cut. Every
+//! command that reads says the same of them, with the same exit code.
+
+use std::fs;
+use std::path::Path;
+
+use tempfile::TempDir;
+
+use crate::support::{attempt, flight, px4, run};
+
+const BLOCK: usize = 512;
+/// A segment of the cards here.
+const SEGMENT: usize = 2 << 20;
+
+/// Every command that reads, with these inputs: its exit code and what it said on both streams. A finding of the vehicle's
+/// health is no damage.
+fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, String)> {
+    ["decode -o out --format csv", "report -o pages/", "verify", "info", "check"]
+        .into_iter()
+        .map(|command| {
+            let ended = attempt(dir, &format!("{command} {inputs}"));
+            for made in ["out", "pages"] {
+                let _ = fs::remove_dir_all(dir.join(made));
+            }
+            let said = [ended.stdout, ended.stderr].concat();
+            let code = ended.status.code().filter(|code| *code != 4).unwrap_or_default();
+            (command, code, String::from_utf8_lossy(&said).into_owned())
+        })
+        .collect()
+}
+
+/// Each of them ends with this code and says this.
+#[track_caller]
+fn all_say(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
+    for (command, ended, said) in readers(dir, inputs) {
+        assert_eq!(ended, code, "hums {command} {inputs}: {said}");
+        for words in words {
+            assert!(said.contains(words), "hums {command} {inputs}: `{words}` is not in {said}");
+        }
+    }
+}
+
+/// A folder `copied` with the first segments of a card's sessions, as a copy has them: each as long as it was allocated.
+fn copied(sessions: usize, flags: &str) -> TempDir {
+    let dir = tempfile::tempdir().expect("directory");
+    let recordings = [px4(), flight("ap_quad_guided.tlog")];
+    for session in 0..sessions {
+        let recording = recordings[session % 2].display();
+        attempt(dir.path(), &format!("sim --input {recording} --sd card.img --card-size 64 {flags}"));
+    }
+    let image = fs::read(dir.path().join("card.img")).expect("an image");
+    let mut starts: Vec<usize> = Vec::new();
+    let mut last = None;
+    for (at, block) in image.as_chunks::<BLOCK>().0.iter().enumerate() {
+        let session = block.starts_with(&[0x48, 0xb1]).then(|| block[7..11].to_vec());
+        if session.is_some() && session != last {
+            starts.push(at * BLOCK);
+            last = session;
+        }
+    }
+    assert_eq!(starts.len(), sessions);
+    fs::create_dir(dir.path().join("copied")).expect("made");
+    for (session, start) in (1..).zip(starts) {
+        let name = format!("copied/{session:05}_00.HUM");
+        fs::write(dir.path().join(name), &image[start..start + SEGMENT]).expect("written");
+    }
+    dir
+}
+
+#[test]
+fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_every_command() {
+    let dir = copied(2, "");
+    all_say(dir.path(), "copied", 0, &[]);
+    let noise: Vec<u8> = (0..SEGMENT as u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 21) as u8).collect();
+    for content in [vec![0; SEGMENT], noise, Vec::new(), vec![0xff; SEGMENT], b"hello".to_vec()] {
+        for name in ["00001_01.HUM", "00002_01.HUM", "00003_00.HUM"] {
+            let path = dir.path().join("copied").join(name);
+            fs::write(&path, &content).expect("written");
+            all_say(
+                dir.path(),
+                "copied",
+                3,
+                &[&format!("{name} has the name of a segment and holds nothing of ours")],
+            );
+            fs::remove_file(path).expect("removed");
+        }
+    }
+    // The log itself, in place of its sectors.
+    let path = dir.path().join("copied/00001_00.HUM");
+    let was = fs::read(&path).expect("there");
+    fs::write(&path, vec![0; SEGMENT]).expect("written");
+    all_say(dir.path(), "copied", 3, &["00001_00.HUM has the name of a segment and holds nothing of ours"]);
+    fs::write(&path, was).expect("written");
+    // A log by another name.
+    fs::write(dir.path().join("copied/flight.hum"), "nothing").expect("written");
+    all_say(dir.path(), "copied", 3, &["flight.hum: has the name of a log and holds nothing of ours"]);
+}
+
+#[test]
+fn a_recording_in_a_folder_that_holds_nothing_is_told() {
+    let dir = copied(1, "");
+    for (name, content) in [("a.tlog", &b""[..]), ("b.bin", b"no log"), ("c.ulg", b""), ("d.tlog.gz", b"no")]
+    {
+        let path = dir.path().join("copied").join(name);
+        fs::write(&path, content).expect("written");
+        for command in ["decode -o out --format csv", "report -o pages/", "info", "check"] {
+            let ended = attempt(dir.path(), &format!("{command} copied"));
+            let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+            assert_eq!(ended.status.code(), Some(3), "{command} {name}: {said}");
+            assert!(said.contains(&format!("{name}: has the name of a recording and holds none")), "{said}");
+        }
+        fs::remove_file(path).expect("removed");
+    }
+}
+
+/// Power went before the second session had a sector; the third one found none there.
+#[test]
+fn a_file_that_the_next_start_found_empty_is_no_loss() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    fs::rename(at("00002_00.HUM"), at("00003_00.HUM")).expect("renamed");
+    fs::write(at("00002_00.HUM"), vec![0; SEGMENT]).expect("written");
+    for (command, code, said) in readers(dir.path(), "copied") {
+        assert_eq!(code, 0, "{command}: {said}");
+    }
+    // Without the third one nothing tells that.
+    fs::remove_file(at("00003_00.HUM")).expect("removed");
+    all_say(dir.path(), "copied", 3, &["00002_00.HUM has the name of a segment and holds nothing of ours"]);
+}
+
+#[test]
+fn two_logs_in_one_file_are_told_by_every_command_in_both_orders() {
+    let dir = tempfile::tempdir().expect("directory");
+    let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"].map(|name| {
+        run(dir.path(), &format!("pack {} -o {name}.hum", flight(name).display()), 0);
+        fs::read(dir.path().join(format!("{name}.hum"))).expect("a log")
+    });
+    for (first, second) in [(&one, &other), (&other, &one)] {
+        fs::write(dir.path().join("joined.hum"), [&first[..], second].concat()).expect("written");
+        let (from, to) = (first.len() / BLOCK, (first.len() + second.len()) / BLOCK - 1);
+        let session = u32::from_le_bytes(second[7..11].try_into().expect("four"));
+        let words =
+            format!("sectors {from} to {to} of joined.hum are of another session (session {session:08x})");
+        all_say(dir.path(), "joined.hum", 3, &[&words, "give each by itself"]);
+    }
+    // Segments off a card, with the room behind their sectors.
+    let dir = copied(2, "");
+    let [one, other] = ["00001_00.HUM", "00002_00.HUM"]
+        .map(|name| fs::read(dir.path().join("copied").join(name)).expect("there"));
+    fs::write(dir.path().join("joined.hum"), [&one[..], &other].concat()).expect("written");
+    let from = SEGMENT / BLOCK;
+    all_say(
+        dir.path(),
+        "joined.hum",
+        3,
+        &[&format!("sectors {from} to "), "are of another session (session "],
+    );
+}
+
+#[test]
+fn segments_of_two_boxes_under_one_sessions_name_are_told_by_every_command() {
+    let dir = copied(2, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    fs::rename(at("00002_00.HUM"), at("00001_01.HUM")).expect("renamed");
+    all_say(
+        dir.path(),
+        "copied",
+        3,
+        &["00001_01.HUM has the name of a segment of this log and holds ", "of another session (session "],
+    );
+}
+
+#[test]
+fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
+    let dir = tempfile::tempdir().expect("directory");
+    attempt(
+        dir.path(),
+        &format!(
+            "sim --input {} --sd card.img --cut-after-writes 1000",
+            flight("ap_quad_guided.tlog").display()
+        ),
+    );
+    all_say(dir.path(), "card.img", 3, &["not proved to its end: armed or in the air since "]);
+    // The next start on the card tells what was there: then all of them know.
+    run(dir.path(), "sim --input PX4 --sd card.img", 0);
+    all_say(
+        dir.path(),
+        "card.img",
+        3,
+        &["whole to its end, as the next start found it; armed or in the air since "],
+    );
+}
+
+#[test]
+fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
+    let dir = copied(2, "");
+    let path = dir.path().join("card.img");
+    let image = fs::read(&path).expect("an image");
+    let codes = || -> Vec<i32> {
+        let codes = readers(dir.path(), "card.img --salvage").into_iter();
+        // A report takes no such flag.
+        codes.filter(|(command, ..)| !command.starts_with("report")).map(|(_, code, _)| code).collect()
+    };
+    assert_eq!(codes(), [0; 4]);
+    let entry = |name: &[u8]| image.windows(11).position(|bytes| bytes == name).expect("an entry");
+    // The newest one, as an operating system deletes it: its entry and its chain in the FAT.
+    let at = entry(b"00002_00HUM");
+    let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));
+    let cluster = word(at + 26) & 0xffff | word(at + 20) << 16;
+    let partition = word(446 + 8) as usize * BLOCK;
+    let fat = partition + (word(partition + 14) & 0xffff) as usize * BLOCK;
+    let mut deleted = image.clone();
+    deleted[at] = 0xe5;
+    let mut next = cluster as usize;
+    while next < 0x0fff_fff8 {
+        let following = word(fat + 4 * next) as usize & 0x0fff_ffff;
+        deleted[fat + 4 * next..fat + 4 * next + 4].fill(0);
+        next = following;
+    }
+    fs::write(&path, &deleted).expect("written");
+    all_say(
+        dir.path(),
+        "card.img",
+        3,
+        &["session 00002, which is newer than all that are there, was deleted"],
+    );
+    assert_eq!(codes(), [3; 4]);
+    // All of them: a card that was formatted in haste.
+    let mut wiped = image.clone();
+    for name in [b"00001_00HUM", b"00002_00HUM"] {
+        wiped[entry(name)..entry(name) + 32].fill(0);
+    }
+    fs::write(&path, &wiped).expect("written");
+    all_say(dir.path(), "card.img", 3, &[]);
+    assert_eq!(codes(), [3; 4]);
+}
+
+#[test]
+fn a_pipe_or_a_device_as_a_recording_is_refused_at_once_and_nothing_is_left() {
+    let dir = tempfile::tempdir().expect("directory");
+    let made = std::process::Command::new("mkfifo").arg(dir.path().join("pipe")).status();
+    assert!(made.expect("it runs").success());
+    for line in [
+        "pack /dev/zero -o new.hum",
+        "pack pipe -o new.hum",
+        "sim --input pipe --sd new.img",
+        "sim --input PX4 --gs-input pipe --sd new.img",
+        "sim --input PX4 --sd pipe",
+        "sim --input PX4 --sd new.img --store pipe",
+    ] {
+        let said = run(dir.path(), line, 1);
+        let said = String::from_utf8_lossy(&said.stderr).into_owned();
+        assert!(said.contains("is a pipe") || said.contains("is no file"), "{line}: {said}");
+        let left: Vec<_> = fs::read_dir(dir.path())
+            .expect("a directory")
+            .map(|entry| entry.expect("one").file_name())
+            .collect();
+        assert!(left.iter().all(|name| name == "pipe" || name == "new.img"), "{line}: {left:?}");
+        let _ = fs::remove_file(dir.path().join("new.img"));
+    }
+}
+
+#[test]
+fn the_name_of_a_file_does_not_become_a_folder() {
+    let dir = copied(2, "");
+    for line in
+        ["decode card.img -o out.tlog --format tlog", "decode copied/00001_00.HUM -o out.csv --format csv"]
+    {
+        let said = run(dir.path(), line, 2);
+        assert!(String::from_utf8_lossy(&said.stderr).contains("is the name of a file"), "{line}");
+        assert!(!dir.path().join("out.tlog").exists() && !dir.path().join("out.csv").exists());
+    }
+    run(dir.path(), "decode card.img -o out.tlog/ --format tlog", 0);
+}

@@ -1,0 +1,218 @@
+//! No command writes over any of its inputs, and one module makes files.
+
+use std::fs;
+use std::path::Path;
+
+use clap::{Arg, CommandFactory as _};
+use hums::cli::Cli;
+
+use crate::support::{attempt, contents, furnished, run};
+
+/// What an argument names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// A file or a folder that is only read.
+    Input,
+    /// A file or a folder that is written.
+    Output,
+    /// No file.
+    Other,
+}
+
+/// An argument that is not here fails the test: decide what it names, and the test tries it from then on.
+fn role(arg: &Arg) -> Role {
+    match arg.get_id().as_str() {
+        "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" => Role::Input,
+        "output" | "sd" | "gs" | "tap" | "store" | "dir" | "spool" => Role::Output,
+        "bucket" | "card_out" | "card_size" | "cut_after_writes" | "cut_store_after" | "dashboard"
+        | "format" | "from" | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token"
+        | "message" | "name" | "names" | "noise" | "org" | "provoke" | "reboot_at_us" | "seed"
+        | "session" | "speed" | "spool_limit" | "stall" | "to" | "token" | "value" | "write_error" => {
+            Role::Other
+        }
+        unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
+    }
+}
+
+/// A good value for an argument, where one is needed.
+fn value(command: &str, arg: &str) -> &'static str {
+    match (command, arg) {
+        ("decode" | "report" | "info" | "verify", "inputs") => "log.hum",
+        (_, "input" | "gs_input") => "flight.tlog",
+        (_, "params") => "hums.param",
+        (_, "key") => "key.txt",
+        (_, "firmware") => "hums.elf",
+        (_, "sd") => "new.img",
+        (_, "output") => "new.out",
+        (_, "format") => "tlog",
+        (_, "link") => "tcp:127.0.0.1:1",
+        (_, "dir") => "new",
+        (_, "name" | "names") => "GS_BUDGET",
+        (_, "value") => "1",
+        (command, arg) => panic!("hums {command} needs --{arg}: which value is good?"),
+    }
+}
+
+/// The words of a command line: its name, what it requires, and these arguments.
+fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
+    let mut words_more = Vec::new();
+    let mut words: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
+    let mut push = |arg: &Arg, value: String| {
+        if let Some(long) = arg.get_long() {
+            words.push(format!("--{long}"));
+        }
+        words.push(value);
+    };
+    for arg in command.get_arguments() {
+        let id = arg.get_id();
+        if let Some((_, value)) = given.iter().find(|(given, _)| given.get_id() == id) {
+            push(arg, value.clone());
+            if id == "spool" {
+                // Only with a database do points wait.
+                words_more = ["--influx", "http://127.0.0.1:9"].map(String::from).to_vec();
+            }
+        } else if arg.is_required_set() {
+            push(arg, value(path[0], id.as_str()).to_owned());
+        }
+    }
+    words.extend(words_more);
+    words
+}
+
+/// All commands that do something, with the words that call them.
+fn leaves<'a>(
+    command: &'a clap::Command,
+    path: &[&'a str],
+    found: &mut Vec<(&'a clap::Command, Vec<&'a str>)>,
+) {
+    if command.get_subcommands().next().is_none() {
+        found.push((command, path.to_vec()));
+    }
+    for sub in command.get_subcommands().filter(|sub| sub.get_name() != "help") {
+        let path: Vec<&str> = path.iter().copied().chain([sub.get_name()]).collect();
+        leaves(sub, &path, found);
+    }
+}
+
+#[test]
+fn no_command_writes_over_any_of_its_inputs() {
+    let mut root = Cli::command();
+    root.build();
+    let mut commands = Vec::new();
+    leaves(&root, &[], &mut commands);
+    let dir = furnished();
+    let before = contents(dir.path());
+    let mut tried = Vec::new();
+    for (command, path) in &commands {
+        let takes = |arg: &&Arg| arg.get_action().takes_values();
+        let of = |wanted: Role| -> Vec<&Arg> {
+            command.get_arguments().filter(takes).filter(|arg| role(arg) == wanted).collect()
+        };
+        for output in of(Role::Output) {
+            for input in of(Role::Input) {
+                let file = value(path[0], input.get_id().as_str());
+                let spellings = [
+                    file.to_owned(),
+                    format!("./folder/../{file}"),
+                    format!("link-{file}"),
+                    format!("hard-{file}"),
+                ];
+                for spelling in spellings {
+                    let given = [(input, file.to_owned()), (output, spelling)];
+                    refused(dir.path(), &words(command, path, &given), &before);
+                }
+                if input.get_id() == "inputs" {
+                    let given = [(input, "folder".to_owned()), (output, format!("folder/{file}"))];
+                    refused(dir.path(), &words(command, path, &given), &before);
+                }
+                tried.push(format!("{} --{}", path.join(" "), output.get_id()));
+            }
+        }
+    }
+    tried.dedup();
+    for known in ["decode --output", "report --output", "pack --output", "sim --sd", "sim --gs", "sim --tap"]
+    {
+        assert!(tried.iter().any(|tried| tried == known), "{known} is not among {tried:?}");
+    }
+}
+
+#[track_caller]
+fn refused(dir: &Path, words: &[String], before: &[(String, Vec<u8>)]) {
+    let line = words.join(" ");
+    let output = attempt(dir, &line);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(matches!(output.status.code(), Some(1 | 2)), "hums {line}: {:?}\n{said}", output.status);
+    // Nothing was changed, and nothing was left either.
+    let after = contents(dir);
+    for (name, bytes) in before {
+        let kept = after.iter().find(|(other, _)| other == name);
+        assert!(
+            kept.is_some_and(|(_, kept)| kept == bytes),
+            "hums {line}: {name} is not what it was\n{said}"
+        );
+    }
+    for (name, _) in &after {
+        let made = before.iter().all(|(other, _)| other != name);
+        if made {
+            assert!(name.starts_with("new"), "hums {line}: left {name}\n{said}");
+            let _ = fs::remove_file(dir.join(name));
+        }
+    }
+}
+
+#[test]
+fn an_output_into_an_input_folder_replaces_nothing_there() {
+    let dir = furnished();
+    let before = contents(&dir.path().join("folder"));
+    for line in ["decode folder -o folder --format csv,parquet,thesis,tlog", "report folder -o folder/"] {
+        run(dir.path(), line, 0);
+        let made = contents(&dir.path().join("folder"));
+        // And again: what is there is the same. A tlog that was made is no input, though it is a recording.
+        run(dir.path(), line, 0);
+        assert_eq!(contents(&dir.path().join("folder")), made);
+    }
+    let after = contents(&dir.path().join("folder"));
+    assert!(before.iter().all(|file| after.contains(file)), "every input is what it was");
+    assert!(after.len() > before.len() + 60);
+}
+
+/// Where files may be made, emptied, renamed or removed besides `files/`, and why.
+const MAY_WRITE: [(&str, &str); 4] = [
+    ("card/image.rs", "a simulated card's image is updated in place, as a card is"),
+    ("run/store.rs", "the simulated board's flash is updated in place, as flash is"),
+    ("run/qemu/mod.rs", "files in a temporary directory of its own"),
+    (
+        "live/influx/spool.rs",
+        "a queue that outlives the program, in place; it takes a file of its own kind only",
+    ),
+];
+
+fn is_rust(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension == "rs")
+}
+
+#[test]
+fn one_place_makes_files() {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    for (name, bytes) in contents(&sources).into_iter().filter(|(name, _)| is_rust(name)) {
+        let source = String::from_utf8(bytes).expect("UTF-8");
+        // Tests may do what they like.
+        let source = source.split("#[cfg(test)]").next().unwrap_or_default();
+        let calls = [
+            "File::create",
+            "File::options",
+            "OpenOptions::new",
+            "fs::write",
+            "fs::rename",
+            "fs::copy",
+            "fs::remove",
+            "fs::hard_link",
+        ];
+        let writes = calls.iter().any(|call| source.contains(call));
+        if writes && !name.starts_with("files/") && !MAY_WRITE.iter().any(|(file, _)| *file == name) {
+            found.push(name);
+        }
+    }
+    assert_eq!(found, Vec::<String>::new(), "use `files::Output`, or say here why not");
+}

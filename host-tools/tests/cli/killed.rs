@@ -1,0 +1,173 @@
+//! What a kill, a full disk or an earlier demo leaves.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::support::{attempt, contents, hums, named, px4, run, until};
+
+/// Files and folders that are not whole.
+fn parts(dir: &Path) -> Vec<String> {
+    contents(dir).into_iter().map(|(name, _)| name).filter(|name| name.contains(".hums-part")).collect()
+}
+
+#[test]
+fn a_full_disk_leaves_the_old_file_or_nothing() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let program = env!("CARGO_BIN_EXE_hums");
+    let tlog = px4().display().to_string();
+    fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..4000]).expect("written");
+    for (before, line, output) in [
+        (
+            "decode log.hum -o old --format tlog --message HEARTBEAT",
+            "decode log.hum -o old --format tlog",
+            "old",
+        ),
+        ("decode log.hum -o old --format jsonl --to 0.1", "decode log.hum -o old --format jsonl", "old"),
+        ("report few.tlog -o old", "report log.hum -o old", "old"),
+        ("pack few.tlog -o old", "pack PX4 -o old", "old"),
+        ("", "decode log.hum -o new/ --format tlog", "new"),
+        ("", "decode log.hum -o new --format csv", "new"),
+        ("", "decode log.hum -o new --format thesis", "new"),
+        ("", "decode log.hum -o new --format parquet", "new"),
+    ] {
+        let _ = fs::remove_file(dir.path().join("old"));
+        if !before.is_empty() {
+            attempt(dir.path(), before);
+        }
+        let old = fs::read(dir.path().join("old")).unwrap_or_default();
+        // No file may be longer than 20 KiB: a write beyond that fails as on a full disk.
+        let limited = format!("ulimit -f 20; exec {program} {} --replace", line.replace("PX4", &tlog));
+        let output_of = Command::new("bash").args(["-c", &limited]).current_dir(dir.path()).output();
+        let ended = output_of.expect("it runs");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
+        assert!(said.contains("cannot be written"), "{line}: {said}");
+        assert_eq!(fs::read(dir.path().join("old")).unwrap_or_default(), old, "{line}");
+        assert_eq!(parts(dir.path()), Vec::<String>::new(), "{line}");
+        if output == "new" {
+            let left =
+                if dir.path().join("new").exists() { contents(&dir.path().join("new")) } else { Vec::new() };
+            assert_eq!(left, Vec::new(), "{line}");
+        }
+    }
+    run(dir.path(), "sim --input PX4 --sd card.img --gs /dev/full", 1);
+}
+
+#[test]
+fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
+    let dir = tempfile::tempdir().expect("directory");
+    let (old, part) = (dir.path().join("old.hum"), dir.path().join(".old.hum.hums-part"));
+    fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..4000]).expect("written");
+    run(dir.path(), "pack few.tlog -o old.hum", 0);
+    let before = fs::read(&old).expect("there");
+    let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
+        .args(["pack", "-", "-o", "old.hum", "--replace"])
+        .current_dir(dir.path())
+        .stdin(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    let tlog = fs::read(px4()).expect("a recording");
+    let mut input = program.stdin.take().expect("it is piped");
+    input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
+    until("it writes", || part.metadata().is_ok_and(|about| about.len() > 10_000));
+    // While it is written nobody else writes it.
+    let said = run(dir.path(), "pack PX4 -o old.hum --replace", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("another run of hums is writing it"));
+    program.kill().expect("it is ours");
+    program.wait().expect("it is ours");
+    assert_eq!(fs::read(&old).expect("there"), before);
+    assert!(part.exists());
+    run(dir.path(), "pack PX4 -o old.hum --replace", 0);
+    assert!(!part.exists());
+    run(dir.path(), "verify old.hum", 0);
+}
+
+#[test]
+fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), "decode log.hum -o out --format csv,parquet --message ATTITUDE", 0);
+    let out = dir.path().join("out");
+    let (few, name) = (contents(&out), named(&out, "log"));
+    run(dir.path(), "decode log.hum -o whole --format csv,parquet", 0);
+    let whole = contents(&dir.path().join("whole"));
+    let of = |all: &[(String, Vec<u8>)], start: &str| -> Vec<(String, Vec<u8>)> {
+        let is_of = |file: &&(String, Vec<u8>)| file.0.starts_with(start) && !file.0.contains(".hums-part");
+        all.iter().filter(is_of).cloned().collect()
+    };
+    let mut killed = 0;
+    for after_ms in (0..60).step_by(6) {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))
+            .args(["decode", "log.hum", "-o", "out", "--format", "csv,parquet", "--replace"])
+            .current_dir(dir.path())
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("it runs");
+        std::thread::sleep(Duration::from_millis(after_ms));
+        program.kill().expect("it is ours");
+        killed += u32::from(!program.wait().expect("it is ours").success());
+        let now = contents(&out);
+        for tables in [format!("{name}/"), "vehicle=".to_owned()] {
+            let found = of(&now, &tables);
+            assert!(
+                found == of(&few, &tables) || found == of(&whole, &tables),
+                "{tables} after {after_ms} ms: {:?}",
+                found.iter().map(|(name, bytes)| (name, bytes.len())).collect::<Vec<_>>()
+            );
+        }
+    }
+    assert!(killed > 0);
+    run(dir.path(), "decode log.hum -o out --format csv,parquet --replace", 0);
+    assert_eq!(contents(&out), whole, "and nothing of the killed runs is left");
+}
+
+#[test]
+fn a_demo_removes_what_a_demo_made_and_nothing_else() {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = |name: &str| dir.path().join(name);
+    let demo = |code: i32| -> String {
+        let input = px4().display().to_string();
+        let words = ["demo", "--input", &input, "--dir", ".", "--dashboard", "never"];
+        // Without a path there is no emulator.
+        let ended = hums().current_dir(dir.path()).env("PATH", "").args(words).output().expect("it runs");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(code), "{said}");
+        said
+    };
+    for name in ["card.img", "report.html"] {
+        fs::write(at(name), "evidence").expect("written");
+        assert!(demo(1).contains("no demo made it"));
+        assert_eq!(fs::read(at(name)).expect("there"), b"evidence");
+        fs::remove_file(at(name)).expect("removed");
+    }
+    demo(0);
+    let made = contents(dir.path());
+    // What the user puts beside it stays.
+    let tables = at("decoded").join(named(&at("decoded"), "00001"));
+    for path in [at("mine.tlog"), at("decoded/mine.csv")] {
+        fs::write(path, "mine").expect("written");
+    }
+    demo(0);
+    for path in [at("mine.tlog"), at("decoded/mine.csv")] {
+        assert_eq!(fs::read(&path).expect("there"), b"mine");
+        fs::remove_file(path).expect("removed");
+    }
+    assert!(contents(dir.path()) == made, "a demo is the same again");
+    // What was changed, or put among the tables, ends it before anything is removed.
+    for (path, why) in [
+        (tables.join("mine.csv"), "is among the demo's tables"),
+        (tables.join("HEARTBEAT.csv"), "was changed since the demo made it"),
+        (at("card.img"), "was changed since the demo made it"),
+    ] {
+        let was = fs::read(&path).ok();
+        fs::write(&path, "evidence").expect("written");
+        let before = contents(dir.path());
+        assert!(demo(1).contains(why), "{}", path.display());
+        assert!(contents(dir.path()) == before, "{}", path.display());
+        was.map_or_else(|| fs::remove_file(&path), |was| fs::write(&path, was)).expect("as it was");
+    }
+}
