@@ -388,3 +388,32 @@ impl BlocksJson {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stranger_is_named_by_box_and_session() {
+        let others = Others {
+            sectors: 300,
+            first: 400,
+            last: 699,
+            session: 0x1a2b_3c4d,
+            board: Some([0x3f; 12]),
+            several: false,
+        };
+        let strange = |hollow| Ending {
+            files: vec!["00001_00.HUM".to_owned()],
+            summary: Summary {
+                strange: vec![Strange { file: 0, hollow, others: Some(others) }],
+                ..Summary::default()
+            },
+            ..Ending::default()
+        };
+        let [joined, hollow] = [false, true].map(|hollow| strange(hollow).strange().join(""));
+        let whom = "of another session (box 3f3f3f3f3f3f3f3f3f3f3f3f, session 1a2b3c4d)";
+        assert!(joined.starts_with(&format!("sectors 400 to 699 of 00001_00.HUM are {whom}: ")), "{joined}");
+        assert!(hollow.ends_with(&format!("holds 300 sectors {whom}")), "{hollow}");
+    }
+}

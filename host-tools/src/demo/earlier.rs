@@ -40,6 +40,8 @@ pub(super) struct Place<'a> {
     inputs: &'a Inputs,
     /// What lies in the decoded folder and stays there.
     others: BTreeSet<PathBuf>,
+    /// What this demo has made so far, with its hash.
+    made: BTreeMap<String, String>,
 }
 
 impl<'a> Place<'a> {
@@ -61,20 +63,29 @@ impl<'a> Place<'a> {
         if mark.exists() {
             Output::remove(&mark, inputs)?;
         }
-        Ok(Self { dir, inputs, others: files(&dir.join(DECODED))? })
+        Ok(Self { dir, inputs, others: files(&dir.join(DECODED))?, made: BTreeMap::new() })
     }
 
-    /// Writes down what this demo made.
-    pub(super) fn note(&self) -> Result<()> {
-        let single = [CARD, GROUND_STATION, REPORT].map(|name| self.dir.join(name));
-        let decoded = files(&self.dir.join(DECODED))?;
-        let made = single.into_iter().filter(|path| path.is_file()).chain(&decoded - &self.others);
+    /// Writes down that this demo made the tables.
+    pub(super) fn note_tables(&mut self) -> Result<()> {
+        let tables = &files(&self.dir.join(DECODED))? - &self.others;
+        let named: Vec<_> = tables
+            .iter()
+            .filter_map(|path| Some((path.strip_prefix(self.dir).ok()?.to_str()?, path.as_path())))
+            .collect();
+        self.note(&named)
+    }
+
+    /// Writes down that this demo makes these files, and where they are now: before they have their names.
+    pub(super) fn note(&mut self, files: &[(&str, &Path)]) -> Result<()> {
+        for (name, path) in files {
+            self.made.insert((*name).to_owned(), hash(path)?);
+        }
         let mut mark =
             Output::create(&self.dir.join(MARK), &self.inputs.clone().replacing(true), &KIND, None)?;
         let mut text = HEAD.to_owned();
-        for path in made {
-            let Some(name) = path.strip_prefix(self.dir).ok().and_then(Path::to_str) else { continue };
-            text = text + &hash(&path)? + " " + name + "\n";
+        for (name, hash) in &self.made {
+            text = text + hash + " " + name + "\n";
         }
         settle(mark.write_all(text.as_bytes()), mark.path())?;
         mark.finish()

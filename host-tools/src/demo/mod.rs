@@ -11,7 +11,7 @@ use anyhow::{Result, bail};
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
-use crate::files::{Inputs, make_directory};
+use crate::files::{InPlacePart, Inputs, make_directory};
 use crate::logs;
 use crate::outcome::Outcome;
 use crate::output::line;
@@ -35,9 +35,14 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     let mut inputs = Inputs::none();
     inputs.add_endpoint(&flight);
     // Each demo begins with an empty card.
-    let place = earlier::Place::clear(&args.dir, &inputs)?;
+    let mut place = earlier::Place::clear(&args.dir, &inputs)?;
     line(&format!("1. {flight} goes in at the autopilot UART"))?;
-    let recorded = record(&flight, &card, &gs)?;
+    // A demo that is killed while it records leaves a part, which the next one removes.
+    let parts = [InPlacePart::begin(&card)?, InPlacePart::begin(&gs)?];
+    let [card_part, gs_part] = parts.each_ref().map(InPlacePart::path);
+    let recorded = record(&flight, card_part, gs_part)?;
+    place.note(&[(earlier::CARD, card_part), (earlier::GROUND_STATION, gs_part)])?;
+    parts.into_iter().try_for_each(InPlacePart::finish)?;
     line("")?;
     line("2. what was on the SD card")?;
     let arguments = cli::Decode {
@@ -51,10 +56,11 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
         replace: false,
     };
     let read = decode::run(&arguments)?;
+    place.note_tables()?;
     let page_of =
         cli::Report { inputs: vec![card.clone()], output: page.clone(), session: None, replace: false };
     report::run(&page_of)?;
-    place.note()?;
+    place.note(&[(earlier::REPORT, &page)])?;
     line("")?;
     line("3. what it says of the flight")?;
     for log in &logs::find(std::slice::from_ref(&card), false)?.logs {

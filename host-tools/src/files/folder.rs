@@ -18,7 +18,7 @@ use super::identity::without_links;
 use super::inputs::Inputs;
 use super::part::{is_written, lock, part_of, sync_folder_of};
 use super::paths::{cannot_write, make_parent, settle};
-use super::stamp::{STAMP, Stamp};
+use super::stamp::{STAMP, Stamp, foreign};
 use super::there::There;
 use crate::outcome::Differs;
 
@@ -249,7 +249,7 @@ fn may_be_replaced(path: &Path, inputs: &Inputs) -> Result<bool> {
 /// Refuses a folder with files in it that we did not make.
 fn check_ours(path: &Path) -> Result<()> {
     let stamp = Stamp::of(path).unwrap_or_default();
-    match stamp.foreign(path).with_context(|| cannot_write(path))? {
+    match foreign(path, |name| stamp.has(name)).with_context(|| cannot_write(path))? {
         Some(name) => bail!(
             "{}: has {name}, which hums did not make, and is not replaced; move that file, or name another output \
              with -o",
@@ -262,33 +262,24 @@ fn check_ours(path: &Path) -> Result<()> {
 /// Removes a folder that has our files only.
 fn remove_ours(folder: &Path) -> io::Result<()> {
     let stamp = Stamp::of(folder).unwrap_or_default();
-    match stamp.foreign(folder)? {
-        Some(name) => Err(io::Error::other(format!("{name} in it was not made by hums"))),
-        None => remove_all(folder),
-    }
+    remove(folder, |name| stamp.has(name))
 }
 
-/// Removes what a run has left that was killed or has failed: its stamp names no file yet.
+/// Removes what a run has left that was killed or has failed: its stamp may name no file yet.
 fn remove_part(folder: &Path) -> io::Result<()> {
     if folder.is_symlink() {
         return fs::remove_file(folder);
     }
-    if Stamp::of(folder).is_some_and(|stamp| !stamp.files.is_empty()) {
-        return remove_ours(folder);
-    }
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        let ours =
-            name == STAMP || EXTENSIONS.iter().any(|extension| name.ends_with(&format!(".{extension}")));
-        if !ours || !entry.file_type()?.is_file() {
-            return Err(io::Error::other(format!("{name} in it was not made by hums")));
-        }
-    }
-    remove_all(folder)
+    let stamp = Stamp::of(folder).filter(|stamp| !stamp.files.is_empty());
+    let is_table = |name: &str| EXTENSIONS.iter().any(|extension| name.ends_with(&format!(".{extension}")));
+    remove(folder, |name| stamp.as_ref().map_or(name == STAMP || is_table(name), |stamp| stamp.has(name)))
 }
 
-fn remove_all(folder: &Path) -> io::Result<()> {
+/// Removes a folder in which all is ours.
+fn remove(folder: &Path, is_ours: impl Fn(&str) -> bool) -> io::Result<()> {
+    if let Some(name) = foreign(folder, is_ours)? {
+        return Err(io::Error::other(format!("{name} in it was not made by hums")));
+    }
     for entry in fs::read_dir(folder)? {
         fs::remove_file(entry?.path())?;
     }

@@ -74,6 +74,33 @@ pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Res
     made.map(|()| file)
 }
 
+/// A file that is made in place under the name of a part, and gets its own once it is whole: a card on which a demo
+/// records.
+#[derive(Debug)]
+pub struct InPlacePart {
+    part: PathBuf,
+    target: PathBuf,
+}
+
+impl InPlacePart {
+    /// Removes what a killed run has left.
+    pub fn begin(target: &Path) -> Result<Self> {
+        let part = part_of(target)?;
+        remove_stale(&part, target)?;
+        Ok(Self { part, target: target.to_owned() })
+    }
+
+    /// Where it is made.
+    pub fn path(&self) -> &Path {
+        &self.part
+    }
+
+    /// It is whole.
+    pub fn finish(self) -> Result<()> {
+        rename_new(&self.part, &self.target).with_context(|| cannot_write(&self.target))
+    }
+}
+
 /// Removes a file that a killed run has left, unless somebody writes it.
 pub(super) fn remove_stale(part: &Path, target: &Path) -> Result<()> {
     if !part.is_symlink() {

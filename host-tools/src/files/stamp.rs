@@ -52,16 +52,20 @@ impl Stamp {
         file.write_all(text.as_bytes())
     }
 
-    /// The first entry of the folder that we did not make.
-    pub(super) fn foreign(&self, folder: &Path) -> io::Result<Option<String>> {
-        for entry in fs::read_dir(folder)? {
-            let entry = entry?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let ours = name == STAMP || self.files.contains(&name);
-            if !ours || !entry.file_type()?.is_file() {
-                return Ok(Some(name));
-            }
-        }
-        Ok(None)
+    /// Whether a file of this name is ours.
+    pub(super) fn has(&self, name: &str) -> bool {
+        name == STAMP || self.files.contains(name)
     }
+}
+
+/// The first entry of a folder that is not ours.
+pub(super) fn foreign(folder: &Path, is_ours: impl Fn(&str) -> bool) -> io::Result<Option<String>> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if !is_ours(&name) || !entry.file_type()?.is_file() {
+            return Ok(Some(name));
+        }
+    }
+    Ok(None)
 }

@@ -126,6 +126,29 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
 }
 
 #[test]
+fn a_demo_that_was_killed_is_in_the_next_ones_way_nowhere() {
+    let dir = tempfile::tempdir().expect("directory");
+    let input = px4().display().to_string();
+    let demo = || {
+        let mut demo = Command::new(env!("CARGO_BIN_EXE_hums"));
+        // Without a path there is no emulator.
+        demo.current_dir(dir.path()).env("PATH", "").stdout(Stdio::null()).stderr(Stdio::null());
+        demo.args(["demo", "--input", &input, "--dir", ".", "--dashboard", "never"]);
+        demo
+    };
+    // Killed while it records.
+    for after_ms in [0, 20, 40] {
+        let mut killed = demo().spawn().expect("it runs");
+        until("it begins", || dir.path().join(".card.img.hums-part").exists());
+        std::thread::sleep(Duration::from_millis(after_ms));
+        killed.kill().expect("it is ours");
+        killed.wait().expect("it is ours");
+    }
+    assert!(demo().status().expect("it runs").success());
+    assert_eq!(parts(dir.path()), Vec::<String>::new());
+}
+
+#[test]
 fn a_demo_removes_what_a_demo_made_and_nothing_else() {
     let dir = tempfile::tempdir().expect("directory");
     let at = |name: &str| dir.path().join(name);
