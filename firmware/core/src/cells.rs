@@ -44,18 +44,20 @@ pub enum Setting {
     Low = 3,
     /// When it is critical.
     Critical = 4,
+    /// Not of the cells: its capacity, mAh.
+    Capacity = 5,
 }
 
-const SETTINGS: usize = 5;
+const SETTINGS: usize = 6;
 
 /// What a cell has at these settings, V: from, to.
-const CELL_V: [(f32, f32); SETTINGS] = [(0.0, 0.0), (4.08, 4.4), (2.7, 3.75), (3.25, 3.8), (2.9, 3.7)];
+const CELL_V: [(f32, f32); SETTINGS - 1] = [(0.0, 0.0), (4.08, 4.4), (2.7, 3.75), (3.25, 3.8), (2.9, 3.7)];
 
-/// A parameter of the autopilot that says something of a battery's cells: who has it, its name, of which battery, and what.
+/// A parameter of the autopilot that says something of a battery: who has it, its name, of which battery, and what.
 pub type Known = (bool, &'static str, u8, Setting);
 
 /// All of them; `true`: PX4's.
-pub const KNOWN: [Known; 13] = [
+pub const KNOWN: [Known; 17] = [
     (true, "BAT1_N_CELLS", 0, Setting::Count),
     (true, "BAT2_N_CELLS", 1, Setting::Count),
     (true, "BAT_N_CELLS", 0, Setting::Count),
@@ -69,6 +71,10 @@ pub const KNOWN: [Known; 13] = [
     (false, "BATT_CRT_VOLT", 0, Setting::Critical),
     (false, "BATT2_LOW_VOLT", 1, Setting::Low),
     (false, "BATT2_CRT_VOLT", 1, Setting::Critical),
+    (true, "BAT1_CAPACITY", 0, Setting::Capacity),
+    (true, "BAT2_CAPACITY", 1, Setting::Capacity),
+    (false, "BATT_CAPACITY", 0, Setting::Capacity),
+    (false, "BATT2_CAPACITY", 1, Setting::Capacity),
 ];
 
 /// The place in [`KNOWN`] of a parameter's name.
@@ -190,6 +196,19 @@ impl Cells {
     /// How many; 0 where it is not known.
     pub(crate) fn of(&self, battery: usize) -> u8 {
         self.packs.get(battery).map_or(0, |pack| pack.count)
+    }
+
+    /// Of all batteries that were heard, by the autopilot's parameters, Ah; 0 where it is not known of each.
+    pub(crate) fn capacity_ah(&self) -> f32 {
+        let heard = self.packs.iter().filter(|pack| pack.highest_v > 0.0);
+        let each = heard.map(|pack| {
+            self.settings.get(usize::from(pack.id)).map_or(0.0, |of| of[Setting::Capacity as usize] / 1_000.0)
+        });
+        each.fold(None, |sum: Option<f32>, ah| {
+            Some(if ah > 0.0 { sum.unwrap_or(0.0) + ah } else { f32::NAN })
+        })
+        .filter(|sum| sum.is_finite())
+        .unwrap_or(0.0)
     }
 
     /// Whether a voltage was heard of this battery.
@@ -316,6 +335,22 @@ mod tests {
         cells.remember(0, 0);
         cells.take_setting(0, 6.0);
         assert_eq!(cells.of(0), 6);
+    }
+
+    #[test]
+    fn the_capacity_is_known_where_it_is_told_of_each_battery() {
+        let set = |cells: &mut Cells, name: &str, mah| cells.take_setting(known(name).unwrap(), mah);
+        let mut cells = plugged(16.8);
+        assert!(cells.capacity_ah().abs() < f32::EPSILON);
+        set(&mut cells, "BATT_CAPACITY", 5_200.0);
+        set(&mut cells, "BATT2_CAPACITY", 3_300.0);
+        assert!((cells.capacity_ah() - 5.2).abs() < 1e-4, "no second one is there");
+        cells.take_voltage(1, 1, 16.8, true, false);
+        assert!((cells.capacity_ah() - 8.5).abs() < 1e-4);
+        // PX4's -1: not known.
+        set(&mut cells, "BAT2_CAPACITY", -1.0);
+        assert!(cells.capacity_ah().abs() < f32::EPSILON);
+        assert_eq!(cells.of(0), 4, "it says nothing of the cells");
     }
 
     #[test]

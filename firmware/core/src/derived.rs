@@ -9,10 +9,15 @@ use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
 use crate::trend::{Rate, Resistance};
+use crate::units::MetresPerSecond2;
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const GRAVITY: f32 = 9.806_65;
+/// No sensor that autopilots have measures more than 32 g an axis: beyond this it is garbage.
+const LOAD_MAX_G: f32 = 60.0;
+/// So much of a cell's voltage may be its sag under the load, V. A cell that sags further is near its end, whatever its charge.
+const SAG_MAX_V: f32 = 0.3;
 /// A motor that never turned faster is not fitted.
 const TURNING_RPM: f32 = 100.0;
 /// An ESC is silent when it misses this many of its own intervals.
@@ -140,9 +145,8 @@ impl Derived {
         self.hear(at);
         match observation {
             Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
-                if let Some([x, y, z]) = imu.acceleration {
-                    let norm = libm::sqrtf(x.0 * x.0 + y.0 * y.0 + z.0 * z.0);
-                    self.load_factor.set(at, norm / GRAVITY);
+                if let Some(load_g) = imu.acceleration.and_then(load_factor_g) {
+                    self.load_factor.set(at, load_g);
                 }
             }
             Observation::Gnss(gnss) => {
@@ -153,10 +157,15 @@ impl Derived {
             Observation::Battery(battery) => {
                 self.take_voltages(vehicle, flight);
                 if let Some(index) = vehicle.told_battery {
-                    self.resistance[index].take(battery);
+                    self.resistance[index].take(battery.voltage, battery.current);
                 }
             }
-            Observation::SystemStatus(_) => self.take_voltages(vehicle, flight),
+            Observation::SystemStatus(system) => {
+                self.take_voltages(vehicle, flight);
+                if vehicle.batteries[0].get().is_none() {
+                    self.resistance[0].take(system.voltage, system.current);
+                }
+            }
             Observation::Parameter(place, value) => self.cells.take_setting(*place, *value),
             Observation::Escs(group) => {
                 let first = usize::from(group.first);
@@ -279,7 +288,8 @@ impl Derived {
         self.cells.of(battery)
     }
 
-    /// The lowest cell's voltage where cells are measured, the pack's share of it otherwise.
+    /// The lowest cell's voltage where cells are measured, the pack's share of it otherwise; what it would be without its sag
+    /// under the load, as far as that is known.
     pub(crate) fn cell_voltage(&self, vehicle: &Vehicle, params: &Params, battery: u8) -> Option<Reading> {
         let index = usize::from(battery);
         let slot = vehicle.batteries.get(index)?;
@@ -295,7 +305,17 @@ impl Derived {
             let cells = self.cell_count(vehicle, index, params);
             pack_v(vehicle, index).filter(|_| cells > 0).map(|pack_v| pack_v / f32::from(cells))
         };
-        Reading::new(at, lowest.or_else(share))
+        Reading::new(at, lowest.or_else(share).map(|cell_v| cell_v + self.sag_v(vehicle, index, params)))
+    }
+
+    /// How far the load makes a cell's voltage sag; [`SAG_MAX_V`] at most.
+    fn sag_v(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> f32 {
+        let known = vehicle.batteries.get(battery).and_then(Latest::get);
+        let system = || vehicle.system.get().and_then(|system| system.current);
+        let current = known.map_or_else(system, |known| known.current);
+        let cells = f32::from(self.cell_count(vehicle, battery, params).max(1));
+        let sag_v = self.resistance.get(battery).zip(current).map_or(0.0, |(of, current)| of.sag_v(current));
+        (sag_v / cells).min(SAG_MAX_V)
     }
 
     /// Seconds since an ESC last told speed or current, once it has missed some of its own intervals; 0 before. Up to when the
@@ -430,6 +450,16 @@ impl Derived {
     pub fn turns(vehicle: &Vehicle, motor: usize) -> bool {
         vehicle.motors.get(motor).and_then(|motor| motor.esc.rpm).is_some_and(|rpm| rpm.0.abs() > TURNING_RPM)
     }
+}
+
+/// The specific force in units of gravity; `None` where it was not measured.
+pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
+    Some(norm(force.map(|axis| axis.0)) / GRAVITY).filter(|load_g| *load_g <= LOAD_MAX_G)
+}
+
+/// How long a vector is.
+pub(crate) fn norm([x, y, z]: [f32; 3]) -> f32 {
+    libm::sqrtf(x * x + y * y + z * z)
 }
 
 /// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.

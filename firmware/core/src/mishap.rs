@@ -10,6 +10,7 @@
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
 //! | disarmed in the air | disarmed above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
+//! | | 10 m below its highest since it has had nearly full throttle, where the autopilot has it | on wings |
 //!
 //! ```text
 //!        seen in a flight            it lies still, or 10 s after disarming
@@ -22,59 +23,41 @@
 //! What is seen while armed but not in a flight (on the bench) is told as [`Change::OnBench`], once for each arming.
 
 mod evidence;
+mod sight;
 mod told;
 
 pub use told::{Change, Kind, Place, Report};
 
-use crate::derived::GRAVITY;
 use crate::flight::{Flight, climb_mps, ground_speed_mps, height_m};
 use crate::latest::Reading;
-use crate::observation::{Autopilot, LandedState, Observation, VehicleKind};
+use crate::observation::{LandedState, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
-use crate::units::{MetresPerSecond2, RadiansPerSecond};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use evidence::{
-    Doubt, Lasting, Recent, Shock, has_pilots_throttle, is_known, is_made_to_turn, is_tilted, on_rotors,
+    BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, is_known,
+    is_tilted, on_rotors, throttle,
 };
 
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);
 /// A vehicle that still flies so long after the last thing seen goes on with its flight.
 const RECOVERED: Span = Span::from_secs(5);
-/// Below this load factor nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.
-const FALL_G: f32 = 0.3;
-/// A vehicle that was disarmed and is carried by less than this falls.
-const UNCARRIED_G: f32 = 0.5;
-/// Tumbling and sinking last so long at least.
-const TUMBLES: Span = Span::from_millis(500);
-const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
-const SINKS: Span = Span::from_millis(500);
 /// A shock stops something that was this fast.
 const IMPACT_MPS: f32 = 4.0;
-/// It has broken off when it is below this part of it within [`BREAKS_OFF`].
-const BROKEN_OFF: f32 = 0.4;
-const BREAKS_OFF: Span = Span::from_secs(1);
 /// It is still for [`STILL`] within this time after a shock.
 const AFTER_SHOCK: Span = Span::from_secs(4);
 const STILL: Span = Span::from_secs(1);
 const STILL_MPS: f32 = 1.0;
 const STILL_RATE: f32 = 0.3;
+/// Rotors pull upwards; what is carried so from above lies on its back.
+const ON_BACK_G: f32 = 0.5;
 /// How long it is seen whether what was disarmed falls.
 const FALL_SHOWS: Span = Span::from_secs(3);
 const FALLEN_M: f32 = 2.0;
 /// What was disarmed and moves so fast is in the air: sinking, and on wings over ground.
 const FALLING_MPS: f32 = 2.5;
 const GLIDING_MPS: f32 = 8.0;
-/// Below this part of the throttle that it hovers with, a fall is what the throttle asks for.
-const THRUST_PART: f32 = 0.5;
-/// Below this throttle nothing flies; above [`FULL_THROTTLE`] nobody asks to sink, and what is still does not fly.
-const IDLE_THROTTLE: f32 = 0.1;
-const FULL_THROTTLE: f32 = 0.9;
-/// Time constant of the throttle that it hovers with.
-const HOVER_S: f32 = 10.0;
-/// Older values decide nothing.
-const FRESH: Span = Span::from_secs(2);
 
 /// What becomes of the flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,6 +102,11 @@ pub struct Mishap {
     /// The fastest sink that broke off in this mishap.
     touch_mps: f32,
     load_g: f32,
+    /// What it is carried with from above, which rotors cannot: it lies on its back.
+    from_above_g: f32,
+    pressure: Pressure,
+    /// Its greatest height since it has had all its thrust, m.
+    peak_m: f32,
     rate: f32,
     /// The last height above home while it was armed.
     height_m: f32,
@@ -155,6 +143,9 @@ impl Mishap {
             sink: Recent::NOTHING,
             touch_mps: 0.0,
             load_g: 1.0,
+            from_above_g: 0.0,
+            pressure: Pressure::NOTHING,
+            peak_m: f32::NEG_INFINITY,
             rate: 0.0,
             height_m: 0.0,
             hover_throttle: 0.0,
@@ -201,151 +192,9 @@ impl Mishap {
                 attitude.at().filter(|_| rates.is_some_and(|rates| is_known(rates.map(|rate| rate.0))))
             }
             Kind::Disarmed => heartbeat.at(),
-            Kind::Sinking => climb_mps(now, vehicle).filter(|_| rotors).map(|_| now),
+            Kind::Sinking => climb_mps(now, vehicle).map(|_| now),
         };
         Reading::new(at.filter(|_| vehicle.kind() != VehicleKind::Surface), Some(0.0))
-    }
-
-    /// Takes an observation that the vehicle took.
-    pub(crate) fn observe(
-        &mut self,
-        at: Instant,
-        vehicle: &Vehicle,
-        observation: &Observation,
-        params: &Params,
-    ) {
-        let watched = self.armed || self.disarmed_at.is_some_and(|since| at.since(since) <= WATCHED);
-        if !watched || vehicle.kind() == VehicleKind::Surface {
-            return;
-        }
-        match observation {
-            Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
-                if let Some(acceleration) = imu.acceleration {
-                    self.take_force(at, acceleration, vehicle, params);
-                }
-                if let Some(rates) = imu.rate {
-                    self.take_rates(at, rates, vehicle, params);
-                }
-            }
-            Observation::Attitude(attitude) => {
-                if let Some(rates) = attitude.rates {
-                    self.take_rates(at, rates, vehicle, params);
-                }
-            }
-            Observation::GlobalPosition(_) | Observation::LocalPosition(_) => {
-                self.take_motion(at, vehicle, params);
-            }
-            Observation::Hud(_) => self.take_throttle(at, vehicle),
-            _ => {}
-        }
-    }
-
-    fn see(&mut self, at: Instant, kind: Kind, value: f32) {
-        let worst = &mut self.worst[kind as usize];
-        *worst = worst.max(value);
-        self.seen.get_or_insert(kind);
-        if let State::Going(last) = &mut self.state {
-            *last = at;
-        }
-    }
-
-    fn take_force(&mut self, at: Instant, force: [MetresPerSecond2; 3], vehicle: &Vehicle, params: &Params) {
-        let [x, y, z] = force.map(|axis| axis.0);
-        let load_g = libm::sqrtf(x * x + y * y + z * z) / GRAVITY;
-        // A sensor that says the same again, or nothing but zeros, is no sensor that flies.
-        if !load_g.is_finite() || load_g == 0.0 || load_g.to_bits() == self.load_g.to_bits() {
-            return;
-        }
-        self.load_g = load_g;
-        let falls = load_g < FALL_G && on_rotors(at, vehicle) && self.asks_for_thrust(at, vehicle);
-        let least_s = params.get(Param::MisFallTime);
-        if let Some(span) = self.falls.take(at, falls)
-            && span.as_secs_f32() >= least_s
-        {
-            self.see(at, Kind::FreeFall, span.as_secs_f32().max(least_s.next_up()));
-        }
-        self.uncarried.take(at, load_g < UNCARRIED_G && self.doubt.is_some());
-        if load_g > params.get(Param::MisImpact) {
-            let before = self.shock.filter(|shock| at.since(shock.at) <= BREAKS_OFF);
-            let shock = before.unwrap_or(Shock {
-                at,
-                load_g,
-                speed_mps: self.speed.greatest(),
-                sink_mps: self.sink.greatest(),
-                stopped: false,
-            });
-            self.shock = Some(Shock { load_g: shock.load_g.max(load_g), ..shock });
-            if matches!(self.state, State::Going(_)) {
-                self.see(at, Kind::Impact, load_g);
-            }
-        }
-    }
-
-    fn take_rates(&mut self, at: Instant, rates: [RadiansPerSecond; 3], vehicle: &Vehicle, params: &Params) {
-        let [x, y, z] = rates.map(|rate| rate.0);
-        let rate = libm::sqrtf(x * x + y * y + z * z);
-        if !rate.is_finite() {
-            return;
-        }
-        self.rate = rate;
-        let rate_dps = rate.to_degrees();
-        let tumbles = rate_dps > params.get(Param::MisTumble) && !is_made_to_turn(vehicle);
-        let least = if on_rotors(at, vehicle) { TUMBLES } else { TUMBLES_ON_WINGS };
-        if self.tumbles.take(at, tumbles).is_some_and(|span| span >= least) {
-            self.see(at, Kind::Tumbling, rate_dps);
-        }
-    }
-
-    fn take_motion(&mut self, at: Instant, vehicle: &Vehicle, params: &Params) {
-        let (Some(climb_mps), Some(ground_mps)) = (climb_mps(at, vehicle), ground_speed_mps(at, vehicle))
-        else {
-            return;
-        };
-        let speed_mps = libm::sqrtf(climb_mps * climb_mps + ground_mps * ground_mps);
-        if let Some(shock) = &mut self.shock
-            && at.since(shock.at) <= BREAKS_OFF
-        {
-            shock.stopped |= speed_mps < BROKEN_OFF * shock.speed_mps;
-        }
-        self.speed.take(at, speed_mps);
-        if vehicle.armed() {
-            self.height_m = height_m(at, vehicle).unwrap_or(0.0);
-        }
-        // What breaks off in a mishap is the touch.
-        if -climb_mps < BROKEN_OFF * self.sink.greatest() && matches!(self.state, State::Going(_)) {
-            self.touch_mps = self.touch_mps.max(self.sink.greatest());
-        }
-        self.sink.take(at, -climb_mps);
-        let limit_mps = params.get(Param::MisSink);
-        let throttle = vehicle.hud.within(at, FRESH).and_then(|hud| hud.throttle).map(|throttle| throttle.0);
-        let told_to =
-            has_pilots_throttle(vehicle) && throttle.is_none_or(|throttle| throttle < FULL_THROTTLE);
-        let sinks = -climb_mps > limit_mps && on_rotors(at, vehicle) && !told_to && self.armed;
-        if self.sinks.take(at, sinks).is_some_and(|span| span >= SINKS) {
-            self.see(at, Kind::Sinking, -climb_mps);
-        }
-    }
-
-    /// The throttle that it hovers with, smoothed.
-    fn take_throttle(&mut self, at: Instant, vehicle: &Vehicle) {
-        let throttle = vehicle.hud.get().and_then(|hud| hud.throttle).map_or(0.0, |throttle| throttle.0);
-        let hovers = climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < 1.0);
-        if hovers && throttle > IDLE_THROTTLE && self.state == State::Quiet {
-            let weight = if self.hover_throttle > 0.0 { 0.25 / HOVER_S } else { 1.0 };
-            self.hover_throttle += weight * (throttle - self.hover_throttle);
-        }
-    }
-
-    /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.
-    fn asks_for_thrust(&self, at: Instant, vehicle: &Vehicle) -> bool {
-        const THROW: u32 = 18;
-        let throttle = vehicle.hud.within(at, FRESH).and_then(|hud| hud.throttle);
-        let least = (THRUST_PART * self.hover_throttle).max(IDLE_THROTTLE);
-        let thrown = vehicle
-            .heartbeat
-            .get()
-            .is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot && heartbeat.mode == THROW);
-        !thrown && throttle.is_none_or(|throttle| throttle.0 > least)
     }
 
     /// One step, at least every 50 ms, before the flight's own.
@@ -424,14 +273,23 @@ impl Mishap {
     fn note_rest(&mut self, now: Instant, vehicle: &Vehicle) {
         let speed_mps =
             ground_speed_mps(now, vehicle).unwrap_or(0.0).max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
-        // Of what was disarmed, or has hit something, the sensors are believed and not the estimate.
+        // Of what was disarmed, lies on its back or has hit something, the sensors are believed and not the estimate.
         let slow = speed_mps < STILL_MPS
             || (!self.armed && on_rotors(now, vehicle))
+            || self.lies_on_its_back(vehicle)
             || (self.worst[Kind::Impact as usize] > 0.0 && self.rate < STILL_RATE / 3.0);
         let still = slow && self.rate < STILL_RATE && (0.7..1.3).contains(&self.load_g);
         self.still_since = if still { self.still_since.or(Some(now)) } else { None };
-        let flies = self.armed && speed_mps > 2.0 * STILL_MPS && !is_tilted(vehicle);
+        // What is carried home may be armed still, and no motor turns.
+        let thrust =
+            !on_rotors(now, vehicle) || throttle(now, vehicle).is_none_or(|part| part > IDLE_THROTTLE);
+        let lies = is_tilted(vehicle) || self.lies_on_its_back(vehicle);
+        let flies = self.armed && speed_mps > 2.0 * STILL_MPS && !lies && thrust;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
+    }
+
+    fn lies_on_its_back(&self, vehicle: &Vehicle) -> bool {
+        vehicle.is_multicopter() && self.from_above_g > ON_BACK_G
     }
 
     fn is_still(&self, now: Instant) -> bool {
@@ -462,7 +320,8 @@ impl Mishap {
             return;
         }
         let hit = (shock.speed_mps >= IMPACT_MPS && shock.stopped)
-            || (on_rotors(now, vehicle) && is_tilted(vehicle));
+            || (on_rotors(now, vehicle) && is_tilted(vehicle))
+            || self.lies_on_its_back(vehicle);
         let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
         if hit && rests && self.is_idle(now, vehicle) {
             self.touch_mps = self.touch_mps.max(shock.sink_mps);
@@ -473,11 +332,11 @@ impl Mishap {
 
     /// Whether what is still does not hang in the air: disarmed, on the ground, on its side, without throttle or with all of it.
     fn is_idle(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        let throttle = vehicle.hud.within(now, FRESH).and_then(|hud| hud.throttle);
         !self.armed
             || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
             || is_tilted(vehicle)
-            || throttle.is_some_and(|throttle| !(IDLE_THROTTLE..FULL_THROTTLE).contains(&throttle.0))
+            || self.lies_on_its_back(vehicle)
+            || throttle(now, vehicle).is_some_and(|part| !(IDLE_THROTTLE..FULL_THROTTLE).contains(&part))
     }
 
     fn goes(&mut self, now: Instant, last: Instant, vehicle: &Vehicle) -> Option<Change> {
@@ -488,7 +347,7 @@ impl Mishap {
             || (long && silent)
             || self.disarmed_at.is_some_and(|since| !self.armed && now.since(since) >= WATCHED);
         if down {
-            self.state = State::Down;
+            (self.state, self.flies_since) = (State::Down, None);
             self.touch_mps = self.touch_mps.max(self.sink.greatest());
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);

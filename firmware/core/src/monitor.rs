@@ -157,7 +157,7 @@ impl Monitor {
         let event = self.step_flight(now);
         self.derived.step(now, &self.vehicle, event, recorder);
         self.step_trends(now, event);
-        self.usage.step(now, &self.vehicle, &self.flight, event, &self.params);
+        self.usage.step(now, &self.vehicle, &self.flight, event, &self.derived, &self.params);
         self.step_wear();
         let inputs = Inputs {
             now,

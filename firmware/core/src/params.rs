@@ -89,9 +89,9 @@ params! {
     VibePx4Crit "VIBE_PX4_CRIT" "m/s2" 9.81 0.0 500.0 "PX4 Flight Review: accelerometer metric, red";
     ClipWarn "CLIP_WARN" "" 10.0 1.0 100_000.0 "samples without ten calm seconds between: one or a few are a gust or a touch";
     ClipCrit "CLIP_CRIT" "" 100.0 1.0 100_000.0 "ArduPilot vibration guide: more than 100";
-    LoadFacWarn "LOAD_FAC_WARN" "g" 2.5 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
-    LoadFacCrit "LOAD_FAC_CRIT" "g" 4.0 1.0 20.0 "airframe; CS-23 utility limit is 4.4";
-    EkfVarWarn "EKF_VAR_WARN" "" 0.5 0.0 10.0 "ArduPilot EKF failsafe, half way";
+    LoadFacWarn "LOAD_FAC_WARN" "g" 3.8 1.0 20.0 "by airframe; the limit of CS-23 for the normal category";
+    LoadFacCrit "LOAD_FAC_CRIT" "g" 4.4 1.0 20.0 "by airframe; the limit of CS-23 for the utility category";
+    EkfVarWarn "EKF_VAR_WARN" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8: above it an innovation is not believed";
     EkfVarCrit "EKF_VAR_CRIT" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8 on two of three";
     EkfRatioWarn "EKF_RATIO_WARN" "" 0.5 0.0 10.0 "PX4 innovation test ratio, half way";
     EkfRatioCrit "EKF_RATIO_CRIT" "" 1.0 0.0 10.0 "PX4: a ratio above 1 rejects the sensor";
@@ -138,7 +138,7 @@ params! {
     StateCrit "AP_STATE_CRIT" "" 4.5 0.0 10.0 "MAV_STATE: 5 is critical, 6 emergency";
     SensorsWarn "AP_SENSORS_WARN" "" 0.5 0.0 32.0 "sensors that SYS_STATUS calls unhealthy";
     HardLanding "HARD_LANDING" "m/s" 2.0 0.1 20.0 "four times ArduPilot's LAND_SPEED of 0.5 m/s";
-    BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: not known";
+    BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: as the autopilot has it (BATT_CAPACITY, BAT1_CAPACITY)";
     GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
     TrdVibeWarn "TRD_VIBE_WARN" "%" 50.0 0.0 10_000.0 "steady vibration above its baseline; off from 10,000";
     TrdVibeCrit "TRD_VIBE_CRIT" "%" 150.0 0.0 10_000.0 "steady vibration above its baseline";

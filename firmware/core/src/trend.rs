@@ -1,7 +1,7 @@
 //! Slow figures: a battery's internal resistance against its own past, and rates of counters that wrap.
 
-use crate::observation::Battery;
 use crate::time::Instant;
+use crate::units::{Amperes, Volts};
 
 /// A battery's internal resistance: the slope of its voltage over its current, from means that forget slowly.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +14,8 @@ pub(crate) struct Resistance {
     samples: u16,
     /// What later figures are compared with, ohm; 0 before there is one.
     baseline_ohm: f32,
+    /// The last figure from a large change of the current, ohm; 0 before there is one.
+    sag_ohm: f32,
 }
 
 impl Resistance {
@@ -28,6 +30,10 @@ impl Resistance {
     const SAMPLES_MIN: u16 = 120;
     /// Samples before the figure is the baseline of this session.
     const SAMPLES_BASELINE: u16 = 480;
+    /// A figure from a large change: this many samples, and a spread of the current of this part of its mean. A voltage that
+    /// falls for another reason (a cell that fails) comes without such a change.
+    const SAMPLES_SAG: u16 = 20;
+    const SPREAD_SAG: f32 = 0.2;
 
     /// Nothing known.
     pub(crate) const fn new() -> Self {
@@ -39,12 +45,13 @@ impl Resistance {
             covariance_va: 0.0,
             samples: 0,
             baseline_ohm: 0.0,
+            sag_ohm: 0.0,
         }
     }
 
     /// Takes what the battery says.
-    pub(crate) fn take(&mut self, battery: &Battery) {
-        let (Some(voltage), Some(current)) = (battery.voltage, battery.current) else { return };
+    pub(crate) fn take(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
+        let (Some(voltage), Some(current)) = (voltage, current) else { return };
         let (voltage_v, current_a) = (voltage.0, current.0);
         if !voltage_v.is_finite() || !current_a.is_finite() {
             return;
@@ -63,12 +70,25 @@ impl Resistance {
         if self.baseline_ohm == 0.0 && self.samples >= Self::SAMPLES_BASELINE {
             self.baseline_ohm = self.ohm().unwrap_or(0.0);
         }
+        let spread_a = Self::SPREAD_SAG * self.current_a;
+        if self.samples >= Self::SAMPLES_SAG && self.variance_a2 >= spread_a * spread_a {
+            self.sag_ohm = self.slope_ohm().unwrap_or(self.sag_ohm);
+        }
+    }
+
+    /// By how much this current makes the voltage sag, volts; 0 while that is not known.
+    pub(crate) fn sag_v(&self, current: Amperes) -> f32 {
+        let sag_v = self.sag_ohm * current.0;
+        if sag_v.is_finite() { sag_v.max(0.0) } else { 0.0 }
     }
 
     /// In ohm; `None` while the current has not varied enough to tell.
     pub(crate) fn ohm(&self) -> Option<f32> {
-        let enough = self.samples >= Self::SAMPLES_MIN
-            && self.variance_a2 >= Self::VARIANCE_MIN_A2
+        self.slope_ohm().filter(|_| self.samples >= Self::SAMPLES_MIN)
+    }
+
+    fn slope_ohm(&self) -> Option<f32> {
+        let enough = self.variance_a2 >= Self::VARIANCE_MIN_A2
             && self.covariance_va * self.covariance_va
                 >= Self::EXPLAINED_MIN * self.variance_a2 * self.variance_v2;
         let ohm = -self.covariance_va / self.variance_a2;
@@ -148,12 +168,7 @@ mod tests {
         for sample in 0..samples {
             let current = if sample / 5 % 2 == 0 { 10.0 } else { 20.0 };
             let voltage = 16.0 - ohm * current - 0.0005 * sample as f32;
-            let battery = Battery {
-                voltage: Some(Volts(voltage)),
-                current: Some(Amperes(current)),
-                ..Battery::default()
-            };
-            resistance.take(&battery);
+            resistance.take(Some(Volts(voltage)), Some(Amperes(current)));
         }
     }
 
@@ -170,9 +185,7 @@ mod tests {
     #[test]
     fn a_steady_current_says_nothing_about_resistance() {
         let mut resistance = Resistance::new();
-        let battery =
-            Battery { voltage: Some(Volts(15.0)), current: Some(Amperes(12.0)), ..Battery::default() };
-        (0..1_000).for_each(|_| resistance.take(&battery));
+        (0..1_000).for_each(|_| resistance.take(Some(Volts(15.0)), Some(Amperes(12.0))));
         assert_eq!((resistance.ohm(), resistance.rise_percent()), (None, None));
     }
 
@@ -182,14 +195,23 @@ mod tests {
         for sample in 0..1_000_u16 {
             let current = 12.0 + f32::from(sample * 7 % 10);
             let voltage = if sample < 600 { 12.6 } else { 11.0 };
-            let battery = Battery {
-                voltage: Some(Volts(voltage)),
-                current: Some(Amperes(current)),
-                ..Battery::default()
-            };
-            resistance.take(&battery);
+            resistance.take(Some(Volts(voltage)), Some(Amperes(current)));
             assert_eq!(resistance.rise_percent(), None, "sample {sample}");
         }
+    }
+
+    #[test]
+    fn the_sag_of_a_take_off_is_known_for_the_flight_and_a_failing_cell_is_no_sag() {
+        let mut resistance = Resistance::new();
+        let mut take = |volts, amperes, samples| {
+            (0..samples).for_each(|_| resistance.take(Some(Volts(volts)), Some(Amperes(amperes))));
+            resistance.sag_v(Amperes(amperes))
+        };
+        assert!(take(16.0, 0.4, 60).abs() < f32::EPSILON, "nothing changed yet");
+        assert!((take(14.6, 12.4, 60) - 1.44).abs() < 0.1, "1.4 V at 12 A more");
+        assert!((take(14.6, 12.4, 1_000) - 1.44).abs() < 0.1, "still known in a steady hover");
+        // A cell fails, and a third of it is taken by a current that rises by a tenth.
+        assert!((take(13.0, 13.6, 600) - 1.58).abs() < 0.1);
     }
 
     #[test]

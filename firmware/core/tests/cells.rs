@@ -8,7 +8,7 @@ use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level};
 use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Lifetime};
-use hums_core::observation::{Battery, Feeds, Observation};
+use hums_core::observation::{Battery, Feeds, Observation, SystemStatus};
 use hums_core::params::{Param, Params};
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
@@ -33,11 +33,17 @@ impl Outcome {
 
 /// A hundred seconds with a pack that has so many volts at rest, and then so many.
 fn fly(monitor: &mut Monitor, resting_v: f32, empty_v: f32, more: &[Observation]) -> Outcome {
+    fly_with(monitor, |now_ms| (if now_ms < EMPTY_MS { resting_v } else { empty_v }, 20.0), more)
+}
+
+/// A hundred seconds with a pack that has these volts and gives these amperes at each time.
+fn fly_with(monitor: &mut Monitor, pack: impl Fn(u64) -> (f32, f32), more: &[Observation]) -> Outcome {
     let mut outcome = Outcome::default();
     for now_ms in (0..100_000).step_by(50) {
         let now = Instant::from_millis(now_ms);
         let mut quad = Quad::healthy();
-        quad.battery.voltage = Some(Volts(if now_ms < EMPTY_MS { resting_v } else { empty_v }));
+        let (pack_v, pack_a) = pack(now_ms);
+        (quad.battery.voltage, quad.battery.current) = (Some(Volts(pack_v)), Some(Amperes(pack_a)));
         if now_ms.is_multiple_of(100) {
             for observation in quad.says(now_ms).iter().chain(more) {
                 monitor.observe(now, AUTOPILOT, observation);
@@ -139,4 +145,44 @@ fn what_the_autopilot_calls_low_is_low_without_any_count() {
     let found: Vec<_> = outcome.findings.iter().map(|finding| (finding.check, finding.level)).collect();
     assert_eq!(found, [("batt_state", Level::Warning)]);
     assert!(monitor.params().get(Param::BatCells) == 0.0);
+}
+
+#[test]
+fn a_pack_that_sags_under_its_load_is_not_empty_until_its_cells_are() {
+    // 0.13 ohm, as a small pack's: 16.1 V at rest, 14.3 V in hover, and in the end 13.7 V: 3.4 V a cell, 3.8 without the load.
+    let sags = |now_ms: u64| match now_ms {
+        0..10_000 => (16.1, 0.4),
+        10_000..EMPTY_MS => (14.3, 14.0),
+        _ => (13.7, 14.0),
+    };
+    assert!(fly_with(&mut Monitor::new(protected()), sags, &[]).findings.is_empty());
+    // However much is sag, 3.1 V are too little.
+    let outcome = fly_with(
+        &mut Monitor::new(protected()),
+        |now_ms| if now_ms < EMPTY_MS { sags(now_ms) } else { (12.4, 14.0) },
+        &[],
+    );
+    assert_eq!(outcome.cells(), [(0, Level::Critical)]);
+    // A cell that fails under an even load is no sag.
+    let fails = |now_ms: u64| if now_ms < EMPTY_MS { (15.6, 14.0) } else { (13.7, 15.0) };
+    assert_eq!(fly_with(&mut Monitor::new(protected()), fails, &[]).cells(), [(0, Level::Critical)]);
+    // Where no battery reports itself, the autopilot's figures tell it as well.
+    let mut monitor = Monitor::new(protected());
+    let mut outcome = Vec::new();
+    for now_ms in (0..100_000).step_by(100) {
+        let now = Instant::from_millis(now_ms);
+        let (pack_v, pack_a) = sags(now_ms);
+        let system = SystemStatus {
+            voltage: Some(Volts(pack_v)),
+            current: Some(Amperes(pack_a)),
+            ..Quad::healthy().system
+        };
+        let said = Quad { system, ..Quad::healthy() }.says(now_ms);
+        for observation in said.iter().filter(|said| !matches!(said, Observation::Battery(_))) {
+            monitor.observe(now, AUTOPILOT, observation);
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &Quad::healthy().recorder, &mut |finding| outcome.push(*finding));
+    }
+    assert_eq!(outcome, []);
 }

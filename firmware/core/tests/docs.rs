@@ -18,7 +18,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("batt_remaining", "BATTERY_STATUS; SYS_STATUS where no battery reports itself"),
     (
         "cell_voltage",
-        "BATTERY_STATUS: the lowest cell, or the pack by its cells; SYS_STATUS likewise; armed and lithium",
+        "BATTERY_STATUS: the lowest cell, or the pack by its cells, without the sag of its load; SYS_STATUS likewise; armed and lithium",
     ),
     ("batt_state", "BATTERY_STATUS: charge_state; 1 low or unhealthy, 2 critical, emergency or failed"),
     ("cell_deviation", "BATTERY_STATUS: highest less lowest cell"),
@@ -49,7 +49,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("vibration_trend", "VIBRATION in steady flight, above its baseline"),
     ("airframe_due", "components of kind airframe, other"),
     ("ekf_variance", "EKF_STATUS_REPORT: the largest variance"),
-    ("ekf_failsafe", "EKF_STATUS_REPORT: the second largest of compass, velocity, position"),
+    ("ekf_failsafe", "EKF_STATUS_REPORT: the second largest of compass, velocity, position; not of planes"),
     ("ekf_test_ratio", "ESTIMATOR_STATUS: the largest test ratio"),
     ("gps_satellites", "GPS_RAW_INT, GPS2_RAW"),
     ("gps_hdop", "GPS_RAW_INT, GPS2_RAW"),
@@ -88,7 +88,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("disarmed_in_air", "HEARTBEAT: disarmed out of a flight, and then it falls, sinks or glides"),
     (
         "sinking",
-        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; on rotors",
+        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; on wings a loss of 10 m with full throttle",
     ),
 ];
 

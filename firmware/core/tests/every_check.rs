@@ -106,7 +106,7 @@ const FAULTS: [(&str, u8, Level, Fault); 54] = [
     }),
     ("clipping", 0, Level::Critical, |quad, _| quad.vibration.clips = [200; 3]),
     ("load_factor", 0, Level::Critical, |quad, _| quad.acceleration_down = -45.0),
-    ("ekf_variance", 0, Level::Warning, |quad, _| quad.estimator.compass = Some(0.7)),
+    ("ekf_variance", 0, Level::Warning, |quad, _| quad.estimator.compass = Some(0.9)),
     ("ekf_failsafe", 0, Level::Critical, |quad, _| {
         (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(0.9));
     }),

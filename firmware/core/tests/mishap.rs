@@ -8,12 +8,14 @@ use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::mishap::{Change, Kind, Place, Report};
 use hums_core::observation::{
-    Attitude, Autopilot, GlobalPosition, Imu, LandedState, Observation, VehicleKind, VtolState,
+    Air, Attitude, Autopilot, GlobalPosition, Imu, LandedState, Observation, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::{MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond};
+use hums_core::units::{
+    Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
+};
 use hums_core::usage::UsageCounter;
 
 /// When it goes wrong.
@@ -26,9 +28,12 @@ struct Motion {
     rates: [f32; 3],
     ground_mps: f32,
     pitch: f32,
+    /// What the barometer says; where it says anything.
+    pressure_hpa: Option<f32>,
 }
 
-const CALM: Motion = Motion { load_g: 1.0, rates: [0.01, 0.02, 0.0], ground_mps: 0.1, pitch: 0.02 };
+const CALM: Motion =
+    Motion { load_g: 1.0, rates: [0.01, 0.02, 0.0], ground_mps: 0.1, pitch: 0.02, pressure_hpa: None };
 
 type Script = fn(u64, &mut Quad, &mut Motion);
 
@@ -90,7 +95,10 @@ fn fly(vehicle: &Quad, script: Script) -> Outcome {
                     Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_)
                 )
             });
-            for said in said.chain([Observation::Attitude(attitude), Observation::GlobalPosition(global)]) {
+            let air = Air { pressure: motion.pressure_hpa.map(Hectopascals), ..Air::default() };
+            let own =
+                [Observation::Air(air), Observation::Attitude(attitude), Observation::GlobalPosition(global)];
+            for said in said.chain(own) {
                 monitor.observe(now, AUTOPILOT, &said);
             }
         }
@@ -315,6 +323,102 @@ fn sinking_is_a_mishap_where_the_autopilot_flies_and_not_where_the_pilot_asks_fo
     }
     for of in WINGS {
         assert!(fly(&on_wings(of), sinks).told().is_empty(), "{of:?}");
+    }
+}
+
+#[test]
+fn an_estimator_that_does_not_believe_itself_makes_no_mishap_unless_the_air_agrees() {
+    // It shakes, climbs by the air, and lands hard and safe while the estimator says that it falls.
+    let shaken: Script = |ms, quad, motion| {
+        let seconds = ms as f32 / 1_000.0;
+        motion.pressure_hpa = Some(1_000.0 - if ms < 6_000 { 0.4 * seconds } else { 2.4 });
+        quad.estimator.velocity = Some(1.5);
+        quad.climb = if (1_500..7_900).contains(&ms) { -10.0 } else { 0.0 };
+        if ms >= 8_000 {
+            motion.load_g = if ms < 8_100 { 4.0 } else { 1.0 };
+            (quad.throttle, motion.rates) = (0.0, [0.0; 3]);
+        }
+    };
+    for of in ROTORS {
+        assert!(fly(&hovering(of), shaken).told().is_empty(), "{of:?}");
+        let sinks = fly(&hovering(of), |ms, quad, motion| {
+            motion.pressure_hpa = Some(1_000.0 + if ms < 2_000 { ms as f32 / 1_000.0 } else { 2.0 });
+            (quad.estimator.velocity, quad.climb) = (Some(1.5), if ms < 2_000 { -8.0 } else { 0.0 });
+        });
+        assert_eq!(sinks.told(), ["sinking"], "{of:?}");
+    }
+}
+
+#[test]
+fn what_is_made_for_falling_is_not_told() {
+    let autorotation: Script = |ms, quad, _| {
+        if ms < 5_000 {
+            (quad.climb, quad.throttle) = (-10.0, 0.0);
+        }
+    };
+    let helicopter = Quad { mode: 26, ..hovering((Autopilot::ArduPilot, VehicleKind::Rotorcraft, 4)) };
+    let thrown = Quad { mode: 18, ..hovering(ROTORS[0]) };
+    for quad in [helicopter, thrown] {
+        assert!(fly(&quad, autorotation).told().is_empty(), "{}", quad.mode);
+    }
+}
+
+#[test]
+fn a_plane_that_sinks_with_all_its_thrust_is_told_and_a_glide_is_not() {
+    let pulls_out: Script = |ms, quad, motion| {
+        sinks_with_thrust(ms, quad, motion);
+        motion.load_g = if (5_000..5_500).contains(&ms) { 4.0 } else { 1.0 };
+    };
+    let glides: Script = |ms, quad, motion| {
+        sinks_with_thrust(ms, quad, motion);
+        quad.throttle = 0.0;
+    };
+    for of in WINGS {
+        let outcome = fly(&on_wings(of), pulls_out);
+        assert_eq!(outcome.told(), ["sinking"], "{of:?}");
+        let (began_ms, _) = outcome.changes[0];
+        assert!((AT_MS + 3_000..AT_MS + 4_000).contains(&began_ms), "{of:?}: {began_ms}");
+        assert_eq!(outcome.flights(), (1, 0, 0), "{of:?}: it flies on");
+        assert!(fly(&on_wings(of), glides).told().is_empty(), "{of:?}");
+        let pilots_mode = if of.0 == Autopilot::Px4 { 0x0001_0000 } else { 5 };
+        let dives = Quad { mode: pilots_mode, ..on_wings(of) };
+        assert!(fly(&dives, sinks_with_thrust).told().is_empty(), "{of:?}: the pilot dives");
+    }
+}
+
+fn sinks_with_thrust(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    motion.ground_mps = 8.0;
+    if ms < 8_000 {
+        (quad.climb, quad.throttle, quad.height) = (-3.4, 1.0, 60.0 - 3.4 * ms as f32 / 1_000.0);
+    }
+}
+
+#[test]
+fn a_quad_that_lies_on_its_back_has_crashed_whatever_its_estimator_says() {
+    let acro = Quad { mode: 1, landed: None, ..hovering(ROTORS[0]) };
+    let outcome = fly(&acro, |ms, quad, motion| {
+        if ms < 1_000 {
+            (motion.load_g, motion.rates) = (5.0, [12.0, 3.0, 0.0]);
+        } else {
+            // The estimator goes on falling, the throttle stick is where it was.
+            (motion.load_g, motion.rates, quad.climb) = (-1.0, [0.0; 3], -12.0);
+            (quad.height, quad.throttle) = (3.0 - ms as f32 / 100.0, 0.4);
+        }
+    });
+    assert_eq!(outcome.told(), ["impact"]);
+    assert_eq!(outcome.flights(), (1, 0, 1), "{:?}", outcome.changes);
+}
+
+#[test]
+fn a_wreck_that_is_carried_home_armed_flies_no_more() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            fall(ms, quad, motion);
+            if ms >= 8_000 {
+                (motion.ground_mps, motion.rates, quad.height) = (3.0, [0.4, 0.5, 0.2], 1.5);
+            }
+        });
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
     }
 }
 

@@ -135,7 +135,7 @@ pub struct Asking {
     groups: Option<usize>,
     identity: Message,
     /// Parameters that were not told yet, a bit each by their place.
-    parameters: u16,
+    parameters: u32,
 }
 
 impl Default for Asking {

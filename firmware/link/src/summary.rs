@@ -11,7 +11,7 @@
 use hums_core::Monitor;
 use hums_core::health::Subsystem;
 use hums_core::health::{self, Finding, Level};
-use hums_core::observation::Source;
+use hums_core::observation::{Feeds, Source};
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
 use hums_core::usage::UsageCounter;
@@ -380,19 +380,26 @@ fn urgency(finding: &Finding) -> u8 {
     }
 }
 
-/// A finding in words a pilot understands, for instance `HUMS: battery low 14.9 % (limit 15)`.
+/// A finding in words a pilot understands, for instance `HUMS: battery low 14.9 % (limit 15)`, or of a battery that does not
+/// keep the vehicle up `HUMS: payload battery low #2 14.9 %`.
 pub fn text(finding: &Finding) -> Text {
     let words = health::words(finding.check);
+    let of = match finding.feeds {
+        Feeds::Vehicle => "",
+        Feeds::Avionics => "avionics ",
+        Feeds::Payload => "payload ",
+    };
     let number = finding.instance + 1;
     let Finding { value, limit, unit, .. } = *finding;
     // Room is for what tells something.
     let digits = if value.abs() < 1_000.0 { 2 } else { 0 };
     match (finding.level, health::instances(finding.check)) {
         (Level::Ok, 0 | 1) => Text::new(format_args!("HUMS: ok again: {words}")),
-        (Level::Ok, _) => Text::new(format_args!("HUMS: ok again: {words} #{number}")),
+        (Level::Ok, _) => Text::new(format_args!("HUMS: ok again: {of}{words} #{number}")),
         (Level::Stale, 0 | 1) => Text::new(format_args!("HUMS: no data: {words}")),
-        (Level::Stale, _) => Text::new(format_args!("HUMS: no data: {words} #{number}")),
+        (Level::Stale, _) => Text::new(format_args!("HUMS: no data: {of}{words} #{number}")),
         (_, 0 | 1) => Text::new(format_args!("HUMS: {words} {value:.digits$} {unit} (limit {limit})")),
+        _ if !of.is_empty() => Text::new(format_args!("HUMS: {of}{words} #{number} {value:.digits$} {unit}")),
         _ => Text::new(format_args!("HUMS: {words} #{number} {value:.digits$} {unit} (limit {limit})")),
     }
 }

@@ -13,6 +13,10 @@
 //!            good for `clear`                 heard again           |
 //!       \-----------------------------------------------------------/
 //! ```
+//!
+//! A value that goes up and down is one thing and not one each time: [`CLEAR`] grows eightfold with each level that it rises to
+//! again, up to [`CLEAR_MAX`], until the check no longer applies (the vehicle landed, or was disarmed). So does the time after
+//! which a bad value is stale: a stream that is slower than values stay fresh is no new alarm with each message.
 
 use core::num::NonZeroU32;
 
@@ -81,6 +85,14 @@ pub struct Check {
 /// How long a value must be good before the level falls, so that a value at its limit does not flicker.
 pub const CLEAR: Span = Span::from_secs(2);
 
+/// The longest that it must be good, once it was bad again twice.
+pub const CLEAR_MAX: Span = Span::from_secs(128);
+
+/// The same for checks that apply on the ground too: they have no end of a flight to begin anew at.
+pub const CLEAR_MAX_ALWAYS: Span = Span::from_secs(16);
+
+const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_millis());
+
 /// Measurements that have to be bad, one after the other: one message of nonsense is no alarm.
 pub const SAMPLES: u8 = 2;
 
@@ -126,6 +138,53 @@ impl Stamp {
     }
 }
 
+/// Two counts up to 15 in a byte.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Samples(u8);
+
+impl Samples {
+    const NONE: Self = Self(0);
+    const BAD: u8 = 0;
+    const VERY_BAD: u8 = 4;
+
+    /// Counts measurements that are bad one after the other; whether there were enough.
+    fn count(&mut self, which: u8, bad: bool, measured: bool) -> bool {
+        let before = self.0 >> which & 0xF;
+        let count = if bad { (before + u8::from(measured || before == 0)).min(0xF) } else { 0 };
+        self.0 = self.0 & !(0xF << which) | count << which;
+        count >= SAMPLES
+    }
+}
+
+/// How often a level was reached again, and the worst one that was reached, since the check began to apply; in a byte.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Repeats(u8);
+
+impl Repeats {
+    const NONE: Self = Self(0);
+    const MOST: u32 = 2;
+
+    const fn count(self) -> u32 {
+        self.0 as u32 & 3
+    }
+
+    /// Eightfold for each.
+    fn grown(self, span: Span) -> Span {
+        Span::from_millis(span.as_millis() << (3 * self.count()))
+    }
+
+    fn note(&mut self, previous: Level, level: Level) {
+        let rank = |level| match level {
+            Level::Warning => 1,
+            Level::Critical => 2,
+            _ => 0,
+        };
+        let (rank, worst) = (if rank(level) > rank(previous) { rank(level) } else { 0 }, self.0 >> 2);
+        let again = u32::from(rank > 0 && rank <= worst);
+        self.0 = (self.count() + again).min(Self::MOST) as u8 | worst.max(rank) << 2;
+    }
+}
+
 /// The memory of one instance of a check.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct State {
@@ -134,8 +193,8 @@ pub struct State {
     /// What it does not fall below, while levels are held: a warning or a critical level.
     held: Option<Level>,
     /// Measurements in a row beyond the warning's limit, and beyond the critical one.
-    bad_samples: u8,
-    very_bad_samples: u8,
+    samples: Samples,
+    repeats: Repeats,
     bad: Stamp,
     very_bad: Stamp,
     better: Stamp,
@@ -164,8 +223,8 @@ impl State {
         Self {
             level: None,
             held: None,
-            bad_samples: 0,
-            very_bad_samples: 0,
+            samples: Samples::NONE,
+            repeats: Repeats::NONE,
             bad: Stamp::NONE,
             very_bad: Stamp::NONE,
             better: Stamp::NONE,
@@ -202,10 +261,10 @@ impl State {
         let seen = reading.map_or(self.seen, |reading| Stamp::at(reading.at.min(now)));
         let measured = core::mem::replace(&mut self.seen, seen) != seen;
         // A value that was measured once and no longer is grows old like one whose message stops.
-        if check.stale_after.is_some_and(|limit| self.seen.older_than(now, limit)) {
+        if self.stale_after(check).is_some_and(|limit| self.seen.older_than(now, limit)) {
             // Measurements that were bad still count: a stream may be slower than values stay fresh.
-            let Self { level, bad_samples, very_bad_samples, seen, .. } = *self;
-            *self = Self { level, bad_samples, very_bad_samples, seen, ..Self::new() };
+            let Self { level, samples, repeats, seen, .. } = *self;
+            *self = Self { level, samples, repeats, seen, ..Self::new() };
             return self.go(Level::Stale, f32::NAN, f32::NAN);
         }
         self.judge(check, now, reading?.value, measured, params)
@@ -241,6 +300,22 @@ impl State {
         change
     }
 
+    /// How long it must be good before the level falls.
+    fn clear(&self, check: &Check) -> Span {
+        let most = if check.when == When::Always { CLEAR_MAX_ALWAYS } else { CLEAR_MAX };
+        self.repeats.grown(CLEAR).min(most)
+    }
+
+    /// How old the value may be. What is bad, and came back as bad after a pause of its stream, is given longer.
+    fn stale_after(&self, check: &Check) -> Option<Span> {
+        match self.level {
+            Some(Level::Warning | Level::Critical) => {
+                check.stale_after.map(|limit| self.repeats.grown(limit))
+            }
+            _ => check.stale_after,
+        }
+    }
+
     /// `measured`: the value was measured since the last step, and not only held.
     fn judge(
         &mut self,
@@ -258,12 +333,12 @@ impl State {
             Side::Above => value > limit - margin,
             Side::Below => value < limit + margin,
         };
-        let very_bad = count(&mut self.very_bad_samples, beyond(critical, 0.0), measured)
+        let very_bad = self.samples.count(Samples::VERY_BAD, beyond(critical, 0.0), measured)
             & self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical);
         // Without a warning limit there is no warning on the way to critical.
         let warned = beyond(warn, 0.0) || (!warn.is_nan() && beyond(critical, 0.0));
-        let bad =
-            count(&mut self.bad_samples, warned, measured) & self.bad.run(warned, now, check.debounce_warn);
+        let bad = self.samples.count(Samples::BAD, warned, measured)
+            & self.bad.run(warned, now, check.debounce_warn);
         let undecided = self.bad.is_set() || self.very_bad.is_set();
 
         let held = match level {
@@ -271,7 +346,7 @@ impl State {
             Level::Warning => beyond(warn, check.hysteresis) || beyond(critical, check.hysteresis),
             _ => false,
         };
-        let better = self.better.run(!held, now, CLEAR);
+        let better = self.better.run(!held, now, self.clear(check));
         let next = if very_bad || (level == Level::Critical && !better) {
             Level::Critical
         } else if bad || (level == Level::Warning && !better) {
@@ -293,15 +368,10 @@ impl State {
         if previous == level {
             return None;
         }
+        self.repeats.note(previous, level);
         self.better = Stamp::NONE;
         Some(Change { level, previous, value, limit })
     }
-}
-
-/// Counts measurements that are bad one after the other; whether there were enough.
-fn count(samples: &mut u8, bad: bool, measured: bool) -> bool {
-    *samples = if bad { samples.saturating_add(u8::from(measured || *samples == 0)) } else { 0 };
-    *samples >= SAMPLES
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! A finding: one check changed its level. The numbers and names here are stored in logs and never change meaning.
 
+use crate::observation::Feeds;
 use crate::time::Instant;
 
 /// How bad it is. The numbers are stored in logs.
@@ -130,6 +131,8 @@ pub struct Finding {
     pub limit: f32,
     /// The unit of both, for instance `V`, `%`, `degC`; empty for a plain number.
     pub unit: &'static str,
+    /// Of a battery: what it feeds.
+    pub feeds: Feeds,
 }
 
 #[cfg(test)]

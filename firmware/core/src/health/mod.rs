@@ -21,7 +21,7 @@ mod structure;
 mod tables;
 mod vocabulary;
 
-pub use check::{CLEAR, Check, Side, State, When};
+pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
 pub use tables::{checks, instances, words};
@@ -100,6 +100,7 @@ impl Health {
                 value: change.value,
                 limit: change.limit,
                 unit: check.unit,
+                feeds: power::feeds(check, inputs, instance),
             };
             exceedances.change(place, check.side, &finding);
             findings(&finding);

@@ -5,7 +5,7 @@ use super::common::STALE;
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::latest::Reading;
-use crate::observation::{Estimator, EstimatorScale, Gnss};
+use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
 use crate::params::Param;
 use crate::time::Span;
 use crate::vehicle::RECEIVERS_MAX;
@@ -43,12 +43,16 @@ const GNSS: Check = Check {
 pub(super) const CHECKS: &[Check] = &[
     ESTIMATOR,
     Check {
-        // ArduPilot's failsafe wants two of compass, velocity and position beyond the limit.
+        // ArduPilot's failsafe wants two of compass, velocity and position beyond the limit; where nothing hovers there is none:
+        // a plane flies on by its airspeed.
         name: "ekf_failsafe",
         words: "EKF failing",
         warn: None,
         critical: Some(Param::EkfVarCrit),
-        read: |inputs, _| estimator(inputs, EstimatorScale::Variance, second_largest),
+        read: |inputs, _| {
+            let reading = estimator(inputs, EstimatorScale::Variance, second_largest);
+            reading.filter(|_| inputs.vehicle.kind() != VehicleKind::Plane)
+        },
         ..ESTIMATOR
     },
     Check {

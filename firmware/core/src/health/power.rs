@@ -4,7 +4,8 @@ use super::check::{Check, Side, When};
 use super::common::{STALE, STALE_SLOW, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
-use crate::latest::Reading;
+use crate::latest::{Latest, Reading};
+use crate::observation::Feeds;
 use crate::params::Param;
 use crate::time::Span;
 use crate::vehicle::BATTERIES_MAX;
@@ -163,6 +164,13 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check { name: "battery_due", words: "battery due", ..due(Subsystem::Power) },
 ];
+
+/// What the battery feeds that a check is of.
+pub(super) fn feeds(check: &Check, inputs: &Inputs<'_>, instance: u8) -> Feeds {
+    let of_battery = check.subsystem == Subsystem::Power && check.instances == BATTERIES;
+    let slot = inputs.vehicle.batteries.get(usize::from(instance)).filter(|_| of_battery);
+    slot.and_then(Latest::get).map_or(Feeds::Vehicle, |battery| battery.feeds)
+}
 
 /// A battery's own figure; the autopilot's only where no battery reports itself (it is ambiguous with several).
 fn remaining_percent(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {

@@ -1,6 +1,7 @@
 //! What a mishap is seen by: how long something lasts, what was greatest of late, what the vehicle hangs on and who flies it.
 
-use crate::observation::{Autopilot, VehicleKind};
+use crate::observation::{Autopilot, EstimatorScale, Heartbeat, VehicleKind};
+use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
 
@@ -8,6 +9,15 @@ use crate::vehicle::Vehicle;
 const SAMPLES: u8 = 3;
 /// 45 degrees: what rests at a greater tilt than that does not fly.
 const TILTED_RAD: f32 = 0.785;
+
+/// Older values decide nothing.
+pub(super) const FRESH: Span = Span::from_secs(2);
+/// A speed has broken off when it is below this part of it within [`BREAKS_OFF`].
+pub(super) const BROKEN_OFF: f32 = 0.4;
+pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
+/// Below this throttle nothing flies; above [`FULL_THROTTLE`] nobody asks to sink, and what is still does not fly.
+pub(super) const IDLE_THROTTLE: f32 = 0.1;
+pub(super) const FULL_THROTTLE: f32 = 0.9;
 
 /// How long something has been so, and in how many samples.
 #[derive(Clone, Copy, Debug)]
@@ -57,12 +67,52 @@ impl Recent {
     }
 }
 
+/// The air pressure of one to two seconds ago, and of now.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pressure {
+    before_hpa: f32,
+    began_hpa: f32,
+    now_hpa: f32,
+    window: Instant,
+}
+
+impl Pressure {
+    const WINDOW: Span = Span::from_secs(1);
+    pub(super) const NOTHING: Self =
+        Self { before_hpa: 0.0, began_hpa: 0.0, now_hpa: 0.0, window: Instant::ZERO };
+
+    pub(super) fn take(&mut self, at: Instant, hpa: f32) {
+        if at.since(self.window) >= Self::WINDOW {
+            (self.before_hpa, self.began_hpa, self.window) = (self.began_hpa, hpa, at);
+        }
+        self.now_hpa = hpa;
+    }
+
+    /// Whether it rises by more than a metre's worth: the vehicle sinks.
+    pub(super) fn rises(&self, at: Instant) -> bool {
+        const METRE_HPA: f32 = 0.12;
+        at.since(self.window) <= FRESH && self.before_hpa > 0.0 && self.now_hpa > self.before_hpa + METRE_HPA
+    }
+}
+
+/// Whether the estimator's speeds are to be believed, by its own word: shaking sensors mislead it.
+pub(super) fn is_believed(vehicle: &Vehicle, params: &Params) -> bool {
+    vehicle.estimator.get().is_none_or(|estimator| {
+        let limit = match estimator.scale {
+            EstimatorScale::Variance => Param::EkfVarWarn,
+            EstimatorScale::TestRatio => Param::EkfRatioCrit,
+        };
+        let of_motion = [estimator.velocity, estimator.position_vertical].into_iter().flatten();
+        of_motion.reduce(f32::max).is_none_or(|worst| worst <= params.get(limit))
+    })
+}
+
 /// A shock, and what came of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shock {
     pub(super) at: Instant,
     pub(super) load_g: f32,
-    /// The speed just before it.
+    /// The speed just before it; 0 where the estimator is not to be believed.
     pub(super) speed_mps: f32,
     /// The sink just before it.
     pub(super) sink_mps: f32,
@@ -96,26 +146,46 @@ pub(super) fn is_tilted(vehicle: &Vehicle) -> bool {
         .is_some_and(|attitude| attitude.roll.0.abs() > TILTED_RAD || attitude.pitch.0.abs() > TILTED_RAD)
 }
 
-/// Modes in which the pilot himself has the throttle: `ArduCopter`'s STABILIZE, ACRO, DRIFT, FLIP; PX4's MANUAL, ACRO, STABILIZED.
-/// Of other autopilots nothing is known.
+/// The part of the throttle that the autopilot gives.
+pub(super) fn throttle(at: Instant, vehicle: &Vehicle) -> Option<f32> {
+    vehicle.hud.within(at, FRESH).and_then(|hud| hud.throttle).map(|throttle| throttle.0)
+}
+
+fn has_wings(heartbeat: &Heartbeat) -> bool {
+    matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol)
+}
+
+/// Thrown or dropped into the air to start: `ArduCopter`'s THROW.
+pub(super) fn is_thrown(vehicle: &Vehicle) -> bool {
+    vehicle.heartbeat.get().is_some_and(|heartbeat| {
+        heartbeat.autopilot == Autopilot::ArduPilot && !has_wings(heartbeat) && heartbeat.mode == 18
+    })
+}
+
+/// Modes in which the pilot himself has the throttle, or which are made for falling: `ArduCopter`'s STABILIZE, ACRO, DRIFT, FLIP,
+/// THROW, AUTOROTATE; `ArduPlane`'s MANUAL, STABILIZE, TRAINING, ACRO, FBWA, AUTOTUNE, QSTABILIZE, QACRO, THERMAL; PX4's MANUAL,
+/// ACRO, STABILIZED. Of other autopilots nothing is known.
 pub(super) fn has_pilots_throttle(vehicle: &Vehicle) -> bool {
     let Some(heartbeat) = vehicle.heartbeat.get() else { return true };
     match heartbeat.autopilot {
-        Autopilot::ArduPilot => matches!(heartbeat.mode, 0 | 1 | 11 | 14),
+        Autopilot::ArduPilot if has_wings(heartbeat) => {
+            matches!(heartbeat.mode, 0 | 2 | 3 | 4 | 5 | 8 | 17 | 23 | 24)
+        }
+        Autopilot::ArduPilot => matches!(heartbeat.mode, 0 | 1 | 11 | 14 | 18 | 26),
         Autopilot::Px4 => matches!(heartbeat.mode >> 16 & 0xFF, 1 | 5 | 7),
         Autopilot::Other => true,
     }
 }
 
-/// Modes that are made for turning over: `ArduCopter`'s ACRO and FLIP, `ArduPlane`'s MANUAL, TRAINING and ACRO, PX4's MANUAL and ACRO.
+/// Modes that are made for turning over: `ArduCopter`'s ACRO, FLIP and TURTLE, `ArduPlane`'s MANUAL, TRAINING and ACRO, PX4's MANUAL and ACRO.
 pub(super) fn is_made_to_turn(vehicle: &Vehicle) -> bool {
     let Some(heartbeat) = vehicle.heartbeat.get() else { return true };
-    let on_wings = matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol);
+    let wings = has_wings(heartbeat);
     match heartbeat.autopilot {
-        Autopilot::ArduPilot if on_wings => matches!(heartbeat.mode, 0 | 3 | 4),
-        Autopilot::ArduPilot => matches!(heartbeat.mode, 1 | 14),
+        Autopilot::ArduPilot if wings => matches!(heartbeat.mode, 0 | 3 | 4 | 23),
+        Autopilot::ArduPilot => matches!(heartbeat.mode, 1 | 14 | 28),
         Autopilot::Px4 => {
-            matches!(heartbeat.mode >> 16 & 0xFF, 5) || (on_wings && heartbeat.mode >> 16 & 0xFF == 1)
+            matches!(heartbeat.mode >> 16 & 0xFF, 5) || (wings && heartbeat.mode >> 16 & 0xFF == 1)
         }
         Autopilot::Other => false,
     }

@@ -142,6 +142,7 @@ impl Usage {
         vehicle: &Vehicle,
         flight: &Flight,
         event: Option<FlightEvent>,
+        derived: &Derived,
         params: &Params,
     ) {
         if event == Some(FlightEvent::TakeOff) {
@@ -157,7 +158,8 @@ impl Usage {
             self.land(params);
         }
         self.totals.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
-        self.capacity_ah = params.get(Param::BatCapacity);
+        let set_ah = params.get(Param::BatCapacity);
+        self.capacity_ah = if set_ah > 0.0 { set_ah } else { derived.cells().capacity_ah() };
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
         self.last = Some(now);
         self.totals.set(UsageCounter::Powered, now.as_secs_f64());

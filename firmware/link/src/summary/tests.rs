@@ -15,6 +15,7 @@ fn finding(level: Level) -> Finding {
         value: 14.9,
         limit: 15.0,
         unit: "%",
+        feeds: Feeds::Vehicle,
     }
 }
 
@@ -93,6 +94,31 @@ fn a_finding_reads_as_a_sentence_and_fits() {
             let told = text(&finding);
             let has_end = matches!(level, Level::Ok | Level::Stale) || told.as_str().ends_with(')');
             assert!(has_end && told.as_str().len() <= 50, "{}", told.as_str());
+        }
+    }
+}
+
+#[test]
+fn a_battery_that_does_not_keep_the_vehicle_up_is_called_what_it_is() {
+    let told = |feeds, level| {
+        let finding = Finding { instance: 1, feeds, ..finding(level) };
+        text(&finding).as_str().to_owned()
+    };
+    assert_eq!(told(Feeds::Payload, Level::Critical), "HUMS: payload battery low #2 14.90 %");
+    assert_eq!(told(Feeds::Avionics, Level::Warning), "HUMS: avionics battery low #2 14.90 %");
+    assert_eq!(told(Feeds::Payload, Level::Ok), "HUMS: ok again: payload battery low #2");
+    for check in health::checks().filter(|check| check.subsystem == Subsystem::Power && check.instances > 1) {
+        for level in Level::ALL {
+            let finding = Finding {
+                check: check.name,
+                unit: check.unit,
+                value: -1234.5,
+                feeds: Feeds::Avionics,
+                ..finding(level)
+            };
+            let told = text(&finding);
+            let whole = told.as_str().ends_with(check.unit) || told.as_str().ends_with("#1");
+            assert!(whole && told.as_str().len() <= 50, "{}", told.as_str());
         }
     }
 }

@@ -258,3 +258,58 @@ fn two_bad_measurements_in_a_row_count_although_the_value_grew_stale_between_the
     let levels = hold(&sparse, &[(0, 10.0), (20_000, 170.0), (40_000, 170.0)], 42_000);
     assert_eq!(levels.last(), Some(&(40_200, Level::Critical)), "{levels:?}");
 }
+
+#[test]
+fn a_value_that_goes_up_and_down_is_told_a_few_times_and_not_each_time() {
+    // Five minutes of two seconds beyond the limit, and eight below.
+    let values: Vec<_> =
+        (0..30).flat_map(|time| [(time * 10_000 + 2_000, 50.0), (time * 10_000 + 10_000, 10.0)]).collect();
+    let warnings = |when| {
+        let changes = run(&Check { when, ..CHECK }, &values);
+        changes.iter().filter(|(_, level)| *level == Level::Warning).count()
+    };
+    assert_eq!((warnings(When::InFlight), warnings(When::Always)), (2, 2));
+    // Good for longer than ever asked for, it is news again.
+    let good: Vec<_> =
+        (0..4).flat_map(|time| [(time * 150_000 + 2_000, 50.0), (time * 150_000 + 150_000, 10.0)]).collect();
+    let changes = run(&Check { when: When::InFlight, ..CHECK }, &good);
+    let at: Vec<u64> =
+        changes.iter().filter(|(_, level)| *level == Level::Ok).map(|(at_ms, _)| at_ms % 150_000).collect();
+    assert_eq!(at, [4_000, 18_000, 130_000, 130_000], "2 s, 16 s, and then 128 s");
+}
+
+#[test]
+fn what_no_longer_applies_forgets_how_often_it_was_bad() {
+    let (mut state, params) = (State::new(), Params::defaults());
+    let check = Check { when: When::InFlight, ..CHECK };
+    let mut cleared = Vec::new();
+    for now_ms in (0..80_000).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        // Landed for a second every 20 s.
+        let (value, applies) = (if now_ms % 20_000 < 2_000 { 50.0 } else { 10.0 }, now_ms % 20_000 < 19_000);
+        let reading = Some(Reading { at: now, value });
+        let change = state.step(&check, now, reading, applies, &params);
+        cleared.extend(change.filter(|change| change.level == Level::Ok).map(|_| now_ms % 20_000));
+    }
+    assert_eq!(cleared, [4_000; 4]);
+}
+
+#[test]
+fn a_bad_value_of_a_slow_stream_is_told_twice_and_then_stays() {
+    let (mut state, params) = (State::new(), Params::defaults());
+    let check = Check { when: When::InFlight, ..CHECK };
+    let mut told = 0;
+    for now_ms in (0..60_000_u64).step_by(50) {
+        // A message each three seconds; it is stale after one.
+        let at = Instant::from_millis(now_ms / 3_000 * 3_000);
+        let change = state.step(
+            &check,
+            Instant::from_millis(now_ms),
+            Some(Reading { at, value: 50.0 }),
+            true,
+            &params,
+        );
+        told += u32::from(change.is_some_and(|change| change.level == Level::Warning));
+    }
+    assert_eq!((told, state.level()), (2, Some(Level::Warning)));
+}

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::health::Subsystem;
+use crate::observation::Feeds;
 
 const TILT: u8 = 3;
 
@@ -16,6 +17,7 @@ fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
         value,
         limit: 45.0,
         unit: "deg",
+        feeds: Feeds::Vehicle,
     }
 }
 

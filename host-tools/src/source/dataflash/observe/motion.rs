@@ -313,7 +313,10 @@ fn position(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 /// Whether the message is of the estimator that flies: EKF3's begin with an X, EKF2's with an N.
 fn is_flying(state: &State, given: &Given<'_>) -> bool {
     let family = given.message.format().name.as_bytes().first();
-    !matches!((state.facts.estimator, family), (Some(2), Some(b'X')) | (Some(3), Some(b'N')))
+    !matches!(
+        (state.facts.estimator, family),
+        (Some(2), Some(b'X')) | (Some(3), Some(b'N')) | (Some(0), Some(b'E' | b'N' | b'X'))
+    )
 }
 
 fn local(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {

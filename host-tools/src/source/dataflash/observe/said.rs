@@ -50,6 +50,8 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         "LOG_DISARMED" => facts.logs_disarmed = Some(value != 0.0),
         "RSSI_TYPE" => facts.has_rssi = number > 0,
         "AHRS_EKF_TYPE" => facts.estimator = Some(number),
+        // Before 2016: 0 where it flies by the older estimator (DCM), and the filter runs beside it.
+        "AHRS_EKF_USE" => facts.estimator = if number == 0 { Some(0) } else { facts.estimator },
         // Of helicopters alone; the name of the firmware is a copter's.
         "H_RSC_MODE" | "H_SV_MAN" if matches!(facts.craft, Craft::Unknown | Craft::Copter) => {
             facts.craft = Craft::Heli;

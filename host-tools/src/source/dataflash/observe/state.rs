@@ -71,7 +71,7 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) has_rssi: bool,
     /// `BATTn_CAPACITY`, mAh.
     pub(super) capacity_mah: [Option<f32>; INSTANCES],
-    /// `AHRS_EKF_TYPE`: 2 or 3.
+    /// `AHRS_EKF_TYPE`: 2 or 3; 0: none of the filters.
     pub(super) estimator: Option<u8>,
     /// Version of the firmware, from the top byte down.
     pub(super) version: u32,
@@ -257,8 +257,11 @@ impl State {
     pub(super) fn speed(&mut self, at: Instant, speed_mps: f32) {
         /// As `hums_core::flight` has it.
         const FLYING_MPS: f32 = 8.0;
+        /// Gliding against the wind it is slower over ground, and still not landed.
+        const MOVING_MPS: f32 = 2.0;
+        let least_mps = if self.arming.armed() == Some(true) { MOVING_MPS } else { FLYING_MPS };
         if self.facts.craft == Craft::Plane {
-            self.evidence(at, speed_mps > FLYING_MPS);
+            self.evidence(at, speed_mps > least_mps);
         }
     }
 

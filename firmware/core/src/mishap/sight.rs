@@ -1,0 +1,200 @@
+//! What each observation shows of a mishap.
+
+use super::evidence::{
+    BREAKS_OFF, BROKEN_OFF, FULL_THROTTLE, IDLE_THROTTLE, Shock, has_pilots_throttle, is_believed,
+    is_made_to_turn, is_thrown, on_rotors, throttle,
+};
+use super::{Kind, Mishap, State, WATCHED};
+use crate::derived::{GRAVITY, load_factor_g, norm};
+use crate::flight::{climb_mps, ground_speed_mps, height_m};
+use crate::observation::{Air, Imu, Observation, VehicleKind};
+use crate::params::{Param, Params};
+use crate::time::{Instant, Span};
+use crate::units::{MetresPerSecond2, RadiansPerSecond};
+use crate::vehicle::Vehicle;
+
+/// Below this load factor nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.
+const FALL_G: f32 = 0.3;
+/// A vehicle that was disarmed and is carried by less than this falls.
+const UNCARRIED_G: f32 = 0.5;
+/// Tumbling and sinking last so long at least.
+const TUMBLES: Span = Span::from_millis(500);
+const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
+const SINKS: Span = Span::from_millis(500);
+/// So much height is lost with all the thrust by what stalls, or has no propeller any more; gusts take less.
+const LOST_ON_WINGS_M: f32 = 10.0;
+/// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
+const PULL_OUT_G: f32 = 6.0;
+/// Below this part of the throttle that it hovers with, a fall is what the throttle asks for.
+const THRUST_PART: f32 = 0.5;
+/// Time constant of the throttle that it hovers with.
+const HOVER_S: f32 = 10.0;
+
+impl Mishap {
+    /// Takes an observation that the vehicle took.
+    pub(crate) fn observe(
+        &mut self,
+        at: Instant,
+        vehicle: &Vehicle,
+        observation: &Observation,
+        params: &Params,
+    ) {
+        let watched = self.armed || self.disarmed_at.is_some_and(|since| at.since(since) <= WATCHED);
+        if !watched || vehicle.kind() == VehicleKind::Surface {
+            return;
+        }
+        match observation {
+            Observation::Imu(imu) if imu.instance == 0 => self.take_imu(at, imu, vehicle, params),
+            Observation::ImuAndAir(imu, air) => {
+                self.take_pressure(at, air);
+                if imu.instance == 0 {
+                    self.take_imu(at, imu, vehicle, params);
+                }
+            }
+            Observation::Air(air) => self.take_pressure(at, air),
+            Observation::Attitude(attitude) => {
+                if let Some(rates) = attitude.rates {
+                    self.take_rates(at, rates, vehicle, params);
+                }
+            }
+            Observation::GlobalPosition(_) | Observation::LocalPosition(_) => {
+                self.take_motion(at, vehicle, params);
+            }
+            Observation::Hud(_) => self.take_throttle(at, vehicle),
+            _ => {}
+        }
+    }
+
+    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle, params: &Params) {
+        if let Some(acceleration) = imu.acceleration {
+            self.take_force(at, acceleration, vehicle, params);
+        }
+        if let Some(rates) = imu.rate {
+            self.take_rates(at, rates, vehicle, params);
+        }
+    }
+
+    fn take_pressure(&mut self, at: Instant, air: &Air) {
+        if let Some(pressure) = air.pressure.filter(|pressure| pressure.0.is_finite()) {
+            self.pressure.take(at, pressure.0);
+        }
+    }
+
+    pub(super) fn see(&mut self, at: Instant, kind: Kind, value: f32) {
+        let worst = &mut self.worst[kind as usize];
+        *worst = worst.max(value);
+        self.seen.get_or_insert(kind);
+        if let State::Going(last) = &mut self.state {
+            *last = at;
+        }
+    }
+
+    fn take_force(&mut self, at: Instant, force: [MetresPerSecond2; 3], vehicle: &Vehicle, params: &Params) {
+        let Some(load_g) = load_factor_g(force) else { return };
+        // A sensor that says the same again, or nothing but zeros, is no sensor that flies.
+        if load_g == 0.0 || load_g.to_bits() == self.load_g.to_bits() {
+            return;
+        }
+        (self.load_g, self.from_above_g) = (load_g, force[2].0 / GRAVITY);
+        let falls = load_g < FALL_G && on_rotors(at, vehicle) && self.asks_for_thrust(at, vehicle);
+        let least_s = params.get(Param::MisFallTime);
+        if let Some(span) = self.falls.take(at, falls)
+            && span.as_secs_f32() >= least_s
+        {
+            self.see(at, Kind::FreeFall, span.as_secs_f32().max(least_s.next_up()));
+        }
+        self.uncarried.take(at, load_g < UNCARRIED_G && self.doubt.is_some());
+        if load_g > params.get(Param::MisImpact) {
+            let before = self.shock.filter(|shock| at.since(shock.at) <= BREAKS_OFF);
+            let shock = before.unwrap_or(Shock {
+                at,
+                load_g,
+                speed_mps: if is_believed(vehicle, params) { self.speed.greatest() } else { 0.0 },
+                sink_mps: self.sink.greatest(),
+                stopped: false,
+            });
+            self.shock = Some(Shock { load_g: shock.load_g.max(load_g), ..shock });
+            let pulled_out = !on_rotors(at, vehicle) && load_g <= PULL_OUT_G;
+            if matches!(self.state, State::Going(_)) && !pulled_out {
+                self.see(at, Kind::Impact, load_g);
+            }
+        }
+    }
+
+    fn take_rates(&mut self, at: Instant, rates: [RadiansPerSecond; 3], vehicle: &Vehicle, params: &Params) {
+        let rate = norm(rates.map(|rate| rate.0));
+        if !rate.is_finite() {
+            return;
+        }
+        self.rate = rate;
+        let rate_dps = rate.to_degrees();
+        let tumbles = rate_dps > params.get(Param::MisTumble) && !is_made_to_turn(vehicle);
+        let least = if on_rotors(at, vehicle) { TUMBLES } else { TUMBLES_ON_WINGS };
+        if self.tumbles.take(at, tumbles).is_some_and(|span| span >= least) {
+            self.see(at, Kind::Tumbling, rate_dps);
+        }
+    }
+
+    fn take_motion(&mut self, at: Instant, vehicle: &Vehicle, params: &Params) {
+        let (Some(climb_mps), Some(ground_mps)) = (climb_mps(at, vehicle), ground_speed_mps(at, vehicle))
+        else {
+            return;
+        };
+        let speed_mps = libm::sqrtf(climb_mps * climb_mps + ground_mps * ground_mps);
+        if let Some(shock) = &mut self.shock
+            && at.since(shock.at) <= BREAKS_OFF
+        {
+            shock.stopped |= speed_mps < BROKEN_OFF * shock.speed_mps;
+        }
+        self.speed.take(at, speed_mps);
+        if vehicle.armed() {
+            self.height_m = height_m(at, vehicle).unwrap_or(0.0);
+        }
+        // What breaks off in a mishap is the touch.
+        if -climb_mps < BROKEN_OFF * self.sink.greatest() && matches!(self.state, State::Going(_)) {
+            self.touch_mps = self.touch_mps.max(self.sink.greatest());
+        }
+        self.sink.take(at, -climb_mps);
+        self.take_sink(at, -climb_mps, vehicle, params);
+    }
+
+    fn take_sink(&mut self, at: Instant, sink_mps: f32, vehicle: &Vehicle, params: &Params) {
+        let limit_mps = params.get(Param::MisSink);
+        let full = throttle(at, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
+        let told_to = has_pilots_throttle(vehicle);
+        let lost_m = self.lose_height(at, full && !told_to, vehicle);
+        let sinks = match vehicle.hovers(at) {
+            Some(true) => sink_mps > limit_mps && (full || !told_to),
+            // It descends as it is told to, but not with all its thrust.
+            Some(false) => lost_m > LOST_ON_WINGS_M,
+            None => false,
+        };
+        let sinks = sinks && self.armed && (is_believed(vehicle, params) || self.pressure.rises(at));
+        if self.sinks.take(at, sinks).is_some_and(|span| span >= SINKS) {
+            self.see(at, Kind::Sinking, sink_mps.max(limit_mps.next_up()));
+        }
+    }
+
+    /// How far it is below the highest that it was since it has had all its thrust.
+    fn lose_height(&mut self, at: Instant, thrust: bool, vehicle: &Vehicle) -> f32 {
+        let height_m = height_m(at, vehicle).filter(|_| thrust && self.armed);
+        self.peak_m = height_m.map_or(f32::NEG_INFINITY, |height_m| self.peak_m.max(height_m));
+        height_m.map_or(0.0, |height_m| self.peak_m - height_m)
+    }
+
+    /// The throttle that it hovers with, smoothed.
+    fn take_throttle(&mut self, at: Instant, vehicle: &Vehicle) {
+        let throttle = throttle(at, vehicle).unwrap_or(0.0);
+        let hovers = climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < 1.0);
+        if hovers && throttle > IDLE_THROTTLE && self.state == State::Quiet {
+            let weight = if self.hover_throttle > 0.0 { 0.25 / HOVER_S } else { 1.0 };
+            self.hover_throttle += weight * (throttle - self.hover_throttle);
+        }
+    }
+
+    /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.
+    fn asks_for_thrust(&self, at: Instant, vehicle: &Vehicle) -> bool {
+        let least = (THRUST_PART * self.hover_throttle).max(IDLE_THROTTLE);
+        !is_thrown(vehicle) && throttle(at, vehicle).is_none_or(|part| part > least)
+    }
+}
