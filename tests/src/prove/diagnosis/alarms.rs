@@ -6,7 +6,7 @@ use hums_core::health::Level;
 
 use super::faults::stem;
 use super::judged::{Judged, with_label};
-use super::outcome::{Counts, False, Outcome};
+use super::outcome::{Counts, False, Outcome, count};
 use super::rates::{an_hour, hours};
 use super::table::Form;
 
@@ -67,19 +67,10 @@ pub(super) const UNLABELLED_BY_CHECK: Form = Form {
     columns: BY_CHECK.columns,
 };
 
-/// The sets of a table: with labels or without.
-fn of(sets: &[Judged], labelled: bool) -> impl Iterator<Item = &Judged> {
-    sets.iter().filter(move |judged| judged.is_labelled == labelled)
-}
-
-fn count<'a>(alarms: impl Iterator<Item = &'a False>, level: Level, in_air: bool) -> u64 {
-    alarms.filter(|one| one.alarm.level == level && one.in_air == in_air).count() as u64
-}
-
 /// One row for each set and vehicle, and one for each autopilot of a set with several vehicles.
 pub(super) fn by_vehicle(sets: &[Judged], labelled: bool) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    for judged in of(sets, labelled) {
+    for judged in with_label(sets, labelled) {
         let mut groups: BTreeMap<(String, String), Vec<&Outcome>> = BTreeMap::new();
         for one in &judged.outcomes {
             groups.entry((one.autopilot.clone(), one.vehicle.clone())).or_default().push(one);
@@ -109,7 +100,7 @@ pub(super) fn by_vehicle(sets: &[Judged], labelled: bool) -> Vec<Vec<String>> {
 /// One row for each set, check and vehicle, the most frequent first.
 pub(super) fn by_check(sets: &[Judged], labelled: bool) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    for judged in of(sets, labelled) {
+    for judged in with_label(sets, labelled) {
         let mut groups: BTreeMap<(&str, &str), (Vec<&False>, u64)> = BTreeMap::new();
         for one in &judged.outcomes {
             let mut seen: Vec<&str> = Vec::new();
@@ -143,7 +134,7 @@ pub(super) fn by_check(sets: &[Judged], labelled: bool) -> Vec<Vec<String>> {
 /// One row for each set.
 pub(super) fn counts(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    for judged in with_label(sets) {
+    for judged in with_label(sets, true) {
         let known: Vec<_> = judged.outcomes.iter().filter_map(|one| one.counts).collect();
         let sum = |of: &dyn Fn(&Counts) -> u64, which: &dyn Fn(&(Counts, Counts)) -> Counts| {
             known.iter().map(|pair| of(&which(pair))).sum::<u64>().to_string()
@@ -161,7 +152,7 @@ pub(super) fn counts(sets: &[Judged]) -> Vec<Vec<String>> {
 /// The recordings whose counts are wrong, a line for each.
 pub(super) fn wrong_counts(sets: &[Judged]) -> Vec<String> {
     let mut lines = Vec::new();
-    for one in with_label(sets).flat_map(|judged| &judged.outcomes) {
+    for one in with_label(sets, true).flat_map(|judged| &judged.outcomes) {
         let Some((truth, counted)) = one.counts.filter(|(truth, counted)| truth != counted) else { continue };
         let differs = [
             ("flights", truth.flights, counted.flights),

@@ -1,6 +1,7 @@
 //! What was found, as `docs/diagnosis.md`: one page for users, written whole by one run on one commit.
 
 use super::alarms::{self, BY_CHECK, COUNTS, FALSE, UNLABELLED, UNLABELLED_BY_CHECK};
+use super::by_hand::{self, BY_HAND, EACH_BY_HAND};
 use super::faults::{self, BY_CLASS, EACH, FOUND};
 use super::judged::Judged;
 use super::options::Known;
@@ -95,6 +96,8 @@ pub(super) fn text(judged: &[Judged]) -> String {
         BY_CHECK.section(&alarms::by_check(judged, true)),
         UNLABELLED.section(&alarms::by_vehicle(judged, false)),
         UNLABELLED_BY_CHECK.section(&alarms::by_check(judged, false)),
+        BY_HAND.section(&by_hand::rows(judged)),
+        EACH_BY_HAND.section(&by_hand::each(judged)),
         counts,
         format!("{NOT_SEEN}\n\n{CANNOT}\n{}\n", missed.join("\n")),
         EACH.section(&faults::each(judged)),
@@ -112,9 +115,10 @@ mod tests {
     /// The lines that are the same in each run, in order.
     fn labels() -> Vec<String> {
         let form = |form: &Form| form.lines();
-        let forms = [&SETS, &FOUND, &BY_CLASS, &FALSE, &BY_CHECK, &UNLABELLED, &UNLABELLED_BY_CHECK, &COUNTS];
+        let alarms = [&FALSE, &BY_CHECK, &UNLABELLED, &UNLABELLED_BY_CHECK, &BY_HAND, &EACH_BY_HAND];
+        let forms = [&SETS, &FOUND, &BY_CLASS].into_iter().chain(alarms).chain([&COUNTS]);
         let mut labels = vec![summary::TITLE.to_owned()];
-        labels.extend(forms.into_iter().flat_map(form));
+        labels.extend(forms.flat_map(form));
         labels.push(NOT_SEEN.to_owned());
         labels.extend(EACH.lines());
         labels

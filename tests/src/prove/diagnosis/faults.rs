@@ -67,7 +67,7 @@ fn delays_s<'a>(faults: impl Iterator<Item = &'a Fault>) -> Vec<f64> {
 /// One row for each set and autopilot.
 pub(super) fn found(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    for judged in with_label(sets) {
+    for judged in with_label(sets, true) {
         let mut by_autopilot: BTreeMap<&str, Vec<&Fault>> = BTreeMap::new();
         for (one, fault) in shown(judged) {
             by_autopilot.entry(&one.autopilot).or_default().push(fault);
@@ -91,7 +91,7 @@ pub(super) fn found(sets: &[Judged]) -> Vec<Vec<String>> {
 /// One row for each set and class.
 pub(super) fn by_class(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    for judged in with_label(sets) {
+    for judged in with_label(sets, true) {
         for class in CLASSES {
             let faults: Vec<&Fault> =
                 shown(judged).filter(|(one, _)| one.class == class.name).map(|(_, fault)| fault).collect();
@@ -121,7 +121,7 @@ pub(super) fn by_class(sets: &[Judged]) -> Vec<Vec<String>> {
 /// One row for each fault.
 pub(super) fn each(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    for one in with_label(sets).flat_map(|judged| &judged.outcomes) {
+    for one in with_label(sets, true).flat_map(|judged| &judged.outcomes) {
         let Some(fault) = &one.fault else { continue };
         let nothing = if fault.visible { "**nothing**" } else { "nothing (the messages do not show it)" };
         let said = fault.autopilot.as_ref();
@@ -141,7 +141,7 @@ pub(super) fn each(sets: &[Judged]) -> Vec<Vec<String>> {
 /// What no check told: the set, the class, and the faults.
 pub(super) fn missed(sets: &[Judged]) -> Vec<String> {
     let mut missed: BTreeMap<(&str, &str), Vec<String>> = BTreeMap::new();
-    for judged in with_label(sets) {
+    for judged in with_label(sets, true) {
         for one in &judged.outcomes {
             if let Some(fault) = one.fault.as_ref().filter(|fault| fault.told.is_none()) {
                 let why = if fault.visible { "" } else { ", the messages do not show it" };

@@ -31,7 +31,7 @@ pub(super) fn judge_all(set: &Set) -> Result<Judged> {
     })
 }
 
-/// The sets with labels.
-pub(super) fn with_label(sets: &[Judged]) -> impl Iterator<Item = &Judged> {
-    sets.iter().filter(|judged| judged.is_labelled)
+/// The sets with labels, or those without.
+pub(super) fn with_label(sets: &[Judged], labelled: bool) -> impl Iterator<Item = &Judged> {
+    sets.iter().filter(move |judged| judged.is_labelled == labelled)
 }

@@ -76,9 +76,14 @@ impl Label {
         Ok(())
     }
 
-    /// The autopilot and the frame, without its version: `ArduCopter quad`.
+    /// The autopilot and the frame, without its version and what stands in brackets: `ArduCopter quad`.
     pub(super) fn group(&self) -> String {
-        let mut words = self.vehicle.split_whitespace();
+        let plain = self.vehicle.split('(').enumerate().map(|(place, part)| match part.split_once(')') {
+            Some((_, rest)) if place > 0 => rest,
+            _ => part,
+        });
+        let plain: String = plain.collect();
+        let mut words = plain.split_whitespace();
         let first = words.next().unwrap_or_default();
         words.next_back().map_or_else(|| first.to_owned(), |last| format!("{first} {last}"))
     }
@@ -108,6 +113,8 @@ mod tests {
         assert_eq!(label.group(), "PX4 quad");
         assert_eq!(label.autopilot_said(), Some((5.0, "GPS lost")));
         assert!(label.flights.is_none(), "no truth of its flights");
+        let octa = FLIGHT.replace("PX4 1.17 SIH quad", "ArduCopter 4.7.0-dev (2025-10) octa (quad X8)");
+        assert_eq!(parse(&format!("[{octa}}}]")).unwrap()[0].group(), "ArduCopter octa");
     }
 
     #[test]

@@ -2,11 +2,13 @@
 //!
 //! Flights are recordings with labels (`labels`), kept apart in sets by who knew them when the limits were chosen (`sets`).
 //! Each is judged by the monitor as `hums check` runs it (`outcome`); what comes of all of them are the tables of
-//! `docs/diagnosis.md` (`document`). It is no campaign of `docs/proof.md`: those try what is promised, and this one measures
+//! `docs/diagnosis.md` (`document`). Recordings of other people have no labels; of those that were judged by hand `verdicts` knows what
+//! was true. It is no campaign of `docs/proof.md`: those try what is promised, and this one measures
 //! what is not perfect.
 
 mod alarms;
 mod bound;
+mod by_hand;
 mod causes;
 mod document;
 mod faults;
@@ -19,6 +21,7 @@ mod sets;
 mod short;
 mod summary;
 mod table;
+mod verdicts;
 
 use std::fs;
 

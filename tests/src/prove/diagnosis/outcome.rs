@@ -1,5 +1,7 @@
 //! One flight, judged: what the monitor said while nothing was wrong, and what it said of the fault.
 
+use std::path::Path;
+
 use anyhow::Result;
 use hums::check::flights::Flight;
 use hums::check::judge::{Heard, Limits};
@@ -10,6 +12,7 @@ use hums_core::health::Level;
 
 use super::causes;
 use super::labels::Label;
+use super::verdicts::{self, Recording};
 
 /// What is said so soon after a landing was in the air: an alarm waits for its debounce.
 const AFTER_LANDING_S: f64 = 3.0;
@@ -69,6 +72,13 @@ pub(super) struct Outcome {
     pub(super) fault: Option<Fault>,
     /// What is true and what was counted; none where the truth is not known.
     pub(super) counts: Option<(Counts, Counts)>,
+    /// What was found out about a recording without a label.
+    pub(super) by_hand: Option<Recording>,
+}
+
+/// How many alarms of a level rose, in the air or on the ground.
+pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Level, in_air: bool) -> u64 {
+    alarms.into_iter().filter(|one| one.alarm.level == level && one.in_air == in_air).count() as u64
 }
 
 /// Judges one flight.
@@ -76,7 +86,8 @@ pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
     // The labelled flights were recorded on a telemetry port; of the others nobody knows.
     let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
     let judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
-    Ok(of(&judged, &place.name, label))
+    let by_hand = if label.is_none() { verdicts::find(Path::new(&place.title))? } else { None };
+    Ok(Outcome { by_hand, ..of(&judged, &place.name, label) })
 }
 
 fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
@@ -110,6 +121,7 @@ fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
             .collect(),
         fault: label.and_then(|label| fault(&alarms, label)),
         counts: label.and_then(|label| Some((truth(label)?, counted(judged)))),
+        by_hand: None,
     }
 }
 

@@ -8,6 +8,7 @@ use hums_core::health::Level;
 
 use super::judged::judge_all;
 use super::options::Flights;
+use super::outcome::count;
 use super::sets::find_all;
 
 /// Faults that are told at least, of those that the messages show, and those whose cause is named.
@@ -39,9 +40,8 @@ pub(super) fn run() -> Result<String> {
                 sums.told += usize::from(fault.told.is_some());
                 sums.named += usize::from(fault.named.is_some());
             }
-            let alarms = |level| one.alarms.iter().filter(|it| it.in_air && it.alarm.level == level).count();
-            sums.warnings += alarms(Level::Warning);
-            sums.critical += alarms(Level::Critical);
+            sums.warnings += count(&one.alarms, Level::Warning, true) as usize;
+            sums.critical += count(&one.alarms, Level::Critical, true) as usize;
             sums.ground += one.alarms.iter().filter(|it| !it.in_air).count();
         }
     }

@@ -6,7 +6,7 @@ use hums_core::health::Level;
 
 use super::judged::Judged;
 use super::options::Known;
-use super::outcome::{Fault, Outcome};
+use super::outcome::{Fault, Outcome, count};
 use super::rates::{an_hour, hours, quantile_s, share};
 
 /// The section's heading.
@@ -50,13 +50,10 @@ fn found(flights: &[&Outcome]) -> String {
 
 fn alarms(flights: &[&Outcome]) -> String {
     let air_s = flights.iter().fold(0.0, |sum, one| sum + one.air_s);
-    let count = |level| {
-        let all = flights.iter().flat_map(|one| &one.alarms);
-        all.filter(|one| one.in_air && one.alarm.level == level).count() as u64
-    };
     let words = |level| {
-        let [rate, most] = an_hour(count(level), air_s);
-        format!("{} ({rate} an hour, at most {most})", count(level))
+        let events = count(flights.iter().flat_map(|one| &one.alarms), level, true);
+        let [rate, most] = an_hour(events, air_s);
+        format!("{events} ({rate} an hour, at most {most})")
     };
     format!(
         "in {} hours in the air, warnings {}, criticals {}.\n",
