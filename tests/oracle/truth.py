@@ -12,9 +12,10 @@ The rules:
 
   height     above the place of arming: the estimator's (GLOBAL_POSITION_INT.alt); for faults of a barometer the GPS receiver's
   take-off   armed and more than 2 m up for 1 s; the flight began when it was 1 m up
-  end        disarmed, a crash, below 1 m for 8 s, or the end of the recording; what comes after a crash is not counted
-  crash      it came below 1.5 m with a sink speed of more than 3 m/s in the second before (6 m/s for a plane), or with more than
-             4 g within a second, or was disarmed above 5 m
+  end        disarmed, a crash, below 1 m for 8 s, or the end of the recording; a vehicle that takes off again 5 s after a crash or
+             later flies once more
+  crash      it came below 1.5 m with a sink speed of more than 3 m/s in the second before (6 m/s for a plane), or with more
+             than 4 g within a second and a speed of more than 1 m/s before (a simulator's legs are hard), or was disarmed above 5 m
   landing    a flight that ended by disarming or by standing for 8 s, without a crash
 
 An entry gets none of the fields where its heights cannot be trusted: no height for 3 s in the air, more than 8 m below the place
@@ -32,8 +33,9 @@ import sys
 
 TAKEOFF_M, TAKEOFF_S, BEGAN_M = 2.0, 1.0, 1.0
 LANDED_M, LANDED_S = 1.0, 8.0
-HIT_M, HIT_S, HIT_M_S, HIT_PLANE_M_S, HIT_G = 1.5, 1.0, 3.0, 6.0, 4.0
+HIT_M, HIT_S, HIT_M_S, HIT_PLANE_M_S, HIT_G, HIT_G_M_S = 1.5, 1.0, 3.0, 6.0, 4.0, 1.0
 DISARMED_M = 5.0
+WRECK_S = 5.0
 LOST_S, DIFFER_M = 3.0, 8.0
 HEARTBEAT, GPS_RAW_INT, SCALED_IMU, RAW_IMU, GLOBAL_POSITION_INT, HIGHRES_IMU = KINDS = 0, 24, 26, 27, 33, 105
 GRAVITY = 9.80665
@@ -80,7 +82,7 @@ class Flights:
         self.heights, self.ground, self.receiver, self.receiver_ground = collections.deque(), None, None, None
         self.up_since = self.low_since = self.began = None
         self.flights, self.landings, self.crash_s = [], 0, None
-        self.falling, self.shock = None, -math.inf
+        self.falling, self.shock, self.speeds = None, -math.inf, collections.deque()
 
     def take(self, at, message):
         kind = message.get_type()
@@ -91,8 +93,12 @@ class Flights:
             self.receiver = message.alt / 1e3
             if self.by_receiver:
                 self.height(at, self.receiver)
-        elif kind == "GLOBAL_POSITION_INT" and not self.by_receiver:
-            self.height(at, message.alt / 1e3)
+        elif kind == "GLOBAL_POSITION_INT":
+            self.speeds.append((at, math.hypot(message.vx, message.vy, message.vz) / 1e2))
+            while self.speeds[0][0] < at - 2 * HIT_S:
+                self.speeds.popleft()
+            if not self.by_receiver:
+                self.height(at, message.alt / 1e3)
         elif kind in ("SCALED_IMU", "RAW_IMU", "HIGHRES_IMU"):
             force = math.hypot(message.xacc, message.yacc, message.zacc)
             if force / (GRAVITY if kind == "HIGHRES_IMU" else 1e3) > HIT_G:
@@ -126,7 +132,7 @@ class Flights:
         self.known &= above > -DIFFER_M or not self.armed
         if self.compares and self.began is not None and None not in (self.receiver, self.receiver_ground):
             self.known &= abs((self.receiver - self.receiver_ground) - above) < DIFFER_M
-        if self.armed and self.began is None and self.crash_s is None:
+        if self.armed and self.began is None and (self.crash_s is None or at - self.crash_s >= WRECK_S):
             if above > BEGAN_M:
                 self.up_since = at if self.up_since is None else self.up_since
                 if above > TAKEOFF_M and at - self.up_since >= TAKEOFF_S:
@@ -144,7 +150,8 @@ class Flights:
         if not flew or self.crash_s is not None or self.above(at) > HIT_M:
             return
         sink = (self.heights[0][1] - self.heights[-1][1]) / HIT_S
-        if sink > (HIT_PLANE_M_S if self.plane else HIT_M_S) or at - self.shock < HIT_S or self.falling is not None:
+        shocked = at - self.shock < HIT_S and max((speed for _, speed in self.speeds), default=math.inf) > HIT_G_M_S
+        if sink > (HIT_PLANE_M_S if self.plane else HIT_M_S) or shocked or self.falling is not None:
             self.crash_s, self.falling = at, None
             self.end(at, landed=False)
 
