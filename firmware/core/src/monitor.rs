@@ -13,7 +13,7 @@ use crate::happening::{Happening, Happenings};
 use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
 use crate::latest::Latest;
-use crate::lifetime::{Airframe, ItemKey, Lifetime, Saving};
+use crate::lifetime::{ItemKey, Lifetime, Saving};
 use crate::mishap::{Change, Fate, Mishap};
 use crate::observation::{Feeds, Observation, Source};
 use crate::params::Params;
@@ -85,9 +85,6 @@ const PHASE_LASTS: Span = Span::from_secs(1);
 
 /// By then the autopilot's parameters have been asked for: where cells are not known now, they will not be.
 const CELLS_COME: Span = Span::from_secs(45);
-
-/// `AUTOPILOT_VERSION` is asked for and answered long before: whoever has said no unique id by then says none.
-const UID_COMES: Span = Span::from_secs(60);
 
 const _: () = assert!(size_of::<Monitor>() <= 14 * 1024);
 
@@ -329,42 +326,6 @@ impl Monitor {
         if phase != before.phase && now.since(before.next_since) >= PHASE_LASTS {
             before.phase = phase;
             happenings.push(Happening::Phase(phase));
-        }
-    }
-
-    /// Whose life it is, and what of it is to be saved.
-    fn step_life(&mut self, now: Instant, event: Option<FlightEvent>) {
-        let uid = self.vehicle.identity.get().map_or(0, |identity| identity.uid);
-        // A system id can be set: where the unique id is known it is waited for, and before the vehicle is surely the
-        // vehicle nothing is decided.
-        let waits = uid == 0 && self.before.airframe.uid != 0 && self.vehicle.known_for(now) < UID_COMES;
-        if waits || !self.vehicle.is_settled(now) {
-            return self.save_life(event);
-        }
-        let seen = Airframe { system: self.vehicle.source.map_or(0, |source| source.system), uid };
-        if self.before.airframe.differs(seen) {
-            // A lifetime belongs to an airframe: this one's begins with this session.
-            self.happenings.push(Happening::OtherAirframe);
-            self.before = Lifetime { boots: self.before.boots, ..Lifetime::new() };
-            self.baselines = Baselines::new();
-            self.exceedances.forget_life();
-            self.exposure.forget_life();
-            for key in [ItemKey::Lifetime, ItemKey::Baselines, ItemKey::Exceedances, ItemKey::Exposure] {
-                self.saving.hurry(key);
-            }
-        }
-        let airframe = self.before.airframe.learn(seen);
-        if airframe != self.before.airframe {
-            self.before.airframe = airframe;
-            self.saving.hurry(ItemKey::Lifetime);
-        }
-        self.save_life(event);
-    }
-
-    fn save_life(&mut self, event: Option<FlightEvent>) {
-        self.saving.change(ItemKey::Session);
-        if event == Some(FlightEvent::Landing) || (self.before_tick.armed && !self.vehicle.armed()) {
-            self.saving.hurry_all();
         }
     }
 

@@ -13,6 +13,7 @@ use hums_core::params::{Param, Params};
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
 use hums_core::units::{Amperes, Volts};
+use hums_core::usage::UsageCounter;
 
 /// The pack is under load and empty from here on.
 const EMPTY_MS: u64 = 60_000;
@@ -185,4 +186,18 @@ fn a_pack_that_sags_under_its_load_is_not_empty_until_its_cells_are() {
         monitor.tick(now, &link, &Quad::healthy().recorder, &mut |finding| outcome.push(*finding));
     }
     assert_eq!(outcome, []);
+}
+
+#[test]
+fn cycles_count_by_the_capacity_that_the_autopilot_knows_and_a_setting_comes_first() {
+    let cycles = |params: Params| {
+        let mut monitor = Monitor::new(params);
+        fly(&mut monitor, 15.6, 15.6, &[setting("BATT_CAPACITY", 1_000.0)]);
+        monitor.usage().value(UsageCounter::BatteryCycles).unwrap_or(0.0)
+    };
+    // 20 A for a hundred seconds are 0.56 Ah.
+    assert!((cycles(Params::defaults()) - 0.55).abs() < 0.02);
+    let mut set = Params::defaults();
+    set.set("BAT_CAPACITY", 10.0).unwrap();
+    assert!((cycles(set) - 0.055).abs() < 0.002);
 }

@@ -9,12 +9,13 @@ use hums_core::happening::Happening;
 use hums_core::health::Finding;
 use hums_core::lifetime::{Airframe, ItemKey, Lifetime};
 use hums_core::observation::{
-    AutopilotIdentity, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind, VtolState,
+    Autopilot, AutopilotIdentity, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind,
+    VtolState,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::Rpm;
+use hums_core::units::{Rpm, Volts};
 use hums_core::usage::UsageCounter;
 
 const OTHER: Source = Source { system: 7, component: 1 };
@@ -251,5 +252,76 @@ fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() 
             vec![(AUTOPILOT, quad.says(now_ms))]
         });
         assert!(findings.iter().all(|finding| finding.check != "motor_imbalance"), "{silent}: {findings:?}");
+    }
+}
+
+/// The classes of vehicles: their kind and their `MAV_TYPE`.
+const CLASSES: [(VehicleKind, u8); 8] = [
+    (VehicleKind::Rotorcraft, 2),
+    (VehicleKind::Rotorcraft, 13),
+    (VehicleKind::Rotorcraft, 4),
+    (VehicleKind::Plane, 1),
+    (VehicleKind::Vtol, 22),
+    (VehicleKind::Surface, 10),
+    (VehicleKind::Surface, 11),
+    (VehicleKind::Surface, 12),
+];
+
+/// A minute and a half: five seconds disarmed; armed and out, banked to 70 degrees for five seconds, with an empty pack at the end;
+/// back and disarmed. `says_landed`: `EXTENDED_SYS_STATE` is sent, which calls an armed rover "in air" on PX4.
+fn out_and_back(
+    autopilot: Autopilot,
+    (kind, type_number): (VehicleKind, u8),
+    says_landed: bool,
+    now_ms: u64,
+) -> Quad {
+    let (armed, out) = ((5_000..70_000).contains(&now_ms), (8_000..67_000).contains(&now_ms));
+    let mode = if autopilot == Autopilot::Px4 { 0x0404_0000 } else { 3 };
+    let mut vehicle = Quad { autopilot, kind, type_number, mode, armed, ..Quad::healthy() };
+    (vehicle.vtol, vehicle.climb) = (VtolState::Hover, 0.0);
+    let state = if out { LandedState::InAir } else { LandedState::OnGround };
+    vehicle.landed = says_landed.then_some(state);
+    if !out {
+        (vehicle.height, vehicle.throttle) = (0.0, 0.0);
+    }
+    vehicle.roll = if (20_000..25_000).contains(&now_ms) { 1.2 } else { 0.02 };
+    let pack_v = if (30_000..70_000).contains(&now_ms) { 13.2 } else { 15.6 };
+    vehicle.battery.voltage = Some(Volts(pack_v));
+    vehicle.vibration.levels = [Some(1.0); 3];
+    vehicle
+}
+
+#[test]
+fn each_class_of_vehicle_flies_banks_and_is_protected_as_its_class_on_both_autopilots() {
+    let mut params = Params::defaults();
+    params.set("PROT_ACTION", 2.0).unwrap();
+    let ways =
+        [Autopilot::ArduPilot, Autopilot::Px4].map(|autopilot| [(autopilot, false), (autopilot, true)]);
+    for (autopilot, says_landed) in ways.into_iter().flatten() {
+        for class in CLASSES {
+            let (mut monitor, mut checks, mut requests) = (Monitor::new(params), Vec::new(), 0);
+            for now_ms in (0..90_000).step_by(50) {
+                let now = Instant::from_millis(now_ms);
+                let vehicle = out_and_back(autopilot, class, says_landed, now_ms);
+                let said = if now_ms.is_multiple_of(100) { vehicle.says(now_ms) } else { Vec::new() };
+                for observation in said {
+                    monitor.observe(now, AUTOPILOT, &observation);
+                }
+                let link = LinkReading { frames_lost: Some(0.0), at: now };
+                monitor.tick(now, &link, &vehicle.recorder, &mut |finding| checks.push(finding.check));
+                requests += usize::from(monitor.take_request().is_some());
+            }
+            let of = format!("{autopilot:?} {class:?} {says_landed}");
+            let flies = class.0 != VehicleKind::Surface;
+            let counted = [UsageCounter::Flights, UsageCounter::Landings, UsageCounter::Mishaps]
+                .map(|counter| monitor.usage().value(counter).unwrap_or(0.0) as u32);
+            assert_eq!(counted, [u32::from(flies), u32::from(flies), 0], "{of}");
+            checks.sort_unstable();
+            checks.dedup();
+            let hangs = class.0 == VehicleKind::Rotorcraft || (class.0 == VehicleKind::Vtol && says_landed);
+            let expected: &[&str] = if hangs { &["cell_voltage", "roll"] } else { &["cell_voltage"] };
+            assert_eq!(checks, expected, "{of}");
+            assert_eq!(requests > 0, flies, "{of}: {requests}");
+        }
     }
 }

@@ -5,11 +5,52 @@ use crate::baseline::Baselines;
 use crate::bytes::Unreadable;
 use crate::component::Component;
 use crate::exposure::Exposure;
+use crate::flight::FlightEvent;
+use crate::happening::Happening;
 use crate::health::exceedance::Exceedances;
-use crate::lifetime::{ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Session};
-use crate::time::Instant;
+use crate::lifetime::{Airframe, ITEM_BYTES_MAX, ItemKey, Lifetime, Room, Session};
+use crate::time::{Instant, Span};
+
+/// `AUTOPILOT_VERSION` is asked for and answered long before: whoever has said no unique id by then says none.
+const UID_COMES: Span = Span::from_secs(60);
 
 impl Monitor {
+    /// Whose life it is, and what of it is to be saved.
+    pub(super) fn step_life(&mut self, now: Instant, event: Option<FlightEvent>) {
+        let uid = self.vehicle.identity.get().map_or(0, |identity| identity.uid);
+        // A system id can be set: where the unique id is known it is waited for, and before the vehicle is surely the
+        // vehicle nothing is decided.
+        let waits = uid == 0 && self.before.airframe.uid != 0 && self.vehicle.known_for(now) < UID_COMES;
+        if waits || !self.vehicle.is_settled(now) {
+            return self.save_life(event);
+        }
+        let seen = Airframe { system: self.vehicle.source.map_or(0, |source| source.system), uid };
+        if self.before.airframe.differs(seen) {
+            // A lifetime belongs to an airframe: this one's begins with this session.
+            self.happenings.push(Happening::OtherAirframe);
+            self.before = Lifetime { boots: self.before.boots, ..Lifetime::new() };
+            self.baselines = Baselines::new();
+            self.exceedances.forget_life();
+            self.exposure.forget_life();
+            for key in [ItemKey::Lifetime, ItemKey::Baselines, ItemKey::Exceedances, ItemKey::Exposure] {
+                self.saving.hurry(key);
+            }
+        }
+        let airframe = self.before.airframe.learn(seen);
+        if airframe != self.before.airframe {
+            self.before.airframe = airframe;
+            self.saving.hurry(ItemKey::Lifetime);
+        }
+        self.save_life(event);
+    }
+
+    fn save_life(&mut self, event: Option<FlightEvent>) {
+        self.saving.change(ItemKey::Session);
+        if event == Some(FlightEvent::Landing) || (self.before_tick.armed && !self.vehicle.armed()) {
+            self.saving.hurry_all();
+        }
+    }
+
     /// Takes an item that was saved in an earlier session; to be called before the first tick, and for
     /// [`ItemKey::Session`] once and last. One that cannot be read is as if there were none.
     pub fn restore(&mut self, key: ItemKey, stored: &[u8]) -> Result<(), Unreadable> {
