@@ -37,8 +37,10 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     // What waits for its first byte, as a pipe may for ever, leaves nothing behind.
     let mut next = source.next().with_context(read)?;
     let (session, utc_us) = (session_of(source.utc_start_us()), source.utc_start_us());
-    let of = format!("s{session:08x}");
-    let mut packer = Packer::new(Output::create(&args.output, &inputs, &made::LOG, Some(&of))?, session);
+    // Raw bytes tell no time: nothing tells such logs apart.
+    let of = utc_us.map(|_| format!("s{session:08x}"));
+    let file = Output::create(&args.output, &inputs, &made::LOG, of.as_deref())?;
+    let mut packer = Packer::new(file, session);
     packer.start(utc_us).with_context(context)?;
     let mut last_us = 0;
     while let Some(chunk) = next {

@@ -24,8 +24,10 @@ const CLUSTER: u32 = 60_000;
 fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
     let (recording, log) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.hum")));
     fs::write(&recording, raw).unwrap();
-    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str(), "--replace".as_ref()])
-        .expect_code(&[0]);
+    if log.exists() {
+        fs::remove_file(&log).unwrap();
+    }
+    hums(["pack".as_ref(), recording.as_os_str(), "-o".as_ref(), log.as_os_str()]).expect_code(&[0]);
     fs::remove_file(recording).unwrap();
     log
 }

@@ -192,6 +192,11 @@ fn what_was_made_of_the_same_log_is_replaced_and_what_was_made_of_another_one_is
         );
         assert!(fs::read(dir.path().join("out")).expect("there") == made, "{line}");
     }
+    // Of raw bytes nothing tells of which recording a log was packed.
+    fs::write(dir.path().join("one.raw"), frames_of(&px4())[..400].concat()).expect("written");
+    fs::write(dir.path().join("two.raw"), frames_of(&px4())[400..900].concat()).expect("written");
+    run(dir.path(), "pack one.raw -o raw.hum", 0);
+    run(dir.path(), "pack two.raw -o raw.hum --replace", 1);
     // A shorter beginning never takes the place of a tlog.
     let before = tlog.clone();
     fs::write(dir.path().join("flight.tlog"), &before).expect("written");
