@@ -2,6 +2,7 @@
 
 mod arming;
 mod equality;
+mod estimator;
 mod hostile;
 mod pause;
 mod writer;
