@@ -277,7 +277,7 @@ fn out_and_back(
 ) -> Quad {
     let (armed, out) = ((5_000..70_000).contains(&now_ms), (8_000..67_000).contains(&now_ms));
     let mode = if autopilot == Autopilot::Px4 { 0x0404_0000 } else { 3 };
-    let mut vehicle = Quad { autopilot, kind, type_number, mode, armed, ..Quad::healthy() };
+    let mut vehicle = Quad { armed, mode, autopilot, kind, type_number, ..Quad::healthy() };
     (vehicle.vtol, vehicle.climb) = (VtolState::Hover, 0.0);
     let state = if out { LandedState::InAir } else { LandedState::OnGround };
     vehicle.landed = says_landed.then_some(state);
