@@ -42,8 +42,11 @@ pub struct Report {
     pub gs_frames: u64,
     /// Bytes sent to the ground station.
     pub gs_bytes: u64,
-    /// Changes of level, in order.
+    /// Changes of level, in order, up to [`FINDINGS_MAX`]; the log has all of them.
     pub findings: Vec<Finding>,
+    /// How many more there were.
+    #[serde(skip_serializing_if = "is_none")]
+    pub findings_left_out: u64,
     /// Usage counters, units in their names.
     pub usage: serde_json::Map<String, serde_json::Value>,
     /// The run's log files on the card.
@@ -63,6 +66,13 @@ pub struct Report {
     /// Instructions by stage, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instructions: Option<serde_json::Value>,
+}
+
+/// Changes of level that are kept one by one: a run may go on for days.
+pub const FINDINGS_MAX: usize = 10_000;
+
+fn is_none(count: &u64) -> bool {
+    *count == 0
 }
 
 /// A change of level.
@@ -201,6 +211,9 @@ impl Report {
         for finding in &self.findings {
             let Finding { subsystem, check, instance, level, time_s, .. } = finding;
             let _ = writeln!(text, "finding  {time_s:>9.3} s  {level:<8}  {subsystem} {check}[{instance}]");
+        }
+        if self.findings_left_out > 0 {
+            let _ = writeln!(text, "finding  and {} more, which the log has", self.findings_left_out);
         }
         for (name, value) in &self.usage {
             let _ = writeln!(text, "usage    {name:<24} {:>12.3}", value.as_f64().unwrap_or_default());

@@ -67,12 +67,13 @@ pub fn run(
     let ports = [(Side::Ground, Frames::default()), (Side::Autopilot, Frames::default())];
     let [mut gs, mut autopilot] = ports.clone().map(|(_, frames)| frames);
     let mut findings = Vec::new();
+    let mut keep = |finding| findings.push(finding);
     let outside = Outside {
         card: board.card,
         flash: &flash,
         gs: &mut gs,
         autopilot: &mut autopilot,
-        findings: &mut findings,
+        findings: &mut keep,
         power_on_us: 0,
         reboot_at_us: None,
     };

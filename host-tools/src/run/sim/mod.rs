@@ -24,7 +24,7 @@ use pipeline::Pipeline;
 
 use super::arrivals::Arrivals;
 use super::ground::{self, Ground};
-use super::report::Report;
+use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
 use super::{check_standard_output, drive, pace, params, paths, prepare_card, salt};
 use crate::card::{Faults, SimCard};
@@ -115,14 +115,13 @@ pub fn power_on(
     mut moment: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<PowerOn> {
     let mut memory = Memory::new(params);
-    let (mut findings, mut gs) = (Vec::new(), std::io::sink());
-    let mut autopilot = std::io::sink();
+    let (mut gs, mut autopilot) = (std::io::sink(), std::io::sink());
     let outside = Outside {
         card,
         flash: &store::open(None, &[])?,
         gs: &mut gs,
         autopilot: &mut autopilot,
-        findings: &mut findings,
+        findings: &mut drop,
         power_on_us: 0,
         reboot_at_us: None,
     };
@@ -191,12 +190,20 @@ impl World<'_> {
     ) -> Result<bool> {
         self.boots += 1;
         let mut memory = Memory::new(&Params::defaults());
+        let Report { findings, findings_left_out, .. } = &mut self.report;
+        let mut keep = |finding| {
+            if findings.len() < FINDINGS_MAX {
+                findings.push(finding);
+            } else {
+                *findings_left_out += 1;
+            }
+        };
         let outside = Outside {
             card: self.card,
             flash: self.flash,
             gs: &mut *self.gs,
             autopilot: &mut *self.autopilot,
-            findings: &mut self.report.findings,
+            findings: &mut keep,
             power_on_us: self.power_on_us,
             reboot_at_us: self.reboots.first().copied(),
         };

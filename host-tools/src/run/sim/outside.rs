@@ -55,7 +55,8 @@ pub(super) struct Outside<'a, 'w> {
     pub(super) flash: &'a FileFlash,
     pub(super) gs: &'w mut (dyn Write + Send),
     pub(super) autopilot: &'w mut (dyn Write + Send),
-    pub(super) findings: &'w mut Vec<Finding>,
+    /// Takes each change of level.
+    pub(super) findings: &'w mut dyn FnMut(Finding),
     /// When this power-on is, in microseconds since the first input byte.
     pub(super) power_on_us: u64,
     /// When our own power goes for a moment, in the same.

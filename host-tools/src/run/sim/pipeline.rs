@@ -205,7 +205,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Self { monitoring, ends, outside, now, .. } = self;
         let Outside { findings, power_on_us, .. } = outside;
         monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
-            findings.push(Finding {
+            findings(Finding {
                 time_s: power_on_us.saturating_add(finding.at.as_micros()) as f64 / 1e6,
                 ..Finding::from(finding)
             });
