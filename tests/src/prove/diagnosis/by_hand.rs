@@ -52,6 +52,33 @@ fn flown(outcome: &Outcome) -> &'static str {
     }
 }
 
+/// Whether it is of a vehicle, and was judged by hand.
+pub(super) fn is_vehicle(outcome: &Outcome) -> bool {
+    outcome.by_hand.as_ref().is_some_and(|known| known.flown == Flown::Vehicle)
+}
+
+/// Alarms in the air with this verdict.
+fn judged_so(outcomes: &[&Outcome], level: Level, wanted: Verdict) -> u64 {
+    let alarms = outcomes
+        .iter()
+        .flat_map(|one| one.alarms.iter().filter(move |alarm| verdict(one, &alarm.alarm.check) == wanted));
+    count(alarms, level, true)
+}
+
+/// The figures that count, in a sentence.
+pub(super) fn alarms(outcomes: &[&Outcome]) -> String {
+    let air_s = outcomes.iter().map(|one| one.air_s).sum::<f64>();
+    let words = |level, name: &str| {
+        let [was_true, was_false, unknown] = Verdict::ALL.map(|wanted| judged_so(outcomes, level, wanted));
+        let [rate, most] = an_hour(was_false, air_s);
+        format!(
+            "{was_false} false {name} ({rate} an hour, at most {most}), {was_true} true and {unknown} not known"
+        )
+    };
+    let (warnings, criticals) = (words(Level::Warning, "warnings"), words(Level::Critical, "criticals"));
+    format!("in {} hours in the air {warnings}; {criticals}.\n", hours(air_s))
+}
+
 fn verdict(outcome: &Outcome, check: &str) -> Verdict {
     outcome.by_hand.as_ref().map_or(Verdict::Unknown, |known| known.of(check).0)
 }
@@ -67,12 +94,7 @@ pub(super) fn rows(sets: &[Judged]) -> Vec<Vec<String>> {
         let air_s = outcomes.iter().map(|one| one.air_s).sum::<f64>();
         let mut row = vec![flown.to_owned(), outcomes.len().to_string(), hours(air_s)];
         for level in [Level::Warning, Level::Critical] {
-            let of = |wanted| {
-                let alarms = outcomes.iter().flat_map(|one| {
-                    one.alarms.iter().filter(move |alarm| verdict(one, &alarm.alarm.check) == wanted)
-                });
-                count(alarms, level, true)
-            };
+            let of = |wanted| judged_so(&outcomes, level, wanted);
             row.extend(Verdict::ALL.map(|wanted| of(wanted).to_string()));
             row.extend(an_hour(of(Verdict::False), air_s));
         }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use hums_core::health::Level;
 
+use super::by_hand;
 use super::judged::Judged;
 use super::options::Known;
 use super::outcome::{Fault, Outcome, count};
@@ -24,9 +25,18 @@ pub(super) fn section(sets: &[Judged]) -> String {
         sets.iter().filter(|set| !set.is_labelled).flat_map(|set| &set.outcomes).collect();
     let mut text = format!("{TITLE}\n\n* Simulator flights, {words}: {}", found(&flights));
     let _ = write!(text, "* In the same flights, while nothing was wrong: {}", alarms(&flights));
-    if !further.is_empty() {
-        let words = "Recordings without labels, where an alarm may be true";
-        let _ = write!(text, "* {words}: {}", alarms(&further));
+    let flown: Vec<&Outcome> = further.iter().copied().filter(|one| by_hand::is_vehicle(one)).collect();
+    if !flown.is_empty() {
+        let alarms = by_hand::alarms(&flown);
+        let _ = write!(
+            text,
+            "* Recordings of other people's vehicles, judged by hand by whoever chose the limits: {alarms}"
+        );
+    }
+    let rest: Vec<&Outcome> = further.into_iter().filter(|one| !by_hand::is_vehicle(one)).collect();
+    if !rest.is_empty() {
+        let words = "Other recordings without labels (simulators of other people among them), where an alarm may be true";
+        let _ = write!(text, "* {words}: {}", alarms(&rest));
     }
     text
 }
