@@ -57,6 +57,11 @@ impl Clock {
         self.reached
     }
 
+    /// By how much the monitor's time is behind the recording's: the sum of the gaps until now.
+    pub(super) const fn behind(&self) -> Span {
+        self.behind
+    }
+
     /// The recording's time of an earlier time of the monitor, seen from `now` of the recording, which is `steps` of the
     /// monitor. Gaps between the two are not counted.
     pub(super) fn recording(now: Instant, steps: Instant, earlier: Instant) -> Instant {

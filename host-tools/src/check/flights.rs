@@ -2,7 +2,8 @@
 
 use hums_core::Monitor;
 use hums_core::mishap::{Change, Kind};
-use hums_core::time::Instant;
+use hums_core::monitor::TICK;
+use hums_core::time::{Instant, Span};
 
 use super::problem::LISTED_MAX;
 
@@ -11,8 +12,10 @@ use super::problem::LISTED_MAX;
 pub struct Flight {
     /// Take-off.
     pub from: Instant,
-    /// Landing, or the recording's end.
+    /// When it was in the air last.
     pub to: Instant,
+    /// How long it was in the air: without what lies on the ground between, and without the recording's gaps.
+    pub air: Span,
     /// It landed.
     pub landed: bool,
     /// It was disarmed in the air, at this height above home, m.
@@ -23,6 +26,8 @@ pub struct Flight {
 #[derive(Debug, Default)]
 pub(super) struct Flights {
     list: Vec<Flight>,
+    /// The last of them goes on.
+    open: bool,
     /// The flight that ends next ends by a mishap.
     crashed: bool,
 }
@@ -30,15 +35,30 @@ pub(super) struct Flights {
 impl Flights {
     /// The vehicle took off.
     pub(super) fn take_off(&mut self, now: Instant, from: Instant) {
-        if self.list.len() < LISTED_MAX {
-            self.list.push(Flight { from, to: now, landed: false, disarmed_at_m: None });
+        self.open = self.list.len() < LISTED_MAX;
+        if self.open {
+            let air = now.since(from);
+            self.list.push(Flight { from, to: now, air, landed: false, disarmed_at_m: None });
+        }
+    }
+
+    /// A step of the monitor was made.
+    pub(super) fn step(&mut self, now: Instant, monitor: &Monitor) {
+        if monitor.flight().airborne()
+            && let Some(flight) = self.list.last_mut().filter(|_| self.open)
+        {
+            flight.air = flight.air + TICK.min(now.since(flight.to));
+            flight.to = now;
         }
     }
 
     /// The flight is over: it is back on the ground, or disarmed, or a mishap ended it.
-    pub(super) fn landing(&mut self, now: Instant) {
+    pub(super) fn landing(&mut self) {
         let crashed = std::mem::take(&mut self.crashed);
-        self.end_flight(now, !crashed);
+        if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
+            flight.landed = !crashed;
+        }
+        self.open = false;
     }
 
     /// A mishap began or ended.
@@ -55,16 +75,11 @@ impl Flights {
     }
 
     /// The recording has ended.
-    pub(super) fn end(mut self, last: Instant, monitor: &Monitor) -> Vec<Flight> {
-        if monitor.flight().airborne() {
-            self.end_flight(last, false);
+    pub(super) fn end(mut self, monitor: &Monitor) -> Vec<Flight> {
+        if !monitor.flight().airborne() {
+            // On the ground, still armed: what is over is the recording, and the flight too.
+            self.landing();
         }
         self.list
-    }
-
-    fn end_flight(&mut self, at: Instant, landed: bool) {
-        if let Some(flight) = self.list.last_mut().filter(|flight| !flight.landed) {
-            (flight.to, flight.landed) = (at, landed);
-        }
     }
 }

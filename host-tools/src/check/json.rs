@@ -61,6 +61,7 @@ struct VehicleJson {
 struct FlightJson {
     from_s: f64,
     to_s: f64,
+    air_s: f64,
     landed: bool,
     disarmed_at_m: Option<f32>,
 }
@@ -190,6 +191,7 @@ fn flight(flight: &Flight) -> FlightJson {
     FlightJson {
         from_s: flight.from.as_secs_f64(),
         to_s: flight.to.as_secs_f64(),
+        air_s: flight.air.as_micros() as f64 / 1e6,
         landed: flight.landed,
         disarmed_at_m: flight.disarmed_at_m,
     }

@@ -16,7 +16,7 @@ use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
 use hums_link::sequence::Sequences;
 
-use super::clock::Clock;
+use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::epochs::Epochs;
 use super::flights::Flights;
@@ -28,6 +28,13 @@ use crate::source::told::{Finding, Told};
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
+
+/// The check of a restart while armed, and for how long it shows one. An autopilot's own log of the next power-on may begin
+/// with its arming: what it was before the restart counts.
+const RESTARTED: &str = "autopilot_reboot";
+const RESTART_SHOWS: Span = Span::from_secs(31);
+/// The check of disarming in the air.
+const DISARMED: &str = "disarmed_in_air";
 
 /// Where a recording was heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -84,6 +91,8 @@ pub struct Judge {
     damages: u64,
     losses: u64,
     restarts: u64,
+    /// When the autopilot's clock began again, the vehicle disarmed.
+    calm_restart: Option<Instant>,
 }
 
 impl Judge {
@@ -110,6 +119,7 @@ impl Judge {
             damages: 0,
             losses: 0,
             restarts: 0,
+            calm_restart: None,
         }
     }
 
@@ -132,10 +142,7 @@ impl Judge {
             }
             Item::Record(told) => self.told(told),
             Item::Gap(gap) => self.gap(gap),
-            Item::Restart => {
-                self.restarts += 1;
-                self.epochs.restart(at);
-            }
+            Item::Restart => self.restart(at),
             Item::Frame(frame) if self.wire.is_some() => {
                 self.advance(at);
                 let at = self.clock.monitor(at);
@@ -158,10 +165,19 @@ impl Judge {
             }
             Told::Finding(finding) => {
                 self.checked_on_board = true;
-                self.board.take(finding);
+                self.board.take(finding, Span::ZERO);
             }
             Told::Checked => self.checked_on_board = true,
             Told::Parameter { .. } | Told::Part { .. } => {}
+        }
+    }
+
+    /// The autopilot's clock began again: another power-on in the same recording.
+    fn restart(&mut self, at: Instant) {
+        self.restarts += 1;
+        self.epochs.restart(at);
+        if !self.monitor.vehicle().armed() {
+            self.calm_restart = Some(at);
         }
     }
 
@@ -171,6 +187,10 @@ impl Judge {
             && self.first.is_some()
         {
             self.advance(from);
+            if to.since(from) >= SETTLE {
+                // What came last before it counts: a landing, a disarming.
+                self.tick(from);
+            }
             self.clock.pause(from, to);
         }
         self.damages += u64::from(gap.cause.is_damage());
@@ -197,13 +217,12 @@ impl Judge {
     fn tick(&mut self, now: Instant) {
         let steps = self.clock.monitor(now);
         let (link, recorder) = (self.link(steps), RecorderStatus::default());
-        let Self { monitor, here, format, wire, .. } = self;
+        let Self { monitor, here, format, wire, calm_restart, clock, .. } = self;
+        let calm = calm_restart.is_some_and(|at| now.since(at) <= RESTART_SHOWS);
         monitor.tick(steps, &link, &recorder, &mut |finding| {
-            if is_of(finding.check, *format, wire.is_some()) {
-                here.take(&Finding {
-                    at: Clock::recording(now, steps, finding.at),
-                    ..Finding::from(finding)
-                });
+            if is_of(finding.check, *format, wire.is_some()) && !(calm && finding.check == RESTARTED) {
+                let at = Clock::recording(now, steps, finding.at);
+                here.take(&Finding { at, ..Finding::from(finding) }, clock.behind());
             }
         });
         let armed = monitor.vehicle().armed();
@@ -218,11 +237,12 @@ impl Judge {
                     let from = since.map_or(now, |since| Clock::recording(now, steps, since));
                     self.flights.take_off(now, from);
                 }
-                Happening::Landing => self.flights.landing(now),
+                Happening::Landing => self.flights.landing(),
                 Happening::Mishap(change) => self.flights.mishap(change, &self.monitor),
                 _ => {}
             }
         }
+        self.flights.step(now, &self.monitor);
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
     }
 
@@ -237,12 +257,17 @@ impl Judge {
         if self.first.is_some() {
             self.advance(self.last);
         }
-        let flights = self.flights.end(self.last, &self.monitor);
+        let mut flights = self.flights.end(&self.monitor);
         let given = !self.limits.given.is_empty();
         let by = if self.checked_on_board && !given { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
             // Nobody knows where it was heard: a packed recording may be that of a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
+        }
+        if self.facts.get(&About::Arming).is_some_and(|words| !words.is_empty()) {
+            // Arming is guessed from the throttle here: a throttle that is closed in the air is no disarming.
+            self.here.drop_checks(|check| check == DISARMED);
+            flights.iter_mut().for_each(|flight| flight.disarmed_at_m = None);
         }
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
@@ -264,7 +289,8 @@ impl Judge {
                 self.here
             }
         };
-        problems.end(last);
+        let behind = if by == JudgedBy::Board { Span::ZERO } else { self.clock.behind() };
+        problems.end(last, behind);
         Judged {
             by,
             monitor: self.monitor,

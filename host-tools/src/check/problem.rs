@@ -27,7 +27,7 @@ pub struct Problem {
     pub at: Instant,
     /// How often it went from good to a warning or worse.
     pub times: u32,
-    /// How long it was at a warning or worse, in all.
+    /// How long it was at a warning or worse, in all, without the recording's gaps.
     pub lasted: Span,
     /// It was still so at the end.
     pub lasting: bool,
@@ -68,13 +68,13 @@ pub(super) struct Problems {
     pub findings: Vec<Finding>,
     /// How many there were.
     pub findings_count: u64,
-    /// By check and part: what was wrong, and since when it is again.
-    open: BTreeMap<(String, u8), (Problem, Option<Instant>)>,
+    /// By check and part: what was wrong, and since when it is again, with the sum of the gaps until then.
+    open: BTreeMap<(String, u8), (Problem, Option<(Instant, Span)>)>,
 }
 
 impl Problems {
-    /// Takes the next change.
-    pub(super) fn take(&mut self, finding: &Finding) {
+    /// Takes the next change; `gaps` is the sum of the recording's gaps until then.
+    pub(super) fn take(&mut self, finding: &Finding, gaps: Span) {
         self.findings_count += 1;
         if self.findings.len() < LISTED_MAX {
             self.findings.push(finding.clone());
@@ -106,10 +106,10 @@ impl Problems {
             problem.value = worse(problem.value, finding.value, &finding.check);
             if since.is_none() {
                 problem.times += 1;
-                *since = Some(finding.at);
+                *since = Some((finding.at, gaps));
             }
-        } else if let Some(from) = since.take() {
-            problem.lasted = problem.lasted + finding.at.since(from);
+        } else if let Some(since) = since.take() {
+            problem.lasted = problem.lasted + lasted(since, finding.at, gaps);
         }
     }
 
@@ -129,10 +129,10 @@ impl Problems {
     }
 
     /// Nothing follows.
-    pub(super) fn end(&mut self, at: Instant) {
+    pub(super) fn end(&mut self, at: Instant, gaps: Span) {
         for (problem, since) in self.open.values_mut() {
-            if let Some(from) = since.take() {
-                problem.lasted = problem.lasted + at.since(from);
+            if let Some(since) = since.take() {
+                problem.lasted = problem.lasted + lasted(since, at, gaps);
                 problem.lasting = true;
             }
         }
@@ -144,6 +144,12 @@ impl Problems {
         problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.at));
         problems
     }
+}
+
+/// From a time, with the sum of the gaps until then, to another.
+fn lasted((from, before): (Instant, Span), at: Instant, gaps: Span) -> Span {
+    let between = gaps.as_micros().saturating_sub(before.as_micros());
+    Span::from_micros(at.since(from).as_micros().saturating_sub(between))
 }
 
 #[cfg(test)]
@@ -174,9 +180,9 @@ mod tests {
             (30, Level::Warning, 3.58),
             (34, Level::Stale, f32::NAN),
         ] {
-            problems.take(&change(at, level, value));
+            problems.take(&change(at, level, value), Span::ZERO);
         }
-        problems.end(Instant::from_millis(90_000));
+        problems.end(Instant::from_millis(90_000), Span::ZERO);
         assert_eq!(problems.findings_count, 5);
         let worst = problems.worst_first();
         let [problem] = worst.as_slice() else { panic!("{worst:?}") };
@@ -188,11 +194,20 @@ mod tests {
     #[test]
     fn critical_stands_before_what_came_earlier_and_good_news_is_no_problem() {
         let mut problems = Problems::default();
-        problems.take(&Finding { instance: 1, ..change(1, Level::Warning, 3.55) });
-        problems.take(&change(9, Level::Critical, 3.4));
-        problems.take(&Finding { instance: 2, ..change(2, Level::Ok, 4.0) });
-        problems.end(Instant::from_millis(10_000));
+        problems.take(&Finding { instance: 1, ..change(1, Level::Warning, 3.55) }, Span::ZERO);
+        problems.take(&change(9, Level::Critical, 3.4), Span::ZERO);
+        problems.take(&Finding { instance: 2, ..change(2, Level::Ok, 4.0) }, Span::ZERO);
+        problems.end(Instant::from_millis(10_000), Span::ZERO);
         let order: Vec<u8> = problems.worst_first().iter().map(|problem| problem.instance).collect();
         assert_eq!(order, [0, 1]);
+    }
+
+    #[test]
+    fn a_gap_of_the_recording_is_no_time_of_a_problem() {
+        let mut problems = Problems::default();
+        problems.take(&change(10, Level::Critical, 3.4), Span::from_secs(5));
+        problems.take(&change(320, Level::Ok, 3.8), Span::from_secs(305));
+        problems.end(Instant::from_millis(400_000), Span::from_secs(305));
+        assert_eq!(problems.worst_first()[0].lasted, Span::from_secs(10));
     }
 }

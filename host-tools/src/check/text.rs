@@ -189,7 +189,7 @@ fn when(judged: &Judged) -> String {
 
 /// All flights together.
 pub(super) fn flown(judged: &Judged) -> Span {
-    judged.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.to.since(flight.from))
+    judged.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
 }
 
 fn in_air(judged: &Judged) -> String {
@@ -211,7 +211,16 @@ fn in_air(judged: &Judged) -> String {
             format!("{} in 1 flight, which the log does not see land; armed {armed}", clock(flown(judged)))
         }
         [_] => format!("{} in 1 flight; armed {armed}", clock(flown(judged))),
-        flights => format!("{} in {} flights; armed {armed}", clock(flown(judged)), flights.len()),
+        flights => {
+            let last = match flights.last() {
+                Some(flight) if flight.disarmed_at_m.is_some() => {
+                    ", the last of which ended by disarming in the air"
+                }
+                Some(flight) if !flight.landed => ", of which the log does not see the last one land",
+                _ => "",
+            };
+            format!("{} in {} flights{last}; armed {armed}", clock(flown(judged)), flights.len())
+        }
     };
     told.map_or(text.clone(), |told| format!("{text} ({told})"))
 }

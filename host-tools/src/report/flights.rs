@@ -17,6 +17,8 @@ const PHASE_MIN: Span = Span::from_secs(2);
 pub struct Flight {
     from_s: f64,
     to_s: f64,
+    /// In the air, without stops on the ground and gaps of the record.
+    air_s: f64,
     landed: bool,
     height_max_m: f32,
     speed_max_m_s: f32,
@@ -37,6 +39,12 @@ pub struct PhaseSpan {
 pub struct Flights {
     flights: Vec<Flight>,
     phases: Vec<PhaseSpan>,
+    /// The last flight goes on.
+    open: bool,
+    /// When the vehicle told something last, and whether it was in the air.
+    last: Option<(Instant, bool)>,
+    /// What the record does not have since then.
+    gap: Span,
 }
 
 impl Flights {
@@ -50,29 +58,52 @@ impl Flights {
         &self.phases
     }
 
-    /// Follows what the vehicle has just told; `airborne` says where it was before that.
-    pub fn follow(&mut self, at: Instant, airborne: bool, reference: &Reference) {
-        match (airborne, reference.flight().airborne_since()) {
-            (false, Some(since)) if self.flights.len() < FLIGHTS_MAX => self.begin(since, at, reference),
-            (true, None) => self.extend(at, true, reference),
-            (true, Some(_)) => self.extend(at, false, reference),
+    /// Follows what the vehicle has just told. A flight is what [`hums_core::flight`] calls one: a bounce ends none.
+    pub fn follow(&mut self, at: Instant, reference: &Reference) {
+        let flight = reference.flight();
+        if let Some((before, true)) = self.last {
+            let step = at.since(before).as_micros().saturating_sub(self.gap.as_micros());
+            self.extend(at, step, reference);
+        }
+        match (self.open, flight.is_open(), flight.airborne_since()) {
+            (false, true, Some(since)) if self.flights.len() < FLIGHTS_MAX => {
+                self.begin(since, at, reference)
+            }
+            (true, false, _) => self.close(),
             _ => {}
         }
+        (self.last, self.gap) = (Some((at, flight.airborne())), Span::ZERO);
         self.extend_phase(at, reference);
+    }
+
+    /// The record has nothing from here to there.
+    pub fn gap(&mut self, from: Instant, to: Instant) {
+        if self.last.is_some_and(|(last, _)| from >= last) {
+            self.gap = self.gap + to.since(from);
+        }
     }
 
     /// The log ends here.
     pub fn end(&mut self, at: Instant, reference: &Reference) {
         self.extend_phase(at, reference);
-        if reference.flight().airborne() {
-            self.extend(at, false, reference);
+        if !reference.flight().airborne() {
+            self.close();
         }
     }
 
+    fn close(&mut self) {
+        if let Some(flight) = self.flights.last_mut().filter(|_| self.open) {
+            flight.landed = true;
+        }
+        self.open = false;
+    }
+
     fn begin(&mut self, since: Instant, at: Instant, reference: &Reference) {
+        self.open = true;
         self.flights.push(Flight {
             from_s: since.as_secs_f64(),
             to_s: at.as_secs_f64(),
+            air_s: at.as_secs_f64() - since.as_secs_f64(),
             landed: false,
             height_max_m: 0.0,
             speed_max_m_s: 0.0,
@@ -81,13 +112,15 @@ impl Flights {
         });
     }
 
-    fn extend(&mut self, at: Instant, landed: bool, reference: &Reference) {
+    /// In the air for so many microseconds more, up to now.
+    fn extend(&mut self, at: Instant, step_us: u64, reference: &Reference) {
         let vehicle = reference.vehicle();
         let height_m = vehicle.global.get().map(|global| global.relative_altitude.0);
         let speed = ground_speed_mps(at, vehicle);
         let percent = percent(at, reference);
-        if let Some(flight) = self.flights.last_mut().filter(|flight| !flight.landed) {
-            (flight.to_s, flight.landed) = (at.as_secs_f64(), landed);
+        if let Some(flight) = self.flights.last_mut().filter(|_| self.open) {
+            flight.to_s = at.as_secs_f64();
+            flight.air_s += step_us as f64 / 1e6;
             flight.height_max_m = flight.height_max_m.max(height_m.unwrap_or(0.0));
             flight.speed_max_m_s = flight.speed_max_m_s.max(speed.unwrap_or(0.0));
             flight.percent_to = percent.or(flight.percent_to);

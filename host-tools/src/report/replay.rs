@@ -78,7 +78,12 @@ impl Replay {
             }
             Item::Observation(source, observation) => self.observe(at, source, observation),
             Item::Text(text) => self.keep(at, text),
-            Item::Gap(_) => self.frames.gap(),
+            Item::Gap(gap) => {
+                self.frames.gap();
+                if let (Some(from), Some(to)) = (gap.from, gap.to) {
+                    self.flights.gap(from, to);
+                }
+            }
             _ => {}
         }
     }
@@ -95,7 +100,6 @@ impl Replay {
     }
 
     fn observe(&mut self, at: Instant, source: Source, observation: &Observation) {
-        let airborne = self.reference.flight().airborne();
         if !self.reference.observe(at, source, observation) {
             return;
         }
@@ -103,7 +107,7 @@ impl Replay {
             self.autopilot = heartbeat.autopilot;
         }
         self.samples.take(at, &self.reference, observation);
-        self.flights.follow(at, airborne, &self.reference);
+        self.flights.follow(at, &self.reference);
     }
 
     fn keep(&mut self, at: Instant, text: Text<'_>) {

@@ -1,11 +1,14 @@
 //! The judge, on recordings made for the purpose.
 
 use hums_core::health::{Level, VOCABULARY};
-use hums_core::observation::{Autopilot, Battery, Esc, EscGroup, Heartbeat, Observation, Source};
+use hums_core::observation::{
+    Attitude, Autopilot, Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VtolState,
+};
 use hums_core::params::Param;
 use hums_core::units::{Fraction, Rpm, Volts};
 
 use super::*;
+use crate::check::flights::Flight;
 use crate::source::item::Cause;
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
@@ -91,9 +94,18 @@ fn each_check_is_judged_or_says_why_not() {
 
 /// A flight at 30 m that is disarmed at 20 s, and falls or stays.
 fn disarmed_high(falls: bool) -> Judged {
+    disarmed_high_with(falls, None)
+}
+
+/// The same, of a log that says how it knows of arming.
+fn disarmed_high_with(falls: bool, arming: Option<&str>) -> Judged {
+    use crate::source::item::Fact;
     use hums_core::observation::GlobalPosition;
     use hums_core::units::{Metres, MetresPerSecond};
     let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+    if let Some(words) = arming {
+        judge.item(Instant::ZERO, Item::Fact(Fact { about: About::Arming, words }));
+    }
     for tick in 0..300_u64 {
         let (at, armed) = (Instant::from_millis(tick * 100), (20..200).contains(&tick));
         let fallen = if falls { tick.saturating_sub(200) as f32 } else { 0.0 };
@@ -118,6 +130,88 @@ fn a_vehicle_that_falls_after_it_is_disarmed_did_not_land() {
     let flights = disarmed_high(false).flights;
     let [flight] = flights.as_slice() else { panic!("{flights:?}") };
     assert_eq!((flight.landed, flight.disarmed_at_m), (true, None), "it stands on a hill");
+}
+
+/// Half a second each, with what the autopilot says of itself: armed, and where it is.
+fn half_seconds(judge: &mut Judge, from_ms: u64, to_ms: u64, armed: bool, landed: LandedState) {
+    for at_ms in (from_ms..to_ms).step_by(500) {
+        let at = Instant::from_millis(at_ms);
+        judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(armed)));
+        judge.item(at, Item::Observation(AUTOPILOT, &Observation::Landed(landed, VtolState::Unknown)));
+    }
+}
+
+fn air_ms(flights: &[Flight]) -> Vec<(u64, bool)> {
+    flights.iter().map(|flight| (flight.air.as_micros() / 1_000, flight.landed)).collect()
+}
+
+#[test]
+fn a_recording_that_ends_on_the_ground_shortly_after_the_landing_has_the_whole_flight() {
+    for ground_ms in [500, 3_000, 30_000] {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+        half_seconds(&mut judge, 5_000, 65_000, true, LandedState::InAir);
+        half_seconds(&mut judge, 65_000, 65_000 + ground_ms, true, LandedState::OnGround);
+        judge.item(Instant::from_millis(65_000 + ground_ms), Item::Observation(AUTOPILOT, &heartbeat(false)));
+        let flights = judge.end().flights;
+        let [(air, true)] = air_ms(&flights)[..] else { panic!("{ground_ms}: {flights:?}") };
+        assert!((59_000..=60_100).contains(&air), "{ground_ms}: {flights:?}");
+        assert!(flights[0].to <= Instant::from_millis(65_100), "{ground_ms}: {flights:?}");
+    }
+}
+
+#[test]
+fn a_gap_is_no_time_in_the_air_and_a_landing_right_before_it_ends_the_flight() {
+    for landed in [false, true] {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+        half_seconds(&mut judge, 5_000, 30_000, true, LandedState::InAir);
+        let at = Instant::from_millis(30_000);
+        if landed {
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(false)));
+        }
+        let (from, to) = (Some(at), Some(Instant::from_millis(930_000)));
+        let words = String::new();
+        let gap = Gap { from, to, cause: Cause::NotKept, place: None, bytes: 0, words };
+        judge.item(Instant::from_millis(930_000), Item::Gap(&gap));
+        half_seconds(&mut judge, 930_000, 950_000, true, LandedState::InAir);
+        let flights = judge.end().flights;
+        let air: u64 = air_ms(&flights).iter().map(|(air, _)| air).sum();
+        assert_eq!(flights.len(), 1 + usize::from(landed), "{flights:?}");
+        assert!((40_000..=46_000).contains(&air), "{flights:?}");
+    }
+}
+
+#[test]
+fn arming_that_is_guessed_from_the_throttle_is_no_disarming_in_the_air() {
+    let judged = disarmed_high_with(true, Some("taken from the throttle"));
+    assert!(judged.problems.iter().all(|problem| problem.check != DISARMED), "{:?}", judged.problems);
+    assert!(judged.flights.iter().all(|flight| flight.disarmed_at_m.is_none()), "{:?}", judged.flights);
+    let told = disarmed_high_with(true, None);
+    assert!(told.problems.iter().any(|problem| problem.check == DISARMED), "{:?}", told.problems);
+}
+
+#[test]
+fn a_second_power_on_in_one_recording_is_a_restart_only_where_the_vehicle_was_armed_before() {
+    for armed in [false, true] {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        let boot = |judge: &mut Judge, at_ms: u64, boot_ms: u32, armed: bool| {
+            let at = Instant::from_millis(at_ms);
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(armed)));
+            let attitude = Attitude { boot_ms: Some(boot_ms), ..Attitude::default() };
+            judge.item(at, Item::Observation(AUTOPILOT, &Observation::Attitude(attitude)));
+        };
+        for second in 0..60_u32 {
+            boot(&mut judge, u64::from(second) * 1_000, 100_000 + second * 1_000, armed || second < 55);
+        }
+        judge.item(Instant::from_millis(60_000), Item::Restart);
+        for second in 0..60_u32 {
+            boot(&mut judge, 60_000 + u64::from(second) * 1_000, 5_000 + second * 1_000, true);
+        }
+        let judged = judge.end();
+        let told = judged.problems.iter().any(|problem| problem.check == RESTARTED);
+        assert_eq!(told, armed, "{:?}", judged.problems);
+    }
 }
 
 #[test]

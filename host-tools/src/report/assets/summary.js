@@ -9,7 +9,7 @@ import { zoom } from "./view.js";
 const { usage, vehicle } = log;
 const tile = (value, unit, label) => value == null ? null : el("div", { class: "tile" }, el("b", {}, value, unit ? el("span", {}, unit) : null), el("small", {}, label));
 const tiles = () => {
-  const flown = data.flights.reduce((sum, f) => sum + f.to_s - f.from_s, 0);
+  const flown = data.flights.reduce((sum, f) => sum + f.air_s, 0);
   const peak = (id) => {
     const plot = data.plots.find((p) => p.id === id);
     return plot ? plot.series[0].values.reduce((a, b) => Math.max(a, b), -Infinity) : null;
@@ -48,7 +48,7 @@ const identity = () => facts([
 const flights = () => data.flights.length ? rows(
   [["#", "n"], ["Take-off"], ["Landing"], ["Time", "n"], ["Height", "n"], ["Speed", "n"], ["Battery", "n"]],
   data.flights.map((f, i) => cells([
-    i + 1, clock(f.from_s) ?? span(f.from_s - start), f.landed ? clock(f.to_s) ?? span(f.to_s - start) : "in the air at the end", span(f.to_s - f.from_s),
+    i + 1, clock(f.from_s) ?? span(f.from_s - start), f.landed ? clock(f.to_s) ?? span(f.to_s - start) : "in the air at the end", span(f.air_s),
     fixed(f.height_max_m, 1) + " m", fixed(f.speed_max_m_s, 1) + " m/s",
     f.percent_from != null && f.percent_to != null ? `${fixed(f.percent_from, 0)} \u2192 ${fixed(f.percent_to, 0)} %` : "",
   ], ["n", "t", "t", "n", "n", "n", "n"], { class: "go", tabindex: 0, onclick: () => zoom(f.from_s, f.to_s), onkeydown: (e) => e.key === "Enter" && zoom(f.from_s, f.to_s) })))
