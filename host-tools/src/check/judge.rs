@@ -267,7 +267,9 @@ impl Judge {
         if self.facts.get(&About::Arming).is_some_and(|words| !words.is_empty()) {
             // Arming is guessed from the throttle here: a throttle that is closed in the air is no disarming.
             self.here.drop_checks(|check| check == DISARMED);
-            flights.iter_mut().for_each(|flight| flight.disarmed_at_m = None);
+            for flight in &mut flights {
+                flight.disarmed_at_m = None;
+            }
         }
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,

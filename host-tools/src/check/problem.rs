@@ -61,6 +61,9 @@ fn worse(known: f32, value: f32, check: &str) -> f32 {
     }
 }
 
+/// Since when, and the sum of the recording's gaps until then.
+type Since = (Instant, Span);
+
 /// Puts changes of level together.
 #[derive(Debug, Default)]
 pub(super) struct Problems {
@@ -69,7 +72,7 @@ pub(super) struct Problems {
     /// How many there were.
     pub findings_count: u64,
     /// By check and part: what was wrong, and since when it is again, with the sum of the gaps until then.
-    open: BTreeMap<(String, u8), (Problem, Option<(Instant, Span)>)>,
+    open: BTreeMap<(String, u8), (Problem, Option<Since>)>,
 }
 
 impl Problems {
@@ -147,7 +150,7 @@ impl Problems {
 }
 
 /// From a time, with the sum of the gaps until then, to another.
-fn lasted((from, before): (Instant, Span), at: Instant, gaps: Span) -> Span {
+fn lasted((from, before): Since, at: Instant, gaps: Span) -> Span {
     let between = gaps.as_micros().saturating_sub(before.as_micros());
     Span::from_micros(at.since(from).as_micros().saturating_sub(between))
 }

@@ -37,7 +37,7 @@ pub struct PhaseSpan {
 /// The flights of a log, and the phases of all of it.
 #[derive(Debug, Default)]
 pub struct Flights {
-    flights: Vec<Flight>,
+    list: Vec<Flight>,
     phases: Vec<PhaseSpan>,
     /// The last flight goes on.
     open: bool,
@@ -50,7 +50,7 @@ pub struct Flights {
 impl Flights {
     /// The flights, in order.
     pub fn all(&self) -> &[Flight] {
-        &self.flights
+        &self.list
     }
 
     /// The phases, in order.
@@ -66,8 +66,8 @@ impl Flights {
             self.extend(at, step, reference);
         }
         match (self.open, flight.is_open(), flight.airborne_since()) {
-            (false, true, Some(since)) if self.flights.len() < FLIGHTS_MAX => {
-                self.begin(since, at, reference)
+            (false, true, Some(since)) if self.list.len() < FLIGHTS_MAX => {
+                self.begin(since, at, reference);
             }
             (true, false, _) => self.close(),
             _ => {}
@@ -92,7 +92,7 @@ impl Flights {
     }
 
     fn close(&mut self) {
-        if let Some(flight) = self.flights.last_mut().filter(|_| self.open) {
+        if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
             flight.landed = true;
         }
         self.open = false;
@@ -100,7 +100,7 @@ impl Flights {
 
     fn begin(&mut self, since: Instant, at: Instant, reference: &Reference) {
         self.open = true;
-        self.flights.push(Flight {
+        self.list.push(Flight {
             from_s: since.as_secs_f64(),
             to_s: at.as_secs_f64(),
             air_s: at.as_secs_f64() - since.as_secs_f64(),
@@ -118,7 +118,7 @@ impl Flights {
         let height_m = vehicle.global.get().map(|global| global.relative_altitude.0);
         let speed = ground_speed_mps(at, vehicle);
         let percent = percent(at, reference);
-        if let Some(flight) = self.flights.last_mut().filter(|_| self.open) {
+        if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
             flight.to_s = at.as_secs_f64();
             flight.air_s += step_us as f64 / 1e6;
             flight.height_max_m = flight.height_max_m.max(height_m.unwrap_or(0.0));
