@@ -30,7 +30,7 @@ pub fn watch() {
             let first = first.and_then(|_| flag::register(signal, Arc::clone(&requested)));
             // Without a handler the signal simply ends the program, as before.
             if let Err(error) = first {
-                eprintln!("hums: Ctrl-C will end the program without closing the log: {error}");
+                note!("Ctrl-C will end the program without closing the log: {error}");
             }
         }
         requested

@@ -1,5 +1,12 @@
 //! The `hums` command: the pipeline of the firmware on this PC, and everything that reads what it wrote.
 
+/// A message on standard error: what the world put into it obeys no terminal.
+macro_rules! note {
+    ($($words:tt)*) => {
+        $crate::output::note(&format!($($words)*))
+    };
+}
+
 pub mod card;
 pub mod check;
 pub mod cli;
@@ -23,6 +30,7 @@ pub mod outcome;
 pub mod output;
 pub mod pack;
 pub mod plural;
+pub mod printable;
 pub mod progress;
 pub mod report;
 pub mod rng;

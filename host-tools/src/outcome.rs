@@ -132,7 +132,7 @@ impl Kept {
     /// Says the latest.
     fn tell(&mut self) {
         if let Some(differs) = self.last.take().as_ref().and_then(differs) {
-            eprintln!("hums: {differs}");
+            note!("{differs}");
         }
     }
 
@@ -172,8 +172,8 @@ pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
         Err(error) => {
             match differs(&error) {
                 // What it was met at says nothing more.
-                Some(differs) => eprintln!("hums: {differs}"),
-                None => eprintln!("hums: {error:#}"),
+                Some(differs) => note!("{differs}"),
+                None => note!("{error:#}"),
             }
             ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }

@@ -7,16 +7,31 @@ use anyhow::Result;
 use serde::Serialize;
 
 use crate::outcome::ReaderGone;
+use crate::printable;
 
-/// Prints one line.
+/// Prints one line, or several; what the world put into it obeys no terminal.
 pub fn line(text: &str) -> Result<()> {
+    raw_line(&printable::lines(text))
+}
+
+/// Prints a line of JSON.
+pub fn json_line(text: &str) -> Result<()> {
+    raw_line(&printable::json(text))
+}
+
+/// Says something on standard error, with our name before it. A standard error that is gone changes nothing.
+pub fn note(text: &str) {
+    eprintln!("hums: {}", printable::message(text));
+}
+
+fn raw_line(text: &str) -> Result<()> {
     let mut out = io::stdout().lock();
     settle(out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()))
 }
 
 /// Prints one JSON object, indented.
 pub fn json(value: &impl Serialize) -> Result<()> {
-    line(&serde_json::to_string_pretty(value)?)
+    json_line(&serde_json::to_string_pretty(value)?)
 }
 
 /// A JSON object that is printed as it is made: some members, then a list that is too long to be held. Its text is that
@@ -41,13 +56,13 @@ impl JsonList {
 
     /// Prints the end of the list and of the object.
     pub fn end(self) -> Result<()> {
-        line(if self.empty { "]\n}" } else { "\n  ]\n}" })
+        raw_line(if self.empty { "]\n}" } else { "\n  ]\n}" })
     }
 }
 
 /// A value as JSON whose lines after the first begin so. No string of JSON has a line's end in it.
 fn indented(value: &impl Serialize, by: &str) -> Result<String> {
-    Ok(serde_json::to_string_pretty(value)?.replace('\n', &format!("\n{by}")))
+    Ok(printable::json(&serde_json::to_string_pretty(value)?).replace('\n', &format!("\n{by}")))
 }
 
 fn print(text: &str) -> Result<()> {

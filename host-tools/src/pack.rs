@@ -54,7 +54,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     }
     file.finish()?;
     if let Some(remark) = source.remark() {
-        eprintln!("hums: {}: {remark}", args.input);
+        note!("{}: {remark}", args.input);
     }
     let ratio = done.recording_bytes as f64 / done.log_bytes.max(1) as f64;
     output::line(&format!(
@@ -67,7 +67,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         && done.bytes_not_frames > 0
     {
         let bytes = count(done.bytes_not_frames, "byte");
-        eprintln!("hums: of no frame, and only counted: {bytes} of the recording");
+        note!("of no frame, and only counted: {bytes} of the recording");
     }
     Ok(Outcome::Done)
 }

@@ -2,6 +2,8 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::printable::word;
+
 /// A bar over so many bytes, on a terminal only; none where nobody knows how many.
 pub fn bytes(total: Option<u64>, name: &str) -> ProgressBar {
     let Some(total) = total else { return ProgressBar::hidden() };
@@ -9,7 +11,7 @@ pub fn bytes(total: Option<u64>, name: &str) -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {bytes}/{total_bytes} {eta}") {
         bar.set_style(style);
     }
-    bar.set_message(name.to_owned());
+    bar.set_message(word(name).into_owned());
     bar
 }
 

@@ -37,6 +37,51 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
     names.get(place).copied()
 }
 
+/// Names of the bits of `MAV_SYS_STATUS_SENSOR`, from bit 0; empty where it is no sensor (the check `sensors` leaves those
+/// two out).
+const SENSORS: [&str; 32] = [
+    "gyroscope",
+    "accelerometer",
+    "compass",
+    "barometer",
+    "differential pressure",
+    "GPS",
+    "optical flow",
+    "vision position",
+    "rangefinder",
+    "external ground truth",
+    "rate control",
+    "attitude stabilisation",
+    "yaw control",
+    "altitude control",
+    "horizontal position control",
+    "motor outputs",
+    "",
+    "second gyroscope",
+    "second accelerometer",
+    "second compass",
+    "geofence",
+    "AHRS",
+    "terrain data",
+    "reversed motors",
+    "logging",
+    "battery",
+    "proximity sensor",
+    "satellite link",
+    "",
+    "obstacle avoidance",
+    "propulsion",
+    "extended status",
+];
+
+/// The names of these bits of `MAV_SYS_STATUS_SENSOR`.
+pub fn sensors(bits: u32) -> impl Iterator<Item = &'static str> {
+    (0..)
+        .zip(SENSORS)
+        .filter(move |(bit, name)| bits & (1 << bit) != 0 && !name.is_empty())
+        .map(|(_, name)| name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -47,5 +92,10 @@ mod tests {
         assert_eq!(name("autopilot_state", 6.0), Some("emergency"));
         assert_eq!((name("autopilot_state", 99.0), name("autopilot_state", f32::NAN)), (None, None));
         assert_eq!(name("cell_voltage", 3.0), None);
+    }
+
+    #[test]
+    fn sensors_are_named_and_the_receiver_and_the_pre_arm_checks_are_none() {
+        assert_eq!(sensors(0x1001_0024).collect::<Vec<_>>(), ["compass", "GPS"]);
     }
 }

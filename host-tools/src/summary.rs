@@ -15,7 +15,7 @@ use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, read};
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::{counter_name, message_name};
-use crate::plural::count;
+use crate::plural::are;
 use crate::progress;
 use crate::source::item;
 use crate::source::recording::Format;
@@ -125,6 +125,11 @@ pub struct ComponentLine {
     pub figures: Figures,
     /// How often it was replaced.
     pub replaced: u32,
+}
+
+/// Why a recording of another program is not whole, as a part of a sentence.
+pub fn damaged_places(count: u64) -> String {
+    format!("{} damaged or cut; hums check says where", are(count, "place"))
 }
 
 /// All that a log holds, counted.
@@ -446,7 +451,7 @@ impl Overview {
         match (self.format, self.ending.summary.gaps) {
             (None, _) => self.ending.unproved(),
             (Some(_), 0) => Vec::new(),
-            (Some(_), gaps) => vec![format!("{}; hums check says where", count(gaps, "damaged place"))],
+            (Some(_), gaps) => vec![damaged_places(gaps)],
         }
     }
 

@@ -13,20 +13,21 @@ use crate::logs::{self, find::Image};
 use crate::outcome::Outcome;
 use crate::output;
 use crate::plural::count;
+use crate::printable::{path, word};
 use crate::summary::Overview;
 
 /// Runs `hums verify`.
 pub fn run(args: &cli::Verify) -> Result<Outcome> {
     let found = logs::find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     let mut json = VerifyJson { ok: !found.is_cut(), images: images_json(&found.images), logs: Vec::new() };
     for image in &found.images {
         let check = file_system(image);
         json.ok &= check.failed == 0;
         if !args.json {
-            output::line(&format!("Card {}", image.path.display()))?;
+            output::line(&format!("Card {}", path(&image.path)))?;
             print(&[check])?;
         }
     }
@@ -37,7 +38,8 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         json.ok &= log.ok;
         worst = worst.max(log.verdict);
         if !args.json {
-            output::line(&format!("Session {} ({})", log.name, overview.ending.files.join(", ")))?;
+            let files = overview.ending.files.join(", ");
+            output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
             print(&log.checks)?;
         }
         json.logs.push(log);

@@ -13,6 +13,9 @@ fn same(ours: &Value<'_>, theirs: &Json) -> bool {
         Value::Unknown => theirs.is_null(),
         Value::Unsigned(value) => theirs.as_u64() == Some(*value),
         Value::Signed(value) => theirs.as_i64() == Some(*value),
+        // JSON has no number for it.
+        Value::Single(value) if !value.is_finite() => theirs.is_null(),
+        Value::Double(value) if !value.is_finite() => theirs.is_null(),
         Value::Single(value) => theirs.as_f64().map(|theirs| theirs as f32) == Some(*value),
         // `serde_json` reads a number to its last bit but one.
         Value::Double(value) => {
@@ -20,6 +23,10 @@ fn same(ours: &Value<'_>, theirs: &Json) -> bool {
         }
         Value::Flag(value) => theirs.as_bool() == Some(*value),
         Value::Text(value) => theirs.as_str() == Some(value),
+        Value::Bytes(bytes) => {
+            let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+            theirs.as_str() == Some(&digits)
+        }
     }
 }
 

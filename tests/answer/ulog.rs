@@ -61,7 +61,7 @@ fn write(log: &Path, folder: &Path) {
 
 fn bits(value: &Value<'_>) -> u64 {
     match *value {
-        Value::Unknown | Value::Text(_) => 0,
+        Value::Unknown | Value::Text(_) | Value::Bytes(_) => 0,
         Value::Unsigned(number) => number,
         Value::Signed(number) => number as u64,
         Value::Single(number) => u64::from(number.to_bits()),

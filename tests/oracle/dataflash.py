@@ -18,12 +18,8 @@ def value_of(message, column, character):
         return list(message._elements[message.fmt.colhash[column]])
     value = getattr(message, column)
     if isinstance(value, bytes):
-        # The contents of files are left as bytes.
-        try:
-            value = value.decode("utf-8")
-        except UnicodeDecodeError:
-            value = value.decode("ISO-8859-1")
-        value = value.split("\0")[0]
+        # The contents of files are left as bytes: hexadecimal digits.
+        value = value.hex()
     if isinstance(value, float) and not math.isfinite(value):
         value = None
     if character == "M" and isinstance(value, int):

@@ -21,11 +21,11 @@ impl Checked {
     /// How the run ended for this one.
     pub(super) fn outcome(&self) -> Outcome {
         let wrong = !self.judged.problems.is_empty();
-        Outcome::lossy(self.judged.damages > 0 || !self.unproved().is_empty()).and(if wrong {
-            Outcome::Findings
-        } else {
-            Outcome::Done
-        })
+        // A file of a card into which nothing was written is no recording.
+        let is_empty = self.ending.as_ref().is_some_and(|ending| ending.summary.session.is_none());
+        let judged = self.judged.is_judged() || is_empty;
+        let lossy = self.judged.damages > 0 || !judged || !self.unproved().is_empty();
+        Outcome::lossy(lossy).and(if wrong { Outcome::Findings } else { Outcome::Done })
     }
 
     /// Why a log of ours is not called whole, as parts of sentences.

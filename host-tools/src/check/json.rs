@@ -1,6 +1,6 @@
 //! `hums check --json`: one object a line for each log. Its names are a contract: `docs/check.md`.
 
-use hums_core::health::{Level, vocabulary};
+use hums_core::health::vocabulary;
 use hums_core::time::Instant;
 use serde::Serialize;
 
@@ -40,6 +40,7 @@ struct LogJson<'a> {
     findings: Vec<FindingJson<'a>>,
     judged: &'a [&'static str],
     not_judged: Vec<NotJudgedJson<'a>>,
+    remarks: &'a [String],
     damage_count: u64,
     loss_count: u64,
     gaps: Vec<GapJson<'a>>,
@@ -80,6 +81,7 @@ struct ProblemJson<'a> {
     value: Option<f64>,
     limit: Option<f64>,
     unit: &'a str,
+    detail: Option<String>,
     meaning: &'static str,
     action: &'static str,
 }
@@ -130,7 +132,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         version: VERSION,
         log: &checked.name,
         format: checked.format.name(),
-        verdict: judged.worst().map_or("unknown", Level::name),
+        verdict: judged.verdict(),
         damaged: judged.damages > 0,
         not_proved: checked.unproved(),
         judged_by: match judged.by {
@@ -150,6 +152,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         findings: judged.findings.iter().map(finding).collect(),
         judged: &judged.judged,
         not_judged: judged.not_judged.iter().map(|(check, why)| NotJudgedJson { check, why }).collect(),
+        remarks: &judged.remarks,
         damage_count: judged.damages,
         loss_count: judged.losses,
         gaps: judged.gaps.iter().map(gap).collect(),
@@ -212,6 +215,7 @@ fn problem(problem: &Problem, time_utc: Option<String>) -> ProblemJson<'_> {
         value: known(problem.value),
         limit: known(problem.limit),
         unit: &problem.unit,
+        detail: (!problem.details.is_empty()).then(|| problem.details.join(", ")),
         meaning: words.map_or("", |words| words.meaning),
         action: words.map_or("", |words| words.action),
     }

@@ -11,6 +11,7 @@ use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
+use hums_core::observation::Observation;
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
@@ -18,11 +19,12 @@ use hums_link::sequence::Sequences;
 
 use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
+use super::details::{self, Details};
 use super::epochs::Epochs;
 use super::flights::Flights;
 use super::judged::{Judged, JudgedBy};
 use super::problem::{LISTED_MAX, Problems};
-use crate::source::item::{About, Gap, Item};
+use crate::source::item::{About, Fact, Gap, Item};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 
@@ -86,6 +88,7 @@ pub struct Judge {
     checked_on_board: bool,
     flights: Flights,
     facts: BTreeMap<About, String>,
+    details: Details,
     epochs: Epochs,
     gaps: Vec<Gap>,
     damages: u64,
@@ -114,6 +117,7 @@ impl Judge {
             checked_on_board: false,
             flights: Flights::default(),
             facts: BTreeMap::new(),
+            details: Details::default(),
             epochs: Epochs::default(),
             gaps: Vec::new(),
             damages: 0,
@@ -134,8 +138,18 @@ impl Judge {
         match item {
             Item::Observation(source, observation) => {
                 self.advance(at);
+                if let Observation::SystemStatus(status) = observation {
+                    self.details.sensors(source, status, &self.monitor, &mut self.here);
+                }
+                if let Observation::Battery(battery) = observation {
+                    self.details.battery(source, battery.id);
+                }
                 self.monitor.observe(self.clock.monitor(at), source, observation);
             }
+            Item::Fact(Fact { about: About::Failsafes, words }) => {
+                self.details.failsafes(words, &mut self.here);
+            }
+            Item::Fact(Fact { about: About::Emergency, words }) => self.emergency(at, words),
             Item::Epoch(epoch_us) => self.epochs.epoch(epoch_us),
             Item::Fact(fact) => {
                 self.facts.insert(fact.about, fact.words.to_owned());
@@ -181,6 +195,20 @@ impl Judge {
         }
     }
 
+    /// The autopilot stops its motors in the moment in which it says why: that is no state which lasts for as long as the
+    /// monitor needs to see it.
+    fn emergency(&mut self, at: Instant, words: &str) {
+        self.advance(at);
+        if self.here.is_open(details::FAILSAFE) {
+            self.here.detail(details::FAILSAFE, words);
+            return;
+        }
+        for finding in details::emergency(at, self.monitor.params()) {
+            self.here.take(&finding, self.clock.behind());
+            self.here.detail(details::FAILSAFE, words);
+        }
+    }
+
     fn gap(&mut self, gap: &Gap) {
         // One that begins before the last observation is a count over the whole recording.
         if let (Some(from), Some(to)) = (gap.from.filter(|from| *from >= self.last), gap.to)
@@ -217,12 +245,13 @@ impl Judge {
     fn tick(&mut self, now: Instant) {
         let steps = self.clock.monitor(now);
         let (link, recorder) = (self.link(steps), RecorderStatus::default());
-        let Self { monitor, here, format, wire, calm_restart, clock, .. } = self;
+        let Self { monitor, here, format, wire, calm_restart, clock, details, .. } = self;
         let calm = calm_restart.is_some_and(|at| now.since(at) <= RESTART_SHOWS);
         monitor.tick(steps, &link, &recorder, &mut |finding| {
             if is_of(finding.check, *format, wire.is_some()) && !(calm && finding.check == RESTARTED) {
                 let at = Clock::recording(now, steps, finding.at);
                 here.take(&Finding { at, ..Finding::from(finding) }, clock.behind());
+                details.tell(finding.check, here);
             }
         });
         let armed = monitor.vehicle().armed();
@@ -306,6 +335,7 @@ impl Judge {
             problems: problems.worst_first(),
             judged,
             not_judged,
+            remarks: self.details.remarks(),
             gaps: self.gaps,
             damages: self.damages,
             losses: self.losses,

@@ -49,6 +49,8 @@ pub struct Judged {
     pub judged: Vec<&'static str>,
     /// Checks that had not, with the reason. Checks that are made for another autopilot are in neither list.
     pub not_judged: Vec<(&'static str, String)>,
+    /// What else the monitor has not judged, as sentences.
+    pub remarks: Vec<String>,
     /// What is missing, in order, up to [`super::problem::LISTED_MAX`].
     pub gaps: Vec<Gap>,
     /// How many gaps are damage.
@@ -68,6 +70,21 @@ impl Judged {
     /// Whether so few checks had something to judge that nothing found is no good news: fewer than one in ten.
     pub fn is_little(&self) -> bool {
         self.judged.len() * 10 < self.judged.len() + self.not_judged.len()
+    }
+
+    /// The verdict in a word, for scripts and tables: the worst level; what says that there was too little, or nothing, to
+    /// judge is not `ok`.
+    pub fn verdict(&self) -> &'static str {
+        match self.worst() {
+            None => "unknown",
+            Some(Level::Ok) if self.is_little() => "too_little",
+            Some(level) => level.name(),
+        }
+    }
+
+    /// Whether there was enough in it that nothing found is good news.
+    pub fn is_judged(&self) -> bool {
+        !matches!(self.verdict(), "unknown" | "too_little")
     }
 
     /// The worst level that was found; `None` where nothing could be judged.

@@ -6,6 +6,7 @@
 pub mod checked;
 mod clock;
 mod coverage;
+mod details;
 mod epochs;
 pub mod flights;
 pub mod json;
@@ -37,10 +38,10 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     let limits = Limits::new(&params::read(args.params.as_deref())?);
     let found = find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-        eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
+        note!("{}: {}", image.path.display(), image.damage.join("; "));
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1;
@@ -49,8 +50,9 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     let mut done = |Told { name, checked }: Told| match checked {
         Ok(checked) => {
             outcome = outcome.and(checked.outcome());
-            let text = if args.json {
-                json::line(&checked)?
+            let json = args.json.then(|| json::line(&checked)).transpose()?;
+            let text = if json.is_some() {
+                String::new()
             } else if many {
                 table.add(&checked);
                 text::line(&checked)
@@ -58,17 +60,23 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
                 text::screen(&checked)
             };
             bar.suspend(|| {
-                checked.unproved().iter().for_each(|why| eprintln!("hums: {name}: {why}"));
-                output::line(text.trim_end())
+                checked.unproved().iter().for_each(|why| note!("{name}: {why}"));
+                match &json {
+                    Some(json) => output::json_line(json),
+                    None => output::line(text.trim_end()),
+                }
             })
         }
         Err(error) => {
             failed += 1;
             if args.json {
-                return bar.suspend(|| output::line(&json::error(&name, &error)));
+                return bar.suspend(|| output::json_line(&json::error(&name, &error)));
             }
-            bar.suspend(|| eprintln!("hums: {error:#}"));
-            Ok(())
+            if many {
+                bar.suspend(|| note!("{error:#}"));
+                return Ok(());
+            }
+            Err(error)
         }
     };
     side_by_side(
@@ -86,7 +94,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     }
     match (failed, many) {
         (0, _) => Ok(outcome),
-        (_, false) => bail!("it could not be read"),
+        (_, false) => bail!("{}: could not be read", found.places.first().map_or("", |place| &place.title)),
         (failed, true) => bail!("{failed} of {} logs could not be read", found.places.len()),
     }
 }
@@ -109,7 +117,7 @@ pub fn recording(place: &Place, limits: &Limits, heard: Heard) -> Result<Checked
 }
 
 fn judged(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Checked> {
-    let (format, judged, summary) = overview::judge(place, limits, heard, shows)?;
+    let overview::Read { format, judged, summary, .. } = overview::judge(place, limits, heard, shows)?;
     let ending = summary.ending.map(|ending| Ending { name: place.name.clone(), ..ending });
     Ok(Checked { name: place.title.clone(), format, judged, ending })
 }

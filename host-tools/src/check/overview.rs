@@ -10,7 +10,7 @@ use hums_core::Monitor;
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
 use crate::ending::Ending;
-use crate::logs::reader::Summary as Read;
+use crate::logs::reader;
 use crate::names::counter_name;
 use crate::progress;
 use crate::source::item::{Gap, Summary, Want};
@@ -20,13 +20,20 @@ use crate::summary::{Contents, ExceedanceLine, FindingLine, MessageCount, Overvi
 /// Items between two looks at how far the reading is.
 const LOOK_EVERY: u32 = 4_096;
 
+/// A recording that was read through and judged.
+pub(super) struct Read {
+    /// What it is.
+    pub(super) format: Format,
+    /// What came of it.
+    pub(super) judged: Judged,
+    /// What was read.
+    pub(super) summary: Summary,
+    /// Bytes of the file that were read.
+    taken: u64,
+}
+
 /// Judges a recording; `shows` how far it is.
-pub(super) fn judge(
-    place: &Place,
-    limits: &Limits,
-    heard: Heard,
-    shows: bool,
-) -> Result<(Format, Judged, Summary)> {
+pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Read> {
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
     let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
@@ -41,7 +48,7 @@ pub(super) fn judge(
         Ok(())
     })?;
     bar.finish_and_clear();
-    Ok((format, judge.end(), summary))
+    Ok(Read { format, judged: judge.end(), summary, taken: progress.taken() })
 }
 
 /// Reads a recording through; where nobody has checked it, the monitor here does.
@@ -51,31 +58,32 @@ pub fn overview(place: &Place) -> Result<Overview> {
         let mut overview = Overview::of(log)?;
         overview.ending.name.clone_from(&place.name);
         if !overview.contents.is_checked() && overview.contents.frames() > 0 {
-            let (_, judged, _) = judge(place, &limits, Heard::Somewhere, true)?;
+            let Read { judged, .. } = judge(place, &limits, Heard::Somewhere, true)?;
             fill(&mut overview.contents, judged);
         }
         return Ok(overview);
     }
-    let (format, judged, summary) = judge(place, &limits, Heard::Somewhere, true)?;
+    let Read { format, judged, summary, taken } = judge(place, &limits, Heard::Somewhere, true)?;
     let mut contents = Contents::default();
     contents.epoch_us = judged.epochs.whole();
     count(&mut contents, format, summary);
     contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
     let (first, last) = judged.span.unzip();
-    let summary = Read {
+    let summary = reader::Summary {
         epoch_us: judged.epochs.whole(),
         frames: contents.frames(),
-        gaps: judged.damages + judged.losses,
+        gaps: judged.damages,
+        losses: judged.losses,
         first,
         last,
-        ..Read::default()
+        ..reader::Summary::default()
     };
     let (name, files) = (place.name.clone(), vec![place.title.clone()]);
     fill(&mut contents, judged);
     Ok(Overview {
         ending: Ending { name, files, summary, ..Ending::default() },
         format: Some(format),
-        bytes_on_card: place.bytes(),
+        bytes_on_card: if place.is_standard() { taken } else { place.bytes() },
         contents,
     })
 }

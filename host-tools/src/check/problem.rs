@@ -12,6 +12,9 @@ pub const LISTED_MAX: usize = 10_000;
 /// Parts that are followed at most: there are 140 of them, and a log may name what it likes.
 const FOLLOWED_MAX: usize = 1_000;
 
+/// Names of what a check was of: there are 32 sensors.
+const DETAILS_MAX: usize = 32;
+
 /// One check of one part that was at a warning or worse.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
@@ -37,6 +40,8 @@ pub struct Problem {
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
+    /// What it was of, where the check is of several: failsafes, sensors. By their names.
+    pub details: Vec<String>,
 }
 
 /// How bad a level is as a problem; stale is not known, and so is none.
@@ -100,6 +105,7 @@ impl Problems {
             value: f32::NAN,
             limit: finding.limit,
             unit: finding.unit.clone(),
+            details: Vec::new(),
         };
         let (problem, since) = self.open.entry(key).or_insert_with(|| (new(), None));
         if rank(finding.level) > rank(problem.level) {
@@ -120,6 +126,19 @@ impl Problems {
     pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
         if let Some((problem, _)) = self.open.get_mut(&(check.to_owned(), instance)) {
             problem.value = worse(problem.value, value, check);
+        }
+    }
+
+    /// Whether it is wrong now.
+    pub(super) fn is_open(&self, check: &str) -> bool {
+        self.open.get(&(check.to_owned(), 0)).is_some_and(|(_, since)| since.is_some())
+    }
+
+    /// What a check of several is of, while it is wrong.
+    pub(super) fn detail(&mut self, check: &str, name: &str) {
+        let Some((problem, Some(_))) = self.open.get_mut(&(check.to_owned(), 0)) else { return };
+        if problem.details.len() < DETAILS_MAX && !problem.details.iter().any(|known| known == name) {
+            problem.details.push(name.to_owned());
         }
     }
 

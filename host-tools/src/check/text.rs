@@ -13,7 +13,9 @@ use super::judged::{Judged, JudgedBy};
 use super::problem::Problem;
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
+use crate::printable::word;
 use crate::source::item::{About, Cause};
+use crate::source::recording::Format;
 use crate::states;
 use crate::utc::iso8601;
 
@@ -25,25 +27,27 @@ const LINES_MAX: usize = 8;
 /// One log, as a screen.
 pub fn screen(checked: &Checked) -> String {
     let judged = &checked.judged;
-    let mut text = format!("{}: {}\n", checked.name, checked.format.words());
-    let _ = writeln!(text, "  vehicle  {}", vehicle(judged));
-    let _ = writeln!(text, "  when     {}", when(judged));
+    let mut text = format!("{}: {}\n", word(&checked.name), checked.format.words());
+    let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
+    let _ = writeln!(text, "  when     {}", when(judged, checked.format));
     let _ = writeln!(text, "  in air   {}", in_air(judged));
     let _ = writeln!(text, "  verdict  {}", verdict(judged));
     text.push('\n');
     problems(&mut text, judged);
     not_judged(&mut text, judged);
     damage(&mut text, judged);
+    for remark in &judged.remarks {
+        let _ = writeln!(text, "  besides  {remark}");
+    }
     text
 }
 
 /// One log of many, as a line.
 pub fn line(checked: &Checked) -> String {
     let judged = &checked.judged;
-    let level = match judged.worst() {
-        None => "unknown",
-        Some(Level::Ok) => "ok",
-        Some(level) => level.name(),
+    let level = match judged.verdict() {
+        "too_little" => "little",
+        verdict => verdict,
     };
     let mut names: Vec<&str> = Vec::new();
     for problem in &judged.problems {
@@ -59,7 +63,7 @@ pub fn line(checked: &Checked) -> String {
     };
     let what: Vec<&str> = [found.as_str(), state].into_iter().filter(|words| !words.is_empty()).collect();
     let air = clock(flown(judged));
-    format!("{level:<8}  {air:>8}  {}  {}", checked.name, what.join("; ")).trim_end().to_owned()
+    format!("{level:<8}  {air:>8}  {}  {}", word(&checked.name), what.join("; ")).trim_end().to_owned()
 }
 
 /// What is wrong with the recording itself. An autopilot's log is cut in the middle of a message wherever its power goes
@@ -173,7 +177,7 @@ pub(super) fn firmware(version: u32) -> Option<String> {
     (version != 0).then(|| format!("{major}.{minor}.{patch}"))
 }
 
-fn when(judged: &Judged) -> String {
+fn when(judged: &Judged, format: Format) -> String {
     let Some((first, last)) = judged.span else { return "nothing of a vehicle is in it".to_owned() };
     let utc = judged.epochs.utc_us(first).map_or_else(
         || "time of day unknown".to_owned(),
@@ -184,7 +188,12 @@ fn when(judged: &Judged) -> String {
         1 => ", its clock began again once".to_owned(),
         count => format!(", its clock began again {count} times"),
     };
-    format!("{utc}, {} recorded{restarts}", clock(last.since(first)))
+    let since = match format {
+        Format::DataFlash | Format::Ulog => "; times count from the autopilot's power-on",
+        Format::Hums => "; times count from the monitor's power-on",
+        Format::Tlog | Format::Raw => "",
+    };
+    format!("{utc}, {} recorded{restarts}{since}", clock(last.since(first)))
 }
 
 /// All flights together.
@@ -267,7 +276,7 @@ fn problems(text: &mut String, judged: &Judged) {
         let Some(first) = group.first() else { continue };
         let words = vocabulary(&first.check);
         let level = if first.level == Level::Critical { "CRITICAL" } else { "warning" };
-        let _ = writeln!(text, "  {level:<8} {:>9}  {}", moment(first.at), sentence(group));
+        let _ = writeln!(text, "  {level:<8} {:>9}  {}", moment(first.at), word(&sentence(group)));
         if let Some(words) = words.filter(|_| place < SHOWN_MAX) {
             let _ = writeln!(text, "                      {}", words.meaning);
             let _ = writeln!(text, "                      {}\n", words.action);
@@ -317,10 +326,14 @@ fn sentence(group: &[&Problem]) -> String {
     } else if first.value.is_finite() {
         let _ = write!(text, ": {}{unit}", short(first.value));
     }
-    if first.limit.is_finite() && state.is_none() {
+    if !first.details.is_empty() {
+        let _ = write!(text, ": {}", first.details.join(", "));
+    } else if first.limit.is_finite() && state.is_none() {
         let _ = write!(text, " (limit {}{unit})", short(first.limit));
     }
-    let _ = write!(text, ", for {}", clock(first.lasted));
+    if first.lasted > Span::ZERO || first.lasting {
+        let _ = write!(text, ", for {}", clock(first.lasted));
+    }
     if first.times > 1 {
         let _ = write!(text, " in {} times", first.times);
     }
@@ -370,7 +383,7 @@ fn damage(text: &mut String, judged: &Judged) {
         };
         let place = gap.place.map_or_else(String::new, |place| format!("byte {place}: "));
         let at = gap.from.map_or_else(String::new, |from| format!(" {}", moment(from)));
-        let _ = writeln!(text, "  {what:<8} {at:>9}  {place}{}", gap.words);
+        let _ = writeln!(text, "  {what:<8} {at:>9}  {place}{}", word(&gap.words));
     }
     let more = (judged.damages + judged.losses).saturating_sub(LINES_MAX as u64);
     if more > 0 {

@@ -298,7 +298,8 @@ impl<'a> Fields<'a> {
                 cell.push_csv(&mut hex);
                 self.text(name, &String::from_utf8_lossy(&hex));
             }
-            Cell::Unknown(_) => {}
+            // A field of the line protocol has one type.
+            Cell::Words(..) | Cell::Unknown(_) => {}
         }
     }
 }

@@ -58,7 +58,8 @@ use crate::logs::reader::{self, Summary};
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
 use crate::plural::count;
 use crate::source::recording::{Place, find};
-use crate::{output, progress};
+use crate::summary::damaged_places;
+use crate::{output, printable, progress};
 use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
@@ -76,21 +77,21 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let (given, remarks) = naming::without_made(&args.inputs);
     let found = find(&given, args.salvage)?;
     for remark in remarks.iter().chain(&found.remarks) {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-        eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
+        note!("{}: {}", image.path.display(), image.damage.join("; "));
     }
     if found.places.is_empty() {
-        eprintln!("hums: no log is in there, so nothing was written");
+        note!("no log is in there, so nothing was written");
     }
     let mut inputs =
         Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     let Works { works, earlier } =
         Works::of(&found.places, |name| appended(&args.output.join(name), "tlog"))?;
     for (made, of) in &earlier {
-        eprintln!("hums: {}: is what this command makes of {of}, and is not read", made.display());
+        note!("{}: is what this command makes of {of}, and is not read", made.display());
         inputs.compare_only(made);
     }
     let standard_output = check_output(args, works.len(), formats)?;
@@ -197,12 +198,12 @@ impl Done {
 
     fn tell(&self) -> Result<()> {
         for remark in &self.remarks {
-            eprintln!("hums: {remark}");
+            note!("{remark}");
         }
         for why in self.ending.iter().flat_map(Ending::unproved) {
-            eprintln!("hums: {}: {why}", self.name);
+            note!("{}: {why}", self.name);
         }
-        self.lines.iter().try_for_each(|line| output::line(line))
+        self.lines.iter().try_for_each(|line| output::line(&printable::word(line)))
     }
 }
 
@@ -267,11 +268,11 @@ impl Task<'_> {
             log.own().map(|own| Ending { name: log.name.clone(), ..Ending::of(own, summary.clone()) });
         if ending.is_none() && summary.gaps > 0 {
             outcome = Outcome::Losses;
-            remarks.push(format!(
-                "{}: {}; hums check says where",
-                log.name,
-                count(summary.gaps, "damaged place")
-            ));
+            remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
+        }
+        if summary.losses > 0 {
+            let times = count(summary.losses, "time");
+            remarks.push(format!("{}: what recorded it lost something {times}, and says so", log.name));
         }
         if written.rows_left_out > 0 {
             remarks.push(format!(

@@ -20,7 +20,7 @@ use super::row::{Cell, CellType, Row};
 use super::write::Writers;
 use crate::logs::reader::{Collect as _, Deliver as _, Summary};
 use crate::progress;
-use crate::source::item::{Item, Kind, Rows, Table, Value, Want};
+use crate::source::item::{Cause, Item, Kind, Rows, Table, Value, Want};
 use crate::source::recording::Place;
 use crate::utc::iso8601;
 
@@ -104,6 +104,7 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
             }
             Item::Gap(gap) => {
                 summary.gaps += u64::from(gap.cause.is_damage());
+                summary.losses += u64::from(gap.cause == Cause::Lost);
                 writers.group(part.take())?;
                 writers.gap(&gap.to_own())?;
             }
@@ -197,14 +198,21 @@ fn cell(kind: Kind, value: Value<'_>) -> Cell {
         Value::Single(value) => Cell::Single(value),
         Value::Double(value) => Cell::Double(value),
         Value::Flag(value) => Cell::Flag(value),
-        Value::Text(words) => Cell::Text(words.to_owned()),
-        Value::Unknown => Cell::Unknown(match kind {
-            Kind::Unsigned => CellType::Count,
-            Kind::Signed => CellType::Signed,
-            Kind::Single => CellType::Single,
-            Kind::Double => CellType::Double,
-            Kind::Flag => CellType::Flag,
-            Kind::Text => CellType::Text,
-        }),
+        Value::Text(words) if kind == Kind::Text => Cell::Text(words.to_owned()),
+        Value::Text(words) => Cell::Words(words.to_owned(), cell_type(kind)),
+        Value::Bytes(bytes) => Cell::Hex(bytes.to_owned()),
+        Value::Unknown => Cell::Unknown(cell_type(kind)),
+    }
+}
+
+const fn cell_type(kind: Kind) -> CellType {
+    match kind {
+        Kind::Unsigned => CellType::Count,
+        Kind::Signed => CellType::Signed,
+        Kind::Single => CellType::Single,
+        Kind::Double => CellType::Double,
+        Kind::Flag => CellType::Flag,
+        Kind::Text => CellType::Text,
+        Kind::Bytes => CellType::Hex,
     }
 }

@@ -26,6 +26,8 @@ pub enum Cell {
     Text(String),
     /// Bytes.
     Hex(Vec<u8>),
+    /// Words in the place of a value of this type: in text and JSON only.
+    Words(String, CellType),
     /// Not known; it would be of this type.
     Unknown(CellType),
 }
@@ -79,7 +81,7 @@ impl Cell {
             Self::Flag(_) => CellType::Flag,
             Self::Text(_) => CellType::Text,
             Self::Hex(_) => CellType::Hex,
-            Self::Unknown(cell_type) => *cell_type,
+            Self::Words(_, cell_type) | Self::Unknown(cell_type) => *cell_type,
         }
     }
 
@@ -92,7 +94,7 @@ impl Cell {
             Self::Double(value) => push_csv_number(out, Scalar::Double(*value)),
             Self::Time(at) => push_seconds(out, at.as_micros()),
             Self::Flag(value) => out.extend_from_slice(if *value { b"true" } else { b"false" }),
-            Self::Text(text) => push_csv_text(out, text.as_bytes()),
+            Self::Text(text) | Self::Words(text, _) => push_csv_text(out, text.as_bytes()),
             Self::Hex(bytes) => push_hex(out, bytes),
             Self::Unknown(_) => {}
         }
@@ -103,7 +105,7 @@ impl Cell {
         match self {
             Self::Single(value) => push_json_number(out, Scalar::Single(*value)),
             Self::Double(value) => push_json_number(out, Scalar::Double(*value)),
-            Self::Text(text) => push_json_text(out, text.as_bytes()),
+            Self::Text(text) | Self::Words(text, _) => push_json_text(out, text.as_bytes()),
             Self::Hex(bytes) => {
                 out.push(b'"');
                 push_hex(out, bytes);

@@ -6,7 +6,7 @@ use std::io::{BufWriter, Write as _};
 use anyhow::Result;
 
 use super::table::Table;
-use super::text::columns;
+use super::text::{columns, push_csv_text};
 use super::unknown::UnknownLines;
 use crate::files::{Folder, FolderFile, buffered, settle};
 
@@ -114,11 +114,18 @@ impl Tables {
     }
 }
 
+/// A column's name as a cell: those of an autopilot's log are words of the world.
+fn cell(name: &str) -> String {
+    let mut out = Vec::new();
+    push_csv_text(&mut out, name.as_bytes());
+    String::from_utf8_lossy(&out).into_owned()
+}
+
 /// A table's first line.
 fn header(table: Table, own: &[&str]) -> String {
     let mut names: Vec<String> = vec!["time_boot[s]".into(), "time_utc".into()];
     match table {
-        Table::Hums(_) => names.extend(own.iter().map(|name| (*name).to_owned())),
+        Table::Hums(_) => names.extend(own.iter().map(|name| cell(name))),
         Table::Message(id) => {
             names.extend(["system".into(), "component".into()]);
             names.extend(hums_dialect::message(id).map(columns).unwrap_or_default());

@@ -149,7 +149,7 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         faults: FaultFlags::default(),
     };
     let here = |why: &anyhow::Error| -> Result<Outcome> {
-        eprintln!("hums: not in the emulator: {why:#}");
+        note!("not in the emulator: {why:#}");
         line("   recorded by the same pipeline on this PC")?;
         sim::run(&cli::Sim { run: run.clone(), tap: None })
     };

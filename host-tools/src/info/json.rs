@@ -251,7 +251,7 @@ impl LogJson {
             records: contents.records,
             messages: messages(contents),
             frames_of_other_messages: contents.other_messages.frames,
-            gaps_count: summary.gaps,
+            gaps_count: summary.gaps + summary.losses,
             frames_missing: summary.frames_missing,
             gaps: gaps(contents),
             losses: losses(contents),

@@ -21,7 +21,7 @@ use text::{image_text, text};
 pub fn run(args: &cli::Info) -> Result<Outcome> {
     let found = find(&args.inputs, args.salvage)?;
     for remark in &found.remarks {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     let mut list = None;

@@ -14,6 +14,7 @@ use super::wear;
 use crate::ending::behind_words;
 use crate::logs;
 use crate::plural::count;
+use crate::printable::{path, word};
 use crate::states;
 use crate::summary::{Contents, FindingLine, LISTED_MAX, Overview};
 use crate::utc::iso8601;
@@ -23,7 +24,7 @@ const SHOWN_MAX: usize = 40;
 
 /// A card for people to read.
 pub fn image_text(image: &logs::find::Image) -> String {
-    let mut text = format!("Card {}", image.path.display());
+    let mut text = format!("Card {}", path(&image.path));
     for damage in &image.damage {
         let _ = write!(text, "\n  damaged: {damage}");
     }
@@ -51,8 +52,8 @@ pub fn text(log: &Overview) -> String {
 fn heading(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     let _ = match log.format {
-        Some(format) => writeln!(text, "{}: {}", log.ending.files.join(", "), format.words()),
-        None => writeln!(text, "Session {} ({})", log.ending.name, log.ending.files.join(", ")),
+        Some(format) => writeln!(text, "{}: {}", word(&log.ending.files.join(", ")), format.words()),
+        None => writeln!(text, "Session {} ({})", word(&log.ending.name), word(&log.ending.files.join(", "))),
     };
     match (summary.first, summary.last) {
         (Some(first), Some(last)) => {
@@ -137,7 +138,7 @@ fn findings_text(text: &mut String, log: &Overview) {
             "    {:>9.3} s  {:<8}  {}",
             finding.at.as_secs_f64(),
             finding.level,
-            sentence(finding)
+            word(&sentence(finding))
         );
     }
     more(text, contents.findings_count, contents.findings.len());
@@ -190,10 +191,15 @@ fn gaps_text(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     // Frames and sectors are counted in logs of ours only.
     let own = log.format.is_none();
-    if summary.gaps == 0 && summary.blocks.damaged == 0 {
+    if summary.gaps + summary.losses + summary.blocks.damaged == 0 {
         text.push_str("  gaps     none\n");
     } else if !own {
-        let _ = writeln!(text, "  gaps     {} (hums check tells where and why)", summary.gaps);
+        let _ = writeln!(
+            text,
+            "  gaps     {} damaged or cut, {} that the recorder itself lost (hums check tells where and why)",
+            count(summary.gaps, "place"),
+            summary.losses
+        );
     } else {
         let (missing, damaged) = (summary.frames_missing, summary.blocks.damaged);
         let _ = writeln!(
@@ -231,7 +237,7 @@ fn gaps_text(text: &mut String, log: &Overview) {
             gap.sectors_skipped
         );
     }
-    more(text, summary.gaps, contents.gaps.len());
+    more(text, (summary.gaps + summary.losses).max(contents.gaps.len() as u64), contents.gaps.len());
     for loss in losses(contents) {
         let _ = writeln!(
             text,
@@ -281,6 +287,7 @@ fn messages_text(text: &mut String, log: &Overview) {
     text.push_str("  messages                                   frames     per s      bytes\n");
     let mut line = |name: &str, frames: u64, bytes: u64| {
         let rate = if seconds > 0.0 { frames as f64 / seconds } else { 0.0 };
+        let name = word(name);
         let _ = writeln!(text, "    {name:<36} {frames:>10} {rate:>9.2} {bytes:>10}");
     };
     for (&(id, verified), count) in &contents.messages {

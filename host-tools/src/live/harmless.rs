@@ -8,24 +8,18 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-/// Bidirectional controls (Unicode 16, property `Bidi_Control`), and the two separators that end a line.
-const fn is_control(c: char) -> bool {
-    matches!(
-        c,
-        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
-    )
-}
+use crate::printable::redirects;
 
 /// A value as JSON; empty where it has no form in JSON, which no type of the pages lacks.
 pub fn json(value: &impl Serialize) -> String {
     let text = serde_json::to_string(value).unwrap_or_default();
-    if text.contains(is_control) { named(&text) } else { text }
+    if text.contains(redirects) { named(&text) } else { text }
 }
 
 fn named(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 64);
     for c in text.chars() {
-        if is_control(c) {
+        if redirects(c) {
             // Writing to a `String` cannot fail.
             let _ = write!(out, "<U+{:04X}>", u32::from(c));
         } else {

@@ -136,8 +136,8 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, Waiting)>> {
     let path = spool.path().to_owned();
     let damage = spool.damage();
     if damage.bytes > 0 {
-        eprintln!(
-            "hums: {}: of an earlier run, and lost: {} of batches that were cut off or are damaged, with {} as far as \
+        note!(
+            "{}: of an earlier run, and lost: {} of batches that were cut off or are damaged, with {} as far as \
              that is known",
             path.display(),
             count(damage.bytes, "byte"),
@@ -145,8 +145,8 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, Waiting)>> {
         );
     }
     if spool.points() > 0 {
-        eprintln!(
-            "hums: of an earlier run, and written first: {} in {}",
+        note!(
+            "of an earlier run, and written first: {} in {}",
             count(spool.points(), "point"),
             path.display()
         );
@@ -179,7 +179,7 @@ fn finish(influx: Influx, spool: &Waiting) -> Outcome {
             eprintln!("  {} lost: for want of room, or with what an earlier run left damaged", figures.lost);
         }
         if figures.stored > 0 {
-            eprintln!(
+            note!(
                 "  {} wait in {}: the next `hums live` with this database writes them",
                 figures.stored,
                 spool.path.display()

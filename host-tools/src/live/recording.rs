@@ -68,7 +68,7 @@ fn chosen(path: &Path, session: Option<&str>) -> Result<Place> {
         return Err(usage(format!("{} has no session {wanted}; it has {}", path.display(), listed(&names))));
     };
     if session.is_none() && names.len() > 1 {
-        eprintln!("hums: {newest} is played, the newest; --session NAME plays another: {}", listed(&names));
+        note!("{newest} is played, the newest; --session NAME plays another: {}", listed(&names));
     }
     Ok(places.swap_remove(index))
 }

@@ -64,6 +64,8 @@ pub struct Summary {
     pub groups: u64,
     /// Gaps.
     pub gaps: u64,
+    /// Places where the recorder itself lost something and says so, of recordings of other programs.
+    pub losses: u64,
     /// Frames that are known to be missing.
     pub frames_missing: u64,
     /// Gaps that are none: what a disarmed vehicle sent was not kept, on purpose.

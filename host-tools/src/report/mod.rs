@@ -33,6 +33,7 @@ use crate::made;
 use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
+use crate::printable::{path as shown, word};
 use crate::source::recording::{Place, find};
 use crate::summary::Overview;
 
@@ -41,10 +42,10 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     let (given, remarks) = without_made(&args.inputs);
     let found = find(&given, false)?;
     for remark in remarks.iter().chain(&found.remarks) {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-        eprintln!("hums: {}: {}", image.path.display(), image.damage.join("; "));
+        note!("{}: {}", image.path.display(), image.damage.join("; "));
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
@@ -69,10 +70,10 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             let html = page::html(&overview, &replay, &trend::of(&this, before), of.as_deref())?;
             if kept.pass(write(&path, &html, &inputs, of.as_deref()))?.is_some() {
                 let bytes = count(html.len() as u64, "byte");
-                output::line(&format!("{}: session {}, {bytes}", path.display(), place.name))?;
+                output::line(&format!("{}: session {}, {bytes}", shown(&path), word(&place.name)))?;
             }
             for why in overview.unproved() {
-                eprintln!("hums: {}: {why}", place.name);
+                note!("{}: {why}", place.name);
             }
             outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
         }
@@ -84,8 +85,8 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     })?;
     followed.finish().try_for_each(&mut done)?;
     if *wanted.sessions.start() > 0 && args.session.is_none() {
-        eprintln!(
-            "hums: this is the last one of {}; -o DIR/ writes a page for each, --session NAME one of them",
+        note!(
+            "this is the last one of {}; -o DIR/ writes a page for each, --session NAME one of them",
             found.places.len()
         );
     }

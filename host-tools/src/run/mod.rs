@@ -126,7 +126,7 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
     if let Some(trouble) =
         image::trouble(&file).with_context(|| format!("{}: cannot be read", path.display()))?
     {
-        eprintln!("hums: {}: {trouble}", path.display());
+        note!("{}: {trouble}", path.display());
     }
     Ok(file)
 }

@@ -109,6 +109,11 @@ pub enum About {
     Frame,
     /// Who or what made the recording.
     Recorder,
+    /// The failsafes that the autopilot has declared and not yet resolved, by their names with `, ` between; empty where
+    /// there is none. It is so from here on.
+    Failsafes,
+    /// An emergency that happens here, in which the autopilot stops the motors at once, by its name.
+    Emergency,
     /// How arming is known, where the recording does not tell it: a sentence. Empty where it does.
     Arming,
 }
@@ -149,9 +154,12 @@ pub enum Kind {
     Flag,
     /// [`Value::Text`]
     Text,
+    /// [`Value::Bytes`]
+    Bytes,
 }
 
-/// One row: as many values as its table has columns, each of its column's kind or [`Value::Unknown`].
+/// One row: as many values as its table has columns, each of its column's kind, [`Value::Unknown`], or
+/// [`Value::Text`] where a text log has words in the place of a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
     /// Its table. The same table is the same `Arc`.
@@ -177,6 +185,8 @@ pub enum Value<'a> {
     Flag(bool),
     /// Words.
     Text(&'a str),
+    /// Bytes that are no words: part of a file's content. Their column is of [`Kind::Bytes`].
+    Bytes(&'a [u8]),
 }
 
 /// Something is missing.

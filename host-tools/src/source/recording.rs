@@ -17,7 +17,9 @@ use super::{dataflash, ulog};
 use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::{self, Content, Log};
+use crate::outcome::usage;
 use crate::plural::count;
+use crate::printable;
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
 pub const RAW_BAUD: u32 = 115_200;
@@ -27,6 +29,9 @@ const LOOK_BYTES: usize = 64 * 1024;
 const DEPTH_MAX: usize = 16;
 /// Recordings of one folder, and folders of one folder, that are kept: each takes some hundred bytes.
 const WALKED_MAX: usize = 10_000;
+
+/// Files that are passed over and named.
+const PASSED_OVER_MAX: usize = 20;
 
 /// What is read besides logs of ours, for messages: the end of a sentence.
 const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
@@ -154,7 +159,12 @@ impl Place {
             From::Log(log) => {
                 let reader = OwnReader::new(log.as_ref().clone());
                 let progress = reader.progress();
-                Ok(Recording { format: Format::Hums, progress, reader: Box::new(reader) })
+                Ok(Recording {
+                    format: Format::Hums,
+                    progress,
+                    name: self.title.clone(),
+                    reader: Box::new(reader),
+                })
             }
         }
     }
@@ -166,6 +176,7 @@ pub struct Recording {
     pub format: Format,
     /// How far it has been read.
     pub progress: Progress,
+    name: String,
     reader: Box<dyn Reader>,
 }
 
@@ -178,6 +189,9 @@ impl Recording {
             if start.is_empty() {
                 bail!("{name}: is empty");
             }
+            if let Some(what) = hint(&start) {
+                bail!("{name}: {what}");
+            }
             bail!("{name}: is neither a log of HUMS, a card or its image, nor {KNOWN}");
         };
         let progress = input.progress();
@@ -187,19 +201,22 @@ impl Recording {
             Detected::DataFlash(form) => dataflash::open(input, form).with_context(|| name.to_owned())?,
             Detected::Ulog => ulog::open(input).with_context(|| name.to_owned())?,
         };
-        Ok(Self { format: format.format(), progress, reader })
+        Ok(Self { format: format.format(), progress, name: name.to_owned(), reader })
     }
 
     /// Reads it from its beginning to its end, or until `take` says [`Stop`].
     pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
-        let mut last = Instant::ZERO;
+        let (mut last, mut is_takers) = (Instant::ZERO, false);
         let mut follow = |at: Instant, item: Item<'_>| {
             last = last.max(at);
-            take(at, item)
+            let taken = take(at, item);
+            is_takers |= taken.is_err();
+            taken
         };
         let summary = match self.reader.read(want, &mut follow) {
             Err(error) if error.is::<Stop>() => return Ok(Summary::default()),
-            result => result?,
+            Err(error) if is_takers => return Err(error),
+            result => result.with_context(|| self.name.clone())?,
         };
         if let Some(words) = self.progress.damage() {
             let place = Some(self.progress.taken());
@@ -243,6 +260,34 @@ fn detect(start: &[u8]) -> Option<Detected> {
         (Kind::Raw, true) => Some(Detected::Raw),
         _ => dataflash::detect(start).map(Detected::DataFlash),
     }
+}
+
+/// What is known of files that are not read, and what to do with them.
+fn hint(start: &[u8]) -> Option<&'static str> {
+    const HINTS: [(&[u8], &str); 9] = [
+        (b"PK\x03\x04", "is a ZIP archive; unpack it (unzip), and give what is in it"),
+        (b"\xfd7zXZ\0", "is compressed with xz; unpack it (xz -dk), or compress it with gzip instead"),
+        (b"BZh", "is compressed with bzip2; unpack it (bzip2 -dk), or compress it with gzip instead"),
+        (
+            b"\x28\xb5\x2f\xfd",
+            "is compressed with Zstandard; unpack it (zstd -dk), or compress it with gzip instead",
+        ),
+        (b"7z\xbc\xaf\x27\x1c", "is a 7-Zip archive; unpack it (7z x), and give what is in it"),
+        (b"Rar!\x1a\x07", "is a RAR archive; unpack it, and give what is in it"),
+        (
+            b"ULogEnc",
+            "is an encrypted log of PX4 (.ulge); decrypt it with the key of its vehicle (PX4: Tools/decrypt_ulog.py)",
+        ),
+        (
+            b"\xff\xfe",
+            "is text in UTF-16; a text log is read as UTF-8: convert it (iconv -f UTF-16 -t UTF-8)",
+        ),
+        (
+            b"\xfe\xff",
+            "is text in UTF-16; a text log is read as UTF-8: convert it (iconv -f UTF-16 -t UTF-8)",
+        ),
+    ];
+    HINTS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, what)| *what)
 }
 
 /// What a file that begins with these bytes (64 KiB, or all of it) is, where it is a recording and none of our own logs.
@@ -319,6 +364,9 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     let mut found = Found::default();
     for input in inputs {
         if input == Path::new("-") {
+            if found.places.iter().any(Place::is_standard) {
+                return Err(usage("-: standard input is named twice, and can be read once only"));
+            }
             found.places.push(Place::standard());
             continue;
         }
@@ -348,9 +396,14 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             // A card has other files beside its logs.
             if walk.others > 0 && found.places.iter().skip(before).all(|place| place.own().is_none()) {
                 let files = count(walk.others, "file");
-                found
-                    .remarks
-                    .push(format!("{}: {files} passed over: no log of a known kind", input.display()));
+                let names: Vec<String> = walk.passed_over.iter().map(|name| format!("\n  {name}")).collect();
+                let more = walk.others.saturating_sub(names.len() as u64);
+                let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
+                found.remarks.push(format!(
+                    "{}: {files} passed over: no log of a known kind{}{more}",
+                    input.display(),
+                    names.concat()
+                ));
             }
         } else if is_own(input)? {
             let own =
@@ -421,6 +474,8 @@ struct Walk {
     left_out: u64,
     /// Files that are no recording: the logs of ours among them.
     others: u64,
+    /// The first of them, by their names in the folder.
+    passed_over: Vec<String>,
     /// Files with the name of a recording that hold none, and the first of them as sentences.
     unknown: u64,
     remarks: Vec<String>,
@@ -442,6 +497,9 @@ impl Walk {
                 if kind.is_dir() { depth < DEPTH_MAX } else { kind.is_file() && is_recording(&path) };
             if !wanted {
                 self.others += u64::from(kind.is_file());
+                if kind.is_file() && self.passed_over.len() < PASSED_OVER_MAX {
+                    self.passed_over.push(printable::path(&path));
+                }
                 if kind.is_file() && is_named_as_recording(&path) {
                     self.unknown += 1;
                     if self.remarks.len() < REMARKS_MAX {

@@ -225,7 +225,7 @@ fn a_folder_says_how_many_of_its_files_are_no_log() {
     fs::write(dir.path().join("notes.txt"), "nothing of a vehicle").expect("written");
     let output = run(dir.path(), "check .", 4);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("1 file passed over: no log of a known kind"), "{told}");
+    assert!(told.contains("1 file passed over: no log of a known kind\n  ./notes.txt\n"), "{told}");
 }
 
 #[test]
@@ -240,6 +240,243 @@ fn a_log_without_times_is_not_called_good_and_its_page_neither() {
     run(dir.path(), "report old.log -o old.html", 3);
     let info = text(&run(dir.path(), "info old.log", 3));
     assert!(info.contains("damaged or cut short") && !info.contains("sector"), "{info}");
+}
+
+/// Messages of an `ArduPilot` log: the definition of FMT, then these.
+fn dataflash(messages: &[(u8, Vec<u8>)]) -> Vec<u8> {
+    let mut log = Vec::new();
+    for (kind, payload) in
+        [(128, format_of(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"))].iter().chain(messages)
+    {
+        log.extend([0xA3, 0x95, *kind]);
+        log.extend(payload);
+    }
+    log
+}
+
+/// What FMT says of a type.
+fn format_of(kind: u8, length: u8, name: &str, characters: &str, columns: &str) -> Vec<u8> {
+    let mut payload = vec![kind, length];
+    for (words, size) in [(name, 4), (characters, 16), (columns, 64)] {
+        payload.extend(words.bytes().chain(std::iter::repeat(0)).take(size));
+    }
+    payload
+}
+
+/// What a terminal obeys, and what turns the direction of writing.
+fn obeyed(text: &str) -> Vec<char> {
+    let is_bad = |c: &char| (c.is_control() && *c != '\n') || matches!(c, '\u{202a}'..='\u{202e}');
+    text.chars().filter(is_bad).collect()
+}
+
+#[test]
+fn no_word_of_a_log_and_no_name_of_a_file_is_obeyed_by_a_terminal() {
+    let dir = tempfile::tempdir().expect("directory");
+    let padded = |words: &str| words.bytes().chain(std::iter::repeat(0)).take(64).collect::<Vec<u8>>();
+    let words = padded("ArduCopter V4.5.0 \u{1b}[2J\u{9b}31m\u{202e}evil");
+    let messages = [
+        (128, format_of(160, 75, "MSG", "QZ", "TimeUS,Message")),
+        (128, format_of(161, 12, "\u{1b}]0", "QB", "TimeUS,=x\u{1b}<b>")),
+        (160, [&1_000_000_u64.to_le_bytes()[..], &words].concat()),
+        (161, [&2_000_000_u64.to_le_bytes()[..], &[1]].concat()),
+    ];
+    let name = "a\u{1b}[31m\nok 1:00 \u{202e}.bin";
+    fs::create_dir(dir.path().join("logs")).expect("a directory");
+    fs::write(dir.path().join("logs").join(name), dataflash(&messages)).expect("written");
+    fs::write(dir.path().join("logs").join("b\u{1b}c\nd.bin"), "nothing").expect("written");
+    fs::copy(flight("px4_hil_quad_low.tlog"), dir.path().join("logs/calm.tlog")).expect("a copy");
+    let one = format!("logs/{name}");
+    for arguments in [
+        vec!["check", "logs"],
+        vec!["check", "--json", "logs"],
+        vec!["check", &one],
+        vec!["info", "logs"],
+        vec!["info", "--json", "logs"],
+        vec!["report", &one, "-o", "page.html"],
+        vec!["decode", &one, "-o", "out", "--format", "csv"],
+        vec!["check", "logs/\u{1b}none"],
+        vec!["verify", "logs/\u{1b}none"],
+    ] {
+        let output =
+            super::support::hums().current_dir(dir.path()).args(&arguments).output().expect("it runs");
+        for said in [&output.stdout, &output.stderr] {
+            let said = String::from_utf8_lossy(said);
+            assert_eq!(obeyed(&said), [], "hums {arguments:?}\n{said:?}");
+            assert!(!said.contains("\nok 1:00") && !said.contains("\nd.bin"), "{arguments:?}: {said}");
+        }
+    }
+    let output = run(dir.path(), "check --json logs", 3);
+    let names: Vec<String> = text(&output)
+        .lines()
+        .map(|line| {
+            serde_json::from_str::<serde_json::Value>(line).expect("JSON")["log"]
+                .as_str()
+                .expect("a name")
+                .to_owned()
+        })
+        .collect();
+    assert!(names.contains(&one), "JSON has the name as it is: {names:?}");
+}
+
+#[test]
+fn a_column_that_would_be_a_formula_is_none_in_the_header_either() {
+    let dir = tempfile::tempdir().expect("directory");
+    let messages = [
+        (128, format_of(161, 12, "X", "QB", "TimeUS,=x<b>")),
+        (161, [&2_000_000_u64.to_le_bytes()[..], &[1]].concat()),
+    ];
+    fs::write(dir.path().join("x.bin"), dataflash(&messages)).expect("written");
+    run(dir.path(), "decode x.bin -o out --format csv", 0);
+    let folder =
+        fs::read_dir(dir.path().join("out")).expect("a folder").next().expect("tables").expect("an entry");
+    let table = fs::read_to_string(folder.path().join("X.csv")).expect("a table");
+    assert!(table.starts_with("time_boot[s],time_utc,TimeUS,'=x<b>\n"), "{table}");
+}
+
+#[test]
+fn words_in_a_column_of_numbers_are_in_text_and_json_and_do_no_harm_in_columns() {
+    let dir = tempfile::tempdir().expect("directory");
+    let log = "ArduCopter V3.1\nFMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+        FMT, 4, 10, ODD, Ihh, TimeMS,A,B\nODD, 1000, high, 7\nODD, 2000, 5, 8\nODD, 3000, nan, 8\n";
+    fs::write(dir.path().join("old.log"), log).expect("written");
+    run(dir.path(), "decode old.log -o out --format csv,jsonl,parquet,influx", 0);
+    let path = super::support::contents(&dir.path().join("out"));
+    let of = |end: &str| {
+        let (_, bytes) = path.iter().find(|(name, _)| name.ends_with(end)).expect("a file");
+        String::from_utf8_lossy(bytes).into_owned()
+    };
+    assert!(
+        of("ODD.csv").contains(",1000,high,7\n") && of("ODD.csv").contains(",2000,5,8\n"),
+        "{}",
+        of("ODD.csv")
+    );
+    assert!(of(".jsonl").contains("\"A\":\"high\",\"B\":7"), "{}", of(".jsonl"));
+    assert!(!of(".lp").contains("high"), "a field of the line protocol has one type");
+    assert!(path.iter().any(|(name, _)| name.ends_with("ODD.parquet")));
+}
+
+#[test]
+fn standard_input_is_read_once() {
+    let dir = tempfile::tempdir().expect("directory");
+    for command in ["check - -", "info - -", "decode - - -o out --format csv"] {
+        let told = String::from_utf8_lossy(&run(dir.path(), command, 2).stderr).into_owned();
+        assert!(told.contains("standard input is named twice"), "{told}");
+    }
+    let bytes = fs::read(flight("px4_hil_quad_low.tlog")).expect("the recording");
+    let length = bytes.len();
+    let output = super::support::hums().args(["info", "-"]).write_stdin(bytes).output().expect("it runs");
+    assert!(text(&output).contains(&format!(" in {length} bytes")), "{}", text(&output));
+}
+
+#[test]
+fn a_log_in_which_there_was_nothing_to_judge_does_not_look_good_to_a_script() {
+    let dir = tempfile::tempdir().expect("directory");
+    let padded = |words: &str| words.bytes().chain(std::iter::repeat(0)).take(64).collect::<Vec<u8>>();
+    let definition = (128, format_of(160, 75, "MSG", "QZ", "TimeUS,Message"));
+    let message =
+        |second: u64, words: &str| (160, [&(second * 1_000_000).to_le_bytes()[..], &padded(words)].concat());
+    let little: Vec<_> = std::iter::once(definition.clone())
+        .chain((1..60).map(|second| message(second, "ArduCopter V4.6.3 (92b0cd78)")))
+        .collect();
+    fs::write(dir.path().join("little.bin"), dataflash(&little)).expect("written");
+    let tracker = [definition, message(1, "AntennaTracker V4.5.0"), message(5, "x")];
+    fs::write(dir.path().join("nobody.bin"), dataflash(&tracker)).expect("written");
+    for (name, verdict, words) in [
+        ("little.bin", "too_little", "too little in it to judge"),
+        ("nobody.bin", "unknown", "nothing can be said: no autopilot was heard"),
+    ] {
+        let checked = json(&run(dir.path(), &format!("check --json {name}"), 3));
+        assert_eq!((checked["verdict"].as_str(), checked["damaged"].as_bool()), (Some(verdict), Some(false)));
+        assert!(text(&run(dir.path(), &format!("check {name}"), 3)).contains(words));
+    }
+}
+
+/// A ULog in which a vehicle is heard for 20 s, and whose logger lost something.
+fn ulog_with_a_dropout() -> Vec<u8> {
+    let mut log = b"ULog\x01\x12\x35\x01".to_vec();
+    log.extend(1_000_000_u64.to_le_bytes());
+    let mut message = |kind: u8, body: &[u8]| {
+        log.extend((body.len() as u16).to_le_bytes());
+        log.push(kind);
+        log.extend(body);
+    };
+    message(
+        b'F',
+        b"vehicle_status:uint64_t timestamp;uint8_t arming_state;uint8_t nav_state;uint8_t system_type;",
+    );
+    message(b'F', b"cpuload:uint64_t timestamp;float load;float ram_usage;");
+    message(b'A', &[&[0, 0, 0][..], b"vehicle_status"].concat());
+    message(b'A', &[&[0, 1, 0][..], b"cpuload"].concat());
+    for second in 1..20_u64 {
+        let time = (second * 1_000_000).to_le_bytes();
+        message(b'D', &[&[0, 0][..], &time, &[1, 4, 2]].concat());
+        message(b'D', &[&[1, 0][..], &time, &0.3_f32.to_le_bytes(), &0.3_f32.to_le_bytes()].concat());
+        if second == 10 {
+            message(b'O', &120_u16.to_le_bytes());
+        }
+    }
+    log
+}
+
+#[test]
+fn what_a_logger_itself_lost_is_said_and_is_no_damage_to_any_command() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("drop.ulg"), ulog_with_a_dropout()).expect("written");
+    let checked = json(&super::support::attempt(dir.path(), "check --json drop.ulg"));
+    assert_eq!((checked["loss_count"].as_u64(), checked["damaged"].as_bool()), (Some(1), Some(false)));
+    let info = text(&run(dir.path(), "info drop.ulg", 0));
+    assert!(info.contains("1 that the recorder itself lost"), "{info}");
+    run(dir.path(), "report drop.ulg -o page.html", 0);
+    let output = run(dir.path(), "decode drop.ulg -o out --format csv", 0);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("lost something 1 time"), "{told}");
+}
+
+#[test]
+fn what_is_read_by_other_programs_is_told_with_what_to_do() {
+    let dir = tempfile::tempdir().expect("directory");
+    for (start, words) in [
+        (&b"PK\x03\x04aaaa"[..], "ZIP archive; unpack it"),
+        (b"\xfd7zXZ\0aaaa", "compressed with xz"),
+        (b"ULogEnc\x01aaaa", "encrypted log of PX4"),
+        (b"\xff\xfeF\0M\0T\0,\0", "UTF-16"),
+    ] {
+        fs::write(dir.path().join("x.bin"), start).expect("written");
+        let told = String::from_utf8_lossy(&run(dir.path(), "check x.bin", 1).stderr).into_owned();
+        assert!(told.contains("x.bin: is ") && told.contains(words), "{told}");
+        assert_eq!(told.lines().count(), 1, "{told}");
+    }
+}
+
+#[test]
+fn a_failsafe_and_a_crash_are_found_by_their_names() {
+    let dir = tempfile::tempdir().expect("directory");
+    let padded = |words: &str| words.bytes().chain(std::iter::repeat(0)).take(64).collect::<Vec<u8>>();
+    let at = |ms: u64| (ms * 1_000).to_le_bytes();
+    let mut messages = vec![
+        (128, format_of(160, 75, "MSG", "QZ", "TimeUS,Message")),
+        (128, format_of(161, 12, "EV", "QB", "TimeUS,Id")),
+        (128, format_of(162, 13, "ERR", "QBB", "TimeUS,Subsys,ECode")),
+        (160, [&at(500)[..], &padded("ArduCopter V4.6.3 (92b0cd78)")].concat()),
+        (161, [&at(1_000)[..], &[10]].concat()),
+        (162, [&at(5_000)[..], &[29, 1]].concat()),
+        (162, [&at(9_000)[..], &[29, 0]].concat()),
+        (162, [&at(15_000)[..], &[12, 1]].concat()),
+        (161, [&at(15_000)[..], &[11]].concat()),
+    ];
+    // Something goes on all the time.
+    messages.extend((0..200_u64).map(|step| (160, [&at(1_000 + 100 * step)[..], &padded("x")].concat())));
+    messages.sort_by_key(|(kind, payload)| {
+        if *kind == 128 { 0 } else { u64::from_le_bytes(*payload.first_chunk().expect("a time")) }
+    });
+    fs::write(dir.path().join("crash.bin"), dataflash(&messages)).expect("written");
+    let checked = json(&super::support::attempt(dir.path(), "check --json crash.bin"));
+    let problems = checked["problems"].as_array().expect("an array");
+    let state = problems.iter().find(|problem| problem["check"] == "autopilot_state").expect("found");
+    assert_eq!(state["detail"], "vibration failsafe, crash check");
+    assert_eq!((state["level"].as_str(), state["times"].as_u64()), (Some("critical"), Some(2)));
+    let screen = text(&super::support::attempt(dir.path(), "check crash.bin"));
+    assert!(screen.contains("autopilot failsafe: emergency: vibration failsafe, crash check"), "{screen}");
 }
 
 /// A tlog as a computer whose clock is an hour ahead would have recorded it.

@@ -161,7 +161,7 @@ impl Inner {
     fn tell_full(&mut self) {
         if !self.told_full && !self.figures.trouble.is_empty() {
             self.told_full = true;
-            eprintln!(
+            note!(
                 "hums: {}: is full, and the database takes nothing ({}): reading the recording waits for it, until Ctrl-C",
                 self.spool.path().display(),
                 self.figures.trouble

@@ -68,7 +68,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let (json, before) = board.finish()?;
     ground.finish()?;
     if let Some(remark) = arrivals.remark() {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     let counters: Counters = serde_json::from_str(&json)
         .with_context(|| format!("the firmware's counters are not understood: {json}"))?;
@@ -76,7 +76,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let frames = report.read_card(&run.sd, earlier)?;
     before.add_to(&mut report, frames);
     if let Some(remark) = report.remark(&run.input) {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }
@@ -151,7 +151,7 @@ fn is_arm_elf(path: &Path) -> bool {
 }
 
 fn build(tree: &Path) -> Result<PathBuf> {
-    eprintln!("hums: no firmware image yet: building it (cargo xtask firmware --board emulated)");
+    note!("no firmware image yet: building it (cargo xtask firmware --board emulated)");
     let output = Command::new("cargo")
         .args(["xtask", "firmware", "--board", "emulated"])
         .current_dir(tree)

@@ -83,11 +83,11 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     ground.finish()?;
     arrivals.finish()?;
     if let Some(remark) = arrivals.remark() {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     let report = world.settle(&run.sd, earlier)?;
     if let Some(remark) = report.remark(&run.input) {
-        eprintln!("hums: {remark}");
+        note!("{remark}");
     }
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }

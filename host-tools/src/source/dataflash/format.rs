@@ -19,8 +19,10 @@ const FIELDS_MAX: usize = 16;
 pub(super) enum FieldKind {
     /// `b`
     I8,
-    /// `B`, `M` (a flight mode)
+    /// `B`
     U8,
+    /// `M`: a flight mode, a number in a binary log and a name in a text log
+    Mode,
     /// `h`
     I16,
     /// `H`
@@ -63,7 +65,8 @@ impl FieldKind {
     fn of(character: u8) -> Option<Self> {
         Some(match character {
             b'b' => Self::I8,
-            b'B' | b'M' => Self::U8,
+            b'B' => Self::U8,
+            b'M' => Self::Mode,
             b'h' => Self::I16,
             b'H' => Self::U16,
             b'i' => Self::I32,
@@ -89,7 +92,7 @@ impl FieldKind {
     /// Bytes that it takes.
     pub(super) const fn size(self) -> usize {
         match self {
-            Self::I8 | Self::U8 => 1,
+            Self::I8 | Self::U8 | Self::Mode => 1,
             Self::I16 | Self::U16 | Self::CentiI16 | Self::CentiU16 | Self::Half => 2,
             Self::I32 | Self::U32 | Self::CentiI32 | Self::CentiU32 | Self::Degrees | Self::Single => 4,
             Self::I64 | Self::U64 | Self::Double => 8,
@@ -107,7 +110,15 @@ impl FieldKind {
     pub(super) const fn is_integer(self) -> bool {
         matches!(
             self,
-            Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::I32 | Self::U32 | Self::I64 | Self::U64
+            Self::I8
+                | Self::U8
+                | Self::Mode
+                | Self::I16
+                | Self::U16
+                | Self::I32
+                | Self::U32
+                | Self::I64
+                | Self::U64
         )
     }
 }
@@ -138,6 +149,8 @@ pub(super) struct Format {
     pub(super) fields_length: Option<u8>,
     /// What of it cannot be read, and why, until it was told.
     odd: Option<String>,
+    /// Whether all of its format characters are known.
+    is_known: bool,
     /// Which column tells the time, and how.
     pub(super) time: Option<TimeField>,
     /// Its rows' table, once a row was made.
@@ -209,9 +222,20 @@ impl Format {
         let fields_length = fields_length.filter(|fields| unknown.is_none() && *fields != length);
         let time = time_field(name, &fields);
         let role = Role::of(kind, name);
-        let odd = odd(name, length, unknown, fields_length);
+        let odd = odd(name, length, unknown, HEADER_BYTES + offset);
         let name = name.to_owned();
-        Self { kind, name, length, fields, fields_length, odd, time, table: None, role }
+        Self {
+            kind,
+            name,
+            length,
+            fields,
+            fields_length,
+            odd,
+            is_known: unknown.is_none(),
+            time,
+            table: None,
+            role,
+        }
     }
 
     /// Whether the other one defines the same.
@@ -336,6 +360,11 @@ impl Formats {
         Defined::New
     }
 
+    /// Whether nothing is wrong with a definition but its length, which says nothing of a text log's lines.
+    pub(super) fn is_only_long(&self, kind: u8) -> bool {
+        self.get(kind).is_some_and(|format| format.is_known)
+    }
+
     /// What is wrong with a definition, once.
     pub(super) fn take_odd(&mut self, kind: u8) -> Option<String> {
         self.by_kind.get_mut(usize::from(kind))?.as_deref_mut()?.odd.take()
@@ -393,17 +422,21 @@ fn odd_fmt(name: &str, length: u8) -> String {
     format!("a definition of FMT itself, with the name {name:?} and {length} bytes, which is not followed")
 }
 
-/// What of a message cannot be read. Columns that leave bytes of it over are no harm.
-fn odd(name: &str, length: u8, unknown: Option<char>, fields: Option<u8>) -> Option<String> {
+/// What of a message cannot be read.
+fn odd(name: &str, length: u8, unknown: Option<char>, fields: usize) -> Option<String> {
     if let Some(character) = unknown {
         return Some(format!(
             "{name} has the format character {character:?}, which is not known: its columns from there on are not read"
         ));
     }
-    let fields = fields.filter(|fields| *fields > length && usize::from(length) > HEADER_BYTES)?;
-    Some(format!(
-        "FMT says that {name} has {length} bytes, and its columns have {fields}: those that do not fit are not read"
-    ))
+    let length = usize::from(length);
+    let so = match length {
+        _ if fields == length => return None,
+        _ if length <= HEADER_BYTES => "which its messages are taken to have",
+        _ if fields > length => "those that do not fit are not read",
+        _ => "what is behind its columns is not read",
+    };
+    Some(format!("FMT says that {name} has {length} bytes, and its columns make {fields}: {so}"))
 }
 
 /// A unit's name with its multiplier as a prefix. `!` and `/` are what hours have been made of.

@@ -39,12 +39,40 @@ impl<'a> Message<'a> {
 
     /// A number, scaled as its format character says; `None` for what is no finite number.
     pub(super) fn number(&self, column: usize) -> Option<f64> {
+        self.any_number(column).filter(|number| number.is_finite())
+    }
+
+    /// The same, be it finite or not.
+    pub(super) fn any_number(&self, column: usize) -> Option<f64> {
         let field = self.field(column)?;
-        let number = match self.body {
-            Body::Bytes(payload) => number(field.kind, payload.get(field.offset..)?)?,
-            Body::Words(words) => words.get(column)?.trim().parse().ok()?,
-        };
-        number.is_finite().then_some(number)
+        match self.body {
+            Body::Bytes(payload) => number(field.kind, payload.get(field.offset..)?),
+            Body::Words(words) => words.get(column)?.trim().parse().ok(),
+        }
+    }
+
+    /// What stands in the place of a number in a text log and is none.
+    pub(super) fn no_number(&self, column: usize) -> Option<&'a str> {
+        match self.body {
+            Body::Bytes(_) => None,
+            Body::Words(words) => Some(words.get(column)?.trim()).filter(|word| !word.is_empty()),
+        }
+    }
+
+    /// Whether it stands in a text log.
+    pub(super) const fn is_words(&self) -> bool {
+        matches!(self.body, Body::Words(_))
+    }
+
+    /// The bytes of a text, those behind a zero too.
+    pub(super) fn bytes(&self, column: usize) -> Option<&'a [u8]> {
+        let field = self.field(column)?;
+        match (self.body, field.kind) {
+            (Body::Bytes(payload), FieldKind::Text(size)) => {
+                payload.get(field.offset..)?.get(..usize::from(size))
+            }
+            _ => None,
+        }
     }
 
     /// A number without a sign; `None` where it has one.
@@ -124,7 +152,7 @@ fn words(bytes: &[u8]) -> Cow<'_, str> {
 fn number(kind: FieldKind, bytes: &[u8]) -> Option<f64> {
     Some(match kind {
         FieldKind::I8 => f64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-        FieldKind::U8 => f64::from(*bytes.first()?),
+        FieldKind::U8 | FieldKind::Mode => f64::from(*bytes.first()?),
         FieldKind::I16 => f64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
         FieldKind::U16 => f64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
         FieldKind::I32 => f64::from(i32::from_le_bytes(*bytes.first_chunk()?)),

@@ -8,10 +8,11 @@ use hums_core::observation::Source;
 use hums_core::time::Instant;
 
 use super::clock::Clock;
-use super::format::{Defined, Format, Formats, Lengths, Role};
+use super::format::{Defined, FMT_TYPE, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
 use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
 use super::table::{self, Tables};
+use crate::plural::count;
 use crate::source::item::{
     About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Want,
@@ -107,6 +108,8 @@ fn define(formats: &mut Formats, kind: u8, body: Body<'_>) -> Option<Defined> {
                 .or_else(|| message.text(4).map(|words| shortened(&words)))
                 .unwrap_or_default();
             let (kind, length) = (byte("Type")?, byte("Length")?);
+            // A text log's lines have no length, whatever it says of one.
+            let length = if message.is_words() && kind != FMT_TYPE { 0 } else { length };
             let (name, characters) = (words("Name")?, words("Format")?);
             Some(formats.define(Format::new(kind, length, &name, characters.as_bytes(), &columns)))
         }
@@ -215,7 +218,9 @@ impl<'w> Session<'w> {
             Some(false) => return Ok(()),
             Some(true) => {}
             None => {
-                self.tell_odd(kind, place, take)?;
+                if matches!(body, Body::Bytes(_)) || !self.formats.is_only_long(kind) {
+                    self.tell_odd(kind, place, take)?;
+                }
                 let needed = self.needs(kind);
                 if let Some(slot) = self.needed.get_mut(index) {
                     *slot = Some(needed);
@@ -351,7 +356,8 @@ impl<'w> Session<'w> {
         if matches!(self.want.rows, Rows::None) {
             return Ok(());
         }
-        let Some(table) = self.table(kind) else { return self.refuse_rows(kind, take) };
+        let is_words = matches!(body, Body::Words(_));
+        let Some(table) = self.table(kind, is_words) else { return self.refuse_rows(kind, take) };
         if !self.want.rows.has(&table.name) {
             return Ok(());
         }
@@ -363,12 +369,12 @@ impl<'w> Session<'w> {
     }
 
     /// The table of a type's rows; `None` where the file has defined too many.
-    fn table(&mut self, kind: u8) -> Option<Arc<Table>> {
+    fn table(&mut self, kind: u8, is_words: bool) -> Option<Arc<Table>> {
         let format = self.formats.get(kind)?;
         if let Some(table) = &format.table {
             return Some(Arc::clone(table));
         }
-        let table = self.tables.of(format, self.formats.units(kind))?;
+        let table = self.tables.of(format, self.formats.units(kind), is_words)?;
         self.formats.set_table(kind, &table);
         Some(table)
     }
@@ -452,6 +458,8 @@ impl Said<'_, '_> {
             Say::Mode(number) => Item::Mode(Mode { number, name: self.craft.mode_name(number) }),
             Say::Event(number, severity, words) => Item::Event(Event { number, severity, words }),
             Say::Arming(words) => Item::Fact(Fact { about: About::Arming, words }),
+            Say::Failsafes(words) => Item::Fact(Fact { about: About::Failsafes, words }),
+            Say::Emergency(words) => Item::Fact(Fact { about: About::Emergency, words }),
             Say::Frame(words) => Item::Fact(Fact { about: About::Frame, words }),
             Say::Firmware(words) if words == self.firmware => return Ok(()),
             Say::Firmware(words) => {
@@ -467,7 +475,8 @@ impl Said<'_, '_> {
                 Item::Epoch(epoch_us)
             }
             Say::Lost(messages) => {
-                let words = format!("{messages} messages that the autopilot's logger had no room for");
+                let messages = count(messages, "message");
+                let words = format!("{messages} that the autopilot's logger had no room for");
                 let gap =
                     Gap { from: Some(self.at), to: None, cause: Cause::Lost, place: None, bytes: 0, words };
                 return (self.take)(self.at, Item::Gap(&gap));

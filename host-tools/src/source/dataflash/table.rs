@@ -9,8 +9,9 @@ use crate::source::item::{Column, Kind, Table, Value};
 
 /// Tables of one name at most: a file that redefines a name for ever does not fill the memory.
 const VERSIONS_MAX: usize = 16;
-/// Names of tables at most: types have 256 numbers, and a definition may change.
-const TABLES_MAX: usize = 4_096;
+/// Tables at most: types have 256 numbers, and a definition may change. Each of them is a file of its own in Parquet, which
+/// takes some 16 KiB of memory until its end.
+const TABLES_MAX: usize = 1_024;
 
 /// The tables made so far, by the name of their messages.
 #[derive(Debug, Default)]
@@ -21,9 +22,10 @@ pub(super) struct Tables {
 
 impl Tables {
     /// The table of a definition whose columns have these units; `None` where there are too many already.
-    pub(super) fn of(&mut self, format: &Format, units: Vec<String>) -> Option<Arc<Table>> {
+    /// `is_words`: of a text log.
+    pub(super) fn of(&mut self, format: &Format, units: Vec<String>, is_words: bool) -> Option<Arc<Table>> {
         let name = safe(&format.name);
-        let columns = columns(format, units);
+        let columns = columns(format, units, is_words);
         if self.count >= TABLES_MAX && !self.by_name.contains_key(&name) {
             return None;
         }
@@ -53,7 +55,7 @@ pub(super) fn safe(name: &str) -> String {
     if name.is_empty() { "_".to_owned() } else { name }
 }
 
-fn columns(format: &Format, units: Vec<String>) -> Vec<Column> {
+fn columns(format: &Format, units: Vec<String>, is_words: bool) -> Vec<Column> {
     let mut columns: Vec<Column> = Vec::new();
     let mut push = |name: String, unit: String, kind: Kind| {
         // A label that comes twice gets its number: a table's columns differ.
@@ -67,15 +69,20 @@ fn columns(format: &Format, units: Vec<String>) -> Vec<Column> {
                 push(format!("{}[{element}]", field.name), unit.clone(), Kind::Signed);
             }
         } else {
-            push(field.name.clone(), unit, kind(field.kind));
+            push(field.name.clone(), unit, kind(format, field.kind, is_words));
         }
     }
     columns
 }
 
-const fn kind(field: FieldKind) -> Kind {
+/// The name of the message that holds files: its text is their content, which may be anything.
+const FILE: &str = "FILE";
+
+fn kind(format: &Format, field: FieldKind, is_words: bool) -> Kind {
     match field {
-        FieldKind::U8 | FieldKind::U16 | FieldKind::U32 | FieldKind::U64 => Kind::Unsigned,
+        FieldKind::Text(64) if format.name == FILE && !is_words => Kind::Bytes,
+        FieldKind::Mode if is_words => Kind::Text,
+        FieldKind::Mode | FieldKind::U8 | FieldKind::U16 | FieldKind::U32 | FieldKind::U64 => Kind::Unsigned,
         FieldKind::I8 | FieldKind::I16 | FieldKind::I32 | FieldKind::I64 | FieldKind::Array => Kind::Signed,
         FieldKind::Half | FieldKind::Single => Kind::Single,
         FieldKind::Double
@@ -88,32 +95,34 @@ const fn kind(field: FieldKind) -> Kind {
     }
 }
 
-/// Makes the values of a row and hands them on. A number that is none (`ArduPilot` writes NaN for what it does not
-/// know) is unknown.
+/// Makes the values of a row and hands them on.
 pub(super) fn with_values<T>(message: &Message<'_>, take: impl FnOnce(&[Value<'_>]) -> T) -> T {
-    let fields = &message.format().fields;
+    let (format, fields) = (message.format(), &message.format().fields);
+    let kinds: Vec<_> = fields.iter().map(|field| kind(format, field.kind, message.is_words())).collect();
     let texts: Vec<_> = (0..fields.len())
-        .map(|column| match fields.get(column).map(|field| field.kind) {
-            Some(FieldKind::Text(_)) => message.text(column),
+        .map(|column| match kinds.get(column) {
+            Some(Kind::Text) => message.text(column),
             _ => None,
         })
         .collect();
     let mut values = Vec::with_capacity(fields.len());
-    for (column, (field, text)) in fields.iter().zip(&texts).enumerate() {
+    for (column, ((field, kind), text)) in fields.iter().zip(&kinds).zip(&texts).enumerate() {
         if field.kind == FieldKind::Array {
             values.extend((0..ARRAY_LENGTH).map(|element| {
                 message.element(column, element).map_or(Value::Unknown, |number| Value::Signed(number.into()))
             }));
             continue;
         }
-        let value = match kind(field.kind) {
+        let value = match kind {
             Kind::Text => text.as_deref().map(Value::Text),
+            Kind::Bytes => message.bytes(column).map(Value::Bytes),
             Kind::Unsigned => message.unsigned(column).map(Value::Unsigned),
             Kind::Signed => message.signed(column).map(Value::Signed),
-            Kind::Single => message.number(column).map(|number| Value::Single(number as f32)),
-            _ => message.number(column).map(Value::Double),
+            Kind::Single => message.any_number(column).map(|number| Value::Single(number as f32)),
+            _ => message.any_number(column).map(Value::Double),
         };
-        values.push(value.unwrap_or(Value::Unknown));
+        let words = || message.no_number(column).map(Value::Text);
+        values.push(value.or_else(words).unwrap_or(Value::Unknown));
     }
     take(&values)
 }
@@ -125,11 +134,11 @@ mod tests {
     #[test]
     fn a_name_has_one_table_for_each_set_of_columns() {
         let mut tables = Tables::default();
-        let format = |columns| Format::new(130, 0, "A/B", b"Qc", columns);
+        let format = |columns| Format::new(130, 13, "A/B", b"Qc", columns);
         let units = || vec![String::new(); 2];
-        let first = tables.of(&format("TimeUS,Roll"), units()).expect("a table");
-        let second = tables.of(&format("TimeUS,Pitch"), units()).expect("a table");
-        let again = tables.of(&format("TimeUS,Roll"), units()).expect("a table");
+        let first = tables.of(&format("TimeUS,Roll"), units(), false).expect("a table");
+        let second = tables.of(&format("TimeUS,Pitch"), units(), false).expect("a table");
+        let again = tables.of(&format("TimeUS,Roll"), units(), false).expect("a table");
         assert_eq!((first.name.as_str(), second.name.as_str()), ("A_B", "A_B_2"));
         assert!(Arc::ptr_eq(&first, &again));
     }
@@ -137,7 +146,7 @@ mod tests {
     #[test]
     fn a_label_that_comes_twice_gets_a_number() {
         let format = Format::new(130, 0, "X", b"BB", "A,A");
-        let table = Tables::default().of(&format, vec![String::new(); 2]).expect("a table");
+        let table = Tables::default().of(&format, vec![String::new(); 2], false).expect("a table");
         assert_eq!(table.columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>(), ["A", "A_2"]);
     }
 }

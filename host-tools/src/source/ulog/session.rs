@@ -394,7 +394,10 @@ impl<'a, 'b> Session<'a, 'b> {
             cause: Cause::Lost,
             place: Some(place),
             bytes: 0,
-            words: format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
+            words: match milliseconds {
+                0 => "a dropout: the card was too slow for the logger".to_owned(),
+                _ => format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
+            },
         };
         self.tell(Item::Gap(&gap))
     }

@@ -150,5 +150,6 @@ fn value(value: &Value<'_>) -> String {
         Value::Double(number) => number.to_string(),
         Value::Flag(flag) => flag.to_string(),
         Value::Text(text) => (*text).to_owned(),
+        Value::Bytes(bytes) => format!("{bytes:02x?}"),
     }
 }

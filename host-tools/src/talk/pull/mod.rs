@@ -57,12 +57,12 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
 fn pull(ftp: &mut Ftp, name: &str, path: &Path) -> Result<bool> {
     let length = ftp.open(name)?;
     if length == 0 {
-        eprintln!("hums: {name}: nothing is recorded in it yet");
+        note!("{name}: nothing is recorded in it yet");
         return Ok(false);
     }
     let there = there(ftp, name, path, length)?;
     if there == There::Whole {
-        eprintln!("hums: {name}: is there already");
+        note!("{name}: is there already");
         return Ok(false);
     }
     let (mut file, _) = Output::resume(path)?;
@@ -76,11 +76,11 @@ fn pull(ftp: &mut Ftp, name: &str, path: &Path) -> Result<bool> {
         have = bytes;
     }
     if have > 0 {
-        eprintln!("hums: {name}: goes on after {have} bytes, which the board confirms");
+        note!("{name}: goes on after {have} bytes, which the board confirms");
     }
     fetch(ftp, name, &mut file, have, length)?;
     if !is_whole(ftp, name, &mut file, length)? {
-        eprintln!("hums: {name}: what came differs from the board's log; once more from its beginning");
+        note!("{name}: what came differs from the board's log; once more from its beginning");
         file.begin_anew()?;
         fetch(ftp, name, &mut file, 0, length)?;
         if !is_whole(ftp, name, &mut file, length)? {
@@ -135,7 +135,7 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<u3
     if bytes <= length && compare(ftp, name, &part, bytes)? != Likeness::Other {
         return Ok(bytes);
     }
-    eprintln!("hums: {name}: what was begun is of another log of this name; it begins anew");
+    note!("{name}: what was begun is of another log of this name; it begins anew");
     file.begin_anew()?;
     Ok(0)
 }
@@ -167,7 +167,7 @@ fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, from: u32, length: u32) -
         // A kill loses no more than a burst.
         let flushed = file.flush();
         settle(flushed, file.path())?;
-        eprintln!("hums: {name}: {have} of {length} bytes");
+        note!("{name}: {have} of {length} bytes");
         if have == before && silent == 0 {
             bail!("the board sends nothing new after {have} of {length} bytes");
         }
@@ -181,8 +181,8 @@ fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result
     settle(flushed, file.path())?;
     let likeness = compare(ftp, name, file.part(), length)?;
     if likeness == Likeness::SameEnds {
-        eprintln!(
-            "hums: {name}: the board's firmware computes no checksum: only its sectors' own checks say that it is whole"
+        note!(
+            "{name}: the board's firmware computes no checksum: only its sectors' own checks say that it is whole"
         );
     }
     Ok(likeness != Likeness::Other)
@@ -203,7 +203,7 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
             (overview.contents.bad_frames, "frames that fail their checksum"),
         ];
         for (number, what) in wrong.into_iter().filter(|(number, _)| *number > 0) {
-            eprintln!("hums: {name}: {what}: {number}; `hums verify` says more");
+            note!("{name}: {what}: {number}; `hums verify` says more");
             outcome = Outcome::Losses;
         }
     }

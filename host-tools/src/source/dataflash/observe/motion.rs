@@ -137,7 +137,12 @@ pub(super) const HANDLERS: &[Handler] = &[
 ];
 
 fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    /// An angle that is further round than this is none, whatever the file says.
+    const TURN_DEG: f32 = 360.0;
     let Some([roll, pitch, yaw]) = given.singles(0) else { return };
+    if [roll, pitch, yaw].into_iter().any(|degrees: f32| degrees.abs() > TURN_DEG) {
+        return;
+    }
     state.heading_deg.set(given.at, yaw.rem_euclid(360.0));
     // 0 to 360 degrees in the log, -180 to 180 in ATTITUDE.
     let yaw = (yaw + 180.0).rem_euclid(360.0) - 180.0;

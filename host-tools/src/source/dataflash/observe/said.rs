@@ -5,7 +5,7 @@ use hums_core::observation::{AutopilotIdentity, Observation};
 use super::handler::{Given, Handler};
 use super::say::{Out, Say};
 use super::state::{State, version_of};
-use super::words::{self, Craft};
+use super::words::{self, CRASH_CHECK, Craft};
 
 /// `MAV_SEVERITY_INFO`: MSG does not tell how grave its words are.
 const INFO: u8 = 6;
@@ -154,6 +154,9 @@ fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if words::is_failsafe(subsystem) {
         let bit = 1 << subsystem;
         state.failsafes = if code == 0 { state.failsafes & !bit } else { state.failsafes | bit };
+    }
+    if subsystem == CRASH_CHECK && code != 0 {
+        out.say(&Say::Emergency(words::subsystem(CRASH_CHECK)));
     }
     let severity = if code == 0 { NOTICE } else { ERROR };
     let number = u32::from(subsystem) << 8 | u32::from(code);

@@ -18,6 +18,10 @@ pub(in crate::source::dataflash) enum Say<'a> {
     Firmware(&'a str),
     /// The airframe.
     Frame(&'a str),
+    /// The failsafes in force from here on, by their names; empty where there is none.
+    Failsafes(&'a str),
+    /// An emergency in which the motors stop at once, by its name.
+    Emergency(&'a str),
     /// How arming is known.
     Arming(&'a str),
     /// UTC at this message, microseconds since 1970.

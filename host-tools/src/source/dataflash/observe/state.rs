@@ -9,7 +9,7 @@ use hums_core::units::{Amperes, Fraction, Metres, Volts};
 
 use super::arming::{Arming, Word};
 use super::say::{Out, Say};
-use super::words::{Craft, name_and_version};
+use super::words::{self, Craft, name_and_version};
 
 /// How often the autopilot's state is said, which the log tells by its changes only: `HEARTBEAT` and `SYS_STATUS` come
 /// at 1 Hz or faster.
@@ -119,6 +119,7 @@ pub(in crate::source::dataflash) struct State {
     said_at: Option<Instant>,
     said: Option<Heartbeat>,
     word_said: Option<Word>,
+    failsafes_said: u64,
 }
 
 /// What messages of arming and of leaving the ground change.
@@ -274,6 +275,9 @@ impl State {
 
     /// Says what the autopilot says again and again: its heartbeat, its status, whether it stands.
     pub(in crate::source::dataflash) fn repeat(&mut self, now: Instant, out: &mut Out<'_>) {
+        if std::mem::replace(&mut self.failsafes_said, self.failsafes) != self.failsafes {
+            out.say(&Say::Failsafes(&words::failsafes(self.failsafes)));
+        }
         let Some(heartbeat) = self.heartbeat() else { return };
         let due = self.said_at.is_none_or(|at| now.since(at) >= SAID_EVERY);
         if !due && self.said == Some(heartbeat) {

@@ -316,8 +316,25 @@ const SUBSYSTEMS: &[(u8, &str)] = &[
     (31, "dead reckoning failsafe"),
 ];
 
-/// Whether a subsystem of ERR is a failsafe that makes the autopilot call its state critical
-/// (`Copter::any_failsafe_triggered`).
+/// The subsystem of ERR that stops the motors at once, and so is no state that lasts.
+pub(super) const CRASH_CHECK: u8 = 12;
+
+/// Whether a subsystem of ERR tells of a failsafe or of an emergency, which lasts until it is resolved or the vehicle is
+/// disarmed. 5, 6, 8, 17, 20, 23 and 31 also make the autopilot call its state critical in its heartbeat
+/// (`Copter::any_failsafe_triggered`); of the others (GPS failsafe of before 3.3, fence, CPU, thrust loss, sensors and leak
+/// of `ArduSub`, vibration, internal error) a heartbeat tells nothing.
 pub(super) const fn is_failsafe(subsystem: u8) -> bool {
-    matches!(subsystem, 5 | 6 | 8 | 17 | 20 | 23 | 31)
+    matches!(subsystem, 5..=9 | 17 | 19 | 20 | 23 | 25..=27 | 29..=31)
+}
+
+/// A subsystem's name; empty where it is not known.
+pub(super) fn subsystem(number: u8) -> &'static str {
+    SUBSYSTEMS.iter().find(|(known, _)| *known == number).map_or("", |(_, name)| name)
+}
+
+/// The failsafes of these bits, by their names.
+pub(super) fn failsafes(bits: u64) -> String {
+    let is_set = |subsystem: u8| bits & (1 << subsystem) != 0;
+    let named = SUBSYSTEMS.iter().filter(|(subsystem, _)| is_set(*subsystem));
+    named.map(|(_, name)| *name).collect::<Vec<_>>().join(", ")
 }

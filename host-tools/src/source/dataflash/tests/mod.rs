@@ -48,6 +48,7 @@ impl Seen {
                     Value::Double(value) => value.to_string(),
                     Value::Flag(value) => value.to_string(),
                     Value::Text(value) => (*value).to_owned(),
+                    Value::Bytes(value) => format!("{value:02x?}"),
                 });
                 assert_eq!(row.values.len(), row.table.columns.len());
                 self.rows.push(format!("{} {}", row.table.name, values.collect::<Vec<_>>().join(" ")));
@@ -244,6 +245,107 @@ fn a_length_that_lies_is_corrected_by_the_columns() {
     let seen = seen(&log.bytes);
     let rows: Vec<&String> = seen.rows.iter().filter(|row| row.starts_with("LIES")).collect();
     assert_eq!(rows, ["LIES 0 0", "LIES 1 1", "LIES 2 2", "LIES 3 3"]);
+}
+
+#[test]
+fn a_definition_whose_length_lies_is_told_with_its_place_when_the_first_message_comes() {
+    for (length, characters, words) in [
+        (0, "QB", "has 0 bytes, and its columns make 12: which its messages are taken to have"),
+        (10, "QB", "has 10 bytes, and its columns make 12: those that do not fit are not read"),
+        (30, "QB", "has 30 bytes, and its columns make 12: what is behind its columns is not read"),
+        (89, "QZZZZ", "has 89 bytes, and its columns make 267: those that do not fit are not read"),
+    ] {
+        let mut log = Writer::new();
+        log.attitudes(0..1);
+        log.format_of(160, length, "LIES", characters, "TimeUS,A");
+        let start = log.bytes.len() as u64;
+        assert!(seen(&log.bytes).gaps.is_empty(), "it has no message");
+        log.raw(160, &[&1_u64.to_le_bytes(), &[1]]);
+        log.bytes.resize(start as usize + usize::from(length).max(12), 0);
+        log.attitudes(1..3);
+        let seen = seen(&log.bytes);
+        let told = seen.gaps.first().expect("told");
+        assert_eq!((told.0, told.1), (Cause::Damaged, start), "{:?}", seen.gaps);
+        assert!(told.3.contains(words), "{}", told.3);
+    }
+    let text = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+        FMT, 13, 99, EV, IB, TimeMS,Id\nEV, 1000, 10\n";
+    assert!(seen(text.as_bytes()).gaps.is_empty(), "lines have no lengths");
+}
+
+#[test]
+fn the_content_of_a_file_comes_with_its_zeros_and_what_is_no_number_as_it_is() {
+    let mut log = Writer::new();
+    log.format(160, "FILE", "NIBZ", "FileName,Offset,Length,Data");
+    log.format(161, "X", "Qfd", "TimeUS,A,B");
+    let mut data = [0; 64];
+    data[..5].copy_from_slice(b"a\0\xffb\0");
+    log.raw(160, &[b"@SYS/uarts.txt\0\0", &0_u32.to_le_bytes(), &[5], &data]);
+    log.raw(161, &[&1_u64.to_le_bytes(), &f32::NAN.to_le_bytes(), &f64::NEG_INFINITY.to_le_bytes()]);
+    let rows = seen(&log.bytes).rows;
+    let row = |name: &str| rows.iter().find(|row| row.starts_with(name)).cloned().expect("a row");
+    assert_eq!(row("FILE @"), format!("FILE @SYS/uarts.txt 0 5 {data:02x?}"));
+    assert_eq!(row("X "), "X 1 NaN -inf");
+}
+
+#[test]
+fn words_in_the_place_of_a_number_are_kept_in_a_text_log() {
+    let log = "ArduCopter V3.1\nFMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+        FMT, 3, 6, MODE, Mh, Mode,ThrCrs\nFMT, 4, 6, ODD, hh, A,B\n\
+        MODE, Stabilize, 424\nMODE, 5, 424\nODD, high, 7\n";
+    let seen = seen(log.as_bytes());
+    let rows: Vec<&String> = seen.rows.iter().filter(|row| !row.starts_with("FMT")).collect();
+    assert_eq!(rows, ["MODE Stabilize 424", "MODE 5 424", "ODD high 7"]);
+    assert!(seen.said.contains(&"STABILIZE".to_owned()), "{:?}", seen.said);
+}
+
+#[test]
+fn an_angle_that_is_none_is_no_attitude() {
+    let mut log = Writer::new();
+    log.format(150, "ATT", "Qfff", "TimeUS,Roll,Pitch,Yaw");
+    for (second, roll) in [(1_u64, 10.0_f32), (2, 3.4e38), (3, -361.0), (4, 11.0)] {
+        let angles = [roll, 1.0, 359.0].map(f32::to_le_bytes).concat();
+        log.raw(150, &[&(second * 1_000_000).to_le_bytes(), &angles]);
+    }
+    let attitudes = seen(&log.bytes).find(|seen| matches!(seen, Observation::Attitude(_)).then_some(()));
+    assert_eq!(attitudes.len(), 2);
+}
+
+#[test]
+fn failsafes_are_in_force_by_name_until_they_are_resolved_or_it_is_disarmed() {
+    let mut log = Writer::new();
+    log.format(160, "MSG", "QZ", "TimeUS,Message");
+    log.format(161, "EV", "QB", "TimeUS,Id");
+    log.format(162, "ERR", "QBB", "TimeUS,Subsys,ECode");
+    log.message(1.0, "ArduCopter V4.6.3 (92b0cd78)");
+    log.raw(161, &[&1_100_000_u64.to_le_bytes(), &[10]]);
+    let state = |log: &Writer| {
+        let seen = seen(&log.bytes);
+        let states = seen.find(|seen| match seen {
+            Observation::Heartbeat(heartbeat) => Some(heartbeat.state),
+            _ => None,
+        });
+        let said = seen.said.iter().rev().find(|said| said.starts_with("Failsafes: ")).cloned();
+        (states.last().copied(), said.unwrap_or_default())
+    };
+    for subsystem in [5, 6, 7, 8, 9, 17, 19, 20, 23, 25, 26, 27, 29, 30, 31] {
+        let mut log = log.clone();
+        log.raw(162, &[&2_000_000_u64.to_le_bytes(), &[subsystem, 1]]);
+        log.attitudes(2..4);
+        assert_eq!(state(&log).0, Some(5), "subsystem {subsystem}");
+        log.raw(162, &[&4_000_000_u64.to_le_bytes(), &[subsystem, 0]]);
+        log.attitudes(5..6);
+        assert_eq!(state(&log), (Some(3), "Failsafes: ".to_owned()), "subsystem {subsystem}");
+    }
+    log.raw(162, &[&2_000_000_u64.to_le_bytes(), &[29, 1]]);
+    log.raw(162, &[&2_100_000_u64.to_le_bytes(), &[6, 1]]);
+    log.attitudes(3..4);
+    assert_eq!(state(&log).1, "Failsafes: battery failsafe, vibration failsafe");
+    log.raw(162, &[&4_000_000_u64.to_le_bytes(), &[12, 1]]);
+    log.raw(161, &[&4_000_000_u64.to_le_bytes(), &[11]]);
+    log.attitudes(5..6);
+    assert_eq!(state(&log), (Some(3), "Failsafes: ".to_owned()));
+    assert!(seen(&log.bytes).said.contains(&"Emergency: crash check".to_owned()));
 }
 
 #[test]

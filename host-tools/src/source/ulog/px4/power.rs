@@ -42,6 +42,7 @@ pub(super) const TOPICS: &[Topic] = &[
             "cell_count",
             "voltage_cell_v",
             "id",
+            "warning",
         ],
         take: battery,
     },
@@ -85,6 +86,7 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
         remaining: remaining.map(|part| Fraction((part * 100.0).round() / 100.0)),
         temperature: when(fields.finite(7)).map(Celsius),
         faults: fields.count(8).unwrap_or(0) as u32,
+        charge: if connected { charge(fields.byte(12)) } else { 0 },
         // PX4 calls every battery lithium polymer.
         ..Battery::default()
     };
@@ -97,6 +99,17 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
     px4.observe(Observation::Battery(battery));
     if !px4.power.has_load {
         system_status(px4);
+    }
+}
+
+/// `MAV_BATTERY_CHARGE_STATE` of `battery_status.warning`, as PX4's stream `BATTERY_STATUS` makes it: none, low, critical,
+/// emergency, failed; 6 and 7 (since v1.13) are unhealthy and charging in both.
+const fn charge(warning: Option<u8>) -> u8 {
+    const UNDEFINED: u8 = 0;
+    match warning {
+        Some(warning @ 0..=4) => warning + 1,
+        Some(state @ 6..=7) => state,
+        _ => UNDEFINED,
     }
 }
 

@@ -118,6 +118,26 @@ fn a_battery_without_cells_has_the_voltage_of_the_whole_and_unknown_is_not_minus
 }
 
 #[test]
+fn a_batterys_warning_is_its_charge_state() {
+    let of = |warning: u8, connected: u8| {
+        let fields = "float voltage_v;bool connected;uint8_t warning;";
+        let data = [floats(&[15.5]), vec![connected, warning]].concat();
+        let said = observations(&log(&[("battery_status", fields, &[(2, data)])]), "Battery(").remove(0);
+        let charge = said.split("charge: ").nth(1).and_then(|rest| rest.split([',', ' ']).next());
+        charge.expect("a charge state").parse::<u8>().expect("a number")
+    };
+    // none, low, critical, emergency, failed, unhealthy, charging, and what is none of these.
+    assert_eq!([0, 1, 2, 3, 4, 6, 7, 5].map(|warning| of(warning, 1)), [1, 2, 3, 4, 5, 6, 7, 0]);
+    assert_eq!(of(2, 0), 0, "no battery is connected");
+    let silent = log(&[(
+        "battery_status",
+        "float voltage_v;bool connected;",
+        &[(2, [floats(&[15.5]), vec![1]].concat())],
+    )]);
+    assert!(observations(&silent, "Battery(")[0].contains("charge: 0"), "a log without the field");
+}
+
+#[test]
 fn a_receiver_that_falls_silent_has_no_fix_any_more_but_not_after_a_dropout() {
     let messages: Vec<(u64, Vec<u8>)> = (2..20).map(|second| (second, vec![2, 4, 0, 2])).collect();
     let read = log(&[

@@ -1,0 +1,114 @@
+//! Words of the world on a terminal: what comes from a log, from a vehicle or from a file's name may hold characters that a
+//! terminal obeys (escape sequences that clear the screen or write elsewhere) or that change how the text around them
+//! reads (`U+202E` shows what follows from right to left, so that `evil` looks like `live`). They are shown by their
+//! numbers, as `\u{1b}`.
+//!
+//! What is printed passes through here: standard output in [`crate::output`], standard error by `note!`.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Characters that change the direction of writing (Unicode 16, property `Bidi_Control`), and the two separators that end a
+/// line.
+pub const fn redirects(c: char) -> bool {
+    matches!(
+        c,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
+    )
+}
+
+/// What a terminal obeys: C0, DEL, C1 (Unicode category Cc), and what changes the direction of writing.
+fn is_obeyed(c: char) -> bool {
+    c.is_control() || redirects(c)
+}
+
+/// A name, or words of the world: one line.
+pub fn word(text: &str) -> Cow<'_, str> {
+    escaped(text, is_obeyed)
+}
+
+/// A path, as one line.
+pub fn path(path: &Path) -> String {
+    word(&path.to_string_lossy()).into_owned()
+}
+
+/// Lines of ours, in which words of the world stand.
+pub fn lines(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| is_obeyed(c) && c != '\n')
+}
+
+/// A message. Further lines of ours are set in by two spaces; any other line's end came with words of the world.
+pub fn message(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_obeyed) {
+        return Cow::Borrowed(text);
+    }
+    text.split("\n  ").map(word).collect::<Vec<_>>().join("\n  ").into()
+}
+
+/// JSON, which stays the same to whoever reads it: such characters stand inside of strings only, and are written by their
+/// numbers there.
+pub fn json(text: &str) -> Cow<'_, str> {
+    let is_meant = |c: char| (c > '\u{7e}' && c.is_control()) || redirects(c);
+    if !text.contains(is_meant) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 64);
+    for c in text.chars() {
+        if is_meant(c) {
+            // Writing to a `String` cannot fail.
+            let _ = write!(out, "\\u{:04x}", u32::from(c));
+        } else {
+            out.push(c);
+        }
+    }
+    out.into()
+}
+
+fn escaped(text: &str, is_meant: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_meant) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 64);
+    for c in text.chars() {
+        if is_meant(c) {
+            out.extend(c.escape_unicode());
+        } else {
+            out.push(c);
+        }
+    }
+    out.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_obeys_is_shown_by_its_number_and_all_else_stays() {
+        assert_eq!(word("a\u{1b}[2Jb\n\u{9b}31m\u{7f}"), "a\\u{1b}[2Jb\\u{a}\\u{9b}31m\\u{7f}");
+        assert_eq!(word("rtl\u{202e}evil\u{2069}"), "rtl\\u{202e}evil\\u{2069}");
+        assert_eq!(lines("one\n\ttwo"), "one\n\\u{9}two");
+        for plain in ["Grüße \u{5d0}\u{644} <b> \\ 👩‍✈️", ""] {
+            assert_eq!(word(plain), plain);
+        }
+    }
+
+    #[test]
+    fn a_name_with_a_line_end_makes_no_line_of_a_message() {
+        assert_eq!(message("a\nhums: all is well: no"), "a\\u{a}hums: all is well: no");
+        assert_eq!(
+            message("none is in there\n  a\u{1b}: passed over"),
+            "none is in there\n  a\\u{1b}: passed over"
+        );
+    }
+
+    #[test]
+    fn json_is_the_same_to_its_reader() {
+        let value = serde_json::json!({"name": "a\u{1b}\u{9b}\u{202e}\u{7f}\n\"é"});
+        let text = value.to_string();
+        let shown = json(&text);
+        assert!(!shown.contains(is_obeyed), "{shown}");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).expect("JSON"), value);
+    }
+}
