@@ -254,7 +254,11 @@ fn detect(start: &[u8]) -> Option<Detected> {
     if ulog::detect(start) {
         return Some(Detected::Ulog);
     }
-    // Before DataFlash's weaker signs: a frame with a checksum that holds is no accident.
+    if let Some(form) = dataflash::begins(start) {
+        return Some(Detected::DataFlash(form));
+    }
+    // Before DataFlash's weaker signs. In 64 KiB of anything else a frame of version 1 whose checksum holds is rare, and
+    // happens.
     match sniff_bytes(start) {
         (Kind::Tlog, true) => Some(Detected::Tlog),
         (Kind::Raw, true) => Some(Detected::Raw),
@@ -560,5 +564,16 @@ mod tests {
         let found = found();
         assert_eq!((found.places.len(), found.is_lossy()), (10_000, true));
         assert!(found.remarks.iter().any(|remark| remark.contains("too many files")), "{:?}", found.remarks);
+    }
+
+    #[test]
+    fn a_frame_that_is_one_by_chance_makes_no_mavlink_of_an_autopilots_log() {
+        use crate::mavlink::frame::tests::HEARTBEAT;
+        let binary = [&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", &HEARTBEAT].concat();
+        let text = [b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n", &HEARTBEAT[..]].concat();
+        for start in [binary, text] {
+            assert_eq!(format_of(&start), Some(Format::DataFlash));
+        }
+        assert_eq!(format_of(&HEARTBEAT.repeat(3)), Some(Format::Raw));
     }
 }

@@ -48,6 +48,16 @@ pub enum Form {
     Text,
 }
 
+/// Whether a file that begins so is such a log, whatever follows: `FMT` is defined first, by itself.
+pub fn begins(start: &[u8]) -> Option<Form> {
+    const OWN: &[u8] = &[0xa3, 0x95, FMT_TYPE, FMT_TYPE, 89];
+    if start.starts_with(OWN) {
+        Some(Form::Binary)
+    } else {
+        start.starts_with(b"FMT, 128, 89, FMT").then_some(Form::Text)
+    }
+}
+
 /// Whether these first bytes of a file (64 KiB of a longer one) are those of such a log.
 pub fn detect(start: &[u8]) -> Option<Form> {
     /// The header of a message that defines one: `FMT` is type 128 and 89 bytes long.
