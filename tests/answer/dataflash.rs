@@ -24,8 +24,9 @@ fn same(ours: &Value<'_>, theirs: &Json) -> bool {
         Value::Flag(value) => theirs.as_bool() == Some(*value),
         Value::Text(value) => theirs.as_str() == Some(value),
         Value::Bytes(bytes) => {
-            let digits: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-            theirs.as_str() == Some(&digits)
+            let theirs = theirs.as_str().unwrap_or_default().as_bytes();
+            let digits = |(pair, byte): (&[u8], &u8)| pair == format!("{byte:02x}").as_bytes();
+            theirs.len() == 2 * bytes.len() && theirs.chunks(2).zip(bytes.iter()).all(digits)
         }
     }
 }
