@@ -160,10 +160,14 @@ fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     Ok((frames, erased))
 }
 
+/// With room for all logs of a day: without a key anybody on the radio begins and ends logs, and a full card overwrites the
+/// oldest of them.
+const CARD_MIB: u64 = 4096;
+
 fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half> {
     let open = |flight: &&str| Stream::of_flight(&own(flight), BAUD);
     let streams = OWN.iter().map(open).collect::<Result<Vec<_>>>()?;
-    let mut card = Card::new(256)?;
+    let mut card = Card::new(CARD_MIB)?;
     let earlier = Stream::of_flight(&own(OWN[0]), FULL_RATE)?.for_seconds(EARLIER_S);
     for boots in 1..=EARLIER {
         card.record(&earlier, boots)?;
