@@ -112,6 +112,8 @@ def main():
         out["replayed_after_power_off"] = sorted(set(answers))
 
     peer.use(KEY)
+    # What was on its way when the key was set is not signed.
+    peer.tally(0.5)
     out["sealed"] = peer.tally(4)
     if state:
         out["stamps_go_on"] = out["sealed"]["first"] > state["heard"]
