@@ -18,8 +18,8 @@ does, with default limits), and prints these tables; with `--write` it writes th
 flights of the repository and fails when fewer faults are found or more false alarms come than before.
 
 * `cargo xtask prove diagnosis FOLDER` judges the flights of a folder too: those of every `labels.json` in and below it, or, where
-  there is none, all recordings as flights of which nothing is known. `--unseen FOLDER` is for flights that were flown after the
-  limits had been frozen. `HUMS_FLIGHTS` names a folder of further recordings.
+  there is none, all recordings as flights of which nothing is known. `--unseen FOLDER` is for flights that nobody
+  who chose the limits had seen. `HUMS_FLIGHTS` names a folder of further recordings.
 * [labels.json](../tests/labelled/README.md) says what was done to a flight and when. No label and none of these flights enters the
   code of a check. Which checks name the cause of which class of fault is a table of the judge's own
   (`tests/src/prove/diagnosis/causes.rs`).
@@ -62,7 +62,7 @@ fn sets(sets: &[Judged]) -> Vec<Vec<String>> {
         let faults = judged.outcomes.iter().filter(|one| one.fault.is_some()).count();
         let known = match judged.known {
             Known::Yes => "known, used for tuning",
-            Known::No => "not known: flown after the limits were frozen",
+            Known::No => "not known",
             Known::Seen => "findings seen, no limit fitted to them",
         };
         vec![

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 pub(super) enum Known {
     /// They were, or might have been.
     Yes,
-    /// They were flown after the limits had been frozen.
+    /// Nobody who chose the limits had seen them.
     No,
     /// Nobody labelled them, and no limit was fitted to them; but their findings have been seen.
     Seen,

@@ -17,7 +17,7 @@ pub(super) const TITLE: &str = "## In short";
 pub(super) fn section(sets: &[Judged]) -> String {
     let labelled = |known| sets.iter().filter(move |set| set.is_labelled && set.known == known);
     let (known, words) = match labelled(Known::No).next() {
-        Some(_) => (Known::No, "flown after the limits were frozen"),
+        Some(_) => (Known::No, "seen by nobody who chose the limits"),
         None => (Known::Yes, "known to whoever chose the limits"),
     };
     let flights: Vec<&Outcome> = labelled(known).flat_map(|set| &set.outcomes).collect();
