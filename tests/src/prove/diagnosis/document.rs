@@ -37,6 +37,12 @@ const CANNOT: &str = "\
   has not seen before.
 * What a check reads must be on the autopilot's port at the rate that the box asks for. Logs of ground stations have less.
 
+What a reader found who had not seen the checks, in 41 further recordings of real vehicles (1.5 h in the air, mostly multicopters,
+2014 to 2025, judged by hand at commit d9bdda6): 7 false warnings and 7 false criticals, some 5 an hour of each. Four were banks
+that the pilot flew in ACRO (`roll`, `pitch`), five `motor_imbalance` while it turned fast or stood on the ground. Two more, on
+the bench, had a gyro with an offset of 23 degrees a second and gave 33 warnings and 36 criticals of `roll` and `pitch`. Of 11
+crashes 7 were told as a mishap, none falsely.
+
 These faults were not told:
 ";
 
