@@ -50,29 +50,29 @@ pub fn message(text: &str) -> Cow<'_, str> {
 /// numbers there.
 pub fn json(text: &str) -> Cow<'_, str> {
     let is_meant = |c: char| (c > '\u{7e}' && c.is_control()) || redirects(c);
-    if !text.contains(is_meant) {
-        return Cow::Borrowed(text);
-    }
-    let mut out = String::with_capacity(text.len() + 64);
-    for c in text.chars() {
-        if is_meant(c) {
-            // Writing to a `String` cannot fail.
-            let _ = write!(out, "\\u{:04x}", u32::from(c));
-        } else {
-            out.push(c);
-        }
-    }
-    out.into()
+    // Writing to a `String` cannot fail.
+    rewritten(text, is_meant, |out, c| {
+        let _ = write!(out, "\\u{:04x}", u32::from(c));
+    })
 }
 
 fn escaped(text: &str, is_meant: impl Fn(char) -> bool) -> Cow<'_, str> {
+    rewritten(text, is_meant, |out, c| out.extend(c.escape_unicode()))
+}
+
+/// The text, with `write` in the place of each character that is meant.
+pub fn rewritten(
+    text: &str,
+    is_meant: impl Fn(char) -> bool,
+    write: impl Fn(&mut String, char),
+) -> Cow<'_, str> {
     if !text.contains(&is_meant) {
         return Cow::Borrowed(text);
     }
     let mut out = String::with_capacity(text.len() + 64);
     for c in text.chars() {
         if is_meant(c) {
-            out.extend(c.escape_unicode());
+            write(&mut out, c);
         } else {
             out.push(c);
         }

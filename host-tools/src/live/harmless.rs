@@ -8,25 +8,16 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::printable::redirects;
+use crate::printable::{redirects, rewritten};
 
 /// A value as JSON; empty where it has no form in JSON, which no type of the pages lacks.
 pub fn json(value: &impl Serialize) -> String {
     let text = serde_json::to_string(value).unwrap_or_default();
-    if text.contains(redirects) { named(&text) } else { text }
-}
-
-fn named(text: &str) -> String {
-    let mut out = String::with_capacity(text.len() + 64);
-    for c in text.chars() {
-        if redirects(c) {
-            // Writing to a `String` cannot fail.
-            let _ = write!(out, "<U+{:04X}>", u32::from(c));
-        } else {
-            out.push(c);
-        }
-    }
-    out
+    // Writing to a `String` cannot fail.
+    rewritten(&text, redirects, |out, c| {
+        let _ = write!(out, "<U+{:04X}>", u32::from(c));
+    })
+    .into_owned()
 }
 
 #[cfg(test)]
