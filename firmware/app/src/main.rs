@@ -39,7 +39,7 @@ use tasks::monitor;
 
 static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 /// In CCM: the hottest data there is, and no DMA reads it (see `memory.x`).
-#[unsafe(link_section = ".ccm.writer")]
+#[unsafe(link_section = ".bss.ccm.writer")]
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: ConstStaticCell<Monitor> = ConstStaticCell::new(Monitor::new(Params::defaults()));
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();

@@ -8,26 +8,25 @@ const PAINT: u32 = 0x5AFE_57AC;
 unsafe extern "C" {
     static mut __sccm: u32;
     static mut __eccm: u32;
-    static __siccm: u32;
     pub(crate) static mut _stack_end: u32;
     pub(crate) static mut _stack_start: u32;
     static __stext: u32;
     static __etext: u32;
 }
 
-/// Gives CCM's variables their first values and paints the stack below the caller. To be called once, first of all,
+/// Sets CCM's variables to zero and paints the stack below the caller. To be called once, first of all,
 /// before any variable in CCM is touched.
 ///
 /// # Safety
 /// No reference to a variable in the section `.ccm` may exist yet, and interrupts must not run yet.
 pub(crate) unsafe fn init() {
     let here = cortex_m::register::msp::read() as usize;
-    // SAFETY: the linker script gives these addresses: CCM's section and its image in flash are equally long and
-    // aligned to words. By the contract above nobody uses the section yet. Below the stack pointer nothing is live:
+    // SAFETY: the linker script gives these addresses, which are aligned to words, and lets only variables into the
+    // section that begin as zeros. By the contract above nobody uses the section yet. Below the stack pointer nothing is live:
     // 256 bytes are left to this function.
     unsafe {
         let words = (&raw const __eccm).offset_from_unsigned(&raw const __sccm);
-        ptr::copy_nonoverlapping(&raw const __siccm, &raw mut __sccm, words);
+        ptr::write_bytes(&raw mut __sccm, 0, words);
         let bottom = &raw mut _stack_end;
         for word in 0..here.saturating_sub(bottom as usize + 256) / 4 {
             bottom.add(word).write_volatile(PAINT);

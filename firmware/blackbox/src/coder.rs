@@ -76,6 +76,9 @@ pub(crate) struct Encoder {
 }
 
 impl Encoder {
+    /// All zeros: no group has begun.
+    pub(crate) const UNSET: Self = Self { low: 0, range: 0 };
+
     pub(crate) const fn new() -> Self {
         Self { low: 0, range: u32::MAX }
     }

@@ -67,6 +67,8 @@ const fn gains() -> [[Gains; SYMBOLS]; SPEED_LAST as usize] {
 }
 
 impl Cdf {
+    /// All zeros, which is no distribution: what a model holds before its first reset.
+    pub(crate) const UNSET: Self = Self([0; SYMBOLS]);
     /// All symbols alike.
     pub(crate) const FLAT: Self = Self::from_sizes([1; SYMBOLS]);
 
@@ -153,6 +155,9 @@ const fn rates() -> [i16; 16] {
 pub(crate) struct Cell(u16);
 
 impl Cell {
+    /// All zeros: what a model holds before its first reset.
+    pub(crate) const UNSET: Self = Self(0);
+    /// Zero and one alike.
     pub(crate) const EVEN: Self = Self(0x8000);
 
     /// Uses so far, up to 15.

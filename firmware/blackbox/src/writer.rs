@@ -100,12 +100,13 @@ impl Default for Writer {
 }
 
 impl Writer {
-    /// A writer at the start of a session.
+    /// A writer at the start of a session. All its bytes are zeros, so that a board needs no image of it in flash: each
+    /// group begins with a model made anew.
     pub const fn new() -> Self {
         Self {
             model: Model::new(),
             frame: Frame::empty(),
-            coder: Encoder::new(),
+            coder: Encoder::UNSET,
             scratch: Out::new(),
             sector: Sector::zeroed(),
             header: Header {

@@ -30,6 +30,11 @@ use crate::layout::Layout;
 /// cards of 32 GB; FAT blocks beyond this are written early, which is harmless: nothing refers to them yet.
 pub(crate) const HELD_BLOCKS: usize = 8;
 
+/// How often a block of the file system is tried to be written. A segment of which only a part of the FAT came through
+/// takes clusters that no file has, so that a card which refuses now and then would look full after a while. The
+/// device bounds the time of all tries together ([`crate::CardDevice::begin_service`]).
+const METADATA_TRIES: u32 = 8;
+
 /// What went wrong below the file system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GateError<E> {
@@ -196,7 +201,15 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     }
 
     fn write_device(&self, block: &Block, at: u32) -> Result<(), GateError<D::Error>> {
-        self.device.write(core::slice::from_ref(block), BlockIdx(at)).map_err(|error| self.fail(error))
+        let mut tries = METADATA_TRIES;
+        loop {
+            tries -= 1;
+            match self.device.write(core::slice::from_ref(block), BlockIdx(at)) {
+                Err(error) if tries == 0 => return Err(self.fail(error)),
+                Err(_) => {}
+                Ok(()) => return Ok(()),
+            }
+        }
     }
 
     fn read_block(&self, block: &mut Block, at: u32) -> Result<(), GateError<D::Error>> {

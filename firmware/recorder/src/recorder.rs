@@ -34,8 +34,9 @@ use trouble::may_work_elsewhere;
 
 /// How often a missing or failing card is looked for.
 const RETRY: Span = Span::from_secs(1);
-/// How often one block is tried before the segment is given up.
-const WRITE_TRIES: u32 = 3;
+/// How often a sector is tried before the segment is given up. A card that refuses one block of five at random so comes to
+/// a new segment once in 100,000 sectors; the device bounds the time of all tries together.
+const WRITE_TRIES: u32 = 8;
 
 /// What became of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,8 +144,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             self.drop_written(1);
             return Written::Done;
         }
-        for _ in 0..WRITE_TRIES {
-            match self.try_write(now, &first) {
+        for tries in 0..WRITE_TRIES {
+            // Of a row in which one block was refused, the first alone is more likely to be taken.
+            let most = if tries == 0 { usize::MAX } else { 1 };
+            match self.try_write(now, &first, most) {
                 Ok(()) => {
                     self.count_retries();
                     return Written::Done;
@@ -164,7 +167,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         // A new segment may lie where the card still works.
         let moved = self.next_segment(now).and_then(|()| {
             self.status.want_group();
-            self.try_write(now, &first)
+            self.try_write(now, &first, 1)
         });
         self.count_retries();
         match moved {
@@ -251,7 +254,8 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         true
     }
 
-    fn try_write(&mut self, now: Instant, first: &Sector) -> Result<(), CardError<D::Error>> {
+    /// Writes the sector that waits first, and of those behind it so many as belong there, `most` in all.
+    fn try_write(&mut self, now: Instant, first: &Sector, most: usize) -> Result<(), CardError<D::Error>> {
         let number = first.number();
         let keep = self.status.waiting().filter(|(from, _)| number >= *from).map(|(_, keep)| keep);
         self.segments.ring.keep(keep);
@@ -276,7 +280,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
                 self.write_copy(log.session, at + 1)?;
             }
             (log.partial_further, log.copy_in_place) = (true, false);
-            self.count_in_row(number, (blocks - at) as usize)
+            self.count_in_row(number, most.min((blocks - at) as usize))
         };
         let written = self.write_sealed(&log, at, count)?;
         self.status.count_blocks(written as u32);

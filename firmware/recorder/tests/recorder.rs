@@ -259,7 +259,7 @@ fn sectors_that_wait_together_are_written_together() {
 
 /// A card that fails in the middle of a command: what it took before is written again, at the same places.
 #[test]
-fn a_write_that_fails_half_way_is_repeated_whole() {
+fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
@@ -269,10 +269,46 @@ fn a_write_that_fails_half_way_is_repeated_whole() {
         assert!(recorder.take(sector));
     }
     device.fail_after.set(Some(5));
-    assert_eq!(recorder.write(Instant::ZERO), Written::Done);
+    while recorder.waiting() > 0 {
+        assert_eq!(recorder.write(Instant::ZERO), Written::Done);
+    }
     assert_eq!(numbers(&device), (0..8).collect::<Vec<_>>());
     assert_eq!(status.read().write_errors, 1);
     assert!(stored(&device).iter().all(|(name, ..)| name.segment == 0), "no new segment was needed");
+}
+
+/// A card that refuses one block write of five: no segment is given up for it, so that the card does not fill and the logs
+/// of earlier sessions stay.
+#[test]
+fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut earlier = Recorder::new(device.clone(), &status, held(), 1);
+    for sector in sectors(100) {
+        assert_eq!(put(&mut earlier, Instant::ZERO, &sector), Written::Done);
+    }
+    earlier.finish();
+    let before: Vec<_> = stored(&device).into_iter().map(|(name, ..)| name).collect();
+
+    device.refused_permille.set(200);
+    for session in 2..8 {
+        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        for row in sectors(2_000).chunks(8) {
+            assert_eq!(recorder.write(Instant::ZERO), Written::Done, "the segment is made");
+            assert!(row.iter().all(|sector| recorder.take(sector)));
+            while recorder.waiting() > 0 {
+                assert_eq!(recorder.write(Instant::ZERO), Written::Done);
+            }
+        }
+        recorder.finish();
+    }
+    let after = stored(&device);
+    let kept = after.iter().filter(|(name, ..)| before.contains(name)).count();
+    assert_eq!(kept, before.len(), "the earlier session's sectors");
+    let last = after.iter().map(|(name, ..)| name.session).max();
+    assert_eq!(last, Some(7), "each session has its own log");
+    assert_eq!(status.read().segments_overwritten, 0);
+    assert!(status.read().write_errors > 500, "{:?}", status.read());
 }
 
 /// Of a disarmed vehicle's record the last while is kept, in few segments; once all is kept, nothing goes any more.

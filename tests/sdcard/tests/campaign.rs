@@ -179,10 +179,10 @@ fn a_block_that_was_taken_but_not_programmed_is_written_again() {
 #[test]
 fn a_place_that_fails_is_left_for_a_new_segment() {
     let medium = medium();
-    let mut rig = recording(sdhc(&medium).with(Plan::always(Fault::WriteError).from(10 * S).times(3)));
+    let mut rig = recording(sdhc(&medium).with(Plan::always(Fault::WriteError).from(10 * S).times(8)));
     rig.run_to(20_000);
     rig.assert_state(CardState::Recording);
-    assert_eq!(rig.status.read().write_errors, 3);
+    assert_eq!(rig.status.read().write_errors, 8);
     let found = rig.finish_whole(&medium);
     assert_eq!((found.sessions, found.segments), (1, 2));
 }

@@ -33,7 +33,7 @@ pub(crate) struct Frame {
 impl Frame {
     pub(crate) const fn empty() -> Self {
         Self {
-            v2: true,
+            v2: false,
             incompat: 0,
             compat: 0,
             sequence: 0,

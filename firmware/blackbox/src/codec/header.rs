@@ -41,15 +41,19 @@ impl Headers {
     pub(super) const fn new() -> Self {
         Self {
             last: 0,
-            first: SYMBOL,
-            symbols: [UNEXPECTED; 16],
-            jumps: [Cdf::FLAT; 2],
-            signatures: Cdf::FLAT,
+            first: Cdf::UNSET,
+            symbols: [Cdf::UNSET; 16],
+            jumps: [Cdf::UNSET; 2],
+            signatures: Cdf::UNSET,
         }
     }
 
     pub(super) fn reset(&mut self) {
-        *self = Self::new();
+        self.last = 0;
+        self.first = SYMBOL;
+        self.symbols = [UNEXPECTED; 16];
+        self.jumps = [Cdf::FLAT; 2];
+        self.signatures = Cdf::FLAT;
     }
 
     /// Whether the header of the last frame was not as expected.

@@ -80,6 +80,7 @@ pub(crate) struct Model {
 const TIME: Cdf = Cdf::from_sizes([40, 10, 6, 4, 4, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 1]);
 
 impl Model {
+    /// All zeros, so that the board needs no image of it in flash: good from the first [`Self::reset`] on.
     pub(crate) const fn new() -> Self {
         Self {
             layouts: Layouts::Current,
@@ -88,7 +89,7 @@ impl Model {
             headers: Headers::new(),
             body: Body::new(),
             records: Records::new(),
-            times: TIME,
+            times: Cdf::UNSET,
         }
     }
 

@@ -33,10 +33,10 @@ pub(super) struct Records {
 impl Records {
     pub(super) const fn new() -> Self {
         Self {
-            kinds: Cdf::FLAT,
+            kinds: Cdf::UNSET,
             kept: [[0; KEPT]; KINDS],
-            words: [Cdf::FLAT; CONTEXTS],
-            halves: [Cdf::FLAT; 4],
+            words: [Cdf::UNSET; CONTEXTS],
+            halves: [Cdf::UNSET; 4],
         }
     }
 

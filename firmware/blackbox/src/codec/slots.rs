@@ -73,7 +73,8 @@ pub(crate) struct Slot {
 pub(crate) const NONE: u8 = u8::MAX;
 
 impl Slot {
-    const NEW: Self = Self {
+    /// All zeros: a place that no message has claimed.
+    const UNSET: Self = Self {
         key: Key { id: 0, v2: false, sender: 0, instance: [0; INSTANCE_BYTES] },
         layout: None,
         elements: 0,
@@ -82,7 +83,7 @@ impl Slot {
         at_ms: 0,
         seed: 0,
         own_seed: false,
-        verified: true,
+        verified: false,
         incompat: 0,
         compat: 0,
         length: Length::Trimmed,
@@ -91,10 +92,10 @@ impl Slot {
         links: 0,
         instance_at: 0,
         instance_size: 0,
-        calm: Cell::EVEN,
+        calm: Cell::UNSET,
         quiet: false,
         frames: 0,
-        next: [NONE; 2],
+        next: [0; 2],
     };
 
     /// A slot before its first frame.
@@ -116,7 +117,9 @@ impl Slot {
             verified: layout.is_some(),
             length: if key.v2 && layout.is_some() { Length::Trimmed } else { Length::Fixed(len_base as u8) },
             links: links::first(key.id),
-            ..Self::NEW
+            calm: Cell::EVEN,
+            next: [NONE; 2],
+            ..Self::UNSET
         }
     }
 }
@@ -171,6 +174,8 @@ struct Guess {
     sure: u8,
 }
 
+/// All zeros: what the places hold before the first reset.
+const UNSET: Guess = Guess { slot: 0, sure: 0 };
 const NO_GUESS: Guess = Guess { slot: NONE, sure: 0 };
 
 /// All slots and senders, and the order in which they speak.
@@ -195,19 +200,19 @@ pub(crate) struct Slots {
 impl Slots {
     pub(crate) const fn new() -> Self {
         Self {
-            list: [Slot::NEW; SLOTS],
+            list: [Slot::UNSET; SLOTS],
             used: 0,
             senders: [Sender { system: 0, component: 0, sequence: 0, signature_link: 0, signature_time: 0 };
                 SENDERS],
             senders_used: 0,
-            order_3: [NO_GUESS; ORDER_3],
-            order_2: [NO_GUESS; ORDER_2],
-            past: [NONE; 3],
-            places: places([NONE; 3]),
-            guesses: (NONE, NONE, 0),
-            kind: [KIND; KINDS],
-            high: Cdf::FLAT,
-            low: [Cdf::FLAT; SLOTS / 16],
+            order_3: [UNSET; ORDER_3],
+            order_2: [UNSET; ORDER_2],
+            past: [0; 3],
+            places: (0, 0),
+            guesses: (0, 0, 0),
+            kind: [Cdf::UNSET; KINDS],
+            high: Cdf::UNSET,
+            low: [Cdf::UNSET; SLOTS / 16],
         }
     }
 

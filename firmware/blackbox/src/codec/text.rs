@@ -18,7 +18,7 @@ pub(crate) struct TextModel {
 
 impl TextModel {
     pub(crate) const fn new() -> Self {
-        Self { rows: [Cdf::FLAT; ROWS], same: [Cell::EVEN; MATCHES] }
+        Self { rows: [Cdf::UNSET; ROWS], same: [Cell::UNSET; MATCHES] }
     }
 
     /// In place: a new one would lie on the stack first.

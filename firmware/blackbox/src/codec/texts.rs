@@ -29,8 +29,8 @@ impl Texts {
             model: TextModel::new(),
             kept: [0; TEXT_BYTES],
             used: 0,
-            changes: Cdf::FLAT,
-            lengths: [Cdf::FLAT; 2],
+            changes: Cdf::UNSET,
+            lengths: [Cdf::UNSET; 2],
         }
     }
 

@@ -40,6 +40,9 @@ pub struct MemCard {
     pub reads: Rc<Cell<u32>>,
     /// After so many more blocks one write fails.
     pub fail_after: Rc<Cell<Option<u32>>>,
+    /// So many of a thousand block writes are refused, at random.
+    pub refused_permille: Rc<Cell<u64>>,
+    random: Rc<Cell<u64>>,
 }
 
 impl MemCard {
@@ -57,6 +60,8 @@ impl MemCard {
             writes: Rc::default(),
             reads: Rc::default(),
             fail_after: Rc::default(),
+            refused_permille: Rc::default(),
+            random: Rc::default(),
         }
     }
 
@@ -86,6 +91,11 @@ impl BlockDevice for MemCard {
         self.writes.set(self.writes.get() + 1);
         for (at, block) in (start.0..).zip(blocks) {
             if self.broken.get() || at >= self.size {
+                return Err(Broken);
+            }
+            let random = self.random.get().wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            self.random.set(random);
+            if (random >> 33) % 1000 < self.refused_permille.get() {
                 return Err(Broken);
             }
             match self.fail_after.get() {

@@ -34,11 +34,11 @@ pub(crate) struct Distributions {
 impl Distributions {
     pub(crate) const fn new() -> Self {
         Self {
-            blocks: [Cdf::FLAT; BLOCKS],
+            blocks: [Cdf::UNSET; BLOCKS],
             used: 0,
-            calm: [CALM; KINDS],
-            young: [Cdf::FLAT; KINDS],
-            first: [Cdf::FLAT; KINDS],
+            calm: [Cdf::UNSET; KINDS],
+            young: [Cdf::UNSET; KINDS],
+            first: [Cdf::UNSET; KINDS],
         }
     }
 

@@ -15,6 +15,8 @@ pub(super) struct Costs {
 }
 
 impl Costs {
+    /// All zeros: of a place that no slot has claimed.
+    pub(super) const UNSET: Self = Self { first: [0; 4], more: [0; 2] };
     pub(super) const NEW: Self = Self { first: [0, 0, 0, UNKNOWN], more: [UNKNOWN; 2] };
 
     #[inline]

@@ -81,7 +81,20 @@ const QUIET_MAX: u8 = 0x3f;
 const STEP_DECIMAL: u8 = 0x80;
 
 impl Element {
-    const NEW: Self = Self::new(What::Integer1, 1, false);
+    /// All zeros: a place that no slot has claimed.
+    const UNSET: Self = Self {
+        last: 0,
+        step: 0,
+        aux: 0,
+        costs: Costs::UNSET,
+        block: 0,
+        other: 0,
+        what: What::Integer1,
+        size: 0,
+        decimal: 0,
+        exponent: 0,
+        quiet: 0,
+    };
 
     pub(crate) const fn new(what: What, size: u8, links: bool) -> Self {
         Self {
@@ -181,7 +194,7 @@ pub(crate) struct Elements {
 
 impl Elements {
     pub(crate) const fn new() -> Self {
-        Self { list: [Element::NEW; ELEMENTS], used: 0 }
+        Self { list: [Element::UNSET; ELEMENTS], used: 0 }
     }
 
     pub(crate) fn reset(&mut self) {
