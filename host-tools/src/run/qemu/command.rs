@@ -87,7 +87,18 @@ fn program() -> Command {
         return Command::new(PROGRAM);
     }
     let mut command = Command::new(SETPRIV);
-    command.args(["--pdeathsig", "KILL", "--", PROGRAM]);
+    // The signal is asked for after the start: had this program ended before, it would never come.
+    let if_still_ours = r#"[ "$PPID" = "$0" ] && exec "$@""#;
+    command.args([
+        "--pdeathsig",
+        "KILL",
+        "--",
+        "sh",
+        "-c",
+        if_still_ours,
+        &std::process::id().to_string(),
+        PROGRAM,
+    ]);
     command
 }
 
