@@ -148,15 +148,47 @@ pub struct Ending {
     pub summary: Summary,
     /// What is known of its end.
     pub proof: Proof,
-    /// The number of a log that was recorded on the card just before this one and is not there.
-    pub gone_before: Option<u32>,
+    /// What became of the session that was recorded on the card just before this one.
+    pub before: SessionBefore,
+}
+
+/// The session that was recorded on a card just before a log, as the log's boot record names it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SessionBefore {
+    /// No boot record names one.
+    #[default]
+    NotNamed,
+    /// It was read too.
+    There,
+    /// It is not among what was read, and nothing tells that it should be: the oldest logs make room for new ones.
+    NotLookedFor(u32),
+    /// It is not there, and an older log of the card is; or its files hold another session.
+    Gone(u32),
+}
+
+impl SessionBefore {
+    /// What is missing, as a part of a sentence.
+    pub fn gone(self) -> Option<String> {
+        match self {
+            Self::Gone(number) => Some(format!(
+                "session {number:05}, which was recorded just before it, is not there under that number"
+            )),
+            Self::NotNamed | Self::There | Self::NotLookedFor(_) => None,
+        }
+    }
 }
 
 impl Ending {
     /// A log by itself; [`crate::followed`] adds what later ones tell of it.
     pub fn of(log: &Log, summary: Summary) -> Self {
         let proof = Proof::of(&summary, None);
-        Self { name: log.name.clone(), files: log.files.clone(), summary, proof, gone_before: None }
+        Self {
+            name: log.name.clone(),
+            files: log.files.clone(),
+            summary,
+            proof,
+            before: SessionBefore::NotNamed,
+        }
     }
 
     /// How the log ends, as a part of a sentence.
@@ -178,7 +210,7 @@ impl Ending {
             all.push(format!(
                 "{}, {} missing, {}, {} or {} lost while recording",
                 count(summary.gaps, "gap"),
-                count(summary.frames_missing, "frame"),
+                summary.missing_words(),
                 count(blocks.damaged, "damaged sector"),
                 count(lost, "frame"),
                 noun(lost, "record")
@@ -198,11 +230,7 @@ impl Ending {
         }
         all.extend(self.strange());
         all.extend(self.newer());
-        all.extend(
-            self.gone_before.map(|number| {
-                format!("session {number:05}, which was recorded just before it, is not there")
-            }),
-        );
+        all.extend(self.before.gone());
         all
     }
 

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use hums_blackbox::record::Before;
 
-use crate::ending::{Ending, Proof};
+use crate::ending::{Ending, Proof, SessionBefore};
 
 /// Logs held back at most; so many after a log may say something of its end.
 pub const HELD_MAX: usize = 4;
@@ -56,18 +56,21 @@ impl<T: Logged> Followed<T> {
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(Logged::ending).collect();
-        // A log of this number is or would be between the one before and the next, on the same card.
-        let is_between = |name: &str, between: u32| {
-            let (other, last) = place(name);
-            card == other && number.zip(last).is_some_and(|(next, last)| last < between && between < next)
+        // Its place is between a log that was read and the next one, on the same card; or a log of its number is there, and
+        // is another session.
+        let is_looked_at = |name: &str| {
+            let (other, read) = place(name);
+            let numbers = number.zip(read);
+            card == other && numbers.is_some_and(|(next, read)| read <= before.number && before.number < next)
         };
-        let last = held.last().map(|log| log.name.clone());
+        let is_looked_at = held.iter().any(|log| is_looked_at(&log.name));
         match held.iter_mut().rev().find(|log| log.summary.session == Some(before.session)) {
-            Some(log) => log.proof = Proof::of(&log.summary, Some(before)),
-            None => {
-                next.gone_before =
-                    Some(before.number).filter(|number| last.is_some_and(|last| is_between(&last, *number)));
+            Some(log) => {
+                log.proof = Proof::of(&log.summary, Some(before));
+                next.before = SessionBefore::There;
             }
+            None if is_looked_at => next.before = SessionBefore::Gone(before.number),
+            None => next.before = SessionBefore::NotLookedFor(before.number),
         }
         // The start looked at each file from the newest on until it found a sector.
         for log in held.into_iter().filter(|log| log.summary.session.is_none()) {

@@ -71,37 +71,62 @@ impl StdError for ReaderGone {}
 #[derive(Debug)]
 pub struct Differs {
     path: PathBuf,
-    /// Why it was not replaced though the user said so.
-    original: bool,
+    why: Reason,
+}
+
+/// Why a file was not replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reason {
+    /// Nobody said `--replace`.
+    NotSaid,
+    /// It may be an original, or was made of another input.
+    Original,
+    /// It has more in it than what would take its place, in bytes.
+    Less {
+        /// What is there.
+        there: u64,
+        /// What would take its place.
+        new: u64,
+    },
 }
 
 impl Differs {
     /// Nobody said `--replace`.
     pub fn new(path: &Path) -> Self {
-        Self { path: path.to_owned(), original: false }
+        Self { path: path.to_owned(), why: Reason::NotSaid }
     }
 
     /// It may be an original, or was made of another input.
     pub fn original(path: &Path) -> Self {
-        Self { path: path.to_owned(), original: true }
+        Self { path: path.to_owned(), why: Reason::Original }
+    }
+
+    /// What is there was made of the same log, of more of it: so many bytes, and so many would take their place.
+    pub fn less(path: &Path, there: u64, new: u64) -> Self {
+        Self { path: path.to_owned(), why: Reason::Less { there, new } }
     }
 }
 
 impl fmt::Display for Differs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let path = self.path.display();
-        if self.original {
-            return write!(
+        match self.why {
+            Reason::NotSaid => write!(
+                f,
+                "{path}: is there already with other content, and was not replaced; name another output, move it away, \
+                 or say --replace"
+            ),
+            Reason::Original => write!(
                 f,
                 "{path}: is there already with other content, and nothing tells that hums made it of the same input: it \
                  may be an original, and --replace does not replace it; name another output, or move it away"
-            );
+            ),
+            Reason::Less { there, new } => write!(
+                f,
+                "{path}: is there already with more in it ({there} bytes; this would be {new}), and --replace does not \
+                 make it less; name another output, or delete it by hand"
+            ),
         }
-        write!(
-            f,
-            "{path}: is there already with other content, and was not replaced; name another output, move it away, or \
-             say --replace"
-        )
     }
 }
 

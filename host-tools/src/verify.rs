@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::cli;
 use crate::decode::side_by_side::side_by_side;
-use crate::ending::{BlocksJson, EndJson, behind_words};
+use crate::ending::{BlocksJson, EndJson, SessionBefore, behind_words};
 use crate::followed::Followed;
 use crate::info::json::{ImageJson, images_json};
 use crate::logs::{self, find::Image};
@@ -29,6 +29,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         if !args.json {
             output::line(&format!("Card {}", path(&image.path)))?;
             print(&[check])?;
+            image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
         }
     }
     let mut followed = Followed::default();
@@ -152,6 +153,12 @@ impl LogJson {
         let gaps = || contents.gaps.iter().filter(|gap| gap.cause != Cause::Disarmed);
         let missing: u64 = gaps().map(|gap| u64::from(gap.sectors_lost)).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
+        // A gap in which nobody knows how many are missing is one at least.
+        let frames_missing = summary.frames_missing + summary.gaps_uncounted;
+        let uncounted = match summary.gaps_uncounted {
+            0 => String::new(),
+            gaps => format!("{} of which nothing tells how many: one each at least", count(gaps, "gap")),
+        };
         let mut checks = vec![
             check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, String::new()),
             check("sector sequence", blocks.sectors, missing, gaps_detail(log)),
@@ -165,12 +172,7 @@ impl LogJson {
                     "{unverified} frames of definitions that the monitor does not know are kept as they came"
                 ),
             ),
-            check(
-                "frames missing",
-                contents.frames() + summary.frames_missing,
-                summary.frames_missing,
-                String::new(),
-            ),
+            check("frames missing", contents.frames() + frames_missing, frames_missing, uncounted),
             check(
                 "times in order",
                 contents.frames() + contents.records,
@@ -204,9 +206,17 @@ fn ends(log: &Overview) -> [Check; 5] {
         (words, false) => format!("behind its last sector: {words}"),
         (words, true) => format!("behind its last sector: {words}; some are of a session that began later"),
     };
-    let gone = ending.gone_before.map_or_else(String::new, |number| {
-        format!("session {number:05}, which was recorded just before it, is not there")
-    });
+    let gone = ending.before.gone();
+    let (before_checked, before_failed) = match ending.before {
+        SessionBefore::NotNamed | SessionBefore::NotLookedFor(_) => (0, 0),
+        SessionBefore::There => (1, 0),
+        SessionBefore::Gone(_) => (1, 1),
+    };
+    let before = match ending.before {
+        SessionBefore::NotNamed => "it names none".to_owned(),
+        SessionBefore::NotLookedFor(number) => format!("session {number:05} is not among what was read"),
+        SessionBefore::There | SessionBefore::Gone(_) => gone.unwrap_or_default(),
+    };
     let twice = "sectors that are there twice, or lie where others belong".to_owned();
     let twice = if blocks.misplaced > 0 { twice } else { String::new() };
     let strange = ending.strange();
@@ -215,7 +225,7 @@ fn ends(log: &Overview) -> [Check; 5] {
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
         check("end", 1, u64::from(!ending.proof.holds() || newer), format!("{}; {behind}", ending.words())),
-        check("session before", 1, u64::from(ending.gone_before.is_some()), gone),
+        check("session before", before_checked, before_failed, before),
     ]
 }
 

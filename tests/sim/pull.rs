@@ -50,7 +50,7 @@ fn begin(board: &Board, output: &Path) -> PathBuf {
     let came = words.into_iter().find(|line| line.contains(" bytes")).expect("something comes");
     pull.signal("KILL");
     pull.end(Duration::from_secs(5));
-    let part = output.join(format!(".{LOG}.hums-part"));
+    let part = output.join(format!(".{LOG}.pull.hums-part"));
     assert!(part.metadata().unwrap().len() > 5_000 && !output.join(LOG).exists(), "{came}");
     part
 }
@@ -85,7 +85,7 @@ fn two_cards_are_never_made_into_one_log() {
     // Where it had got to, it goes on.
     let apart = home.path().join("apart");
     fs::create_dir(&apart).unwrap();
-    fs::write(apart.join(format!(".{LOG}.hums-part")), &kept).unwrap();
+    fs::write(apart.join(format!(".{LOG}.pull.hums-part")), &kept).unwrap();
     let told = pull(&first, &apart, &[LOG]).expect_code(&[0]).stderr;
     assert!(told.contains(&format!("goes on after {} bytes", kept.len())), "{told}");
     assert_on_card(&apart.join(LOG), &one_card);

@@ -23,8 +23,9 @@ impl Checked {
         let wrong = !self.judged.problems.is_empty();
         // A file of a card into which nothing was written is no recording.
         let is_empty = self.ending.as_ref().is_some_and(|ending| ending.summary.session.is_none());
-        let judged = self.judged.is_judged() || is_empty;
-        let lossy = self.judged.damages > 0 || !judged || !self.unproved().is_empty();
+        // Too little to judge is no damage: it is said, and what was judged counts.
+        let nobody = self.judged.worst().is_none() && !is_empty;
+        let lossy = self.judged.damages > 0 || nobody || !self.unproved().is_empty();
         Outcome::lossy(lossy).and(if wrong { Outcome::Findings } else { Outcome::Done })
     }
 

@@ -82,11 +82,6 @@ impl Judged {
         }
     }
 
-    /// Whether there was enough in it that nothing found is good news.
-    pub fn is_judged(&self) -> bool {
-        !matches!(self.verdict(), "unknown" | "too_little")
-    }
-
     /// The worst level that was found; `None` where nothing could be judged.
     pub fn worst(&self) -> Option<Level> {
         match self.problems.first() {

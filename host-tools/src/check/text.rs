@@ -31,7 +31,7 @@ pub fn screen(checked: &Checked) -> String {
     let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
     let _ = writeln!(text, "  when     {}", when(judged, checked.format));
     let _ = writeln!(text, "  in air   {}", in_air(judged));
-    let _ = writeln!(text, "  verdict  {}", verdict(judged));
+    let _ = writeln!(text, "  verdict  {}{}", verdict(judged), but(checked));
     text.push('\n');
     problems(&mut text, judged);
     not_judged(&mut text, judged);
@@ -45,9 +45,12 @@ pub fn screen(checked: &Checked) -> String {
 /// One log of many, as a line.
 pub fn line(checked: &Checked) -> String {
     let judged = &checked.judged;
-    let level = match judged.verdict() {
-        "too_little" => "little",
-        verdict => verdict,
+    let level = match (judged.verdict(), state(checked)) {
+        ("too_little", _) => "little",
+        // Nothing wrong in what is left of it is not all right.
+        ("ok", State::Damaged) => "damaged",
+        ("ok", State::NotProved) => "unproved",
+        (verdict, _) => verdict,
     };
     let mut names: Vec<&str> = Vec::new();
     for problem in &judged.problems {
@@ -57,23 +60,54 @@ pub fn line(checked: &Checked) -> String {
         }
     }
     let found = names.join(", ");
-    let state = match state(judged) {
-        "" if !checked.unproved().is_empty() => "not proved to be whole",
-        words => words,
-    };
-    let what: Vec<&str> = [found.as_str(), state].into_iter().filter(|words| !words.is_empty()).collect();
+    let what: Vec<&str> =
+        [found.as_str(), state(checked).words()].into_iter().filter(|words| !words.is_empty()).collect();
     let air = clock(flown(judged));
     format!("{level:<8}  {air:>8}  {}  {}", word(&checked.name), what.join("; ")).trim_end().to_owned()
 }
 
-/// What is wrong with the recording itself. An autopilot's log is cut in the middle of a message wherever its power goes
-/// before it closes the log: that is not the same as damage inside of it.
-fn state(judged: &Judged) -> &'static str {
+/// What is wrong with the recording itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// Nothing that is known.
+    Whole,
+    /// An autopilot's log is cut in the middle of a message wherever its power goes before it closes the log: that is not
+    /// the same as damage inside of it.
+    Cut,
+    Damaged,
+    /// A log of ours without damage, of which nothing proves that it is whole.
+    NotProved,
+}
+
+impl State {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Whole => "",
+            Self::Cut => "cut at its end",
+            Self::Damaged => "part of it is missing or damaged",
+            Self::NotProved => "not proved to be whole",
+        }
+    }
+}
+
+fn state(checked: &Checked) -> State {
+    let judged = &checked.judged;
     let mut damages = judged.gaps.iter().filter(|gap| gap.cause.is_damage());
     match judged.damages {
-        0 => "",
-        _ if damages.all(|gap| gap.cause == Cause::Cut) => "cut at its end",
-        _ => "damaged",
+        0 if checked.unproved().is_empty() => State::Whole,
+        0 => State::NotProved,
+        _ if damages.all(|gap| gap.cause == Cause::Cut) => State::Cut,
+        _ => State::Damaged,
+    }
+}
+
+/// What the verdict is not about: the end of its line.
+fn but(checked: &Checked) -> String {
+    match state(checked) {
+        State::Whole => String::new(),
+        State::Cut => "; the log is cut at its end".to_owned(),
+        State::Damaged => "; part of the log is missing or damaged, and was not judged".to_owned(),
+        State::NotProved => "; the log is not proved to be whole".to_owned(),
     }
 }
 
@@ -86,6 +120,7 @@ pub struct Table {
     logs: u64,
     damaged: u64,
     cut: u64,
+    not_proved: u64,
     little: u64,
     flown_us: u64,
 }
@@ -95,8 +130,10 @@ impl Table {
     pub fn add(&mut self, checked: &Checked) {
         let judged = &checked.judged;
         self.logs += 1;
-        self.damaged += u64::from(state(judged) == "damaged");
-        self.cut += u64::from(state(judged) == "cut at its end");
+        let state = state(checked);
+        self.damaged += u64::from(state == State::Damaged);
+        self.cut += u64::from(state == State::Cut);
+        self.not_proved += u64::from(state == State::NotProved);
         self.flown_us = self.flown_us.saturating_add(flown(judged).as_micros());
         let level = judged.worst().map_or("unknown", Level::name);
         self.little += u64::from(judged.worst() == Some(Level::Ok) && judged.is_little());
@@ -122,12 +159,13 @@ impl Table {
         );
         for (count, what) in [
             (count("ok").saturating_sub(self.little), "nothing wrong"),
-            (self.little, "too little in it to judge"),
+            (self.little, "not enough in it to judge"),
             (count("warning"), "warnings"),
             (count("critical"), "critical"),
             (count("unknown"), "no vehicle in it"),
-            (self.damaged, "damaged (counted above too)"),
+            (self.damaged, "with parts missing or damaged (counted above too)"),
             (self.cut, "cut at their end (counted above too)"),
+            (self.not_proved, "not proved to be whole (counted above too)"),
             (failed as u64, "could not be read"),
         ] {
             if count > 0 {
@@ -260,7 +298,7 @@ fn verdict(judged: &Judged) -> String {
             format!("look at this before the next flight: {}", plural(warnings, "warning"))
         }
         Some(_) if judged.is_little() => format!(
-            "too little in it to judge: {} of {all} checks had something to judge, and nothing was wrong there",
+            "not enough to judge: {} of {all} checks had something to judge, and nothing was wrong there",
             judged.judged.len()
         ),
         Some(_) => format!(

@@ -13,8 +13,9 @@ const EXAMPLES: &str = "Examples:
 Reads a ground station's tlog, raw MAVLink, ArduPilot's logs (.bin, .log), PX4's logs (.ulg), each also as .gz, logs of
 HUMS, cards and their images; told apart by what is in them. The checks and their limits are those of the monitor on
 board. A log of HUMS is shown with what the monitor on board found, unless --params asks for other limits.
-Exit codes: 0 nothing wrong; 4 something wrong (a warning or worse); 3 the log has losses or damage, whatever was found;
-1 failed; 2 usage.";
+Exit codes: 0 nothing wrong in what could be judged (a log with too little in it says so: \"not enough to judge\"); 4 something
+wrong (a warning or worse); 3 the log has losses or damage, or no vehicle is in it, whatever was found; 1 failed; 2 usage.
+Of several logs 3 goes over 4 over 0.";
 
 /// `hums check`
 #[derive(Args, Clone, Debug)]

@@ -83,7 +83,7 @@ const PULL_EXAMPLES: &str = "Examples:
   hums pull --link udpin:0.0.0.0:14550 -o logs --last 1
   hums pull --link tcp:192.168.1.5:5760 -o logs 00001_00.HUM
 
-A file that is there already is left if it is the same log by its checksum. One that was begun (.NAME.hums-part) is gone
+A file that is there already is left if it is the same log by its checksum. One that was begun (.NAME.pull.hums-part) is gone
 on with, once the board has confirmed that it is the beginning of its log. Exit code 3: a log came as it is on the card,
 and has damage there.";
 

@@ -242,7 +242,8 @@ impl Task<'_> {
             let dir = claim(&mut taken, &first, nth, &context.stamp);
             if dir != first {
                 remarks.push(format!(
-                    "{}: {} has other tables of a session of this number; these go to {}",
+                    "{}: {} has other tables of a session of this number; these go to {}: a query over both counts \
+                     twice what both have",
                     log.name,
                     first.display(),
                     dir.display()
@@ -371,8 +372,9 @@ fn nothing_of(log: &Place, summary: &Summary) -> String {
     )
 }
 
-/// A directory for a session's tables: that of its own earlier tables, otherwise a free one. Another session of the
-/// same name (of a board without a source of randomness) gets a number; so does another part of the same session.
+/// A directory for a session's tables: that of its own earlier tables, otherwise that of the session. A further log of one
+/// command under the same session (a copy that was cut short, a board without a source of randomness) gets a number. What
+/// an earlier command has put there is not joined by another part of the session: a query would read both.
 fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32, stamp: &str) -> PathBuf {
     let numbered = |number: u32| {
         let mut name = dir.to_owned().into_os_string();
@@ -385,7 +387,8 @@ fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32, stamp: &str) -> Pa
     let mut own = own.filter(|path| Folder::made_of(path).is_some_and(|made_of| made_of == stamp));
     let is_free = |path: &PathBuf| Folder::is_free(path) && !taken.contains(path);
     let free = || (nth..u32::MAX).map(numbered).find(is_free);
-    let claimed = own.next().or_else(free).unwrap_or_else(|| dir.to_owned());
+    let first = || (nth == 1).then(|| dir.to_owned()).filter(|dir| !taken.contains(dir));
+    let claimed = own.next().or_else(first).or_else(free).unwrap_or_else(|| dir.to_owned());
     taken.insert(claimed.clone());
     claimed
 }
@@ -419,11 +422,13 @@ mod tests {
         }
         assert_eq!(claim(2, "one"), dir, "a later run, in another order");
         assert_eq!(claim(1, "two"), second);
-        assert_eq!(claim(1, "three"), root.path().join("session=s1-3"));
+        assert_eq!(claim(3, "three"), root.path().join("session=s1-3"));
         assert_eq!(
-            claim(1, "four"),
+            claim(3, "four"),
             root.path().join("session=s1-4"),
             "also while the third is being written"
         );
+        // Another part of the session, in a later command: nothing goes beside what is there.
+        assert_eq!(super::claim(&mut BTreeSet::new(), &dir, 1, "five"), dir);
     }
 }

@@ -7,13 +7,13 @@ use std::io::IsTerminal as _;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
 use crate::files::{InPlacePart, Inputs, make_directory};
 use crate::logs;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, usage};
 use crate::output::line;
 use crate::run::{emulate, qemu, sim};
 use crate::summary::Overview;
@@ -129,9 +129,9 @@ fn flight(args: &cli::Demo) -> Result<Endpoint> {
         emulate::source_tree().map(|tree| tree.join(FLIGHT)).filter(|flight| flight.is_file());
     match flight {
         Some(flight) => Ok(Endpoint::File(flight)),
-        None => {
-            bail!("no flight to show: this is not inside the source tree of hums; name a tlog with --input")
-        }
+        None => Err(usage(
+            "hums demo shows a flight of the source tree, and this is outside of it; name a recording with --input",
+        )),
     }
 }
 

@@ -5,7 +5,7 @@
 //! what would be written, file by file; only with `--replace` is it replaced, and only where nothing lies in it but
 //! what its stamp names.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -16,8 +16,8 @@ use anyhow::{Context as _, Result, bail};
 
 use super::identity::without_links;
 use super::inputs::Inputs;
-use super::part::{is_written, lock, part_of, sync_folder_of};
-use super::paths::{cannot_write, make_parent, settle};
+use super::part::{is_written, lock, sync_folder_of};
+use super::paths::{cannot_write, make_parent, part_of, settle};
 use super::stamp::{STAMP, Stamp, foreign};
 use super::there::There;
 use crate::outcome::Differs;
@@ -191,6 +191,15 @@ impl Part {
         // Again: somebody may have put something there meanwhile.
         if self.replaces {
             check_ours(path)?;
+            let bytes = |folder: &Path, files: &BTreeSet<String>| -> u64 {
+                let length = |name| fs::metadata(folder.join(name)).map_or(0, |about| about.len());
+                files.iter().map(length).sum()
+            };
+            let there = bytes(path, &Stamp::of(path).unwrap_or_default().files);
+            let new = bytes(&self.path, &stamp.files);
+            if new < there {
+                return Err(Differs::less(path, there, new).into());
+            }
         } else if !Folder::is_free(path) {
             return Err(Differs::new(path).into());
         }

@@ -23,9 +23,9 @@ pub use identity::FileId;
 pub use inputs::Inputs;
 pub use kind::{Kind, Origin};
 pub use output::Output;
-pub use part::{InPlacePart, PART, is_part, lock_in_place, make_in_place};
+pub use part::{InPlacePart, is_part, lock_in_place, make_in_place};
 pub use paths::{
-    appended, cannot_write, inside, is_seekable, make_directory, make_parent, remove_if_empty,
+    PART, appended, cannot_write, inside, is_seekable, make_directory, make_parent, remove_if_empty,
     says_directory, settle,
 };
 

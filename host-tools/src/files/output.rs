@@ -9,8 +9,8 @@ use anyhow::{Context as _, Result, bail};
 use super::identity::without_links;
 use super::inputs::Inputs;
 use super::kind::{Found, Kind, Origin};
-use super::part::{lock, part_of, remove_stale, rename_new, sync_folder_of};
-use super::paths::{cannot_write, settle};
+use super::part::{lock, remove_stale, rename_new, sync_folder_of};
+use super::paths::{begun_of, cannot_write, part_of, settle};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
 
@@ -48,6 +48,8 @@ struct Part {
     permissions: Option<Permissions>,
     /// It may replace a file that is its own beginning: nothing of that is lost.
     replaces_beginning: bool,
+    /// It replaces no file that is longer.
+    keeps_longer: bool,
     /// An earlier run may have begun it: it stays when it is dropped.
     resumed: bool,
 }
@@ -99,10 +101,11 @@ impl Output {
             }
         }
         let part = Part {
-            path: part_of(&target)?,
+            path: begun_of(&target)?,
             target,
             permissions: None,
             replaces_beginning: true,
+            keeps_longer: false,
             resumed: true,
         };
         if part.path.is_symlink() {
@@ -215,9 +218,12 @@ impl Part {
     fn of(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Place> {
         inputs.refuse(path)?;
         let target = without_links(path).with_context(|| cannot_write(path))?;
+        // A table beside a file is shorter where that has become whole.
+        let keeps_longer = !matches!(kind.origin, Origin::Ours);
         let part = |target: PathBuf, permissions, replaces_beginning| -> Result<Place> {
             let path = part_of(&target)?;
-            Ok(Place::Free(Self { path, target, permissions, replaces_beginning, resumed: false }))
+            let resumed = false;
+            Ok(Place::Free(Self { path, target, permissions, replaces_beginning, keeps_longer, resumed }))
         };
         let about = match fs::metadata(path) {
             Ok(about) => about,
@@ -245,6 +251,11 @@ impl Part {
     /// Gives it its name.
     fn place(&self, file: &File) -> io::Result<()> {
         if let Some(permissions) = &self.permissions {
+            let there = fs::metadata(&self.target).map_or(0, |about| about.len());
+            let new = file.metadata()?.len();
+            if self.keeps_longer && new < there {
+                return Err(io::Error::other(Differs::less(&self.target, there, new)));
+            }
             file.set_permissions(permissions.clone())?;
             return fs::rename(&self.path, &self.target);
         }

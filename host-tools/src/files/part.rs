@@ -9,25 +9,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 
 use super::identity::without_links;
-use super::paths::cannot_write;
-
-/// How the name of a file ends that is not whole yet.
-pub const PART: &str = ".hums-part";
+use super::paths::{PART, cannot_write, part_of};
 
 /// Whether a name is that of a file or a folder that is not whole: readers pass it over.
 pub fn is_part(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(PART))
-}
-
-/// The part of a target.
-pub(super) fn part_of(target: &Path) -> Result<PathBuf> {
-    let Some(name) = target.file_name() else {
-        bail!("{}: is no name of a file", target.display());
-    };
-    let mut part = std::ffi::OsString::from(".");
-    part.push(name);
-    part.push(PART);
-    Ok(target.with_file_name(part))
 }
 
 /// Takes the lock, which its owner keeps for as long as the file is open; whoever writes already is told of.

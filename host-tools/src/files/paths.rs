@@ -6,6 +6,29 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
+/// How the name of a file or a folder ends that is not whole yet.
+pub const PART: &str = ".hums-part";
+
+/// The part of a target, beside it.
+pub(super) fn part_of(target: &Path) -> Result<PathBuf> {
+    beside(target, PART)
+}
+
+/// What `hums pull` has begun of a target, beside it: to be gone on with, so no other command takes it for its own.
+pub(super) fn begun_of(target: &Path) -> Result<PathBuf> {
+    beside(target, &format!(".pull{PART}"))
+}
+
+fn beside(target: &Path, ending: &str) -> Result<PathBuf> {
+    let Some(name) = target.file_name() else {
+        bail!("{}: is no name of a file", target.display());
+    };
+    let mut part = std::ffi::OsString::from(".");
+    part.push(name);
+    part.push(ending);
+    Ok(target.with_file_name(part))
+}
+
 /// Makes a directory, unless it is there.
 pub fn make_directory(dir: &Path) -> Result<()> {
     if dir.is_file() {
@@ -30,7 +53,9 @@ pub fn make_parent(path: &Path) -> Result<()> {
 
 /// Says that a file cannot be written, and names its folder where that is missing.
 pub fn cannot_write(path: &Path) -> String {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+    // A folder that is being made is there under the name of its part.
+    let is_there = |folder: &Path| folder.exists() || part_of(folder).is_ok_and(|part| part.exists());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !is_there(folder));
     let why = folder.map_or_else(String::new, |folder| format!("; there is no folder {}", folder.display()));
     format!("{}: cannot be written{why}", path.display())
 }

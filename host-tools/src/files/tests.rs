@@ -138,7 +138,7 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
     output.write_all(b"another, and longer").expect("written");
     output.finish().expect_err("what is there is no beginning of it");
     drop(output);
-    assert_eq!(names(dir.path()), [".log.hums-part", "log", "old"]);
+    assert_eq!(names(dir.path()), [".log.pull.hums-part", "log", "old"]);
     assert_eq!(fs::read(&path).expect("there"), b"onetwothree");
 }
 

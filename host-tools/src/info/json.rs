@@ -18,6 +18,8 @@ pub struct ImageJson {
     damage: Vec<String>,
     lost_clusters: u64,
     found_by_scan: bool,
+    /// What was not looked at; `null` where every block was.
+    not_looked_at: Option<String>,
 }
 
 /// The images of a run as JSON.
@@ -27,6 +29,7 @@ pub fn images_json(images: &[logs::find::Image]) -> Vec<ImageJson> {
         damage: image.damage.clone(),
         lost_clusters: image.lost_clusters,
         found_by_scan: image.scanned,
+        not_looked_at: image.not_looked_at(),
     };
     images.iter().map(json).collect()
 }
@@ -58,7 +61,10 @@ pub struct LogJson {
     /// Frames of ids beyond those that are listed, none of which has a definition here.
     frames_of_other_messages: u64,
     gaps_count: u64,
+    /// As far as they were counted.
     frames_missing: u64,
+    /// Gaps of which nothing tells how many frames are missing in them.
+    gaps_uncounted: u64,
     gaps: Vec<GapJson>,
     losses: Vec<LossJson>,
     /// Who checked the vehicle's health: `board`; `hums` (this program, when it read the log); `nobody`.
@@ -253,6 +259,7 @@ impl LogJson {
             frames_of_other_messages: contents.other_messages.frames,
             gaps_count: summary.gaps + summary.losses,
             frames_missing: summary.frames_missing,
+            gaps_uncounted: summary.gaps_uncounted,
             gaps: gaps(contents),
             losses: losses(contents),
             checked_by: contents.checked_by(),

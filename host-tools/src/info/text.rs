@@ -31,7 +31,7 @@ pub fn image_text(image: &logs::find::Image) -> String {
     if image.scanned {
         text.push_str("\n  the logs were found by looking at every block");
     }
-    if let Some(words) = image.lost_words() {
+    for words in image.lost_words().into_iter().chain(image.not_looked_at()) {
         let _ = write!(text, "\n  {words}");
     }
     text
@@ -104,6 +104,9 @@ fn ending(text: &mut String, log: &Overview) {
     }
     if ending.has_newer() {
         text.push_str("           some of them are of a session that began later: two logs are mixed here\n");
+    }
+    if let Some(gone) = ending.before.gone() {
+        let _ = writeln!(text, "  before   {gone}");
     }
     for strange in ending.strange() {
         let _ = writeln!(text, "  files    {strange}");
@@ -201,13 +204,12 @@ fn gaps_text(text: &mut String, log: &Overview) {
             summary.losses
         );
     } else {
-        let (missing, damaged) = (summary.frames_missing, summary.blocks.damaged);
         let _ = writeln!(
             text,
             "  gaps     {}, {} missing, {}",
             summary.gaps,
-            count(missing, "frame"),
-            count(damaged, "damaged sector")
+            summary.missing_words(),
+            count(summary.blocks.damaged, "damaged sector")
         );
     }
     for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {

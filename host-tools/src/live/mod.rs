@@ -151,6 +151,15 @@ fn database(args: &cli::Live) -> Result<Option<(Influx, Waiting)>> {
             path.display()
         );
     }
+    if spool.is_over_limit() {
+        note!(
+            "{}: has {}, which is more than --spool-limit {} (MiB): nothing is added before that is written, and what \
+             comes meanwhile is lost and counted (a recording waits)",
+            path.display(),
+            count(spool.bytes(), "byte"),
+            args.spool_limit
+        );
+    }
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     // As good as unique among the sessions of one vehicle, and in their order.
     let session = format!("s{:08x}", now.as_secs() as u32);
@@ -190,10 +199,15 @@ fn finish(influx: Influx, spool: &Waiting) -> Outcome {
             eprintln!("  {unsaved} waited in memory only, and are lost");
         }
     }
+    if !figures.left_out.is_empty() {
+        note!("{}; the rest is not in the database: write the recording again", figures.left_out);
+    }
     if !figures.disk.is_empty() {
         eprintln!("{}: {}", spool.path.display(), figures.disk);
     }
-    Outcome::lossy(missing > 0 || spool.is_damaged || !figures.disk.is_empty())
+    Outcome::lossy(
+        missing > 0 || spool.is_damaged || !figures.disk.is_empty() || !figures.left_out.is_empty(),
+    )
 }
 
 fn listen(text: &str) -> Result<(TcpListener, SocketAddr)> {

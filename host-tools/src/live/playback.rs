@@ -136,6 +136,8 @@ pub struct Player {
     source: SourceJson,
     epoch_us: Option<u64>,
     influx: Option<Influx>,
+    /// How much of the recording was read, 0 to 1, where the user ended the reading.
+    read_to: Option<f64>,
     rate: Rate,
     /// Counts how often the time went back.
     epoch: u64,
@@ -159,7 +161,8 @@ impl Player {
             ..SourceJson::default()
         };
         let (rate, timeline) = (Rate::default(), Arc::default());
-        Self { hub, commands, limits, source, epoch_us: None, influx, rate, epoch: 0, timeline }
+        let (epoch_us, read_to) = (None, None);
+        Self { hub, commands, limits, source, epoch_us, influx, read_to, rate, epoch: 0, timeline }
     }
 
     /// Runs until Ctrl-C; gives what is still to be written. A recording that cannot be read is told on the page too.
@@ -167,6 +170,7 @@ impl Player {
         let mut loaded =
             self.load(&mut opened).with_context(|| format!("{}: cannot be read", self.source.name))?;
         drop(opened);
+        self.read_to = interrupt::requested().then_some(self.source.progress);
         self.write(&mut loaded)?;
         self.play(&mut loaded)?;
         Ok(self.influx)
@@ -183,6 +187,7 @@ impl Player {
         // `Ctrl-C` ends a long reading too.
         recording::each(opened, &mut |at, epoch, progress, heard| -> io::Result<bool> {
             *epoch_us = epoch.or(*epoch_us);
+            source.progress = progress;
             if start.is_none() {
                 start = Some(at);
                 world.begin(at);
@@ -224,7 +229,6 @@ impl Player {
             end = end.max(at);
             if frames.is_multiple_of(LOOK_EVERY) && shown.elapsed() >= PUBLISH {
                 shown = Wall::now();
-                source.progress = progress;
                 let around = Around { source, epoch_us: None, frames_s: 0.0, influx: None };
                 hub.publish(Published {
                     head: show::head(&World::new(Limits::default()), Instant::ZERO, &around),
@@ -253,7 +257,7 @@ impl Player {
         let epoch_us = self.epoch_us.unwrap_or(0);
         let mut world = World::new(self.limits.clone());
         world.begin(loaded.start);
-        let end = loaded.end;
+        let (end, mut given_to) = (loaded.end, loaded.start);
         loaded.follow(&mut world, end, &mut |at, frame, world| {
             if let Some(frame) = frame {
                 influx.frame(at, epoch_us, frame, world);
@@ -261,8 +265,19 @@ impl Player {
             influx.found(epoch_us, world);
             influx.usage(at, epoch_us, world);
             world.found.clear();
+            given_to = at;
             !interrupt::requested()
         })?;
+        let name = &self.source.name;
+        if let Some(part) = self.read_to {
+            let percent = part * 100.0;
+            influx.leave_out(format!("{name}: {percent:.0} % of it were read when it was ended"));
+        } else if given_to < end {
+            let [given, end] = [given_to, end].map(Instant::as_secs_f64);
+            influx.leave_out(format!(
+                "{name}: its points go to {given:.1} s of {end:.1} s, where it was ended"
+            ));
+        }
         loaded.seek(0, 0)
     }
 

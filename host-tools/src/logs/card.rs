@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::Header;
-use hums_recorder::layout::Layout;
+use hums_recorder::layout::{Layout, LayoutError};
 
-use super::fat::{CardFile, Extent, Volume};
+use super::fat::{CardFile, Extent, ReadAt as _, Volume};
 use super::found::{Found, Image, belong};
-use super::places::{Log, Piece};
+use super::places::{BLOCK_BYTES, Log, Piece};
 use super::scan::{Scan, scan};
 use crate::card::{ReadOnlyImage, length};
 
@@ -44,8 +45,9 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
     let context = || format!("{}: cannot be read", path.display());
     let file = File::open(path).with_context(context)?;
     let device = ReadOnlyImage::new(file.try_clone().with_context(context)?).with_context(context)?;
-    let mut about = Image { path: path.to_owned(), damage: Vec::new(), lost_clusters: 0, scanned: false };
+    let mut about = Image { path: path.to_owned(), ..Image::default() };
     let (before, more) = (found.logs.len(), found.logs_more);
+    let mut renamed: Vec<String> = Vec::new();
     match Layout::read(&device) {
         Ok(layout) => {
             let walk = Volume::new(&file, layout).and_then(Volume::walk).with_context(context)?;
@@ -58,7 +60,7 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
                 ));
             }
             // Older logs are deleted to make room; the newest one is what a card is read for.
-            let newest = walk.files.iter().map(|file| file.name.session).max();
+            let newest = walk.files.iter().filter_map(|file| Some(file.name?.session)).max();
             if let (Some(newest), Some((deleted, place))) = (newest, walk.deleted)
                 && deleted.session > newest % 10_000
                 && has_sector(path, vec![place])?
@@ -68,9 +70,15 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
                     newest / 10_000 * 10_000 + deleted.session
                 ));
             }
+            about.deleted_logs = walk.deleted_logs;
+            renamed
+                .extend(walk.files.iter().filter(|file| file.name.is_none()).map(|file| file.path.clone()));
             found.add(sessions_of(path, &walk.files));
         }
-        Err(error) => about.damage.push(error.to_string()),
+        Err(error) => {
+            let cut = cut_short(&file, &device).with_context(context)?;
+            about.damage.push(cut.unwrap_or_else(|| error.to_string()));
+        }
     }
     let knows_none = about.damage.is_empty() && found.logs.len() == before;
     // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead.
@@ -90,14 +98,37 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
                 about.damage.join("; ")
             );
         }
+        about.searched = true;
         about.scanned = !logs.is_empty();
         if about.scanned && knows_none {
             about.damage.push("its file system knows of no log, and sectors of logs are there".to_owned());
         }
         found.add(logs);
+    } else {
+        for name in renamed {
+            found.remark(format!(
+                "{}: {name} begins as a log and has not the name of a segment: it is read as a log of its own",
+                path.display()
+            ));
+        }
     }
     found.images.push(about);
     Ok(())
+}
+
+/// Says of an image that ends before its first partition does that it is cut short. Its volume is then not what is wrong.
+fn cut_short(file: &File, device: &ReadOnlyImage) -> io::Result<Option<String>> {
+    let mut entry = [0; BLOCK_BYTES];
+    let has = length(file)?;
+    // The partition table's first entry: type, first block and blocks, behind the code.
+    file.read_at(0, &mut entry)?;
+    let word = |at: usize| entry.get(at..at + 4).and_then(|word| word.first_chunk().copied());
+    let [start, blocks] = [446 + 8, 446 + 12].map(|at| word(at).map_or(0, u32::from_le_bytes));
+    let wanted = (u64::from(start) + u64::from(blocks)) * BLOCK_BYTES as u64;
+    let is_volume = matches!(Layout::read(device), Err(LayoutError::BadVolume(_)));
+    Ok((is_volume && blocks > 0 && has < wanted).then(|| {
+        format!("the image is cut short: it has {has} bytes, and its partition ends at byte {wanted}")
+    }))
 }
 
 /// Whether there is a sector of a log here.
@@ -117,17 +148,22 @@ fn has_sector(path: &Path, extents: Vec<Extent>) -> Result<bool> {
     Ok(false)
 }
 
+/// The segments of each session together, and each file of another name by itself.
 fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     let mut sessions: BTreeMap<u32, Vec<&CardFile>> = BTreeMap::new();
-    for file in files {
-        sessions.entry(file.name.session).or_default().push(file);
+    for (name, file) in files.iter().filter_map(|file| Some((file.name?, file))) {
+        sessions.entry(name.session).or_default().push(file);
     }
-    let log = |(session, mut segments): (u32, Vec<&CardFile>)| {
-        segments.sort_by_key(|file| file.name);
+    let log = |name: String, segments: &[&CardFile]| {
         let files = segments.iter().map(|file| file.path.clone()).collect();
         let piece = |file: &&CardFile| Piece { path: path.to_owned(), extents: file.extents.clone() };
-        let pieces = segments.iter().map(piece).collect();
-        Log { name: format!("{session:05}"), files, pieces, session: None }
+        Log { name, files, pieces: segments.iter().map(piece).collect(), session: None }
     };
-    sessions.into_iter().map(log).collect()
+    let session = |(session, mut segments): (u32, Vec<&CardFile>)| {
+        segments.sort_by_key(|file| file.name);
+        log(format!("{session:05}"), &segments)
+    };
+    let renamed = files.iter().filter(|file| file.name.is_none());
+    let renamed = renamed.map(|file| log(file.path.replace(['/', '.'], "_"), &[file]));
+    sessions.into_iter().map(session).chain(renamed).collect()
 }

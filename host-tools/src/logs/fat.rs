@@ -12,6 +12,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
+use hums_blackbox::Header;
 use hums_recorder::LogName;
 use hums_recorder::layout::Layout;
 
@@ -50,13 +51,14 @@ pub struct Extent {
     pub length: u64,
 }
 
-/// A segment of a log on the card.
+/// A file of a log on the card: a segment, or a file that was given another name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CardFile {
     /// Its directories and its short name, for instance `LOGS/00042_07.HUM`.
     pub path: String,
-    /// Which segment of which session its name says it is.
-    pub name: LogName,
+    /// Which segment of which session its name says it is. `None` where it is not the name of a segment, and the file's
+    /// first block is a sector of a log.
+    pub name: Option<LogName>,
     /// The size that the directory says, in bytes.
     pub size: u64,
     /// Where it lies; less than `size` where its chain is damaged.
@@ -66,7 +68,8 @@ pub struct CardFile {
 /// What a walk over the volume found.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
-    /// The logs' segments, in directory order, up to `FILES_MAX`. Other files are only checked.
+    /// The logs' segments and other files that begin with a sector of a log, in directory order, up to `FILES_MAX`. The rest
+    /// is only checked.
     pub files: Vec<CardFile>,
     /// What does not hold, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub damage: Vec<String>,
@@ -77,6 +80,8 @@ pub struct Walk {
     /// The deleted segment with the highest name whose first cluster is free, and where that cluster lies. A deleted entry
     /// has lost its name's first digit, which is taken for 0.
     pub deleted: Option<(LogName, Extent)>,
+    /// Deleted segments whose first cluster is free and begins with a sector of a log.
+    pub deleted_logs: u64,
 }
 
 /// Something that blocks can be read from at any place: an image file, a raw device, memory.
@@ -274,15 +279,31 @@ impl<'a, I: ReadAt> Volume<'a, I> {
     /// The entry of a file that was deleted.
     fn deleted(&mut self, child: &Child) -> io::Result<()> {
         let Some(name) = child.segment().filter(|_| self.is_cluster(child.first)) else { return Ok(()) };
-        if self.walk.deleted.is_none_or(|(newest, _)| newest < name) && self.entry(child.first)? == 0 {
+        if self.entry(child.first)? != 0 {
+            return Ok(());
+        }
+        self.walk.deleted_logs += u64::from(self.begins_as_log(child)?);
+        if self.walk.deleted.is_none_or(|(newest, _)| newest < name) {
             let place = Extent { start: self.place(child.first), length: self.cluster_bytes() };
             self.walk.deleted = Some((name, place));
         }
         Ok(())
     }
 
+    /// Whether a file begins with a sector of a log.
+    fn begins_as_log(&self, child: &Child) -> io::Result<bool> {
+        let mut block = [0; BLOCK as usize];
+        if child.is_directory || u64::from(child.size) < BLOCK || !self.is_cluster(child.first) {
+            return Ok(false);
+        }
+        self.image.read_at(self.place(child.first), &mut block)?;
+        Ok(Header::read(&block).is_ok())
+    }
+
     fn child(&mut self, child: &Child, path: &str, depth: usize) -> io::Result<()> {
-        let name = Name::Child(path, child);
+        let segment = child.segment();
+        let is_kept = segment.is_some() || self.begins_as_log(child)?;
+        let name = Name::Child { path, child, is_kept };
         if child.is_directory {
             if depth >= DEPTH_MAX {
                 self.damaged(format!("{name}: directories deeper than {DEPTH_MAX} are not read"));
@@ -299,7 +320,9 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         if missing > 0 {
             self.damaged(format!("{name}: the last {missing} of its {size} bytes have no cluster"));
         }
-        let Some(segment) = child.segment() else { return Ok(()) };
+        if !is_kept {
+            return Ok(());
+        }
         if self.walk.files.len() >= FILES_MAX {
             self.files_more += 1;
             return Ok(());
@@ -350,15 +373,15 @@ struct Chain {
 /// What a chain is of. Its name is only put together where it is told.
 enum Name<'a> {
     Directory(&'a str),
-    Child(&'a str, &'a Child),
+    Child { path: &'a str, child: &'a Child, is_kept: bool },
 }
 
 impl Name<'_> {
-    /// Whether its extents are needed: those of directories and of segments.
+    /// Whether its extents are needed: those of directories and of logs.
     fn is_kept(&self) -> bool {
         match self {
             Self::Directory(_) => true,
-            Self::Child(_, child) => child.segment().is_some(),
+            Self::Child { is_kept, .. } => *is_kept,
         }
     }
 }
@@ -368,8 +391,8 @@ impl fmt::Display for Name<'_> {
         match self {
             Self::Directory("") => f.write_str("the root directory"),
             Self::Directory(path) => f.write_str(path),
-            Self::Child("", child) => f.write_str(&child.name()),
-            Self::Child(path, child) => write!(f, "{path}/{}", child.name()),
+            Self::Child { path: "", child, .. } => f.write_str(&child.name()),
+            Self::Child { path, child, .. } => write!(f, "{path}/{}", child.name()),
         }
     }
 }

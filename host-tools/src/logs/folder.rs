@@ -171,8 +171,8 @@ fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
-/// `00042_07.HUM` in any case of letters.
-fn segment_name(path: &Path) -> Option<LogName> {
+/// The segment that a file's name says it is: `00042_07.HUM` in any case of letters.
+pub fn segment_name(path: &Path) -> Option<LogName> {
     let name = path.file_name()?.to_str()?.to_ascii_uppercase();
     let (base, extension) = name.split_once('.')?;
     LogName::from_short(base.as_bytes(), extension.as_bytes())

@@ -94,7 +94,7 @@ impl Found {
 }
 
 /// A card image's file system.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Image {
     /// The file.
     pub path: PathBuf,
@@ -104,6 +104,10 @@ pub struct Image {
     pub lost_clusters: u64,
     /// The logs were found by looking at every block, because the file system could not tell.
     pub scanned: bool,
+    /// Every block was looked at.
+    pub searched: bool,
+    /// Deleted segments whose sectors may still be there.
+    pub deleted_logs: u64,
 }
 
 impl Image {
@@ -113,6 +117,16 @@ impl Image {
         let what = if self.damage.is_empty() && !self.scanned { " (lost space, no data)" } else { "" };
         let number = Some(self.lost_clusters).filter(|number| *number > 0)?;
         Some(format!("{}{what}", belong(number)))
+    }
+
+    /// What was not looked at, where not every block was.
+    pub fn not_looked_at(&self) -> Option<String> {
+        let deleted = match self.deleted_logs {
+            0 => String::new(),
+            number => format!(", among them those of {}", count(number, "deleted segment")),
+        };
+        let words = "sectors that no file names were not looked at";
+        (!self.searched).then(|| format!("{words}{deleted}: --salvage does"))
     }
 }
 

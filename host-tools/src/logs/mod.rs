@@ -21,7 +21,7 @@ pub mod strangers;
 
 pub use card::{is_card, on_card};
 pub use find::{Content, Found, find};
-pub use folder::passed_over;
+pub use folder::{passed_over, segment_name};
 pub use places::{Log, Piece};
 
 impl Found {

@@ -18,6 +18,7 @@ use super::in_order::{in_order, workers};
 pub use super::marks::Marks;
 use super::places::Log;
 use super::strangers::Strange;
+use crate::plural::count;
 
 /// Groups in work for each worker, and at most.
 const GROUPS_PER_WORKER: usize = 2;
@@ -68,6 +69,8 @@ pub struct Summary {
     pub losses: u64,
     /// Frames that are known to be missing.
     pub frames_missing: u64,
+    /// Gaps of which nothing tells how many frames are missing in them.
+    pub gaps_uncounted: u64,
     /// Gaps that are none: what a disarmed vehicle sent was not kept, on purpose.
     pub not_kept: u64,
     /// Groups whose first entry came before the last one of the group before.
@@ -92,6 +95,17 @@ pub struct Summary {
     pub other_epoch_us: Option<u64>,
     /// What of its files is not the log's.
     pub strange: Vec<Strange>,
+}
+
+impl Summary {
+    /// How many frames are missing, as far as that is known: the beginning of a phrase that goes on with `missing`.
+    pub fn missing_words(&self) -> String {
+        match (self.gaps_uncounted, self.frames_missing) {
+            (0, number) => count(number, "frame"),
+            (_, 0) => "an unknown number of frames".to_owned(),
+            (_, number) => format!("{} and an unknown number more", count(number, "frame")),
+        }
+    }
 }
 
 /// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
@@ -368,6 +382,7 @@ impl Stitch {
         } else {
             self.summary.gaps += 1;
             self.summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
+            self.summary.gaps_uncounted += u64::from(gap.frames.is_none());
         }
         deliver.gap(&gap)
     }

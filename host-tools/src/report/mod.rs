@@ -29,6 +29,7 @@ use crate::decode::naming::{Traits, without_made};
 use crate::decode::side_by_side::side_by_side;
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{Followed, HELD_MAX};
+use crate::logs::{Log, segment_name};
 use crate::made;
 use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
@@ -62,21 +63,23 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     let mut done = |overview: Overview| {
         let (index, this) = (earlier.len(), trend::Session::of(&overview));
         if let Some(place) = found.places.get(index).filter(|_| wanted.sessions.contains(&index)) {
-            // A card's sessions are one box's; what lies in a folder beside a recording may be anybody's.
-            let before = if place.own().is_some() { &earlier[..] } else { &[] };
+            let on_card =
+                earlier.iter().zip(&found.places).filter(|(_, other)| are_of_one_card(place, other));
+            let before: Vec<trend::Session> = on_card.map(|(session, _)| session.clone()).collect();
             let traits = Traits::of(place)?;
             let (path, of) = (wanted.path(place, &traits), traits.identity(place));
             let replay = replay::Replay::of(place)?;
-            let html = page::html(&overview, &replay, &trend::of(&this, before), of.as_deref())?;
+            let html = page::html(&overview, &replay, &trend::of(&this, &before), of.as_deref())?;
             if kept.pass(write(&path, &html, &inputs, of.as_deref()))?.is_some() {
                 let bytes = count(html.len() as u64, "byte");
                 output::line(&format!("{}: session {}, {bytes}", shown(&path), word(&place.name)))?;
             }
-            for why in overview.unproved() {
-                note!("{}: {why}", place.name);
-            }
-            outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
         }
+        // Also of the sessions before, which the page compares with, and of those that were read for its end.
+        for why in overview.unproved() {
+            note!("{}: {why}", overview.ending.name);
+        }
+        outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
         earlier.push(this);
         Ok(())
     };
@@ -92,6 +95,18 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     }
     kept.end()?;
     Ok(outcome)
+}
+
+/// Whether two sessions are of one card: in one image, or segments in one folder. Then one box recorded them. What lies
+/// beside a recording or a packed log may be anybody's.
+fn are_of_one_card(one: &Place, other: &Place) -> bool {
+    let Some((one, other)) = one.own().zip(other.own()) else { return false };
+    let image = |log: &Log| log.pieces.first().map(|piece| piece.path.clone());
+    let folder = |log: &Log| {
+        let first = log.pieces.first().map(|piece| piece.path.as_path());
+        first.filter(|path| segment_name(path).is_some()).and_then(Path::parent).map(Path::to_owned)
+    };
+    image(one) == image(other) || folder(one).is_some() && folder(one) == folder(other)
 }
 
 fn write(path: &Path, html: &str, inputs: &Inputs, of: Option<&str>) -> Result<()> {

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use super::support::{flight, frames_of, json, recorded, run, text};
+use super::support::{flight, frames_of, json, px4, recorded, run, text};
 
 /// Checks that tell of the place on a link, which a recording of another place cannot.
 const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
@@ -99,7 +99,9 @@ fn damage_is_said_with_its_place_and_wins_over_findings() {
     assert_eq!((checked["verdict"].as_str(), checked["damaged"].as_bool()), (Some("critical"), Some(true)));
     let place = checked["gaps"][0]["place"].as_u64().expect("a place");
     assert!((999_600..1_000_200).contains(&place), "{place}");
-    assert!(text(&run(dir.path(), "check hit.tlog", 3)).contains("damaged"));
+    let screen = text(&run(dir.path(), "check hit.tlog", 3));
+    let verdict = screen.lines().find(|line| line.contains("  verdict  ")).unwrap_or_default();
+    assert!(verdict.ends_with("; part of the log is missing or damaged, and was not judged"), "{screen}");
 
     // A log whose recorder lost its power ends within a message: that is told as what it is.
     fs::write(dir.path().join("cut.tlog"), &bytes[..999_001]).expect("written");
@@ -107,10 +109,40 @@ fn damage_is_said_with_its_place_and_wins_over_findings() {
     let both = text(&run(dir.path(), "check hit.tlog cut.tlog", 3));
     let line = |name: &str| both.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();
     assert!(
-        line("hit.tlog").ends_with("; damaged") && line("cut.tlog").ends_with("cut at its end"),
+        line("hit.tlog").ends_with("; part of it is missing or damaged")
+            && line("cut.tlog").ends_with("cut at its end"),
         "{both}"
     );
-    assert!(both.contains("1  damaged (") && both.contains("1  cut at their end ("), "{both}");
+    assert!(
+        both.contains("1  with parts missing or damaged (") && both.contains("1  cut at their end ("),
+        "{both}"
+    );
+}
+
+#[test]
+fn a_log_whose_middle_is_gone_is_not_called_all_right_anywhere() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let log = fs::read(dir.path().join("log.hum")).expect("a log");
+    let from = log.len() / 1024 * 512;
+    let missing = [&log[..from - 20 * 512], &log[from..]].concat();
+    fs::write(dir.path().join("log.hum"), missing).expect("written");
+    let words = "; part of the log is missing or damaged, and was not judged";
+    let screen = text(&run(dir.path(), "check log.hum", 3));
+    assert!(screen.contains(words), "{screen}");
+    fs::copy(px4(), dir.path().join("calm.tlog")).expect("a copy");
+    let table = text(&run(dir.path(), "check log.hum calm.tlog", 3));
+    let line = |name: &str| table.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();
+    assert!(line("log.hum").starts_with("damaged ") && line("calm.tlog").starts_with("ok "), "{table}");
+    assert!(line("log.hum").ends_with("part of it is missing or damaged"), "{table}");
+    // Where nobody knows how many frames are missing, nothing says that none is.
+    fs::write(dir.path().join("log.hum"), [&log[..512], &log[from..]].concat()).expect("written");
+    for command in ["check", "info", "verify", "decode -o out --format tlog"] {
+        let ended = run(dir.path(), &format!("{command} log.hum"), 3);
+        let said = [ended.stdout, ended.stderr].concat();
+        let said = String::from_utf8_lossy(&said);
+        assert!(!said.contains("0 frames missing"), "{command}: {said}");
+    }
 }
 
 #[test]
@@ -381,14 +413,19 @@ fn a_log_in_which_there_was_nothing_to_judge_does_not_look_good_to_a_script() {
     fs::write(dir.path().join("little.bin"), dataflash(&little)).expect("written");
     let tracker = [definition, message(1, "AntennaTracker V4.5.0"), message(5, "x")];
     fs::write(dir.path().join("nobody.bin"), dataflash(&tracker)).expect("written");
-    for (name, verdict, words) in [
-        ("little.bin", "too_little", "too little in it to judge"),
-        ("nobody.bin", "unknown", "nothing can be said: no autopilot was heard"),
+    for (name, code, verdict, words) in [
+        ("little.bin", 0, "too_little", "not enough to judge: "),
+        ("nobody.bin", 3, "unknown", "nothing can be said: no autopilot was heard"),
     ] {
-        let checked = json(&run(dir.path(), &format!("check --json {name}"), 3));
+        let checked = json(&run(dir.path(), &format!("check --json {name}"), code));
         assert_eq!((checked["verdict"].as_str(), checked["damaged"].as_bool()), (Some(verdict), Some(false)));
-        assert!(text(&run(dir.path(), &format!("check {name}"), 3)).contains(words));
+        assert!(text(&run(dir.path(), &format!("check {name}"), code)).contains(words));
     }
+    // It neither hides what is wrong with another log nor counts as good.
+    faults(dir.path());
+    let table = text(&run(dir.path(), "check little.bin faults.tlog", 4));
+    assert!(table.contains("1  not enough in it to judge") && !table.contains("nothing wrong"), "{table}");
+    run(dir.path(), "check nobody.bin faults.tlog little.bin", 3);
 }
 
 /// A ULog in which a vehicle is heard for 20 s, and whose logger lost something.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tempfile::TempDir;
 
-use crate::support::{attempt, flight, px4, run};
+use crate::support::{attempt, flight, json, px4, run, text};
 
 const BLOCK: usize = 512;
 /// A segment of the cards here.
@@ -129,6 +129,27 @@ fn a_file_that_the_next_start_found_empty_is_no_loss() {
 }
 
 #[test]
+fn another_session_under_the_number_of_the_session_before_is_told_by_every_command() {
+    let dir = copied(3, "");
+    all_say(dir.path(), "copied", 0, &[]);
+    let at = |name: &str| dir.path().join("copied").join(name);
+    fs::rename(at("00001_00.HUM"), at("00002_00.HUM")).expect("renamed");
+    all_say(
+        dir.path(),
+        "copied",
+        3,
+        &["session 00002, which was recorded just before it, is not there under that number"],
+    );
+    let said = String::from_utf8_lossy(&run(dir.path(), "verify copied", 3).stdout).into_owned();
+    assert!(said.contains("FAILED  session before     1 checked, 1 failed"), "{said}");
+    // Without any log before it nothing tells that one should be there: that is said, and is no finding.
+    fs::remove_file(at("00002_00.HUM")).expect("removed");
+    let said = String::from_utf8_lossy(&run(dir.path(), "verify copied", 0).stdout).into_owned();
+    let words = "session before     0 checked, 0 failed; session 00002 is not among what was read";
+    assert!(said.contains(words), "{said}");
+}
+
+#[test]
 fn two_logs_in_one_file_are_told_by_every_command_in_both_orders() {
     let dir = tempfile::tempdir().expect("directory");
     let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"].map(|name| {
@@ -233,6 +254,55 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     fs::write(&path, &wiped).expect("written");
     all_say(dir.path(), "card.img", 3, &[]);
     assert_eq!(codes(), [3; 4]);
+}
+
+#[test]
+fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_called_absent() {
+    let dir = copied(3, "");
+    let path = dir.path().join("card.img");
+    let image = fs::read(&path).expect("an image");
+    let entry = |name: &[u8]| image.windows(11).position(|bytes| bytes == name).expect("an entry");
+    // The newest one was renamed on a PC.
+    let mut renamed = image.clone();
+    renamed[entry(b"00003_00HUM")..][..11].copy_from_slice(b"FLIGHT  BAK");
+    fs::write(&path, &renamed).expect("written");
+    all_say(dir.path(), "card.img", 0, &["FLIGHT.BAK begins as a log and has not the name of a segment"]);
+    assert!(text(&run(dir.path(), "verify card.img", 0)).contains("Session FLIGHT_BAK (FLIGHT.BAK)"));
+    // Another file has taken its entry, and its clusters are free.
+    let at = entry(b"00003_00HUM");
+    let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));
+    let partition = word(446 + 8) as usize * BLOCK;
+    let fat = partition + (word(partition + 14) & 0xffff) as usize * BLOCK;
+    let free = |image: &mut [u8], entry: usize| {
+        let mut next = (word(entry + 26) & 0xffff | word(entry + 20) << 16) as usize;
+        while next < 0x0fff_fff8 {
+            let following = word(fat + 4 * next) as usize & 0x0fff_ffff;
+            image[fat + 4 * next..fat + 4 * next + 4].fill(0);
+            next = following;
+        }
+    };
+    let mut taken = image.clone();
+    free(&mut taken, at);
+    taken[at..at + 11].copy_from_slice(b"NOTES   TXT");
+    taken[at + 20..at + 32].fill(0);
+    fs::write(&path, &taken).expect("written");
+    let words = "sectors that no file names were not looked at: --salvage does";
+    for (command, sessions) in [("info", "Session 0000"), ("verify", "Session 0000")] {
+        let said = text(&run(dir.path(), &format!("{command} card.img"), 0));
+        assert!(said.contains(words) && said.matches(sessions).count() == 2, "{command}: {said}");
+        let said = text(&run(dir.path(), &format!("{command} card.img --salvage"), 0));
+        assert!(!said.contains(words) && said.matches("Session session-").count() == 3, "{command}: {said}");
+    }
+    let told = json(&run(dir.path(), "info --json card.img", 0));
+    assert_eq!(told["images"][0]["not_looked_at"], words);
+    // The oldest one was deleted: that makes room, and is told.
+    let mut oldest = image.clone();
+    let at = entry(b"00001_00HUM");
+    free(&mut oldest, at);
+    oldest[at] = 0xe5;
+    fs::write(&path, &oldest).expect("written");
+    let said = text(&run(dir.path(), "info card.img", 0));
+    assert!(said.contains("not looked at, among them those of 1 deleted segment: --salvage does"), "{said}");
 }
 
 #[test]

@@ -94,18 +94,37 @@ fn what_is_there_is_not_replaced_by_other_content_unless_the_user_says_so() {
                 kept(&format!("decode cut/log.hum -o out --format {format}"));
             }
         }
-        run(dir.path(), &line("cut", "--replace"), 3);
+        // Nor by less of the same session, whatever the user says.
+        for format in ["tlog", "jsonl", "influx", "csv", "thesis"] {
+            let line = if line("", "").starts_with("decode") {
+                format!("decode cut/log.hum -o out --format {format} --replace")
+            } else {
+                line("cut", "--replace")
+            };
+            let said = String::from_utf8_lossy(&run(dir.path(), &line, 1).stderr).into_owned();
+            let words = "does not make it less; name another output, or delete it by hand";
+            assert!(said.contains(words) || said.contains("may be an original"), "{line}: {said}");
+            assert!(contents(&out) == made, "{line} changed something");
+        }
+        // The whole takes the place of a part.
+        fs::remove_dir_all(&out).expect("removed");
+        run(dir.path(), &line("cut", ""), 3);
         assert_ne!(contents(&out), made);
         run(dir.path(), &line("whole", "--replace"), 0);
-        assert_eq!(contents(&out), made, "no table of the others is left");
+        assert!(contents(&out).iter().all(|file| made.contains(file)), "a table of the part is left");
     }
-    // Parquet tables of two parts of a session lie side by side.
-    run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 0);
-    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --message ATTITUDE", 1);
+    // Parquet tables of two parts of a session never lie side by side: a query reads all that is there.
     run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 3);
-    run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 0);
-    assert_eq!(parquet_sessions(&dir.path().join("fleet")).len(), 2);
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 1);
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --replace", 0);
+    let made = contents(&dir.path().join("fleet"));
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --message ATTITUDE", 1);
+    run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 1);
+    run(dir.path(), "decode cut/log.hum -o fleet --format parquet --replace", 1);
+    assert!(contents(&dir.path().join("fleet")) == made);
+    assert_eq!(parquet_sessions(&dir.path().join("fleet")).len(), 1);
     // A table of the user's own stays, and so does the folder that it is in.
+    run(dir.path(), "decode whole/log.hum -o out --format csv", 0);
     let tables = out.join(named(&out, "log"));
     fs::write(tables.join("mine.csv"), "mine").expect("written");
     let before = contents(&out);
@@ -192,6 +211,11 @@ fn what_was_made_of_the_same_log_is_replaced_and_what_was_made_of_another_one_is
         );
         assert!(fs::read(dir.path().join("out")).expect("there") == made, "{line}");
     }
+    // The beginning of the recording has the same session, and takes no place of the whole.
+    let made = fs::read(dir.path().join("log.hum")).expect("there");
+    let said = run(dir.path(), "pack few.tlog -o log.hum --replace", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("does not make it less"));
+    assert!(fs::read(dir.path().join("log.hum")).expect("there") == made);
     // Of raw bytes nothing tells of which recording a log was packed.
     fs::write(dir.path().join("one.raw"), frames_of(&px4())[..400].concat()).expect("written");
     fs::write(dir.path().join("two.raw"), frames_of(&px4())[400..900].concat()).expect("written");

@@ -17,6 +17,8 @@ pub struct Figures {
     pub rejected: u64,
     /// What it said of those last.
     pub refusal: String,
+    /// What of a recording no points were made of, because the user ended it; empty where there is nothing such.
+    pub left_out: String,
     /// They made room in a full file, or neither it nor memory took them.
     pub lost: u64,
     /// Why points did not go into the file at some time; empty where all did.

@@ -58,6 +58,7 @@ pub struct Influx {
     usage_at: Instant,
     queue: Arc<Queue>,
     writer: Option<JoinHandle<()>>,
+    left_out: String,
 }
 
 impl Influx {
@@ -79,6 +80,7 @@ impl Influx {
             usage_at: Instant::ZERO,
             queue,
             writer,
+            left_out: String::new(),
         })
     }
 
@@ -201,6 +203,11 @@ impl Influx {
         figures
     }
 
+    /// Says what of the recording no points were made of.
+    pub fn leave_out(&mut self, words: String) {
+        self.left_out = words;
+    }
+
     /// Gives away what is left and waits for the database, for a while, or until the user asks again to end; what became of
     /// all points.
     pub fn finish(mut self) -> Figures {
@@ -215,7 +222,7 @@ impl Influx {
         {
             std::thread::sleep(LOOK);
         }
-        self.queue.figures()
+        Figures { left_out: std::mem::take(&mut self.left_out), ..self.queue.figures() }
     }
 }
 

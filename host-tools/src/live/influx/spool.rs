@@ -199,7 +199,17 @@ impl Spool {
 
     /// Whether a batch fits without the loss of an older one.
     pub const fn has_room(&self, batch: &Batch) -> bool {
-        self.bytes() + (RECORD_BYTES + batch.text.len()) as u64 <= self.size
+        self.bytes() + (RECORD_BYTES + batch.text.len()) as u64 <= self.room()
+    }
+
+    /// How many bytes may wait in it: its ring is as large as an earlier program's limit until it is empty.
+    const fn room(&self) -> u64 {
+        if self.size < self.limit { self.size } else { self.limit }
+    }
+
+    /// Whether an earlier program has left more in it than the limit allows. Nothing is added before that has become less.
+    pub const fn is_over_limit(&self) -> bool {
+        self.bytes() > self.limit
     }
 
     /// The number of the oldest batch, by which it is told from all others that were ever there.
@@ -207,17 +217,21 @@ impl Spool {
         self.removed
     }
 
-    /// Adds a batch; where it does not fit, the oldest ones go. How many points went.
+    /// Adds a batch; where it does not fit, the oldest ones go. Where an earlier program has left more than the limit allows,
+    /// that stays and the batch goes. How many points went.
     pub fn put(&mut self, batch: &Batch) -> io::Result<u64> {
         let head = Head {
             length: batch.text.len(),
             points: u32::try_from(batch.points).map_err(|_| io::ErrorKind::InvalidInput)?,
         };
-        if head.bytes() > self.size || head.length > BATCH_BYTES_MAX {
+        if self.is_over_limit() {
+            return Ok(batch.points);
+        }
+        if head.bytes() > self.room() || head.length > BATCH_BYTES_MAX {
             return Err(io::Error::other("a batch is larger than the whole file may be"));
         }
         let mut lost = 0;
-        while self.bytes() + head.bytes() > self.size {
+        while self.bytes() + head.bytes() > self.room() {
             let before = self.points;
             self.drop_oldest()?;
             lost += before - self.points;
@@ -491,15 +505,29 @@ mod tests {
     }
 
     #[test]
-    fn another_limit_counts_once_it_is_empty() {
+    fn a_limit_below_what_is_found_lets_nothing_be_added_and_nothing_be_lost() {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("spool");
         let mut spool = open(&path, 10_000);
         (0..10).for_each(|number| assert_eq!(spool.put(&batch(number)).expect("room"), 0));
         drop(spool);
-        let mut spool = open(&path, 600);
-        assert_eq!(drain(&mut spool).len(), 10);
+        let mut spool = open(&path, 900);
+        let before = path.metadata().expect("a file").len();
+        assert!(spool.is_over_limit() && !spool.has_room(&batch(10)));
+        assert_eq!(spool.put(&batch(10)).expect("counted"), batch(10).points, "the new one goes");
+        assert_eq!(
+            (spool.points(), path.metadata().expect("a file").len()),
+            ((0..10).map(|n| batch(n).points).sum(), before)
+        );
+        // Below the limit it counts as any other.
+        for number in 0..9 {
+            assert_eq!(spool.oldest().expect("it reads"), Some(batch(number)));
+            spool.drop_oldest().expect("it is there");
+        }
+        assert!(!spool.is_over_limit() && spool.put(&batch(10)).expect("room") == 0);
+        assert!(spool.put(&batch(11)).expect("room") > 0 && spool.bytes() <= 900);
+        assert_eq!(drain(&mut spool).last(), Some(&batch(11)));
         spool.put(&batch(0)).expect("room");
-        assert!(spool.put(&batch(1)).expect("room") + spool.put(&batch(2)).expect("room") > 0);
+        assert!((1..4).map(|number| spool.put(&batch(number)).expect("room")).sum::<u64>() > 0);
     }
 }

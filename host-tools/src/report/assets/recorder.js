@@ -13,7 +13,7 @@ export const recorderSection = () => {
   const own = log.format === "hums";
   recorder.append(el("div", { class: "split" },
     el("div", { class: "panel" }, facts([
-      ["Frames", own ? `${whole(log.frames)} recorded, ${whole(log.frames_missing)} missing` : log.frames ? whole(log.frames) : null],
+      ["Frames", own ? `${whole(log.frames)} recorded, ${log.gaps_uncounted ? `at least ${whole(log.frames_missing + log.gaps_uncounted)}` : whole(log.frames_missing)} missing` : log.frames ? whole(log.frames) : null],
       ["Records", own ? whole(log.records) : null],
       ["Size", own ? `${bytes(log.log_bytes)}; as a tlog ${bytes(log.tlog_bytes)}: ${fixed(log.ratio, 2)} times smaller` : bytes(log.bytes_on_card)],
       ["Sectors", own ? `${whole(log.sectors)}, ${whole(log.sectors_damaged)} damaged` : null],

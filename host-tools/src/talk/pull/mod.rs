@@ -18,7 +18,7 @@ use self::ftp::Ftp;
 use super::Client;
 use crate::cli;
 use crate::files::{Output, make_directory, settle};
-use crate::logs;
+use crate::logs::{self, segment_name};
 use crate::outcome::Outcome;
 use crate::output::Stdout;
 use crate::plural::count;
@@ -188,20 +188,29 @@ fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result
     Ok(likeness != Likeness::Other)
 }
 
-/// Reads a log through, and says what is wrong with it.
+/// Reads a segment through, and says what is wrong with it. What is natural is not: behind its last sector a file has what
+/// it held before, a further segment does not begin with the session, and each of them alone proves no end.
 fn verify(name: &str, path: &Path) -> Result<Outcome> {
     let found = logs::find(&[path.to_owned()], false)?;
     let mut outcome = Outcome::Done;
     for log in &found.logs {
         let overview = Overview::verified(log)?;
-        let blocks = overview.ending.summary.blocks;
+        let (blocks, behind) = (overview.ending.summary.blocks, overview.ending.summary.behind);
+        let is_further = segment_name(path).is_some_and(|name| name.segment > 0);
+        let begins_later = overview.contents.gaps.first().is_some_and(|gap| gap.from.is_none());
+        let gaps = overview.ending.summary.gaps - u64::from(is_further && begins_later);
         let wrong = [
             (blocks.damaged, "damaged sectors"),
-            (blocks.stale, "sectors of another session"),
-            (blocks.foreign, "blocks that are no sectors"),
-            (overview.ending.summary.gaps, "gaps"),
+            (blocks.misplaced.saturating_sub(behind.misplaced), "sectors where others belong"),
+            (blocks.stale.saturating_sub(behind.stale), "sectors of another session"),
+            (blocks.foreign.saturating_sub(behind.foreign), "blocks that are no sectors"),
+            (gaps, "gaps"),
             (overview.contents.bad_frames, "frames that fail their checksum"),
         ];
+        for why in overview.ending.strange() {
+            note!("{name}: {why}");
+            outcome = Outcome::Losses;
+        }
         for (number, what) in wrong.into_iter().filter(|(number, _)| *number > 0) {
             note!("{name}: {what}: {number}; `hums verify` says more");
             outcome = Outcome::Losses;

@@ -8,6 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context as _, Result, ensure};
+use hums::ending::SessionBefore;
 use hums::followed::Followed;
 use hums::logs::{Found, find};
 use hums::run::sim::power_on;
@@ -495,7 +496,7 @@ fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
     overviews.extend(followed.finish());
     let told = |log: &Overview| {
         let is_it = log.ending.summary.session.is_some_and(|session| less.contains(&session));
-        log.ending.gone_before.is_some() || is_it && verdict(log) == Verdict::NotProved
+        matches!(log.ending.before, SessionBefore::Gone(_)) || is_it && verdict(log) == Verdict::NotProved
     };
     Ok(overviews.iter().any(told))
 }
