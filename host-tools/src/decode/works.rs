@@ -47,7 +47,7 @@ impl<'a> Works<'a> {
         let (mut earlier, mut named) = (Vec::new(), Vec::new());
         for (log, traits) in logs {
             let made = log.path().and_then(|path| Some((path, *targets.get(&FileId::of(path).ok()?)?)));
-            match made.filter(|(_, of)| !std::ptr::eq(*of, log)) {
+            match made.filter(|(_, of)| of.title != log.title) {
                 Some((path, of)) => earlier.push((path, of.title.as_str())),
                 None => named.push((log, traits)),
             }

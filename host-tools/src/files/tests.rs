@@ -140,6 +140,12 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
     drop(output);
     assert_eq!(names(dir.path()), [".log.pull.hums-part", "log", "old"]);
     assert_eq!(fs::read(&path).expect("there"), b"onetwothree");
+    // Another command that writes a file of this name leaves what was begun alone.
+    fs::remove_file(&path).expect("removed");
+    let mut other = create(&path).expect("created");
+    other.write_all(b"other").expect("written");
+    other.finish().expect("whole");
+    assert_eq!(names(dir.path()), [".log.pull.hums-part", "log", "old"]);
 }
 
 #[test]

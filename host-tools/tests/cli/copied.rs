@@ -306,6 +306,36 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
 }
 
 #[test]
+fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged() {
+    let dir = copied(2, "");
+    let path = dir.path().join("card.img");
+    let mut image = fs::read(&path).expect("an image");
+    let blocks = image.as_chunks_mut::<BLOCK>().0;
+    let sector = blocks.iter_mut().filter(|block| block.starts_with(&[0x48, 0xb1])).nth(20);
+    sector.expect("a sector")[100] ^= 4;
+    fs::write(&path, image).expect("written");
+    for line in ["report card.img -o page.html", "verify card.img"] {
+        run(dir.path(), line, 3);
+    }
+    let said = run(dir.path(), "report card.img -o other.html", 3).stderr;
+    assert!(String::from_utf8_lossy(&said).contains("00001: 1 gap, "));
+}
+
+#[test]
+fn an_image_that_was_cut_short_is_told_as_that() {
+    let dir = copied(1, "");
+    let path = dir.path().join("card.img");
+    let image = fs::read(&path).expect("an image");
+    let half = image.len() / 2;
+    fs::write(&path, &image[..half]).expect("written");
+    let words = format!("the image is cut short: it has {half} bytes, and its partition ends at byte ");
+    for (command, code, said) in readers(dir.path(), "card.img") {
+        assert!(code == 3 && said.contains(&words), "{command}: {said}");
+        assert!(!said.contains("larger than its partition"), "{command}: {said}");
+    }
+}
+
+#[test]
 fn a_pipe_or_a_device_as_a_recording_is_refused_at_once_and_nothing_is_left() {
     let dir = tempfile::tempdir().expect("directory");
     let made = std::process::Command::new("mkfifo").arg(dir.path().join("pipe")).status();

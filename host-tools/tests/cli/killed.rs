@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::support::{attempt, contents, hums, named, px4, run, until};
+use crate::support::{attempt, contents, flight, hums, named, px4, run, until};
 
 /// Files and folders that are not whole.
 fn parts(dir: &Path) -> Vec<String> {
@@ -45,7 +45,7 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
         let ended = output_of.expect("it runs");
         let said = String::from_utf8_lossy(&ended.stderr);
         assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
-        assert!(said.contains("cannot be written"), "{line}: {said}");
+        assert!(said.contains("cannot be written") && !said.contains("there is no folder"), "{line}: {said}");
         assert_eq!(fs::read(dir.path().join("old")).unwrap_or_default(), old, "{line}");
         assert_eq!(parts(dir.path()), Vec::<String>::new(), "{line}");
         if output == "new" {
@@ -193,4 +193,43 @@ fn a_demo_removes_what_a_demo_made_and_nothing_else() {
         assert!(contents(dir.path()) == before, "{}", path.display());
         was.map_or_else(|| fs::remove_file(&path), |was| fs::write(&path, was)).expect("as it was");
     }
+}
+
+#[test]
+fn a_demo_outside_of_the_source_tree_says_what_it_needs() {
+    let dir = tempfile::tempdir().expect("directory");
+    let program = dir.path().join("hums");
+    fs::hard_link(env!("CARGO_BIN_EXE_hums"), &program)
+        .or_else(|_| fs::copy(env!("CARGO_BIN_EXE_hums"), &program).map(|_| ()))
+        .expect("a copy");
+    let ended = Command::new(&program).arg("demo").current_dir(dir.path()).output().expect("it runs");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(2), "{said}");
+    assert!(said.lines().count() == 1 && said.contains("name a recording with --input"), "{said}");
+    assert_eq!(contents(dir.path()).len(), 1, "nothing is made");
+}
+
+#[test]
+fn a_recording_whose_writing_is_ended_says_what_of_it_is_not_in_the_database() {
+    let dir = tempfile::tempdir().expect("directory");
+    let spool = dir.path().join("spool");
+    let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
+    // Nobody listens there, so that the reading waits when 1 MiB waits.
+    live.args(["live", "--influx", "http://127.0.0.1:9", "--spool-limit", "1", "--listen", "127.0.0.1:0"]);
+    live.arg("--spool").arg(&spool).arg("--input").arg(flight("ap_quad_guided.tlog"));
+    let mut live = live.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+    until("the spool is full", || spool.metadata().is_ok_and(|about| about.len() > 700_000));
+    let end = || {
+        let ended = Command::new("kill").args(["-INT", &live.id().to_string()]).status();
+        assert!(ended.expect("it runs").success());
+    };
+    end();
+    std::thread::sleep(Duration::from_millis(500));
+    // The second one ends the wait for the database.
+    end();
+    let mut said = String::new();
+    let stderr = live.stderr.as_mut().expect("piped");
+    std::io::Read::read_to_string(stderr, &mut said).expect("text");
+    assert_eq!(live.wait().expect("it ends").code(), Some(3), "{said}");
+    assert!(said.contains("where it was ended; the rest is not in the database"), "{said}");
 }

@@ -20,9 +20,10 @@
 
 use core::num::NonZeroU32;
 
-use super::finding::{Level, Subsystem};
+use super::finding::{Finding, Level, Subsystem};
 use super::inputs::Inputs;
 use crate::latest::Reading;
+use crate::observation::Feeds;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 
@@ -217,6 +218,24 @@ pub struct Change {
     pub limit: f32,
 }
 
+impl Check {
+    /// What a change of its level is told as.
+    pub(super) const fn finding(&self, instance: u8, at: Instant, change: Change, feeds: Feeds) -> Finding {
+        Finding {
+            at,
+            subsystem: self.subsystem,
+            check: self.name,
+            instance,
+            level: change.level,
+            previous: change.previous,
+            value: change.value,
+            limit: change.limit,
+            unit: self.unit,
+            feeds,
+        }
+    }
+}
+
 impl State {
     /// Nothing seen yet.
     pub const fn new() -> Self {
@@ -235,6 +254,11 @@ impl State {
     /// The level, or `None` while the check has had nothing to say.
     pub const fn level(&self) -> Option<Level> {
         self.level
+    }
+
+    /// Whether it never had a value since it began to apply, nor a level: then a step without a value changes nothing.
+    pub(super) fn is_new(&self) -> bool {
+        self.level.is_none() && self.held.is_none() && !self.seen.is_set()
     }
 
     /// One step: at least every 50 ms.

@@ -30,7 +30,7 @@ pub use vocabulary::{Scope, VOCABULARY, Words, vocabulary};
 use crate::params::Param;
 use crate::time::Span;
 use exceedance::Exceedances;
-use tables::STATES;
+use tables::{STATES, TABLES};
 
 /// A vehicle that has not been heard for so long is silent.
 const SILENT: Span = Span::from_secs(5);
@@ -67,7 +67,8 @@ impl Health {
         let latched = inputs.params.get(Param::Latch) >= 0.5 && inputs.vehicle.armed();
         let quiet = inputs.mishap.is_going();
         let heard = inputs.vehicle.heartbeat.within(inputs.now, SILENT).is_some();
-        for (place, check, instance, state) in self.each_mut() {
+        let mut states = self.states.iter_mut();
+        for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
             let quiet = quiet && check.when != When::Always;
             let applies = match check.when {
                 When::Always => true,
@@ -75,45 +76,37 @@ impl Health {
                 When::Armed => inputs.vehicle.armed(),
                 When::InFlight => inputs.flight.airborne(),
             };
-            let reading = (check.read)(inputs, instance);
-            let before = *state;
-            let change = state.step(check, inputs.now, reading, applies, inputs.params);
-            if quiet && (heard || change.is_none_or(|change| change.level != Level::Stale)) {
-                // It would only echo the mishap: it stays as it was, unless the vehicle falls silent.
-                *state = before.seen_as(state);
-                continue;
-            }
-            let change = if latched { state.hold(&before, change) } else { state.release(change) };
-            let Some(change) = change else {
-                if let (Some(Level::Warning | Level::Critical), Some(reading)) = (state.level(), reading) {
-                    exceedances.note(place, instance, check.side, reading.value);
+            for (instance, state) in (0..check.instances).zip(&mut states) {
+                // Most have nothing to say and never had: a step would change nothing.
+                let is_new = state.is_new();
+                if is_new && !applies {
+                    continue;
                 }
-                continue;
-            };
-            let finding = Finding {
-                at: inputs.now,
-                subsystem: check.subsystem,
-                check: check.name,
-                instance,
-                level: change.level,
-                previous: change.previous,
-                value: change.value,
-                limit: change.limit,
-                unit: check.unit,
-                feeds: power::feeds(check, inputs, instance),
-            };
-            exceedances.change(place, check.side, &finding);
-            findings(&finding);
+                let reading = (check.read)(inputs, instance);
+                if is_new && reading.is_none() {
+                    continue;
+                }
+                let before = *state;
+                let change = state.step(check, inputs.now, reading, applies, inputs.params);
+                if quiet && (heard || change.is_none_or(|change| change.level != Level::Stale)) {
+                    // It would only echo the mishap: it stays as it was, unless the vehicle falls silent.
+                    *state = before.seen_as(state);
+                    continue;
+                }
+                let change = if latched { state.hold(&before, change) } else { state.release(change) };
+                let Some(change) = change else {
+                    if let (Some(Level::Warning | Level::Critical), Some(reading)) = (state.level(), reading)
+                    {
+                        exceedances.note(place, instance, check.side, reading.value);
+                    }
+                    continue;
+                };
+                let feeds = power::feeds(check, inputs, instance);
+                let finding = check.finding(instance, inputs.now, change, feeds);
+                exceedances.change(place, check.side, &finding);
+                findings(&finding);
+            }
         }
-    }
-
-    /// Each check by its place among all, and its instances.
-    fn each_mut(&mut self) -> impl Iterator<Item = (u8, &'static Check, u8, &mut State)> {
-        (0..)
-            .zip(checks())
-            .flat_map(|(place, check)| (0..check.instances).map(move |instance| (place, check, instance)))
-            .zip(&mut self.states)
-            .map(|((place, check, instance), state)| (place, check, instance, state))
     }
 
     /// Every check instance that has had something to say, with its level.

@@ -33,7 +33,7 @@ pub(super) const STATES: usize = {
 
 /// All checks, by subsystem.
 pub fn checks() -> impl Iterator<Item = &'static Check> {
-    TABLES.into_iter().flatten()
+    TABLES.iter().copied().flatten()
 }
 
 /// What a check means, in a few words that a pilot understands; its name where there is no such check.

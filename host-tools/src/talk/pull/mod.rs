@@ -218,3 +218,45 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
     }
     Ok(outcome)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::endpoint::Endpoint;
+
+    /// The sectors of a recording of the repository, as `hums pack` makes them.
+    fn packed(dir: &Path, name: &str) -> Vec<u8> {
+        let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
+        let output = dir.join(name);
+        let pack = cli::Pack { input: Endpoint::File(input), output: output.clone(), replace: false };
+        crate::pack::run(&pack).expect("packed");
+        fs::read(output).expect("there")
+    }
+
+    #[test]
+    fn what_a_recycled_file_held_before_is_no_damage_and_what_is_in_the_middle_is() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let new = packed(dir.path(), "px4_hil_quad_low.tlog");
+        let old = packed(dir.path(), "ap_quad_guided.tlog");
+        let verified = |name: &str, bytes: &[u8]| {
+            let path = dir.path().join(name);
+            fs::write(&path, bytes).expect("written");
+            verify(name, &path).expect("it reads")
+        };
+        let recycled = [&new[..], &old[new.len()..]].concat();
+        assert_eq!(verified("00007_00.HUM", &recycled), Outcome::Done);
+        // A further segment does not begin with the session's first sector; a first one does.
+        let group = 64 * 512;
+        assert_eq!(verified("00007_01.HUM", &new[2 * group..]), Outcome::Done);
+        assert_eq!(verified("00007_00.HUM", &new[2 * group..]), Outcome::Losses);
+        let middle = new.len() / 1024 * 512;
+        let mut mixed = new.clone();
+        mixed[middle..middle + group].copy_from_slice(&old[middle..middle + group]);
+        assert_eq!(verified("00007_00.HUM", &mixed), Outcome::Losses);
+        mixed[middle..middle + group].fill(0);
+        assert_eq!(verified("00007_00.HUM", &mixed), Outcome::Losses);
+    }
+}
