@@ -3,12 +3,13 @@
 
 use hums_core::Monitor;
 use hums_core::health::{Level, checks};
-use hums_core::observation::{Source, SystemStatus};
+use hums_core::observation::{AutopilotIdentity, Heartbeat, Source, SystemStatus};
 use hums_core::params::{Param, Params};
 use hums_core::time::Instant;
 use hums_core::vehicle::BATTERIES_MAX;
 
 use super::problem::Problems;
+use crate::names::autopilot_name;
 use crate::source::told::Finding;
 use crate::states;
 
@@ -24,7 +25,24 @@ pub(super) struct Details {
     sensors: u32,
     /// Batteries in the order in which they came: component and id.
     batteries: Vec<(u8, u8)>,
+    /// Autopilots in the order in which they came.
+    autopilots: Vec<Heard>,
 }
+
+/// An autopilot that was heard, as far as one is told from another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Heard {
+    system: u8,
+    /// `MAV_AUTOPILOT`
+    autopilot: u8,
+    /// Its unique id, once it told one.
+    uid: u64,
+}
+
+/// `MAV_AUTOPILOT_INVALID`: what sends it is no autopilot.
+const NO_AUTOPILOT: u8 = 8;
+/// `MAV_COMP_ID_AUTOPILOT1`
+const AUTOPILOT: u8 = 1;
 
 /// Batteries that are told apart: `ArduPilot` has 16.
 const TOLD_APART_MAX: usize = 32;
@@ -52,6 +70,51 @@ impl Details {
         }
     }
 
+    /// An autopilot tells what it is.
+    pub(super) fn heartbeat(&mut self, source: Source, heartbeat: &Heartbeat) {
+        let (system, autopilot) = (source.system, heartbeat.autopilot_number);
+        let is_new =
+            !self.autopilots.iter().any(|known| (known.system, known.autopilot) == (system, autopilot));
+        if is_new && source.component == AUTOPILOT && autopilot != NO_AUTOPILOT {
+            self.autopilot(Heard { system, autopilot, uid: 0 });
+        }
+    }
+
+    /// An autopilot tells who it is.
+    pub(super) fn identity(&mut self, source: Source, identity: &AutopilotIdentity) {
+        let uid = identity.uid;
+        let mut same = self.autopilots.iter_mut().filter(|known| known.system == source.system).rev();
+        let Some(latest) = same.next().filter(|_| source.component == AUTOPILOT && uid != 0) else { return };
+        if latest.uid == 0 {
+            latest.uid = uid;
+        } else if latest.uid != uid && !same.any(|known| known.uid == uid) {
+            let other = Heard { uid, ..*latest };
+            self.autopilot(other);
+        }
+    }
+
+    fn autopilot(&mut self, heard: Heard) {
+        if self.autopilots.len() < TOLD_APART_MAX {
+            self.autopilots.push(heard);
+        }
+    }
+
+    /// Says that the recording is of more than one vehicle: files that were joined, or a ground station of several.
+    fn vehicles(&self) -> Option<String> {
+        let words = |heard: &Heard| {
+            let uid = if heard.uid == 0 { String::new() } else { format!(", uid {:016x}", heard.uid) };
+            format!("system {} ({}{uid})", heard.system, autopilot_name(heard.autopilot))
+        };
+        let all: Vec<String> = self.autopilots.iter().map(words).collect();
+        (all.len() > 1).then(|| {
+            format!(
+                "more than one vehicle is in it: {}; one system id is judged, as if it were one vehicle: give each \
+                 vehicle's recording by itself",
+                all.join(", ")
+            )
+        })
+    }
+
     /// A battery tells of itself.
     pub(super) fn battery(&mut self, source: Source, id: u8) {
         let battery = (source.component, id);
@@ -68,7 +131,7 @@ impl Details {
             let of = if *component == 1 { String::new() } else { format!(" of component {component}") };
             format!("battery {number}{of} is not judged: the monitor follows {BATTERIES_MAX} batteries")
         };
-        beyond.iter().map(words).collect()
+        self.vehicles().into_iter().chain(beyond.iter().map(words)).collect()
     }
 
     /// A check's level has changed, or what it is of.

@@ -138,11 +138,14 @@ impl Judge {
         match item {
             Item::Observation(source, observation) => {
                 self.advance(at);
-                if let Observation::SystemStatus(status) = observation {
-                    self.details.sensors(source, status, &self.monitor, &mut self.here);
-                }
-                if let Observation::Battery(battery) = observation {
-                    self.details.battery(source, battery.id);
+                match observation {
+                    Observation::SystemStatus(status) => {
+                        self.details.sensors(source, status, &self.monitor, &mut self.here);
+                    }
+                    Observation::Battery(battery) => self.details.battery(source, battery.id),
+                    Observation::Heartbeat(heartbeat) => self.details.heartbeat(source, heartbeat),
+                    Observation::Identity(identity) => self.details.identity(source, identity),
+                    _ => {}
                 }
                 self.monitor.observe(self.clock.monitor(at), source, observation);
             }

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use super::support::{flight, frames_of, json, px4, recorded, run, text};
+use super::support::{attempt, flight, frames_of, json, px4, recorded, run, text};
 
 /// Checks that tell of the place on a link, which a recording of another place cannot.
 const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
@@ -248,6 +248,22 @@ fn a_recording_is_decoded_without_a_log_of_ours_between() {
         text.lines().map(|line| line.splitn(3, ',').nth(2).unwrap_or_default().to_owned()).collect()
     };
     assert_eq!(columns(table("out")), columns(table("packed")));
+}
+
+#[test]
+fn a_recording_of_two_vehicles_is_told_as_that() {
+    let dir = tempfile::tempdir().expect("directory");
+    let both = [px4(), flight("ap_quad_guided.tlog")].map(|path| fs::read(path).expect("a recording"));
+    fs::write(dir.path().join("both.tlog"), both.concat()).expect("written");
+    let words = "more than one vehicle is in it: system 1 (PX4";
+    let screen = text(&attempt(dir.path(), "check both.tlog"));
+    assert!(screen.contains(words) && screen.contains("), system 1 (ArduPilot"), "{screen}");
+    assert!(json(&attempt(dir.path(), "check --json both.tlog"))["remarks"][0].as_str().is_some());
+    // Two recordings of one command are two logs.
+    fs::write(dir.path().join("one.tlog"), &both[0]).expect("written");
+    fs::write(dir.path().join("two.tlog"), &both[1]).expect("written");
+    let objects = text(&attempt(dir.path(), "check --json one.tlog two.tlog"));
+    assert!(objects.lines().count() == 2 && !objects.contains("more than one vehicle"), "{objects}");
 }
 
 #[test]
