@@ -2,11 +2,12 @@
 
 usage: truth.py DIALECT.py FOLDER        rewrites FOLDER/labels.json
 
-DIALECT.py is made by pymavlink's mavgen. Each entry of labels.json gets three fields:
+DIALECT.py is made by pymavlink's mavgen. Each entry of labels.json gets four fields:
 
   flights    from and to of each time in the air, in seconds since the first frame
   landings   how many of them ended on the ground without a crash
   crash_s    when it hit the ground in a crash; null where it did not
+  battery_low_s  when the autopilot itself first called a battery low; null where it never did
 
 The rules:
 
@@ -15,10 +16,13 @@ The rules:
   end        disarmed, a crash, below 1 m for 8 s, or the end of the recording; a vehicle that takes off again 5 s after a crash or
              later flies once more
   crash      it came below 1.5 m with a sink speed of more than 3 m/s in the second before (6 m/s for a plane), or with more
-             than 4 g within a second and a speed of more than 1 m/s before (a simulator's legs are hard), or was disarmed above 5 m
+             than 4 g within a second and a speed of more than 1.5 m/s before (a simulator's legs are hard), or was disarmed above 5 m;
+             a plane without rotors that touches at less than 2 m/s of sink and without throttle lands, however it skids
   landing    a flight that ended by disarming or by standing for 8 s, without a crash
 
-An entry gets none of the fields where its heights cannot be trusted: no height for 3 s in the air, more than 8 m below the place
+  battery    BATTERY_STATUS.charge_state is MAV_BATTERY_CHARGE_STATE_LOW or worse, up to UNHEALTHY
+
+An entry gets none of the first three fields where its heights cannot be trusted: no height for 3 s in the air, more than 8 m below the place
 of arming while armed, or the estimator's and the receiver's differ by more than 8 m. Faults of a receiver are known from the estimator alone.
 """
 
@@ -33,11 +37,13 @@ import sys
 
 TAKEOFF_M, TAKEOFF_S, BEGAN_M = 2.0, 1.0, 1.0
 LANDED_M, LANDED_S = 1.0, 8.0
-HIT_M, HIT_S, HIT_M_S, HIT_PLANE_M_S, HIT_G, HIT_G_M_S = 1.5, 1.0, 3.0, 6.0, 4.0, 1.0
+HIT_M, HIT_S, HIT_M_S, HIT_PLANE_M_S, HIT_G, HIT_G_M_S, FLARED_M_S = 1.5, 1.0, 3.0, 6.0, 4.0, 1.5, 2.0
 DISARMED_M = 5.0
 WRECK_S = 5.0
 LOST_S, DIFFER_M = 3.0, 8.0
-HEARTBEAT, GPS_RAW_INT, SCALED_IMU, RAW_IMU, GLOBAL_POSITION_INT, HIGHRES_IMU = KINDS = 0, 24, 26, 27, 33, 105
+HEARTBEAT, GPS_RAW_INT, SCALED_IMU, RAW_IMU, GLOBAL_POSITION_INT, HIGHRES_IMU, BATTERY_STATUS, VFR_HUD, \
+    EXTENDED_SYS_STATE = KINDS = 0, 24, 26, 27, 33, 105, 147, 74, 245
+CHARGE_LOW, CHARGE_UNHEALTHY, IDLE = 2, 6, 10
 GRAVITY = 9.80665
 ARMED, AUTOPILOTS, PLANES = 128, (3, 12), (1, 19, 20, 21, 22, 23, 24, 25)
 
@@ -82,6 +88,7 @@ class Flights:
         self.heights, self.ground, self.receiver, self.receiver_ground = collections.deque(), None, None, None
         self.up_since = self.low_since = self.began = None
         self.flights, self.landings, self.crash_s = [], 0, None
+        self.battery_low_s, self.rotors, self.throttle = None, False, 0
         self.falling, self.shock, self.speeds = None, -math.inf, collections.deque()
 
     def take(self, at, message):
@@ -89,6 +96,13 @@ class Flights:
         if kind == "HEARTBEAT":
             if message.autopilot in AUTOPILOTS and message.get_srcComponent() == 1:
                 self.heartbeat(at, bool(message.base_mode & ARMED), message.type)
+        elif kind == "VFR_HUD":
+            self.throttle = message.throttle
+        elif kind == "EXTENDED_SYS_STATE":
+            self.rotors = message.vtol_state != 0
+        elif kind == "BATTERY_STATUS":
+            if CHARGE_LOW <= message.charge_state <= CHARGE_UNHEALTHY and self.battery_low_s is None:
+                self.battery_low_s = round(at, 2)
         elif kind == "GPS_RAW_INT" and message.fix_type >= 3:
             self.receiver = message.alt / 1e3
             if self.by_receiver:
@@ -151,6 +165,7 @@ class Flights:
             return
         sink = (self.heights[0][1] - self.heights[-1][1]) / HIT_S
         shocked = at - self.shock < HIT_S and max((speed for _, speed in self.speeds), default=math.inf) > HIT_G_M_S
+        shocked &= not (self.plane and not self.rotors and sink < FLARED_M_S and self.throttle < IDLE)
         if sink > (HIT_PLANE_M_S if self.plane else HIT_M_S) or shocked or self.falling is not None:
             self.crash_s, self.falling = at, None
             self.end(at, landed=False)
@@ -165,10 +180,11 @@ class Flights:
         if self.falling is not None and self.crash_s is None:
             self.crash_s = self.falling
         self.end(at, landed=False)
-        if not self.known:
-            return {}
-        crash_s = None if self.crash_s is None else round(self.crash_s, 2)
-        return {"flights": self.flights, "landings": int(self.landings), "crash_s": crash_s}
+        known = {"battery_low_s": self.battery_low_s}
+        if self.known:
+            crash_s = None if self.crash_s is None else round(self.crash_s, 2)
+            known |= {"flights": self.flights, "landings": int(self.landings), "crash_s": crash_s}
+        return known
 
 
 def main(dialect_path, folder):
@@ -181,7 +197,7 @@ def main(dialect_path, folder):
         for at, message in messages(dialect, os.path.join(folder, label["file"])):
             flights.take(at, message)
             last = at
-        for field in ("flights", "landings", "crash_s"):
+        for field in ("flights", "landings", "crash_s", "battery_low_s"):
             label.pop(field, None)
         label.update(flights.result(last))
     with open(path, "w") as file:

@@ -9,7 +9,7 @@ use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
 use crate::trend::{Rate, Resistance};
-use crate::units::MetresPerSecond2;
+use crate::units::{MetresPerSecond2, RadiansPerSecond};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// Standard gravity, m/s2 (CGPM 1901).
@@ -29,6 +29,13 @@ const STEADY_TILT_RAD: f32 = 0.26;
 const MOTORS_TOLD: Span = Span::from_secs(1);
 /// Below this part of their highest speed motors do not carry a vehicle (thrust goes by the square).
 const FLYING_PART: f32 = 0.2;
+/// Below this part of the middle speed a motor is lost; no control in steady flight drives it there.
+const LOST_PART: f32 = 0.4;
+/// Nothing hovers with less throttle.
+const IDLE_THROTTLE: f32 = 0.1;
+/// What turns faster than this, rad/s, or did of late, drives each motor as it needs to.
+const TURNS_RATE: f32 = 0.7;
+const TURNED: Span = Span::from_secs(2);
 /// Time constant of the motor speeds that are compared.
 const MOTOR_SMOOTHING_S: f32 = 1.0;
 /// A link on which nothing at all came for so long was silent, unless it often is: streams of one a second have such pauses.
@@ -68,6 +75,8 @@ pub struct Derived {
     pause_s: f32,
     /// The motor whose speed is furthest from the others'.
     furthest: u8,
+    /// When it turned fast last.
+    turned_at: Option<Instant>,
     had_fix: [bool; RECEIVERS_MAX],
     clips: Lately,
     clips_known: bool,
@@ -121,6 +130,7 @@ impl Derived {
             resumed: Instant::ZERO,
             pause_s: 0.0,
             furthest: 0,
+            turned_at: None,
             had_fix: [false; RECEIVERS_MAX],
             clips: Lately::NONE,
             clips_known: false,
@@ -148,7 +158,9 @@ impl Derived {
                 if let Some(load_g) = imu.acceleration.and_then(load_factor_g) {
                     self.load_factor.set(at, load_g);
                 }
+                self.take_rates(at, imu.rate);
             }
+            Observation::Attitude(attitude) => self.take_rates(at, attitude.rates),
             Observation::Gnss(gnss) => {
                 if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
                     *had_fix |= gnss.fix >= 3;
@@ -175,6 +187,12 @@ impl Derived {
                 }
             }
             _ => {}
+        }
+    }
+
+    fn take_rates(&mut self, at: Instant, rates: Option<[RadiansPerSecond; 3]>) {
+        if rates.is_some_and(|rates| norm(rates.map(|rate| rate.0)) > TURNS_RATE) {
+            self.turned_at = Some(at);
         }
     }
 
@@ -327,8 +345,12 @@ impl Derived {
         Some(Reading { at: now, value: if missed { silence_s } else { 0.0 } })
     }
 
-    /// How far a motor's speed is from the middle one of all, in percent of it, in steady flight; 0 for all but the motor that is
-    /// furthest from it: where one is lost the others turn as they must to make up for it.
+    /// How far a motor's speed is from the middle one of all and from that of each other motor, in percent of the middle one, in
+    /// steady flight; 0 for all but the motor that is furthest from the middle one: where one is lost the others turn as they must
+    /// to make up for it.
+    ///
+    /// What turns, leans or carries its load on one side drives motors in twos, threes and fours: those of one sense of rotation,
+    /// the front ones, the upper ones of coaxial pairs. So a motor is off where no other one is near it, whatever the layout.
     pub(crate) fn motor_imbalance(
         &self,
         now: Instant,
@@ -339,14 +361,35 @@ impl Derived {
         let track = self.motors.get(usize::from(motor)).filter(|track| track.highest_rpm > TURNING_RPM)?;
         let middle = self.middle_speed()?;
         let compares = vehicle.is_multicopter() && self.motors_told(now, middle);
-        if !compares || !Self::is_steady(now, vehicle, flight) {
+        // On the ground, still armed, each motor idles as it likes.
+        let idles = vehicle
+            .hud
+            .within(now, MOTORS_TOLD)
+            .and_then(|hud| hud.throttle)
+            .is_some_and(|throttle| throttle.0 < IDLE_THROTTLE);
+        // Where one is lost, the one opposite may stop too, and the vehicle may turn.
+        let lost = track.smooth_rpm < LOST_PART * middle;
+        if !compares || idles || !(lost || self.turns_little(now)) || !Self::is_steady(now, vehicle, flight) {
             return None;
         }
         let named = usize::from(self.furthest) == usize::from(motor);
-        Reading::new(
-            track.last,
-            Some(if named { (track.smooth_rpm - middle).abs() / middle * 100.0 } else { 0.0 }),
-        )
+        let alone = if lost { f32::INFINITY } else { self.apart(motor) };
+        let off = (track.smooth_rpm - middle).abs().min(alone) / middle * 100.0;
+        Reading::new(track.last, Some(if named { off } else { 0.0 }))
+    }
+
+    /// How far a motor's speed is from the nearest one of the others.
+    fn apart(&self, motor: u8) -> f32 {
+        let Some(own) = self.motors.get(usize::from(motor)) else { return 0.0 };
+        let others = (0..)
+            .zip(&self.motors)
+            .filter(|(other, track)| *other != motor && track.highest_rpm > TURNING_RPM);
+        others.map(|(_, track)| (track.smooth_rpm - own.smooth_rpm).abs()).reduce(f32::min).unwrap_or(0.0)
+    }
+
+    /// Whether it has not turned fast of late.
+    fn turns_little(&self, now: Instant) -> bool {
+        self.turned_at.is_none_or(|at| now.since(at) > TURNED)
     }
 
     /// Which motor is furthest from the middle one. It stays the one that was found first until another is twice as far: where one

@@ -3,13 +3,13 @@
 //! # In the air
 //! Only what is armed flies, and only what can: a rover, a boat or a submarine never does, whatever its landed state says
 //! (PX4 calls an armed rover "in air"). The autopilot's own word ([`LandedState`], `EXTENDED_SYS_STATE`) counts where it is
-//! given. Otherwise, for half a second:
+//! given, but for a multicopter that idles at the height where it was armed. Otherwise, for half a second:
 //!
 //! | what is known | in the air | on the ground again, for two seconds |
 //! |---|---|---|
 //! | a height above home or above the local origin | more than one metre above the place of arming | less than half a metre, and still |
 //! | the speed of a plane or VTOL | faster than 8 m/s | as above |
-//! | only the throttle (no position at all) | more than a fifth | less than a tenth |
+//! | only the throttle (no position at all) | more than a fifth, and the displayed altitude rose by a metre | less than a tenth |
 //!
 //! The place of arming counts only where arming was seen. Whoever hears an armed vehicle first (a restart in the air) takes
 //! the height above home as it is, and goes on in the air at once: [`FlightEvent::Resumed`].
@@ -105,6 +105,8 @@ pub struct Flight {
     armed: bool,
     /// Height where it was armed.
     armed_height_m: Option<f32>,
+    /// The pilot's display of the altitude while it stood without thrust.
+    idle_altitude_m: Option<f32>,
     changing_since: Option<Instant>,
 }
 
@@ -118,6 +120,7 @@ impl Flight {
             seen_on_ground: false,
             armed: false,
             armed_height_m: None,
+            idle_altitude_m: None,
             changing_since: None,
         }
     }
@@ -162,7 +165,7 @@ impl Flight {
     /// One step, at least every 50 ms.
     pub fn step(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
         self.note_arming(now, vehicle);
-        let says = Self::autopilot_says(now, vehicle);
+        let says = Self::autopilot_says(now, vehicle).filter(|flies| !flies || !self.idles_low(now, vehicle));
         let flies = self.armed && can_fly(vehicle) && says.unwrap_or_else(|| self.seems_to_fly(now, vehicle));
         let debounce = match (says, self.airborne()) {
             // What is on the ground is judged as such at once: motors that stop are no fault there. One wrong word ends no
@@ -195,6 +198,10 @@ impl Flight {
             self.armed_height_m = height_m(now, vehicle);
         }
         self.armed = heartbeat.armed;
+        let idles = !self.armed || throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
+        if idles && !self.airborne() {
+            self.idle_altitude_m = altitude_m(now, vehicle).or(self.idle_altitude_m);
+        }
     }
 
     fn begin_or_end(&mut self, now: Instant) -> Option<FlightEvent> {
@@ -253,15 +260,32 @@ impl Flight {
         }
     }
 
+    /// At the height where it was armed, with less throttle than flies: `ArduPilot`'s and PX4's land detectors call a vehicle that is
+    /// armed on the bench, spools up, or came down under a pilot's sticks, not landed.
+    fn idles_low(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
+        let low =
+            self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m.abs() < TAKEOFF_HEIGHT_M);
+        vehicle.hovers(now) == Some(true)
+            && low
+            && throttle(now, vehicle).is_some_and(|throttle| throttle < enough)
+    }
+
     fn seems_to_fly(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let speed_mps = ground_speed_mps(now, vehicle);
         let Some(height_m) = self.height_above_start_m(now, vehicle) else {
             let fast = speed_mps.is_some_and(|speed_mps| has_wings(vehicle) && speed_mps > PLANE_FLYING_MPS);
-            let throttle = vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.throttle);
+            let throttle = throttle(now, vehicle);
             let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
-            let thrust = throttle.is_none_or(|throttle| throttle.0 > enough);
+            let thrust = throttle.is_none_or(|throttle| throttle > enough);
+            // Motors are tried on the bench: the barometer says so.
+            let rose = self
+                .idle_altitude_m
+                .zip(altitude_m(now, vehicle))
+                .is_none_or(|(stood_m, is_m)| is_m > stood_m + TAKEOFF_HEIGHT_M);
             // Without any word about height, speed or thrust it goes on with what it does.
-            return fast || (thrust && (self.airborne() || (throttle.is_some() && !has_wings(vehicle))));
+            return fast
+                || (thrust && (self.airborne() || (throttle.is_some() && rose && !has_wings(vehicle))));
         };
         let speed_mps = speed_mps.unwrap_or(0.0);
         if self.airborne() {
@@ -284,6 +308,16 @@ pub(crate) fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let global = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
     let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.position[2].0);
     global.or_else(local).filter(|height_m| height_m.is_finite())
+}
+
+/// The part of the throttle that the autopilot gives.
+fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+    vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.throttle).map(|throttle| throttle.0)
+}
+
+/// The altitude of the pilot's display, of the barometer where there is no position.
+fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+    vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.altitude).map(|altitude| altitude.0)
 }
 
 /// Speed upwards from the best source that is fresh, in m/s.

@@ -16,6 +16,7 @@ pub mod health;
 mod latest;
 pub mod lifetime;
 pub mod mishap;
+mod modes;
 pub mod monitor;
 pub mod observation;
 pub mod params;

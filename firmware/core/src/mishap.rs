@@ -6,11 +6,13 @@
 //! | kind | what is seen | where |
 //! |---|---|---|
 //! | free fall | specific force below 0.3 g for `MIS_FALL_TIME`, and the throttle asks for thrust | on rotors |
-//! | impact | a shock above `MIS_IMPACT`, and the speed breaks off or the vehicle lies on its side; then it is still | everywhere |
+//! | impact | a shock above `MIS_IMPACT`, and the speed breaks off harder than legs take it or the vehicle lies on its side; then it is still | everywhere |
+//! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
+//! | | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
 //! | disarmed in the air | disarmed above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
-//! | | 10 m below its highest since it has had nearly full throttle, where the autopilot has it | on wings |
+//! | | 7 m lost, faster than 1 m/s, at nearly full throttle, where the autopilot has it | everywhere |
 //!
 //! ```text
 //!        seen in a flight            it lies still, or 10 s after disarming
@@ -45,11 +47,18 @@ const WATCHED: Span = Span::from_secs(10);
 const RECOVERED: Span = Span::from_secs(5);
 /// A shock stops something that was this fast.
 const IMPACT_MPS: f32 = 4.0;
+/// Legs take this from what comes down upright, at the fastest landing speeds that are set (2.5 m/s): harder is no landing.
+const LEGS_G: f32 = 4.0;
+const LEGS_MPS: f32 = 3.0;
+/// What comes down on wings without throttle, and sinks slower than this, lands and skids.
+const FLARED_MPS: f32 = 2.0;
 /// It is still for [`STILL`] within this time after a shock.
 const AFTER_SHOCK: Span = Span::from_secs(4);
 const STILL: Span = Span::from_secs(1);
 const STILL_MPS: f32 = 1.0;
 const STILL_RATE: f32 = 0.3;
+/// What is so far above the place where it lay flies again, though it hovers.
+const ROSE_M: f32 = 3.0;
 /// Rotors pull upwards; what is carried so from above lies on its back.
 const ON_BACK_G: f32 = 0.5;
 /// How long it is seen whether what was disarmed falls.
@@ -93,6 +102,7 @@ pub struct Mishap {
     on_bench: bool,
     falls: Lasting,
     tumbles: Lasting,
+    overturned: Lasting,
     sinks: Lasting,
     still_since: Option<Instant>,
     flies_since: Option<Instant>,
@@ -105,8 +115,9 @@ pub struct Mishap {
     /// What it is carried with from above, which rotors cannot: it lies on its back.
     from_above_g: f32,
     pressure: Pressure,
-    /// Its greatest height since it has had all its thrust, m.
+    /// Its greatest height since it has had all its thrust, m, which fades; and when that was worked out last.
     peak_m: f32,
+    peak_at: Instant,
     rate: f32,
     /// The last height above home while it was armed.
     height_m: f32,
@@ -135,6 +146,7 @@ impl Mishap {
             on_bench: false,
             falls: Lasting::NOT,
             tumbles: Lasting::NOT,
+            overturned: Lasting::NOT,
             sinks: Lasting::NOT,
             still_since: None,
             flies_since: None,
@@ -146,6 +158,7 @@ impl Mishap {
             from_above_g: 0.0,
             pressure: Pressure::NOTHING,
             peak_m: f32::NEG_INFINITY,
+            peak_at: Instant::ZERO,
             rate: 0.0,
             height_m: 0.0,
             hover_throttle: 0.0,
@@ -284,7 +297,9 @@ impl Mishap {
         let thrust =
             !on_rotors(now, vehicle) || throttle(now, vehicle).is_none_or(|part| part > IDLE_THROTTLE);
         let lies = is_tilted(vehicle) || self.lies_on_its_back(vehicle);
-        let flies = self.armed && speed_mps > 2.0 * STILL_MPS && !lies && thrust;
+        let lay_at_m = f32::from(self.place.height_m);
+        let rose = height_m(now, vehicle).is_some_and(|height_m| height_m > lay_at_m + ROSE_M);
+        let flies = self.armed && (speed_mps > 2.0 * STILL_MPS || rose) && !lies && thrust;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
     }
 
@@ -319,7 +334,11 @@ impl Mishap {
             self.shock = None;
             return;
         }
-        let hit = (shock.speed_mps >= IMPACT_MPS && shock.stopped)
+        let lands = !on_rotors(now, vehicle)
+            && shock.sink_mps < FLARED_MPS
+            && throttle(now, vehicle).is_none_or(|part| part < IDLE_THROTTLE);
+        let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
+        let hit = (shock.speed_mps >= IMPACT_MPS && shock.stopped && hard && !lands)
             || (on_rotors(now, vehicle) && is_tilted(vehicle))
             || self.lies_on_its_back(vehicle);
         let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
@@ -343,7 +362,12 @@ impl Mishap {
         let long = now.since(last) >= RECOVERED;
         let silent = vehicle.heartbeat.within(now, RECOVERED).is_none();
         let near_ground = height_m(now, vehicle).is_some_and(|height_m| height_m < 2.0);
-        let down = (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
+        // With all its thrust it would climb: it dances on the ground.
+        let dances = near_ground
+            && on_rotors(now, vehicle)
+            && throttle(now, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
+        let down = (dances && long && self.speed.greatest() < 2.0 * STILL_MPS)
+            || (self.is_still(now) && (self.is_idle(now, vehicle) || (long && near_ground)))
             || (long && silent)
             || self.disarmed_at.is_some_and(|since| !self.armed && now.since(since) >= WATCHED);
         if down {
@@ -352,7 +376,7 @@ impl Mishap {
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);
         }
-        if long && self.armed {
+        if long && self.armed && !dances {
             self.calm();
             return Some(Change::FliesOn);
         }

@@ -169,6 +169,29 @@ pub struct Attitude {
     pub boot_ms: Option<u32>,
 }
 
+/// The attitude that the autopilot wants: what the mission, its own loops or the pilot's sticks ask for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wanted {
+    /// Right wing down is positive.
+    pub roll: Radians,
+    /// Nose up is positive.
+    pub pitch: Radians,
+}
+
+impl Wanted {
+    /// Of the quaternion of a rotation from north, east, down to the body, its real part first; `None` where it is none.
+    pub fn from_quaternion([w, x, y, z]: [f32; 4]) -> Option<Self> {
+        let norm = w * w + x * x + y * y + z * z;
+        // Zeros before there is one, and what is no number.
+        if !(0.9..1.1).contains(&norm) {
+            return None;
+        }
+        let roll = libm::atan2f(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y));
+        let pitch = libm::asinf((2.0 * (w * y - z * x)).clamp(-1.0, 1.0));
+        Some(Self { roll: Radians(roll), pitch: Radians(pitch) })
+    }
+}
+
 /// Position and velocity from the local origin, north, east, down.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LocalPosition {
@@ -495,6 +518,8 @@ pub enum Observation {
     ImuAndAir(Imu, Air),
     /// `ATTITUDE`
     Attitude(Attitude),
+    /// `ATTITUDE_TARGET`, `NAV_CONTROLLER_OUTPUT`
+    Wanted(Wanted),
     /// `LOCAL_POSITION_NED`
     LocalPosition(LocalPosition),
     /// `GLOBAL_POSITION_INT`

@@ -10,7 +10,7 @@ use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
     GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
     Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio,
-    VehicleKind, Vibration, VibrationScale, VtolState,
+    VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
 use crate::time::{Instant, Span};
 
@@ -59,6 +59,8 @@ pub struct Vehicle {
     pub air: Latest<Air>,
     /// Attitude.
     pub attitude: Latest<Attitude>,
+    /// The attitude that the autopilot wants.
+    pub wanted: Latest<Wanted>,
     /// Position from the local origin.
     pub local: Latest<LocalPosition>,
     /// The fused position.
@@ -131,6 +133,7 @@ impl Vehicle {
             imu: Latest::nothing(),
             air: Latest::nothing(),
             attitude: Latest::nothing(),
+            wanted: Latest::nothing(),
             local: Latest::nothing(),
             global: Latest::nothing(),
             hud: Latest::nothing(),
@@ -184,7 +187,12 @@ impl Vehicle {
 
     /// What kind of vehicle it is.
     pub fn kind(&self) -> VehicleKind {
-        self.heartbeat.get().map_or(VehicleKind::Other, |heartbeat| heartbeat.kind)
+        match self.heartbeat.get().map_or(VehicleKind::Other, |heartbeat| heartbeat.kind) {
+            // `ArduPlane` calls itself a plane with rotors too (Q_ENABLE), but where Q_MAV_TYPE says more. Only what has both tells
+            // which of them it flies on.
+            VehicleKind::Plane if self.vtol != VtolState::Unknown => VehicleKind::Vtol,
+            kind => kind,
+        }
     }
 
     /// Whether it hangs on several like rotors: only there are motors to be compared with each other. A helicopter's tail,
@@ -276,6 +284,7 @@ impl Vehicle {
                 }
                 self.attitude.set(at, attitude);
             }
+            Observation::Wanted(wanted) => self.wanted.set(at, wanted),
             Observation::LocalPosition(local) => self.local.set(at, local),
             Observation::GlobalPosition(global) => self.global.set(at, global),
             Observation::Hud(hud) => self.hud.set(at, hud),

@@ -174,7 +174,7 @@ fn a_vtol_that_hovers_is_judged_as_what_hangs_on_rotors_and_on_its_wings_it_bank
         let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
             let kind = VehicleKind::Vtol;
             let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
-            let mut vehicle = Quad { kind, type_number: 22, landed, vtol, ..Quad::healthy() };
+            let mut vehicle = Quad { kind, type_number: 22, landed, vtol, mode: 10, ..Quad::healthy() };
             if (20_000..25_000).contains(&now_ms) {
                 vehicle.roll = 1.2;
             }
@@ -276,9 +276,15 @@ fn out_and_back(
     now_ms: u64,
 ) -> Quad {
     let (armed, out) = ((5_000..70_000).contains(&now_ms), (8_000..67_000).contains(&now_ms));
-    let mode = if autopilot == Autopilot::Px4 { 0x0404_0000 } else { 3 };
+    let mode = match (autopilot, kind) {
+        (Autopilot::Px4, _) => 0x0404_0000,
+        (_, VehicleKind::Plane | VehicleKind::Vtol) => 10,
+        _ => 3,
+    };
     let mut vehicle = Quad { armed, mode, autopilot, kind, type_number, ..Quad::healthy() };
-    (vehicle.vtol, vehicle.climb) = (VtolState::Hover, 0.0);
+    vehicle.climb = 0.0;
+    // A multicopter is told as hovering too, and a plane as nothing.
+    vehicle.vtol = if kind == VehicleKind::Plane { VtolState::Unknown } else { VtolState::Hover };
     let state = if out { LandedState::InAir } else { LandedState::OnGround };
     vehicle.landed = says_landed.then_some(state);
     if !out {

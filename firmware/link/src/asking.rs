@@ -60,7 +60,7 @@ enum By {
 type Wanted = (u32, By, u8, u8);
 
 /// What the checks need, the most needed first.
-const WANTED: [Wanted; 24] = [
+const WANTED: [Wanted; 26] = [
     (1, By::Both, 2, 43),           // SYS_STATUS
     (30, By::Both, 10, 40),         // ATTITUDE
     (33, By::Both, 5, 40),          // GLOBAL_POSITION_INT
@@ -75,8 +75,10 @@ const WANTED: [Wanted; 24] = [
     (291, By::Px4, 5, 69),          // ESC_STATUS
     (290, By::Px4, 1, 58),          // ESC_INFO
     (105, By::Px4, 20, 75),         // HIGHRES_IMU
+    (83, By::Px4, 2, 49),           // ATTITUDE_TARGET
     (32, By::Px4, 5, 40),           // LOCAL_POSITION_NED
     (193, By::ArduPilot, 2, 34),    // EKF_STATUS_REPORT
+    (62, By::ArduPilot, 2, 38),     // NAV_CONTROLLER_OUTPUT
     (125, By::ArduPilot, 1, 18),    // POWER_STATUS
     (11_030, By::ArduPilot, 5, 56), // ESC_TELEMETRY_1_TO_4
     (11_031, By::ArduPilot, 5, 56), // ESC_TELEMETRY_5_TO_8

@@ -1,14 +1,25 @@
 //! Roll and pitch of what hangs on rotors. A plane banks as it needs to, and so does a VTOL while it flies on its wings.
+//!
+//! An angle that the autopilot wants is none that it lost: pilots bank a multicopter steeply, and the autopilot turns their sticks
+//! into an attitude that it wants ([`Wanted`]). So an angle counts only where the vehicle is further than [`FOLLOWS_RAD`] from the
+//! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes.
 
 use super::check::{Check, Side, When};
 use super::common::STALE;
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::latest::Reading;
-use crate::observation::{Attitude, VehicleKind};
+use crate::modes::{is_banked_by_hand, is_made_to_turn};
+use crate::observation::{Attitude, VehicleKind, Wanted};
 use crate::params::Param;
 use crate::time::Span;
 use crate::units::Radians;
+
+/// 25 degrees: an attitude follows the wanted one within this, but for moments that are shorter than the debounce. The thrust loss
+/// and crash checks of `ArduCopter` take 30 degrees.
+const FOLLOWS_RAD: f32 = 0.436;
+/// What is wanted comes at 1 Hz or faster where it comes at all.
+const WANTED_AGE: Span = Span::from_secs(2);
 
 const ROLL: Check = Check {
     name: "roll",
@@ -26,7 +37,7 @@ const ROLL: Check = Check {
     stale_after: STALE,
     instances: 1,
     alarm_only: false,
-    read: |inputs, _| degrees(inputs, |attitude| attitude.roll),
+    read: |inputs, _| degrees(inputs, |attitude| attitude.roll, |wanted| wanted.roll),
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -34,18 +45,35 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "pitch",
         words: "pitch",
-        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch),
+        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, |wanted| wanted.pitch),
         ..ROLL
     },
 ];
 
-fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians) -> Option<Reading> {
-    if !matches!(inputs.vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
+fn degrees(
+    inputs: &Inputs<'_>,
+    angle: fn(&Attitude) -> Radians,
+    wanted: fn(&Wanted) -> Radians,
+) -> Option<Reading> {
+    let Inputs { now, vehicle, .. } = *inputs;
+    if !matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
         return None;
     }
-    // On wings, and between both, no angle is too much.
-    let judged = inputs.vehicle.hovers(inputs.now) == Some(true);
-    let slot = &inputs.vehicle.attitude;
-    let degrees = |attitude: &Attitude| angle(attitude).0.to_degrees().abs();
-    Reading::new(slot.at(), slot.get().map(|attitude| if judged { degrees(attitude) } else { 0.0 }))
+    let told = vehicle.wanted.within(now, WANTED_AGE).map(|told| wanted(told).0);
+    let degrees = |attitude: &Attitude| {
+        let is = angle(attitude).0;
+        let asked = is_made_to_turn(vehicle)
+            || told.map_or_else(|| is_banked_by_hand(vehicle), |told| apart(is, told) < FOLLOWS_RAD);
+        // On wings, and between both, no angle is too much.
+        let judged = vehicle.hovers(now) == Some(true) && !asked;
+        if judged || !is.is_finite() { is.to_degrees().abs() } else { 0.0 }
+    };
+    Reading::new(vehicle.attitude.at(), vehicle.attitude.get().map(degrees))
+}
+
+/// How far two angles are apart, the short way round.
+fn apart(one: f32, other: f32) -> f32 {
+    let turn = core::f32::consts::TAU;
+    let apart = libm::fabsf(one - other) % turn;
+    apart.min(turn - apart)
 }

@@ -1,6 +1,6 @@
 //! What a mishap is seen by: how long something lasts, what was greatest of late, what the vehicle hangs on and who flies it.
 
-use crate::observation::{Autopilot, EstimatorScale, Heartbeat, VehicleKind};
+use crate::observation::EstimatorScale;
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
@@ -149,44 +149,4 @@ pub(super) fn is_tilted(vehicle: &Vehicle) -> bool {
 /// The part of the throttle that the autopilot gives.
 pub(super) fn throttle(at: Instant, vehicle: &Vehicle) -> Option<f32> {
     vehicle.hud.within(at, FRESH).and_then(|hud| hud.throttle).map(|throttle| throttle.0)
-}
-
-fn has_wings(heartbeat: &Heartbeat) -> bool {
-    matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol)
-}
-
-/// Thrown or dropped into the air to start: `ArduCopter`'s THROW.
-pub(super) fn is_thrown(vehicle: &Vehicle) -> bool {
-    vehicle.heartbeat.get().is_some_and(|heartbeat| {
-        heartbeat.autopilot == Autopilot::ArduPilot && !has_wings(heartbeat) && heartbeat.mode == 18
-    })
-}
-
-/// Modes in which the pilot himself has the throttle, or which are made for falling: `ArduCopter`'s STABILIZE, ACRO, DRIFT, FLIP,
-/// THROW, AUTOROTATE; `ArduPlane`'s MANUAL, STABILIZE, TRAINING, ACRO, FBWA, AUTOTUNE, QSTABILIZE, QACRO, THERMAL; PX4's MANUAL,
-/// ACRO, STABILIZED. Of other autopilots nothing is known.
-pub(super) fn has_pilots_throttle(vehicle: &Vehicle) -> bool {
-    let Some(heartbeat) = vehicle.heartbeat.get() else { return true };
-    match heartbeat.autopilot {
-        Autopilot::ArduPilot if has_wings(heartbeat) => {
-            matches!(heartbeat.mode, 0 | 2 | 3 | 4 | 5 | 8 | 17 | 23 | 24)
-        }
-        Autopilot::ArduPilot => matches!(heartbeat.mode, 0 | 1 | 11 | 14 | 18 | 26),
-        Autopilot::Px4 => matches!(heartbeat.mode >> 16 & 0xFF, 1 | 5 | 7),
-        Autopilot::Other => true,
-    }
-}
-
-/// Modes that are made for turning over: `ArduCopter`'s ACRO, FLIP and TURTLE, `ArduPlane`'s MANUAL, TRAINING and ACRO, PX4's MANUAL and ACRO.
-pub(super) fn is_made_to_turn(vehicle: &Vehicle) -> bool {
-    let Some(heartbeat) = vehicle.heartbeat.get() else { return true };
-    let wings = has_wings(heartbeat);
-    match heartbeat.autopilot {
-        Autopilot::ArduPilot if wings => matches!(heartbeat.mode, 0 | 3 | 4 | 23),
-        Autopilot::ArduPilot => matches!(heartbeat.mode, 1 | 14 | 28),
-        Autopilot::Px4 => {
-            matches!(heartbeat.mode >> 16 & 0xFF, 5) || (wings && heartbeat.mode >> 16 & 0xFF == 1)
-        }
-        Autopilot::Other => false,
-    }
 }

@@ -1,13 +1,13 @@
 //! What each observation shows of a mishap.
 
 use super::evidence::{
-    BREAKS_OFF, BROKEN_OFF, FULL_THROTTLE, IDLE_THROTTLE, Shock, has_pilots_throttle, is_believed,
-    is_made_to_turn, is_thrown, on_rotors, throttle,
+    BREAKS_OFF, BROKEN_OFF, FULL_THROTTLE, IDLE_THROTTLE, Shock, is_believed, on_rotors, throttle,
 };
 use super::{Kind, Mishap, State, WATCHED};
 use crate::derived::{GRAVITY, load_factor_g, norm};
 use crate::flight::{climb_mps, ground_speed_mps, height_m};
-use crate::observation::{Air, Imu, Observation, VehicleKind};
+use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
+use crate::observation::{Air, Attitude, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::units::{MetresPerSecond2, RadiansPerSecond};
@@ -20,9 +20,14 @@ const UNCARRIED_G: f32 = 0.5;
 /// Tumbling and sinking last so long at least.
 const TUMBLES: Span = Span::from_millis(500);
 const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
+const TURNS_OVER: Span = Span::from_millis(700);
+/// The cosine of 100 degrees.
+const OVERTURNED: f32 = -0.174;
 const SINKS: Span = Span::from_millis(500);
-/// So much height is lost with all the thrust by what stalls, or has no propeller any more; gusts take less.
-const LOST_ON_WINGS_M: f32 = 10.0;
+/// So much height is lost with all the thrust by what stalls, or has lost a propeller; gusts take less.
+const LOST_M: f32 = 7.0;
+/// What sinks slower than this with all its thrust follows a glide path against the wind, m/s: a height is forgotten so fast.
+const GLIDES_MPS: f32 = 1.0;
 /// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
 const PULL_OUT_G: f32 = 6.0;
 /// Below this part of the throttle that it hovers with, a fall is what the throttle asks for.
@@ -53,6 +58,7 @@ impl Mishap {
             }
             Observation::Air(air) => self.take_pressure(at, air),
             Observation::Attitude(attitude) => {
+                self.take_attitude(at, attitude, vehicle, params);
                 if let Some(rates) = attitude.rates {
                     self.take_rates(at, rates, vehicle, params);
                 }
@@ -135,6 +141,15 @@ impl Mishap {
         }
     }
 
+    /// Rotors that pull downwards carry nothing: in no mode but those made for it does an autopilot or a pilot ask for that.
+    fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
+        let upright = libm::cosf(attitude.roll.0) * libm::cosf(attitude.pitch.0);
+        let over = upright < OVERTURNED && self.armed && on_rotors(at, vehicle) && !is_made_to_turn(vehicle);
+        if self.overturned.take(at, over).is_some_and(|span| span >= TURNS_OVER) {
+            self.see(at, Kind::Tumbling, self.rate.to_degrees().max(params.get(Param::MisTumble).next_up()));
+        }
+    }
+
     fn take_motion(&mut self, at: Instant, vehicle: &Vehicle, params: &Params) {
         let (Some(climb_mps), Some(ground_mps)) = (climb_mps(at, vehicle), ground_speed_mps(at, vehicle))
         else {
@@ -164,9 +179,9 @@ impl Mishap {
         let told_to = has_pilots_throttle(vehicle);
         let lost_m = self.lose_height(at, full && !told_to, vehicle);
         let sinks = match vehicle.hovers(at) {
-            Some(true) => sink_mps > limit_mps && (full || !told_to),
             // It descends as it is told to, but not with all its thrust.
-            Some(false) => lost_m > LOST_ON_WINGS_M,
+            Some(true) => (sink_mps > limit_mps && (full || !told_to)) || lost_m > LOST_M,
+            Some(false) => lost_m > LOST_M,
             None => false,
         };
         let sinks = sinks && self.armed && (is_believed(vehicle, params) || self.pressure.rises(at));
@@ -175,10 +190,12 @@ impl Mishap {
         }
     }
 
-    /// How far it is below the highest that it was since it has had all its thrust.
+    /// How far it is below the highest that it was since it has had all its thrust, but for what a glide path takes.
     fn lose_height(&mut self, at: Instant, thrust: bool, vehicle: &Vehicle) -> f32 {
+        let since_s = at.since(core::mem::replace(&mut self.peak_at, at)).as_secs_f32();
         let height_m = height_m(at, vehicle).filter(|_| thrust && self.armed);
-        self.peak_m = height_m.map_or(f32::NEG_INFINITY, |height_m| self.peak_m.max(height_m));
+        let faded_m = self.peak_m - GLIDES_MPS * since_s;
+        self.peak_m = height_m.map_or(f32::NEG_INFINITY, |height_m| faded_m.max(height_m));
         height_m.map_or(0.0, |height_m| self.peak_m - height_m)
     }
 

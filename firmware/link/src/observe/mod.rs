@@ -39,9 +39,11 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         33 => Observation::GlobalPosition(motion::global_position(payload)?),
         42 => Observation::MissionCurrent(read::<ap::MISSION_CURRENT_DATA>(payload, &[4])?.seq),
         46 => Observation::MissionReached(read::<ap::MISSION_ITEM_REACHED_DATA>(payload, &[])?.seq),
+        62 => Observation::Wanted(motion::nav_controller_output(payload)?),
         65 => Observation::RadioControl(system::rc(payload)?),
         74 => Observation::Hud(motion::hud(payload)?),
         77 => Observation::CommandAck(system::command_ack(payload)),
+        83 => Observation::Wanted(motion::attitude_target(payload)?),
         105 => {
             let (imu, air) = motion::highres_imu(payload)?;
             Observation::ImuAndAir(imu, air)

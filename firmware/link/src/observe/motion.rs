@@ -2,7 +2,7 @@
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud, Imu, LocalPosition,
-    Vibration, VibrationScale,
+    Vibration, VibrationScale, Wanted,
 };
 use hums_core::units::{
     Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
@@ -153,6 +153,20 @@ pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
     let rates = vector([attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed]);
     let rates = rates.map(|rates| rates.map(RadiansPerSecond));
     Some(Attitude { roll, pitch, yaw, rates, boot_ms: Some(attitude.time_boot_ms) })
+}
+
+/// `ArduPilot`: whole degrees in old versions.
+pub(super) fn nav_controller_output(payload: &[u8]) -> Option<Wanted> {
+    let [roll, pitch] = [0, 4].map(|at| Radians(float(payload, at).to_radians()));
+    (roll.0.is_finite() && pitch.0.is_finite()).then_some(Wanted { roll, pitch })
+}
+
+pub(super) fn attitude_target(payload: &[u8]) -> Option<Wanted> {
+    Wanted::from_quaternion([4, 8, 12, 16].map(|at| float(payload, at)))
+}
+
+fn float(payload: &[u8], at: usize) -> f32 {
+    f32::from_bits(Fields(payload).u32(at))
 }
 
 pub(super) fn local_position(payload: &[u8]) -> Option<LocalPosition> {

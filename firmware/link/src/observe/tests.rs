@@ -36,6 +36,22 @@ fn a_vehicle_of_a_type_that_is_newer_than_our_list_is_a_vehicle() {
 }
 
 #[test]
+fn the_wanted_attitude_is_told_in_degrees_and_as_a_quaternion() {
+    let wanted = |said: Option<Observation>| match said {
+        Some(Observation::Wanted(wanted)) => Some([wanted.roll.0, wanted.pitch.0].map(f32::to_degrees)),
+        _ => None,
+    };
+    let nav = ap::NAV_CONTROLLER_OUTPUT_DATA { nav_roll: -35.0, nav_pitch: 12.5, ..Default::default() };
+    assert_eq!(wanted(said(&nav)), Some([-35.0, 12.5]));
+    assert_eq!(wanted(said(&ap::NAV_CONTROLLER_OUTPUT_DATA { nav_pitch: f32::NAN, ..nav })), None);
+    let (sin, cos) = 15_f32.to_radians().sin_cos();
+    let target = ap::ATTITUDE_TARGET_DATA { q: [cos, 0.0, -sin, 0.0], ..Default::default() };
+    let [roll, pitch] = wanted(said(&target)).unwrap();
+    assert!(roll.abs() < 1e-3 && (pitch + 30.0).abs() < 1e-3, "{roll} {pitch}");
+    assert_eq!(wanted(said(&ap::ATTITUDE_TARGET_DATA { q: [0.0; 4], ..target })), None, "nothing yet");
+}
+
+#[test]
 fn unknown_system_status_is_none_of_the_values() {
     let message = ap::SYS_STATUS_DATA {
         load: u16::MAX,

@@ -13,6 +13,7 @@
 //! | `visible` | whether the messages show the fault at all |
 //! | `autopilot_texts` | what the autopilot said: second, `MAV_SEVERITY`, text |
 //! | `flights` | from and to of each time in the air; with it, `landings` and `crash_s` (null: none) |
+//! | `battery_low_s` | when the autopilot itself first called a battery low (null: never) |
 //!
 //! Other fields are passed over. Without `flights`, the flight takes no part in the count of flights, landings and mishaps.
 
@@ -20,9 +21,14 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
+use hums_core::health::{Subsystem, checks};
 use serde::Deserialize;
 
 use super::causes;
+
+/// A mishap that is told from so long before a crash to so long after it is that crash.
+const CRASH_BEFORE_S: f64 = 3.0;
+const CRASH_AFTER_S: f64 = 10.0;
 
 /// The name of the file.
 pub(super) const FILE: &str = "labels.json";
@@ -44,6 +50,8 @@ pub(super) struct Label {
     pub(super) landings: u64,
     #[serde(default)]
     pub(super) crash_s: Option<f64>,
+    #[serde(default)]
+    pub(super) battery_low_s: Option<f64>,
 }
 
 /// The labels of a folder, in their order.
@@ -74,6 +82,15 @@ impl Label {
             ensure!(*from_s >= 0.0 && to_s > from_s, "flights: {from_s} to {to_s} is no time");
         }
         Ok(())
+    }
+
+    /// Whether an alarm is true though nothing was done to the vehicle: it crashed all the same, or its own battery ran low.
+    pub(super) fn explains(&self, alarm: &str, at_s: f64) -> bool {
+        let of =
+            |subsystem: Subsystem| checks().any(|check| check.name == alarm && check.subsystem == subsystem);
+        let crash = |crash_s: f64| (crash_s - CRASH_BEFORE_S..crash_s + CRASH_AFTER_S).contains(&at_s);
+        (self.crash_s.is_some_and(crash) && of(Subsystem::Mishap))
+            || (self.battery_low_s.is_some_and(|low_s| at_s >= low_s) && of(Subsystem::Power))
     }
 
     /// The autopilot and the frame, without its version and what stands in brackets: `ArduCopter quad`.
@@ -115,6 +132,26 @@ mod tests {
         assert!(label.flights.is_none(), "no truth of its flights");
         let octa = FLIGHT.replace("PX4 1.17 SIH quad", "ArduCopter 4.7.0-dev (2025-10) octa (quad X8)");
         assert_eq!(parse(&format!("[{octa}}}]")).unwrap()[0].group(), "ArduCopter octa");
+    }
+
+    #[test]
+    fn a_crash_and_a_battery_that_the_autopilot_calls_low_explain_their_alarms_and_no_others() {
+        let text = FLIGHT.replace("20.5", "null");
+        let known = format!("[{text}, \"flights\": [[5, 30]], \"crash_s\": 30.0, \"battery_low_s\": 40.0}}]");
+        let label = &parse(&known).unwrap()[0];
+        for (check, at_s, explained) in [
+            ("impact", 31.5, true),
+            ("sinking", 28.0, true),
+            ("impact", 20.0, false),
+            ("impact", 45.0, false),
+            ("roll", 31.0, false),
+            ("batt_remaining", 41.0, true),
+            ("batt_remaining", 39.0, false),
+            ("sensors", 41.0, false),
+        ] {
+            assert_eq!(label.explains(check, at_s), explained, "{check} {at_s}");
+        }
+        assert!(!parse(&format!("[{text}}}]")).unwrap()[0].explains("impact", 31.5), "nothing is known");
     }
 
     #[test]

@@ -102,7 +102,9 @@ fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
         air.iter().map(|(from_s, to_s)| (to_s.min(quiet_s) - from_s).max(0.0)).fold(0.0, |sum, s| sum + s);
     let is_in_air =
         |at_s: f64| air.iter().any(|(from_s, to_s)| (*from_s..=to_s + AFTER_LANDING_S).contains(&at_s));
-    let false_ones = alarms.iter().filter(|alarm| alarm.at_s < quiet_s);
+    let false_ones = alarms.iter().filter(|alarm| {
+        alarm.at_s < quiet_s && !label.is_some_and(|label| label.explains(&alarm.check, alarm.at_s))
+    });
     let class = label.and_then(|label| causes::of(&label.class));
     let heartbeat = judged.vehicle().heartbeat.get();
     let autopilot = heartbeat.map_or_else(|| "unknown".to_owned(), |it| autopilot_name(it.autopilot_number));

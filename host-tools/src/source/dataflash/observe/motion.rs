@@ -2,7 +2,7 @@
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, Observation,
-    SystemTime, Vibration, VibrationScale,
+    SystemTime, Vibration, VibrationScale, Wanted,
 };
 use hums_core::time::Span;
 use hums_core::units::{
@@ -32,7 +32,12 @@ const MOTION: Handler =
     Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
 
 pub(super) const HANDLERS: &[Handler] = &[
-    Handler { names: &[("ATT", 0)], columns: &[&["Roll"], &["Pitch"], &["Yaw"]], take: attitude, ..MOTION },
+    Handler {
+        names: &[("ATT", 0)],
+        columns: &[&["Roll"], &["Pitch"], &["Yaw"], &["DesRoll"], &["DesPitch"]],
+        take: attitude,
+        ..MOTION
+    },
     Handler {
         names: &[("IMU", 0), ("IMU2", 1), ("IMU3", 2)],
         columns: &[
@@ -149,6 +154,12 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let [roll, pitch, yaw] = [roll, pitch, yaw].map(|degrees| Radians(degrees.to_radians()));
     // Rates are in IMU.
     let rates = None;
+    if let Some([roll, pitch]) = given.singles(3)
+        && [roll, pitch].into_iter().all(|degrees: f32| degrees.abs() <= TURN_DEG)
+    {
+        let [roll, pitch] = [roll, pitch].map(|degrees| Radians(degrees.to_radians()));
+        out.observe(&Observation::Wanted(Wanted { roll, pitch }));
+    }
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }
 

@@ -334,7 +334,9 @@ impl State {
             Craft::Copter => (VehicleKind::Rotorcraft, copter_type(frame_class.unwrap_or(1))),
             Craft::Heli => (VehicleKind::Rotorcraft, 4),
             Craft::Plane if quadplane && quadplane_type > 1 => (VehicleKind::Vtol, quadplane_type),
-            Craft::Plane => (if quadplane { VehicleKind::Vtol } else { VehicleKind::Plane }, 1),
+            // `MAV_TYPE_VTOL_FIXEDROTOR`
+            Craft::Plane if quadplane => (VehicleKind::Vtol, 22),
+            Craft::Plane => (VehicleKind::Plane, 1),
             Craft::Rover if frame_class == Some(2) => (VehicleKind::Surface, 11),
             Craft::Rover => (VehicleKind::Surface, 10),
             Craft::Sub => (VehicleKind::Surface, 12),

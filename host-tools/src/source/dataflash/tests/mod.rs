@@ -312,6 +312,25 @@ fn an_angle_that_is_none_is_no_attitude() {
 }
 
 #[test]
+fn the_attitude_that_is_wanted_stands_beside_the_one_that_is() {
+    let mut log = Writer::new();
+    log.format(150, "ATT", "Qfffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch,Yaw");
+    for (second, wanted) in [(1_u64, 40.0_f32), (2, f32::NAN), (3, 3.4e38)] {
+        let angles = [wanted, 38.0, -5.0, -4.0, 359.0].map(f32::to_le_bytes).concat();
+        log.raw(150, &[&(second * 1_000_000).to_le_bytes(), &angles]);
+    }
+    let seen = seen(&log.bytes);
+    let wanted = seen.find(|seen| match seen {
+        Observation::Wanted(wanted) => {
+            Some([wanted.roll.0, wanted.pitch.0].map(|angle| angle.to_degrees().round()))
+        }
+        _ => None,
+    });
+    assert_eq!(wanted, [[40.0, -5.0]]);
+    assert_eq!(seen.find(|seen| matches!(seen, Observation::Attitude(_)).then_some(())).len(), 3);
+}
+
+#[test]
 fn failsafes_are_in_force_by_name_until_they_are_resolved_or_it_is_disarmed() {
     let mut log = Writer::new();
     log.format(160, "MSG", "QZ", "TimeUS,Message");

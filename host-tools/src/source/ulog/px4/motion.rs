@@ -2,7 +2,7 @@
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition, Observation,
-    Vibration, VibrationScale,
+    Vibration, VibrationScale, Wanted,
 };
 use hums_core::units::{
     Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
@@ -46,6 +46,14 @@ pub(super) const TOPICS: &[Topic] = &[
         every_us: FAST_US,
         fields: &["q", "rollspeed", "pitchspeed", "yawspeed"],
         take: attitude,
+    },
+    Topic {
+        name: "vehicle_attitude_setpoint",
+        instances: 1,
+        every_us: MEDIUM_US,
+        // Until v1.15 the angles are in it too, and before v1.6 only they.
+        fields: &["q_d", "roll_body", "pitch_body"],
+        take: attitude_setpoint,
     },
     Topic {
         name: "vehicle_local_position",
@@ -216,6 +224,17 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
         rates: rates.map(|rates| rates.map(RadiansPerSecond)),
         boot_ms: Some((said.recorded_us / 1_000) as u32),
     }));
+}
+
+fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
+    let angles = || {
+        let [roll, pitch] = [said.fields.finite(1)?, said.fields.finite(2)?].map(Radians);
+        Some(Wanted { roll, pitch })
+    };
+    let wanted = said.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
+    if let Some(wanted) = wanted {
+        px4.observe(Observation::Wanted(wanted));
+    }
 }
 
 fn local_position(px4: &mut Px4, said: &Said<'_>) {

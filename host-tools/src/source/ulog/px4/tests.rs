@@ -185,6 +185,22 @@ fn an_attitude_is_that_of_its_quaternion_and_fast_topics_are_thinned() {
 }
 
 #[test]
+fn the_wanted_attitude_is_a_quaternion_and_before_v1_6_two_angles() {
+    let half = 0.5_f32.sqrt();
+    for (fields, values) in [
+        ("float roll_body;float pitch_body;float[4] q_d;", vec![0.0, 0.0, half, half, 0.0, 0.0]),
+        ("float[4] q_d;", vec![half, half, 0.0, 0.0]),
+        ("float roll_body;float pitch_body;", vec![core::f32::consts::FRAC_PI_2, 0.0]),
+    ] {
+        let format = format!("vehicle_attitude_setpoint:uint64_t timestamp;{fields}");
+        let log = Writer::new(SECOND).format(&format).subscribe(0, 0, "vehicle_attitude_setpoint");
+        let log = log.data(0, 2 * SECOND, &floats(&values));
+        let wanted = observations(&read(&log.bytes), "Wanted(");
+        assert!(wanted.len() == 1 && wanted[0].contains("roll: Radians(1.57"), "{fields} {wanted:?}");
+    }
+}
+
+#[test]
 fn the_rates_of_an_attitude_are_its_own_or_those_of_the_gyros() {
     let attitude = [1.0, 0.0, 0.0, 0.0];
     let old =

@@ -1,0 +1,143 @@
+//! Free falls, disarming in the air, and what becomes of the flight.
+
+use super::*;
+
+#[test]
+fn a_fall_with_the_motors_asked_for_thrust_ends_the_flight_with_its_touch() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), fall);
+        let told = outcome.told();
+        assert_eq!(told.first(), Some(&"free_fall"), "{of:?}: {told:?}");
+        assert!(told.contains(&"impact"), "{of:?}: {told:?}");
+        let [(began_ms, Change::Began(Kind::FreeFall)), (down_ms, Change::Down)] = outcome.changes[..] else {
+            panic!("{of:?}: {:?}", outcome.changes)
+        };
+        let (place, touch) = (outcome.reports[0].place, outcome.reports[1].touch);
+        assert!((AT_MS + 300..=AT_MS + 500).contains(&began_ms), "{of:?}: {began_ms}");
+        assert!((AT_MS + 3_000..AT_MS + 5_000).contains(&down_ms), "{of:?}: {down_ms}");
+        assert_eq!(place.position, Some((473_977_420, -85_455_940)));
+        assert!((150..200).contains(&touch), "{of:?}: {touch}");
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}");
+        assert_eq!(outcome.count(UsageCounter::HardLandings), 1);
+        assert!(outcome.count(UsageCounter::TouchdownMax) >= 15, "{of:?}");
+        // Nothing that would only echo it.
+        let echoes = outcome.findings.iter().filter(|finding| {
+            finding.subsystem != Subsystem::Mishap && finding.at.as_millis() > began_ms + 100
+        });
+        assert_eq!(echoes.count(), 0, "{of:?}: {:?}", outcome.findings);
+    }
+}
+
+#[test]
+fn what_does_not_fly_has_no_mishap_of_the_air() {
+    for (autopilot, kind, type_number) in SURFACE {
+        let rover = Quad { landed: Some(LandedState::InAir), ..vehicle(autopilot, kind, type_number) };
+        let outcome = fly(&rover, fall);
+        assert!(
+            outcome.told().is_empty() && outcome.changes.is_empty(),
+            "{type_number}: {:?}",
+            outcome.changes
+        );
+    }
+}
+
+#[test]
+fn a_vehicle_that_is_disarmed_in_the_air_is_told_and_one_that_lands_on_a_hill_is_not() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            fall(ms, quad, motion);
+            (quad.armed, quad.throttle) = (false, 0.0);
+        });
+        let told = outcome.told();
+        assert!(told.contains(&"disarmed_in_air"), "{of:?}: {told:?} {:?}", outcome.changes);
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}");
+        assert_eq!(outcome.count(UsageCounter::HardLandings), 1, "{of:?}");
+        let hill = fly(&hovering(of), |ms, quad, _| {
+            (quad.armed, quad.throttle, quad.landed) = (ms < 1_000, 0.0, Some(LandedState::OnGround));
+        });
+        assert!(hill.told().is_empty(), "{of:?}: {:?}", hill.findings);
+        assert_eq!(hill.flights(), (1, 1, 0), "{of:?}");
+        // Without a landed state the height above home says that it flies; nothing falls, so nothing was disarmed in the air.
+        let mut silent = hovering(of);
+        silent.landed = None;
+        let hill = fly(&silent, |ms, quad, _| (quad.armed, quad.throttle) = (ms < 1_000, 0.0));
+        assert!(hill.told().is_empty(), "{of:?}: {:?}", hill.findings);
+        assert_eq!(hill.flights(), (1, 1, 0), "{of:?}");
+    }
+}
+
+#[test]
+fn a_plane_that_is_disarmed_in_the_air_glides_on_and_is_told() {
+    for of in WINGS {
+        let outcome = fly(&on_wings(of), |ms, quad, motion| {
+            (quad.armed, quad.throttle) = (false, 0.0);
+            motion.ground_mps = if ms < 8_000 { 18.0 } else { 0.0 };
+            (quad.climb, quad.height) =
+                if ms < 8_000 { (-2.0, 20.0 - ms as f32 / 500.0) } else { (0.0, 0.0) };
+        });
+        assert_eq!(outcome.told(), ["disarmed_in_air"], "{of:?}");
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}");
+    }
+}
+
+#[test]
+fn what_the_throttle_asks_for_is_no_free_fall_and_a_dead_sensor_is_none_either() {
+    let dive: Script = |ms, quad, motion| {
+        if ms < 1_500 {
+            (motion.load_g, quad.throttle) = (0.05, 0.0);
+        }
+    };
+    let thrown = Quad { mode: 18, ..hovering(ROTORS[0]) };
+    for (quad, script) in [
+        (hovering(ROTORS[0]), dive),
+        (thrown, |ms, _, motion: &mut Motion| {
+            if ms < 1_000 {
+                motion.load_g = 0.05;
+            }
+        }),
+    ] {
+        assert!(fly(&quad, script).told().is_empty());
+    }
+}
+
+#[test]
+fn after_a_mishap_the_next_arming_begins_anew() {
+    let outcome = fly(&hovering(ROTORS[0]), |ms, quad, motion| {
+        fall(ms, quad, motion);
+        quad.landed = Some(LandedState::OnGround);
+        quad.armed = !(8_000..20_000).contains(&ms);
+        if ms >= 25_000 {
+            (quad.height, quad.throttle, quad.landed) = (20.0, 0.5, Some(LandedState::InAir));
+        }
+    });
+    assert_eq!(outcome.flights(), (2, 0, 1), "{:?}", outcome.changes);
+    assert!(outcome.monitor.flight().airborne());
+    assert_eq!(outcome.monitor.health().subsystem(Subsystem::Mishap), Level::Ok);
+}
+
+#[test]
+fn every_text_of_a_mishap_fits() {
+    let place = |height_m| Place { position: Some((-899_999_999, -1_799_999_999)), height_m };
+    let unknown = Place { position: None, height_m: -12_345 };
+    let began = Change::Began(Kind::Sinking);
+    let cases = [
+        (began, place(-999)),
+        (began, place(12_345)),
+        (began, unknown),
+        (Change::Down, place(0)),
+        (Change::FliesOn, unknown),
+        (Change::OnBench(Kind::Disarmed), unknown),
+    ];
+    for (change, place) in cases {
+        let text = Report { change, place, touch: 9_999 }.text();
+        assert!(!text.is_empty() && "HUMS: ".len() + text.len() <= 50, "{text}");
+        if change == Change::Down {
+            assert!(text.ends_with("999.9 m/s"), "{text}");
+        } else if change == began {
+            assert!(text.ends_with(" m"), "{text}");
+        }
+    }
+    let place = Place { position: Some((473_977_420, -85_455_940)), height_m: 30 };
+    let report = Report { change: Change::Began(Kind::Impact), place, touch: 0 };
+    assert_eq!(report.text(), "mishap at 47.397742,-8.545594 30 m");
+}

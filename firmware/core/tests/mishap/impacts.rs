@@ -1,0 +1,154 @@
+//! Impacts, landings and wrecks.
+
+use super::*;
+
+#[test]
+fn a_quad_that_lies_on_its_back_has_crashed_whatever_its_estimator_says() {
+    let acro = Quad { mode: 1, landed: None, ..hovering(ROTORS[0]) };
+    let outcome = fly(&acro, |ms, quad, motion| {
+        if ms < 1_000 {
+            (motion.load_g, motion.rates) = (5.0, [12.0, 3.0, 0.0]);
+        } else {
+            // The estimator goes on falling, the throttle stick is where it was.
+            (motion.load_g, motion.rates, quad.climb) = (-1.0, [0.0; 3], -12.0);
+            (quad.height, quad.throttle) = (3.0 - ms as f32 / 100.0, 0.4);
+        }
+    });
+    assert_eq!(outcome.told(), ["impact"]);
+    assert_eq!(outcome.flights(), (1, 0, 1), "{:?}", outcome.changes);
+}
+
+#[test]
+fn a_wreck_that_is_carried_home_armed_flies_no_more() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            fall(ms, quad, motion);
+            if ms >= 8_000 {
+                (motion.ground_mps, motion.rates, quad.height) = (3.0, [0.4, 0.5, 0.2], 1.5);
+            }
+        });
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
+    }
+}
+
+#[test]
+fn an_impact_is_a_shock_a_speed_that_breaks_off_and_then_stillness() {
+    let crash: Script = |ms, quad, motion| {
+        (motion.ground_mps, quad.climb) = (18.0, -3.0);
+        if ms >= 1_000 {
+            quad.climb = 0.0;
+            motion.load_g = if ms < 1_100 { 8.0 } else { 1.0 };
+            (motion.ground_mps, quad.throttle, quad.height, motion.rates) = (0.0, 0.0, 0.5, [0.0; 3]);
+        }
+    };
+    for of in WINGS {
+        let outcome = fly(&on_wings(of), crash);
+        assert_eq!(outcome.told(), ["impact"], "{of:?}");
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}");
+        assert_eq!(outcome.reports[0].touch, 30, "{of:?}: as it sank before the shock");
+    }
+    // A shock alone: a gust, a bird, a hard manoeuvre.
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, _, motion| {
+            if ms < 100 {
+                motion.load_g = 6.0;
+            }
+        });
+        assert!(outcome.told().is_empty(), "{of:?}: {:?}", outcome.findings);
+        assert_eq!(outcome.flights(), (1, 0, 0));
+    }
+}
+
+#[test]
+fn a_hard_landing_is_none() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            let touches = 9_600;
+            if ms < touches {
+                (quad.climb, quad.height) = (-2.0, 20.0 - ms as f32 / 500.0);
+            } else {
+                (quad.climb, quad.height, quad.throttle) = (0.0, 0.8, 0.0);
+                motion.load_g = if ms < touches + 100 { 4.0 } else { 1.0 };
+                quad.landed =
+                    Some(if ms < touches + 1_000 { LandedState::InAir } else { LandedState::OnGround });
+                quad.armed = ms < touches + 3_000;
+            }
+        });
+        assert!(outcome.told().is_empty(), "{of:?}: {:?}", outcome.findings);
+        assert_eq!(outcome.flights(), (1, 1, 0), "{of:?}");
+        assert_eq!(outcome.count(UsageCounter::HardLandings), 1, "{of:?}");
+    }
+}
+
+#[test]
+fn a_landing_that_legs_take_is_none_though_it_moves_sideways() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            let touches = 7_800;
+            if ms < touches {
+                motion.ground_mps = 3.3;
+                (quad.climb, quad.height) = (-2.5, 20.0 - ms as f32 / 400.0);
+            } else {
+                (quad.climb, quad.height, quad.throttle) = (0.0, 0.2, 0.0);
+                (motion.ground_mps, motion.rates) = (0.0, [0.0; 3]);
+                motion.load_g = if ms < touches + 100 { 3.8 } else { 1.0 };
+            }
+        });
+        assert!(outcome.told().is_empty(), "{of:?}: {:?}", outcome.findings);
+        assert_eq!(outcome.flights(), (1, 1, 0), "{of:?}");
+    }
+}
+
+/// Touches at 11.5 m/s with a hard jolt, and slides to a stop.
+fn skids(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    let slid = ms as f32 / 1_000.0;
+    motion.ground_mps = if ms < 2_000 { 11.5 } else { (11.5 - 8.0 * (slid - 2.0)).max(0.0) };
+    (quad.climb, quad.height) = if ms < 2_000 { (-0.4, 0.8 - 0.4 * slid) } else { (0.0, 0.0) };
+    motion.load_g = if (2_000..2_100).contains(&ms) { 10.8 } else { 1.0 };
+    motion.rates = if ms < 3_500 { CALM.rates } else { [0.0; 3] };
+    quad.throttle = 0.05;
+}
+
+#[test]
+fn a_plane_that_lands_without_throttle_skids_and_one_that_flies_into_a_wall_does_not() {
+    for of in WINGS {
+        assert!(fly(&on_wings(of), skids).told().is_empty(), "{of:?}");
+        let hit = fly(&on_wings(of), |ms, quad, motion| {
+            skids(ms, quad, motion);
+            quad.throttle = 0.6;
+            if ms >= 3_600 {
+                quad.landed = Some(LandedState::OnGround);
+            }
+        });
+        assert_eq!(hit.told(), ["impact"], "{of:?}: {:?}", hit.changes);
+    }
+}
+
+#[test]
+fn a_wreck_that_dances_on_the_ground_with_all_its_thrust_is_down() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            quad.throttle = 1.0;
+            if ms < 2_500 {
+                (quad.climb, quad.height) = (-8.0, 20.0 - ms as f32 / 125.0);
+            } else {
+                (quad.climb, quad.height, motion.ground_mps) = (0.3, 0.6, 0.5);
+                motion.rates = [0.5, 0.3, 2.5];
+            }
+        });
+        assert_eq!(outcome.told(), ["sinking"], "{of:?}");
+        assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
+    }
+}
+
+#[test]
+fn what_crashed_and_was_never_disarmed_begins_another_flight_where_it_hovers() {
+    let outcome = fly(&hovering(ROTORS[0]), |ms, quad, motion| {
+        fall(ms, quad, motion);
+        if ms >= 20_000 {
+            (quad.climb, quad.height, quad.throttle) = (0.0, 12.0, 0.5);
+            (motion.ground_mps, motion.load_g, motion.rates) = (0.1, 1.0, CALM.rates);
+        }
+    });
+    assert_eq!(outcome.flights(), (2, 0, 1), "{:?}", outcome.changes);
+}

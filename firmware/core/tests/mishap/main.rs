@@ -1,0 +1,179 @@
+//! Mishaps, scripted for each class of vehicle: what is one, what is none, and what becomes of the flight.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod falls;
+mod impacts;
+mod sinks;
+mod turns;
+
+use common::{AUTOPILOT, Quad};
+use hums_core::Monitor;
+use hums_core::happening::Happening;
+use hums_core::health::{Finding, Level, Subsystem};
+use hums_core::mishap::{Change, Kind, Place, Report};
+use hums_core::observation::{
+    Air, Attitude, Autopilot, GlobalPosition, Imu, LandedState, Observation, VehicleKind, VtolState,
+};
+use hums_core::params::Params;
+use hums_core::status::LinkReading;
+use hums_core::time::Instant;
+use hums_core::units::{
+    Hectopascals, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
+};
+use hums_core::usage::UsageCounter;
+
+/// When it goes wrong.
+const AT_MS: u64 = 20_000;
+
+/// How the vehicle moves besides what a [`Quad`] says.
+#[derive(Clone, Copy)]
+struct Motion {
+    load_g: f32,
+    rates: [f32; 3],
+    ground_mps: f32,
+    pitch: f32,
+    /// What the barometer says; where it says anything.
+    pressure_hpa: Option<f32>,
+}
+
+const CALM: Motion =
+    Motion { load_g: 1.0, rates: [0.01, 0.02, 0.0], ground_mps: 0.1, pitch: 0.02, pressure_hpa: None };
+
+type Script = fn(u64, &mut Quad, &mut Motion);
+
+struct Outcome {
+    monitor: Monitor,
+    findings: Vec<Finding>,
+    changes: Vec<(u64, Change)>,
+    reports: Vec<Report>,
+}
+
+impl Outcome {
+    /// What was told of mishaps, each kind once, in order.
+    fn told(&self) -> Vec<&'static str> {
+        let of_mishap =
+            |finding: &&Finding| finding.subsystem == Subsystem::Mishap && finding.level == Level::Critical;
+        self.findings.iter().filter(of_mishap).map(|finding| finding.check).collect()
+    }
+
+    fn count(&self, counter: UsageCounter) -> u32 {
+        self.monitor.usage().value(counter).unwrap_or(0.0) as u32
+    }
+
+    fn flights(&self) -> (u32, u32, u32) {
+        let [flights, landings, mishaps] =
+            [UsageCounter::Flights, UsageCounter::Landings, UsageCounter::Mishaps].map(|of| self.count(of));
+        (flights, landings, mishaps)
+    }
+}
+
+/// A minute; `script` gets the time since it goes wrong.
+fn fly(vehicle: &Quad, script: Script) -> Outcome {
+    let mut monitor = Monitor::new(Params::defaults());
+    let (mut findings, mut changes, mut reports) = (Vec::new(), Vec::new(), Vec::new());
+    for now_ms in (0..60_000).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        let (mut quad, mut motion) = (vehicle.clone(), CALM);
+        if now_ms >= AT_MS {
+            script(now_ms - AT_MS, &mut quad, &mut motion);
+        }
+        // No sensor says the same for ever.
+        let noise = (now_ms / 50 % 7) as f32 * 0.002;
+        let acceleration = Some([0.0, 0.0, -(motion.load_g + noise) * 9.806_65].map(MetresPerSecond2));
+        let rates = Some(motion.rates.map(RadiansPerSecond));
+        let imu = Imu { acceleration, rate: rates, ..Imu::default() };
+        monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
+        if now_ms.is_multiple_of(100) {
+            let (roll, pitch) = (Radians(quad.roll), Radians(motion.pitch));
+            let attitude = Attitude { roll, pitch, rates, ..Attitude::default() };
+            let height = if now_ms < 2_000 { quad.start_height } else { quad.height };
+            let global = GlobalPosition {
+                position: Some(Position { latitude_deg: 47.397_742, longitude_deg: -8.545_594 }),
+                relative_altitude: hums_core::units::Metres(height),
+                velocity: [motion.ground_mps, 0.0, -quad.climb].map(MetresPerSecond),
+                ..GlobalPosition::default()
+            };
+            let said = quad.says(now_ms).into_iter().filter(|said| {
+                !matches!(
+                    said,
+                    Observation::Imu(_) | Observation::Attitude(_) | Observation::GlobalPosition(_)
+                )
+            });
+            let air = Air { pressure: motion.pressure_hpa.map(Hectopascals), ..Air::default() };
+            let own =
+                [Observation::Air(air), Observation::Attitude(attitude), Observation::GlobalPosition(global)];
+            for said in said.chain(own) {
+                monitor.observe(now, AUTOPILOT, &said);
+            }
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
+        while let Some(happening) = monitor.take_happening() {
+            if let Happening::Mishap(change) = happening {
+                changes.push((now_ms, change));
+                reports.push(monitor.mishap().report(change));
+            }
+        }
+    }
+    Outcome { monitor, findings, changes, reports }
+}
+
+/// Falls from 20 m for two seconds, hits with 15 g, and lies.
+fn fall(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    let seconds = ms as f32 / 1_000.0;
+    if ms < 2_000 {
+        (motion.load_g, quad.climb, quad.height) = (0.05, -9.8 * seconds, 20.0 - 4.9 * seconds * seconds);
+    } else {
+        (quad.climb, quad.height, quad.throttle) = (0.0, 0.0, 0.0);
+        motion.load_g = if ms < 2_100 { 15.0 } else { 1.0 };
+        motion.rates = [0.0; 3];
+    }
+}
+
+fn vehicle(autopilot: Autopilot, kind: VehicleKind, type_number: u8) -> Quad {
+    // A mode in which the autopilot flies: ArduCopter's AUTO, ArduPlane's and PX4's missions.
+    let mode = match (autopilot, kind) {
+        (Autopilot::Px4, _) => 0x0404_0000,
+        (_, VehicleKind::Plane | VehicleKind::Vtol) => 10,
+        _ => 3,
+    };
+    Quad { mode, autopilot, kind, type_number, ..Quad::healthy() }
+}
+
+const ROTORS: [(Autopilot, VehicleKind, u8); 6] = [
+    (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 2),
+    (Autopilot::Px4, VehicleKind::Rotorcraft, 2),
+    (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 13),
+    (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 4),
+    (Autopilot::ArduPilot, VehicleKind::Vtol, 22),
+    (Autopilot::Px4, VehicleKind::Vtol, 22),
+];
+
+const WINGS: [(Autopilot, VehicleKind, u8); 4] = [
+    (Autopilot::ArduPilot, VehicleKind::Plane, 1),
+    (Autopilot::Px4, VehicleKind::Plane, 1),
+    (Autopilot::ArduPilot, VehicleKind::Vtol, 22),
+    (Autopilot::Px4, VehicleKind::Vtol, 22),
+];
+
+const SURFACE: [(Autopilot, VehicleKind, u8); 6] = [
+    (Autopilot::ArduPilot, VehicleKind::Surface, 10),
+    (Autopilot::ArduPilot, VehicleKind::Surface, 11),
+    (Autopilot::ArduPilot, VehicleKind::Surface, 12),
+    (Autopilot::Px4, VehicleKind::Surface, 10),
+    (Autopilot::Px4, VehicleKind::Surface, 11),
+    (Autopilot::Px4, VehicleKind::Surface, 12),
+];
+
+fn hovering((autopilot, kind, type_number): (Autopilot, VehicleKind, u8)) -> Quad {
+    Quad { landed: Some(LandedState::InAir), vtol: VtolState::Hover, ..vehicle(autopilot, kind, type_number) }
+}
+
+fn on_wings((autopilot, kind, type_number): (Autopilot, VehicleKind, u8)) -> Quad {
+    Quad {
+        landed: Some(LandedState::InAir),
+        vtol: VtolState::Forward,
+        ..vehicle(autopilot, kind, type_number)
+    }
+}

@@ -1,0 +1,117 @@
+//! Sinking without being told to.
+
+use super::*;
+
+#[test]
+fn sinking_is_a_mishap_where_the_autopilot_flies_and_not_where_the_pilot_asks_for_it() {
+    let sinks: Script = |ms, quad, _| {
+        if ms < 2_000 {
+            (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
+        }
+    };
+    for of in ROTORS {
+        assert_eq!(fly(&hovering(of), sinks).told(), ["sinking"], "{of:?}");
+        let pilots_mode = if of.0 == Autopilot::Px4 { 0x0007_0000 } else { 0 };
+        let pilots = Quad { mode: pilots_mode, ..hovering(of) };
+        assert!(fly(&pilots, sinks).told().is_empty(), "{of:?}");
+    }
+    for of in WINGS {
+        assert!(fly(&on_wings(of), sinks).told().is_empty(), "{of:?}");
+    }
+}
+
+#[test]
+fn an_estimator_that_does_not_believe_itself_makes_no_mishap_unless_the_air_agrees() {
+    // It shakes, climbs by the air, and lands hard and safe while the estimator says that it falls.
+    let shaken: Script = |ms, quad, motion| {
+        let seconds = ms as f32 / 1_000.0;
+        motion.pressure_hpa = Some(1_000.0 - if ms < 6_000 { 0.4 * seconds } else { 2.4 });
+        quad.estimator.velocity = Some(1.5);
+        quad.climb = if (1_500..7_900).contains(&ms) { -10.0 } else { 0.0 };
+        if ms >= 8_000 {
+            motion.load_g = if ms < 8_100 { 4.0 } else { 1.0 };
+            (quad.throttle, motion.rates) = (0.0, [0.0; 3]);
+        }
+    };
+    for of in ROTORS {
+        assert!(fly(&hovering(of), shaken).told().is_empty(), "{of:?}");
+        let sinks = fly(&hovering(of), |ms, quad, motion| {
+            motion.pressure_hpa = Some(1_000.0 + if ms < 2_000 { ms as f32 / 1_000.0 } else { 2.0 });
+            (quad.estimator.velocity, quad.climb) = (Some(1.5), if ms < 2_000 { -8.0 } else { 0.0 });
+        });
+        assert_eq!(sinks.told(), ["sinking"], "{of:?}");
+    }
+}
+
+#[test]
+fn what_is_made_for_falling_is_not_told() {
+    let autorotation: Script = |ms, quad, _| {
+        if ms < 5_000 {
+            (quad.climb, quad.throttle) = (-10.0, 0.0);
+        }
+    };
+    let helicopter = Quad { mode: 26, ..hovering((Autopilot::ArduPilot, VehicleKind::Rotorcraft, 4)) };
+    let thrown = Quad { mode: 18, ..hovering(ROTORS[0]) };
+    for quad in [helicopter, thrown] {
+        assert!(fly(&quad, autorotation).told().is_empty(), "{}", quad.mode);
+    }
+}
+
+#[test]
+fn a_plane_that_sinks_with_all_its_thrust_is_told_and_a_glide_is_not() {
+    let pulls_out: Script = |ms, quad, motion| {
+        sinks_with_thrust(ms, quad, motion);
+        motion.load_g = if (5_000..5_500).contains(&ms) { 4.0 } else { 1.0 };
+    };
+    let glides: Script = |ms, quad, motion| {
+        sinks_with_thrust(ms, quad, motion);
+        quad.throttle = 0.0;
+    };
+    for of in WINGS {
+        let outcome = fly(&on_wings(of), pulls_out);
+        assert_eq!(outcome.told(), ["sinking"], "{of:?}");
+        let (began_ms, _) = outcome.changes[0];
+        assert!((AT_MS + 3_000..AT_MS + 4_000).contains(&began_ms), "{of:?}: {began_ms}");
+        assert_eq!(outcome.flights(), (1, 0, 0), "{of:?}: it flies on");
+        assert!(fly(&on_wings(of), glides).told().is_empty(), "{of:?}");
+        let pilots_mode = if of.0 == Autopilot::Px4 { 0x0001_0000 } else { 5 };
+        let dives = Quad { mode: pilots_mode, ..on_wings(of) };
+        assert!(fly(&dives, sinks_with_thrust).told().is_empty(), "{of:?}: the pilot dives");
+    }
+}
+
+fn sinks_with_thrust(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    motion.ground_mps = 8.0;
+    if ms < 8_000 {
+        (quad.climb, quad.throttle, quad.height) = (-3.4, 1.0, 60.0 - 3.4 * ms as f32 / 1_000.0);
+    }
+}
+
+#[test]
+fn a_plane_that_follows_its_glide_path_against_the_wind_with_all_its_thrust_is_none() {
+    let descends: Script = |ms, quad, motion| {
+        (motion.ground_mps, quad.throttle) = (8.0, 1.0);
+        (quad.climb, quad.height) = (-0.7, 90.0 - 0.7 * ms as f32 / 1_000.0);
+    };
+    for of in WINGS {
+        assert!(fly(&Quad { height: 90.0, ..on_wings(of) }, descends).told().is_empty(), "{of:?}");
+    }
+}
+
+fn sinks_slowly(ms: u64, quad: &mut Quad, _: &mut Motion) {
+    if ms < 6_000 {
+        (quad.climb, quad.height, quad.throttle) = (-4.5, 60.0 - 4.5 * ms as f32 / 1_000.0, 0.97);
+    }
+}
+
+#[test]
+fn a_multicopter_that_loses_height_with_all_its_thrust_sinks_though_it_sinks_slowly() {
+    for of in ROTORS {
+        assert_eq!(fly(&Quad { height: 60.0, ..hovering(of) }, sinks_slowly).told(), ["sinking"], "{of:?}");
+        let told_to = fly(&Quad { height: 60.0, ..hovering(of) }, |ms, quad, motion| {
+            sinks_slowly(ms, quad, motion);
+            quad.throttle = 0.3;
+        });
+        assert!(told_to.told().is_empty(), "{of:?}");
+    }
+}

@@ -1,0 +1,95 @@
+//! Tumbling and turning over.
+
+use super::*;
+
+#[test]
+fn tumbling_is_told_by_body_rates_and_a_vehicle_that_recovers_has_one_flight() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), |ms, _, motion| {
+            if ms < 1_500 {
+                motion.rates = [15.0, 2.0, 0.0];
+            }
+        });
+        assert_eq!(outcome.told(), ["tumbling"], "{of:?}");
+        let [(began_ms, Change::Began(Kind::Tumbling)), (over_ms, Change::FliesOn)] = outcome.changes[..]
+        else {
+            panic!("{of:?}: {:?}", outcome.changes)
+        };
+        assert!(
+            began_ms <= AT_MS + 700 && (AT_MS + 6_000..AT_MS + 7_000).contains(&over_ms),
+            "{began_ms} {over_ms}"
+        );
+        assert_eq!(outcome.flights(), (1, 0, 0), "{of:?}: the flight goes on");
+        let last = outcome.findings.last().unwrap();
+        assert_eq!((last.check, last.level), ("tumbling", Level::Ok));
+    }
+    let pilots = [
+        (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 2, 1),
+        (Autopilot::Px4, VehicleKind::Rotorcraft, 2, 0x0005_0000),
+        (Autopilot::ArduPilot, VehicleKind::Plane, 1, 4),
+    ];
+    for (autopilot, kind, type_number, mode) in pilots {
+        let acro = Quad { mode, ..hovering((autopilot, kind, type_number)) };
+        let outcome = fly(&acro, |ms, _, motion| {
+            if ms < 3_000 {
+                motion.rates = [8.0, 0.0, 0.0];
+            }
+        });
+        assert!(outcome.told().is_empty(), "{autopilot:?} {kind:?}: acro is what the pilot wants");
+    }
+}
+
+#[test]
+fn a_plane_rolls_and_dives_as_it_likes_and_a_spin_is_told() {
+    for of in WINGS {
+        let roll = fly(&on_wings(of), |ms, quad, motion| {
+            motion.ground_mps = 18.0;
+            if ms < 1_000 {
+                (motion.rates, quad.climb, motion.load_g) = ([6.5, 0.0, 0.0], -12.0, 0.1);
+            }
+        });
+        assert!(roll.told().is_empty(), "{of:?}: {:?}", roll.findings);
+        let spin = fly(&on_wings(of), |ms, _, motion| {
+            motion.ground_mps = 18.0;
+            if ms < 4_000 {
+                motion.rates = [6.5, 1.0, 3.0];
+            }
+        });
+        assert_eq!(spin.told(), ["tumbling"], "{of:?}");
+    }
+}
+
+#[test]
+fn on_the_bench_it_is_an_event_for_each_arming_and_not_told() {
+    let bench =
+        Quad { height: 0.0, landed: Some(LandedState::OnGround), throttle: 0.0, ..hovering(ROTORS[0]) };
+    let outcome = fly(&bench, |ms, _, motion| {
+        if ms % 5_000 < 2_000 {
+            motion.rates = [9.0, 0.0, 0.0];
+        }
+    });
+    assert!(outcome.told().is_empty(), "{:?}", outcome.findings);
+    assert!(matches!(outcome.changes[..], [(_, Change::OnBench(Kind::Tumbling))]), "{:?}", outcome.changes);
+    let disarmed = Quad { armed: false, ..bench };
+    assert!(fly(&disarmed, fall).changes.is_empty(), "nobody watches what is carried about");
+}
+
+#[test]
+fn a_multicopter_whose_top_looks_down_is_told_but_not_in_modes_made_for_it() {
+    let overturned: Script = |ms, quad, _| {
+        if ms < 1_500 {
+            quad.roll = 2.5;
+        }
+    };
+    for of in ROTORS {
+        assert_eq!(fly(&hovering(of), overturned).told(), ["tumbling"], "{of:?}");
+        let mode = if of.0 == Autopilot::Px4 { 0x0005_0000 } else { 1 };
+        let kind = of.1;
+        if kind == VehicleKind::Rotorcraft {
+            assert!(fly(&Quad { mode, ..hovering(of) }, overturned).told().is_empty(), "{of:?}");
+        }
+    }
+    for of in WINGS {
+        assert!(fly(&on_wings(of), overturned).told().is_empty(), "{of:?}: a roll");
+    }
+}

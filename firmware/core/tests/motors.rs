@@ -1,0 +1,84 @@
+//! Speeds of motors against each other: which frames, what turns, what stands.
+
+mod common;
+
+use common::{AUTOPILOT, Quad};
+use hums_core::Monitor;
+use hums_core::observation::{Attitude, Esc, EscGroup, LandedState, Observation};
+use hums_core::params::Params;
+use hums_core::status::LinkReading;
+use hums_core::time::Instant;
+use hums_core::units::{Radians, RadiansPerSecond, Rpm};
+
+/// A minute of flight with these speeds from 20 s on, turning with `yaw_rate` then; what is told of motors.
+fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8)> {
+    let mut monitor = Monitor::new(Params::defaults());
+    let mut findings = Vec::new();
+    for now_ms in (0..60_000).step_by(100) {
+        let now = Instant::from_millis(now_ms);
+        let begun = now_ms >= 20_000;
+        let quad = vehicle.clone();
+        let esc = quad.escs[0].unwrap_or_default();
+        let rpm = |motor: usize| if begun { speeds[motor] } else { 5_000.0 };
+        let group = |first: usize| EscGroup {
+            first: first as u8,
+            escs: [0, 1, 2, 3].map(|place| {
+                let fitted = first + place < speeds.len();
+                fitted.then(|| Esc { rpm: Some(Rpm(rpm(first + place))), ..esc })
+            }),
+        };
+        let own = |said: &Observation| !matches!(said, Observation::Escs(_) | Observation::Attitude(_));
+        let rates = [0.0, 0.0, if begun { yaw_rate } else { 0.0 }].map(RadiansPerSecond);
+        let attitude = Attitude { roll: Radians(0.02), rates: Some(rates), ..Attitude::default() };
+        let more =
+            [Observation::Attitude(attitude), Observation::Escs(group(0)), Observation::Escs(group(4))];
+        for said in quad.says(now_ms).into_iter().filter(own).chain(more) {
+            monitor.observe(now, AUTOPILOT, &said);
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+            if finding.check.starts_with("motor") {
+                findings.push((finding.check, finding.instance));
+            }
+        });
+    }
+    findings.dedup();
+    findings
+}
+
+#[test]
+fn motors_that_carry_different_loads_in_groups_are_none_of_them_off() {
+    // A Y6's upper and lower motors, and what a quad turns with; both slower than the limit of what counts as turning.
+    let y6 = Quad { type_number: 13, ..Quad::healthy() };
+    assert_eq!(flies(&y6, &[5_100.0, 3_550.0, 5_050.0, 3_500.0, 3_520.0, 5_080.0], 0.4), []);
+    assert_eq!(flies(&Quad::healthy(), &[4_200.0, 4_150.0, 5_900.0, 5_950.0], 0.5), []);
+    // The front ones of a quad whose load hangs before its middle.
+    assert_eq!(flies(&Quad::healthy(), &[5_800.0, 4_300.0, 5_750.0, 4_250.0], 0.0), []);
+}
+
+#[test]
+fn a_motor_that_is_alone_with_its_speed_is_off_in_groups_too() {
+    let y6 = Quad { type_number: 13, ..Quad::healthy() };
+    assert_eq!(
+        flies(&y6, &[5_100.0, 3_550.0, 5_050.0, 3_500.0, 3_520.0, 7_900.0], 0.0),
+        [("motor_imbalance", 5)]
+    );
+    assert_eq!(flies(&Quad::healthy(), &[5_000.0, 6_700.0, 5_050.0, 4_950.0], 0.0), [("motor_imbalance", 1)]);
+}
+
+#[test]
+fn what_turns_fast_drives_each_motor_as_it_needs_to_and_a_motor_that_stopped_is_found_all_the_same() {
+    let torn = [3_200.0, 4_300.0, 5_300.0, 6_500.0];
+    assert_eq!(flies(&Quad::healthy(), &torn, 1.8), []);
+    assert_eq!(flies(&Quad::healthy(), &torn, 0.1), [("motor_imbalance", 3)]);
+    let hexa = Quad { type_number: 13, ..Quad::healthy() };
+    let dead = [5_900.0, 6_000.0, 300.0, 6_200.0, 6_100.0, 900.0];
+    assert_eq!(flies(&hexa, &dead, 1.8), [("motor_imbalance", 2)]);
+}
+
+#[test]
+fn motors_that_idle_on_the_ground_are_not_compared() {
+    // The autopilot goes on to call it in the air.
+    let stands = Quad { throttle: 0.02, height: 12.0, landed: Some(LandedState::InAir), ..Quad::healthy() };
+    assert_eq!(flies(&stands, &[2_200.0, 2_050.0, 2_900.0, 800.0], 0.0), []);
+}

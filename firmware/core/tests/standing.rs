@@ -1,0 +1,81 @@
+//! What stands and is called flying: on the bench, spooling up, landed by hand.
+
+mod common;
+
+use common::{AUTOPILOT, Quad};
+use hums_core::Monitor;
+use hums_core::observation::{Hud, LandedState, Observation};
+use hums_core::params::Params;
+use hums_core::status::{LinkReading, RecorderStatus};
+use hums_core::time::Instant;
+use hums_core::units::{Fraction, Metres};
+use hums_core::usage::UsageCounter;
+
+/// Flights and landings of two minutes, of what a script says.
+fn counts(script: impl Fn(u64) -> Vec<Observation>) -> (u32, u32) {
+    let mut monitor = Monitor::new(Params::defaults());
+    for now_ms in (0..120_000).step_by(100) {
+        let now = Instant::from_millis(now_ms);
+        for said in script(now_ms) {
+            monitor.observe(now, AUTOPILOT, &said);
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &RecorderStatus::default(), &mut |_| ());
+    }
+    let count = |of| monitor.usage().value(of).unwrap_or(0.0) as u32;
+    (count(UsageCounter::Flights), count(UsageCounter::Landings))
+}
+
+/// As the autopilot says: in the air from its arming on.
+fn called_in_air(now_ms: u64) -> Quad {
+    Quad { armed: now_ms >= 5_000, landed: Some(LandedState::InAir), climb: 0.0, ..Quad::healthy() }
+}
+
+#[test]
+fn what_idles_on_the_bench_does_not_fly_though_the_autopilot_calls_it_in_the_air() {
+    let bench = |now_ms| Quad { height: 0.2, throttle: 0.12, ..called_in_air(now_ms) }.says(now_ms);
+    assert_eq!(counts(bench), (0, 0));
+    let takes_off = |now_ms| {
+        let throttle = if now_ms < 40_000 { 0.12 } else { 0.45 };
+        let height = if now_ms < 42_000 { 0.2 } else { 10.0 };
+        Quad { height, throttle, ..called_in_air(now_ms) }.says(now_ms)
+    };
+    assert_eq!(counts(takes_off), (1, 0));
+    let restarted =
+        |now_ms| Quad { armed: true, height: 0.3, throttle: 0.4, ..called_in_air(now_ms) }.says(now_ms);
+    assert_eq!(counts(restarted), (1, 0), "heard first in a hover at the height of home");
+}
+
+#[test]
+fn what_a_pilot_landed_and_left_armed_has_landed() {
+    let lands = |now_ms| {
+        let flies = (10_000..50_000).contains(&now_ms) || (80_000..100_000).contains(&now_ms);
+        let (height, throttle) = if flies { (8.0, 0.4) } else { (0.1, 0.0) };
+        let mut said = Quad { height, throttle, ..called_in_air(now_ms) }.says(now_ms);
+        for said in &mut said {
+            if let Observation::GlobalPosition(global) = said {
+                global.velocity = Default::default();
+            }
+        }
+        said
+    };
+    assert_eq!(counts(lands), (2, 2));
+}
+
+#[test]
+fn motors_tried_without_any_position_are_no_flight_where_the_barometer_does_not_rise() {
+    let tried = |height_m: f32| {
+        move |now_ms: u64| {
+            let runs = now_ms >= 20_000;
+            let quad = Quad { armed: now_ms >= 5_000, ..Quad::healthy() };
+            let altitude = 480.0 + if runs { height_m } else { 0.3 };
+            let throttle = Some(Fraction(if runs { 0.6 } else { 0.0 }));
+            let hud = Hud { throttle, altitude: Some(Metres(altitude)), ..Hud::default() };
+            let own =
+                |said: &Observation| !matches!(said, Observation::GlobalPosition(_) | Observation::Hud(_));
+            quad.says(now_ms).into_iter().filter(own).chain([Observation::Hud(hud)]).collect()
+        }
+    };
+    assert_eq!(counts(tried(0.6)), (0, 0));
+    assert_eq!(counts(tried(6.0)), (1, 0));
+}
