@@ -322,6 +322,24 @@ fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged
 }
 
 #[test]
+fn a_report_compares_sessions_of_one_card_only() {
+    let dir = copied(3, "");
+    let sessions = |line: &str| {
+        run(dir.path(), &format!("{line} -o page.html"), 0);
+        let page = fs::read_to_string(dir.path().join("page.html")).expect("text");
+        fs::remove_file(dir.path().join("page.html")).expect("removed");
+        let (_, trend) = page.split_once("\"trend\":{\"sessions\":[").expect("a trend");
+        trend.split_once(']').map_or(0, |(sessions, _)| sessions.matches("\"name\"").count())
+    };
+    assert_eq!((sessions("report card.img"), sessions("report copied")), (2, 2));
+    // Packed logs may be anybody's: of two vehicles, for instance.
+    for name in ["one", "two"] {
+        run(dir.path(), &format!("pack PX4 -o {name}.hum"), 0);
+    }
+    assert_eq!(sessions("report one.hum two.hum"), 1);
+}
+
+#[test]
 fn an_image_that_was_cut_short_is_told_as_that() {
     let dir = copied(1, "");
     let path = dir.path().join("card.img");

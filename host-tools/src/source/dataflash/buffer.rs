@@ -4,7 +4,8 @@ use std::io::{self, Read};
 
 use crate::source::stream::read_some;
 
-const CHUNK_BYTES: usize = 256 * 1024;
+/// Read at once: pages that are touched for the first time cost a small log more than its messages.
+const CHUNK_BYTES: usize = 64 * 1024;
 
 /// The part of a file that is read, and where in it the reading stands.
 pub(super) struct Buffer<R> {

@@ -4,8 +4,9 @@ use std::io::{self, Read};
 
 use super::super::stream::read_some;
 
-/// How much is read at once: many times the longest message (65,538 bytes), so that little is moved.
-const READ_BYTES: usize = 512 * 1024;
+/// How much is read at once: more than the longest message (65,538 bytes), and many times a usual one, so that little is
+/// moved. Pages that are touched for the first time cost a small log more than its messages.
+const READ_BYTES: usize = 128 * 1024;
 
 /// Part of the input, and where it lies.
 pub(super) struct Window<R> {
