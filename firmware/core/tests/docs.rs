@@ -34,7 +34,10 @@ const INPUTS: &[(&str, &str)] = &[
     ("esc_failure", "ESC_INFO: failure flags; 1 any, 2 motor stuck or ESC failed"),
     ("esc_errors", "ESC_INFO: error count, a minute; wraps are no errors"),
     ("motor_loss", "ESC_STATUS, ESC_TELEMETRY: current in percent of the others' mean, throttle above 20 %"),
-    ("motor_imbalance", "ESC_STATUS, ESC_TELEMETRY: speed against the others' mean, in steady flight"),
+    (
+        "motor_imbalance",
+        "ESC_STATUS, ESC_TELEMETRY: speed against the middle one and the nearest other one, in steady flight",
+    ),
     ("motor_trend", "the same with its sign, against its baseline"),
     ("throttle_trend", "VFR_HUD: throttle in hover, above its baseline"),
     ("drive_due", "components of kind motor, propeller, ESC"),
@@ -67,8 +70,8 @@ const INPUTS: &[(&str, &str)] = &[
     ("autopilot_reboot", "ATTITUDE, SYSTEM_TIME: a boot time that falls while it is armed, for 30 s"),
     ("autopilot_state", "HEARTBEAT: MAV_STATE"),
     ("sensors", "SYS_STATUS: sensors present and enabled that are not healthy"),
-    ("roll", "ATTITUDE"),
-    ("pitch", "ATTITUDE"),
+    ("roll", "ATTITUDE, against ATTITUDE_TARGET or NAV_CONTROLLER_OUTPUT"),
+    ("pitch", "ATTITUDE, against ATTITUDE_TARGET or NAV_CONTROLLER_OUTPUT"),
     ("recording", "our recorder: 1 not recording, 2 not recording while armed"),
     ("record_queue", "our recorder: the sector queue"),
     ("record_lost", "our recorder: frames lost, ten seconds"),
@@ -84,11 +87,14 @@ const INPUTS: &[(&str, &str)] = &[
         "impact",
         "the same: a shock, with the speed of GLOBAL_POSITION_INT breaking off or the vehicle on its side, then stillness",
     ),
-    ("tumbling", "ATTITUDE, or the inertial messages: body rates for 0.5 s, on wings for 1.5 s"),
+    (
+        "tumbling",
+        "ATTITUDE, or the inertial messages: body rates for 0.5 s, on wings for 1.5 s; the top down for 0.7 s",
+    ),
     ("disarmed_in_air", "HEARTBEAT: disarmed out of a flight, and then it falls, sinks or glides"),
     (
         "sinking",
-        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; on wings a loss of 10 m with full throttle",
+        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; or a loss of 7 m with nearly full throttle",
     ),
 ];
 
