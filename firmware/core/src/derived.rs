@@ -191,7 +191,9 @@ impl Derived {
     }
 
     fn take_rates(&mut self, at: Instant, rates: Option<[RadiansPerSecond; 3]>) {
-        if rates.is_some_and(|rates| norm(rates.map(|rate| rate.0)) > TURNS_RATE) {
+        // No root: this is done with each inertial sample.
+        let square = |rates: [RadiansPerSecond; 3]| rates.iter().map(|rate| rate.0 * rate.0).sum::<f32>();
+        if rates.is_some_and(|rates| square(rates) > TURNS_RATE * TURNS_RATE) {
             self.turned_at = Some(at);
         }
     }

@@ -143,8 +143,14 @@ impl Mishap {
 
     /// Rotors that pull downwards carry nothing: in no mode but those made for it does an autopilot or a pilot ask for that.
     fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
-        let upright = libm::cosf(attitude.roll.0) * libm::cosf(attitude.pitch.0);
-        let over = upright < OVERTURNED && self.armed && on_rotors(at, vehicle) && !is_made_to_turn(vehicle);
+        let Attitude { roll, pitch, .. } = attitude;
+        // Below 86 degrees of each, no cosine is asked for: this is done with each attitude.
+        let tilts = libm::fabsf(roll.0).max(libm::fabsf(pitch.0)) > 1.5;
+        let over = tilts
+            && libm::cosf(roll.0) * libm::cosf(pitch.0) < OVERTURNED
+            && self.armed
+            && on_rotors(at, vehicle)
+            && !is_made_to_turn(vehicle);
         if self.overturned.take(at, over).is_some_and(|span| span >= TURNS_OVER) {
             self.see(at, Kind::Tumbling, self.rate.to_degrees().max(params.get(Param::MisTumble).next_up()));
         }
