@@ -8,7 +8,7 @@ use hums_core::monitor::TICK;
 use hums_core::time::{Instant, Span};
 
 /// What follows a long gap and is not judged: what is told once a second has come again by then.
-pub(super) const SETTLE: Span = Span::from_secs(1);
+pub(crate) const SETTLE: Span = Span::from_secs(1);
 
 /// The two times, side by side.
 #[derive(Clone, Copy, Debug, Default)]

@@ -52,6 +52,11 @@ impl Flights {
         }
     }
 
+    /// Which of the flights goes on.
+    pub(super) fn going_on(&self) -> Option<usize> {
+        self.list.len().checked_sub(1).filter(|_| self.open)
+    }
+
     /// The flight is over: it is back on the ground, or disarmed, or a mishap ended it.
     pub(super) fn landing(&mut self) {
         let crashed = std::mem::take(&mut self.crashed);

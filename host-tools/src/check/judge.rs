@@ -133,6 +133,11 @@ impl Judge {
         Self { wire: (heard == Heard::OnTheWire).then(Sequences::new), ..self }
     }
 
+    /// Which flight the vehicle is in, counted from 0 as in [`Judged::flights`].
+    pub fn flight(&self) -> Option<usize> {
+        self.flights.going_on()
+    }
+
     /// Takes the next item.
     pub fn item(&mut self, at: Instant, item: Item<'_>) {
         match item {

@@ -18,6 +18,7 @@ pub mod text;
 
 use anyhow::{Result, bail};
 
+pub(crate) use clock::SETTLE;
 pub use overview::overview;
 
 use crate::cli;

@@ -106,7 +106,7 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<()> {
     recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };
         let heard = match item {
-            Item::Observation(..) | Item::Text(_) => match &entry {
+            Item::Observation(..) | Item::Text(_) | Item::Gap(_) => match &entry {
                 Some(entry) => Heard::Entry(entry),
                 None => return Ok(()),
             },

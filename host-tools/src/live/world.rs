@@ -13,6 +13,7 @@ use super::craft::Craft;
 use super::history::History;
 use super::native::Entry;
 use super::told::{Limits, Told, parameter, place_of};
+use crate::check::SETTLE;
 
 /// Vehicles that are told apart; later ones are counted.
 pub const VEHICLES_MAX: usize = 8;
@@ -125,12 +126,13 @@ impl World {
 
     /// Takes what an autopilot's own log tells, which has no frames.
     pub fn entry(&mut self, at: Instant, entry: &Entry, mut histories: Option<&mut Histories>) {
-        self.advance(at, histories.as_deref_mut());
-        self.frames += 1;
         let system = match entry {
             Entry::Observation(source, _) => source.system,
             Entry::Text(text) => text.source.system,
+            Entry::Gap(from, to) => return self.pass(*from, *to, histories),
         };
+        self.advance(at, histories.as_deref_mut());
+        self.frames += 1;
         if let Entry::Observation(_, observation) = entry
             && matches!(**observation, Observation::Heartbeat(_))
             && !self.crafts.contains_key(&system)
@@ -142,6 +144,18 @@ impl World {
         match entry {
             Entry::Observation(source, observation) => craft.observe(at, *source, observation, &mut history),
             Entry::Text(text) => craft.text(text.clone(), &mut history),
+            Entry::Gap(..) => {}
+        }
+    }
+
+    /// An autopilot's own log has nothing from here to there, which is no silence of the vehicle: nothing is stepped, and
+    /// nothing for a moment after it, while the first values come in ([`SETTLE`]).
+    fn pass(&mut self, from: Instant, to: Instant, histories: Option<&mut Histories>) {
+        // One that begins before what was heard last is a count over the whole log.
+        if self.next_tick <= to && from + SETTLE + TICK >= self.next_tick {
+            self.advance(from, histories);
+            let settle = if to.since(from) >= SETTLE { SETTLE } else { TICK };
+            self.next_tick = self.next_tick.max(to + settle);
         }
     }
 
@@ -207,6 +221,8 @@ impl World {
 #[cfg(test)]
 mod tests {
     use hums_core::component::{Figures, Kind, Status};
+    use hums_core::health::Level;
+    use hums_core::observation::{Heartbeat, Source};
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::messages;
     use hums_link::packet::Packet;
@@ -236,6 +252,28 @@ mod tests {
         assert!(world.crafts.iter().all(|(system, craft)| {
             craft.monitor.vehicle().source.is_some_and(|source| source.system == *system)
         }));
+    }
+
+    /// What an autopilot's own log lost is no silence of the vehicle: nothing is stale or lost for it.
+    #[test]
+    fn a_gap_of_an_autopilots_own_log_is_no_silence_of_the_vehicle() {
+        let source = Source { system: 1, component: 1 };
+        let beat = Heartbeat { armed: true, ..Heartbeat::default() };
+        let beat = Entry::Observation(source, Box::new(Observation::Heartbeat(beat)));
+        let found = |gap: bool| {
+            let mut world = World::new(Limits::default());
+            world.begin(Instant::ZERO);
+            for second in (0..20).chain(40..60) {
+                if gap && second == 40 {
+                    let (from, to) = (Instant::from_millis(19_000), Instant::from_millis(40_000));
+                    world.entry(to, &Entry::Gap(from, to), None);
+                }
+                world.entry(Instant::from_millis(second * 1_000), &beat, None);
+            }
+            world.found.iter().filter(|(_, finding)| finding.level != Level::Ok).count()
+        };
+        assert!(found(false) > 0, "a silence is found");
+        assert_eq!(found(true), 0);
     }
 
     #[test]

@@ -1,13 +1,13 @@
-//! Flights and their phases, by the rules of the firmware.
+//! Flights, as [`crate::check`] finds them, with how high and fast they were; and phases, by the rules of the firmware.
 
 use hums_core::flight::ground_speed_mps;
 use hums_core::time::{Instant, Span};
 use serde::Serialize;
 
+use crate::check::flights::Flight as Judged;
 use crate::decode::reference::{Quantity, Reference};
 
 /// Kept one by one at most.
-const FLIGHTS_MAX: usize = 500;
 const PHASES_MAX: usize = 2_000;
 /// A phase that lasts less is part of the one before.
 const PHASE_MIN: Span = Span::from_secs(2);
@@ -20,6 +20,8 @@ pub struct Flight {
     /// In the air, without stops on the ground and gaps of the record.
     air_s: f64,
     landed: bool,
+    /// Disarmed in the air, which is no landing.
+    disarmed_in_air: bool,
     height_max_m: f32,
     speed_max_m_s: f32,
     percent_from: Option<f32>,
@@ -34,113 +36,79 @@ pub struct PhaseSpan {
     to_s: f64,
 }
 
-/// The flights of a log, and the phases of all of it.
+/// How high and fast the vehicle was in each flight, and what it took of the battery.
 #[derive(Debug, Default)]
-pub struct Flights {
-    list: Vec<Flight>,
-    phases: Vec<PhaseSpan>,
-    /// The last flight goes on.
-    open: bool,
-    /// When the vehicle told something last, and whether it was in the air.
-    last: Option<(Instant, bool)>,
-    /// What the record does not have since then.
-    gap: Span,
+pub struct Extents(Vec<Extent>);
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Extent {
+    height_max_m: f32,
+    speed_max_m_s: f32,
+    percent_from: Option<f32>,
+    percent_to: Option<f32>,
 }
 
-impl Flights {
-    /// The flights, in order.
-    pub fn all(&self) -> &[Flight] {
-        &self.list
-    }
-
-    /// The phases, in order.
-    pub fn phases(&self) -> &[PhaseSpan] {
-        &self.phases
-    }
-
-    /// Follows what the vehicle has just told. A flight is what [`hums_core::flight`] calls one: a bounce ends none.
-    pub fn follow(&mut self, at: Instant, reference: &Reference) {
-        let flight = reference.flight();
-        if let Some((before, true)) = self.last {
-            let step = at.since(before).as_micros().saturating_sub(self.gap.as_micros());
-            self.extend(at, step, reference);
+impl Extents {
+    /// The vehicle has just told something, in this flight.
+    pub fn take(&mut self, at: Instant, flight: Option<usize>, reference: &Reference) {
+        let Some(index) = flight else { return };
+        if index >= self.0.len() {
+            self.0.resize(index + 1, Extent::default());
         }
-        match (self.open, flight.is_open(), flight.airborne_since()) {
-            (false, true, Some(since)) if self.list.len() < FLIGHTS_MAX => {
-                self.begin(since, at, reference);
-            }
-            (true, false, _) => self.close(),
-            _ => {}
-        }
-        (self.last, self.gap) = (Some((at, flight.airborne())), Span::ZERO);
-        self.extend_phase(at, reference);
-    }
-
-    /// The record has nothing from here to there.
-    pub fn gap(&mut self, from: Instant, to: Instant) {
-        if self.last.is_some_and(|(last, _)| from >= last) {
-            self.gap = self.gap + to.since(from);
-        }
-    }
-
-    /// The log ends here.
-    pub fn end(&mut self, at: Instant, reference: &Reference) {
-        self.extend_phase(at, reference);
-        if !reference.flight().airborne() {
-            self.close();
-        }
-    }
-
-    fn close(&mut self) {
-        if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
-            flight.landed = true;
-        }
-        self.open = false;
-    }
-
-    fn begin(&mut self, since: Instant, at: Instant, reference: &Reference) {
-        self.open = true;
-        self.list.push(Flight {
-            from_s: since.as_secs_f64(),
-            to_s: at.as_secs_f64(),
-            air_s: at.as_secs_f64() - since.as_secs_f64(),
-            landed: false,
-            height_max_m: 0.0,
-            speed_max_m_s: 0.0,
-            percent_from: percent(at, reference),
-            percent_to: None,
-        });
-    }
-
-    /// In the air for so many microseconds more, up to now.
-    fn extend(&mut self, at: Instant, step_us: u64, reference: &Reference) {
+        let Some(extent) = self.0.get_mut(index) else { return };
         let vehicle = reference.vehicle();
         let height_m = vehicle.global.get().map(|global| global.relative_altitude.0);
-        let speed = ground_speed_mps(at, vehicle);
         let percent = percent(at, reference);
-        if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
-            flight.to_s = at.as_secs_f64();
-            flight.air_s += step_us as f64 / 1e6;
-            flight.height_max_m = flight.height_max_m.max(height_m.unwrap_or(0.0));
-            flight.speed_max_m_s = flight.speed_max_m_s.max(speed.unwrap_or(0.0));
-            flight.percent_to = percent.or(flight.percent_to);
-        }
+        extent.height_max_m = extent.height_max_m.max(height_m.unwrap_or(0.0));
+        extent.speed_max_m_s = extent.speed_max_m_s.max(ground_speed_mps(at, vehicle).unwrap_or(0.0));
+        extent.percent_from = extent.percent_from.or(percent);
+        extent.percent_to = percent.or(extent.percent_to);
+    }
+
+    /// The flights that the judge found, with these.
+    pub fn flights(&self, judged: &[Judged]) -> Vec<Flight> {
+        let flight = |(index, flight): (usize, &Judged)| {
+            let extent = self.0.get(index).copied().unwrap_or_default();
+            Flight {
+                from_s: flight.from.as_secs_f64(),
+                to_s: flight.to.as_secs_f64(),
+                air_s: flight.air.as_micros() as f64 / 1e6,
+                landed: flight.landed,
+                disarmed_in_air: flight.disarmed_at_m.is_some(),
+                height_max_m: extent.height_max_m,
+                speed_max_m_s: extent.speed_max_m_s,
+                percent_from: extent.percent_from,
+                percent_to: extent.percent_to,
+            }
+        };
+        judged.iter().enumerate().map(flight).collect()
+    }
+}
+
+/// The phases of a log.
+#[derive(Debug, Default)]
+pub struct Phases(Vec<PhaseSpan>);
+
+impl Phases {
+    /// In order.
+    pub fn all(&self) -> &[PhaseSpan] {
+        &self.0
     }
 
     /// The phase goes on, or another begins; one too short to matter is taken back.
-    fn extend_phase(&mut self, at: Instant, reference: &Reference) {
+    pub fn extend(&mut self, at: Instant, reference: &Reference) {
         let phase = reference.flight().phase(at, reference.vehicle()).name();
         let at_s = at.as_secs_f64();
-        let full = self.phases.len() >= PHASES_MAX;
-        if let Some(last) = self.phases.last_mut() {
+        let full = self.0.len() >= PHASES_MAX;
+        if let Some(last) = self.0.last_mut() {
             last.to_s = last.to_s.max(at_s);
             if last.phase == phase || full {
                 return;
             }
             let short = at_s - last.from_s < f64::from(PHASE_MIN.as_secs_f32());
-            if short && self.phases.len() > 1 {
-                self.phases.pop();
-                if let Some(before) = self.phases.last_mut() {
+            if short && self.0.len() > 1 {
+                self.0.pop();
+                if let Some(before) = self.0.last_mut() {
                     before.to_s = at_s;
                     if before.phase == phase {
                         return;
@@ -148,7 +116,7 @@ impl Flights {
                 }
             }
         }
-        self.phases.push(PhaseSpan { phase, from_s: at_s, to_s: at_s });
+        self.0.push(PhaseSpan { phase, from_s: at_s, to_s: at_s });
     }
 }
 

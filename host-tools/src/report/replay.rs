@@ -5,9 +5,10 @@ use hums_core::observation::{Autopilot, Observation, Source};
 use hums_core::time::Instant;
 use serde::Serialize;
 
-use super::flights::Flights;
+use super::flights::{Extents, Flight, Phases};
 use super::frames::{Frames, Sign};
 use super::samples::Samples;
+use crate::check::judge::{Judge, Limits};
 use crate::decode::reference::Reference;
 use crate::source::item::{Item, Text, Want};
 use crate::source::recording::Place;
@@ -24,14 +25,17 @@ pub struct Replay {
     pub samples: Samples,
     /// Who speaks, as far as scales depend on it.
     pub autopilot: Autopilot,
-    /// Flights and phases.
-    pub flights: Flights,
+    /// Flights, as `hums check` finds them.
+    pub flights: Vec<Flight>,
+    /// Phases of all of it.
+    pub phases: Phases,
     /// What the vehicle said in words.
     pub texts: Vec<Said>,
     /// How many there were.
     pub texts_count: u64,
     reference: Reference,
     frames: Frames,
+    extents: Extents,
 }
 
 /// A place on the track, as the page takes it.
@@ -57,17 +61,22 @@ impl Replay {
     pub fn of(place: &Place) -> Result<Self> {
         let mut replay = Self::default();
         let want = Want { frames: true, observations: true, ..Want::default() };
-        place.open()?.read(want, &mut |at, item| {
-            replay.item(at, item);
+        let recording = place.open()?;
+        let mut judge = Judge::new(&Limits::default(), recording.format);
+        recording.read(want, &mut |at, item| {
+            judge.item(at, item);
+            replay.item(at, item, judge.flight());
             Ok(())
         })?;
         if let Some(end) = replay.reference.heard() {
-            replay.flights.end(end, &replay.reference);
+            replay.phases.extend(end, &replay.reference);
         }
+        replay.flights = replay.extents.flights(&judge.end().flights);
         Ok(replay)
     }
 
-    fn item(&mut self, at: Instant, item: Item<'_>) {
+    /// Takes the next item, while the vehicle is in this flight.
+    fn item(&mut self, at: Instant, item: Item<'_>, flight: Option<usize>) {
         match item {
             Item::Frame(frame) => {
                 let sign = Sign { at, source: frame.source(), sequence: frame.sequence() };
@@ -76,14 +85,9 @@ impl Replay {
                     self.frames.take(&sign, vehicle, &mut self.samples.store);
                 }
             }
-            Item::Observation(source, observation) => self.observe(at, source, observation),
+            Item::Observation(source, observation) => self.observe(at, source, observation, flight),
             Item::Text(text) => self.keep(at, text),
-            Item::Gap(gap) => {
-                self.frames.gap();
-                if let (Some(from), Some(to)) = (gap.from, gap.to) {
-                    self.flights.gap(from, to);
-                }
-            }
+            Item::Gap(_) => self.frames.gap(),
             _ => {}
         }
     }
@@ -99,7 +103,7 @@ impl Replay {
         self.samples.track.points().iter().map(place).collect()
     }
 
-    fn observe(&mut self, at: Instant, source: Source, observation: &Observation) {
+    fn observe(&mut self, at: Instant, source: Source, observation: &Observation, flight: Option<usize>) {
         if !self.reference.observe(at, source, observation) {
             return;
         }
@@ -107,7 +111,8 @@ impl Replay {
             self.autopilot = heartbeat.autopilot;
         }
         self.samples.take(at, &self.reference, observation);
-        self.flights.follow(at, &self.reference);
+        self.extents.take(at, flight, &self.reference);
+        self.phases.extend(at, &self.reference);
     }
 
     fn keep(&mut self, at: Instant, text: Text<'_>) {

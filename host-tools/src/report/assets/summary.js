@@ -45,10 +45,18 @@ const identity = () => facts([
   ["Files", log.files.join(", ")],
 ]);
 
+// When it landed, or how the flight ended otherwise.
+const landing = (f, start, end) => {
+  const at = clock(f.to_s) ?? span(f.to_s - start);
+  if (f.landed) return at;
+  if (f.disarmed_in_air) return `disarmed in the air, ${at}`;
+  return end - f.to_s < 5 ? "in the air at the end" : `not seen, last in the air ${at}`;
+};
+
 const flights = () => data.flights.length ? rows(
   [["#", "n"], ["Take-off"], ["Landing"], ["Time", "n"], ["Height", "n"], ["Speed", "n"], ["Battery", "n"]],
   data.flights.map((f, i) => cells([
-    i + 1, clock(f.from_s) ?? span(f.from_s - start), f.landed ? clock(f.to_s) ?? span(f.to_s - start) : "in the air at the end", span(f.air_s),
+    i + 1, clock(f.from_s) ?? span(f.from_s - start), landing(f, start, end), span(f.air_s),
     fixed(f.height_max_m, 1) + " m", fixed(f.speed_max_m_s, 1) + " m/s",
     f.percent_from != null && f.percent_to != null ? `${fixed(f.percent_from, 0)} \u2192 ${fixed(f.percent_to, 0)} %` : "",
   ], ["n", "t", "t", "n", "n", "n", "n"], { class: "go", tabindex: 0, onclick: () => zoom(f.from_s, f.to_s), onkeydown: (e) => e.key === "Enter" && zoom(f.from_s, f.to_s) })))
