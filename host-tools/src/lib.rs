@@ -7,6 +7,7 @@ macro_rules! note {
     };
 }
 
+pub mod archive;
 pub mod card;
 pub mod check;
 pub mod cli;

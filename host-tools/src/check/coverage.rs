@@ -2,13 +2,15 @@
 
 use hums_core::Monitor;
 use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
-use hums_core::observation::{Autopilot, Heartbeat};
+use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
 
 use super::judged::JudgedBy;
 
+/// Checks of a receiver that the monitor leaves alone until the receiver has had a fix.
+const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
 /// How often it is noted.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
@@ -80,8 +82,9 @@ impl Coverage {
     /// list.
     pub(super) fn lists(&self, recording: &Recording<'_>) -> Lists {
         let (mut judged, mut not_judged) = (Vec::new(), Vec::new());
+        let had_fix = checks().zip(&self.seen).any(|(check, seen)| check.name == "gps_fix" && seen.value);
         for (check, seen) in checks().zip(&self.seen) {
-            match recording.why_not(check, *seen) {
+            match recording.why_not(check, *seen, had_fix) {
                 Verdict::Judged => judged.push(check.name),
                 Verdict::NotJudged(why) => not_judged.push((check.name, why)),
                 Verdict::NotMeant => {}
@@ -115,7 +118,7 @@ enum Verdict {
 }
 
 impl Recording<'_> {
-    fn why_not(&self, check: &Check, seen: Seen) -> Verdict {
+    fn why_not(&self, check: &Check, seen: Seen, had_fix: bool) -> Verdict {
         let Some(words) = vocabulary(check.name) else { return Verdict::NotMeant };
         let autopilot = self.monitor.vehicle().heartbeat.get().map(|Heartbeat { autopilot, .. }| *autopilot);
         let not = |why: &str| Verdict::NotJudged(why.to_owned());
@@ -157,7 +160,22 @@ impl Recording<'_> {
             }
             When::InFlight if !self.flew => not("never in the air"),
             _ if seen.value => not("only for a moment in this recording"),
+            _ if !had_fix && OF_A_FIX.contains(&check.name) => {
+                Verdict::NotJudged(self.why_no_fix(words.needs))
+            }
             _ => Verdict::NotJudged(format!("no {}", words.needs)),
+        }
+    }
+
+    /// A receiver that never had a fix is not judged: it may not be in use. It is named.
+    fn why_no_fix(&self, needs: &str) -> String {
+        let told = |gnss: &Gnss| gnss.satellites.is_some() || gnss.fix > 0;
+        let receivers = self.monitor.vehicle().gnss.iter().zip(1_u8..);
+        let told = receivers.filter(|(slot, _)| slot.get().is_some_and(told));
+        let numbers: Vec<String> = told.map(|(_, number)| number.to_string()).collect();
+        match numbers.as_slice() {
+            [] => format!("no {needs}"),
+            numbers => format!("GPS {} never had a fix", numbers.join(" and ")),
         }
     }
 }
@@ -173,4 +191,47 @@ fn is_off(check: &Check, params: &Params) -> bool {
             }
     };
     [check.warn, check.critical].into_iter().flatten().all(off)
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_core::observation::{Observation, Source, VehicleKind};
+
+    use super::*;
+
+    #[test]
+    fn a_receiver_that_never_had_a_fix_is_named() {
+        let why = |gnss: Option<Gnss>| {
+            let mut monitor = Monitor::new(Params::default());
+            let heartbeat = Heartbeat {
+                autopilot: Autopilot::Px4,
+                autopilot_number: 12,
+                kind: VehicleKind::Rotorcraft,
+                type_number: 2,
+                armed: true,
+                state: 4,
+                mode: 0,
+            };
+            let source = Source { system: 1, component: 1 };
+            monitor.observe(Instant::ZERO, source, &Observation::Heartbeat(heartbeat));
+            if let Some(gnss) = gnss {
+                monitor.observe(Instant::ZERO, source, &Observation::Gnss(gnss));
+            }
+            let recording = Recording {
+                by: JudgedBy::Here,
+                monitor: &monitor,
+                is_of_link: false,
+                on_the_wire: false,
+                armed: Span::from_secs(60),
+                arming: None,
+                flew: true,
+            };
+            let (_, not_judged) = Coverage::new().lists(&recording);
+            not_judged.into_iter().find(|(check, _)| *check == "gps_satellites").map(|(_, why)| why)
+        };
+        let none = Gnss { satellites: Some(0), hdop: Some(99.99), ..Gnss::default() };
+        assert_eq!(why(Some(none)).as_deref(), Some("GPS 1 never had a fix"));
+        assert_eq!(why(None).as_deref(), Some("no GPS satellite count"));
+        assert_eq!(why(Some(Gnss::default())).as_deref(), Some("no GPS satellite count"), "no receiver");
+    }
 }

@@ -54,7 +54,7 @@ const fn rank(level: Level) -> u8 {
 }
 
 /// The side of a check's limits that is bad.
-fn side(check: &str) -> Side {
+pub(super) fn side(check: &str) -> Side {
     checks().find(|known| known.name == check).map_or(Side::Above, |check| check.side)
 }
 

@@ -5,12 +5,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use hums_core::health::{Level, vocabulary};
+use hums_core::health::{Level, Side, vocabulary};
 use hums_core::time::{Instant, Span};
 
 use super::checked::Checked;
 use super::judged::{Judged, JudgedBy};
-use super::problem::Problem;
+use super::problem::{Problem, side};
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
 use crate::printable::word;
@@ -343,9 +343,19 @@ fn groups(problems: &[Problem]) -> Vec<Vec<&Problem>> {
     groups
 }
 
+/// The one with the worst value; the first one of several, and where no value is known.
+fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
+    let is_worse = |one: &Problem, than: &Problem| match side(&one.check) {
+        _ if than.value.is_nan() => !one.value.is_nan(),
+        Side::Above => one.value > than.value,
+        Side::Below => one.value < than.value,
+    };
+    group.iter().copied().reduce(|worst, one| if is_worse(one, worst) { one } else { worst })
+}
+
 /// What it was: the check, the parts, the worst value, its limit, how long.
 fn sentence(group: &[&Problem]) -> String {
-    let Some(first) = group.first() else { return String::new() };
+    let Some(first) = worst_of(group) else { return String::new() };
     let part = vocabulary(&first.check).map_or("", |words| words.part);
     let mut text = name(&first.check).to_owned();
     if !part.is_empty() {
@@ -455,6 +465,33 @@ fn short(value: f32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_several_parts_the_worst_value_is_shown() {
+        let problem = |check: &str, instance, value| Problem {
+            subsystem: hums_core::health::Subsystem::Propulsion,
+            check: check.to_owned(),
+            instance,
+            level: Level::Warning,
+            at: Instant::ZERO,
+            times: 1,
+            lasted: Span::ZERO,
+            lasting: false,
+            value,
+            limit: 10.0,
+            unit: String::new(),
+            details: Vec::new(),
+        };
+        let shown = |check: &str, values: [f32; 3]| {
+            let all: Vec<Problem> =
+                (0..).zip(values).map(|(instance, value)| problem(check, instance, value)).collect();
+            sentence(&all.iter().collect::<Vec<_>>())
+        };
+        let motors = shown("motor_imbalance", [f32::NAN, 12.0, 31.0]);
+        assert!(motors.contains("motors 1, 2, 3: 31 "), "{motors}");
+        let cells = shown("cell_voltage", [3.5, 3.2, 3.4]);
+        assert!(cells.contains(": 3.2 "), "{cells}");
+    }
 
     #[test]
     fn times_are_read_at_a_glance() {

@@ -8,6 +8,7 @@ use anyhow::{Context as _, Result};
 use hums_blackbox::{Header, NotASector};
 
 use super::places::BLOCK_BYTES;
+use crate::archive;
 use crate::mavlink::frame::{Peek, peek};
 
 /// How far into a file to look for a first sector before calling it no log.
@@ -70,6 +71,8 @@ pub fn look(path: &Path) -> Result<Content> {
         (1.., _) => Content::Log,
         (0, Some(version)) => Content::Newer(version),
         _ if frame_at(0) || frame_at(8) => Content::Mavlink,
+        // Large, and known to be something else.
+        _ if start.starts_with(&archive::GZIP) || archive::hint(&start).is_some() => Content::Other,
         // A card whose first blocks are gone: only looking at all of it tells.
         _ if large => Content::Image,
         _ => Content::Other,

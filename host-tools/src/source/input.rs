@@ -14,9 +14,8 @@ use anyhow::{Context as _, Result};
 use flate2::bufread::MultiGzDecoder;
 
 use super::stream::read_some;
+use crate::archive::GZIP;
 
-/// The first bytes of a gzip file (RFC 1952), with the only compression method there is.
-const GZIP: [u8; 3] = [0x1f, 0x8b, 8];
 const BUFFER_BYTES: usize = 64 * 1024;
 
 /// How far an input has been read. Clones tell of the same input.

@@ -10,7 +10,7 @@ use super::paced::Paced;
 use super::raw::Raw;
 use super::said::Said;
 use super::stream::Source as _;
-use super::timeline::Timeline;
+use super::timeline::{Timeline, Wrong, is_wrong};
 use super::tlog::{Record, Records, TIME_BYTES, UTC_US_MIN};
 use crate::names::message_name;
 use crate::plural::count;
@@ -68,10 +68,21 @@ impl Reader for TlogReader {
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut timeline: Option<Timeline> = None;
+        let mut wrong = Wrong::default();
         let (mut place, mut now) = (0_u64, Instant::ZERO);
         while let Some(record) = self.records.next_record()? {
             let bytes = match record {
                 Record::Frame { time_us, bytes } => {
+                    let (before, after) =
+                        (timeline.and_then(|timeline| timeline.recorded_us()), || self.records.times_after());
+                    let is_jump = timeline.is_none_or(|timeline| timeline.is_jump(time_us));
+                    // Where a wrong one is the first of all, the next one tells when the recording began.
+                    let time_us = if is_jump && is_wrong(before, time_us, after()) == Some(true) {
+                        wrong.add(now, place);
+                        before.or_else(|| after().first().copied()).unwrap_or(time_us)
+                    } else {
+                        time_us
+                    };
                     let timeline = match &mut timeline {
                         Some(timeline) => timeline,
                         none => {
@@ -110,6 +121,9 @@ impl Reader for TlogReader {
                 counts.add(frame.id(), frame.bytes().len());
                 said.frame(now, &frame, want, take)
             })?;
+        }
+        if let Some(gap) = wrong.gap() {
+            take(now, Item::Gap(&gap))?;
         }
         said.end(take)?;
         Ok(counts.summary())
@@ -181,4 +195,54 @@ fn push(
         framer.idle(&mut sink);
     }
     result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mavlink::frame::tests::HEARTBEAT;
+
+    const SECOND: u64 = 1_000_000;
+
+    /// Of a tlog with these times, in tenths of seconds: gaps, restarts, and the last time in tenths.
+    fn told(tenths: &[u64]) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
+        let record = |tenth: &u64| {
+            [&(1_700_000_000 * SECOND + tenth * SECOND / 10).to_be_bytes()[..], &HEARTBEAT].concat()
+        };
+        let bytes: Vec<u8> = tenths.iter().flat_map(record).collect();
+        let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
+        let (mut gaps, mut restarts, mut last) = (Vec::new(), 0, Instant::ZERO);
+        let summary = reader.read(Want { frames: true, ..Want::default() }, &mut |at, item| {
+            match item {
+                Item::Gap(gap) => gaps.push((gap.cause, gap.place)),
+                Item::Restart => restarts += 1,
+                _ => {}
+            }
+            last = at;
+            Ok(())
+        });
+        assert!(summary.is_ok());
+        (gaps, restarts, last.as_millis() / 100)
+    }
+
+    #[test]
+    fn one_wrong_time_is_damage_and_changes_no_other_time() {
+        let usual: Vec<u64> = (1_000..1_200).collect();
+        assert_eq!(told(&usual), (vec![], 0, 199));
+        for (at, wrong) in [(100, 1_130), (100, 1_400), (100, 9_000), (100, 100), (0, 1_500)] {
+            let mut times = usual.clone();
+            times[at] = wrong;
+            // The first record's time begins the recording, unless it is the wrong one.
+            let end = if at == 0 { 198 } else { 199 };
+            assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_was_set_and_a_silence_are_none() {
+        let set: Vec<u64> = (1_000..1_100).chain(500..600).collect();
+        assert_eq!(told(&set), (vec![], 1, 99 + 99));
+        let silent: Vec<u64> = (1_000..1_100).chain(1_500..1_600).collect();
+        assert_eq!(told(&silent), (vec![], 0, 599));
+    }
 }

@@ -14,6 +14,7 @@ use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
+use crate::archive;
 use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::{self, Content, Log};
@@ -185,12 +186,12 @@ impl Recording {
     pub fn new(mut input: Input, name: &str) -> Result<Self> {
         let context = || format!("{name}: cannot be read");
         let start = input.peek(LOOK_BYTES).with_context(context)?;
+        if let Some(what) = hint(&start) {
+            bail!("{name}: {what}");
+        }
         let Some(format) = detect(&start) else {
             if start.is_empty() {
                 bail!("{name}: is empty");
-            }
-            if let Some(what) = hint(&start) {
-                bail!("{name}: {what}");
             }
             bail!("{name}: is neither a log of HUMS, a card or its image, nor {KNOWN}");
         };
@@ -251,6 +252,10 @@ impl Detected {
 }
 
 fn detect(start: &[u8]) -> Option<Detected> {
+    if hint(start).is_some() {
+        // A log that lies in an archive as it is would be read from its middle.
+        return None;
+    }
     if ulog::detect(start) {
         return Some(Detected::Ulog);
     }
@@ -259,39 +264,21 @@ fn detect(start: &[u8]) -> Option<Detected> {
     }
     // Before DataFlash's weaker signs. In 64 KiB of anything else a frame of version 1 whose checksum holds is rare, and
     // happens.
-    match sniff_bytes(start) {
-        (Kind::Tlog, true) => Some(Detected::Tlog),
-        (Kind::Raw, true) => Some(Detected::Raw),
+    let (kind, frames) = sniff_bytes(start);
+    if dataflash::is_headless(start, frames) {
+        return Some(Detected::DataFlash(dataflash::Form::Binary));
+    }
+    match kind {
+        Kind::Tlog if frames > 0 => Some(Detected::Tlog),
+        Kind::Raw if frames > 0 => Some(Detected::Raw),
         _ => dataflash::detect(start).map(Detected::DataFlash),
     }
 }
 
-/// What is known of files that are not read, and what to do with them.
+/// What is known of a file that is not read, by its first bytes as they are after unpacking, and what to do with it.
 fn hint(start: &[u8]) -> Option<&'static str> {
-    const HINTS: [(&[u8], &str); 9] = [
-        (b"PK\x03\x04", "is a ZIP archive; unpack it (unzip), and give what is in it"),
-        (b"\xfd7zXZ\0", "is compressed with xz; unpack it (xz -dk), or compress it with gzip instead"),
-        (b"BZh", "is compressed with bzip2; unpack it (bzip2 -dk), or compress it with gzip instead"),
-        (
-            b"\x28\xb5\x2f\xfd",
-            "is compressed with Zstandard; unpack it (zstd -dk), or compress it with gzip instead",
-        ),
-        (b"7z\xbc\xaf\x27\x1c", "is a 7-Zip archive; unpack it (7z x), and give what is in it"),
-        (b"Rar!\x1a\x07", "is a RAR archive; unpack it, and give what is in it"),
-        (
-            b"ULogEnc",
-            "is an encrypted log of PX4 (.ulge); decrypt it with the key of its vehicle (PX4: Tools/decrypt_ulog.py)",
-        ),
-        (
-            b"\xff\xfe",
-            "is text in UTF-16; a text log is read as UTF-8: convert it (iconv -f UTF-16 -t UTF-8)",
-        ),
-        (
-            b"\xfe\xff",
-            "is text in UTF-16; a text log is read as UTF-8: convert it (iconv -f UTF-16 -t UTF-8)",
-        ),
-    ];
-    HINTS.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, what)| *what)
+    const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
+    archive::hint(start).or_else(|| start.starts_with(&archive::GZIP).then_some(TWICE))
 }
 
 /// What a file that begins with these bytes (64 KiB, or all of it) is, where it is a recording and none of our own logs.
@@ -335,13 +322,19 @@ impl Found {
 
     /// Drops what was added since there were `before` places and lies in files of earlier inputs.
     fn drop_repeats(&mut self, before: usize) {
-        let mut inside = BTreeSet::new();
+        // The sessions of one card's image are in one file; a second path of that file is a second name of it.
+        let mut inside: BTreeMap<FileId, PathBuf> = BTreeMap::new();
         for place in self.places.split_off(before) {
             let pieces =
                 place.own().into_iter().flat_map(|log| &log.pieces).map(|piece| piece.path.as_path());
-            let files: Vec<FileId> =
-                pieces.chain(place.path()).filter_map(|path| FileId::of(path).ok()).collect();
-            if !files.is_empty() && files.iter().all(|file| self.seen.contains(file)) {
+            let files: Vec<(FileId, PathBuf)> = pieces
+                .chain(place.path())
+                .filter_map(|path| Some((FileId::of(path).ok()?, path.to_owned())))
+                .collect();
+            let is_known = |(file, path): &(FileId, PathBuf)| {
+                self.seen.contains(file) || inside.get(file).is_some_and(|known| known != path)
+            };
+            if !files.is_empty() && files.iter().all(is_known) {
                 if self.remarks.len() < REMARKS_MAX {
                     self.remarks
                         .push(format!("{}: was named or found already; it is read once", place.title));
@@ -349,9 +342,11 @@ impl Found {
             } else {
                 self.places.push(place);
             }
-            inside.extend(files);
+            for (file, path) in files {
+                inside.entry(file).or_insert(path);
+            }
         }
-        self.seen.append(&mut inside);
+        self.seen.extend(inside.into_keys());
     }
 
     /// Every file that any of it is in.
@@ -393,8 +388,9 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             found.is_cut |= walk.unknown > 0;
             found.remarks.append(&mut walk.remarks);
             if found.places.len() == before {
+                let passed_over = walk.hinted.iter();
                 let remarks: Vec<String> =
-                    found.remarks.iter().map(|remark| format!("\n  {remark}")).collect();
+                    found.remarks.iter().chain(passed_over).map(|remark| format!("\n  {remark}")).collect();
                 bail!("{}: no log and no recording is in there{}", input.display(), remarks.concat());
             }
             // A card has other files beside its logs.
@@ -465,8 +461,12 @@ fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
 }
 
 fn is_recording(path: &Path) -> bool {
-    let start = Input::open(path).ok().and_then(|mut input| input.peek(LOOK_BYTES).ok());
-    start.is_some_and(|start| detect(&start).is_some())
+    detect(&start_of(path)).is_some()
+}
+
+/// The first bytes of a file; none where it cannot be read.
+fn start_of(path: &Path) -> Vec<u8> {
+    Input::open(path).ok().and_then(|mut input| input.peek(LOOK_BYTES).ok()).unwrap_or_default()
 }
 
 /// The files of a folder, and of those in it, that are recordings other than our own logs. Links are not followed, and
@@ -480,6 +480,8 @@ struct Walk {
     others: u64,
     /// The first of them, by their names in the folder.
     passed_over: Vec<String>,
+    /// The first of them that are archives and the like, as sentences that say what to do.
+    hinted: Vec<String>,
     /// Files with the name of a recording that hold none, and the first of them as sentences.
     unknown: u64,
     remarks: Vec<String>,
@@ -497,12 +499,17 @@ impl Walk {
                 // What a run of this program has not made whole is nobody's recording.
                 continue;
             }
-            let wanted =
-                if kind.is_dir() { depth < DEPTH_MAX } else { kind.is_file() && is_recording(&path) };
+            let start = if kind.is_file() { start_of(&path) } else { Vec::new() };
+            let wanted = if kind.is_dir() { depth < DEPTH_MAX } else { detect(&start).is_some() };
             if !wanted {
                 self.others += u64::from(kind.is_file());
                 if kind.is_file() && self.passed_over.len() < PASSED_OVER_MAX {
-                    self.passed_over.push(printable::path(&path));
+                    let what = hint(&start).map_or_else(String::new, |what| format!(": {what}"));
+                    let words = format!("{}{what}", printable::path(&path));
+                    if !what.is_empty() {
+                        self.hinted.push(words.clone());
+                    }
+                    self.passed_over.push(words);
                 }
                 if kind.is_file() && is_named_as_recording(&path) {
                     self.unknown += 1;
@@ -564,6 +571,75 @@ mod tests {
         let found = found();
         assert_eq!((found.places.len(), found.is_lossy()), (10_000, true));
         assert!(found.remarks.iter().any(|remark| remark.contains("too many files")), "{:?}", found.remarks);
+    }
+
+    /// A log of ArduPilot that defines one message and has many of it.
+    fn dataflash() -> (Vec<u8>, Vec<u8>) {
+        let mut fmt = [&[0xa3, 0x95, 128, 150, 13][..], b"ATT\0Qc"].concat();
+        fmt.resize(3 + 2 + 4 + 16, 0);
+        fmt.extend(b"TimeUS,Roll");
+        fmt.resize(89, 0);
+        let message = |time: u64| [&[0xa3, 0x95, 150][..], &time.to_le_bytes(), &[1, 0]].concat();
+        (fmt, (0..200_u64).flat_map(|second| message(second * 1_000_000)).collect())
+    }
+
+    #[test]
+    fn an_archive_of_any_size_is_refused_with_what_to_do_and_named_in_its_folder() {
+        let (fmt, messages) = dataflash();
+        let log = [&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", &[0; 75], &fmt, &messages].concat();
+        let mut tar = vec![0; 512];
+        tar[257..262].copy_from_slice(b"ustar");
+        tar.extend(&log);
+        let zip = [b"PK\x03\x04 stored", &log[..]].concat();
+        let utf_16: Vec<u8> = b"\xff\xfe".iter().copied().chain([b'F', 0].repeat(10)).collect();
+        let twice = [&archive::GZIP[..], &[0; 100]].concat();
+        assert_eq!(hint(&twice).map(|what| what.contains("twice")), Some(true));
+        for (start, what) in [(tar, "tar"), (zip, "ZIP"), (utf_16, "UTF-16")] {
+            for bytes in [0, 2 << 20] {
+                let dir = tempfile::tempdir().expect("a folder");
+                let path = dir.path().join("file");
+                let mut all = start.clone();
+                all.resize(all.len() + bytes, 7);
+                fs::write(&path, &all).expect("room");
+                let found = find(std::slice::from_ref(&path), false).expect("one place");
+                let Err(error) = found.places[0].open() else { panic!("{what} is read") };
+                assert!(error.to_string().contains(what), "{error}");
+                let error = find(&[dir.path().to_owned()], false).expect_err("no recording").to_string();
+                assert!(error.contains("unpack") || error.contains("iconv"), "{error}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_with_two_names_in_a_folder_is_read_once() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (fmt, messages) = dataflash();
+        fs::write(dir.path().join("a.bin"), [fmt, messages].concat()).expect("room");
+        fs::hard_link(dir.path().join("a.bin"), dir.path().join("b.bin")).expect("a second name");
+        let found = find(&[dir.path().to_owned()], false).expect("a log");
+        assert_eq!(found.places.len(), 1);
+        assert!(found.remarks.iter().any(|remark| remark.contains("read once")), "{:?}", found.remarks);
+    }
+
+    #[test]
+    fn an_autopilots_log_without_its_beginning_is_one_that_is_damaged() {
+        use crate::mavlink::frame::tests::HEARTBEAT;
+        let (_, messages) = dataflash();
+        assert_eq!(format_of(&messages), Some(Format::DataFlash));
+        // By chance.
+        assert_eq!(format_of(&[&messages[..], &HEARTBEAT].concat()), Some(Format::DataFlash));
+        let mut gaps = Vec::new();
+        let recording = Recording::new(Input::new(io::Cursor::new(messages)).expect("memory"), "cut.bin");
+        let summary = recording.expect("a log").read(Want::default(), &mut |_, item| {
+            if let Item::Gap(gap) = item {
+                gaps.push((gap.cause, gap.place));
+            }
+            Ok(())
+        });
+        assert!(summary.is_ok());
+        assert_eq!(gaps, [(Cause::Cut, Some(0))]);
+        // A port over which such a log is downloaded is a port.
+        assert_eq!(format_of(&[&HEARTBEAT[..], &[0xa3, 0x95, 1]].concat().repeat(50)), Some(Format::Raw));
     }
 
     #[test]

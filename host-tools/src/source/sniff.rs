@@ -55,8 +55,8 @@ pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
     Ok((kind, Cursor::new(window).chain(input)))
 }
 
-/// What these first bytes are, and whether a frame is among them whose checksum holds.
-pub fn sniff_bytes(bytes: &[u8]) -> (Kind, bool) {
+/// What these first bytes are, and how many frames are among them whose checksum holds.
+pub fn sniff_bytes(bytes: &[u8]) -> (Kind, usize) {
     let (votes, good) = count(bytes);
     let kind = match votes {
         _ if bytes.is_empty() => Kind::Empty,
@@ -72,14 +72,14 @@ fn count_votes(bytes: &[u8]) -> i32 {
     count(bytes).0
 }
 
-/// The votes, and whether any frame's checksum holds.
-fn count(bytes: &[u8]) -> (i32, bool) {
-    let (mut votes, mut good) = (0, false);
+/// The votes, and how many frames have a checksum that holds.
+fn count(bytes: &[u8]) -> (i32, usize) {
+    let (mut votes, mut good) = (0, 0);
     let mut at = 0;
     while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty()) {
         match peek(rest) {
             Peek::Frame(frame) if frame.check() == Check::Good => {
-                good = true;
+                good += 1;
                 let next = at + frame.bytes.len();
                 let begins =
                     |at: usize| bytes.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));

@@ -7,10 +7,58 @@
 
 use hums_core::time::Instant;
 
+use super::item::{Cause, Gap};
+use crate::plural::count;
+
 /// A step back beyond this is a clock that began again, not a reordering.
 pub const STEP_BACK_US_MAX: u64 = 1_000_000;
 /// A step forward beyond this is damage or a clock that was set; gaps of hours are real.
 pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
+
+/// So many of the times after a jump are asked whether it is one.
+pub const ASKED: usize = 5;
+
+/// Whether a time that is far from the one before it is wrong: the times after it go on from the one before it, and not
+/// from it. `None` where none of them tells. Of the first time of all (`before` is `None`): whether the others are
+/// before it.
+///
+/// One damaged bit makes such a time. A pause and a restart are confirmed by what comes after them. After a jump
+/// forward, times from before the jump's beginning tell nothing: a log begins with old values.
+pub fn is_wrong(before: Option<u64>, recorded: u64, after: impl IntoIterator<Item = u64>) -> Option<bool> {
+    let (mut wrong, mut right) = (0_usize, 0_usize);
+    for time in after.into_iter().take(ASKED) {
+        let disagrees = match before {
+            Some(before) if recorded > before && time.saturating_add(STEP_BACK_US_MAX) < before => continue,
+            Some(before) => time.abs_diff(before) < time.abs_diff(recorded),
+            None => time.saturating_add(STEP_BACK_US_MAX) < recorded,
+        };
+        *(if disagrees { &mut wrong } else { &mut right }) += 1;
+    }
+    (wrong + right > 0).then_some(wrong > right)
+}
+
+/// Messages with a wrong time: how many, and where the first one is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wrong {
+    count: u64,
+    first: Option<(Instant, u64)>,
+}
+
+impl Wrong {
+    /// One more, at this byte of the recording.
+    pub fn add(&mut self, at: Instant, place: u64) {
+        self.count += 1;
+        self.first.get_or_insert((at, place));
+    }
+
+    /// Tells them as damage; nothing where there are none.
+    pub fn gap(self) -> Option<Gap> {
+        let (at, place) = self.first?;
+        let words =
+            format!("{} with a wrong time, far from the times around it", count(self.count, "message"));
+        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
+    }
+}
 
 /// What a recorded time became.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +115,16 @@ impl Timeline {
         Instant::from_micros(self.last.map_or(0, |(_, reached)| reached))
     }
 
+    /// Whether a recorded time is so far from the latest one, forward or back, that it may be wrong; the first one may.
+    pub fn is_jump(&self, recorded_us: u64) -> bool {
+        self.last.is_none_or(|(before, _)| recorded_us.abs_diff(before) > STEP_BACK_US_MAX)
+    }
+
+    /// The latest recorded time.
+    pub fn recorded_us(&self) -> Option<u64> {
+        self.last.map(|(recorded_us, _)| recorded_us)
+    }
+
     /// How often the clock fell or jumped.
     pub fn restarts(&self) -> u64 {
         self.restarts
@@ -103,6 +161,20 @@ mod tests {
             got,
             [(60 * SECOND, false), (61 * SECOND, false), (61 * SECOND, true), (62 * SECOND, false)]
         );
+    }
+
+    #[test]
+    fn a_time_is_wrong_where_the_times_after_it_go_on_from_the_one_before_it() {
+        let after = |seconds: [u64; 5]| seconds.map(|second| second * SECOND);
+        let wrong = |recorded: u64, seconds| is_wrong(Some(100 * SECOND), recorded * SECOND, after(seconds));
+        assert_eq!(wrong(108, [100, 100, 101, 101, 101]), Some(true));
+        assert_eq!(wrong(3, [100, 100, 101, 101, 101]), Some(true));
+        assert_eq!(wrong(108, [100, 108, 108, 109, 109]), Some(false), "a pause");
+        assert_eq!(wrong(3, [3, 3, 4, 4, 4]), Some(false), "a restart");
+        assert_eq!(wrong(108, [5, 6, 7, 8, 9]), None, "old values");
+        assert_eq!(is_wrong(None, 30 * SECOND, after([2, 2, 2, 3, 3])), Some(true), "the first of all");
+        assert_eq!(is_wrong(None, SECOND, after([2, 2, 90, 91, 92])), Some(false));
+        assert_eq!(is_wrong(Some(SECOND), 9 * SECOND, []), None, "the last of all");
     }
 
     #[test]

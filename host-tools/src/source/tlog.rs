@@ -10,13 +10,14 @@
 use std::io::{self, Read};
 
 use super::stream::{Chunk, Source, read_some};
+use super::timeline::ASKED;
 use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
 use crate::plural::count;
 
 pub(super) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
-/// Enough to see a record and the beginning of the one after it.
-const LOOKAHEAD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
+/// Enough to see a record, and those after it that are asked whether its time is right.
+const LOOKAHEAD_BYTES: usize = (ASKED + 2) * (TIME_BYTES + FRAME_BYTES_MAX);
 
 /// A step back beyond this is a clock that was set, not a reordering.
 const STEP_BACK_US_MAX: u64 = 1_000_000;
@@ -55,6 +56,25 @@ impl<R: Read> Records<R> {
 
     fn rest(&self) -> &[u8] {
         self.buffer.get(self.at..).unwrap_or_default()
+    }
+
+    /// The times of the next few records.
+    pub(super) fn times_after(&self) -> Vec<u64> {
+        let (mut times, mut at) = (Vec::new(), 0);
+        while let Some(rest) = self.rest().get(at..LOOKAHEAD_BYTES.min(self.rest().len())) {
+            match record_at(rest, self.ended) {
+                Some((time_us, length)) => {
+                    times.push(time_us);
+                    at += TIME_BYTES + length;
+                }
+                None if rest.is_empty() => break,
+                None => at += 1,
+            }
+            if times.len() >= ASKED {
+                break;
+            }
+        }
+        times
     }
 
     /// Whether the input ended with these bytes, which were the last that came, in the middle of a record.

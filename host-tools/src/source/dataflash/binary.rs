@@ -9,6 +9,7 @@
 
 use std::io::{self, Read};
 
+use super::ahead::AHEAD_BYTES;
 use super::buffer::Buffer;
 use super::format::{HEADER_BYTES, Lengths};
 
@@ -27,6 +28,8 @@ pub(super) enum Piece<'a> {
         payload: &'a [u8],
         /// Where it begins.
         place: u64,
+        /// What is here of the bytes after it.
+        after: &'a [u8],
     },
     /// Bytes that could not be read.
     Damage(Damage),
@@ -84,7 +87,7 @@ impl<R: Read> Binary<R> {
     /// type is the right one.
     pub(super) fn next(&mut self, lengths: &mut Lengths) -> io::Result<Option<Piece<'_>>> {
         loop {
-            self.buffer.fill(LOOKAHEAD_BYTES)?;
+            self.buffer.fill(LOOKAHEAD_BYTES.max(AHEAD_BYTES))?;
             let rest = self.buffer.rest();
             if rest.is_empty() {
                 let end = self.skipped.take().map(|skipped| Piece::Damage(skipped.told(true)));
@@ -96,10 +99,10 @@ impl<R: Read> Binary<R> {
                         return Ok(Some(Piece::Damage(skipped.told(false))));
                     }
                     let place = self.place();
-                    let bytes = self.buffer.take(length);
+                    let (bytes, after) = self.buffer.take_before(length);
                     let kind = bytes.get(2).copied().unwrap_or_default();
                     let payload = bytes.get(HEADER_BYTES..).unwrap_or_default();
-                    return Ok(Some(Piece::Message { kind, payload, place }));
+                    return Ok(Some(Piece::Message { kind, payload, place, after }));
                 }
                 Look::Skip { bytes, undefined, cut } => self.skip(bytes, undefined, cut),
             }

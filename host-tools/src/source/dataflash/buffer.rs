@@ -46,9 +46,14 @@ impl<R: Read> Buffer<R> {
 
     /// The next bytes, which are read then.
     pub(super) fn take(&mut self, bytes: usize) -> &[u8] {
+        self.take_before(bytes).0
+    }
+
+    /// The next bytes, which are read then, and what is here of those after them.
+    pub(super) fn take_before(&mut self, bytes: usize) -> (&[u8], &[u8]) {
         let start = self.at;
         self.at += bytes;
-        self.bytes.get(start..self.at).unwrap_or_default()
+        (self.bytes.get(start..self.at).unwrap_or_default(), self.rest())
     }
 
     /// Sees to it that so many bytes are there, or all that there are.

@@ -4,14 +4,16 @@
 //! oldest (`ArduCopter` 2.9 and 3.0) only in GPS messages, as the receiver's time of the week. A message without a time
 //! counts as written with the one before it.
 //!
-//! A single damaged byte makes a time of years: a jump counts when the next message agrees with it. The message of a
-//! jump that none follows is not trusted.
+//! A single damaged bit makes a time of any size: a jump counts where the next messages of the file agree with it, and is
+//! a wrong time where they go on from before it. Where none of them tells, the next message that is read decides. The
+//! message of a jump that none follows is not trusted.
 
 use hums_core::time::{Instant, Span};
 
-use super::format::TimeField;
+use super::ahead::Ahead;
+use super::format::{Formats, TimeField};
 use super::message::Message;
-use crate::source::timeline::{Moment, STEP_BACK_US_MAX, Timeline};
+use crate::source::timeline::{Moment, STEP_BACK_US_MAX, Timeline, is_wrong};
 
 /// A step forward beyond this wants a second message that agrees. A log that is only written while armed does have
 /// pauses of any length.
@@ -48,6 +50,8 @@ pub(super) struct When {
     pub(super) boot_us: Option<u64>,
     /// Its own time is a jump that nothing confirms: the message is likely damaged.
     pub(super) doubted: bool,
+    /// The messages after it say that its time is wrong.
+    pub(super) wrong: bool,
     /// It has a time of its own.
     pub(super) timed: bool,
 }
@@ -73,27 +77,35 @@ impl Clock {
         self.timeline.now()
     }
 
-    /// When a message was written. `week` is a GPS message's time of the week where the log has no other clock.
-    pub(super) fn at(&mut self, message: &Message<'_>, week: Option<u64>) -> When {
-        let boot_us = match message.format().time {
-            Some(TimeField::Micros(column)) => message.unsigned(column.into()),
-            Some(TimeField::Millis(column)) => {
-                message.unsigned(column.into()).map(|ms| ms.saturating_mul(1_000))
-            }
-            None => None,
-        };
+    /// When a message was written, `ahead` of which others follow. `week` is a GPS message's time of the week where the log has no other clock.
+    pub(super) fn at(
+        &mut self,
+        message: &Message<'_>,
+        week: Option<u64>,
+        (ahead, formats): (Ahead<'_>, &Formats),
+    ) -> When {
+        let boot_us = time_of(message);
         let Some(recorded_us) = boot_us.or_else(|| week.map(|ms| self.since_first(ms.saturating_mul(1_000))))
         else {
-            return When { at: self.now(), restarted: false, boot_us, doubted: false, timed: false };
+            return When { timed: false, ..self.as_before(boot_us) };
         };
-        if self.is_doubtful(recorded_us) {
+        let is_jump = self.recorded_us.is_none_or(|before| recorded_us.abs_diff(before) > STEP_BACK_US_MAX);
+        let wrong = if is_jump && boot_us.is_some() {
+            is_wrong(self.recorded_us, recorded_us, ahead.times(formats))
+        } else {
+            None
+        };
+        if wrong == Some(true) {
+            return When { doubted: true, wrong: true, ..self.as_before(boot_us) };
+        }
+        if wrong.is_none() && self.is_doubtful(recorded_us) {
             let agrees = self.doubted_us.is_some_and(|doubted_us| {
                 recorded_us.saturating_add(STEP_BACK_US_MAX) >= doubted_us
                     && recorded_us <= doubted_us.saturating_add(AGREE_US)
             });
             if !agrees {
                 self.doubted_us = Some(recorded_us);
-                return When { at: self.now(), restarted: false, boot_us, doubted: true, timed: true };
+                return When { doubted: true, ..self.as_before(boot_us) };
             }
         }
         self.doubted_us = None;
@@ -104,7 +116,12 @@ impl Clock {
         let before = self.now();
         let Moment { at, restarted } = self.timeline.at(recorded_us);
         self.silence = Some(before).filter(|before| !restarted && at.since(*before) > SILENCE);
-        When { at, restarted, boot_us, doubted: false, timed: true }
+        When { at, restarted, boot_us, doubted: false, wrong: false, timed: true }
+    }
+
+    /// Written with the message before it.
+    fn as_before(&self, boot_us: Option<u64>) -> When {
+        When { at: self.now(), restarted: false, boot_us, doubted: false, wrong: false, timed: true }
     }
 
     /// The time of the week as time since the first one; it goes on over the week's end.
@@ -124,5 +141,13 @@ impl Clock {
         };
         recorded_us.saturating_add(STEP_BACK_US_MAX) < before
             || recorded_us > before.saturating_add(STEP_DOUBTED_US)
+    }
+}
+
+/// Microseconds since power-on, as the message tells them.
+pub(super) fn time_of(message: &Message<'_>) -> Option<u64> {
+    match message.format().time? {
+        TimeField::Micros(column) => message.unsigned(column.into()),
+        TimeField::Millis(column) => message.unsigned(column.into()).map(|ms| ms.saturating_mul(1_000)),
     }
 }

@@ -57,6 +57,8 @@ pub(super) enum FieldKind {
     Array,
 }
 
+/// Room for the names of a message's columns in a binary log's FMT.
+const COLUMNS_BYTES: usize = 64;
 /// Numbers in an `a` field.
 pub(super) const ARRAY_LENGTH: usize = 32;
 
@@ -151,6 +153,10 @@ pub(super) struct Format {
     odd: Option<String>,
     /// Whether all of its format characters are known.
     is_known: bool,
+    /// Fewer columns have names than there are format characters.
+    lacks_names: bool,
+    /// Its format characters.
+    pub(super) characters: usize,
     /// Which column tells the time, and how.
     pub(super) time: Option<TimeField>,
     /// Its rows' table, once a row was made.
@@ -222,7 +228,12 @@ impl Format {
         let fields_length = fields_length.filter(|fields| unknown.is_none() && *fields != length);
         let time = time_field(name, &fields);
         let role = Role::of(kind, name);
-        let odd = odd(name, length, unknown, HEADER_BYTES + offset);
+        let characters = characters.iter().take(FIELDS_MAX).take_while(|character| **character != 0).count();
+        let named = columns.split(',').filter(|label| !label.trim().is_empty()).count();
+        // Names that fill FMT's own column are cut off by it.
+        let lacks_names = named < characters && columns.len() + 1 < COLUMNS_BYTES;
+        let odd = odd(name, length, unknown, HEADER_BYTES + offset)
+            .or_else(|| lacks_names.then(|| unnamed(name, named, characters)));
         let name = name.to_owned();
         Self {
             kind,
@@ -232,6 +243,8 @@ impl Format {
             fields_length,
             odd,
             is_known: unknown.is_none(),
+            lacks_names,
+            characters,
             time,
             table: None,
             role,
@@ -241,6 +254,11 @@ impl Format {
     /// Whether the other one defines the same.
     fn same(&self, other: &Self) -> bool {
         self.name == other.name && self.length == other.length && self.fields == other.fields
+    }
+
+    /// Whether its last column is a text, in which commas may stand.
+    pub(super) fn ends_in_text(&self) -> bool {
+        self.fields.last().is_none_or(|field| matches!(field.kind, FieldKind::Text(_)))
     }
 
     /// The column of this label.
@@ -362,7 +380,7 @@ impl Formats {
 
     /// Whether nothing is wrong with a definition but its length, which says nothing of a text log's lines.
     pub(super) fn is_only_long(&self, kind: u8) -> bool {
-        self.get(kind).is_some_and(|format| format.is_known)
+        self.get(kind).is_some_and(|format| format.is_known && !format.lacks_names)
     }
 
     /// What is wrong with a definition, once.
@@ -420,6 +438,10 @@ impl Formats {
 
 fn odd_fmt(name: &str, length: u8) -> String {
     format!("a definition of FMT itself, with the name {name:?} and {length} bytes, which is not followed")
+}
+
+fn unnamed(name: &str, named: usize, characters: usize) -> String {
+    format!("FMT names {named} of the {characters} columns of {name}: those without a name are not read")
 }
 
 /// What of a message cannot be read.

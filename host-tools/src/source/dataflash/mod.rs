@@ -8,6 +8,7 @@
 //! The first part of a file is looked through before it is read: the units of a message may be told after its first
 //! rows, and what vehicle it is after its first observations.
 
+mod ahead;
 mod binary;
 mod buffer;
 mod clock;
@@ -20,10 +21,11 @@ mod table;
 mod tests;
 mod text;
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use anyhow::{Context as _, Result, bail};
 
+use self::ahead::Ahead;
 use self::binary::{Binary, Damage, Piece};
 use self::format::{FMT_TYPE, HEADER_BYTES};
 use self::message::Body;
@@ -72,6 +74,16 @@ pub fn detect(start: &[u8]) -> Option<Form> {
     }
 }
 
+/// Whether these first bytes of a file are of a binary log whose own beginning is gone: messages stand everywhere in it, and
+/// hardly any of the MAVLink frames that a recorded download of such a log is made of (90 bytes of it in each).
+pub fn is_headless(start: &[u8], frames: usize) -> bool {
+    /// No message is longer; by chance two such bytes stand in 64 KiB once.
+    const MESSAGE_BYTES: usize = 256;
+    const HEADS_MIN: usize = 8;
+    let heads = start.windows(2).filter(|bytes| *bytes == [0xA3, 0x95]).count();
+    heads >= HEADS_MIN && heads * MESSAGE_BYTES >= start.len() && frames * 16 <= heads
+}
+
 /// The reader of such a log.
 pub fn open(input: Input, form: Form) -> Result<Box<dyn Reader>> {
     Ok(Box::new(DataFlash { input: Some(input), form }))
@@ -101,16 +113,16 @@ fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Res
     let mut first = First::default();
     let mut window = Binary::new(bytes.window(FIRST_BYTES).context(CONTEXT)?);
     while let Some(piece) = window.next(first.lengths())? {
-        if let Piece::Message { kind, payload, .. } = piece {
-            first.learn(kind, Body::Bytes(payload));
+        if let Piece::Message { kind, payload, after, .. } = piece {
+            first.learn(kind, Body::Bytes(payload), Ahead::Bytes(after));
         }
     }
     let mut session = Session::new(first, want);
     while let Some(piece) = bytes.next(session.lengths()).context(CONTEXT)? {
         match piece {
-            Piece::Message { kind, payload, place } => {
+            Piece::Message { kind, payload, place, after } => {
                 let length = (HEADER_BYTES + payload.len()) as u64;
-                session.message(kind, Body::Bytes(payload), place, length, take)?;
+                session.message((kind, Body::Bytes(payload)), place, length, Ahead::Bytes(after), take)?;
             }
             Piece::Damage(Damage { place, bytes, at_end, words }) => {
                 let cause = if at_end { Cause::Cut } else { Cause::Damaged };
@@ -130,7 +142,8 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
             first.banner(&line.words);
         }
         if let Ok(Some(kind)) = kinds.of(&line, first.formats()) {
-            first.learn(kind, Body::Words(&values_of(&line, kind, first.formats())));
+            let values = values_of(&line, kind, first.formats());
+            first.learn(kind, Body::Words(&values), Ahead::Lines(line.after));
             kinds.learn(kind, first.formats());
         }
     }
@@ -152,8 +165,12 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         if let Some(Skipped { place, bytes, words, .. }) = skipped.take() {
             session.gap(Cause::Damaged, Some(place), bytes, words, take)?;
         }
+        if let Some(words) = kinds.surplus(&line, kind, session.formats()) {
+            session.gap(Cause::Damaged, Some(line.place), 0, words, take)?;
+        }
         let values = values_of(&line, kind, session.formats());
-        session.message(kind, Body::Words(&values), line.place, line.bytes, take)?;
+        let body = (kind, Body::Words(&values));
+        session.message(body, line.place, line.bytes, Ahead::Lines(line.after), take)?;
         kinds.learn(kind, session.formats());
     }
     if let Some(Skipped { place, bytes, words, whole }) = skipped {
@@ -165,7 +182,13 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
 
 /// The values of a line of this type.
 fn values_of<'a>(line: &'a Line<'_>, kind: u8, formats: &format::Formats) -> Vec<&'a str> {
-    text::values(&line.words, formats.get(kind).map_or(0, |format| format.fields.len()))
+    let Some(format) = formats.get(kind) else { return Vec::new() };
+    let mut values = text::values(&line.words, format.fields.len());
+    // What is behind the last column is told, and not read.
+    if let Some(last) = values.last_mut().filter(|_| !format.ends_in_text()) {
+        *last = last.split(',').next().unwrap_or_default();
+    }
+    values
 }
 
 /// Lines that could not be read.
@@ -182,6 +205,8 @@ struct Kinds {
     by_name: HashMap<String, u8>,
     /// Definitions have begun: what stands before them is a banner.
     begun: bool,
+    /// Types of which a line with too many values was told.
+    surplus: BTreeSet<u8>,
 }
 
 impl Kinds {
@@ -207,6 +232,18 @@ impl Kinds {
             return Err(format!("a line of {name} with {found} of {columns} values"));
         }
         Ok(Some(kind))
+    }
+
+    /// What is wrong with a line that has more values than its type has columns; once for each type.
+    fn surplus(&mut self, line: &Line<'_>, kind: u8, formats: &format::Formats) -> Option<String> {
+        let format = formats.get(kind).filter(|format| !format.ends_in_text())?;
+        let (columns, found) = (format.characters.max(format.fields.len()), line.words.matches(',').count());
+        (found > columns && self.surplus.insert(kind)).then(|| {
+            format!(
+                "a line of {} with {found} values for {columns} columns: the others are not read",
+                format.name
+            )
+        })
     }
 
     /// After a definition: its name.

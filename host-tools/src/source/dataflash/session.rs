@@ -7,6 +7,7 @@ use anyhow::Result;
 use hums_core::observation::Source;
 use hums_core::time::Instant;
 
+use super::ahead::Ahead;
 use super::clock::Clock;
 use super::format::{Defined, FMT_TYPE, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
@@ -17,6 +18,7 @@ use crate::source::item::{
     About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Want,
 };
+use crate::source::timeline::Wrong;
 
 /// The autopilot: every log is of one.
 const SOURCE: Source = Source { system: 1, component: 1 };
@@ -65,7 +67,7 @@ impl First {
     }
 
     /// Takes a message.
-    pub(super) fn learn(&mut self, kind: u8, body: Body<'_>) {
+    pub(super) fn learn(&mut self, kind: u8, body: Body<'_>, ahead: Ahead<'_>) {
         if let Some((defined, _)) = defined_by(&self.formats, kind, body) {
             self.handlers.forget(defined);
         }
@@ -74,7 +76,7 @@ impl First {
         let Some(format) = formats.get(kind) else { return };
         let message = Message::new(format, body);
         if begins_us.is_none() {
-            let when = clock.at(&message, None);
+            let when = clock.at(&message, None, (ahead, formats));
             *begins_us = when.boot_us.filter(|_| !when.doubted);
         }
         if let Some(resolved) = handlers.of(format).filter(|resolved| resolved.handler.is_fact) {
@@ -156,6 +158,7 @@ pub(super) struct Session<'w> {
     /// What messages with a doubted time, or with none, have changed: it holds from the next message on whose time is
     /// known.
     later: Option<Standing>,
+    wrong: Wrong,
 }
 
 impl<'w> Session<'w> {
@@ -179,6 +182,7 @@ impl<'w> Session<'w> {
             firmware: first.banner.unwrap_or_default(),
             rows_refused: false,
             later: None,
+            wrong: Wrong::default(),
         }
     }
 
@@ -203,10 +207,10 @@ impl<'w> Session<'w> {
     /// Takes a message.
     pub(super) fn message(
         &mut self,
-        kind: u8,
-        body: Body<'_>,
+        (kind, body): (u8, Body<'_>),
         place: u64,
         bytes: u64,
+        ahead: Ahead<'_>,
         take: &mut Take<'_>,
     ) -> Result<()> {
         let index = usize::from(kind);
@@ -231,7 +235,7 @@ impl<'w> Session<'w> {
             }
         }
         self.define(kind, body, place, take)?;
-        self.say(kind, body, take)?;
+        self.say((kind, body), place, ahead, take)?;
         self.row(kind, body, take)
     }
 
@@ -292,13 +296,22 @@ impl<'w> Session<'w> {
     }
 
     /// Hands on what a message says, and what the autopilot says again and again.
-    fn say(&mut self, kind: u8, body: Body<'_>, take: &mut Take<'_>) -> Result<()> {
-        let Self { want, formats, state, clock, handlers, epoch_us, firmware, later, .. } = self;
+    fn say(
+        &mut self,
+        (kind, body): (u8, Body<'_>),
+        place: u64,
+        ahead: Ahead<'_>,
+        take: &mut Take<'_>,
+    ) -> Result<()> {
+        let Self { want, formats, state, clock, handlers, epoch_us, firmware, later, wrong, .. } = self;
         let Some(format) = formats.get(kind) else { return Ok(()) };
         let message = Message::new(format, body);
         let week = || message.unsigned(format.field("TimeMS").or_else(|| format.field("Time"))?);
         let week = if formats.has_boot_clock || format.name != "GPS" { None } else { week() };
-        let when = clock.at(&message, week);
+        let when = clock.at(&message, week, (ahead, formats));
+        if when.wrong {
+            wrong.add(when.at, place);
+        }
         if when.restarted {
             take(when.at, Item::Restart)?;
             state.restart();
@@ -405,6 +418,9 @@ impl<'w> Session<'w> {
 
     /// What was read.
     pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
+        if let Some(gap) = self.wrong.gap() {
+            take(self.clock.now(), Item::Gap(&gap))?;
+        }
         let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();
         // The clock follows only what is wanted.
         let has_time = |(kind, (count, _)): (u8, &(u64, u64))| {

@@ -20,6 +20,8 @@ pub(super) struct Line<'a> {
     pub(super) words: Cow<'a, str>,
     /// It has an end; only the last one may have none.
     pub(super) whole: bool,
+    /// What is here of the bytes after it.
+    pub(super) after: &'a [u8],
 }
 
 /// A reader of lines.
@@ -48,12 +50,13 @@ impl<R: Read> Lines<R> {
         let length = end.unwrap_or(searched.len());
         let next = length + usize::from(end.is_some());
         let place = self.0.place();
-        let line = self.0.take(next).get(..length).unwrap_or_default();
+        let (line, after) = self.0.take_before(next);
+        let line = line.get(..length).unwrap_or_default();
         let words = std::str::from_utf8(line).map_or_else(
             |_| line.iter().map(|byte| char::from(*byte)).collect::<String>().into(),
             Cow::Borrowed,
         );
-        Ok(Some(Line { place, bytes: next as u64, words, whole: end.is_some() }))
+        Ok(Some(Line { place, bytes: next as u64, words, whole: end.is_some(), after }))
     }
 }
 

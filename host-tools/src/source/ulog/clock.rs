@@ -1,10 +1,13 @@
 //! The log's clock: microseconds since the autopilot's boot, as times that never fall.
 //!
 //! Messages of different topics overtake each other, and at the beginning of a log stands what was published last of each topic,
-//! which may be minutes old: both count as now. A single time that is far off is damage and counts as now too. Where
+//! which may be minutes old: both count as now. A single time that is far ahead of those before and after it is wrong, and
+//! counts as now too. Where
 //! the times stay far off, the clock was set or another log was joined on: then time goes on from where it was.
 
 use hums_core::time::Instant;
+
+use crate::source::timeline::{STEP_BACK_US_MAX, is_wrong};
 
 /// A step beyond this, forward or back, wants to be confirmed. Topics are logged every ten seconds at least or once only.
 const STEP_US_MAX: u64 = 10_000_000;
@@ -26,6 +29,8 @@ pub(super) struct Clock {
     /// A time that was too far ahead, and how many agree with it.
     ahead: Option<(u64, u32)>,
     behind: u32,
+    /// How many were taken since the log's beginning, up to [`BEHIND`].
+    taken: u32,
 }
 
 impl Clock {
@@ -35,12 +40,23 @@ impl Clock {
         if !again {
             self.reached = if recorded > DAY_US { 0 } else { recorded };
         }
-        *self = Self { recorded, reached: self.reached, begun: true, ahead: None, behind: 0 };
+        *self = Self { recorded, reached: self.reached, begun: true, ahead: None, behind: 0, taken: 0 };
         again
+    }
+
+    /// Whether a time is so far ahead that it may be wrong. At a log's beginning are old values, and any step is right.
+    pub(super) fn is_doubtful(&self, recorded: u64) -> bool {
+        self.taken >= BEHIND && recorded.saturating_sub(self.recorded) > STEP_BACK_US_MAX
+    }
+
+    /// Whether a doubtful time is wrong: those after it go on from before it.
+    pub(super) fn is_wrong(&self, recorded: u64, after: impl IntoIterator<Item = u64>) -> bool {
+        is_wrong(Some(self.recorded), recorded, after) == Some(true)
     }
 
     /// The next recorded time; `true` where the clock fell for good.
     pub(super) fn take(&mut self, recorded: u64) -> bool {
+        self.taken = self.taken.saturating_add(1).min(BEHIND);
         let step = recorded.saturating_sub(self.recorded);
         if step > STEP_US_MAX {
             let agrees = |&(time, _): &(u64, u32)| recorded.abs_diff(time) <= STEP_US_MAX;

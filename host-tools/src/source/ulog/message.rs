@@ -18,6 +18,8 @@ pub(super) const MAGIC: [u8; 7] = [b'U', b'L', b'o', b'g', 0x01, 0x12, 0x35];
 /// The longest message other than data that is looked for in damage: each byte may be the beginning of one, and to look
 /// through 65,536 bytes for each would take seconds a megabyte.
 const FOUND_BYTES_MAX: usize = 2_048;
+/// Messages after one that are looked at for their times.
+const DATA_AFTER_MAX: usize = 64;
 /// What a synchronisation message holds.
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 
@@ -292,6 +294,22 @@ fn could_be(kind: u8, bytes: usize) -> bool {
 fn header(rest: &[u8]) -> Option<(u8, usize)> {
     let &[low, high, kind] = rest.first_chunk::<HEADER_BYTES>()?;
     Some((kind, usize::from(u16::from_le_bytes([low, high]))))
+}
+
+/// The messages of data at the beginning of some bytes, with the numbers of their subscriptions, as far as each message
+/// follows the one before it; at most [`DATA_AFTER_MAX`] messages are looked at.
+pub(super) fn data_after(bytes: &[u8]) -> impl Iterator<Item = (u16, &[u8])> {
+    let mut rest = bytes;
+    let next = move || {
+        let (kind, body_bytes) = header(rest)?;
+        let body = rest.get(HEADER_BYTES..HEADER_BYTES + body_bytes)?;
+        rest = rest.get(HEADER_BYTES + body_bytes..)?;
+        Some((kind, body))
+    };
+    std::iter::from_fn(next).take(DATA_AFTER_MAX).filter_map(|(kind, body)| {
+        let (id, data) = body.split_first_chunk().filter(|_| kind == b'D')?;
+        Some((u16::from_le_bytes(*id), data))
+    })
 }
 
 /// The time in the header of a file, where one stands.

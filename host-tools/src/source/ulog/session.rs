@@ -11,7 +11,8 @@ use super::clock::Clock;
 use super::fields::Fields;
 use super::format::Formats;
 use super::message::{
-    FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, beginning, words as text_of,
+    FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, beginning, data_after,
+    words as text_of,
 };
 use super::px4::{Px4, Said, Told};
 use super::rows;
@@ -21,6 +22,7 @@ use crate::source::item::{
     About, Cause, Column, Event, Fact, Gap, Item, Kind, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Value, Want,
 };
+use crate::source::timeline::Wrong;
 
 /// What a look needs to see: the longest message and the header after it.
 const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + FILE_HEADER_BYTES;
@@ -52,7 +54,8 @@ pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut T
         }
         match session.look(rest) {
             Found::Message(message, bytes) => {
-                session.message(place, &message, bytes)?;
+                let after = rest.get(bytes..).unwrap_or_default();
+                session.message(place, &message, bytes, after)?;
                 window.consume(bytes);
             }
             found => damage(window, &mut session, found == Found::Cut)?,
@@ -109,6 +112,7 @@ struct Session<'a, 'b> {
     strays: (u64, u64),
     /// The words that were told last: a topic and a logged string may have the same.
     last_words: String,
+    wrong: Wrong,
 }
 
 /// Information that is more than rows.
@@ -138,6 +142,7 @@ impl<'a, 'b> Session<'a, 'b> {
             appended: Vec::new(),
             strays: (0, 0),
             last_words: String::new(),
+            wrong: Wrong::default(),
         }
     }
 
@@ -180,6 +185,9 @@ impl<'a, 'b> Session<'a, 'b> {
                 format!("no appended data at {place}, which the header names: the file ends before it");
             self.gap(Cause::Cut, Some(place), 0, words)?;
         }
+        if let Some(gap) = self.wrong.gap() {
+            self.tell(Item::Gap(&gap))?;
+        }
         self.tell_facts()?;
         Ok(Summary { messages: self.subscriptions.counts(), ending: None })
     }
@@ -193,9 +201,9 @@ impl<'a, 'b> Session<'a, 'b> {
         self.tell(Item::Gap(&gap))
     }
 
-    fn message(&mut self, place: u64, message: &Message<'_>, bytes: usize) -> Result<()> {
+    fn message(&mut self, place: u64, message: &Message<'_>, bytes: usize, after: &[u8]) -> Result<()> {
         match *message {
-            Message::Data { id, data } => self.data(place, id, data, bytes),
+            Message::Data { id, data } => self.data(place, (id, data), bytes, after),
             Message::Flags { incompatible, appended } => self.flags(place, incompatible, appended),
             Message::Format(text) => match self.formats.define(text) {
                 Ok(()) => Ok(()),
@@ -209,7 +217,7 @@ impl<'a, 'b> Session<'a, 'b> {
                 self.subscriptions.remove(id);
                 Ok(())
             }
-            Message::Text { level, time_us, words } => self.text(level, time_us, words),
+            Message::Text { level, time_us, words } => self.text(place, (level, time_us, words), after),
             Message::Dropout(milliseconds) => self.dropout(place, milliseconds),
             Message::Beginning { time_us } => self.another(time_us),
             Message::Sync | Message::Unknown => Ok(()),
@@ -293,7 +301,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.gap(Cause::Damaged, Some(place), 0, format!("a subscription to {name}, one of too many"))
     }
 
-    fn data(&mut self, place: u64, id: u16, data: &[u8], bytes: usize) -> Result<()> {
+    fn data(&mut self, place: u64, (id, data): (u16, &[u8]), bytes: usize, after: &[u8]) -> Result<()> {
         let Some(subscription) = self.subscriptions.get_mut(id) else {
             if self.strays.0 == 0 {
                 self.strays.1 = place;
@@ -302,10 +310,12 @@ impl<'a, 'b> Session<'a, 'b> {
             return Ok(());
         };
         let recorded = subscription.take(data, bytes);
+        let recorded = recorded.filter(|&recorded| !self.is_wrong(recorded, place, after));
         if recorded.is_some_and(|recorded| self.clock.take(recorded)) {
             (self.take)(self.clock.now(), Item::Restart)?;
         }
         let now = self.clock.now();
+        let Some(subscription) = self.subscriptions.get_mut(id) else { return Ok(()) };
         if let Some(table) = &subscription.table {
             let values = rows::values(&subscription.layout, subscription.instance, data);
             (self.take)(now, Item::Row(Row { table, values: &values }))?;
@@ -325,6 +335,20 @@ impl<'a, 'b> Session<'a, 'b> {
         }
         self.px4.step(now, self.clock.recorded());
         self.hand_on()
+    }
+
+    /// Whether the time of the message at hand is wrong; counts those.
+    fn is_wrong(&mut self, recorded: u64, place: u64, after: &[u8]) -> bool {
+        if !self.clock.is_doubtful(recorded) {
+            return false;
+        }
+        let subscriptions = &self.subscriptions;
+        let times = data_after(after).filter_map(|(id, data)| subscriptions.time(id, data));
+        let is_wrong = self.clock.is_wrong(recorded, times);
+        if is_wrong {
+            self.wrong.add(self.clock.now(), place);
+        }
+        is_wrong
     }
 
     /// What the mapping has made.
@@ -368,9 +392,9 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    fn text(&mut self, level: u8, time_us: u64, words: &[u8]) -> Result<()> {
+    fn text(&mut self, place: u64, (level, time_us, words): (u8, u64, &[u8]), after: &[u8]) -> Result<()> {
         self.tell_facts()?;
-        if self.clock.take(time_us) {
+        if !self.is_wrong(time_us, place, after) && self.clock.take(time_us) {
             self.tell(Item::Restart)?;
         }
         self.say(level, text_of(words).trim_end())

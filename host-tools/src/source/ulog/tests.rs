@@ -62,6 +62,34 @@ fn a_parameter_that_changes_in_flight_is_told_when_it_changes() {
 }
 
 #[test]
+fn one_wrong_time_is_damage_and_changes_no_other_time() {
+    let log = |times: &[u64]| {
+        let mut writer =
+            Writer::new(SECOND).format(POSITION).subscribe(0, 0, "position").subscribe(1, 1, "position");
+        for &time in times {
+            writer = writer.data(0, time, &position(1.0, 1)).data(1, time - 50_000, &position(2.0, 2));
+        }
+        let read = read(&writer.bytes);
+        let last = read.items.iter().map(|(at, _)| *at).max().unwrap_or(0);
+        (read.of("gap").len(), read.of("gap").first().map(|gap| (*gap).to_owned()), last)
+    };
+    let usual: Vec<u64> = (0..600).map(|number| 2 * SECOND + number * 20_000).collect();
+    let end = usual[599];
+    for wrong in [1_300_000, 3 * SECOND, 8 * SECOND, 30 * SECOND, 1 << 50] {
+        let mut times = usual.clone();
+        times[500] += wrong;
+        // The time of the other instance is wrong as well.
+        let told = log(&times).1.unwrap_or_default();
+        assert_eq!(told, "Damaged 2 messages with a wrong time, far from the times around it", "{wrong}");
+        assert_eq!(log(&times).2, end, "{wrong}");
+    }
+    // A gap is one.
+    let after: Vec<u64> =
+        usual.iter().map(|time| if *time > 12 * SECOND { time + 5 * SECOND } else { *time }).collect();
+    assert_eq!(log(&after), (0, None, end + 5 * SECOND));
+}
+
+#[test]
 fn a_dropout_is_a_gap_with_its_length_and_no_damage() {
     let read = read(&small().dropout(73).data(0, 4 * SECOND, &position(0.0, 0)).bytes);
     assert_eq!(read.gaps.len(), 1);

@@ -38,6 +38,11 @@ impl Subscription {
     pub(super) fn take(&mut self, data: &[u8], message_bytes: usize) -> Option<u64> {
         self.count += 1;
         self.bytes += message_bytes as u64;
+        self.time(data)
+    }
+
+    /// The time of a message, where it has one.
+    fn time(&self, data: &[u8]) -> Option<u64> {
         let at = self.layout.timestamp? as usize;
         Some(u64::from_le_bytes(*data.get(at..)?.first_chunk()?))
     }
@@ -63,6 +68,11 @@ impl Subscriptions {
 
     pub(super) fn get_mut(&mut self, id: u16) -> Option<&mut Subscription> {
         self.numbered.get_mut(usize::from(id))?.as_deref_mut()
+    }
+
+    /// The time of a message of data, where it is known.
+    pub(super) fn time(&self, id: u16, data: &[u8]) -> Option<u64> {
+        self.numbered.get(usize::from(id))?.as_ref()?.time(data)
     }
 
     /// `false` where there are too many.

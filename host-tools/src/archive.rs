@@ -1,0 +1,63 @@
+//! Files that are not read but known by their first bytes: archives, compressed and encrypted logs, text in UTF-16.
+
+/// First bytes, and what to do with such a file: the end of a sentence that begins with its name.
+const KNOWN: [(&[u8], &str); 8] = [
+    (b"PK\x03\x04", "is a ZIP archive; unpack it (unzip), and give what is in it"),
+    (b"\xfd7zXZ\0", "is compressed with xz; unpack it (xz -dk), or compress it with gzip instead"),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "is compressed with Zstandard; unpack it (zstd -dk), or compress it with gzip instead",
+    ),
+    (b"7z\xbc\xaf\x27\x1c", "is a 7-Zip archive; unpack it (7z x), and give what is in it"),
+    (b"Rar!\x1a\x07", "is a RAR archive; unpack it, and give what is in it"),
+    (
+        b"ULogEnc",
+        "is an encrypted log of PX4 (.ulge); decrypt it with the key of its vehicle (PX4: Tools/decrypt_ulog.py)",
+    ),
+    (b"PK\x05\x06", "is a ZIP archive with nothing in it"),
+    (b"PK\x07\x08", "is a part of a ZIP archive; unpack it (unzip), and give what is in it"),
+];
+const BZIP2: &str = "is compressed with bzip2; unpack it (bzip2 -dk), or compress it with gzip instead";
+const TAR: &str = "is a tar archive; unpack it (tar -xf), and give what is in it";
+const UTF_16: &str = "is text in UTF-16; a text log is read as UTF-8: convert it (iconv -f UTF-16 -t UTF-8)";
+/// The first bytes of a gzip file (RFC 1952), with the only compression method there is.
+pub const GZIP: [u8; 3] = [0x1f, 0x8b, 8];
+/// Where a tar's first header says what it is (POSIX.1-1988 and later, GNU).
+const USTAR_AT: usize = 257;
+
+/// What a file that begins so (some hundred bytes) is and what to do with it, where it is one of these.
+pub fn hint(start: &[u8]) -> Option<&'static str> {
+    if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| start.starts_with(magic)) {
+        return Some(what);
+    }
+    match *start.first_chunk()? {
+        [b'B', b'Z', b'h', b'1'..=b'9'] => return Some(BZIP2),
+        // FE FF alone is also the beginning of a MAVLink frame of version 1.
+        [0xff, 0xfe, character, 0] | [0xfe, 0xff, 0, character] if character > 0 => return Some(UTF_16),
+        _ => {}
+    }
+    start.get(USTAR_AT..).is_some_and(|start| start.starts_with(b"ustar")).then_some(TAR)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_archive_is_told_by_its_first_bytes_and_a_frame_is_none() {
+        let mut tar = vec![b'a'; 600];
+        tar[USTAR_AT..USTAR_AT + 5].copy_from_slice(b"ustar");
+        for (start, what) in [
+            (&b"PK\x03\x04...."[..], "ZIP"),
+            (b"BZh91AY&SY", "bzip2"),
+            (b"\xff\xfeF\0M\0T\0", "UTF-16"),
+            (b"ULogEnc\x01", "encrypted"),
+            (&tar, "tar"),
+        ] {
+            assert!(hint(start).is_some_and(|words| words.contains(what)), "{what}");
+        }
+        for start in [&b""[..], b"PK", b"\xfe\xff\x01\x01\x01\x00", b"BZhello", b"ULog\x01\x12\x35\x01"] {
+            assert_eq!(hint(start), None, "{start:?}");
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Times that one damaged bit has changed, beside pauses and restarts, which are as far off and are right.
+
+use super::*;
+
+/// Where the time of the message stands that begins at this byte.
+fn set_time(log: &mut Writer, message: usize, seconds: f64) {
+    log.bytes[message + 3..message + 11].copy_from_slice(&((seconds * 1e6) as u64).to_le_bytes());
+}
+
+/// A log with its definitions.
+fn begun() -> Writer {
+    let mut log = Writer::new();
+    log.format(151, "IMU", "QB", "TimeUS,I");
+    log.attitudes(1..1);
+    log
+}
+
+/// Ten messages a second.
+fn tenths(log: &mut Writer, tenths: std::ops::Range<u64>) {
+    for tenth in tenths {
+        log.raw(151, &[&(tenth * 100_000).to_le_bytes(), &[0]]);
+        if tenth % 10 == 0 {
+            log.attitudes(tenth / 10..tenth / 10 + 1);
+        }
+    }
+}
+
+/// What is told of time: gaps, restarts, and the last time.
+fn told(log: &[u8]) -> (Vec<(Cause, String)>, usize, u64) {
+    let seen = seen(log);
+    let gaps = seen.gaps.into_iter().map(|(cause, _, _, words)| (cause, words)).collect();
+    (gaps, seen.restarts, seen.last.as_millis())
+}
+
+const WRONG: &str = "1 message with a wrong time, far from the times around it";
+
+#[test]
+fn one_wrong_time_is_damage_and_neither_a_restart_nor_a_gap_nor_later_times() {
+    for wrong in [1.3, 2.1, 3.0, 8.0, 29.0, 60.0, 1e9, -3.0, -9.0] {
+        let mut log = begun();
+        tenths(&mut log, 10..200);
+        let message = log.bytes.len();
+        log.attitudes(20..21);
+        tenths(&mut log, 201..300);
+        set_time(&mut log, message, 20.0 + wrong);
+        assert_eq!(told(&log.bytes), (vec![(Cause::Damaged, WRONG.to_owned())], 0, 29_900), "{wrong}");
+        let place = seen(&log.bytes).gaps[0].1;
+        assert_eq!(place, message as u64);
+    }
+}
+
+#[test]
+fn a_wrong_time_of_the_first_message_is_no_restart() {
+    let mut log = begun();
+    let message = log.bytes.len();
+    log.attitudes(1..2);
+    tenths(&mut log, 11..100);
+    set_time(&mut log, message, 40.0);
+    assert_eq!(told(&log.bytes), (vec![(Cause::Damaged, WRONG.to_owned())], 0, 9_900));
+}
+
+#[test]
+fn a_pause_and_a_restart_are_seen_with_their_first_message() {
+    let mut log = begun();
+    tenths(&mut log, 10..200);
+    tenths(&mut log, 230..300);
+    tenths(&mut log, 10..50);
+    let gaps = vec![(Cause::NotKept, "nothing was written".to_owned())];
+    assert_eq!(told(&log.bytes), (gaps, 1, 29_900 + 3_900));
+}
+
+#[test]
+fn a_wrong_time_in_a_text_log_is_told_too() {
+    let mut log = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+                   FMT, 150, 13, ATT, Qc, TimeUS,Roll\n"
+        .to_owned();
+    for tenth in 10..300_u64 {
+        let time = tenth * 100_000 + if tenth == 150 { 8_000_000 } else { 0 };
+        log.push_str(&format!("ATT, {time}, 1.5\n"));
+    }
+    assert_eq!(told(log.as_bytes()), (vec![(Cause::Damaged, WRONG.to_owned())], 0, 29_900));
+}
+
+#[test]
+fn a_line_with_too_many_values_is_told_once_and_its_columns_are_read() {
+    let mut log = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+                   FMT, 150, 13, ATT, Qc, TimeUS,Roll\nFMT, 151, 75, MSG, QZ, TimeUS,Message\n"
+        .to_owned();
+    for tenth in 10..30_u64 {
+        log.push_str(&format!("ATT, {}, 1.5, 7\nMSG, {}, one, two\n", tenth * 100_000, tenth * 100_000));
+    }
+    let seen = seen(log.as_bytes());
+    let [gap] = seen.gaps.as_slice() else { panic!("{:?}", seen.gaps) };
+    assert_eq!((gap.0, gap.3.contains("3 values for 2 columns")), (Cause::Damaged, true), "{}", gap.3);
+    assert!(seen.rows.contains(&"ATT 1000000 1.5".to_owned()), "{:?}", seen.rows);
+}
+
+#[test]
+fn columns_without_names_are_damage_where_messages_of_them_come() {
+    let mut log = Writer::new();
+    log.format(151, "IMU", "QBB", "TimeUS,I");
+    log.format(152, "NONE", "QBB", "TimeUS");
+    log.raw(151, &[&1_000_000_u64.to_le_bytes(), &[0, 1]]);
+    log.raw(151, &[&2_000_000_u64.to_le_bytes(), &[0, 1]]);
+    let (gaps, ..) = told(&log.bytes);
+    let words = "FMT names 2 of the 3 columns of IMU: those without a name are not read";
+    assert_eq!(gaps, [(Cause::Damaged, words.to_owned())]);
+}
