@@ -15,6 +15,7 @@ use crate::logs::Log;
 use crate::logs::reader::Summary;
 use crate::logs::strangers::{Others, Strange};
 use crate::plural::{are, count, noun};
+use crate::sessions::copy_words;
 use crate::utc::iso8601;
 
 /// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
@@ -150,6 +151,23 @@ pub struct Ending {
     pub proof: Proof,
     /// What became of the session that was recorded on the card just before this one.
     pub before: SessionBefore,
+    /// What of its name disagrees with what the logs hold.
+    pub misnamed: Option<Misnamed>,
+}
+
+/// A log whose files have another session's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Misnamed {
+    /// The same session is there under this lower number.
+    Copy {
+        /// The number.
+        of: u32,
+    },
+    /// It was recorded after the session of this number, which is its own or a higher one.
+    Later {
+        /// The number.
+        before: u32,
+    },
 }
 
 /// The session that was recorded on a card just before a log, as the log's boot record names it.
@@ -164,6 +182,13 @@ pub enum SessionBefore {
     NotLookedFor(u32),
     /// It is not there, and an older log of the card is; or its files hold another session.
     Gone(u32),
+    /// It is there under another number: files were renamed or exchanged.
+    Elsewhere {
+        /// Its number.
+        number: u32,
+        /// The number under which it is there.
+        there: u32,
+    },
 }
 
 impl SessionBefore {
@@ -172,6 +197,10 @@ impl SessionBefore {
         match self {
             Self::Gone(number) => Some(format!(
                 "session {number:05}, which was recorded just before it, is not there under that number"
+            )),
+            Self::Elsewhere { number, there } => Some(format!(
+                "session {number:05}, which was recorded just before it, is there under the name {there:05}: files were \
+                 renamed or exchanged"
             )),
             Self::NotNamed | Self::There | Self::NotLookedFor(_) => None,
         }
@@ -188,12 +217,21 @@ impl Ending {
             summary,
             proof,
             before: SessionBefore::NotNamed,
+            misnamed: None,
         }
     }
 
     /// How the log ends, as a part of a sentence.
     pub fn words(&self) -> String {
         self.proof.words(&self.summary)
+    }
+
+    /// The number under which the same session is there too, of a log that is not to be counted again.
+    pub const fn copy_of(&self) -> Option<u32> {
+        match self.misnamed {
+            Some(Misnamed::Copy { of }) => Some(of),
+            _ => None,
+        }
     }
 
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark.
@@ -228,10 +266,24 @@ impl Ending {
         if !self.proof.holds() && summary.session.is_some() {
             all.push(self.words());
         }
+        all.extend(self.noise());
         all.extend(self.strange());
         all.extend(self.newer());
         all.extend(self.before.gone());
         all
+    }
+
+    /// Blocks behind the last sector that are neither empty nor sectors of any log, where nothing proves that the log ends
+    /// before them.
+    pub fn noise(&self) -> Option<String> {
+        let number = Some(self.summary.behind.foreign).filter(|number| *number > 0)?;
+        (!self.proof.is_whole() && self.summary.session.is_some()).then(|| {
+            format!(
+                "{} {} behind its last sector: damaged sectors, or what other files left there",
+                count(number, "block"),
+                foreign_words(number)
+            )
+        })
     }
 
     /// What of its files is not the log's.
@@ -241,6 +293,13 @@ impl Ending {
         let told: Vec<_> = self.summary.strange.iter().filter(told).collect();
         let mut all: Vec<_> =
             told.iter().take(NAMED_MAX).map(|strange| self.strange_words(strange)).collect();
+        match self.misnamed {
+            Some(Misnamed::Copy { of }) => all.push(format!("it {}", copy_words(of))),
+            Some(Misnamed::Later { before }) => all.push(format!(
+                "it was recorded after session {before:05}, so its number is not its own: files were renamed or exchanged"
+            )),
+            None => {}
+        }
         if told.len() > NAMED_MAX {
             all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
         }
@@ -304,13 +363,18 @@ fn moment(summary: &Summary, at: Instant) -> String {
     utc.map_or_else(|| format!("{:.3} s", at.as_secs_f64()), |utc| iso8601(utc / 1000 * 1000))
 }
 
+/// That a block is no sector of a log.
+const fn foreign_words(number: u64) -> &'static str {
+    if number == 1 { "that is no sector" } else { "that are no sectors" }
+}
+
 /// What lies behind the last sector, in words; empty where nothing does.
 pub fn behind_words(behind: &BlockCounts) -> String {
     let kinds = [
         (behind.damaged, "damaged"),
         (behind.misplaced, "of earlier parts of this log"),
         (behind.stale, "of another session"),
-        (behind.foreign, "that are no sectors"),
+        (behind.foreign, foreign_words(behind.foreign)),
         (behind.erased, "erased"),
         (behind.empty, "of zeros"),
     ];

@@ -7,7 +7,8 @@ use std::collections::VecDeque;
 
 use hums_blackbox::record::Before;
 
-use crate::ending::{Ending, Proof, SessionBefore};
+use crate::ending::{Ending, Misnamed, Proof, SessionBefore};
+use crate::sessions::{Sessions, place};
 
 /// Logs held back at most; so many after a log may say something of its end.
 pub const HELD_MAX: usize = 4;
@@ -22,21 +23,24 @@ pub trait Logged {
 #[derive(Debug)]
 pub struct Followed<T> {
     held: VecDeque<T>,
-}
-
-impl<T> Default for Followed<T> {
-    fn default() -> Self {
-        Self { held: VecDeque::new() }
-    }
+    sessions: Sessions,
 }
 
 impl<T: Logged> Followed<T> {
+    /// Of logs whose first sectors were looked at.
+    pub const fn new(sessions: Sessions) -> Self {
+        Self { held: VecDeque::new(), sessions }
+    }
+
     /// Takes the next log; gives those of which nothing more will be said, in order.
     pub fn push(&mut self, mut next: T) -> Vec<T> {
         let mut has_sectors = false;
         if let Some(ending) = next.ending() {
             has_sectors = ending.summary.session.is_some();
-            if let Some(before) = ending.summary.marks.before.filter(Before::has_end) {
+            ending.misnamed = self.misnamed(ending);
+            if let Some(before) = ending.summary.marks.before.filter(Before::has_end)
+                && ending.copy_of().is_none()
+            {
                 self.tell(&before, ending);
             }
         }
@@ -52,6 +56,17 @@ impl<T: Logged> Followed<T> {
         self.held.into_iter()
     }
 
+    /// What of a log's name disagrees with what the logs hold.
+    fn misnamed(&self, ending: &Ending) -> Option<Misnamed> {
+        let session = ending.summary.session?;
+        if let Some(of) = self.sessions.copy_of(&ending.name, session) {
+            return Some(Misnamed::Copy { of });
+        }
+        let before = ending.summary.marks.before.filter(Before::has_end)?;
+        let is_later = place(&ending.name).1.is_some_and(|number| number <= before.number);
+        (is_later && before.session != session).then_some(Misnamed::Later { before: before.number })
+    }
+
     /// What the start of `next` found of the log before it.
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
@@ -64,13 +79,19 @@ impl<T: Logged> Followed<T> {
             card == other && numbers.is_some_and(|(next, read)| read <= before.number && before.number < next)
         };
         let is_looked_at = held.iter().any(|log| is_looked_at(&log.name));
+        let numbers = self.sessions.numbers(card, before.session);
+        let elsewhere = numbers.first().copied().filter(|_| !numbers.contains(&before.number));
         match held.iter_mut().rev().find(|log| log.summary.session == Some(before.session)) {
             Some(log) => {
                 log.proof = Proof::of(&log.summary, Some(before));
                 next.before = SessionBefore::There;
             }
+            None if numbers.contains(&before.number) => next.before = SessionBefore::There,
             None if is_looked_at => next.before = SessionBefore::Gone(before.number),
             None => next.before = SessionBefore::NotLookedFor(before.number),
+        }
+        if let Some(there) = elsewhere {
+            next.before = SessionBefore::Elsewhere { number: before.number, there };
         }
         // The start looked at each file from the newest on until it found a sector.
         for log in held.into_iter().filter(|log| log.summary.session.is_none()) {
@@ -81,10 +102,4 @@ impl<T: Logged> Followed<T> {
             }
         }
     }
-}
-
-/// A log's name in two: what stands before its number, and the number.
-fn place(name: &str) -> (&str, Option<u32>) {
-    let (card, number) = name.rsplit_once('/').unwrap_or(("", name));
-    (card, number.parse().ok().filter(|_| number.len() == 5))
 }

@@ -14,6 +14,7 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path, word};
+use crate::sessions::Sessions;
 use crate::summary::Overview;
 
 /// Runs `hums verify`.
@@ -32,12 +33,14 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
             image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
         }
     }
-    let mut followed = Followed::default();
-    let mut worst = Verdict::Holds;
+    let logs = found.logs.iter().map(|log| (log.name.as_str(), log));
+    let mut followed = Followed::new(Sessions::of(logs));
+    let (mut worst, mut copies) = (Verdict::Holds, 0);
     let mut done = |overview: &Overview| {
         let log = LogJson::new(overview);
         json.ok &= log.ok;
         worst = worst.max(log.verdict);
+        copies += usize::from(overview.ending.copy_of().is_some());
         if !args.json {
             let files = overview.ending.files.join(", ");
             output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
@@ -54,7 +57,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     if args.json {
         output::json(&json)?;
     } else {
-        let logs = count(json.logs.len(), "session");
+        let logs = count(json.logs.len() - copies, "session");
         let worst = if ok { worst } else { Verdict::NotProved };
         output::line(&format!("{logs}: {}", worst.words()))?;
     }
@@ -210,21 +213,24 @@ fn ends(log: &Overview) -> [Check; 5] {
     let (before_checked, before_failed) = match ending.before {
         SessionBefore::NotNamed | SessionBefore::NotLookedFor(_) => (0, 0),
         SessionBefore::There => (1, 0),
-        SessionBefore::Gone(_) => (1, 1),
+        SessionBefore::Gone(_) | SessionBefore::Elsewhere { .. } => (1, 1),
     };
     let before = match ending.before {
         SessionBefore::NotNamed => "it names none".to_owned(),
         SessionBefore::NotLookedFor(number) => format!("session {number:05} is not among what was read"),
-        SessionBefore::There | SessionBefore::Gone(_) => gone.unwrap_or_default(),
+        SessionBefore::There | SessionBefore::Gone(_) | SessionBefore::Elsewhere { .. } => {
+            gone.unwrap_or_default()
+        }
     };
     let twice = "sectors that are there twice, or lie where others belong".to_owned();
     let twice = if blocks.misplaced > 0 { twice } else { String::new() };
     let strange = ending.strange();
+    let holds = ending.proof.holds() && !newer && ending.noise().is_none();
     [
         check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, twice),
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
-        check("end", 1, u64::from(!ending.proof.holds() || newer), format!("{}; {behind}", ending.words())),
+        check("end", 1, u64::from(!holds), format!("{}; {behind}", ending.words())),
         check("session before", before_checked, before_failed, before),
     ]
 }

@@ -92,9 +92,16 @@ fn two_cards_are_never_made_into_one_log() {
     let told = pull(&first, &apart, &[LOG]).expect_code(&[0]).stderr;
     assert!(told.contains("is there already"), "{told}");
 
-    // All of it, and something behind it.
+    // One bit of it is another one: it is no other card's.
     let log = apart.join(LOG);
     let mut spoiled = fs::read(&log).unwrap();
+    spoiled[600] ^= 1;
+    fs::write(&log, &spoiled).unwrap();
+    let told = pull(&first, &apart, &[LOG]).expect_code(&[1]).stderr;
+    assert!(told.contains("differs from the board's log (the same session)"), "{told}");
+    spoiled[600] ^= 1;
+
+    // All of it, and something behind it.
     fs::write(&log, [&spoiled[..], &[0; 5]].concat()).unwrap();
     let told = pull(&first, &apart, &[LOG]).expect_code(&[1]).stderr;
     assert!(told.contains("begins as the board's log, and has 5 bytes more than that has"), "{told}");

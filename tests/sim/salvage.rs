@@ -157,7 +157,8 @@ fn a_deleted_log_is_found_again() {
 
 /// Records one more session on a card.
 fn record_more(image: &Path, flight: &Path) {
-    let sim = ["sim".as_ref(), "--json".as_ref(), "--input".as_ref(), flight.as_os_str(), "--sd".as_ref()];
+    let flags = ["--json", "--overwrite-oldest"].map(std::ffi::OsStr::new);
+    let sim = ["sim".as_ref(), flags[0], flags[1], "--input".as_ref(), flight.as_os_str(), "--sd".as_ref()];
     hums(sim.into_iter().chain([image.as_os_str()])).expect_code(&[0]);
 }
 

@@ -29,7 +29,7 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::progress;
 use crate::run::params;
-use crate::source::recording::{Place, find};
+use crate::source::recording::{Place, find, sessions_of};
 use checked::Checked;
 use judge::{Heard, Limits};
 use text::Table;
@@ -47,7 +47,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1;
     let (bar, mut table, mut failed) = (progress::logs(found.places.len()), Table::default(), 0_usize);
-    let mut followed = Followed::default();
+    let mut followed = Followed::new(sessions_of(&found.places));
     let mut done = |Told { name, checked }: Told| match checked {
         Ok(checked) => {
             outcome = outcome.and(checked.outcome());

@@ -120,6 +120,8 @@ pub struct Table {
     logs: u64,
     damaged: u64,
     cut: u64,
+    /// Logs that hold a session of another one.
+    copies: u64,
     not_proved: u64,
     little: u64,
     flown_us: u64,
@@ -129,6 +131,10 @@ impl Table {
     /// Adds a log.
     pub fn add(&mut self, checked: &Checked) {
         let judged = &checked.judged;
+        if checked.ending.as_ref().is_some_and(|ending| ending.copy_of().is_some()) {
+            self.copies += 1;
+            return;
+        }
         self.logs += 1;
         let state = state(checked);
         self.damaged += u64::from(state == State::Damaged);
@@ -166,6 +172,7 @@ impl Table {
             (self.damaged, "with parts missing or damaged (counted above too)"),
             (self.cut, "cut at their end (counted above too)"),
             (self.not_proved, "not proved to be whole (counted above too)"),
+            (self.copies, "the same session once more (not counted above)"),
             (failed as u64, "could not be read"),
         ] {
             if count > 0 {

@@ -44,6 +44,9 @@ pub struct Run {
     /// As fast as possible on a virtual clock (repeatable), or in real time; live inputs are always real
     #[arg(long, value_enum)]
     pub speed: Option<Speed>,
+    /// Overwrite the oldest sessions where the card has no room, as on a vehicle
+    #[arg(long)]
+    pub overwrite_oldest: bool,
     /// Print the result as one JSON object
     #[arg(long)]
     pub json: bool,

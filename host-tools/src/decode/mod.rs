@@ -52,12 +52,13 @@ use hums_core::time::Instant;
 
 use crate::cli;
 use crate::ending::Ending;
-use crate::files::{Folder, Inputs, appended, says_directory};
+use crate::files::{Folder, Inputs, appended, check_parent, says_directory};
 use crate::followed::{Followed, Logged};
 use crate::logs::reader::{self, Summary};
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
 use crate::plural::count;
-use crate::source::recording::{Place, find};
+use crate::sessions::{Sessions, copy_words};
+use crate::source::recording::{Place, find, sessions_of};
 use crate::summary::damaged_places;
 use crate::{output, printable, progress};
 use collect::Collected;
@@ -97,11 +98,12 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let standard_output = check_output(args, works.len(), formats)?;
     let native = check_forms(&works, formats)?;
     let selection = Selection::new(args, native)?;
-    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs: works.len() };
+    let (logs, sessions) = (works.len(), sessions_of(&found.places));
+    let mut followed = Followed::new(sessions.clone());
+    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs, sessions };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
     let (mut kept, mut any_kept) = (Kept::default(), false);
-    let mut followed = Followed::default();
     let mut tell = |done: Done| {
         outcome = outcome.and(done.outcome());
         written |= done.written;
@@ -168,6 +170,7 @@ struct Task<'a> {
     output: &'a Path,
     standard_output: bool,
     logs: usize,
+    sessions: Sessions,
 }
 
 /// A log's outcome, to be told in the logs' order.
@@ -220,9 +223,7 @@ impl Task<'_> {
         let (name, nth) = match &work.named {
             Named::As(name, nth) => (name, *nth),
             Named::Copy(of) => {
-                let of = all.get(*of).map_or("another log", |work| work.log.name.as_str());
-                let remark = format!("{}: is a copy of {of}, which is written once", log.name);
-                return Ok(Done { written: true, remarks: vec![remark], ..Done::of(log) });
+                return Ok(self.copy(log, all.get(*of).map_or("another log", |work| &work.log.name)));
             }
         };
         let mut remarks = Vec::new();
@@ -239,6 +240,7 @@ impl Task<'_> {
             && let Ok(mut taken) = taken.lock()
         {
             let first = partition(self.output, &context.identity);
+            check_parent(&first)?;
             let dir = claim(&mut taken, &first, nth, &context.stamp);
             if dir != first {
                 remarks.push(format!(
@@ -285,6 +287,14 @@ impl Task<'_> {
         }
         let lines = if self.standard_output { Vec::new() } else { written.lines };
         Ok(Done { outcome, ending, written: true, lines, remarks, ..Done::of(log) })
+    }
+
+    /// A log that is a copy of another one. Under two numbers of one card one of them has lost its own session.
+    fn copy(&self, log: &Place, of: &str) -> Done {
+        let mut remarks = vec![format!("{}: is a copy of {of}, which is written once", log.name)];
+        let number = log.own().and_then(|own| self.sessions.copy_of_log(&log.name, own));
+        remarks.extend(number.map(|number| format!("{}: it {}", log.name, copy_words(number))));
+        Done { written: true, outcome: Outcome::lossy(number.is_some()), remarks, ..Done::of(log) }
     }
 
     /// What must be known of a log before its first byte is written.

@@ -105,23 +105,34 @@ pub enum Named {
 
 /// Names the logs of one command, in their order. Two that share a session and are no copies of each other get
 /// different names: a copy that was cut short, for instance.
-pub fn names(logs: &[(&Place, Traits)]) -> Vec<Named> {
-    let mut known: BTreeMap<(Option<u32>, [u8; 16]), usize> = BTreeMap::new();
-    let mut of_session: BTreeMap<Option<u32>, u32> = BTreeMap::new();
-    let mut taken: BTreeMap<String, u32> = BTreeMap::new();
-    let name = |(index, (log, traits)): (usize, &(&Place, Traits))| {
-        if let Some(first) = known.get(&(traits.session, traits.fingerprint)) {
+#[derive(Debug, Default)]
+pub struct Names {
+    /// The indices of logs, by session and content.
+    known: BTreeMap<(Option<u32>, [u8; 16]), usize>,
+    of_session: BTreeMap<Option<u32>, u32>,
+    taken: BTreeMap<String, u32>,
+}
+
+impl Names {
+    /// Names the log of this index.
+    pub fn name(&mut self, index: usize, log: &Place, traits: &Traits) -> Named {
+        if let Some(first) = self.known.get(&(traits.session, traits.fingerprint)) {
             return Named::Copy(*first);
         }
-        known.insert((traits.session, traits.fingerprint), index);
-        let count = of_session.entry(traits.session).or_default();
+        self.known.insert((traits.session, traits.fingerprint), index);
+        let count = self.of_session.entry(traits.session).or_default();
         *count += 1;
         let name = traits.name(log);
-        let of_name = taken.entry(name.clone()).or_default();
+        let of_name = self.taken.entry(name.clone()).or_default();
         *of_name += 1;
         Named::As(if *of_name > 1 { format!("{name}-{of_name}") } else { name }, *count)
-    };
-    logs.iter().enumerate().map(name).collect()
+    }
+}
+
+/// Names all logs of one command.
+pub fn names(logs: &[(&Place, Traits)]) -> Vec<Named> {
+    let mut names = Names::default();
+    logs.iter().enumerate().map(|(index, (log, traits))| names.name(index, log, traits)).collect()
 }
 
 /// Inputs without those that `hums decode` and `hums report` make and that are no recordings, and what is said of them:

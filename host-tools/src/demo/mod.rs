@@ -145,6 +145,7 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         store: None,
         params: None,
         speed: None,
+        overwrite_oldest: false,
         json: false,
         faults: FaultFlags::default(),
     };

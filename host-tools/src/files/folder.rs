@@ -16,7 +16,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::identity::without_links;
 use super::inputs::Inputs;
-use super::part::{is_written, lock, sync_folder_of};
+use super::part::{is_written, lock, lock_folder_of, sync_folder_of};
 use super::paths::{cannot_write, make_parent, part_of, settle};
 use super::stamp::{STAMP, Stamp, foreign};
 use super::there::There;
@@ -76,6 +76,7 @@ impl Folder {
         inputs.refuse(path)?;
         make_parent(path)?;
         let target = without_links(path).with_context(|| cannot_write(path))?;
+        let _beginning = lock_folder_of(&target);
         restore(&target)?;
         let to = if Self::is_free(path) {
             To::Part(Part::begin(path, target, false)?)
@@ -91,7 +92,8 @@ impl Folder {
     pub fn is_free(path: &Path) -> bool {
         match fs::read_dir(path) {
             Ok(mut entries) => entries.next().is_none(),
-            Err(error) => error.kind() == io::ErrorKind::NotFound,
+            // Below a file, or where nobody may look, nothing of this name is known to be there: making it says why.
+            Err(error) => error.kind() == io::ErrorKind::NotFound || fs::symlink_metadata(path).is_err(),
         }
     }
 
@@ -205,6 +207,7 @@ impl Part {
         }
         // An open file keeps Windows from renaming its folder.
         self.stamp = None;
+        let _ending = lock_folder_of(&self.target);
         put_in_place(&self.path, &self.target, exchange).with_context(|| cannot_write(path))?;
         sync_folder_of(&self.target);
         self.path = PathBuf::new();
@@ -215,6 +218,7 @@ impl Part {
 impl Drop for Part {
     fn drop(&mut self) {
         if !self.path.as_os_str().is_empty() {
+            let _ending = lock_folder_of(&self.target);
             // Where it cannot be removed, the next run does.
             let _ = remove_part(&self.path);
         }

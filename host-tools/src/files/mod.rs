@@ -25,8 +25,8 @@ pub use kind::{Kind, Origin};
 pub use output::Output;
 pub use part::{InPlacePart, is_part, lock_in_place, make_in_place};
 pub use paths::{
-    PART, appended, cannot_write, inside, is_seekable, make_directory, make_parent, remove_if_empty,
-    says_directory, settle,
+    PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
+    remove_if_empty, says_directory, settle,
 };
 
 #[cfg(test)]

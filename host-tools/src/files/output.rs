@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use super::identity::without_links;
 use super::inputs::Inputs;
 use super::kind::{Found, Kind, Origin};
-use super::part::{lock, remove_stale, rename_new, sync_folder_of};
+use super::part::{lock, lock_folder_of, remove_stale, rename_new, sync_folder_of};
 use super::paths::{begun_of, cannot_write, part_of, settle};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
@@ -129,6 +129,7 @@ impl Output {
     }
 
     fn begin(path: &Path, part: Part) -> Result<Self> {
+        let _beginning = lock_folder_of(&part.target);
         remove_stale(&part.path, path)?;
         let file = File::options().write(true).create_new(true).open(&part.path);
         let file = file.with_context(|| cannot_write(path))?;

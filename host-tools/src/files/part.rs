@@ -30,6 +30,14 @@ pub(super) fn lock(file: &File, target: &Path) -> Result<()> {
     }
 }
 
+/// Keeps other runs from beginning or ending anything in the folder of a target, for as long as it is held: what a killed
+/// run has left is removed, and the new part made and locked, in one go. None where the system does not lock folders.
+pub(super) fn lock_folder_of(target: &Path) -> Option<File> {
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = File::open(folder).ok()?;
+    folder.lock().ok().map(|()| folder)
+}
+
 /// Takes the lock of a file that is updated in place, for as long as it is open: two runs that write one card or one
 /// store would leave neither's. Only on Unix: a lock on Windows would also keep the same run from reading it.
 pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
@@ -44,10 +52,12 @@ pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
 pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Result<File> {
     let target = without_links(path).with_context(|| cannot_write(path))?;
     let part = part_of(&target)?;
+    let beginning = lock_folder_of(&target);
     remove_stale(&part, path)?;
     let file = File::options().read(true).write(true).create_new(true).open(&part);
     let file = file.with_context(|| cannot_write(path))?;
     lock(&file, path)?;
+    drop(beginning);
     let made = fill(&file).and_then(|()| rename_new(&part, &target).with_context(|| cannot_write(path)));
     if !cfg!(unix) {
         // As `lock_in_place` has it.
@@ -96,7 +106,11 @@ pub(super) fn remove_stale(part: &Path, target: &Path) -> Result<()> {
             Err(_) => {}
         }
     }
-    std::fs::remove_file(part).with_context(|| cannot_write(part))
+    match std::fs::remove_file(part) {
+        // The run that wrote it has finished meanwhile.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed.with_context(|| cannot_write(part)),
+    }
 }
 
 /// Renames a file to a name that nothing has; [`io::ErrorKind::AlreadyExists`] where something has it.

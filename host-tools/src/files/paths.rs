@@ -31,10 +31,25 @@ fn beside(target: &Path, ending: &str) -> Result<PathBuf> {
 
 /// Makes a directory, unless it is there.
 pub fn make_directory(dir: &Path) -> Result<()> {
-    if dir.is_file() {
-        bail!("{}: is a file, and a directory is needed there; name another output", dir.display());
-    }
+    check_directory(dir)?;
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
+}
+
+/// Refuses a directory that cannot be one: it, or what it is to lie in, is a file.
+fn check_directory(dir: &Path) -> Result<()> {
+    // Without a slash at its end, with which a file is not found.
+    let dir: PathBuf = dir.components().collect();
+    match dir.ancestors().find(|folder| folder.is_file()) {
+        Some(file) => {
+            bail!("{}: is a file, and a directory is needed there; name another output", file.display())
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a path whose directory, or any directory above it, is a file.
+pub fn check_parent(path: &Path) -> Result<()> {
+    path.parent().map_or(Ok(()), check_directory)
 }
 
 /// Removes a directory, if nothing is in it.

@@ -294,3 +294,23 @@ fn two_runs_do_not_write_one_folder() {
     assert!(second.contains("another run of hums is writing it"), "{second}");
     first.finish().expect("whole");
 }
+
+#[test]
+fn of_many_runs_that_begin_at_once_each_gets_its_turn_or_is_told_of_another_one() {
+    let dir = furnished();
+    let (file, folder) = (dir.path().join("new"), dir.path().join("session"));
+    let begin = || -> [Option<String>; 2] {
+        let output = create(&file).map(drop);
+        let tables = Folder::create(&folder, &Inputs::none(), "one").map(drop);
+        [output, tables].map(|begun| begun.err().map(|error| format!("{error:#}")))
+    };
+    let told: Vec<String> = std::thread::scope(|scope| {
+        let run = || (0..50).flat_map(|_| begin()).flatten().collect::<Vec<_>>();
+        let runs: Vec<_> = (0..4).map(|_| scope.spawn(run)).collect();
+        runs.into_iter().flat_map(|run| run.join().expect("no panic")).collect()
+    });
+    for told in told {
+        assert!(told.contains("another run of hums is writing it"), "{told}");
+    }
+    assert_eq!(names(dir.path()), ["old"]);
+}

@@ -12,7 +12,7 @@ use crate::decode::side_by_side::side_by_side;
 use crate::followed::Followed;
 use crate::outcome::Outcome;
 use crate::output;
-use crate::source::recording::find;
+use crate::source::recording::{find, sessions_of};
 use crate::summary::Overview;
 use json::{LogJson, images_json};
 use text::{image_text, text};
@@ -32,7 +32,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&image_text(image))?;
         }
     }
-    let mut followed = Followed::default();
+    let mut followed = Followed::new(sessions_of(&found.places));
     let mut done = |overview: &Overview| {
         outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
         if let Some(list) = &mut list {

@@ -108,7 +108,7 @@ fn ending(text: &mut String, log: &Overview) {
     if let Some(gone) = ending.before.gone() {
         let _ = writeln!(text, "  before   {gone}");
     }
-    for strange in ending.strange() {
+    for strange in ending.noise().into_iter().chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }
     let (superseded, misplaced) = (summary.blocks.superseded, summary.blocks.misplaced);

@@ -40,6 +40,24 @@ pub fn on_card(path: &Path) -> Vec<Log> {
     read().unwrap_or_default()
 }
 
+/// How much room a card has for files, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// What is free.
+    pub free: u64,
+    /// All.
+    pub all: u64,
+}
+
+/// The room on a card; none where its file system cannot be read.
+pub fn room(path: &Path) -> Option<Room> {
+    let file = File::open(path).ok()?;
+    let layout = Layout::read(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
+    let (all, clusters) = (layout.data_bytes(), u64::from(layout.clusters));
+    let walk = Volume::new(&file, layout).and_then(Volume::walk).ok()?;
+    Some(Room { free: all / clusters.max(1) * walk.free_clusters, all })
+}
+
 /// The logs on a card: by its file system, or where that does not tell, by looking at every block.
 pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let context = || format!("{}: cannot be read", path.display());

@@ -73,6 +73,8 @@ pub struct Walk {
     pub files: Vec<CardFile>,
     /// What does not hold, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub damage: Vec<String>,
+    /// Clusters that are free.
+    pub free_clusters: u64,
     /// Clusters that are allocated and belong to no file: room that a cut left behind, or a file whose entry is lost.
     pub lost_clusters: u64,
     /// Where they lie, as far as there is room to keep it.
@@ -343,9 +345,16 @@ impl<'a, I: ReadAt> Volume<'a, I> {
             let used =
                 self.used.get(cluster as usize / 64).is_some_and(|word| word & (1 << (cluster % 64)) != 0);
             // 0x0ffffff7 marks a bad cluster.
-            if !used && !matches!(self.entry(cluster)?, 0 | 0x0fff_fff7) {
-                self.walk.lost_clusters += 1;
-                self.keep_lost(cluster);
+            if used {
+                continue;
+            }
+            match self.entry(cluster)? {
+                0 => self.walk.free_clusters += 1,
+                0x0fff_fff7 => {}
+                _ => {
+                    self.walk.lost_clusters += 1;
+                    self.keep_lost(cluster);
+                }
             }
         }
         Ok(())

@@ -19,7 +19,7 @@ pub mod reader;
 mod scan;
 pub mod strangers;
 
-pub use card::{is_card, on_card};
+pub use card::{Room, is_card, on_card, room};
 pub use find::{Content, Found, find};
 pub use folder::{passed_over, segment_name};
 pub use places::{Log, Piece};

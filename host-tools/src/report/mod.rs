@@ -25,7 +25,7 @@ use anyhow::{Result, bail};
 
 use crate::check;
 use crate::cli;
-use crate::decode::naming::{Traits, without_made};
+use crate::decode::naming::{Named, Names, Traits, without_made};
 use crate::decode::side_by_side::side_by_side;
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{Followed, HELD_MAX};
@@ -35,7 +35,7 @@ use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path as shown, word};
-use crate::source::recording::{Place, find};
+use crate::source::recording::{Place, find, sessions_of};
 use crate::summary::Overview;
 
 /// Runs `hums report`.
@@ -55,24 +55,29 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     let wanted = wanted(args, &found.places)?;
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     // Of each session only what later ones are compared with is kept.
-    let mut earlier: Vec<trend::Session> = Vec::new();
+    let mut earlier: Vec<Option<trend::Session>> = Vec::new();
     let mut kept = Kept::default();
     // The next start on the card tells how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
-    let mut followed = Followed::default();
+    let mut followed = Followed::new(sessions_of(&found.places));
+    let mut names = Names::default();
     let mut done = |overview: Overview| {
         let (index, this) = (earlier.len(), trend::Session::of(&overview));
         if let Some(place) = found.places.get(index).filter(|_| wanted.sessions.contains(&index)) {
             let on_card =
                 earlier.iter().zip(&found.places).filter(|(_, other)| are_of_one_card(place, other));
-            let before: Vec<trend::Session> = on_card.map(|(session, _)| session.clone()).collect();
+            let before: Vec<trend::Session> = on_card.filter_map(|(session, _)| session.clone()).collect();
             let traits = Traits::of(place)?;
-            let (path, of) = (wanted.path(place, &traits), traits.identity(place));
-            let replay = replay::Replay::of(place)?;
-            let html = page::html(&overview, &replay, &trend::of(&this, &before), of.as_deref())?;
-            if kept.pass(write(&path, &html, &inputs, of.as_deref()))?.is_some() {
-                let bytes = count(html.len() as u64, "byte");
-                output::line(&format!("{}: session {}, {bytes}", shown(&path), word(&place.name)))?;
+            match names.name(index, place, &traits) {
+                Named::Copy(of) => {
+                    let of = found.places.get(of).map_or("another log", |place| &place.name);
+                    note!("{}: is a copy of {of}, whose page is written once", place.name);
+                }
+                Named::As(name, _) => {
+                    let (path, of) = (wanted.path(&name), traits.identity(place));
+                    let trend = trend::of(&this, &before);
+                    kept.pass(make(place, &overview, &trend, &path, of.as_deref(), &inputs))?;
+                }
             }
         }
         // Also of the sessions before, which the page compares with, and of those that were read for its end.
@@ -80,7 +85,8 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             note!("{}: {why}", overview.ending.name);
         }
         outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
-        earlier.push(this);
+        // A session that is there twice counts once.
+        earlier.push(overview.ending.copy_of().is_none().then_some(this));
         Ok(())
     };
     side_by_side(found.places.get(..end).unwrap_or_default(), check::overview, |overview| {
@@ -107,6 +113,21 @@ fn are_of_one_card(one: &Place, other: &Place) -> bool {
         first.filter(|path| segment_name(path).is_some()).and_then(Path::parent).map(Path::to_owned)
     };
     image(one) == image(other) || folder(one).is_some() && folder(one) == folder(other)
+}
+
+/// Makes the page of a session, and says so.
+fn make(
+    place: &Place,
+    overview: &Overview,
+    trend: &trend::Trend,
+    path: &Path,
+    of: Option<&str>,
+    inputs: &Inputs,
+) -> Result<()> {
+    let html = page::html(overview, &replay::Replay::of(place)?, trend, of)?;
+    write(path, &html, inputs, of)?;
+    let bytes = count(html.len() as u64, "byte");
+    output::line(&format!("{}: session {}, {bytes}", shown(path), word(&place.name)))
 }
 
 fn write(path: &Path, html: &str, inputs: &Inputs, of: Option<&str>) -> Result<()> {
@@ -147,11 +168,7 @@ fn wanted(args: &cli::Report, logs: &[Place]) -> Result<Wanted> {
 
 impl Wanted {
     /// A page in a directory has the name that `hums decode` gives the session's files.
-    fn path(&self, place: &Place, traits: &Traits) -> PathBuf {
-        if self.directory {
-            appended(&self.output.join(traits.name(place)), "html")
-        } else {
-            self.output.clone()
-        }
+    fn path(&self, name: &str) -> PathBuf {
+        if self.directory { appended(&self.output.join(name), "html") } else { self.output.clone() }
     }
 }

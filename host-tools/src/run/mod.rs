@@ -4,6 +4,7 @@
 //! [`sim`] runs the tasks' bodies on this PC, [`emulate`] the firmware itself in QEMU.
 
 pub mod arrivals;
+mod earlier;
 pub mod emulate;
 pub mod ground;
 pub(crate) mod params;

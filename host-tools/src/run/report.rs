@@ -8,6 +8,7 @@ use hums_blackbox::record::Stats;
 use hums_core::health;
 use serde::Serialize;
 
+use super::earlier::EarlierSessions;
 use crate::endpoint::Endpoint;
 use crate::logs;
 use crate::outcome::Outcome;
@@ -51,6 +52,12 @@ pub struct Report {
     pub usage: serde_json::Map<String, serde_json::Value>,
     /// The run's log files on the card.
     pub log_files: Vec<String>,
+    /// Earlier sessions that were overwritten, in whole or in part, because the card had no room.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub overwritten: Vec<String>,
+    /// The command line allows that.
+    #[serde(skip)]
+    pub may_overwrite: bool,
     /// Power went at a block write that the command line chose.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub power_cut: bool,
@@ -143,11 +150,16 @@ impl Report {
         self.gs_bytes = stats.gs_bytes;
     }
 
-    /// Adds what the card's logs of this run say (those beyond the first `earlier` ones); gives their frames.
-    pub fn read_card(&mut self, card: &Path, earlier: usize) -> Result<u64> {
+    /// Adds what the card's logs of this run say, and which earlier ones it overwrote; gives the frames of the run's.
+    pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<u64> {
         let mut frames = 0;
         // A card that cannot be read has no log to tell of; the counters say what was lost.
-        for log in logs::on_card(card).iter().skip(earlier) {
+        let logs = logs::on_card(card);
+        if !logs.is_empty() {
+            self.overwritten = earlier.overwritten(&logs);
+            self.may_overwrite = earlier.is_allowed();
+        }
+        for log in logs.iter().filter(|log| !earlier.has(log)) {
             let overview = Overview::of(log)?;
             frames += overview.contents.frames();
             self.log_files.extend(log.files.iter().cloned());
@@ -169,7 +181,13 @@ impl Report {
         } else {
             output::line(&self.text())?;
         }
-        Ok(Outcome::lossy(self.frames_lost > 0))
+        if !self.overwritten.is_empty() {
+            note!(
+                "the card had no room: earlier sessions were overwritten, in whole or in part: {}",
+                self.overwritten.join(", ")
+            );
+        }
+        Ok(Outcome::lossy(self.frames_lost > 0 || !self.overwritten.is_empty() && !self.may_overwrite))
     }
 
     /// What is strange about an input of which nothing came out.

@@ -21,6 +21,7 @@ use crate::logs::{self, Content, Log};
 use crate::outcome::usage;
 use crate::plural::count;
 use crate::printable;
+use crate::sessions::Sessions;
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
 pub const RAW_BAUD: u32 = 115_200;
@@ -439,6 +440,11 @@ fn make_names_unique(places: &mut [Place]) {
             place.name = format!("{}-{count}", place.name);
         }
     }
+}
+
+/// Which session each number of the cards holds.
+pub fn sessions_of(places: &[Place]) -> Sessions {
+    Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
 }
 
 /// Whether a file is a log of ours or a card's image.

@@ -390,3 +390,110 @@ fn the_name_of_a_file_does_not_become_a_folder() {
     }
     run(dir.path(), "decode card.img -o out.tlog/ --format tlog", 0);
 }
+
+#[test]
+fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
+    let dir = copied(3, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    fs::copy(at("00001_00.HUM"), at("00003_00.HUM")).expect("copied");
+    let words = "is session 00001 once more; its own log is not there";
+    all_say(dir.path(), "copied", 3, &[words]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("\n2 sessions: "), "{said}");
+    let said = text(&attempt(dir.path(), "check copied"));
+    assert!(said.contains("2 logs checked") && said.contains("1  the same session once more"), "{said}");
+    // A damaged copy is one as well.
+    let mut copy = fs::read(at("00003_00.HUM")).expect("there");
+    copy[20 * BLOCK + 100] ^= 1;
+    fs::write(at("00003_00.HUM"), copy).expect("written");
+    all_say(dir.path(), "copied", 3, &[words]);
+    // In a folder of its own a copy is nothing strange.
+    fs::create_dir(dir.path().join("other")).expect("made");
+    fs::remove_file(at("00003_00.HUM")).expect("removed");
+    fs::copy(at("00001_00.HUM"), dir.path().join("other/00001_00.HUM")).expect("copied");
+    all_say(dir.path(), "copied other", 0, &[]);
+}
+
+#[test]
+fn logs_that_were_renamed_or_exchanged_are_told_by_every_command() {
+    let dir = copied(3, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    fs::rename(at("00001_00.HUM"), at("00009_00.HUM")).expect("renamed");
+    let words = |session, name| {
+        format!("session {session}, which was recorded just before it, is there under the name {name}")
+    };
+    all_say(dir.path(), "copied", 3, &[&words("00001", "00009")]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("FAILED  session before     1 checked, 1 failed"), "{said}");
+    fs::rename(at("00009_00.HUM"), at("00001_00.HUM")).expect("renamed");
+    all_say(dir.path(), "copied", 0, &[]);
+    // The oldest one and the newest one exchanged.
+    fs::rename(at("00001_00.HUM"), at("other")).expect("renamed");
+    fs::rename(at("00003_00.HUM"), at("00001_00.HUM")).expect("renamed");
+    fs::rename(at("other"), at("00003_00.HUM")).expect("renamed");
+    let later = "it was recorded after session 00002, so its number is not its own";
+    all_say(dir.path(), "copied", 3, &[later, &words("00001", "00003")]);
+
+    // Two entries of a card's directory.
+    let image = dir.path().join("card.img");
+    let mut card = fs::read(&image).expect("a card");
+    let [second, third] = [b"00002_00HUM", b"00003_00HUM"].map(|name| {
+        card.windows(name.len()).position(|bytes| bytes == name).expect("an entry of the directory")
+    });
+    (card[second + 4], card[third + 4]) = (card[third + 4], card[second + 4]);
+    fs::write(&image, card).expect("written");
+    all_say(dir.path(), "card.img", 3, &[&words("00002", "00003")]);
+}
+
+#[test]
+fn noise_behind_the_last_end_mark_is_told_by_every_command() {
+    let dir = copied(1, "");
+    let path = dir.path().join("copied/00001_00.HUM");
+    let log = fs::read(&path).expect("a log");
+    let last = log
+        .as_chunks::<BLOCK>()
+        .0
+        .iter()
+        .rposition(|block| block.starts_with(&[0x48, 0xb1]))
+        .expect("sectors");
+    let mut noisy = log.clone();
+    let noise = |(at, byte): (usize, &mut u8)| *byte = (at * 7 % 251) as u8 + 1;
+    noisy[last * BLOCK..(last + 1) * BLOCK].iter_mut().enumerate().for_each(noise);
+    fs::write(&path, noisy).expect("written");
+    all_say(dir.path(), "copied", 3, &["1 block that is no sector"]);
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("FAILED  end "), "{said}");
+    // Nothing there: whether there was anything nobody knows.
+    for empty in [0x00, 0xff] {
+        let mut log = log.clone();
+        log[last * BLOCK..(last + 1) * BLOCK].fill(empty);
+        fs::write(&path, log).expect("written");
+        let said = text(&attempt(dir.path(), "info copied"));
+        assert!(!said.contains("that is no sector"), "{said}");
+    }
+}
+
+#[test]
+fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alone() {
+    let dir = copied(1, "");
+    let whole = fs::read(dir.path().join("copied/00001_00.HUM")).expect("a log");
+    for (folder, spoiled) in [("damaged", true), ("same", false)] {
+        let mut log = whole.clone();
+        log[20 * BLOCK + 100] ^= u8::from(spoiled);
+        fs::create_dir(dir.path().join(folder)).expect("made");
+        fs::write(dir.path().join(folder).join("00001_00.HUM"), log).expect("written");
+    }
+    for flags in ["", "--replace"] {
+        let said = run(dir.path(), &format!("report damaged copied same -o pages/ {flags}"), 3);
+        let lines = text(&said);
+        assert_eq!(lines.lines().count(), 2, "{lines}");
+        let told = String::from_utf8_lossy(&said.stderr).into_owned();
+        assert!(told.contains("is a copy of copied/00001, whose page is written once"), "{told}");
+        let mut pages: Vec<String> = fs::read_dir(dir.path().join("pages"))
+            .expect("pages")
+            .map(|page| page.expect("a page").file_name().to_string_lossy().into_owned())
+            .collect();
+        pages.sort();
+        assert!(pages.len() == 2 && pages[0].ends_with("-2.html"), "{pages:?}");
+    }
+}

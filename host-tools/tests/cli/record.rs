@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write;
 use std::net::{TcpListener, UdpSocket};
 
-use crate::support::{frames_of, hums, json, px4, run};
+use crate::support::{attempt, flight, frames_of, hums, json, px4, run};
 
 #[test]
 fn the_tap_shows_what_the_uart_got() {
@@ -94,4 +94,36 @@ fn parameters_come_from_a_file_and_slips_in_it_are_told() {
         assert!(String::from_utf8_lossy(&output.stderr).contains("line 1"), "{wrong}");
     }
     assert!(!dir.path().join("b.img").exists(), "a slip left an image behind");
+}
+
+#[test]
+fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goes_is_told() {
+    let dir = tempfile::tempdir().expect("directory");
+    let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
+    fs::write(dir.path().join("short.raw"), &recording[..20_000]).expect("written");
+    let sim = "sim --input short.raw --sd card.img --json";
+    run(dir.path(), &format!("{sim} --card-size 34"), 0);
+    // The smallest card has room for some sixteen sessions.
+    let refused = (0..40).map(|_| attempt(dir.path(), sim)).find(|ended| ended.status.code() != Some(0));
+    let refused = refused.expect("the card becomes full");
+    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(2), "{told}");
+    assert!(told.contains("would overwrite its oldest session (00001)"), "{told}");
+    assert!(told.contains("--overwrite-oldest"), "{told}");
+    let sessions = |line: &str| {
+        let logs = json(&attempt(dir.path(), line))["logs"].as_array().expect("logs").clone();
+        logs.iter().map(|log| log["name"].as_str().expect("a name").to_owned()).collect::<Vec<_>>()
+    };
+    let before = sessions("info card.img --json");
+    assert_eq!(before[0], "00001");
+
+    let ended = run(dir.path(), &format!("{sim} --overwrite-oldest"), 0);
+    let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(told.contains("earlier sessions were overwritten, in whole or in part: 00001"), "{told}");
+    let report = json(&ended);
+    assert_eq!(report["overwritten"], serde_json::json!(["00001"]));
+    let after = sessions("info card.img --json");
+    let newest = after.last().expect("sessions");
+    assert!(!after.contains(&"00001".to_owned()) && !before.contains(newest));
+    assert_eq!(report["log_files"], serde_json::json!([format!("{newest}_00.HUM")]));
 }

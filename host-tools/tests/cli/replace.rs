@@ -296,3 +296,19 @@ fn a_time_in_which_there_is_nothing_is_told_and_nothing_is_written() {
     assert!(!dir.path().join("out.tlog").exists());
     assert!(all_named(&dir.path().join("out"), "log").is_empty());
 }
+
+#[test]
+fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    fs::write(dir.path().join("notes.txt"), "mine").expect("written");
+    fs::create_dir(dir.path().join("fleet")).expect("made");
+    fs::write(dir.path().join("fleet/vehicle=system-1"), "mine").expect("written");
+    for (output, format) in [("notes.txt/", "csv"), ("notes.txt/", "parquet"), ("fleet", "parquet")] {
+        let ended = attempt(dir.path(), &format!("decode log.hum -o {output} --format {format}"));
+        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(1), "{output} {format}: {told}");
+        assert!(told.contains("is a file, and a directory is needed there"), "{output} {format}: {told}");
+    }
+    assert_eq!(fs::read(dir.path().join("notes.txt")).expect("there"), b"mine");
+}

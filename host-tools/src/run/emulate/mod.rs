@@ -14,6 +14,7 @@ use anyhow::{Context, Result, bail};
 use board::{Board, Earlier, Fixed};
 use serde::Deserialize;
 
+use super::earlier::EarlierSessions;
 use super::qemu;
 use super::report::Report;
 use super::{
@@ -21,7 +22,6 @@ use super::{
 };
 use crate::cli;
 use crate::endpoint::Endpoint;
-use crate::logs;
 use crate::outcome::{Outcome, usage};
 
 /// The environment variable that names the image as `--firmware` does.
@@ -48,7 +48,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(Some(&store), &params)?))
     })?;
-    let earlier = logs::on_card(&run.sd).len();
+    let earlier = EarlierSessions::of(run, &params)?;
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run, &inputs)?;
@@ -73,7 +73,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let counters: Counters = serde_json::from_str(&json)
         .with_context(|| format!("the firmware's counters are not understood: {json}"))?;
     let mut report = counters.into_report();
-    let frames = report.read_card(&run.sd, earlier)?;
+    let frames = report.read_card(&run.sd, &earlier)?;
     before.add_to(&mut report, frames);
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");

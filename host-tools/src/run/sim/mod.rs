@@ -23,6 +23,7 @@ use outside::{Memory, Outside};
 use pipeline::Pipeline;
 
 use super::arrivals::Arrivals;
+use super::earlier::EarlierSessions;
 use super::ground::{self, Ground};
 use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
@@ -30,7 +31,6 @@ use super::{check_standard_output, drive, pace, params, paths, prepare_card, sal
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
-use crate::logs;
 use crate::outcome::Outcome;
 use crate::run::Machine as _;
 use crate::source::Chunk;
@@ -50,7 +50,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     if let Some(step) = run.faults.cut_store_after {
         flash.cut_after(step, run.faults.seed);
     }
-    let earlier = logs::on_card(&run.sd).len();
+    let earlier = EarlierSessions::of(run, &params)?;
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
     let (mut ground, gs) = ground::open(run, &inputs)?;
     let entropy = salt::salt(run, &mut arrivals)?;
@@ -85,7 +85,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
     }
-    let report = world.settle(&run.sd, earlier)?;
+    let report = world.settle(&run.sd, &earlier)?;
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");
     }
@@ -245,7 +245,7 @@ impl World<'_> {
     }
 
     /// The report, with what the card itself tells.
-    fn settle(self, card: &Path, earlier: usize) -> Result<Report> {
+    fn settle(self, card: &Path, earlier: &EarlierSessions) -> Result<Report> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();
         let findings = std::mem::take(&mut report.findings);

@@ -6,6 +6,7 @@ use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
+use hums_blackbox::Header;
 use hums_link::ftp;
 
 use super::ftp::Ftp;
@@ -13,6 +14,8 @@ use super::ftp::Ftp;
 /// What is compared where the board computes no checksum: the first sector, which names its session by a random number,
 /// and the last one.
 const SECTOR: u32 = 512;
+/// Sectors of a file that are searched for one that is sound.
+const LOOK_SECTORS: u32 = 128;
 
 /// What a comparison says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +55,28 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
         }
     }
     Ok(Likeness::SameEnds)
+}
+
+/// Whether a file holds sectors of the session that the board's log that is open begins with. A session's number is random.
+pub(super) fn is_same_session(ftp: &mut Ftp, path: &Path) -> Result<bool> {
+    let mut theirs = Vec::new();
+    while theirs.len() < SECTOR as usize {
+        let had = theirs.len() as u32;
+        theirs.extend(ftp.piece(had, SECTOR - had)?);
+    }
+    let theirs = theirs.first_chunk().and_then(|sector| Header::read(sector).ok());
+    let Some(theirs) = theirs else { return Ok(false) };
+    let mut file = File::open(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let mut sector = [0; SECTOR as usize];
+    for _ in 0..LOOK_SECTORS {
+        if file.read_exact(&mut sector).is_err() {
+            break;
+        }
+        if let Ok(ours) = Header::read(&sector) {
+            return Ok(ours.session == theirs.session);
+        }
+    }
+    Ok(false)
 }
 
 fn checksum(file: &mut File, bytes: u32) -> io::Result<u32> {

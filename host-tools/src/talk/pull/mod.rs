@@ -13,7 +13,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 
-use self::compare::{Likeness, compare};
+use self::compare::{Likeness, compare, is_same_session};
 use self::ftp::Ftp;
 use super::Client;
 use crate::cli;
@@ -121,6 +121,11 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
         Likeness::Same => Ok(There::Whole),
         // Not proved: it comes once more, and takes the place of what is there when it is whole.
         Likeness::SameEnds => Ok(There::Nothing),
+        Likeness::Other if is_same_session(ftp, path)? => bail!(
+            "{} differs from the board's log (the same session): damaged or changed here; move it away, or name another \
+             directory with -o",
+            path.display()
+        ),
         Likeness::Other => bail!(
             "{} is another log of the same name, of another card or another board; name another directory with -o",
             path.display()

@@ -12,6 +12,7 @@ use hums::ending::SessionBefore;
 use hums::followed::Followed;
 use hums::logs::{Found, find};
 use hums::run::sim::power_on;
+use hums::sessions::Sessions;
 use hums::summary::Overview;
 use hums::verify::{Verdict, verdict};
 use hums_blackbox::Header;
@@ -489,7 +490,8 @@ fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
     if found.images.iter().any(|image| !image.damage.is_empty()) {
         return Ok(true);
     }
-    let (mut followed, mut overviews) = (Followed::default(), Vec::new());
+    let logs = found.logs.iter().map(|log| (log.name.as_str(), log));
+    let (mut followed, mut overviews) = (Followed::new(Sessions::of(logs)), Vec::new());
     for log in &found.logs {
         overviews.extend(followed.push(Overview::verified(log)?));
     }

@@ -1,0 +1,93 @@
+//! The sessions that are on a card before a run. A card without room makes the recorder overwrite the oldest of them: right
+//! on a vehicle, and a surprise on a PC. So a run does not begin on a full card unless it is told to, and what was
+//! overwritten is said by session.
+
+use std::path::Path;
+
+use anyhow::Result;
+use hums_core::params::ParamSpec;
+use hums_recorder::recorder::SEGMENT_BYTES_MAX;
+
+use crate::cli;
+use crate::logs::{self, Log, Room};
+use crate::outcome::usage;
+use crate::sessions::first_session;
+
+/// The recorder makes a segment as long as this part of a card at most, so that a small card holds several.
+const SEGMENTS_MIN: u64 = 16;
+/// The parameter by which only what is around an arming is kept, in segments that are shorter.
+const BY_ARMING: &str = "REC_MODE";
+
+/// A session by its name on the card and by what its sectors name, with how many files it has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Session {
+    name: String,
+    of_sectors: Option<u32>,
+    files: usize,
+}
+
+impl Session {
+    fn of(log: &Log) -> Self {
+        Self { name: log.name.clone(), of_sectors: first_session(log), files: log.files.len() }
+    }
+
+    fn is(&self, other: &Self) -> bool {
+        self.name == other.name && self.of_sectors == other.of_sectors
+    }
+}
+
+/// The sessions before a run.
+#[derive(Clone, Debug, Default)]
+pub struct EarlierSessions {
+    sessions: Vec<Session>,
+    /// They may be overwritten.
+    allowed: bool,
+}
+
+impl EarlierSessions {
+    /// Looks at a card. A usage error where a session would have to be overwritten for the run to begin.
+    pub fn of(run: &cli::Run, params: &[(&ParamSpec, f32)]) -> Result<Self> {
+        let sessions: Vec<Session> = logs::on_card(&run.sd).iter().map(Session::of).collect();
+        let by_arming = params.iter().any(|(spec, value)| spec.name == BY_ARMING && *value > 0.0);
+        // What a store holds is known once it runs; what is overwritten then is said in the end.
+        let is_known = !by_arming && run.store.is_none() && !run.overwrite_oldest;
+        if let Some(oldest) = sessions.first().filter(|_| is_known && !has_room(&run.sd)) {
+            return Err(usage(format!(
+                "{}: the card is full, and the run would overwrite its oldest session ({}); name another image, or say \
+                 --overwrite-oldest",
+                run.sd.display(),
+                oldest.name
+            )));
+        }
+        Ok(Self { sessions, allowed: run.overwrite_oldest })
+    }
+
+    /// Whether a log was there before the run.
+    pub fn has(&self, log: &Log) -> bool {
+        let log = Session::of(log);
+        self.sessions.iter().any(|session| session.is(&log))
+    }
+
+    /// The names of those that are gone now, or have fewer files.
+    pub fn overwritten(&self, after: &[Log]) -> Vec<String> {
+        let after: Vec<Session> = after.iter().map(Session::of).collect();
+        let is_whole =
+            |session: &&Session| after.iter().any(|after| after.is(session) && after.files >= session.files);
+        self.sessions
+            .iter()
+            .filter(|session| !is_whole(session))
+            .map(|session| session.name.clone())
+            .collect()
+    }
+
+    /// Whether sessions may be overwritten.
+    pub const fn is_allowed(&self) -> bool {
+        self.allowed
+    }
+}
+
+/// Whether a card has room for a segment. One that cannot be read has no session to lose.
+fn has_room(card: &Path) -> bool {
+    logs::room(card)
+        .is_none_or(|Room { free, all }| free >= (all / SEGMENTS_MIN).min(u64::from(SEGMENT_BYTES_MAX)))
+}
