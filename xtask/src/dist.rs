@@ -101,7 +101,9 @@ impl Release {
             files.push(self.sbom(&format!("hums-{}", board.name()), "firmware/app", &board.choice())?);
         }
         self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
-        files.push(read("hums", &self.target().join(STATIC_TARGET).join("release/hums"))?);
+        let program = self.target().join(STATIC_TARGET).join("release/hums");
+        self.try_out(&program)?;
+        files.push(read("hums", &program)?);
         files.push(self.sbom("hums", "host-tools", &["--target", STATIC_TARGET])?);
         for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
             files.push(read(licence, &self.tree.join(licence))?);
@@ -109,6 +111,23 @@ impl Release {
         files.push(("BUILD".to_owned(), self.provenance()?.into_bytes()));
         files.push(("SHA256SUMS".to_owned(), sums(&files).into_bytes()));
         Ok(files)
+    }
+
+    /// The tests run a program that is built for tests. This is the one that is released: it must find what is in the flight
+    /// with faults (`docs/health.md`).
+    fn try_out(&self, program: &Path) -> Result<()> {
+        const FINDINGS: [&str; 3] = ["cell_voltage", "autopilot_state", "batt_state"];
+        let flight = self.tree.join("tests/flights/ap_quad_faults.tlog");
+        let (json, code) = Shell::new(program).args(["check", "--json"]).arg(flight).output_and_code()?;
+        let missing: Vec<_> =
+            FINDINGS.into_iter().filter(|check| !json.contains(&format!("\"{check}\""))).collect();
+        if code != 4 || !missing.is_empty() {
+            bail!(
+                "the program of the release does not find {} in ap_quad_faults.tlog (exit code {code}, not 4)",
+                missing.join(", ")
+            );
+        }
+        Ok(())
     }
 
     fn target(&self) -> PathBuf {

@@ -41,7 +41,7 @@ cargo xtask COMMAND
   test [--only STEP]... [--list] everything that CI checks, or the steps named with what they need; a table at the end
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
                                  the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise;
-                                 all of them (hours) make docs/proof.md
+                                 all of them (an hour) make docs/proof.md
   prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]
                                  faults found and false alarms, on the labelled flights of the repository and of folders;
                                  --write makes docs/diagnosis.md

@@ -19,14 +19,18 @@ pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
 pub const ASKED: usize = 5;
 
 /// Whether a time that is far from the one before it is wrong: the times after it go on from the one before it, and not
-/// from it. `None` where none of them tells. Of the first time of all (`before` is `None`): whether the others are
-/// before it.
+/// from it. `None` where none of them tells. Of the first time of all (`before` is `None`): whether the next one and
+/// most others are before it.
 ///
 /// One damaged bit makes such a time. A pause and a restart are confirmed by what comes after them. After a jump
 /// forward, times from before the jump's beginning tell nothing: a log begins with old values.
 pub fn is_wrong(before: Option<u64>, recorded: u64, after: impl IntoIterator<Item = u64>) -> Option<bool> {
     let (mut wrong, mut right) = (0_usize, 0_usize);
     for time in after.into_iter().take(ASKED) {
+        if before.is_none() && wrong == 0 && right > 0 {
+            // The clock went on from the first time, and fell later.
+            return Some(false);
+        }
         let disagrees = match before {
             Some(before) if recorded > before && time.saturating_add(STEP_BACK_US_MAX) < before => continue,
             Some(before) => time.abs_diff(before) < time.abs_diff(recorded),

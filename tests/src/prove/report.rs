@@ -35,7 +35,7 @@ pub struct Part {
 const HEAD: &str = "\
 # Proof
 
-What the recorder promises, tried in bulk. `cargo xtask prove` runs all campaigns (hours) on the recordings of the repository
+What the recorder promises, tried in bulk. `cargo xtask prove` runs all campaigns (an hour) on the recordings of the repository
 and writes this file whole; `cargo xtask prove NAME` only prints the figures of one. `cargo xtask test` runs the short form of
 each campaign. The same commit and seed give the same figures, apart from the seconds.
 ";

@@ -1,6 +1,5 @@
 //! The times of the next messages: what tells whether a jump of the clock is one, or one damaged time.
 
-use super::clock::time_of;
 use super::format::{Format, Formats, HEADER_BYTES};
 use super::message::{Body, Message};
 use super::text;
@@ -33,17 +32,14 @@ impl Ahead<'_> {
 fn of_bytes(bytes: &[u8], formats: &Formats) -> Vec<u64> {
     let (mut times, mut at) = (Vec::new(), 0);
     while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty() && times.len() < ASKED) {
-        let kind = match rest {
-            [0xA3, 0x95, kind, ..] => *kind,
-            _ => {
-                at += 1;
-                continue;
-            }
+        let &[0xA3, 0x95, kind, ..] = rest else {
+            at += 1;
+            continue;
         };
         let length = usize::from(formats.lengths.told[usize::from(kind)]);
         let format = formats.get(kind).filter(|format| format.time.is_some());
         if let (Some(format), Some(payload)) = (format, rest.get(HEADER_BYTES..length)) {
-            times.extend(time_of(&Message::new(format, Body::Bytes(payload))));
+            times.extend(Message::new(format, Body::Bytes(payload)).time_us());
         }
         at += length.max(1);
     }
@@ -62,5 +58,5 @@ fn time_of_line(line: &str, formats: &Formats) -> Option<u64> {
     let named = |format: &&Format| format.name == name && format.time.is_some();
     let format = (0..=u8::MAX).filter_map(|kind| formats.get(kind)).find(named)?;
     let values = text::values(line, format.fields.len().min(VALUES_MAX));
-    time_of(&Message::new(format, Body::Words(&values)))
+    Message::new(format, Body::Words(&values)).time_us()
 }

@@ -11,7 +11,7 @@
 use hums_core::time::{Instant, Span};
 
 use super::ahead::Ahead;
-use super::format::{Formats, TimeField};
+use super::format::Formats;
 use super::message::Message;
 use crate::source::timeline::{Moment, STEP_BACK_US_MAX, Timeline, is_wrong};
 
@@ -48,12 +48,28 @@ pub(super) struct When {
     pub(super) restarted: bool,
     /// Microseconds since power-on as the message says; `None` where it says nothing.
     pub(super) boot_us: Option<u64>,
-    /// Its own time is a jump that nothing confirms: the message is likely damaged.
-    pub(super) doubted: bool,
-    /// The messages after it say that its time is wrong.
-    pub(super) wrong: bool,
-    /// It has a time of its own.
-    pub(super) timed: bool,
+    /// What its own time is worth.
+    pub(super) own: Own,
+}
+
+/// What a message's own time is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Own {
+    /// It has none.
+    None,
+    /// It counts.
+    Sound,
+    /// It is a jump that nothing confirms: the message is likely damaged.
+    Doubted,
+    /// The messages after it say that it is wrong.
+    Wrong,
+}
+
+impl Own {
+    /// Whether it does not count, though there is one.
+    pub(super) fn is_doubted(self) -> bool {
+        matches!(self, Self::Doubted | Self::Wrong)
+    }
 }
 
 impl Clock {
@@ -77,17 +93,18 @@ impl Clock {
         self.timeline.now()
     }
 
-    /// When a message was written, `ahead` of which others follow. `week` is a GPS message's time of the week where the log has no other clock.
+    /// When a message was written. `week` is a GPS message's time of the week where the log has no other clock; `ahead` is
+    /// what follows the message in the file.
     pub(super) fn at(
         &mut self,
         message: &Message<'_>,
         week: Option<u64>,
         (ahead, formats): (Ahead<'_>, &Formats),
     ) -> When {
-        let boot_us = time_of(message);
+        let boot_us = message.time_us();
         let Some(recorded_us) = boot_us.or_else(|| week.map(|ms| self.since_first(ms.saturating_mul(1_000))))
         else {
-            return When { timed: false, ..self.as_before(boot_us) };
+            return self.as_before(boot_us, Own::None);
         };
         let is_jump = self.recorded_us.is_none_or(|before| recorded_us.abs_diff(before) > STEP_BACK_US_MAX);
         let wrong = if is_jump && boot_us.is_some() {
@@ -96,7 +113,7 @@ impl Clock {
             None
         };
         if wrong == Some(true) {
-            return When { doubted: true, wrong: true, ..self.as_before(boot_us) };
+            return self.as_before(boot_us, Own::Wrong);
         }
         if wrong.is_none() && self.is_doubtful(recorded_us) {
             let agrees = self.doubted_us.is_some_and(|doubted_us| {
@@ -105,7 +122,7 @@ impl Clock {
             });
             if !agrees {
                 self.doubted_us = Some(recorded_us);
-                return When { doubted: true, ..self.as_before(boot_us) };
+                return self.as_before(boot_us, Own::Doubted);
             }
         }
         self.doubted_us = None;
@@ -116,12 +133,12 @@ impl Clock {
         let before = self.now();
         let Moment { at, restarted } = self.timeline.at(recorded_us);
         self.silence = Some(before).filter(|before| !restarted && at.since(*before) > SILENCE);
-        When { at, restarted, boot_us, doubted: false, wrong: false, timed: true }
+        When { at, restarted, boot_us, own: Own::Sound }
     }
 
     /// Written with the message before it.
-    fn as_before(&self, boot_us: Option<u64>) -> When {
-        When { at: self.now(), restarted: false, boot_us, doubted: false, wrong: false, timed: true }
+    fn as_before(&self, boot_us: Option<u64>, own: Own) -> When {
+        When { at: self.now(), restarted: false, boot_us, own }
     }
 
     /// The time of the week as time since the first one; it goes on over the week's end.
@@ -141,13 +158,5 @@ impl Clock {
         };
         recorded_us.saturating_add(STEP_BACK_US_MAX) < before
             || recorded_us > before.saturating_add(STEP_DOUBTED_US)
-    }
-}
-
-/// Microseconds since power-on, as the message tells them.
-pub(super) fn time_of(message: &Message<'_>) -> Option<u64> {
-    match message.format().time? {
-        TimeField::Micros(column) => message.unsigned(column.into()),
-        TimeField::Millis(column) => message.unsigned(column.into()).map(|ms| ms.saturating_mul(1_000)),
     }
 }

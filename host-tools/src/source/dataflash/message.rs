@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use hums_core::half;
 
-use super::format::{Field, FieldKind, Format};
+use super::format::{Field, FieldKind, Format, TimeField};
 
 /// A message.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +72,14 @@ impl<'a> Message<'a> {
                 payload.get(field.offset..)?.get(..usize::from(size))
             }
             _ => None,
+        }
+    }
+
+    /// Microseconds since power-on, as it tells them.
+    pub(super) fn time_us(&self) -> Option<u64> {
+        match self.format.time? {
+            TimeField::Micros(column) => self.unsigned(column.into()),
+            TimeField::Millis(column) => Some(self.unsigned(column.into())?.saturating_mul(1_000)),
         }
     }
 

@@ -8,7 +8,7 @@ use hums_core::observation::Source;
 use hums_core::time::Instant;
 
 use super::ahead::Ahead;
-use super::clock::Clock;
+use super::clock::{Clock, Own};
 use super::format::{Defined, FMT_TYPE, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
 use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
@@ -77,7 +77,7 @@ impl First {
         let message = Message::new(format, body);
         if begins_us.is_none() {
             let when = clock.at(&message, None, (ahead, formats));
-            *begins_us = when.boot_us.filter(|_| !when.doubted);
+            *begins_us = when.boot_us.filter(|_| !when.own.is_doubted());
         }
         if let Some(resolved) = handlers.of(format).filter(|resolved| resolved.handler.is_fact) {
             observe::take(state, resolved, &message, (Instant::ZERO, None), &mut Out::new(&mut |_| ()));
@@ -309,7 +309,7 @@ impl<'w> Session<'w> {
         let week = || message.unsigned(format.field("TimeMS").or_else(|| format.field("Time"))?);
         let week = if formats.has_boot_clock || format.name != "GPS" { None } else { week() };
         let when = clock.at(&message, week, (ahead, formats));
-        if when.wrong {
+        if when.own == Own::Wrong {
             wrong.add(when.at, place);
         }
         if when.restarted {
@@ -326,7 +326,7 @@ impl<'w> Session<'w> {
             let (from, to, words) = (Some(from), Some(when.at), words.to_owned());
             take(when.at, Item::Gap(&Gap { from, to, cause, place: None, bytes: 0, words }))?;
         }
-        if let Some(standing) = later.take_if(|_| !when.doubted && when.timed) {
+        if let Some(standing) = later.take_if(|_| when.own == Own::Sound) {
             state.stand(standing);
         }
         let craft = state.craft();
@@ -345,17 +345,17 @@ impl<'w> Session<'w> {
         if let Some(resolved) = handlers.of(format) {
             // A message with a time that cannot be is likely damaged; its words are kept.
             let is_said = resolved.handler.is_said;
-            if is_said && (when.doubted || !when.timed) {
+            if is_said && when.own != Own::Sound {
                 let before = state.standing();
                 state.stand(later.unwrap_or(before));
                 observe::take(state, resolved, &message, (when.at, when.boot_us), &mut out);
                 let after = state.standing();
                 // Without a time, disarming counts as of the message before it, and arming as of the next: a logger pauses
                 // in between.
-                let waits = if when.doubted { after != before } else { after.arms(&before) };
+                let waits = if when.own.is_doubted() { after != before } else { after.arms(&before) };
                 *later = waits.then_some(after);
                 state.stand(if waits { before } else { after });
-            } else if !when.doubted {
+            } else if !when.own.is_doubted() {
                 observe::take(state, resolved, &message, (when.at, when.boot_us), &mut out);
             }
             if is_timed && is_said && want.observations {

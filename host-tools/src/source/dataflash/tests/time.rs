@@ -74,10 +74,10 @@ fn a_wrong_time_in_a_text_log_is_told_too() {
     let mut log = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
                    FMT, 150, 13, ATT, Qc, TimeUS,Roll\n"
         .to_owned();
-    for tenth in 10..300_u64 {
+    log.extend((10..300_u64).map(|tenth| {
         let time = tenth * 100_000 + if tenth == 150 { 8_000_000 } else { 0 };
-        log.push_str(&format!("ATT, {time}, 1.5\n"));
-    }
+        format!("ATT, {time}, 1.5\n")
+    }));
     assert_eq!(told(log.as_bytes()), (vec![(Cause::Damaged, WRONG.to_owned())], 0, 29_900));
 }
 
@@ -86,9 +86,8 @@ fn a_line_with_too_many_values_is_told_once_and_its_columns_are_read() {
     let mut log = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
                    FMT, 150, 13, ATT, Qc, TimeUS,Roll\nFMT, 151, 75, MSG, QZ, TimeUS,Message\n"
         .to_owned();
-    for tenth in 10..30_u64 {
-        log.push_str(&format!("ATT, {}, 1.5, 7\nMSG, {}, one, two\n", tenth * 100_000, tenth * 100_000));
-    }
+    let lines = |tenth| format!("ATT, {tenth}00000, 1.5, 7\nMSG, {tenth}00000, one, two\n");
+    log.extend((10..30).map(lines));
     let seen = seen(log.as_bytes());
     let [gap] = seen.gaps.as_slice() else { panic!("{:?}", seen.gaps) };
     assert_eq!((gap.0, gap.3.contains("3 values for 2 columns")), (Cause::Damaged, true), "{}", gap.3);
