@@ -37,11 +37,17 @@ const CANNOT: &str = "\
   has not seen before.
 * What a check reads must be on the autopilot's port at the rate that the box asks for. Logs of ground stations have less.
 
-What a reader found who had not seen the checks, in 41 further recordings of real vehicles (1.5 h in the air, mostly multicopters,
-2014 to 2025, judged by hand at commit d9bdda6): 7 false warnings and 7 false criticals, some 5 an hour of each. Four were banks
-that the pilot flew in ACRO (`roll`, `pitch`), five `motor_imbalance` while it turned fast or stood on the ground. Two more, on
-the bench, had a gyro with an offset of 23 degrees a second and gave 33 warnings and 36 criticals of `roll` and `pitch`. Of 11
-crashes 7 were told as a mishap, none falsely.
+What readers found who had not seen the checks, in recordings of real vehicles that were not used to build them, judged by hand:
+
+* At commit d9bdda6, 41 recordings, 1.5 h in the air, mostly multicopters, 2014 to 2025: 7 false warnings and 7 false criticals, most of
+  them banks flown in ACRO and `motor_imbalance` of a vehicle that turned fast or stood; and 69 alarms of a gyro with an offset on the
+  bench. Of 11 crashes 7 were told as a mishap. The checks were changed after it.
+* At commit 5569e89, after that change, 88 recordings, 1.6 h in the air (a quarter of an hour of it is not true: the autopilot called a vehicle
+  that stood \"not landed\"); 64 are flight, crash and bench tests of one fleet of multicopters, 2014 to 2016; one flight of a plane, no VTOL.
+  Warnings: 30 true, 1 false. Criticals: 72 true, 2 not known, **19 false**. 17 of these are of six logs of one day in which a gyro with an
+  offset of 7 degrees a second turned the autopilot's own attitude over while the vehicle stood; the other two, 1.5 an hour, are a descent that an
+  estimator claimed (`sinking`, `disarmed_in_air`). Of 20 crashes and tip-overs 16 were told by a critical finding of their own; missed were two flips at
+  take-off of a vehicle that the autopilot never called flying. Of some 85 flights 74 were counted right. The checks were not changed after it.
 
 These faults were not told:
 ";
