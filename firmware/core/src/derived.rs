@@ -9,11 +9,10 @@ use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
 use crate::trend::{Rate, Resistance};
-use crate::units::{MetresPerSecond2, RadiansPerSecond};
+pub use crate::units::GRAVITY;
+use crate::units::MetresPerSecond2;
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
-/// Standard gravity, m/s2 (CGPM 1901).
-pub const GRAVITY: f32 = 9.806_65;
 /// No sensor that autopilots have measures more than 32 g an axis: beyond this it is garbage.
 const LOAD_MAX_G: f32 = 60.0;
 /// So much of a cell's voltage may be its sag under the load, V. A cell that sags further is near its end, whatever its charge.
@@ -33,8 +32,7 @@ const FLYING_PART: f32 = 0.2;
 const LOST_PART: f32 = 0.4;
 /// Nothing hovers with less throttle.
 const IDLE_THROTTLE: f32 = 0.1;
-/// What turns faster than this, rad/s, or did of late, drives each motor as it needs to.
-const TURNS_RATE: f32 = 0.7;
+/// What turns fast, or did of late, drives each motor as it needs to.
 const TURNED: Span = Span::from_secs(2);
 /// Time constant of the motor speeds that are compared.
 const MOTOR_SMOOTHING_S: f32 = 1.0;
@@ -75,8 +73,6 @@ pub struct Derived {
     pause_s: f32,
     /// The motor whose speed is furthest from the others'.
     furthest: u8,
-    /// When it turned fast last.
-    turned_at: Option<Instant>,
     had_fix: [bool; RECEIVERS_MAX],
     clips: Lately,
     clips_known: bool,
@@ -130,7 +126,6 @@ impl Derived {
             resumed: Instant::ZERO,
             pause_s: 0.0,
             furthest: 0,
-            turned_at: None,
             had_fix: [false; RECEIVERS_MAX],
             clips: Lately::NONE,
             clips_known: false,
@@ -158,9 +153,7 @@ impl Derived {
                 if let Some(load_g) = imu.acceleration.and_then(load_factor_g) {
                     self.load_factor.set(at, load_g);
                 }
-                self.take_rates(at, imu.rate);
             }
-            Observation::Attitude(attitude) => self.take_rates(at, attitude.rates),
             Observation::Gnss(gnss) => {
                 if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
                     *had_fix |= gnss.fix >= 3;
@@ -187,14 +180,6 @@ impl Derived {
                 }
             }
             _ => {}
-        }
-    }
-
-    fn take_rates(&mut self, at: Instant, rates: Option<[RadiansPerSecond; 3]>) {
-        // No root: this is done with each inertial sample.
-        let square = |rates: [RadiansPerSecond; 3]| rates.iter().map(|rate| rate.0 * rate.0).sum::<f32>();
-        if rates.is_some_and(|rates| square(rates) > TURNS_RATE * TURNS_RATE) {
-            self.turned_at = Some(at);
         }
     }
 
@@ -371,7 +356,11 @@ impl Derived {
             .is_some_and(|throttle| throttle.0 < IDLE_THROTTLE);
         // Where one is lost, the one opposite may stop too, and the vehicle may turn.
         let lost = track.smooth_rpm < LOST_PART * middle;
-        if !compares || idles || !(lost || self.turns_little(now)) || !Self::is_steady(now, vehicle, flight) {
+        if !compares
+            || idles
+            || !(lost || vehicle.inertial.turns_little(now, TURNED))
+            || !Self::is_steady(now, vehicle, flight)
+        {
             return None;
         }
         let named = usize::from(self.furthest) == usize::from(motor);
@@ -387,11 +376,6 @@ impl Derived {
             .zip(&self.motors)
             .filter(|(other, track)| *other != motor && track.highest_rpm > TURNING_RPM);
         others.map(|(_, track)| (track.smooth_rpm - own.smooth_rpm).abs()).reduce(f32::min).unwrap_or(0.0)
-    }
-
-    /// Whether it has not turned fast of late.
-    fn turns_little(&self, now: Instant) -> bool {
-        self.turned_at.is_none_or(|at| now.since(at) > TURNED)
     }
 
     /// Which motor is furthest from the middle one. It stays the one that was found first until another is twice as far: where one

@@ -3,7 +3,8 @@
 //! # In the air
 //! Only what is armed flies, and only what can: a rover, a boat or a submarine never does, whatever its landed state says
 //! (PX4 calls an armed rover "in air"). The autopilot's own word ([`LandedState`], `EXTENDED_SYS_STATE`) counts where it is
-//! given, but for a multicopter that idles at the height where it was armed. Otherwise, for half a second:
+//! given, but for what idles: on rotors, with less throttle than flies or no more vibration than at rest, and neither height, climb
+//! nor speed that would show flight; on wings, with little throttle, no speed and no height. Otherwise, for half a second:
 //!
 //! | what is known | in the air | on the ground again, for two seconds |
 //! |---|---|---|
@@ -28,9 +29,16 @@ const PLANE_FLYING_MPS: f32 = 8.0;
 /// A multicopter hovers at a quarter to three quarters of its throttle and idles on the ground below a tenth.
 const FLYING_THROTTLE: f32 = 0.2;
 const IDLE_THROTTLE: f32 = 0.1;
+const FULL_THROTTLE: f32 = 0.95;
 /// Nothing that is watched here is faster: garbage, which must not get into sums and maxima.
 const SPEED_MAX_MPS: f32 = 1_000.0;
 const STILL_MPS: f32 = 0.5;
+/// What climbs, sinks or goes faster than this moves, whatever wind and noise make of what stands.
+const MOVES_MPS: f32 = 1.5;
+/// With idle throttle the height of what stands may drift so far: pressure and estimators do.
+const DRIFT_M: f32 = 8.0;
+/// Above this it hovers though it does not shake: simulators do not.
+const STANDS_M: f32 = 2.0;
 const TAKEOFF_DEBOUNCE: Span = Span::from_millis(500);
 const LANDING_DEBOUNCE: Span = Span::from_secs(2);
 /// The autopilot's word has its own debounce; one message of nonsense at 2 Hz has none.
@@ -94,6 +102,7 @@ pub enum FlightEvent {
 
 /// Whether the vehicle flies.
 #[derive(Clone, Copy, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Flight {
     airborne_since: Option<Instant>,
     /// A flight is going on, and when the vehicle was in the air last.
@@ -107,6 +116,8 @@ pub struct Flight {
     armed_height_m: Option<f32>,
     /// The pilot's display of the altitude while it stood without thrust.
     idle_altitude_m: Option<f32>,
+    /// It had throttle to fly with since its arming: what is told of the throttle means something.
+    driven: bool,
     changing_since: Option<Instant>,
 }
 
@@ -121,6 +132,7 @@ impl Flight {
             armed: false,
             armed_height_m: None,
             idle_altitude_m: None,
+            driven: false,
             changing_since: None,
         }
     }
@@ -165,8 +177,11 @@ impl Flight {
     /// One step, at least every 50 ms.
     pub fn step(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
         self.note_arming(now, vehicle);
-        let says = Self::autopilot_says(now, vehicle).filter(|flies| !flies || !self.idles_low(now, vehicle));
-        let flies = self.armed && can_fly(vehicle) && says.unwrap_or_else(|| self.seems_to_fly(now, vehicle));
+        let idles = self.idles(now, vehicle);
+        let says = Self::autopilot_says(now, vehicle).filter(|flies| !flies || !idles);
+        let flies = self.armed
+            && can_fly(vehicle)
+            && says.unwrap_or_else(|| !idles && self.seems_to_fly(now, vehicle));
         let debounce = match (says, self.airborne()) {
             // What is on the ground is judged as such at once: motors that stop are no fault there. One wrong word ends no
             // flight.
@@ -198,6 +213,8 @@ impl Flight {
             self.armed_height_m = height_m(now, vehicle);
         }
         self.armed = heartbeat.armed;
+        let flying = |throttle| throttle >= FLYING_THROTTLE;
+        self.driven = self.armed && (self.driven || throttle(now, vehicle).is_some_and(flying));
         let idles = !self.armed || throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
         if idles && !self.airborne() {
             self.idle_altitude_m = altitude_m(now, vehicle).or(self.idle_altitude_m);
@@ -260,15 +277,62 @@ impl Flight {
         }
     }
 
-    /// At the height where it was armed, with less throttle than flies: `ArduPilot`'s and PX4's land detectors call a vehicle that is
-    /// armed on the bench, spools up, or came down under a pilot's sticks, not landed.
-    fn idles_low(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    /// Nothing that moves, and less throttle than flies, or no more vibration than at rest: `ArduPilot`'s and PX4's land detectors
+    /// call a vehicle that is armed on the bench, spools up, or came down under a pilot's sticks, not landed. What glides moves;
+    /// what is thrown, falls or autorotates does too.
+    fn idles(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let throttle = throttle(now, vehicle);
         let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
+        let little = throttle.is_some_and(|throttle| throttle < enough);
         let low =
             self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m.abs() < TAKEOFF_HEIGHT_M);
-        vehicle.hovers(now) == Some(true)
-            && low
-            && throttle(now, vehicle).is_some_and(|throttle| throttle < enough)
+        if little && low && vehicle.hovers(now) == Some(true) {
+            return true;
+        }
+        let moves = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() > MOVES_MPS);
+        if moves(climb_mps(now, vehicle)) || moves(ground_speed_mps(now, vehicle)) {
+            return false;
+        }
+        let height_m = self.height_above_start_m(now, vehicle).or_else(|| self.rise_m(now, vehicle));
+        let within = |limit_m: f32| height_m.is_none_or(|height_m| height_m.abs() < limit_m);
+        match vehicle.hovers(now).or_else(|| has_wings(vehicle).then_some(false)) {
+            Some(true) => {
+                let shakes = vehicle.inertial.shakes(now);
+                // Some logs tell a throttle that says nothing.
+                let told = throttle.filter(|_| self.driven || shakes != Some(true));
+                let off = told.is_some_and(|throttle| throttle < IDLE_THROTTLE);
+                if self.airborne() {
+                    let idles = throttle.is_some_and(|throttle| throttle < FLYING_THROTTLE);
+                    let calm = shakes == Some(false) && within(STANDS_M);
+                    return (off && (self.driven || within(DRIFT_M))) || (idles && calm);
+                }
+                // With all its thrust it would climb.
+                let low = height_m.is_some() && within(TAKEOFF_HEIGHT_M);
+                let full = throttle.is_some_and(|throttle| throttle >= FULL_THROTTLE);
+                (off && within(DRIFT_M))
+                    || (full && low)
+                    || ((shakes == Some(false) || vehicle.inertial.contradicts(now)) && within(STANDS_M))
+            }
+            Some(false) => {
+                let hud = vehicle.hud.within(now, MOTION_AGE);
+                let airspeed_mps = hud.and_then(|hud| hud.airspeed).map_or(0.0, |speed| speed.0);
+                let slow = airspeed_mps < PLANE_FLYING_MPS / 2.0 && ground_speed_mps(now, vehicle).is_some();
+                let off = throttle.is_some_and(|throttle| throttle < FLYING_THROTTLE);
+                off && slow && height_m.is_some_and(|height_m| height_m < TAKEOFF_HEIGHT_M)
+            }
+            None => false,
+        }
+    }
+
+    /// Whether it stands without thrust.
+    pub(crate) fn is_at_rest(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let off = throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < IDLE_THROTTLE / 2.0);
+        !self.is_open() && off && vehicle.heartbeat.get().is_some()
+    }
+
+    /// How far the displayed altitude rose since it stood without thrust.
+    fn rise_m(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+        self.idle_altitude_m.zip(altitude_m(now, vehicle)).map(|(stood_m, is_m)| is_m - stood_m)
     }
 
     fn seems_to_fly(&self, now: Instant, vehicle: &Vehicle) -> bool {
@@ -279,10 +343,7 @@ impl Flight {
             let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
             let thrust = throttle.is_none_or(|throttle| throttle > enough);
             // Motors are tried on the bench: the barometer says so.
-            let rose = self
-                .idle_altitude_m
-                .zip(altitude_m(now, vehicle))
-                .is_none_or(|(stood_m, is_m)| is_m > stood_m + TAKEOFF_HEIGHT_M);
+            let rose = self.rise_m(now, vehicle).is_none_or(|rise_m| rise_m > TAKEOFF_HEIGHT_M);
             // Without any word about height, speed or thrust it goes on with what it does.
             return fast
                 || (thrust && (self.airborne() || (throttle.is_some() && rose && !has_wings(vehicle))));
@@ -312,12 +373,14 @@ pub(crate) fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 
 /// The part of the throttle that the autopilot gives.
 fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.throttle).map(|throttle| throttle.0)
+    let hud = vehicle.hud.within(now, MOTION_AGE);
+    hud.and_then(|hud| hud.throttle).map(|throttle| throttle.0).filter(|part| part.is_finite())
 }
 
 /// The altitude of the pilot's display, of the barometer where there is no position.
 fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.altitude).map(|altitude| altitude.0)
+    let hud = vehicle.hud.within(now, MOTION_AGE);
+    hud.and_then(|hud| hud.altitude).map(|altitude| altitude.0).filter(|height_m| height_m.is_finite())
 }
 
 /// Speed upwards from the best source that is fresh, in m/s.

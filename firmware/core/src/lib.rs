@@ -13,6 +13,7 @@ pub mod flight;
 pub mod half;
 pub mod happening;
 pub mod health;
+pub mod inertial;
 mod latest;
 pub mod lifetime;
 pub mod mishap;

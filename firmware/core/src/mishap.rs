@@ -9,8 +9,9 @@
 //! | impact | a shock above `MIS_IMPACT`, and the speed breaks off harder than legs take it or the vehicle lies on its side; then it is still | everywhere |
 //! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
-//! | | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
 //! | disarmed in the air | disarmed above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
+//! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
+//! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle | on rotors |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
 //! | | 7 m lost, faster than 1 m/s, at nearly full throttle, where the autopilot has it | everywhere |
 //!
@@ -22,7 +23,11 @@
 //!                                            armed again
 //! ```
 //! While it goes on the flight is held open, so that a vehicle that recovers has one flight and not two; `Down` ends it.
-//! What is seen while armed but not in a flight (on the bench) is told as [`Change::OnBench`], once for each arming.
+//! What is seen while armed but not in a flight (on the bench) is told as [`Change::OnBench`], once for each arming; but what its own
+//! rotors turned over is a mishap, though it never flew.
+//!
+//! An estimator may be wrong. No attitude counts which the accelerometer and the gyros contradict ([`crate::inertial`]), and no
+//! vertical speed which the air pressure contradicts.
 
 mod evidence;
 mod sight;
@@ -61,6 +66,8 @@ const STILL_RATE: f32 = 0.3;
 const ROSE_M: f32 = 3.0;
 /// Rotors pull upwards; what is carried so from above lies on its back.
 const ON_BACK_G: f32 = 0.5;
+/// What lies over so long after its last throttle was turned over by its rotors, and by no hand.
+const DRIVEN: Span = Span::from_secs(5);
 /// How long it is seen whether what was disarmed falls.
 const FALL_SHOWS: Span = Span::from_secs(3);
 const FALLEN_M: f32 = 2.0;
@@ -122,6 +129,10 @@ pub struct Mishap {
     /// The last height above home while it was armed.
     height_m: f32,
     hover_throttle: f32,
+    /// When it was armed with throttle last.
+    driven_at: Option<Instant>,
+    /// It was level while it was armed.
+    stood: bool,
     /// Where it began, or ended.
     place: Place,
 }
@@ -162,6 +173,8 @@ impl Mishap {
             rate: 0.0,
             height_m: 0.0,
             hover_throttle: 0.0,
+            driven_at: None,
+            stood: false,
             place: Place { position: None, height_m: 0 },
         }
     }
@@ -200,6 +213,10 @@ impl Mishap {
         let at = match kind {
             Kind::FreeFall => forces().filter(|_| rotors),
             Kind::Impact => forces(),
+            Kind::Overturned => {
+                let known = attitude.get().is_some_and(|it| it.roll.0.is_finite() && it.pitch.0.is_finite());
+                attitude.at().filter(|_| known && rotors)
+            }
             Kind::Tumbling => {
                 let rates = attitude.get().and_then(|attitude| attitude.rates);
                 attitude.at().filter(|_| rates.is_some_and(|rates| is_known(rates.map(|rate| rate.0))))
@@ -224,7 +241,7 @@ impl Mishap {
         self.shocked(now, vehicle);
         let seen = self.seen.take();
         match (self.state, seen) {
-            (State::Quiet, Some(kind)) if flight.is_open() => {
+            (State::Quiet, Some(kind)) if flight.is_open() || self.is_turned_over(now, vehicle, kind) => {
                 self.state = State::Going(now);
                 let mut place = Place::of(now, vehicle);
                 if let (Kind::Disarmed, Some(doubt)) = (kind, self.doubt.take()) {
@@ -254,6 +271,8 @@ impl Mishap {
             disarmed_at: self.disarmed_at,
             on_bench: self.on_bench,
             hover_throttle: self.hover_throttle,
+            driven_at: self.driven_at,
+            stood: self.stood,
             ..Self::new()
         };
     }
@@ -267,8 +286,9 @@ impl Mishap {
             }
         }
         if armed && !self.armed {
-            (self.on_bench, self.disarmed_at, self.doubt) = (false, None, None);
+            (self.on_bench, self.disarmed_at, self.doubt, self.stood) = (false, None, None, false);
         }
+        self.stood |= armed && vehicle.inertial.is_level(now);
         if self.armed && !armed {
             self.disarmed_at = Some(now);
             // The height of before: PX4's is 0 from the disarming on.
@@ -276,7 +296,8 @@ impl Mishap {
             // The autopilot may have called it landed because it is disarmed.
             if high && flight.is_open() && self.state == State::Quiet {
                 let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
-                self.doubt = Some(Doubt { since: now, height_m: self.height_m, altitude_m });
+                self.doubt =
+                    Some(Doubt { since: now, height_m: self.height_m, altitude_m, uncarried: false });
             }
         }
         self.armed = armed;
@@ -296,11 +317,29 @@ impl Mishap {
         // What is carried home may be armed still, and no motor turns.
         let thrust =
             !on_rotors(now, vehicle) || throttle(now, vehicle).is_none_or(|part| part > IDLE_THROTTLE);
-        let lies = is_tilted(vehicle) || self.lies_on_its_back(vehicle);
+        let lies = is_tilted(now, vehicle) || self.lies_on_its_back(vehicle);
         let lay_at_m = f32::from(self.place.height_m);
         let rose = height_m(now, vehicle).is_some_and(|height_m| height_m > lay_at_m + ROSE_M);
         let flies = self.armed && (speed_mps > 2.0 * STILL_MPS || rose) && !lies && thrust;
         self.flies_since = if flies { self.flies_since.or(Some(now)) } else { None };
+    }
+
+    /// Whether what was seen outside of a flight is the work of its own rotors, and no hand's: it had throttle just now, and the
+    /// inertial messages show it.
+    fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: Kind) -> bool {
+        self.was_driven(now)
+            && on_rotors(now, vehicle)
+            && (kind == Kind::Tumbling || self.lies_turned(now, vehicle).is_some())
+    }
+
+    /// How far it lies over, in radians, what stood level while it was armed and turned since.
+    fn lies_turned(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+        let turned = self.stood && !vehicle.inertial.turns_little(now, DRIVEN);
+        vehicle.inertial.lies_over(now).filter(|_| turned)
+    }
+
+    fn was_driven(&self, now: Instant) -> bool {
+        self.driven_at.is_some_and(|at| now.since(at) <= DRIVEN)
     }
 
     fn lies_on_its_back(&self, vehicle: &Vehicle) -> bool {
@@ -313,14 +352,18 @@ impl Mishap {
 
     /// Disarmed out of a flight: what falls, sinks or glides on was disarmed in the air.
     fn doubted(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
-        let Some(Doubt { since, height_m, altitude_m }) = self.doubt else { return };
-        let fallen =
-            |before: f32| vehicle.global.get().is_some_and(|global| global.altitude.0 < before - FALLEN_M);
-        let sinks = self.sink.now > FALLING_MPS && now.since(since) > Recent::WINDOW;
+        let Some(Doubt { since, height_m, altitude_m, uncarried }) = self.doubt else { return };
+        // An estimator is shaken by the touch, and may fall on while the vehicle stands.
+        let air = |sink_mps: f32| self.pressure.agrees(now, sink_mps) != Some(false);
+        let fallen = |before: f32| {
+            vehicle.global.get().is_some_and(|global| global.altitude.0 < before - FALLEN_M)
+                && air(FALLING_MPS)
+        };
+        let sinks = self.sink.now > FALLING_MPS && now.since(since) > Recent::WINDOW && air(self.sink.now);
         let glides = !on_rotors(now, vehicle)
             && now.since(since) > BREAKS_OFF
             && ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > GLIDING_MPS);
-        if self.uncarried.samples >= 2 || sinks || glides || altitude_m.is_some_and(fallen) {
+        if uncarried || sinks || glides || altitude_m.is_some_and(fallen) {
             self.see(now, Kind::Disarmed, height_m.max(params.get(Param::MisDisarm).next_up()));
         } else if now.since(since) > FALL_SHOWS {
             self.doubt = None;
@@ -339,7 +382,7 @@ impl Mishap {
             && throttle(now, vehicle).is_none_or(|part| part < IDLE_THROTTLE);
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
         let hit = (shock.speed_mps >= IMPACT_MPS && shock.stopped && hard && !lands)
-            || (on_rotors(now, vehicle) && is_tilted(vehicle))
+            || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
             || self.lies_on_its_back(vehicle);
         let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
         if hit && rests && self.is_idle(now, vehicle) {
@@ -353,7 +396,7 @@ impl Mishap {
     fn is_idle(&self, now: Instant, vehicle: &Vehicle) -> bool {
         !self.armed
             || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
-            || is_tilted(vehicle)
+            || is_tilted(now, vehicle)
             || self.lies_on_its_back(vehicle)
             || throttle(now, vehicle).is_some_and(|part| !(IDLE_THROTTLE..FULL_THROTTLE).contains(&part))
     }

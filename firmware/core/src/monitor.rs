@@ -143,6 +143,14 @@ impl Monitor {
         self.happenings.push(Happening::OtherVehicle);
     }
 
+    /// The autopilot was powered on again since the last observation: the flight of before is over, though nobody saw how it ended.
+    pub fn begin_anew(&mut self) {
+        self.flight = Flight::grounded();
+        self.mishap = Mishap::new();
+        self.protect = Protect::new();
+        self.usage.break_off();
+    }
+
     /// One step, every [`TICK`]: flight, checks, usage. Each change of a check's level is given to `findings`, once.
     pub fn tick(
         &mut self,
@@ -212,13 +220,18 @@ impl Monitor {
     fn step_flight(&mut self, now: Instant) -> Option<FlightEvent> {
         let Self { vehicle, flight, mishap, usage, params, happenings, .. } = self;
         if let Some(change) = mishap.step(now, vehicle, flight, params) {
-            if change == Change::Down {
+            if change == Change::Down && flight.is_open() {
                 usage.count_mishap(mishap.touch_mps());
             }
             happenings.push(Happening::Mishap(change));
         }
         let event = match mishap.fate() {
-            Fate::Own => flight.step(now, vehicle),
+            Fate::Own => {
+                if flight.is_at_rest(now, vehicle) {
+                    vehicle.inertial.rest(now);
+                }
+                flight.step(now, vehicle)
+            }
             Fate::Over => flight.end(now, vehicle),
             Fate::Held => {
                 flight.stay(now);

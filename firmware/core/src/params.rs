@@ -223,6 +223,7 @@ params! {
     BatStateWarn "BAT_STATE_WARN" "" 0.5 0.0 3.0 "1: the autopilot calls it low or unhealthy, by its own thresholds";
     BatStateCrit "BAT_STATE_CRIT" "" 1.5 0.0 3.0 "2: the autopilot calls it critical, an emergency or failed";
     MisSink "MIS_SINK" "m/s" 6.0 1.0 50.0 "above the fastest descent that PX4 (4) and ArduPilot (5) can be set to";
+    MisOverturn "MIS_OVERTURN" "deg" 60.0 30.0 180.0 "tilt of what carries the vehicle; of the estimator's attitude 100 degrees at least";
 }
 
 impl Param {

@@ -1,6 +1,9 @@
 //! SI units (and the few that the field uses instead) as types, so that a value never crosses a border without its
 //! unit. Single precision everywhere but in positions: a sensor has less than 24 bits to say.
 
+/// Standard gravity, m/s2 (CGPM 1901).
+pub const GRAVITY: f32 = 9.806_65;
+
 macro_rules! units {
     ($($(#[$doc:meta])* $name:ident, $symbol:literal;)*) => {$(
         $(#[$doc])*

@@ -5,6 +5,7 @@
 //! beyond is recorded only.
 
 use crate::election::Election;
+use crate::inertial::Inertial;
 use crate::latest::Latest;
 use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
@@ -18,10 +19,10 @@ use crate::time::{Instant, Span};
 pub const BATTERIES_MAX: usize = 4;
 /// GNSS receivers that are monitored.
 pub const RECEIVERS_MAX: usize = 2;
-/// How long after an autopilot's first heartbeat its boot time is told.
-const RESTART_SHOWS: Span = Span::from_secs(3);
 /// `EXTENDED_SYS_STATE` comes at 1 Hz or faster where it comes at all.
 pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
+/// An attitude that was the wanted one at each sample for so long follows none.
+const LED: Span = Span::from_secs(5);
 /// A boot time that falls by more than this is a reboot, not reordering.
 const REBOOT_MS: u32 = 3_000;
 /// A fall from here is the end of the counter's range.
@@ -55,12 +56,16 @@ pub struct Vehicle {
     pub gnss_integrity: [Latest<GnssIntegrity>; RECEIVERS_MAX],
     /// The first inertial sensor.
     pub imu: Latest<Imu>,
+    /// What it and the gyros of the attitude say by themselves.
+    pub inertial: Inertial,
     /// The air.
     pub air: Latest<Air>,
     /// Attitude.
     pub attitude: Latest<Attitude>,
     /// The attitude that the autopilot wants.
     pub wanted: Latest<Wanted>,
+    /// When the attitude was another one than that last.
+    led_at: Option<Instant>,
     /// Position from the local origin.
     pub local: Latest<LocalPosition>,
     /// The fused position.
@@ -105,13 +110,12 @@ pub struct Vehicle {
     pub rebooted_at: Option<Instant>,
     /// Whether it was armed then: a restart on the ground is none that endangers anybody.
     pub rebooted_armed: bool,
-    /// Since when it has said that it is disarmed, after it was armed.
-    disarmed_since: Option<Instant>,
     /// How often another system has become the vehicle: everything else here is then of that one.
     pub changes: u32,
     election: Election,
-    /// The highest boot time since its last boot, milliseconds.
+    /// The highest boot time since its last boot, milliseconds, and whether it was armed when it was told last.
     boot_ms: Option<u32>,
+    boot_armed: bool,
 }
 
 impl Default for Vehicle {
@@ -131,9 +135,11 @@ impl Vehicle {
             gnss: [const { Latest::nothing() }; RECEIVERS_MAX],
             gnss_integrity: [const { Latest::nothing() }; RECEIVERS_MAX],
             imu: Latest::nothing(),
+            inertial: Inertial::new(),
             air: Latest::nothing(),
             attitude: Latest::nothing(),
             wanted: Latest::nothing(),
+            led_at: None,
             local: Latest::nothing(),
             global: Latest::nothing(),
             hud: Latest::nothing(),
@@ -167,10 +173,10 @@ impl Vehicle {
             reboots: 0,
             rebooted_at: None,
             rebooted_armed: false,
-            disarmed_since: None,
             changes: 0,
             election: Election::new(),
             boot_ms: None,
+            boot_armed: false,
         }
     }
 
@@ -265,7 +271,7 @@ impl Vehicle {
 
     fn take(&mut self, at: Instant, component: u8, observation: &Observation) {
         match *observation {
-            Observation::Heartbeat(heartbeat) => self.take_heartbeat(at, heartbeat),
+            Observation::Heartbeat(heartbeat) => self.heartbeat.set(at, heartbeat),
             Observation::SystemStatus(system) => self.system.set(at, system),
             Observation::SystemTime(time) => self.take_time(at, time),
             Observation::Gnss(gnss) => set_instance(&mut self.gnss, gnss.instance, at, gnss),
@@ -282,6 +288,9 @@ impl Vehicle {
                 if let Some(boot_ms) = attitude.boot_ms {
                     self.take_boot_time(at, boot_ms);
                 }
+                self.inertial.take_rates(at, attitude.rates);
+                self.inertial.take_attitude(at, attitude.roll, attitude.pitch);
+                self.note_led(at, &attitude);
                 self.attitude.set(at, attitude);
             }
             Observation::Wanted(wanted) => self.wanted.set(at, wanted),
@@ -311,15 +320,6 @@ impl Vehicle {
         }
     }
 
-    fn take_heartbeat(&mut self, at: Instant, heartbeat: Heartbeat) {
-        if heartbeat.armed {
-            self.disarmed_since = None;
-        } else if self.armed() {
-            self.disarmed_since = Some(at);
-        }
-        self.heartbeat.set(at, heartbeat);
-    }
-
     fn take_time(&mut self, at: Instant, time: SystemTime) {
         self.take_boot_time(at, time.boot_ms);
         self.time.set(at, time);
@@ -334,19 +334,37 @@ impl Vehicle {
         } else if boot_ms.saturating_add(REBOOT_MS) < before {
             self.reboots = self.reboots.saturating_add(1);
             self.rebooted_at = Some(at);
-            // The first heartbeat after a restart says disarmed, and may come before the time that shows the restart.
-            self.rebooted_armed =
-                self.armed() || self.disarmed_since.is_some_and(|since| at.since(since) <= RESTART_SHOWS);
+            // As it was before: the first heartbeat after a restart may come before the time that shows it, and an autopilot's own
+            // log of the next power-on may begin with its arming.
+            self.rebooted_armed = self.boot_armed;
             self.boot_ms = Some(boot_ms);
         } else {
             self.boot_ms = Some(before.max(boot_ms));
         }
+        self.boot_armed = self.armed();
+    }
+
+    fn note_led(&mut self, at: Instant, attitude: &Attitude) {
+        /// 0.6 degrees, which is more than rounding.
+        const COPY_RAD: f32 = 0.01;
+        if let Some(Wanted { roll, pitch }) = self.wanted.within(at, LED)
+            && ((roll.0 - attitude.roll.0).abs() > COPY_RAD || (pitch.0 - attitude.pitch.0).abs() > COPY_RAD)
+        {
+            self.led_at = Some(at);
+        }
+    }
+
+    /// Whether the attitude that is said to be wanted leads the vehicle's. Some firmwares log the attitude itself as the one that is
+    /// wanted: what it is like at each sample is then no command.
+    pub(crate) fn is_led(&self, now: Instant) -> bool {
+        self.led_at.is_some_and(|at| now.since(at) <= LED)
     }
 
     /// The first sensor's figures serve; the others measure the same thing.
     fn take_imu(&mut self, at: Instant, imu: Imu) {
         if imu.instance == 0 {
             self.imu.set(at, imu);
+            self.inertial.take(at, &imu);
         }
     }
 

@@ -87,14 +87,15 @@ const INPUTS: &[(&str, &str)] = &[
         "impact",
         "the same: a shock, with the speed of GLOBAL_POSITION_INT breaking off or the vehicle on its side, then stillness",
     ),
-    (
-        "tumbling",
-        "ATTITUDE, or the inertial messages: body rates for 0.5 s, on wings for 1.5 s; the top down for 0.7 s",
-    ),
+    ("tumbling", "ATTITUDE, or the inertial messages: body rates for 0.5 s, on wings for 1.5 s"),
     ("disarmed_in_air", "HEARTBEAT: disarmed out of a flight, and then it falls, sinks or glides"),
     (
         "sinking",
         "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; or a loss of 7 m with nearly full throttle",
+    ),
+    (
+        "overturned",
+        "ATTITUDE: the top down by more than 100 degrees; the inertial messages: it lies over, with throttle of late; for 0.7 s, on rotors",
     ),
 ];
 

@@ -154,7 +154,7 @@ const FAULTS: [(&str, u8, Level, Fault); 54] = [
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`.
-const ELSEWHERE: [&str; 13] = [
+const ELSEWHERE: [&str; 14] = [
     "esc_silent",
     "esc_errors",
     "heartbeat",
@@ -168,6 +168,7 @@ const ELSEWHERE: [&str; 13] = [
     "tumbling",
     "disarmed_in_air",
     "sinking",
+    "overturned",
 ];
 
 /// What is due, and the kind of component (`CMP1_KIND`) that is.

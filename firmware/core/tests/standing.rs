@@ -4,11 +4,11 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::observation::{Hud, LandedState, Observation};
+use hums_core::observation::{Hud, LandedState, Observation, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::Instant;
-use hums_core::units::{Fraction, Metres};
+use hums_core::units::{Fraction, Metres, MetresPerSecond};
 use hums_core::usage::UsageCounter;
 
 /// Flights and landings of two minutes, of what a script says.
@@ -78,4 +78,65 @@ fn motors_tried_without_any_position_are_no_flight_where_the_barometer_does_not_
     };
     assert_eq!(counts(tried(0.6)), (0, 0));
     assert_eq!(counts(tried(6.0)), (1, 0));
+}
+
+/// What the autopilot calls in the air from its arming at 5 s on, without a position.
+fn without_position(now_ms: u64, throttle: f32, altitude_m: Option<f32>, climb_mps: f32) -> Vec<Observation> {
+    let hud = Hud {
+        throttle: Some(Fraction(throttle)),
+        altitude: altitude_m.map(Metres),
+        climb: Some(MetresPerSecond(climb_mps)),
+        ..Hud::default()
+    };
+    let own = |said: &Observation| !matches!(said, Observation::GlobalPosition(_) | Observation::Hud(_));
+    let said = called_in_air(now_ms).says(now_ms).into_iter().filter(own);
+    said.chain([Observation::Hud(hud)]).collect()
+}
+
+#[test]
+fn what_has_no_throttle_and_does_not_move_does_not_fly_whatever_is_said_of_it() {
+    assert_eq!(counts(|now_ms| without_position(now_ms, 0.0, None, 0.2)), (0, 0), "nothing tells its height");
+    let drifts =
+        |now_ms: u64| Quad { height: now_ms as f32 / 20_000.0, throttle: 0.02, ..called_in_air(now_ms) };
+    assert_eq!(counts(|now_ms| drifts(now_ms).says(now_ms)), (0, 0), "its height drifts by 6 m");
+    let unsaid = |now_ms| Quad { landed: None, ..drifts(now_ms) }.says(now_ms);
+    assert_eq!(counts(unsaid), (0, 0), "nobody says that it flies");
+    let full = |now_ms| {
+        let throttle = if now_ms < 20_000 { 0.0 } else { 1.0 };
+        Quad { height: 0.4, throttle, ..called_in_air(now_ms) }.says(now_ms)
+    };
+    assert_eq!(counts(full), (0, 0), "without propellers, all its throttle");
+    let rolls = |now_ms| {
+        let kind = VehicleKind::Plane;
+        Quad { kind, type_number: 1, height: 0.3, throttle: 0.0, ..called_in_air(now_ms) }.says(now_ms)
+    };
+    assert_eq!(counts(rolls), (0, 0), "a plane that stands");
+}
+
+#[test]
+fn what_hovers_low_what_glides_and_what_falls_without_throttle_flies() {
+    let low = |now_ms| {
+        let throttle = if now_ms < 20_000 { 0.0 } else { 0.3 };
+        let climb = if (20_000..21_000).contains(&now_ms) { 0.5 } else { 0.0 };
+        without_position(now_ms, throttle, Some(if now_ms < 20_000 { 480.0 } else { 480.5 }), climb)
+    };
+    assert_eq!(counts(low), (1, 0), "half a metre up, without a position");
+    let glides = |now_ms| {
+        let kind = VehicleKind::Plane;
+        let mut said =
+            Quad { kind, type_number: 1, height: 60.0, throttle: 0.0, climb: -1.0, ..called_in_air(now_ms) }
+                .says(now_ms);
+        for said in &mut said {
+            if let Observation::GlobalPosition(global) = said {
+                global.velocity[0] = MetresPerSecond(14.0);
+            }
+        }
+        said
+    };
+    assert_eq!(counts(glides), (1, 0), "with its motor off");
+    let sinks = |now_ms| {
+        let (throttle, climb) = if now_ms < 60_000 { (0.5, 0.0) } else { (0.0, -4.0) };
+        without_position(now_ms, throttle, None, climb)
+    };
+    assert_eq!(counts(sinks), (1, 0), "it descends without throttle");
 }

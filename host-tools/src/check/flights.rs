@@ -66,6 +66,11 @@ impl Flights {
         self.open = false;
     }
 
+    /// It goes on no more, and nobody saw how it ended.
+    pub(super) fn break_off(&mut self) {
+        (self.open, self.crashed) = (false, false);
+    }
+
     /// A mishap began or ended.
     pub(super) fn mishap(&mut self, change: Change, monitor: &Monitor) {
         match change {
@@ -74,7 +79,7 @@ impl Flights {
                     flight.disarmed_at_m = Some(f32::from(monitor.mishap().height_m()));
                 }
             }
-            Change::Down => self.crashed = true,
+            Change::Down => self.crashed = self.open,
             Change::Began(_) | Change::FliesOn | Change::OnBench(_) => {}
         }
     }

@@ -31,10 +31,6 @@ use crate::source::told::{Finding, Told};
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
 
-/// The check of a restart while armed, and for how long it shows one. An autopilot's own log of the next power-on may begin
-/// with its arming: what it was before the restart counts.
-const RESTARTED: &str = "autopilot_reboot";
-const RESTART_SHOWS: Span = Span::from_secs(31);
 /// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
 
@@ -94,8 +90,6 @@ pub struct Judge {
     damages: u64,
     losses: u64,
     restarts: u64,
-    /// When the autopilot's clock began again, the vehicle disarmed.
-    calm_restart: Option<Instant>,
 }
 
 impl Judge {
@@ -123,7 +117,6 @@ impl Judge {
             damages: 0,
             losses: 0,
             restarts: 0,
-            calm_restart: None,
         }
     }
 
@@ -194,12 +187,14 @@ impl Judge {
         }
     }
 
-    /// The autopilot's clock began again: another power-on in the same recording.
+    /// The autopilot's clock began again: another power-on in the same recording. Its own log begins anew with each: what it flew
+    /// before is over. (A box that is restarted in the air, or the clock of a ground station that is set, ends no flight.)
     fn restart(&mut self, at: Instant) {
         self.restarts += 1;
         self.epochs.restart(at);
-        if !self.monitor.vehicle().armed() {
-            self.calm_restart = Some(at);
+        if matches!(self.format, Format::DataFlash | Format::Ulog) {
+            self.monitor.begin_anew();
+            self.flights.break_off();
         }
     }
 
@@ -253,10 +248,9 @@ impl Judge {
     fn tick(&mut self, now: Instant) {
         let steps = self.clock.monitor(now);
         let (link, recorder) = (self.link(steps), RecorderStatus::default());
-        let Self { monitor, here, format, wire, calm_restart, clock, details, .. } = self;
-        let calm = calm_restart.is_some_and(|at| now.since(at) <= RESTART_SHOWS);
+        let Self { monitor, here, format, wire, clock, details, .. } = self;
         monitor.tick(steps, &link, &recorder, &mut |finding| {
-            if is_of(finding.check, *format, wire.is_some()) && !(calm && finding.check == RESTARTED) {
+            if is_of(finding.check, *format, wire.is_some()) {
                 let at = Clock::recording(now, steps, finding.at);
                 here.take(&Finding { at, ..Finding::from(finding) }, clock.behind());
                 details.tell(finding.check, here);

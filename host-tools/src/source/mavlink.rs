@@ -130,7 +130,52 @@ impl Reader for TlogReader {
     }
 }
 
-/// The raw bytes of a port, in the time that a line at this rate takes for them.
+/// The time of frames without recorded times: what the autopilot's own messages tell of the time since its boot, and until it
+/// tells any, what a line takes for the bytes.
+#[derive(Default)]
+struct BootTimes {
+    /// Whose times count: the first system whose autopilot tells one.
+    system: Option<u8>,
+    timeline: Option<Timeline>,
+    /// The line's time at the first of them.
+    base: Instant,
+}
+
+impl BootTimes {
+    /// The time of a frame, and whether the autopilot's clock began again before it.
+    fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, bool) {
+        let told = Self::boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
+        if let Some(boot_ms) = told {
+            let boot_us = u64::from(boot_ms) * 1_000;
+            if self.timeline.is_none() {
+                (self.system, self.base) = (Some(frame.system()), line);
+            }
+            let timeline = self.timeline.get_or_insert_with(|| Timeline::from_first(boot_us));
+            let moment = timeline.at(boot_us);
+            return (self.after_base(moment.at), moment.restarted);
+        }
+        (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), false)
+    }
+
+    fn after_base(&self, at: Instant) -> Instant {
+        Instant::from_micros(self.base.as_micros().saturating_add(at.as_micros()))
+    }
+
+    /// `time_boot_ms` of an autopilot's `SYSTEM_TIME`, `ATTITUDE` and `GLOBAL_POSITION_INT`; zeros at the end of a payload are not sent.
+    fn boot_ms(frame: &hums_link::Frame<'_>) -> Option<u32> {
+        /// `MAV_COMP_ID_AUTOPILOT1`
+        const AUTOPILOT: u8 = 1;
+        let offset = match frame.id() {
+            2 => 8,
+            30 | 33 => 0,
+            _ => return None,
+        };
+        let byte = |at: usize| frame.payload().get(offset + at).copied().unwrap_or(0);
+        (frame.component() == AUTOPILOT).then(|| u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]))
+    }
+}
+
+/// The raw bytes of a port, in the time that the autopilot's messages tell, or that a line at this rate takes for them.
 pub struct RawReader {
     bytes: Paced<Raw<Input>>,
 }
@@ -146,15 +191,22 @@ impl Reader for RawReader {
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut now = Instant::ZERO;
-        let mut each = |at, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
+        let mut line = Instant::ZERO;
+        let mut times = BootTimes::default();
+        let mut each = |line, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
             counts.add(frame.id(), frame.bytes().len());
+            let (at, restarted) = times.at(line, &frame);
+            now = at;
+            if restarted {
+                take(at, Item::Restart)?;
+            }
             said.frame(at, &frame, want, take)
         };
         while let Some(chunk) = self.bytes.next()? {
-            now = Instant::from_micros(chunk.at_us);
-            push(&mut framer, &chunk.bytes, false, &mut |frame| each(now, frame, take))?;
+            line = Instant::from_micros(chunk.at_us);
+            push(&mut framer, &chunk.bytes, false, &mut |frame| each(line, frame, take))?;
         }
-        push(&mut framer, &[], true, &mut |frame| each(now, frame, take))?;
+        push(&mut framer, &[], true, &mut |frame| each(line, frame, take))?;
         said.end(take)?;
         let noise = framer.counts().bytes_not_frames;
         if noise > 0 {

@@ -2,7 +2,8 @@
 //!
 //! An angle that the autopilot wants is none that it lost: pilots bank a multicopter steeply, and the autopilot turns their sticks
 //! into an attitude that it wants ([`Wanted`]). So an angle counts only where the vehicle is further than [`FOLLOWS_RAD`] from the
-//! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes.
+//! wanted one. Where nobody says what is wanted, it counts but in modes in which the pilot banks as far as he likes. What is said to
+//! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
 
 use super::check::{Check, Side, When};
 use super::common::STALE;
@@ -59,13 +60,14 @@ fn degrees(
     if !matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
         return None;
     }
-    let told = vehicle.wanted.within(now, WANTED_AGE).map(|told| wanted(told).0);
+    let told = vehicle.wanted.within(now, WANTED_AGE).filter(|_| vehicle.is_led(now));
+    let told = told.map(|told| wanted(told).0);
     let degrees = |attitude: &Attitude| {
         let is = angle(attitude).0;
         let asked = is_made_to_turn(vehicle)
             || told.map_or_else(|| is_banked_by_hand(vehicle), |told| apart(is, told) < FOLLOWS_RAD);
-        // On wings, and between both, no angle is too much.
-        let judged = vehicle.hovers(now) == Some(true) && !asked;
+        // On wings, and between both, no angle is too much; and none counts that the sensors contradict.
+        let judged = vehicle.hovers(now) == Some(true) && !asked && !vehicle.inertial.contradicts(now);
         if judged || !is.is_finite() { is.to_degrees().abs() } else { 0.0 }
     };
     Reading::new(vehicle.attitude.at(), vehicle.attitude.get().map(degrees))

@@ -61,4 +61,12 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.mishap.reading(Kind::Sinking, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
+    Check {
+        name: Kind::Overturned.name(),
+        words: "mishap: overturned",
+        unit: "deg",
+        critical: Some(Param::MisOverturn),
+        read: |inputs, _| inputs.mishap.reading(Kind::Overturned, inputs.now, inputs.vehicle),
+        ..FREE_FALL
+    },
 ];

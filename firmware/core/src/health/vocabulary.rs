@@ -208,6 +208,9 @@ vocabulary! {
     "The vehicle was disarmed in the air, and fell."; "Look for who or what disarmed it; inspect the vehicle.";
     "sinking" Vehicle "sinking", "", needs "climb rate of a vehicle on rotors";
     "The vehicle sank fast without being told to."; "Look for lost thrust, an empty battery or a wrong height.";
+    "overturned" Vehicle "overturned", "", needs "attitude of a vehicle on rotors";
+    "The vehicle turned over, or lay over, while its motors ran.";
+    "Inspect the vehicle; check motor order, propellers and calibration.";
 }
 
 #[cfg(test)]

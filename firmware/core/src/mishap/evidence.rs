@@ -74,24 +74,41 @@ pub(super) struct Pressure {
     began_hpa: f32,
     now_hpa: f32,
     window: Instant,
+    changed_at: Instant,
 }
 
 impl Pressure {
     const WINDOW: Span = Span::from_secs(1);
-    pub(super) const NOTHING: Self =
-        Self { before_hpa: 0.0, began_hpa: 0.0, now_hpa: 0.0, window: Instant::ZERO };
+    pub(super) const NOTHING: Self = Self {
+        before_hpa: 0.0,
+        began_hpa: 0.0,
+        now_hpa: 0.0,
+        window: Instant::ZERO,
+        changed_at: Instant::ZERO,
+    };
 
     pub(super) fn take(&mut self, at: Instant, hpa: f32) {
         if at.since(self.window) >= Self::WINDOW {
             (self.before_hpa, self.began_hpa, self.window) = (self.began_hpa, hpa, at);
         }
+        if hpa.to_bits() != self.now_hpa.to_bits() {
+            self.changed_at = at;
+        }
         self.now_hpa = hpa;
     }
 
-    /// Whether it rises by more than a metre's worth: the vehicle sinks.
-    pub(super) fn rises(&self, at: Instant) -> bool {
-        const METRE_HPA: f32 = 0.12;
-        at.since(self.window) <= FRESH && self.before_hpa > 0.0 && self.now_hpa > self.before_hpa + METRE_HPA
+    /// Whether it rises as it does in a vehicle that sinks so fast, or began to within the last second; `None` where there is no
+    /// pressure, or one that never changes.
+    pub(super) fn agrees(&self, at: Instant, sink_mps: f32) -> Option<bool> {
+        const HPA_PER_METRE: f32 = 0.12;
+        /// Of the height that is lost in a second: it may have begun to sink within it, and its pressures are as old as their
+        /// stream is slow.
+        const PART_S: f32 = 0.3;
+        /// Wind and propellers make as much.
+        const NOISE_M: f32 = 0.8;
+        let known = at.since(self.window) <= FRESH && at.since(self.changed_at) <= FRESH;
+        let least_hpa = HPA_PER_METRE * (PART_S * sink_mps).max(NOISE_M);
+        (known && self.before_hpa > 0.0).then_some(self.now_hpa > self.before_hpa + least_hpa)
     }
 }
 
@@ -128,6 +145,8 @@ pub(super) struct Doubt {
     pub(super) height_m: f32,
     /// Above mean sea level.
     pub(super) altitude_m: Option<f32>,
+    /// Nothing has carried it since.
+    pub(super) uncarried: bool,
 }
 
 pub(super) fn is_known(vector: [f32; 3]) -> bool {
@@ -139,11 +158,13 @@ pub(super) fn on_rotors(now: Instant, vehicle: &Vehicle) -> bool {
     vehicle.hovers(now) == Some(true)
 }
 
-pub(super) fn is_tilted(vehicle: &Vehicle) -> bool {
-    vehicle
-        .attitude
-        .get()
-        .is_some_and(|attitude| attitude.roll.0.abs() > TILTED_RAD || attitude.pitch.0.abs() > TILTED_RAD)
+/// Whether it lies on its side or its back, by an attitude that the sensors do not contradict.
+pub(super) fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
+    !vehicle.inertial.contradicts(now)
+        && vehicle
+            .attitude
+            .get()
+            .is_some_and(|attitude| attitude.roll.0.abs() > TILTED_RAD || attitude.pitch.0.abs() > TILTED_RAD)
 }
 
 /// The part of the throttle that the autopilot gives.

@@ -15,14 +15,17 @@ use crate::vehicle::Vehicle;
 
 /// Below this load factor nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.
 const FALL_G: f32 = 0.3;
-/// A vehicle that was disarmed and is carried by less than this falls.
+/// A vehicle that was disarmed and is carried by less than this for so long falls; a bounce is shorter.
 const UNCARRIED_G: f32 = 0.5;
+const UNCARRIED: Span = Span::from_millis(200);
 /// Tumbling and sinking last so long at least.
 const TUMBLES: Span = Span::from_millis(500);
 const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
 const TURNS_OVER: Span = Span::from_millis(700);
-/// The cosine of 100 degrees.
-const OVERTURNED: f32 = -0.174;
+/// What is level and still by its sensors for so long is not turned over.
+const LEVEL: Span = Span::from_millis(500);
+/// Rotors that pull downwards for a moment more than level, by the estimator's attitude alone.
+const OVERTURNED_DEG: f32 = 100.0;
 const SINKS: Span = Span::from_millis(500);
 /// So much height is lost with all the thrust by what stalls, or has lost a propeller; gusts take less.
 const LOST_M: f32 = 7.0;
@@ -110,6 +113,20 @@ impl Mishap {
             self.see(at, Kind::FreeFall, span.as_secs_f32().max(least_s.next_up()));
         }
         self.uncarried.take(at, load_g < UNCARRIED_G && self.doubt.is_some());
+        if self.uncarried.samples >= 2
+            && at.since(self.uncarried.since) >= UNCARRIED
+            && let Some(doubt) = &mut self.doubt
+        {
+            doubt.uncarried = true;
+        }
+        let limit_deg = params.get(Param::MisOverturn);
+        if let Some(tilt_deg) = self.lies_turned(at, vehicle).map(f32::to_degrees)
+            && tilt_deg > limit_deg
+            && self.was_driven(at)
+            && on_rotors(at, vehicle)
+        {
+            self.see(at, Kind::Overturned, tilt_deg);
+        }
         if load_g > params.get(Param::MisImpact) {
             let before = self.shock.filter(|shock| at.since(shock.at) <= BREAKS_OFF);
             let shock = before.unwrap_or(Shock {
@@ -146,13 +163,16 @@ impl Mishap {
         let Attitude { roll, pitch, .. } = attitude;
         // Below 86 degrees of each, no cosine is asked for: this is done with each attitude.
         let tilts = libm::fabsf(roll.0).max(libm::fabsf(pitch.0)) > 1.5;
-        let over = tilts
-            && libm::cosf(roll.0) * libm::cosf(pitch.0) < OVERTURNED
+        let tilt_deg =
+            if tilts { libm::acosf(libm::cosf(roll.0) * libm::cosf(pitch.0)).to_degrees() } else { 0.0 };
+        let over = tilt_deg > OVERTURNED_DEG.max(params.get(Param::MisOverturn))
             && self.armed
             && on_rotors(at, vehicle)
-            && !is_made_to_turn(vehicle);
+            && !is_made_to_turn(vehicle)
+            && !vehicle.inertial.contradicts(at)
+            && !vehicle.inertial.is_level_for(at, LEVEL);
         if self.overturned.take(at, over).is_some_and(|span| span >= TURNS_OVER) {
-            self.see(at, Kind::Tumbling, self.rate.to_degrees().max(params.get(Param::MisTumble).next_up()));
+            self.see(at, Kind::Overturned, tilt_deg);
         }
     }
 
@@ -190,7 +210,8 @@ impl Mishap {
             Some(false) => lost_m > LOST_M,
             None => false,
         };
-        let sinks = sinks && self.armed && (is_believed(vehicle, params) || self.pressure.rises(at));
+        let believed = || self.pressure.agrees(at, sink_mps).unwrap_or_else(|| is_believed(vehicle, params));
+        let sinks = sinks && self.armed && believed();
         if self.sinks.take(at, sinks).is_some_and(|span| span >= SINKS) {
             self.see(at, Kind::Sinking, sink_mps.max(limit_mps.next_up()));
         }
@@ -208,6 +229,9 @@ impl Mishap {
     /// The throttle that it hovers with, smoothed.
     fn take_throttle(&mut self, at: Instant, vehicle: &Vehicle) {
         let throttle = throttle(at, vehicle).unwrap_or(0.0);
+        if self.armed && throttle > IDLE_THROTTLE {
+            self.driven_at = Some(at);
+        }
         let hovers = climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < 1.0);
         if hovers && throttle > IDLE_THROTTLE && self.state == State::Quiet {
             let weight = if self.hover_throttle > 0.0 { 0.25 / HOVER_S } else { 1.0 };

@@ -22,11 +22,13 @@ pub enum Kind {
     Disarmed = 3,
     /// It sinks without being told to; in m/s.
     Sinking = 4,
+    /// It was turned over by its own rotors, or lies over; degrees of tilt.
+    Overturned = 5,
 }
 
 impl Kind {
     /// How many there are.
-    pub(super) const COUNT: usize = 5;
+    pub(super) const COUNT: usize = 6;
 
     /// The name of its check.
     pub const fn name(self) -> &'static str {
@@ -36,6 +38,7 @@ impl Kind {
             Self::Tumbling => "tumbling",
             Self::Disarmed => "disarmed_in_air",
             Self::Sinking => "sinking",
+            Self::Overturned => "overturned",
         }
     }
 }

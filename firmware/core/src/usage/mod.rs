@@ -212,6 +212,12 @@ impl Usage {
         }
     }
 
+    /// The flight is over, and nobody saw how it ended.
+    pub(crate) fn break_off(&mut self) {
+        (self.touchdown, self.airborne, self.crashed, self.touched_mps) =
+            (Touchdown::new(), false, false, 0.0);
+    }
+
     /// The flight ends now by a mishap, in which it touched with so many m/s: that is no landing.
     pub(crate) fn count_mishap(&mut self, touch_mps: f32) {
         self.crashed = true;

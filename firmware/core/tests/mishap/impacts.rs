@@ -14,7 +14,7 @@ fn a_quad_that_lies_on_its_back_has_crashed_whatever_its_estimator_says() {
             (quad.height, quad.throttle) = (3.0 - ms as f32 / 100.0, 0.4);
         }
     });
-    assert_eq!(outcome.told(), ["impact"]);
+    assert_eq!(outcome.told(), ["impact", "overturned"]);
     assert_eq!(outcome.flights(), (1, 0, 1), "{:?}", outcome.changes);
 }
 

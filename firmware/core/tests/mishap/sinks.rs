@@ -115,3 +115,21 @@ fn a_multicopter_that_loses_height_with_all_its_thrust_sinks_though_it_sinks_slo
         assert!(told_to.told().is_empty(), "{of:?}");
     }
 }
+
+/// It stands in the air, its barometer says so, and the estimator falls.
+fn falls_by_estimate(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    motion.pressure_hpa = Some(980.0 + (ms / 100 % 5) as f32 * 0.01);
+    quad.climb = if (3_000..8_000).contains(&ms) { -12.0 } else { 0.0 };
+}
+
+#[test]
+fn an_estimator_that_believes_itself_makes_no_mishap_against_the_air() {
+    for of in ROTORS {
+        assert!(fly(&hovering(of), falls_by_estimate).told().is_empty(), "{of:?}");
+        let stuck = fly(&hovering(of), |ms, quad, motion| {
+            falls_by_estimate(ms, quad, motion);
+            motion.pressure_hpa = Some(980.0);
+        });
+        assert_eq!(stuck.told(), ["sinking"], "{of:?}: a barometer that never changes says nothing");
+    }
+}

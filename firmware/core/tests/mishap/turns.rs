@@ -76,13 +76,16 @@ fn on_the_bench_it_is_an_event_for_each_arming_and_not_told() {
 
 #[test]
 fn a_multicopter_whose_top_looks_down_is_told_but_not_in_modes_made_for_it() {
-    let overturned: Script = |ms, quad, _| {
+    let overturned: Script = |ms, quad, motion| {
         if ms < 1_500 {
-            quad.roll = 2.5;
+            (quad.roll, motion.rates) = (2.5, [3.0, 0.5, 0.0]);
         }
     };
     for of in ROTORS {
-        assert_eq!(fly(&hovering(of), overturned).told(), ["tumbling"], "{of:?}");
+        let outcome = fly(&hovering(of), overturned);
+        assert_eq!(outcome.told(), ["overturned"], "{of:?}");
+        let finding = outcome.findings.iter().find(|finding| finding.check == "overturned").unwrap();
+        assert!((finding.value - 143.2).abs() < 1.0, "{finding:?}: its tilt");
         let mode = if of.0 == Autopilot::Px4 { 0x0005_0000 } else { 1 };
         let kind = of.1;
         if kind == VehicleKind::Rotorcraft {
@@ -91,5 +94,47 @@ fn a_multicopter_whose_top_looks_down_is_told_but_not_in_modes_made_for_it() {
     }
     for of in WINGS {
         assert!(fly(&on_wings(of), overturned).told().is_empty(), "{of:?}: a roll");
+    }
+}
+
+/// Stands level and still, and its estimator turns over by 7 degrees a second.
+fn drifts(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    let drifted = 0.122 * ms as f32 / 1_000.0;
+    (quad.roll, motion.rates) = (drifted % core::f32::consts::PI, [0.122, 0.02, 0.0]);
+}
+
+#[test]
+fn an_attitude_that_the_sensors_contradict_is_none() {
+    for of in ROTORS {
+        let outcome = fly(&hovering(of), drifts);
+        let attitude: Vec<_> =
+            outcome.findings.iter().filter(|of| matches!(of.check, "roll" | "pitch")).collect();
+        assert!(outcome.told().is_empty() && attitude.is_empty(), "{of:?}: {:?}", outcome.findings);
+    }
+}
+
+/// Armed on the ground with throttle; its motors turn it over by its side in half a second, and it lies there.
+fn flips(quad: &mut Quad, motion: &mut Motion, ms: u64, throttle: f32) {
+    (quad.throttle, quad.height) = (if ms < 1_500 { throttle } else { 0.0 }, 0.0);
+    quad.armed = ms < 4_000;
+    if ms < 500 {
+        (quad.roll, motion.rates) = (2.0 * ms as f32 / 500.0, [4.5, 0.0, 0.0]);
+    } else {
+        // What the estimator makes of it is another thing.
+        (quad.roll, motion.rates, motion.load_g) = (0.3, [0.0; 3], -0.9);
+    }
+}
+
+#[test]
+fn what_its_own_rotors_turn_over_is_told_though_it_never_flew_and_what_a_hand_turns_over_is_not() {
+    let stands =
+        |of| Quad { landed: Some(LandedState::OnGround), height: 0.0, throttle: 0.0, ..hovering(of) };
+    for of in ROTORS {
+        let outcome = fly(&stands(of), |ms, quad, motion| flips(quad, motion, ms, 0.4));
+        assert_eq!(outcome.told(), ["overturned"], "{of:?}: {:?}", outcome.changes);
+        assert!(matches!(outcome.changes[..], [(_, Change::Began(_)), (_, Change::Down)]), "{of:?}");
+        assert_eq!(outcome.flights(), (0, 0, 0), "{of:?}: it never flew");
+        let by_hand = fly(&stands(of), |ms, quad, motion| flips(quad, motion, ms, 0.0));
+        assert!(by_hand.told().is_empty(), "{of:?}: {:?}", by_hand.findings);
     }
 }

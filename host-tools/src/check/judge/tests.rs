@@ -209,7 +209,7 @@ fn a_second_power_on_in_one_recording_is_a_restart_only_where_the_vehicle_was_ar
             boot(&mut judge, 60_000 + u64::from(second) * 1_000, 5_000 + second * 1_000, true);
         }
         let judged = judge.end();
-        let told = judged.problems.iter().any(|problem| problem.check == RESTARTED);
+        let told = judged.problems.iter().any(|problem| problem.check == "autopilot_reboot");
         assert_eq!(told, armed, "{:?}", judged.problems);
     }
 }

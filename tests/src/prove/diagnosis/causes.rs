@@ -57,11 +57,15 @@ pub(super) const CLASSES: &[Class] = &[
     Class { name: "barometer", about: "barometers", checks: &[] },
     Class { name: "inertial", about: "accelerometers, gyros, airspeed", checks: &[] },
     Class { name: "vibration", about: "vibration", checks: &["vibration", "vibration_px4", "clipping"] },
-    Class { name: "attitude", about: "loss of attitude", checks: &["roll", "pitch", "tumbling"] },
+    Class {
+        name: "attitude",
+        about: "loss of attitude",
+        checks: &["roll", "pitch", "tumbling", "overturned"],
+    },
     Class {
         name: "crash",
         about: "disarmed in the air, falls, impacts",
-        checks: &["free_fall", "impact", "tumbling", "disarmed_in_air", "sinking"],
+        checks: &["free_fall", "impact", "tumbling", "disarmed_in_air", "sinking", "overturned"],
     },
     Class { name: "link", about: "links of the autopilot", checks: &["heartbeat", "frames_lost"] },
     Class { name: "rc", about: "remote control", checks: &["rc_rssi"] },

@@ -139,7 +139,10 @@ fn arm(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
 fn event(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let Some(number) = given.byte(0) else { return };
     match number {
-        10 => state.arm(true),
+        10 => {
+            state.arm_again(given.at);
+            state.arm(true);
+        }
         11 => state.arm(false),
         15 => state.arming.tell(true),
         18 => state.land(),

@@ -116,10 +116,27 @@ pub(in crate::source::dataflash) struct State {
     pub(super) messages_lost: Option<u64>,
     /// When UTC was said last.
     pub(super) utc_said: Option<Instant>,
+    /// When the event of arming came last.
+    armed_at: Option<Instant>,
+    rearms: Rearms,
     said_at: Option<Instant>,
     said: Option<Heartbeat>,
     word_said: Option<Word>,
     failsafes_said: u64,
+}
+
+/// How long it is said to be disarmed then: longer than what follows a gap and is not judged.
+const REARMS: Span = Span::from_millis(1_600);
+
+/// Whether it is said to be disarmed though it is armed again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Rearms {
+    #[default]
+    No,
+    /// From the next message on.
+    Begins,
+    /// Since then.
+    Since(Instant),
 }
 
 /// What messages of arming and of leaving the ground change.
@@ -201,6 +218,18 @@ impl State {
         }
     }
 
+    /// The event of arming comes while it is armed, long after the last one: nobody logged the disarming in between, and the vehicle
+    /// is said to be disarmed for a moment.
+    pub(super) fn arm_again(&mut self, at: Instant) {
+        /// Newer logs tell one arming by several messages.
+        const ONE_ARMING: Span = Span::from_secs(2);
+        let before = self.armed_at.replace(at);
+        if self.is_armed() && before.is_some_and(|before| at.since(before) > ONE_ARMING) {
+            self.rearms = Rearms::Begins;
+            self.landed = if self.tells_landing() { LandedState::OnGround } else { self.landed };
+        }
+    }
+
     /// The vehicle is armed or disarmed, as a message says. A copter tells by an event when it leaves the ground, so it
     /// stands until then.
     pub(super) fn arm(&mut self, armed: bool) {
@@ -278,6 +307,11 @@ impl State {
         if std::mem::replace(&mut self.failsafes_said, self.failsafes) != self.failsafes {
             out.say(&Say::Failsafes(&words::failsafes(self.failsafes)));
         }
+        self.rearms = match self.rearms {
+            Rearms::Begins => Rearms::Since(now),
+            Rearms::Since(since) if now.since(since) >= REARMS => Rearms::No,
+            same => same,
+        };
         let Some(heartbeat) = self.heartbeat() else { return };
         let due = self.said_at.is_none_or(|at| now.since(at) >= SAID_EVERY);
         if !due && self.said == Some(heartbeat) {
@@ -308,7 +342,7 @@ impl State {
         const ACTIVE: u8 = 4;
         const CRITICAL: u8 = 5;
         let (kind, type_number) = self.kind()?;
-        let armed = self.is_armed();
+        let armed = self.is_armed() && self.rearms == Rearms::No;
         let stands = self.landed == LandedState::OnGround || !armed;
         let state = match (self.failsafes, stands) {
             (1.., _) => CRITICAL,

@@ -1,0 +1,227 @@
+//! What accelerometer and gyros say by themselves, without an estimator: whether the vehicle is level and still, and whether it
+//! lies on its side or its back.
+//!
+//! An estimator that is fed by a gyro with an offset turns its attitude over while the vehicle stands. What really turns over turns
+//! fast, and what flies at a great tilt is carried with more than its weight, or falls. So an attitude far from level is contradicted
+//! where the force has been that of a level vehicle at rest for [`LASTS`], and nothing turned; and it is so until both agree again.
+//!
+//! Motors that run shake a vehicle. How far the force steps from sample to sample is compared with what it did at rest.
+//!
+//! Forces are smoothed ([`SMOOTHING_S`]), because motors shake a vehicle that stands. Where the messages do not have both force and
+//! rates, nothing is said.
+
+use crate::observation::Imu;
+use crate::time::{Instant, Span};
+use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond};
+
+/// Time constant of the force.
+const SMOOTHING_S: f32 = 0.3;
+/// It has been level and still for so long.
+const LASTS: Span = Span::from_millis(1_500);
+/// Older samples say nothing.
+const FRESH: Span = Span::from_secs(1);
+/// What turns faster than this, rad/s (40 degrees a second), turns fast; what turns slower than that on the average, rad/s (29
+/// degrees a second: more than the offset of a gyro that still flies), is still.
+const TURNS_RATE: f32 = 0.7;
+const STILL_RATE: f32 = 0.5;
+/// A rate that stays within the first of these, rad/s, and below the second, is an offset: nothing turns so steadily and is carried as
+/// at rest.
+const STEADY_RATE: f32 = 0.15;
+const OFFSET_RATE: f32 = 1.2;
+/// 45 degrees: an attitude beyond is contradicted by what is level. It is believed again within 20 degrees.
+const TILTED_RAD: f32 = 0.785;
+const AGREES_RAD: f32 = 0.35;
+const TILTED: Span = Span::from_millis(500);
+/// The weight of what is at rest, in units of gravity, with the scale error and the offset of a sensor.
+const REST_G: core::ops::Range<f32> = 0.75..1.25;
+/// The cosines of 30 degrees, within which a vehicle is level, and of 60, beyond which it lies over.
+const LEVEL: f32 = 0.866;
+const OVER: f32 = 0.5;
+/// Time constant of the steps from sample to sample.
+const SHAKES_S: f32 = 0.5;
+/// They are known so long after the first.
+const STEPS_KNOWN: Span = Span::from_secs(2);
+/// Motors that carry a vehicle make the steps so many times those at rest, and by more than a sensor's noise changes, m/s2.
+const SHAKES: f32 = 2.5;
+const SHAKES_MPS2: f32 = 0.01;
+/// It lies over for so long before that is believed.
+const LIES: Span = Span::from_millis(700);
+
+/// What accelerometer and gyros say.
+#[derive(Clone, Copy, Debug)]
+pub struct Inertial {
+    /// Specific force, smoothed, m/s2.
+    force: [f32; 3],
+    /// The last sample's, along the body's axis downwards, and how far it steps from sample to sample, smoothed; m/s2.
+    down: f32,
+    step: f32,
+    steps_since: Instant,
+    /// The least that it stepped at rest; 0 where that is not known.
+    step_at_rest: f32,
+    at: Option<Instant>,
+    /// Rates, smoothed, rad/s.
+    rate: [f32; 3],
+    rates_at: Option<Instant>,
+    still: bool,
+    /// When it turned fast last.
+    turned_at: Option<Instant>,
+    /// The estimator's attitude is another one than that of the sensors; and since when it has been far from level.
+    contradicts: bool,
+    tilted_since: Option<Instant>,
+    level_since: Option<Instant>,
+    over_since: Option<Instant>,
+}
+
+impl Inertial {
+    /// Nothing known.
+    pub(crate) const fn new() -> Self {
+        Self {
+            force: [0.0; 3],
+            down: 0.0,
+            step: 0.0,
+            steps_since: Instant::ZERO,
+            step_at_rest: 0.0,
+            at: None,
+            rate: [0.0; 3],
+            rates_at: None,
+            still: false,
+            turned_at: None,
+            contradicts: false,
+            tilted_since: None,
+            level_since: None,
+            over_since: None,
+        }
+    }
+
+    /// A sample of the first sensor.
+    pub(crate) fn take(&mut self, at: Instant, imu: &Imu) {
+        self.take_rates(at, imu.rate);
+        if let Some(rates) = imu.rate {
+            let weight = weight(self.rates_at, at, SMOOTHING_S);
+            let (mut square, mut apart) = (0.0, 0.0);
+            for (smooth, axis) in self.rate.iter_mut().zip(rates) {
+                let off = axis.0 - *smooth;
+                *smooth += weight * off;
+                (square, apart) = (square + *smooth * *smooth, apart + off * off);
+            }
+            self.still = square < STILL_RATE * STILL_RATE
+                || (square < OFFSET_RATE * OFFSET_RATE && apart < STEADY_RATE * STEADY_RATE);
+            if !self.rate.iter().all(|axis| axis.is_finite()) {
+                self.rate = [0.0; 3];
+            }
+            self.rates_at = Some(at);
+        }
+        if let Some(force) = imu.acceleration {
+            self.take_force(at, force.map(|MetresPerSecond2(axis)| axis));
+        }
+    }
+
+    /// Body rates, of the sensor or of the estimator.
+    pub(crate) fn take_rates(&mut self, at: Instant, rates: Option<[RadiansPerSecond; 3]>) {
+        // No root: this is done with each inertial sample.
+        let square = |rates: [RadiansPerSecond; 3]| rates.iter().map(|rate| rate.0 * rate.0).sum::<f32>();
+        if rates.is_some_and(|rates| square(rates) > TURNS_RATE * TURNS_RATE) {
+            self.turned_at = Some(at);
+        }
+    }
+
+    fn take_force(&mut self, at: Instant, force: [f32; 3]) {
+        let step_s = self.at.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
+        if step_s == 0.0 {
+            return;
+        }
+        let weight = weight(self.at, at, SMOOTHING_S);
+        self.at = Some(at);
+        for (smooth, axis) in self.force.iter_mut().zip(force) {
+            *smooth += weight * (axis - *smooth);
+        }
+        self.take_step(at, step_s, force[2]);
+        if !self.force.iter().all(|axis| axis.is_finite()) {
+            (self.force, self.at) = ([0.0; 3], None);
+        }
+        let [x, y, z] = self.force;
+        let square = x * x + y * y + z * z;
+        let rests =
+            (REST_G.start * REST_G.start..REST_G.end * REST_G.end).contains(&(square / (GRAVITY * GRAVITY)));
+        // No root: squares of cosines, with the sign of z, which is negative in what is upright.
+        let level = rests && self.still && z < 0.0 && z * z > LEVEL * LEVEL * square;
+        let over = rests && (z > 0.0 || z * z < OVER * OVER * square);
+        self.level_since = level.then(|| self.level_since.unwrap_or(at));
+        self.over_since = over.then(|| self.over_since.unwrap_or(at));
+    }
+
+    fn take_step(&mut self, at: Instant, step_s: f32, down: f32) {
+        let step = libm::fabsf(down - core::mem::replace(&mut self.down, down));
+        if step_s < 1.0 && step.is_finite() {
+            self.step += step_s / (SHAKES_S + step_s) * (step - self.step);
+        } else {
+            (self.step, self.steps_since) = (0.0, at);
+        }
+    }
+
+    /// Whether the steps are known for long enough.
+    fn has_steps(&self, now: Instant) -> bool {
+        self.at.is_some_and(|at| now.since(at) <= FRESH && at.since(self.steps_since) >= STEPS_KNOWN)
+    }
+
+    /// It is at rest: without thrust, on the ground.
+    pub(crate) fn rest(&mut self, now: Instant) {
+        if self.has_steps(now) && (self.step_at_rest == 0.0 || self.step < self.step_at_rest) {
+            self.step_at_rest = self.step;
+        }
+    }
+
+    /// Whether it shakes more than it did at rest; `None` where one of the two is not known.
+    pub(crate) fn shakes(&self, now: Instant) -> Option<bool> {
+        let known = self.has_steps(now) && self.step_at_rest > 0.0;
+        known.then_some(self.step > SHAKES * self.step_at_rest + SHAKES_MPS2)
+    }
+
+    fn is_fresh(&self, now: Instant) -> bool {
+        let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= FRESH);
+        fresh(self.at) && fresh(self.rates_at)
+    }
+
+    /// Whether it has not turned fast for so long.
+    pub(crate) fn turns_little(&self, now: Instant, span: Span) -> bool {
+        self.turned_at.is_none_or(|at| now.since(at) > span)
+    }
+
+    /// Whether it has been level and still for a while, whatever an estimator says.
+    pub(crate) fn is_level(&self, now: Instant) -> bool {
+        self.is_level_for(now, LASTS)
+    }
+
+    /// Whether it has been level and still for so long.
+    pub(crate) fn is_level_for(&self, now: Instant, span: Span) -> bool {
+        self.is_fresh(now) && self.level_since.is_some_and(|since| now.since(since) >= span)
+    }
+
+    /// The estimator's attitude.
+    pub(crate) fn take_attitude(&mut self, at: Instant, roll: Radians, pitch: Radians) {
+        let tilt = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
+        self.tilted_since = (tilt > TILTED_RAD).then(|| self.tilted_since.unwrap_or(at));
+        let tilted = self.tilted_since.is_some_and(|since| at.since(since) >= TILTED);
+        if (tilted || tilt < AGREES_RAD) && self.is_level(at) {
+            self.contradicts = tilted;
+        }
+    }
+
+    /// Whether the estimator's attitude is not that of the vehicle.
+    pub(crate) fn contradicts(&self, now: Instant) -> bool {
+        self.contradicts && self.is_fresh(now)
+    }
+
+    /// How far it lies over, in radians, once it has lain so for a moment: by the force that carries it.
+    pub(crate) fn lies_over(&self, now: Instant) -> Option<f32> {
+        let lasts = self.is_fresh(now) && self.over_since.is_some_and(|since| now.since(since) >= LIES);
+        let [x, y, z] = self.force;
+        lasts.then(|| libm::atan2f(libm::sqrtf(x * x + y * y), -z))
+    }
+}
+
+/// How much a sample counts.
+fn weight(before: Option<Instant>, at: Instant, constant_s: f32) -> f32 {
+    let step_s = before.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
+    if step_s < 1.0 { step_s / (constant_s + step_s) } else { 1.0 }
+}
