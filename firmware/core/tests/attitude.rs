@@ -15,6 +15,11 @@ const NOTHING: [&str; 0] = [];
 
 /// A minute in which it banks from 20 s on; `wanted` is the roll that the autopilot wants then, where it says so.
 fn banks(vehicle: &Quad, wanted: Option<f32>) -> Vec<&'static str> {
+    banks_and_wants(vehicle, |turns, _| wanted.map(|roll| if turns { roll } else { 0.0 }))
+}
+
+/// The same; `wanted` gets whether it banks, and its roll.
+fn banks_and_wants(vehicle: &Quad, wanted: impl Fn(bool, f32) -> Option<f32>) -> Vec<&'static str> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
     for now_ms in (0..60_000).step_by(100) {
@@ -24,12 +29,12 @@ fn banks(vehicle: &Quad, wanted: Option<f32>) -> Vec<&'static str> {
         if turns {
             quad.roll = BANK;
         }
+        if let Some(roll) = wanted(turns, quad.roll) {
+            let wanted = Wanted { roll: Radians(roll), ..Wanted::default() };
+            monitor.observe(now, AUTOPILOT, &Observation::Wanted(wanted));
+        }
         for said in quad.says(now_ms) {
             monitor.observe(now, AUTOPILOT, &said);
-        }
-        if let Some(roll) = wanted {
-            let roll = Radians(if turns { roll } else { 0.0 });
-            monitor.observe(now, AUTOPILOT, &Observation::Wanted(Wanted { roll, ..Wanted::default() }));
         }
         for step in [0, 50] {
             let now = Instant::from_millis(now_ms + step);
@@ -65,6 +70,14 @@ fn a_bank_that_is_wanted_is_none_and_one_that_nobody_asked_for_is_found() {
         assert_eq!(banks(&quad, Some(0.1)), ["roll"], "{autopilot:?} {mode:x}: not wanted");
         assert_eq!(banks(&quad, Some(-BANK)), ["roll"], "{autopilot:?} {mode:x}: the other way");
         assert_eq!(banks(&quad, None), ["roll"], "{autopilot:?} {mode:x}: nobody says what is wanted");
+    }
+}
+
+#[test]
+fn what_is_wanted_and_is_the_attitude_itself_at_each_sample_is_no_command() {
+    for (autopilot, mode) in ANGLES {
+        let copied = banks_and_wants(&quad(autopilot, mode), |_, roll| Some(roll + 0.002));
+        assert_eq!(copied, ["roll"], "{autopilot:?} {mode:x}");
     }
 }
 

@@ -251,6 +251,9 @@ fn push(
 
 #[cfg(test)]
 mod tests {
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+    use hums_link::packet::Packet;
+
     use super::*;
     use crate::mavlink::frame::tests::HEARTBEAT;
 
@@ -296,5 +299,31 @@ mod tests {
         assert_eq!(told(&set), (vec![], 1, 99 + 99));
         let silent: Vec<u64> = (1_000..1_100).chain(1_500..1_600).collect();
         assert_eq!(told(&silent), (vec![], 0, 599));
+    }
+
+    /// The times, in milliseconds, of attitudes that tell these times since the autopilot's boot, and how often it restarted.
+    fn read(component: u8, boot_ms: &[u32]) -> (Vec<u64>, usize) {
+        let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
+        let frame = |boot_ms: &u32| encoder.frame(&mut buffer, &Packet::new(30).u32(0, *boot_ms)).to_vec();
+        let bytes: Vec<u8> = boot_ms.iter().flat_map(frame).collect();
+        let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
+        let (mut times, mut restarts) = (Vec::new(), 0);
+        let want = Want { frames: true, ..Want::default() };
+        let mut take = |at: Instant, item: Item<'_>| {
+            times.extend(matches!(item, Item::Frame(_)).then(|| at.as_millis()));
+            restarts += usize::from(matches!(item, Item::Restart));
+            Ok(())
+        };
+        reader.read(want, &mut take).expect("memory");
+        (times, restarts)
+    }
+
+    #[test]
+    fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_line_brings_them() {
+        let (times, restarts) = read(1, &[60_000, 61_000, 75_500, 75_400, 900, 1_900]);
+        let since_first: Vec<u64> = times.iter().map(|at| at - times[0]).collect();
+        assert_eq!((since_first, restarts), (vec![0, 1_000, 15_500, 15_500, 15_500, 16_500], 1));
+        let (times, restarts) = read(100, &[60_000, 61_000, 75_500]);
+        assert!(times.len() == 3 && times[2] < 20 && restarts == 0, "no autopilot says so: {times:?}");
     }
 }

@@ -215,6 +215,22 @@ fn a_second_power_on_in_one_recording_is_a_restart_only_where_the_vehicle_was_ar
 }
 
 #[test]
+fn another_power_on_in_an_autopilots_own_log_ends_the_flight_of_before_and_a_ground_stations_clock_does_not()
+{
+    for (format, flights) in [(Format::DataFlash, 2), (Format::Ulog, 2), (Format::Tlog, 1), (Format::Hums, 1)]
+    {
+        let mut judge = Judge::new(&Limits::default(), format);
+        half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+        half_seconds(&mut judge, 5_000, 40_000, true, LandedState::InAir);
+        judge.item(Instant::from_millis(40_000), Item::Restart);
+        half_seconds(&mut judge, 40_000, 80_000, true, LandedState::InAir);
+        let judged = judge.end();
+        assert_eq!(judged.flights.len(), flights, "{format:?}: {:?}", judged.flights);
+        assert!(judged.flights.iter().all(|flight| !flight.landed), "{format:?}: {:?}", judged.flights);
+    }
+}
+
+#[test]
 fn trends_over_flights_are_not_judged_from_one_recording() {
     for format in [Format::DataFlash, Format::Tlog, Format::Hums] {
         let stored = VOCABULARY.iter().filter(|words| words.scope == Scope::Stored);

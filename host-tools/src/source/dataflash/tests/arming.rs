@@ -54,6 +54,17 @@ fn arming_right_after_a_pause_of_the_logger_does_not_count_as_of_before_it() {
 }
 
 #[test]
+fn a_second_arming_after_a_pause_means_that_it_was_disarmed_in_between() {
+    let mut log = copter(0.0);
+    event(&mut log, 2, 10);
+    log.attitudes(2..20);
+    // Nobody logged the disarming.
+    event(&mut log, 200, 10);
+    log.attitudes(200..210);
+    assert_eq!(changes(&seen(&log.bytes)), [(1, false), (2, true), (200, false), (202, true)]);
+}
+
+#[test]
 fn arming_without_a_time_counts_from_the_next_time_on() {
     let log = "ArduCopter V3.1.1 (681dafcf)\n\
         FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
