@@ -56,7 +56,16 @@ impl JsonList {
 
     /// Prints the end of the list and of the object.
     pub fn end(self) -> Result<()> {
-        raw_line(if self.empty { "]\n}" } else { "\n  ]\n}" })
+        raw_line(&format!("{}\n}}", self.end_of_list()))
+    }
+
+    /// Prints the end of the list, a last member, which is known only now, and the end of the object.
+    pub fn end_with(self, name: &str, value: &impl Serialize) -> Result<()> {
+        raw_line(&format!("{},\n  \"{name}\": {}\n}}", self.end_of_list(), indented(value, "  ")?))
+    }
+
+    fn end_of_list(&self) -> &'static str {
+        if self.empty { "]" } else { "\n  ]" }
     }
 }
 

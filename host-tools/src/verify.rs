@@ -5,10 +5,10 @@ use hums_blackbox::Cause;
 use serde::Serialize;
 
 use crate::cli;
-use crate::decode::side_by_side::side_by_side;
 use crate::ending::{BlocksJson, EndJson, SessionBefore, behind_words};
 use crate::followed::Followed;
-use crate::info::json::{ImageJson, images_json};
+use crate::info::json::images_json;
+use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, find::Image};
 use crate::outcome::Outcome;
 use crate::output;
@@ -23,41 +23,42 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     for remark in &found.remarks {
         note!("{remark}");
     }
-    let mut json = VerifyJson { ok: !found.is_cut(), images: images_json(&found.images), logs: Vec::new() };
+    let (mut ok, mut logs) = (!found.is_cut(), 0_u64);
+    // The list is printed as it is made: a folder may have ten thousand logs.
+    let begin = || output::JsonList::begin("images", &images_json(&found.images), "logs");
+    let mut list = args.json.then(begin).transpose()?;
     for image in &found.images {
         let check = file_system(image);
-        json.ok &= check.failed == 0;
+        ok &= check.failed == 0;
         if !args.json {
             output::line(&format!("Card {}", path(&image.path)))?;
             print(&[check])?;
             image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
         }
     }
-    let logs = found.logs.iter().map(|log| (log.name.as_str(), log));
-    let mut followed = Followed::new(Sessions::of(logs));
-    let (mut worst, mut copies) = (Verdict::Holds, 0);
+    let named = found.logs.iter().map(|log| (log.name.as_str(), log));
+    let mut followed = Followed::new(Sessions::of(named));
+    let mut worst = Verdict::Holds;
     let mut done = |overview: &Overview| {
         let log = LogJson::new(overview);
-        json.ok &= log.ok;
+        ok &= log.ok;
         worst = worst.max(log.verdict);
-        copies += usize::from(overview.ending.copy_of().is_some());
-        if !args.json {
-            let files = overview.ending.files.join(", ");
-            output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
-            print(&log.checks)?;
+        logs += u64::from(overview.ending.copy_of().is_none());
+        if let Some(list) = &mut list {
+            return list.element(&log);
         }
-        json.logs.push(log);
-        Ok(())
+        let files = overview.ending.files.join(", ");
+        output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
+        print(&log.checks)
     };
     side_by_side(&found.logs, Overview::verified, |overview| {
         followed.push(overview?).iter().try_for_each(&mut done)
     })?;
     followed.finish().try_for_each(|overview| done(&overview))?;
-    let ok = json.ok;
-    if args.json {
-        output::json(&json)?;
+    if let Some(list) = list {
+        list.end_with("ok", &ok)?;
     } else {
-        let logs = count(json.logs.len() - copies, "session");
+        let logs = count(logs, "session");
         let worst = if ok { worst } else { Verdict::NotProved };
         output::line(&format!("{logs}: {}", worst.words()))?;
     }
@@ -101,13 +102,6 @@ fn print(checks: &[Check]) -> Result<()> {
         ))?;
     }
     Ok(())
-}
-
-#[derive(Debug, Serialize)]
-struct VerifyJson {
-    ok: bool,
-    images: Vec<ImageJson>,
-    logs: Vec<LogJson>,
 }
 
 #[derive(Debug, Serialize)]

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use hums_dialect::crc;
 use hums_tests::child;
 use hums_tests::flights::{own, root};
 use hums_tests::oracle;
@@ -22,6 +23,16 @@ fn cards(dir: &Path) {
         let image = dir.join("cards").join(format!("{card}.img"));
         child::run(sim.arg(own(flight)).arg("--sd").arg(image), LIMIT).expect_code(&[0]);
     }
+    // Recorders that check nothing: a packed recording, and one of which nobody can tell the vehicle.
+    let packed = dir.join("cards/packed.hum");
+    hums(["pack".as_ref(), own("ap_quad_faults.tlog").as_os_str(), "-o".as_ref(), packed.as_os_str()])
+        .expect_code(&[0]);
+    let (raw, silent) = (dir.join("silent.raw"), dir.join("cards/silent.hum"));
+    // A SYSTEM_TIME and no heartbeat.
+    let frame = [0xfe, 12, 0, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0];
+    let crc = crc::step(crc::update(crc::START, &frame[1..]), 137);
+    fs::write(&raw, [&frame[..], &crc.to_le_bytes()].concat().repeat(100)).unwrap();
+    hums(["pack".as_ref(), raw.as_os_str(), "-o".as_ref(), silent.as_os_str()]).expect_code(&[0]);
 }
 
 /// The rows of the query under a heading, as objects.
@@ -54,13 +65,14 @@ fn the_documents_queries_answer_what_the_cards_say() {
     let info = hums(["info".as_ref(), "--json".as_ref(), cards.as_os_str()]).expect_code(&[0]).text();
     let info: Value = serde_json::from_str(&info).unwrap();
     let logs = info["logs"].as_array().unwrap();
-    assert_eq!(logs.len(), 3, "three sessions on two cards");
+    assert_eq!(logs.len(), 5, "three sessions on two cards, and two packed recordings");
+    let on_board = || logs.iter().filter(|log| log["checked_by"] == "board");
 
     let results = oracle::fleet(&root().join("docs/fleet.md"), dir.path());
     let hours = rows(&results, "Hours per motor");
     let sum: f64 =
         hours.iter().filter(|row| row["motor"] == 1).map(|row| row["hours"].as_f64().unwrap()).sum();
-    let expected: f64 = logs.iter().map(|log| log["usage"]["motor0_run_time_s"].as_f64().unwrap()).sum();
+    let expected: f64 = on_board().map(|log| log["usage"]["motor0_run_time_s"].as_f64().unwrap()).sum();
     assert!((sum * 3600.0 - expected).abs() < 1.0, "motor 1 ran {sum} h, by info {expected} s");
     assert!(expected > 600.0, "{expected} s");
 
@@ -70,7 +82,7 @@ fn the_documents_queries_answer_what_the_cards_say() {
 
     let ageing = rows(&results, "Battery ageing");
     // The PX4 flight's battery does not measure its current.
-    assert_eq!(ageing.len(), 2, "a row for each session whose battery measures its current: {ageing:?}");
+    assert_eq!(ageing.len(), 3, "a row for each session whose battery measures its current: {ageing:?}");
 
     let attention = rows(&results, "What needs attention");
     let worrying = |log: &&Value| {
@@ -79,6 +91,10 @@ fn the_documents_queries_answer_what_the_cards_say() {
     };
     let expected: usize = logs.iter().map(|log| worrying(&log)).sum();
     assert!(expected > 0 && attention.len() == expected, "{expected}: {attention:?}");
+    let by = |by: &str| attention.iter().filter(|row| row["checked_by"] == by).count();
+    assert!(by("board") > 0 && by("hums") > 0 && by("nobody") == 0, "{attention:?}");
+
+    assert_all_are_told(&results, logs);
 
     // What the other document shows in Python reads the same rows.
     let printed = oracle::snippets(&root().join("docs/decode.md"), dir.path());
@@ -97,10 +113,40 @@ fn the_documents_queries_answer_what_the_cards_say() {
         "{expected}: {}",
         printed[0]
     );
-    assert_eq!(printed[1].matches("('").count(), 3, "a row for each session: {}", printed[1]);
+    assert_eq!(printed[1].matches("('").count(), 4, "a row for each session with attitudes: {}", printed[1]);
 
     let recorders = rows(&results, "How the recorders did");
     let frames: u64 = recorders.iter().map(|row| row["frames_in"].as_u64().unwrap()).sum();
-    let expected: u64 = logs.iter().map(|log| log["frames"].as_u64().unwrap()).sum();
+    let expected: u64 = on_board().map(|log| log["frames"].as_u64().unwrap()).sum();
     assert_eq!(frames, expected);
+}
+
+/// No session is passed over in silence.
+#[track_caller]
+fn assert_all_are_told(results: &Value, logs: &[Value]) {
+    let mut checked: Vec<(String, String, u64)> = rows(results, "Who was checked").iter().map(told).collect();
+    let mut expected: Vec<(String, String, u64)> = logs
+        .iter()
+        .map(|log| {
+            (
+                format!("s{}", word(&log["session"])),
+                word(&log["checked_by"]),
+                log["findings_count"].as_u64().unwrap(),
+            )
+        })
+        .collect();
+    checked.sort_unstable();
+    expected.sort_unstable();
+    assert_eq!(checked, expected);
+    let by = |by: &str| checked.iter().filter(|(_, checked_by, _)| checked_by == by).count();
+    assert_eq!((by("board"), by("hums"), by("nobody")), (3, 1, 1));
+}
+
+fn word(value: &Value) -> String {
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+/// A session, who checked it, and how many findings there are.
+fn told(row: &Value) -> (String, String, u64) {
+    (word(&row["session"]), word(&row["checked_by"]), row["findings"].as_u64().unwrap())
 }

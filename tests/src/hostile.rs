@@ -122,6 +122,118 @@ pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
     log_path
 }
 
+/// A log of PX4's with more topics than it has, two joined: 2,000 tables of 30 columns each.
+pub fn wide_ulog(dir: &Path) -> PathBuf {
+    const TOPICS: u16 = 1_000;
+    const FIELDS: usize = 30;
+    let mut log = Vec::new();
+    let message = |log: &mut Vec<u8>, kind: u8, body: &[u8]| {
+        log.extend_from_slice(&u16::try_from(body.len()).unwrap().to_le_bytes());
+        log.push(kind);
+        log.extend_from_slice(body);
+    };
+    for part in 0..2 {
+        log.extend_from_slice(b"ULog\x01\x12\x35\x01");
+        log.extend_from_slice(&1_000_000_u64.to_le_bytes());
+        message(&mut log, b'B', &[0; 40]);
+        let name = |topic: u16| format!("topic_{part}{topic:04}");
+        for topic in 0..TOPICS {
+            let field = |field| format!("uint8_t f_{part}{topic:04}_{field};");
+            let fields = (0..FIELDS).map(field).collect::<Vec<_>>().concat();
+            message(&mut log, b'F', format!("{}:uint64_t timestamp;{fields}", name(topic)).as_bytes());
+        }
+        for topic in 0..TOPICS {
+            message(&mut log, b'A', &[&[0][..], &topic.to_le_bytes(), name(topic).as_bytes()].concat());
+        }
+        for row in 0..40_u64 {
+            for topic in 0..TOPICS {
+                let at = 1_000_000 + row * 100_000 + u64::from(topic);
+                let data = [&topic.to_le_bytes()[..], &at.to_le_bytes(), &[row as u8; FIELDS]].concat();
+                message(&mut log, b'D', &data);
+            }
+        }
+    }
+    let path = dir.join("wide.ulg");
+    fs::write(&path, log).unwrap();
+    path
+}
+
+/// A log of PX4's whose topics are arrays of so many bytes, each a column.
+pub fn long_arrays(dir: &Path) -> PathBuf {
+    let mut log = b"ULog\x01\x12\x35\x01".to_vec();
+    log.extend_from_slice(&1_000_000_u64.to_le_bytes());
+    let message = |log: &mut Vec<u8>, kind: u8, body: &[u8]| {
+        log.extend_from_slice(&u16::try_from(body.len()).unwrap().to_le_bytes());
+        log.push(kind);
+        log.extend_from_slice(body);
+    };
+    for (topic, length) in [(0_u16, 1_000_usize), (1, 30_000)] {
+        message(
+            &mut log,
+            b'F',
+            format!("array_{topic}:uint64_t timestamp;uint8_t[{length}] data;").as_bytes(),
+        );
+        message(
+            &mut log,
+            b'A',
+            &[&[0][..], &topic.to_le_bytes(), format!("array_{topic}").as_bytes()].concat(),
+        );
+        for row in 0..200_u64 {
+            let at = 1_000_000 + row * 1_000;
+            message(
+                &mut log,
+                b'D',
+                &[&topic.to_le_bytes()[..], &at.to_le_bytes(), &vec![7; length]].concat(),
+            );
+        }
+    }
+    let path = dir.join("arrays.ulg");
+    fs::write(&path, log).unwrap();
+    path
+}
+
+/// A log of `ArduPilot`'s that defines each of 64 messages sixteen times with other columns: as many tables as are kept.
+pub fn wide_dataflash(dir: &Path) -> PathBuf {
+    const COLUMNS: usize = 14;
+    let format = |kind: u8, bytes: usize, name: &str, format: &str, columns: &str| {
+        let mut message = vec![0xa3, 0x95, 128, kind, u8::try_from(bytes).unwrap()];
+        for (text, room) in [(name, 4), (format, 16), (columns, 64)] {
+            let mut text = text.as_bytes().to_vec();
+            text.resize(room, 0);
+            message.extend_from_slice(&text);
+        }
+        message
+    };
+    let mut log = format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns");
+    for version in 0..16_u8 {
+        for kind in 0..64_u8 {
+            let letter = char::from(b'A' + version);
+            let column = |column| format!(",{letter}{column:02}");
+            let columns = (0..COLUMNS).map(column).collect::<Vec<_>>().concat();
+            let bytes = 3 + 8 + COLUMNS;
+            let types = format!("Q{}", "B".repeat(COLUMNS));
+            log.extend_from_slice(&format(
+                130 + kind,
+                bytes,
+                &format!("T{kind:02}"),
+                &types,
+                &format!("TimeUS{columns}"),
+            ));
+        }
+        for row in 0..60_u64 {
+            for kind in 0..64_u8 {
+                let at = 1_000_000 + (u64::from(version) * 60 + row) * 10_000;
+                log.extend_from_slice(&[0xa3, 0x95, 130 + kind]);
+                log.extend_from_slice(&at.to_le_bytes());
+                log.extend_from_slice(&[row as u8; COLUMNS]);
+            }
+        }
+    }
+    let path = dir.join("wide.bin");
+    fs::write(&path, log).unwrap();
+    path
+}
+
 /// A card of 64 MiB with a short session on it.
 fn card(dir: &Path, name: &str) -> (PathBuf, File, Layout) {
     let (recording, image) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.img")));

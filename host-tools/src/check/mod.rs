@@ -22,9 +22,9 @@ pub(crate) use clock::SETTLE;
 pub use overview::overview;
 
 use crate::cli;
-use crate::decode::side_by_side::side_by_side;
 use crate::ending::Ending;
 use crate::followed::{Followed, Logged};
+use crate::logs::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::progress;

@@ -111,9 +111,14 @@ fn count(contents: &mut Contents, format: Format, summary: Summary) {
 /// What the monitor here makes of a recording.
 fn fill(contents: &mut Contents, judged: Judged) {
     let Judged { monitor, findings, findings_count, span, .. } = judged;
+    contents.vehicle = vehicle(&monitor);
+    contents.checked_here = contents.vehicle.is_some();
+    if !contents.checked_here {
+        // No autopilot was heard: counters that nobody counted would look as if somebody had.
+        return;
+    }
     contents.findings_count = findings_count;
     contents.findings = findings.into_iter().map(FindingLine::from).collect();
-    contents.vehicle = vehicle(&monitor);
     monitor.for_each_counter(|number, value| {
         contents.usage.insert(counter_name(number), value);
     });
@@ -127,7 +132,6 @@ fn fill(contents: &mut Contents, judged: Judged) {
             contents.exceedances.insert((exceedance.check.name.to_owned(), exceedance.instance), line);
         }
     }
-    contents.checked_here = contents.vehicle.is_some();
 }
 
 fn vehicle(monitor: &Monitor) -> Option<Vehicle> {

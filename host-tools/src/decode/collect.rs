@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use hums_blackbox::{Entry, Gap};
+use hums_blackbox::{Entry, Gap, Record};
 use hums_core::time::Instant;
 use hums_link::{self as link, Check, observe};
 
+use super::batches::Batches;
+use super::checked::OnBoard;
 use super::context::Context;
 use super::influx::Lines;
-use super::parquet::Batches;
 use super::record::{gap_row, rows};
 use super::reference::Observed;
 use super::row::Row;
@@ -46,6 +47,8 @@ pub struct Collected<'a> {
     pub frames: u64,
     /// Records written.
     pub records: u64,
+    /// Findings of the log's own monitor, wanted or not.
+    pub on_board: OnBoard,
     /// Bytes in `tables`, and what the tables themselves take.
     tables_bytes: usize,
 }
@@ -68,6 +71,7 @@ impl<'a> Collected<'a> {
             observed: Vec::new(),
             frames: 0,
             records: 0,
+            on_board: OnBoard::default(),
             tables_bytes: 0,
         }
     }
@@ -214,6 +218,9 @@ impl Collect for Collected<'_> {
     fn entry(&mut self, entry: &Entry<'_>) {
         let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = *entry;
         let wanted = self.context.selection.has_time(at, self.context.epoch_us);
+        if let Entry::Record { record: Record::Finding(finding), .. } = entry {
+            self.on_board.add(finding.level);
+        }
         match entry {
             Entry::Frame { bytes, verified, .. } => self.frame(at, bytes, *verified, wanted),
             Entry::Record { record, .. } if wanted => self.rows(at, &rows(record)),

@@ -7,15 +7,11 @@ use arrow_array::types::{
     ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type,
     UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{
-    Array, ArrayRef, BooleanArray, Float32Array, Float64Array, Int64Array, ListArray, PrimitiveArray,
-    StringArray, UInt64Array,
-};
+use arrow_array::{Array, ArrayRef, ListArray, PrimitiveArray};
 use arrow_buffer::OffsetBuffer;
 use arrow_schema::{DataType, Field};
 use hums_dialect::Kind;
 
-use super::row::{Cell, CellType};
 use crate::mavlink::values::{Scalar, Value};
 
 /// One field's values.
@@ -161,79 +157,4 @@ where
     let field = element_field(values.data_type().clone());
     let offsets = OffsetBuffer::from_lengths(std::iter::repeat_n(length, rows));
     Arc::new(ListArray::new(field, offsets, Arc::new(values), None))
-}
-
-/// The type of a column of the monitor's own tables. A column `value` holds quantities, whole ones too.
-pub fn cell_data_type(name: &str, cell: CellType) -> DataType {
-    match cell {
-        CellType::Count if name == "value" => DataType::Float64,
-        CellType::Count => DataType::UInt64,
-        CellType::Signed => DataType::Int64,
-        CellType::Single => DataType::Float32,
-        CellType::Double | CellType::Time => DataType::Float64,
-        CellType::Flag => DataType::Boolean,
-        CellType::Text | CellType::Hex => DataType::Utf8,
-    }
-}
-
-/// Cells as an array of this type; a cell that is not of it is null.
-pub fn cell_array<'a>(data_type: &DataType, cells: impl Iterator<Item = Option<&'a Cell>>) -> ArrayRef {
-    match data_type {
-        DataType::UInt64 => Arc::new(
-            cells
-                .map(|cell| match cell {
-                    Some(Cell::Count(value)) => Some(*value),
-                    _ => None,
-                })
-                .collect::<UInt64Array>(),
-        ),
-        DataType::Int64 => Arc::new(
-            cells
-                .map(|cell| match cell {
-                    Some(Cell::Signed(value)) => Some(*value),
-                    _ => None,
-                })
-                .collect::<Int64Array>(),
-        ),
-        DataType::Float32 => Arc::new(
-            cells
-                .map(|cell| match cell {
-                    Some(Cell::Single(value)) => Some(*value),
-                    _ => None,
-                })
-                .collect::<Float32Array>(),
-        ),
-        DataType::Float64 => Arc::new(
-            cells
-                .map(|cell| match cell {
-                    Some(Cell::Double(value)) => Some(*value),
-                    Some(Cell::Single(value)) => Some(f64::from(*value)),
-                    Some(Cell::Count(value)) => Some(*value as f64),
-                    Some(Cell::Time(at)) => Some(at.as_secs_f64()),
-                    _ => None,
-                })
-                .collect::<Float64Array>(),
-        ),
-        DataType::Boolean => Arc::new(
-            cells
-                .map(|cell| match cell {
-                    Some(Cell::Flag(value)) => Some(*value),
-                    _ => None,
-                })
-                .collect::<BooleanArray>(),
-        ),
-        _ => Arc::new(
-            cells
-                .map(|cell| match cell {
-                    Some(Cell::Text(text)) => Some(text.clone()),
-                    Some(cell @ Cell::Hex(_)) => {
-                        let mut hex = Vec::new();
-                        cell.push_csv(&mut hex);
-                        Some(String::from_utf8_lossy(&hex).into_owned())
-                    }
-                    _ => None,
-                })
-                .collect::<StringArray>(),
-        ),
-    }
 }

@@ -1,5 +1,6 @@
 //! What is asked for, and what all parts of a log's decoding need to know.
 
+use super::checked::Checked;
 use super::identity::Identity;
 use super::influx::Tags;
 use super::selection::Selection;
@@ -38,6 +39,11 @@ impl Formats {
         }
     }
 
+    /// Whether any of them has a place for records.
+    pub fn has_records(self) -> bool {
+        self.csv || self.jsonl || self.influx || self.parquet
+    }
+
     /// Whether a log becomes exactly one file.
     pub fn is_single_file(self) -> bool {
         let single = u8::from(self.tlog) + u8::from(self.jsonl) + u8::from(self.influx);
@@ -64,4 +70,6 @@ pub struct Context {
     pub of: Option<String>,
     /// What must not be written over.
     pub inputs: Inputs,
+    /// What this program found, where the recorder ran no checks.
+    pub checked: Option<Checked>,
 }

@@ -19,6 +19,9 @@
 //!
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with `thesis`.
 
+pub mod batches;
+mod cells;
+pub mod checked;
 pub mod collect;
 pub mod columns;
 pub mod context;
@@ -33,7 +36,6 @@ pub mod recorded;
 pub mod reference;
 pub mod row;
 pub mod selection;
-pub mod side_by_side;
 pub mod table;
 pub mod tables;
 pub mod text;
@@ -55,12 +57,14 @@ use crate::ending::Ending;
 use crate::files::{Folder, Inputs, appended, check_parent, says_directory};
 use crate::followed::{Followed, Logged};
 use crate::logs::reader::{self, Summary};
+use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
 use crate::plural::count;
 use crate::sessions::{Sessions, copy_words};
 use crate::source::recording::{Place, find, sessions_of};
 use crate::summary::damaged_places;
 use crate::{output, printable, progress};
+use checked::Checked;
 use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
@@ -68,7 +72,7 @@ use identity::Identity;
 use influx::Tags;
 use naming::Named;
 use selection::Selection;
-use side_by_side::side_by_side;
+
 use works::{Work, Works, check_forms};
 use write::Writers;
 
@@ -260,11 +264,13 @@ impl Task<'_> {
             context.epoch_us = epoch_us;
             read = self.read(log, name, &context, parquet.as_deref());
         }
-        let (summary, writers) = read?;
+        let (summary, mut writers) = read?;
         if writers.is_empty() && context.selection.has_limits() {
             remarks.push(nothing_of(log, &summary));
             return Ok(Done { remarks, ..Done::of(log) });
         }
+        let not_checked = writers.checked(summary.last)?;
+        remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
         let written = writers.finish()?;
         let mut outcome = Outcome::Done;
         let ending =
@@ -308,11 +314,16 @@ impl Task<'_> {
             ..Context::default()
         };
         let Some(log) = work.log.own() else {
-            context.identity = recorded::identity(work.log)?;
+            let judges = self.formats.has_records();
+            (context.identity, context.checked) = recorded::identity(work.log, judges)?;
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
             context.epoch_us = context.identity.epoch_us;
             return Ok(context);
         };
+        // A box's log begins with the record of its start, and its monitor checks.
+        if self.formats.has_records() && !work.traits.has_board() {
+            context.checked = Checked::of(work.log)?;
+        }
         context.epoch_us = if self.formats.influx || self.formats.parquet {
             context.identity = Identity::of(log)?;
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);

@@ -54,6 +54,11 @@ impl Traits {
         Ok(Self { session: groups.session(), board, fingerprint })
     }
 
+    /// Whether it begins with the record of a box's start.
+    pub fn has_board(&self) -> bool {
+        self.board.is_some()
+    }
+
     /// The name of the log's files.
     pub fn name(&self, place: &Place) -> String {
         let Some(log) = place.own() else {

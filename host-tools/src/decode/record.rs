@@ -5,9 +5,11 @@ use hums_blackbox::Gap;
 use hums_blackbox::record::{Record, Stats};
 use hums_core::time::Instant;
 
+use super::checked::{BOARD, finding_row};
 use super::row::{Cell, CellType, Row};
 use super::wear;
 use crate::names::{clock_source_name, counter_name, event_name, fault_name};
+use crate::source::told::Finding;
 
 fn text(text: &str) -> Cell {
     Cell::Text(text.to_owned())
@@ -67,20 +69,7 @@ pub fn rows(record: &Record<'_>) -> Vec<Row> {
                 ("source", text(clock_source_name(clock.source))),
             ],
         ),
-        Record::Finding(finding) => one(
-            "HUMS_FINDING",
-            vec![
-                ("at[s]", Cell::Time(finding.at)),
-                ("subsystem", text(finding.subsystem.name())),
-                ("check", text(finding.check)),
-                ("instance", count(finding.instance)),
-                ("level", text(finding.level.name())),
-                ("previous", text(finding.previous.name())),
-                ("value", Cell::Single(finding.value)),
-                ("limit", Cell::Single(finding.limit)),
-                ("unit", text(finding.unit)),
-            ],
-        ),
+        Record::Finding(finding) => vec![finding_row(&Finding::from(finding), BOARD)],
         _ => recorder_rows(record),
     }
 }

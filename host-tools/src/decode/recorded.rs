@@ -12,31 +12,39 @@ use hums_core::time::Instant;
 use hums_link::Check;
 use sha2::{Digest as _, Sha256};
 
+use super::checked::Checked;
 use super::collect::Collected;
 use super::context::Context;
 use super::identity::Identity;
 use super::reference::Observed;
 use super::row::{Cell, CellType, Row};
 use super::write::Writers;
+use crate::check::judge::{Judge, Limits};
 use crate::logs::reader::{Collect as _, Deliver as _, Summary};
 use crate::progress;
 use crate::source::item::{Cause, Item, Kind, Rows, Table, Value, Want};
 use crate::source::recording::Place;
 use crate::utc::iso8601;
 
-/// Items of one part.
+/// Items of one part, and bytes that they take: one message can have a table of a thousand columns.
 const PART_ITEMS: u32 = 4_096;
+const PART_BYTES: usize = 4 << 20;
 /// Names of tables and columns of all logs together, bytes: they are kept for as long as the program runs. A log that
 /// has more of them is not made by an autopilot; its further tables are left out, and counted.
 const NAMES_BYTES_MAX: usize = 4 << 20;
 
-/// Who flew and when, and UTC at time zero; and the time of the first entry, by the recording's clock. The recording is
-/// read through for it.
-pub fn identity(place: &Place) -> Result<Identity> {
+/// Who flew and when, and UTC at time zero; where it is asked for, what the monitor here says of it, as `hums check` does.
+/// The recording is read through for it.
+pub fn identity(place: &Place, judges: bool) -> Result<(Identity, Option<Checked>)> {
     let (mut epoch_us, mut first, mut system, mut uid) = (None, None, None, None);
     let mut hash = Sha256::new();
     let want = Want { observations: true, ..Want::default() };
-    place.open()?.read(want, &mut |at, item| {
+    let recording = place.open()?;
+    let mut judge = judges.then(|| Judge::new(&Limits::default(), recording.format));
+    recording.read(want, &mut |at, item| {
+        if let Some(judge) = &mut judge {
+            judge.item(at, item);
+        }
         match item {
             Item::Epoch(epoch) => epoch_us = Some(epoch),
             Item::Observation(source, observation) => {
@@ -63,7 +71,8 @@ pub fn identity(place: &Place) -> Result<Identity> {
     // No recorder gave it a number: the times in it are its own.
     let number: [u8; 4] = hash.finalize().first_chunk().copied().unwrap_or_default();
     let session = format!("r{:08x}", u32::from_be_bytes(number));
-    Ok(Identity { vehicle, date, session, epoch_us })
+    let checked = judge.and_then(|judge| Checked::new(judge.end()));
+    Ok((Identity { vehicle, date, session, epoch_us }, checked))
 }
 
 /// Reads a recording into the writers.
@@ -111,7 +120,7 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
             _ => return Ok(()),
         }
         part.items += 1;
-        if part.items >= PART_ITEMS {
+        if part.items >= PART_ITEMS || part.collected.held_bytes() >= PART_BYTES {
             bar.set_position(seen.taken());
             writers.group(part.take())?;
         }

@@ -7,8 +7,8 @@ use anyhow::Result;
 
 use super::context::Formats;
 use super::naming::{self, Named, Traits};
-use super::side_by_side::side_by_side;
 use crate::files::FileId;
+use crate::logs::side_by_side::side_by_side;
 use crate::outcome::usage as usage_error;
 use crate::source::recording::Place;
 
@@ -70,9 +70,9 @@ pub(super) fn check_forms(works: &[Work<'_>], formats: Formats) -> Result<bool> 
             native = true;
             if formats.tlog {
                 return Err(usage_error(format!(
-                    "{}: is an {}, which has no MAVLink frames for a tlog; --format csv, jsonl or parquet has all of it",
+                    "{}: is {}, which has no MAVLink frames for a tlog; --format csv, jsonl or parquet has all of it",
                     place.title,
-                    format.words()
+                    format.with_article()
                 )));
             }
         }

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use hums_blackbox::{Cause, Gap};
+use hums_core::time::Instant;
 
+use super::checked::{Checked, OnBoard};
 use super::collect::Collected;
 use super::context::Context;
 use super::destination::Destination;
@@ -97,6 +99,7 @@ pub struct Writers<'a> {
     records: u64,
     /// JSON's.
     objects: u64,
+    on_board: OnBoard,
     rows_left_out: u64,
 }
 
@@ -172,8 +175,28 @@ impl<'a> Writers<'a> {
             frames: 0,
             records: 0,
             objects: 0,
+            on_board: OnBoard::default(),
             rows_left_out: 0,
         })
+    }
+
+    /// All of the log was read, up to this time: who checked the vehicle, and what this program found. Gives why nobody did, as
+    /// a part of a sentence.
+    pub fn checked(&mut self, last: Option<Instant>) -> Result<Option<&'static str>> {
+        let context = self.context;
+        if !context.formats.has_records() {
+            return Ok(None);
+        }
+        let mut collected = Collected::new(context);
+        for (at, row) in context.checked.iter().flat_map(Checked::findings) {
+            if context.selection.has_time(at, context.epoch_us) {
+                collected.rows(at, &[row]);
+            }
+        }
+        let row = context.checked.as_ref().map_or_else(|| self.on_board.row(), Checked::row);
+        collected.rows(last.unwrap_or(Instant::ZERO), &[row]);
+        self.put(collected)?;
+        Ok(context.checked.as_ref().and_then(Checked::not_checked))
     }
 
     /// Counts rows that could not be written.
@@ -185,6 +208,7 @@ impl<'a> Writers<'a> {
         self.frames += collected.frames;
         self.records += collected.records;
         self.objects += lines_of(&collected.jsonl);
+        self.on_board.and(collected.on_board);
         for (file, bytes) in [(&mut self.tlog, &collected.tlog), (&mut self.jsonl, &collected.jsonl)] {
             if let Some(file) = file {
                 file.write(bytes)?;

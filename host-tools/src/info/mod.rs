@@ -8,8 +8,8 @@ use anyhow::Result;
 
 use crate::check;
 use crate::cli;
-use crate::decode::side_by_side::side_by_side;
 use crate::followed::Followed;
+use crate::logs::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::source::recording::{find, sessions_of};

@@ -17,6 +17,7 @@ mod marks;
 pub mod places;
 pub mod reader;
 mod scan;
+pub mod side_by_side;
 pub mod strangers;
 
 pub use card::{Room, is_card, on_card, room};

@@ -77,6 +77,15 @@ impl Format {
         }
     }
 
+    /// What it is, for people, in a sentence: `a PX4 log (ULog)`.
+    pub fn with_article(self) -> String {
+        match self {
+            Self::Raw => self.words().to_owned(),
+            Self::DataFlash => format!("an {}", self.words()),
+            Self::Hums | Self::Tlog | Self::Ulog => format!("a {}", self.words()),
+        }
+    }
+
     /// Whether it holds what came over a link, as a ground station or a recorder on a port heard it; otherwise the
     /// autopilot wrote it itself.
     pub const fn is_of_link(self) -> bool {

@@ -80,5 +80,6 @@ fn the_times_asked_for_are_those_that_the_tables_have_and_what_was_written_is_co
     let said = String::from_utf8_lossy(&said.stderr);
     assert!(said.contains("its times go from 300.000 s to 310.000 s"), "{said}");
     let said = text(&run(dir.path(), "decode late.log -o out/ --format jsonl,csv --message ATT", 0));
-    assert!(said.contains(".jsonl: 11 objects") && said.contains(": 1 table, 11 rows"), "{said}");
+    // And the row that tells who checked the vehicle.
+    assert!(said.contains(".jsonl: 12 objects") && said.contains(": 2 tables, 12 rows"), "{said}");
 }

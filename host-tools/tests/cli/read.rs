@@ -98,7 +98,10 @@ fn filters_choose_by_time_and_by_message() {
     let dir = tempfile::tempdir().expect("directory");
     packed(dir.path());
     let decode = |more: &str| {
-        text(&run(dir.path(), &format!("decode flight.hum -o - --format jsonl --message ATTITUDE {more}"), 0))
+        let line = format!("decode flight.hum -o - --format jsonl --message ATTITUDE {more}");
+        let lines = text(&run(dir.path(), &line, 0));
+        // Who checked the vehicle is of the whole log.
+        lines.lines().filter(|line| !line.contains("HUMS_CHECKED")).collect::<Vec<_>>().join("\n")
     };
     let all = decode("");
     let part = decode("--from 100 --to 110.5");
@@ -115,6 +118,62 @@ fn filters_choose_by_time_and_by_message() {
     assert_eq!(decode(&format!("--from {utc} --to 110.5")), part);
     run(dir.path(), "decode flight.hum -o - --format jsonl --message ATITUDE", 2);
     run(dir.path(), "decode flight.hum -o - --format jsonl --from yesterday", 2);
+}
+
+/// Findings as `hums decode` writes them: level, check, seconds, who found it.
+fn findings_of(jsonl: &str) -> Vec<String> {
+    let rows = jsonl.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).expect(line));
+    let findings = rows.filter(|row| row["record"] == "HUMS_FINDING");
+    let words = |row: serde_json::Value| {
+        let fields = &row["fields"];
+        format!("{} {} {} {}", fields["check"], fields["level"], fields["at[s]"], fields["checked_by"])
+    };
+    findings.map(words).collect()
+}
+
+#[test]
+fn a_recording_that_nobody_checked_has_the_findings_of_this_program_and_says_so() {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = dir.path();
+    fs::copy(flight("ap_quad_faults.tlog"), at.join("flight.tlog")).expect("copied");
+    run(at, "pack flight.tlog -o flight.hum", 0);
+    for input in ["flight.hum", "flight.tlog"] {
+        let info: serde_json::Value =
+            serde_json::from_str(&text(&run(at, &format!("info --json {input}"), 0))).expect("JSON");
+        let expected: Vec<String> = info["logs"][0]["findings"]
+            .as_array()
+            .expect("findings")
+            .iter()
+            .map(|finding| {
+                format!("{} {} {} \"hums\"", finding["check"], finding["level"], finding["time_s"])
+            })
+            .collect();
+        let jsonl = text(&run(at, &format!("decode {input} -o - --format jsonl"), 0));
+        let found = findings_of(&jsonl);
+        assert!(found.len() > 5 && found == expected, "{input}: {found:?}\n{expected:?}");
+        let last: serde_json::Value =
+            serde_json::from_str(jsonl.lines().last().expect("a line")).expect("JSON");
+        assert_eq!(last["record"], "HUMS_CHECKED");
+        assert_eq!(last["fields"]["checked_by"], info["logs"][0]["checked_by"]);
+        assert_eq!(
+            (&last["fields"]["verdict"], last["fields"]["findings"].as_u64()),
+            (&"critical".into(), Some(found.len() as u64))
+        );
+        run(at, &format!("decode {input} -o {input}.out --format csv,influx"), 0);
+        let tables: Vec<_> = fs::read_dir(at.join(format!("{input}.out"))).expect("made").collect();
+        assert_eq!(tables.len(), 2, "tables and points");
+        for entry in tables {
+            let path = entry.expect("an entry").path();
+            let has = if path.is_dir() {
+                fs::read_to_string(path.join("HUMS_FINDING.csv")).expect("a table").lines().count()
+                    == found.len() + 1
+            } else {
+                let points = fs::read_to_string(&path).expect("points");
+                points.lines().filter(|line| line.starts_with("HUMS_FINDING,")).count() == found.len()
+            };
+            assert!(has, "{}", path.display());
+        }
+    }
 }
 
 #[test]

@@ -24,6 +24,11 @@ pub(super) fn table(layout: &Layout) -> Table {
     Table { name: table_name(layout), columns }
 }
 
+/// How many columns it has.
+pub(super) fn columns(layout: &Layout) -> usize {
+    1 + layout.fields.iter().map(|field| elements(field).unwrap_or(1) as usize).sum::<usize>()
+}
+
 /// Its name: the topic's, without what a file's name cannot have.
 pub(super) fn table_name(layout: &Layout) -> String {
     layout.name.replace('/', "_")

@@ -295,10 +295,10 @@ impl<'a, 'b> Session<'a, 'b> {
                 );
             }
         };
-        if self.subscriptions.add(id, instance, &layout, self.want.rows) {
-            return Ok(());
+        match self.subscriptions.add(id, instance, &layout, self.want.rows) {
+            Ok(()) => Ok(()),
+            Err(why) => self.gap(Cause::Damaged, Some(place), 0, format!("a subscription to {name}, {why}")),
         }
-        self.gap(Cause::Damaged, Some(place), 0, format!("a subscription to {name}, one of too many"))
     }
 
     fn data(&mut self, place: u64, (id, data): (u16, &[u8]), bytes: usize, after: &[u8]) -> Result<()> {

@@ -12,7 +12,9 @@ use crate::source::item::{MessageCount, Rows, Table};
 /// Subscriptions at a time at most. PX4 has some 200.
 const SUBSCRIPTIONS_MAX: usize = 4_096;
 /// Columns of all tables at most, those of logs that were joined on too. A log of PX4 with all of its topics has 8,000.
-const COLUMNS_MAX: usize = 65_536;
+const COLUMNS_MAX: usize = 32_768;
+/// Columns of one table at most. The widest of PX4, an array of bytes that came from elsewhere, has 300.
+const TABLE_COLUMNS_MAX: usize = 1_024;
 /// Names of topics that are counted at most; the rest is counted together.
 const NAMES_MAX: usize = 4_096;
 /// The name of the rest.
@@ -75,15 +77,23 @@ impl Subscriptions {
         self.numbered.get(usize::from(id))?.as_ref()?.time(data)
     }
 
-    /// `false` where there are too many.
-    pub(super) fn add(&mut self, id: u16, instance: u8, layout: &Arc<Layout>, rows: Rows<'_>) -> bool {
+    /// What does not fit, as the end of a sentence.
+    pub(super) fn add(
+        &mut self,
+        id: u16,
+        instance: u8,
+        layout: &Arc<Layout>,
+        rows: Rows<'_>,
+    ) -> Result<(), &'static str> {
         self.remove(id);
         if self.living >= SUBSCRIPTIONS_MAX {
-            return false;
+            return Err("one of too many");
         }
         self.living += 1;
         let topic = px4::topic(&layout.name).filter(|topic| instance < topic.instances);
-        let table = rows.has(&rows::table_name(layout)).then(|| self.table(layout)).flatten();
+        let has_rows = rows.has(&rows::table_name(layout));
+        let table = has_rows.then(|| self.table(layout)).flatten();
+        let is_left_out = has_rows && table.is_none();
         let subscription = Subscription {
             layout: Arc::clone(layout),
             instance,
@@ -100,11 +110,18 @@ impl Subscriptions {
         if let Some(slot) = self.numbered.get_mut(place) {
             *slot = Some(Box::new(subscription));
         }
-        true
+        if is_left_out {
+            Err("whose rows are left out: more columns than any log of PX4 has")
+        } else {
+            Ok(())
+        }
     }
 
     /// The table of these fields: one that is there, or another.
     fn table(&mut self, layout: &Layout) -> Option<Arc<Table>> {
+        if rows::columns(layout) > TABLE_COLUMNS_MAX {
+            return None;
+        }
         let mut table = rows::table(layout);
         let tables = self.tables.entry(table.name.clone()).or_default();
         if let Some(known) = tables.iter().find(|known| known.columns == table.columns) {

@@ -3,7 +3,7 @@
 
 use anyhow::Result;
 
-use crate::logs::in_order::{in_order, workers};
+use super::in_order::{in_order, workers};
 
 /// Logs in work at most: writing one leaves its workers idle; a few fill these pauses.
 const AT_ONCE: usize = 4;

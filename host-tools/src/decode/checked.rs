@@ -1,0 +1,133 @@
+//! Who checked the vehicle's health in a log, as rows: `HUMS_CHECKED`, one row a log, and `HUMS_FINDING` of what this program
+//! found where the recorder ran no checks. A table without a finding is then no table that nobody has checked.
+
+use anyhow::Result;
+use hums_core::health::Level;
+use hums_core::time::Instant;
+
+use super::row::{Cell, CellType, Row};
+use crate::check::judge::{Heard, Limits};
+use crate::check::judged::{Judged, JudgedBy};
+use crate::check::recording;
+use crate::source::recording::Place;
+use crate::source::told::Finding;
+
+/// The word for the monitor on board, as `hums info --json` has it in `checked_by`.
+pub const BOARD: &str = "board";
+/// The word for this program.
+const HUMS: &str = "hums";
+/// The word where no autopilot was heard.
+const NOBODY: &str = "nobody";
+
+/// What this program found in a recording whose recorder ran no checks.
+#[derive(Clone, Debug)]
+pub struct Checked {
+    by: &'static str,
+    verdict: &'static str,
+    findings: Vec<Finding>,
+    count: u64,
+    judged: u64,
+    not_judged: u64,
+}
+
+impl Checked {
+    /// Judges a log of ours; `None` where its own monitor did.
+    pub fn of(place: &Place) -> Result<Option<Self>> {
+        Ok(Self::new(recording(place, &Limits::default(), Heard::Somewhere)?.judged))
+    }
+
+    /// Of a recording that was judged; `None` where the monitor on board did that.
+    pub fn new(judged: Judged) -> Option<Self> {
+        if judged.by == JudgedBy::Board {
+            return None;
+        }
+        let (by, verdict) = (if judged.worst().is_some() { HUMS } else { NOBODY }, judged.verdict());
+        let Judged { findings, findings_count: count, judged, not_judged, .. } = judged;
+        let (judged, not_judged) = (judged.len() as u64, not_judged.len() as u64);
+        Some(Self { by, verdict, findings, count, judged, not_judged })
+    }
+
+    /// Why there are no findings of anybody, as a part of a sentence; `None` where it was checked.
+    pub fn not_checked(&self) -> Option<&'static str> {
+        (self.by == NOBODY).then_some("not checked: no autopilot was heard in it")
+    }
+
+    /// Its findings with their times.
+    pub fn findings(&self) -> impl Iterator<Item = (Instant, Row)> {
+        self.findings.iter().map(|finding| (finding.at, finding_row(finding, self.by)))
+    }
+
+    /// The row of the log.
+    pub fn row(&self) -> Row {
+        let number = |count| Cell::Count(count);
+        row(self.by, self.verdict, self.count, number(self.judged), number(self.not_judged))
+    }
+}
+
+/// The findings of a log's own monitor, counted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OnBoard {
+    count: u64,
+    /// The worst level, by its number; that of an input which stopped is none.
+    worst: u8,
+}
+
+impl OnBoard {
+    /// One more.
+    pub fn add(&mut self, level: Level) {
+        self.count += 1;
+        if level != Level::Stale {
+            self.worst = self.worst.max(level as u8);
+        }
+    }
+
+    /// Those of the next group.
+    pub fn and(&mut self, next: Self) {
+        self.count += next.count;
+        self.worst = self.worst.max(next.worst);
+    }
+
+    /// The row of the log. What its monitor could not judge is not in the record.
+    pub fn row(&self) -> Row {
+        // As `hums check` calls it: what is only worth knowing is nothing wrong.
+        let verdict = match Level::ALL.get(usize::from(self.worst)) {
+            Some(level @ (Level::Warning | Level::Critical)) => level.name(),
+            _ => Level::Ok.name(),
+        };
+        let unknown = || Cell::Unknown(CellType::Count);
+        row(BOARD, verdict, self.count, unknown(), unknown())
+    }
+}
+
+fn row(by: &str, verdict: &str, findings: u64, judged: Cell, not_judged: Cell) -> Row {
+    Row::new(
+        "HUMS_CHECKED",
+        vec![
+            ("checked_by", Cell::Text(by.to_owned())),
+            ("verdict", Cell::Text(verdict.to_owned())),
+            ("findings", Cell::Count(findings)),
+            ("judged", judged),
+            ("not_judged", not_judged),
+        ],
+    )
+}
+
+/// A finding, and who found it.
+pub fn finding_row(finding: &Finding, by: &str) -> Row {
+    let text = |text: &str| Cell::Text(text.to_owned());
+    Row::new(
+        "HUMS_FINDING",
+        vec![
+            ("at[s]", Cell::Time(finding.at)),
+            ("subsystem", text(finding.subsystem.name())),
+            ("check", text(&finding.check)),
+            ("instance", Cell::Count(finding.instance.into())),
+            ("level", text(finding.level.name())),
+            ("previous", text(finding.previous.name())),
+            ("value", Cell::Single(finding.value)),
+            ("limit", Cell::Single(finding.limit)),
+            ("unit", text(&finding.unit)),
+            ("checked_by", text(by)),
+        ],
+    )
+}
