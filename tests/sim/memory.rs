@@ -195,10 +195,24 @@ fn cards_full_of_entries_or_sessions_take_little_memory() {
         hostile::directories(dir.path(), 12, true),
         hostile::sessions(dir.path(), 60_000),
     ];
-    for card in cards {
+    for card in &cards {
         for flag in ["--json", "--salvage"] {
             let outcome = run(&["info", flag, card.to_str().unwrap()]);
             assert_bounded(&format!("info {flag} {}", card.display()), outcome.memory_kib_max, empty);
         }
+    }
+    // Every command looks for logs in the same way; of each session of the last card it would make a file.
+    let page = dir.path().join("page.html");
+    let out = dir.path().join("out");
+    for card in cards[..2].iter().map(|card| card.to_str().unwrap()) {
+        for words in [
+            &["verify", "--json", card][..],
+            &["check", card],
+            &["report", card, "-o", page.to_str().unwrap()],
+            &["decode", card, "-o", out.to_str().unwrap(), "--format", "jsonl"],
+        ] {
+            assert_bounded(&words.join(" "), run(words).memory_kib_max, empty);
+        }
+        assert_live_bounded(Path::new(card), empty);
     }
 }

@@ -85,9 +85,23 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
             assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{what}: {info}");
             assert_eq!(info["logs"][0]["gaps_count"], 0, "{what}: the log itself is whole");
             json("verify", &image, &[], 3);
+            for command in ["info", "verify", "check"] {
+                changes_nothing(command, &image, what);
+            }
             let decoded = Decoded::of(&image, &[3]);
             frames::assert_same(&input, &decoded.frames(&manifest.seeds), &stream);
         }
+    }
+}
+
+/// Nothing that is said of a card which holds evidence advises to change anything on it.
+#[track_caller]
+fn changes_nothing(command: &str, image: &Path, what: &str) {
+    let outcome = hums([command.as_ref(), image.as_os_str()]).expect_code(&[3]);
+    let said = format!("{}{}", outcome.text(), outcome.stderr).to_ascii_lowercase();
+    let words: Vec<&str> = said.split(|character: char| !character.is_ascii_alphabetic()).collect();
+    for advice in ["format", "reformat", "erase", "delete", "fsck", "chkdsk", "repair"] {
+        assert!(!words.contains(&advice), "{what}: {command} says `{advice}`: {said}");
     }
 }
 

@@ -99,6 +99,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
         note!("{}: is what this command makes of {of}, and is not read", made.display());
         inputs.compare_only(made);
     }
+    inputs.refuse(&args.output)?;
     let standard_output = check_output(args, works.len(), formats)?;
     let native = check_forms(&works, formats)?;
     let selection = Selection::new(args, native)?;

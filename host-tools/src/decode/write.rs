@@ -48,6 +48,7 @@ impl Single {
     }
 
     fn file(path: &Path, context: &Context, kind: &Kind) -> Result<Self> {
+        context.inputs.refuse(path)?;
         make_parent(path)?;
         Ok(Self::File(Output::create(path, &context.inputs, kind, context.of.as_deref())?))
     }

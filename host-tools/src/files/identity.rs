@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// A file's identity.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,11 +39,15 @@ fn node(path: &Path) -> io::Result<Node> {
 }
 
 impl FileId {
-    /// The identity of what `path` means. Links are followed, also one to a file that is not there yet.
+    /// The identity of what `path` means. Links are followed, also one to a file that is not there yet. `..` behind a folder
+    /// that is not there leads back to where that folder would be made.
     pub fn of(path: &Path) -> io::Result<Self> {
         match node(path) {
             Ok(node) => Ok(Self::Existing(node)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self::Place(place(path)?)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => match folded(path) {
+                Some(path) => Self::of(&path),
+                None => Ok(Self::Place(place(path)?)),
+            },
             Err(error) => Err(error),
         }
     }
@@ -69,6 +73,23 @@ fn standard(stream: impl std::os::fd::AsFd) -> Option<FileId> {
 #[cfg(not(unix))]
 fn standard<T>(_: T) -> Option<FileId> {
     None
+}
+
+/// A path without the `missing/..` in it; `None` where there is none.
+fn folded(path: &Path) -> Option<PathBuf> {
+    let (mut kept, mut is_folded) = (PathBuf::new(), false);
+    for part in path.components() {
+        let is_missing = part == Component::ParentDir
+            && matches!(kept.components().next_back(), Some(Component::Normal(_)))
+            && fs::symlink_metadata(&kept).is_err();
+        if is_missing {
+            kept.pop();
+        } else {
+            kept.push(part);
+        }
+        is_folded |= is_missing;
+    }
+    is_folded.then_some(kept)
 }
 
 /// A path whose last part is no link, and whose folder is without links. The folder must be there.

@@ -54,6 +54,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     }
     let wanted = wanted(args, &found.places)?;
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
+    inputs.refuse(&args.output)?;
     // Of each session only what later ones are compared with is kept.
     let mut earlier: Vec<Option<trend::Session>> = Vec::new();
     let mut kept = Kept::default();
@@ -131,6 +132,7 @@ fn make(
 }
 
 fn write(path: &Path, html: &str, inputs: &Inputs, of: Option<&str>) -> Result<()> {
+    inputs.refuse(path)?;
     make_parent(path)?;
     let mut file = Output::create(path, inputs, &made::PAGE, of)?;
     settle(file.write_all(html.as_bytes()), path)?;

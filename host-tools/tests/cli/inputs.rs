@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use clap::{Arg, CommandFactory as _};
+use clap::{Arg, ArgAction, CommandFactory as _};
 use hums::cli::Cli;
 
-use crate::support::{attempt, contents, furnished, run};
+use crate::support::{attempt, contents, furnished, recorded, run};
 
 /// What an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +79,12 @@ fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Ve
     words
 }
 
+/// The flags of a command that take no value and change what it does.
+fn flags(command: &clap::Command) -> Vec<String> {
+    let is_flag = |arg: &&Arg| matches!(arg.get_action(), ArgAction::SetTrue);
+    command.get_arguments().filter(is_flag).filter_map(|arg| Some(format!("--{}", arg.get_long()?))).collect()
+}
+
 /// All commands that do something, with the words that call them.
 fn leaves<'a>(
     command: &'a clap::Command,
@@ -114,12 +120,18 @@ fn no_command_writes_over_any_of_its_inputs() {
                 let spellings = [
                     file.to_owned(),
                     format!("./folder/../{file}"),
+                    format!("./new-folder/../{file}"),
                     format!("link-{file}"),
                     format!("hard-{file}"),
                 ];
                 for spelling in spellings {
                     let given = [(input, file.to_owned()), (output, spelling)];
-                    refused(dir.path(), &words(command, path, &given), &before);
+                    let words = words(command, path, &given);
+                    refused(dir.path(), &words, &before);
+                    for flag in flags(command) {
+                        let with = [words.as_slice(), &[flag]].concat();
+                        refused(dir.path(), &with, &before);
+                    }
                 }
                 if input.get_id() == "inputs" {
                     let given = [(input, "folder".to_owned()), (output, format!("folder/{file}"))];
@@ -134,6 +146,27 @@ fn no_command_writes_over_any_of_its_inputs() {
     {
         assert!(tried.iter().any(|tried| tried == known), "{known} is not among {tried:?}");
     }
+}
+
+#[test]
+fn a_cards_image_is_written_over_by_no_format() {
+    let dir = recorded();
+    let at = dir.path();
+    let before = contents(at);
+    for format in ["tlog", "csv", "jsonl", "influx", "parquet", "thesis", "tlog,csv"] {
+        for output in ["card.img", "./card.img", "./new-folder/../card.img"] {
+            for flag in ["", "--replace", "--salvage"] {
+                refused(at, &words_of(&format!("decode card.img -o {output} --format {format} {flag}")), &before);
+            }
+        }
+    }
+    for flag in ["", "--replace"] {
+        refused(at, &words_of(&format!("report card.img -o ./new-folder/../card.img {flag}")), &before);
+    }
+}
+
+fn words_of(line: &str) -> Vec<String> {
+    line.split_whitespace().map(str::to_owned).collect()
 }
 
 #[track_caller]
@@ -151,6 +184,10 @@ fn refused(dir: &Path, words: &[String], before: &[(String, Vec<u8>)]) {
             "hums {line}: {name} is not what it was\n{said}"
         );
     }
+    let is_told = said.contains("input of this command");
+    let knows = ["decode", "report", "pack"].iter().any(|command| line.starts_with(command));
+    assert!(is_told || !knows, "hums {line}: does not say that it is an input\n{said}");
+    assert!(!dir.join("new-folder").exists(), "hums {line}: made a folder\n{said}");
     for (name, _) in &after {
         let made = before.iter().all(|(other, _)| other != name);
         if made {

@@ -32,6 +32,12 @@ fn handler(name: &str) -> Option<&'static Handler> {
     lists.into_iter().flatten().find(named)
 }
 
+/// Whether observations or other items are made of the messages of this name.
+#[cfg(test)]
+pub(super) fn has_handler(name: &str) -> bool {
+    handler(name).is_some()
+}
+
 /// A handler with the columns of the message that it is for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolved {

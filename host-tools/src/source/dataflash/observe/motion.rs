@@ -101,6 +101,12 @@ pub(super) const HANDLERS: &[Handler] = &[
         ..MOTION
     },
     Handler {
+        names: &[("ORGN", 0)],
+        columns: &[&["Type"], &["Alt"]],
+        take: origin,
+        ..MOTION
+    },
+    Handler {
         names: &[("XKF1", 0), ("XKF6", 1), ("NKF1", 0), ("NKF6", 1), ("EKF1", 0)],
         columns: &[&["C"], &["VN"], &["VE"], &["VD"], &["PN"], &["PE"], &["PD"]],
         take: local,
@@ -255,7 +261,8 @@ fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut
     let Some(Metres(altitude)) = gnss.altitude else { return };
     let first = *state.first_altitude.get_or_insert(altitude);
     let height = state.baro_height.within(given.at, TOGETHER);
-    let relative = given.single(12).or(height).unwrap_or(altitude - first);
+    let above_home = || state.home_altitude.map(|home| altitude - home);
+    let relative = given.single(12).or(height).or_else(above_home).unwrap_or(altitude - first);
     state.height(relative);
     state.altitude.set(given.at, altitude);
     out.observe(&Observation::GlobalPosition(GlobalPosition {
@@ -324,6 +331,14 @@ fn position(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         relative_altitude: Metres(relative),
         velocity: velocity(state, given).map(MetresPerSecond),
     }));
+}
+
+/// Where home is. The estimator's own origin (type 0) is none.
+fn origin(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    const HOME: u64 = 1;
+    if given.unsigned(0) == Some(HOME) {
+        state.home_altitude = given.single(1);
+    }
 }
 
 /// Whether the message is of the estimator that flies: EKF3's begin with an X, EKF2's with an N.

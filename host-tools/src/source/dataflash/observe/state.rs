@@ -111,6 +111,8 @@ pub(in crate::source::dataflash) struct State {
     pub(super) heading_deg: Dated<f32>,
     /// Height of the first GPS fix, where nothing better tells the height above it.
     pub(super) first_altitude: Option<f32>,
+    /// Height of home.
+    pub(super) home_altitude: Option<f32>,
     pub(super) clips: [u32; 3],
     pub(super) cells: [Dated<[Option<Volts>; CELLS_MAX]>; INSTANCES],
     pub(super) messages_lost: Option<u64>,

@@ -22,9 +22,12 @@ pub(super) use state::{Px4, Said, Told, Topic};
 
 /// How often what MAVLink repeats is repeated.
 const REPEAT_US: u64 = 1_000_000;
+/// All topics that serve.
+const LISTS: [&[Topic]; 4] = [system::TOPICS, motion::TOPICS, power::TOPICS, receivers::TOPICS];
+
 /// The row of a topic, if it is needed.
 pub(super) fn topic(name: &str) -> Option<&'static Topic> {
-    [system::TOPICS, motion::TOPICS, power::TOPICS, receivers::TOPICS]
+    LISTS
         .into_iter()
         .flatten()
         .find(|topic| topic.name == name)

@@ -151,6 +151,42 @@ pub(super) const TOPICS: &[Topic] = &[
         take: estimator_status,
     },
     Topic {
+        name: "estimator_innovation_test_ratios",
+        instances: 9,
+        every_us: MEDIUM_US,
+        fields: &[
+            "gps_hvel",
+            "gps_vvel",
+            "ev_hvel",
+            "ev_vvel",
+            "aux_hvel",
+            "gps_hpos",
+            "ev_hpos",
+            "gps_vpos",
+            "ev_vpos",
+            "rng_vpos",
+            "baro_vpos",
+            "mag_field",
+            "heading",
+        ],
+        take: test_ratios,
+    },
+    Topic {
+        name: "estimator_status_flags",
+        instances: 9,
+        every_us: 0,
+        fields: &["cs_tilt_align", "cs_fake_pos", "cs_constant_pos", "cs_gnss_fault", "fs_bad_acc_vertical"],
+        take: estimator_flags,
+    },
+    // Motors are given this since v1.13.
+    Topic {
+        name: "actuator_motors",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["control"],
+        take: motors,
+    },
+    Topic {
         name: "sensor_selection",
         instances: 1,
         every_us: 0,
@@ -254,7 +290,7 @@ fn local_position(px4: &mut Px4, said: &Said<'_>) {
     }
     let heading = fields.finite(10).or_else(|| fields.finite(11));
     let [thrust, plane] = px4.motion.thrust;
-    let throttle = thrust.into_iter().chain(plane).reduce(f32::max);
+    let throttle = thrust.into_iter().chain(plane).reduce(f32::max).or(px4.motion.motors);
     let armed = px4.system.armed();
     px4.observe(Observation::Hud(Hud {
         airspeed: px4.motion.airspeed.map(MetresPerSecond),
@@ -325,6 +361,7 @@ fn estimator_status(px4: &mut Px4, said: &Said<'_>) {
     if said.instance != px4.motion.estimator {
         return;
     }
+    px4.motion.estimator_status = true;
     let ratio = |field| fields.finite(field).filter(|ratio| *ratio >= 0.0);
     px4.observe(Observation::Estimator(Estimator {
         scale: EstimatorScale::TestRatio,
@@ -340,6 +377,48 @@ fn estimator_status(px4: &mut Px4, said: &Said<'_>) {
     {
         px4.observe(vibration(levels.map(Some), [0; 3]));
     }
+}
+
+/// The same figures of a log without `estimator_status`, sensor by sensor: the largest counts, as PX4's estimator has it
+/// there. These are squares (innovation squared by its limit squared), and there they are not.
+fn test_ratios(px4: &mut Px4, said: &Said<'_>) {
+    if said.instance != px4.motion.estimator || px4.motion.estimator_status {
+        return;
+    }
+    let largest = |fields: std::ops::Range<usize>| {
+        let elements = fields.flat_map(|field| (0..3).filter_map(move |element| said.fields.element(field, element)));
+        let squares = elements.filter(|square| square.is_finite() && *square >= 0.0);
+        squares.reduce(f64::max).map(|square| square.sqrt() as f32)
+    };
+    px4.observe(Observation::Estimator(Estimator {
+        scale: EstimatorScale::TestRatio,
+        velocity: largest(0..5),
+        position_horizontal: largest(5..7),
+        position_vertical: largest(7..11),
+        compass: largest(11..13),
+        flags: px4.motion.estimator_flags,
+    }));
+}
+
+/// `ESTIMATOR_STATUS_FLAGS` of a log without `estimator_status`, as far as they are told.
+fn estimator_flags(px4: &mut Px4, said: &Said<'_>) {
+    const ATTITUDE: u16 = 1;
+    const CONST_POS_MODE: u16 = 1 << 7;
+    const GPS_GLITCH: u16 = 1 << 10;
+    const ACCEL_ERROR: u16 = 1 << 11;
+    if said.instance == px4.motion.estimator {
+        let bits = [ATTITUDE, CONST_POS_MODE, CONST_POS_MODE, GPS_GLITCH, ACCEL_ERROR];
+        let set = bits.into_iter().enumerate().filter(|(field, _)| said.fields.flag(*field));
+        px4.motion.estimator_flags = set.fold(0, |all, (_, bit)| all | bit);
+    }
+}
+
+/// A motor that there is not, or that stands, has no number or nothing.
+fn motors(px4: &mut Px4, said: &Said<'_>) {
+    let given = (0..12).filter_map(|motor| said.fields.element(0, motor)).filter(|part| part.is_finite());
+    let running: Vec<f64> = given.filter(|part| *part > 0.0).collect();
+    let sum: f64 = running.iter().sum();
+    px4.motion.motors = Some((sum / running.len().max(1) as f64) as f32);
 }
 
 fn vibration(levels: [Option<f32>; 3], clips: [u32; 3]) -> Observation {

@@ -37,6 +37,8 @@ pub(in crate::source::ulog) enum Told {
     Event { number: u32, severity: u8 },
     Mode { number: u32, name: Option<&'static str> },
     Utc { utc_us: u64, recorded_us: u64 },
+    /// Why it is in failsafe, by name; empty where it is not.
+    Failsafes(String),
 }
 
 /// The least time between two messages of a fast topic: the monitor's own step (`hums_core::monitor::TICK`), and the rate
@@ -89,6 +91,9 @@ pub(super) struct System {
     pub(super) landed: Option<bool>,
     pub(super) told_mode: Option<u32>,
     pub(super) told_identity: bool,
+    /// The flags of `failsafe_flags` that are set, by name.
+    pub(super) failsafes: String,
+    pub(super) told_failsafes: String,
     pub(super) reached: Option<i64>,
     /// UTC less the time since boot, from a receiver.
     pub(super) utc_offset_us: Option<u64>,
@@ -118,6 +123,12 @@ pub(super) struct Motion {
     pub(super) airspeed: Option<f32>,
     pub(super) airspeed_validated: bool,
     pub(super) thrust: [Option<f32>; 2],
+    /// What the motors are given, where the log has no thrust setpoint.
+    pub(super) motors: Option<f32>,
+    /// The log has `estimator_status`.
+    pub(super) estimator_status: bool,
+    /// `ESTIMATOR_STATUS_FLAGS`, as far as `estimator_status_flags` has them.
+    pub(super) estimator_flags: u16,
     /// The estimator that flies.
     pub(super) estimator: u8,
     /// The accelerometer that flies.

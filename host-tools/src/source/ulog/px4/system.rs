@@ -49,6 +49,36 @@ pub(super) const TOPICS: &[Topic] = &[
         take: |px4, said| px4.system.setpoint = said.fields.byte(1).filter(|_| said.fields.flag(0)),
     },
     Topic {
+        name: "failsafe_flags",
+        instances: 1,
+        every_us: 0,
+        fields: &[
+            "manual_control_signal_lost",
+            "gcs_connection_lost",
+            "offboard_control_signal_lost",
+            "battery_warning",
+            "battery_low_remaining_time",
+            "battery_unhealthy",
+            "geofence_breached",
+            "mission_failure",
+            "navigator_failure",
+            "vtol_fixed_wing_system_failure",
+            "wind_limit_exceeded",
+            "flight_time_limit_exceeded",
+            "attitude_invalid",
+            "angular_velocity_invalid",
+            "local_position_invalid",
+            "global_position_invalid",
+            "local_position_accuracy_low",
+            "position_accuracy_low",
+            "fd_critical_failure",
+            "fd_motor_failure",
+            "fd_esc_arming_failure",
+            "fd_imbalanced_prop",
+        ],
+        take: failsafe_flags,
+    },
+    Topic {
         name: "vehicle_land_detected",
         instances: 1,
         every_us: 0,
@@ -105,6 +135,33 @@ pub(super) const TOPICS: &[Topic] = &[
         fields: &["rpm_estimate", "indicated_frequency_rpm"],
         take: rpm,
     },
+];
+
+/// The conditions of `failsafe_flags`, in the order of its fields above, for people. Flags of modes that are not flown, and
+/// what only keeps it from arming, are left out.
+const FAILSAFES: [&str; 22] = [
+    "manual control",
+    "ground station",
+    "offboard control",
+    "battery",
+    "battery time",
+    "battery health",
+    "fence",
+    "mission",
+    "navigator",
+    "VTOL system",
+    "wind",
+    "flight time",
+    "attitude",
+    "angular velocity",
+    "local position",
+    "global position",
+    "position accuracy",
+    "position accuracy",
+    "attitude failure",
+    "motor failure",
+    "ESC",
+    "propeller",
 ];
 
 /// `ARMING_STATE_ARMED`: the same number in all versions; 1 is standby, later called disarmed.
@@ -257,11 +314,29 @@ fn status(px4: &mut Px4, said: &Said<'_>) {
         calibrating: fields.flag(9),
     };
     px4.system.status = Some(status);
+    px4.failsafes();
     // What changes is told at once; the rest waits for its turn.
     let now = |status: Status| (status.arming, status.nav, status.failsafe);
     if before.is_none_or(|before| now(before) != now(status)) {
         px4.heartbeat();
     }
+}
+
+/// Since v1.14. They are conditions, which also hold where no failsafe acts on them: they are told while it is in failsafe.
+fn failsafe_flags(px4: &mut Px4, said: &Said<'_>) {
+    // `BATTERY_WARNING_CRITICAL`: a low battery alone is a warning.
+    const BATTERY: &str = "battery";
+    const CRITICAL: f64 = 2.0;
+    let mut names: Vec<&str> = Vec::new();
+    for (field, name) in FAILSAFES.into_iter().enumerate() {
+        let least = if name == BATTERY { CRITICAL } else { 1.0 };
+        let is_set = said.fields.get(field).is_some_and(|value| value >= least);
+        if is_set && !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    px4.system.failsafes = names.join(", ");
+    px4.failsafes();
 }
 
 fn armed(px4: &mut Px4, said: &Said<'_>) {
@@ -362,6 +437,16 @@ impl Px4 {
             // The unique id that MAVLink sends is not in the log.
             let identity = AutopilotIdentity { firmware: self.system.release, uid: 0 };
             self.observe(Observation::Identity(identity));
+        }
+    }
+
+    /// Tells why it is in failsafe, when that changes.
+    fn failsafes(&mut self) {
+        let in_failsafe = self.system.status.is_some_and(|status| status.failsafe);
+        let words = if in_failsafe { self.system.failsafes.as_str() } else { "" };
+        if words != self.system.told_failsafes {
+            words.clone_into(&mut self.system.told_failsafes);
+            self.told.push(Told::Failsafes(self.system.told_failsafes.clone()));
         }
     }
 

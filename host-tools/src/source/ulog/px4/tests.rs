@@ -219,3 +219,90 @@ fn the_rates_of_an_attitude_are_its_own_or_those_of_the_gyros() {
     let attitudes = observations(&read(&log.bytes), "Attitude(");
     assert!(attitudes[0].contains("RadiansPerSecond(5.5), RadiansPerSecond(-6.5)"), "{attitudes:?}");
 }
+
+#[test]
+fn a_log_without_the_estimators_status_has_its_test_ratios_as_the_status_has_them() {
+    let fields = "float[2] gps_hvel;float gps_vvel;float[2] gps_hpos;float baro_vpos;float[3] mag_field;float heading;";
+    let squares = [0.04, 0.25, 0.01, 0.81, 0.09, 0.16, 0.0, f32::NAN, 0.36, 0.49];
+    let ratios = ("estimator_innovation_test_ratios", fields, &[(3, floats(&squares))][..]);
+    let flags = ("estimator_status_flags", "bool cs_tilt_align;bool cs_gnss_fault;", &[(2, vec![1, 1])][..]);
+    let found = observations(&log(&[flags, ratios]), "Estimator(");
+    assert_eq!(found.len(), 1, "{found:?}");
+    for figure in [
+        "TestRatio",
+        "velocity: Some(0.5)",
+        "position_horizontal: Some(0.9",
+        "position_vertical: Some(0.4",
+        "compass: Some(0.7",
+        "flags: 1025",
+    ] {
+        assert!(found[0].contains(figure), "{figure}: {found:?}");
+    }
+    let status = ("estimator_status", "float vel_test_ratio;", &[(2, floats(&[0.125]))][..]);
+    let found = observations(&log(&[status, ratios]), "Estimator(");
+    assert!(found.len() == 1 && found[0].contains("velocity: Some(0.125)"), "the status counts: {found:?}");
+}
+
+#[test]
+fn flags_of_failsafes_are_named_while_the_vehicle_is_in_failsafe() {
+    let flags = "bool gcs_connection_lost;uint8_t battery_warning;bool fd_motor_failure;";
+    let read = log(&[
+        ("vehicle_status", STATUS, &[(2, vec![2, 4, 0, 2]), (4, vec![2, 5, 1, 2]), (6, vec![2, 4, 0, 2])]),
+        ("failsafe_flags", flags, &[(3, vec![1, 1, 0]), (5, vec![1, 2, 1])]),
+    ]);
+    let told: Vec<&str> = read.of("fact").into_iter().filter(|fact| fact.starts_with("Failsafes")).collect();
+    let named = ["ground station", "ground station, battery, motor failure", ""];
+    assert_eq!(told.len(), named.len(), "{told:?}");
+    assert!(told.iter().zip(named).all(|(told, named)| told.ends_with(named)), "{told:?}");
+}
+
+#[test]
+fn the_throttle_is_that_of_the_motors_where_nothing_else_tells_it() {
+    let motors = [&[0.5, 0.7, f32::NAN, 0.0][..], &[f32::NAN; 8]].concat();
+    let throttle = |thrust: bool| {
+        let status = ("vehicle_status", STATUS, &[(2, vec![2, 4, 0, 2])][..]);
+        let position = ("vehicle_local_position", "float x;", &[(5, floats(&[1.0]))][..]);
+        let motors = ("actuator_motors", "float[12] control;", &[(3, floats(&motors))][..]);
+        let wanted = [(4, floats(&[0.0, 0.0, -0.25]))];
+        let wanted = ("vehicle_thrust_setpoint", "float[3] xyz;", if thrust { &wanted[..] } else { &[] });
+        let hud = observations(&log(&[status, motors, wanted, position]), "Hud(").remove(0);
+        hud.split("throttle: Some(Fraction(").nth(1).and_then(|rest| rest.split(')').next()).expect("a throttle").to_owned()
+    };
+    assert_eq!((throttle(false).as_str(), throttle(true).as_str()), ("0.6", "0.25"));
+}
+
+/// What is said of PX4's logs.
+const DOCUMENT: &str = include_str!("../../../../../docs/ulog.md");
+
+#[test]
+fn each_topic_that_serves_is_in_the_document_and_each_other_that_is_asked_for_is_among_the_rows() {
+    for list in super::LISTS.iter().copied().flatten() {
+        assert!(DOCUMENT.contains(&format!("`{}`", list.name)), "{} is not in docs/ulog.md", list.name);
+    }
+    let (_, rows) = DOCUMENT.split_once("## Only rows").expect("a list of what is only read as rows");
+    for name in [
+        "battery_status",
+        "sensor_combined",
+        "vehicle_attitude",
+        "vehicle_local_position",
+        "vehicle_global_position",
+        "vehicle_gps_position",
+        "sensor_gps",
+        "estimator_status",
+        "estimator_status_flags",
+        "estimator_innovation_test_ratios",
+        "failsafe_flags",
+        "vehicle_status",
+        "vehicle_land_detected",
+        "actuator_outputs",
+        "actuator_motors",
+        "esc_status",
+        "cpuload",
+        "vehicle_imu_status",
+        "event",
+        "log_message",
+    ] {
+        let is_row = rows.contains(&format!("| `{name}` |"));
+        assert!(super::topic(name).is_some() != is_row, "{name}: serves, or is told to be rows only");
+    }
+}
