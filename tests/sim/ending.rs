@@ -5,6 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use hums_blackbox::Header;
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
 use hums_tests::flights::own;
 use hums_tests::program::hums;
 use serde_json::Value;
@@ -14,13 +16,16 @@ const BLOCK: usize = 512;
 
 /// Records the flight onto a card; power goes at this block write. How many there were.
 fn record(image: &Path, cut: Option<u64>) -> u64 {
-    let flight = own(FLIGHT);
+    record_of(&own(FLIGHT), image, cut)["blocks_written"].as_u64().unwrap()
+}
+
+/// Records a flight likewise: what `hums sim --json` says.
+fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
     let mut arguments = vec!["sim".into(), "--json".into(), "--card-size".into(), "64".into()];
     arguments.extend(["--input".into(), flight.display().to_string()]);
     arguments.extend(["--sd".into(), image.display().to_string()]);
     arguments.extend(cut.iter().flat_map(|cut| ["--cut-after-writes".into(), cut.to_string()]));
-    let report: Value = serde_json::from_str(&hums(arguments).expect_code(&[0, 3]).text()).unwrap();
-    report["blocks_written"].as_u64().unwrap()
+    serde_json::from_str(&hums(arguments).expect_code(&[0, 3]).text()).unwrap()
 }
 
 /// The logs as `verify --json` has them; the exit code must be this one.
@@ -88,4 +93,65 @@ fn the_next_log_on_the_card_tells_that_the_end_of_the_one_before_is_gone() {
     );
     assert_eq!(end["behind"]["erased"], 30, "{end}");
     assert_eq!(logs[1]["end"]["proof"], "closed");
+}
+
+/// A vehicle that is armed at 5 s, in the air from 8 s on, lands at 38 s and stays armed. 56 frames a second.
+fn landing(path: &Path) {
+    let (mut log, mut encoder) = (Vec::new(), Encoder::of(1, 1));
+    for tick in 0..60 * 50_u64 {
+        let armed = if tick >= 5 * 50 { 0x80 } else { 0 };
+        let landed = if (8 * 50..38 * 50).contains(&tick) { 2 } else { 1 };
+        let heartbeat = || Packet::new(0).u8(4, 2).u8(5, 3).u8(6, 0x51 | armed).u8(7, 4).u8(8, 3);
+        let state = || Packet::new(245).u8(1, landed);
+        let packets = [
+            Some(Packet::new(30).u32(0, tick as u32 * 20)),
+            tick.is_multiple_of(50).then(heartbeat),
+            tick.is_multiple_of(10).then(state),
+        ];
+        for packet in packets.iter().flatten() {
+            let mut buffer = [0; FRAME_BYTES_MAX];
+            log.extend_from_slice(&(1_700_000_000_000_000 + tick * 20_000).to_be_bytes());
+            log.extend_from_slice(encoder.frame(&mut buffer, packet));
+        }
+    }
+    fs::write(path, log).unwrap();
+}
+
+#[test]
+fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_within_200_ms() {
+    let dir = tempfile::tempdir().unwrap();
+    let (flight, image) = (dir.path().join("flight.tlog"), dir.path().join("card.img"));
+    landing(&flight);
+    let cut = |at| {
+        let _ = fs::remove_file(&image);
+        let report = record_of(&flight, &image, at);
+        let text =
+            hums(["verify".as_ref(), "--json".as_ref(), image.as_os_str()]).expect_code(&[0, 3]).text();
+        (report, serde_json::from_str::<Value>(&text).unwrap()["logs"][0]["end"].clone())
+    };
+    // The first write with which the mark is on the card.
+    let (mut without, mut with) = (1, cut(None).0["blocks_written"].as_u64().unwrap());
+    while with - without > 1 {
+        let middle = without.midpoint(with);
+        let is_there = cut(Some(middle)).1["mark"]["why"] == "landed";
+        (without, with) = if is_there { (without, middle) } else { (middle, with) };
+    }
+    let (report, end) = cut(Some(with));
+    assert_eq!(end["proof"], "mark", "{end}");
+    assert!(end["words"].as_str().unwrap().contains("whole to the landing at "), "{end}");
+    hums(["verify".as_ref(), image.as_os_str()]).expect_code(&[0]);
+    // What came in between the mark and that write.
+    let decode = [
+        "decode".as_ref(),
+        image.as_os_str(),
+        "-o".as_ref(),
+        "-".as_ref(),
+        "--format".as_ref(),
+        "jsonl".as_ref(),
+    ];
+    let rows = hums(decode).expect_code(&[0]).text();
+    let mark = rows.lines().find(|row| row.contains("HUMS_MARK")).expect("a mark");
+    let mark: Value = serde_json::from_str(mark).unwrap();
+    let later = report["frames_in"].as_u64().unwrap() - mark["fields"]["frames"].as_u64().unwrap();
+    assert!(later * 1_000 <= 200 * 56, "{later} frames after the mark: {report}");
 }

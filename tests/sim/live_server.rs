@@ -131,3 +131,15 @@ fn sigterm_ends_what_waits_for_a_board() {
     stderr.read_to_string(&mut words).unwrap();
     assert!(words.contains("interrupted"), "{words}");
 }
+
+#[test]
+fn an_autopilots_own_log_is_played() {
+    let log = hums_tests::flights::root().join("tests/labelled/px4/p23_motor_dead_quad.cut.ulg.gz");
+    let live = Live::start(&["--input", log.to_str().unwrap()]);
+    let host = live.address.trim_start_matches("http://").trim_end_matches('/');
+    assert!(answer(handshake(host)).contains("101"), "its page opens");
+    // It goes on: the log is longer than this.
+    std::thread::sleep(Duration::from_secs(2));
+    let (code, said) = live.interrupt(Duration::from_secs(20));
+    assert_eq!(code, Some(0), "{said}");
+}

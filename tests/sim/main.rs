@@ -20,6 +20,7 @@ mod persistence;
 mod power_cut;
 mod protection;
 mod pull;
+mod raw_device;
 mod round_trip;
 mod salvage;
 mod second_decoder;

@@ -76,7 +76,7 @@ fn standard<T>(_: T) -> Option<FileId> {
 }
 
 /// A path without the `missing/..` in it; `None` where there is none.
-fn folded(path: &Path) -> Option<PathBuf> {
+pub(super) fn folded(path: &Path) -> Option<PathBuf> {
     let (mut kept, mut is_folded) = (PathBuf::new(), false);
     for part in path.components() {
         let is_missing = part == Component::ParentDir

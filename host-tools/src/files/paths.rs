@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
+use super::identity::folded;
+
 /// How the name of a file or a folder ends that is not whole yet.
 pub const PART: &str = ".hums-part";
 
@@ -39,6 +41,8 @@ pub fn make_directory(dir: &Path) -> Result<()> {
 fn check_directory(dir: &Path) -> Result<()> {
     // Without a slash at its end, with which a file is not found.
     let dir: PathBuf = dir.components().collect();
+    // Nor where it is spelled through a folder that would be made on the way.
+    let dir = folded(&dir).unwrap_or(dir);
     match dir.ancestors().find(|folder| folder.is_file()) {
         Some(file) => {
             bail!("{}: is a file, and a directory is needed there; name another output", file.display())

@@ -156,7 +156,11 @@ fn a_cards_image_is_written_over_by_no_format() {
     for format in ["tlog", "csv", "jsonl", "influx", "parquet", "thesis", "tlog,csv"] {
         for output in ["card.img", "./card.img", "./new-folder/../card.img"] {
             for flag in ["", "--replace", "--salvage"] {
-                refused(at, &words_of(&format!("decode card.img -o {output} --format {format} {flag}")), &before);
+                refused(
+                    at,
+                    &words_of(&format!("decode card.img -o {output} --format {format} {flag}")),
+                    &before,
+                );
             }
         }
     }

@@ -7,6 +7,7 @@ mod help;
 mod in_place;
 mod inputs;
 mod killed;
+mod pairs;
 mod read;
 mod record;
 mod replace;

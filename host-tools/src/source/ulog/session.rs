@@ -373,9 +373,7 @@ impl<'a, 'b> Session<'a, 'b> {
             Told::Text { severity, words } => self.say(severity, &words),
             Told::Event { number, severity } => self.tell(Item::Event(Event { number, severity, words: "" })),
             Told::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
-            Told::Failsafes(words) => {
-                self.tell(Item::Fact(Fact { about: About::Failsafes, words: &words }))
-            }
+            Told::Failsafes(words) => self.tell(Item::Fact(Fact { about: About::Failsafes, words: &words })),
             Told::Utc { utc_us, recorded_us } => self.epoch(i128::from(utc_us) - i128::from(recorded_us)),
         }
     }

@@ -100,12 +100,7 @@ pub(super) const HANDLERS: &[Handler] = &[
         take: position,
         ..MOTION
     },
-    Handler {
-        names: &[("ORGN", 0)],
-        columns: &[&["Type"], &["Alt"]],
-        take: origin,
-        ..MOTION
-    },
+    Handler { names: &[("ORGN", 0)], columns: &[&["Type"], &["Alt"]], take: origin, ..MOTION },
     Handler {
         names: &[("XKF1", 0), ("XKF6", 1), ("NKF1", 0), ("NKF6", 1), ("EKF1", 0)],
         columns: &[&["C"], &["VN"], &["VE"], &["VD"], &["PN"], &["PE"], &["PD"]],

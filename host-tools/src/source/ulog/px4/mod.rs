@@ -27,10 +27,7 @@ const LISTS: [&[Topic]; 4] = [system::TOPICS, motion::TOPICS, power::TOPICS, rec
 
 /// The row of a topic, if it is needed.
 pub(super) fn topic(name: &str) -> Option<&'static Topic> {
-    LISTS
-        .into_iter()
-        .flatten()
-        .find(|topic| topic.name == name)
+    LISTS.into_iter().flatten().find(|topic| topic.name == name)
 }
 
 impl Px4 {

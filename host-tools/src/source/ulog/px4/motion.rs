@@ -179,13 +179,7 @@ pub(super) const TOPICS: &[Topic] = &[
         take: estimator_flags,
     },
     // Motors are given this since v1.13.
-    Topic {
-        name: "actuator_motors",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["control"],
-        take: motors,
-    },
+    Topic { name: "actuator_motors", instances: 1, every_us: MEDIUM_US, fields: &["control"], take: motors },
     Topic {
         name: "sensor_selection",
         instances: 1,
@@ -386,7 +380,8 @@ fn test_ratios(px4: &mut Px4, said: &Said<'_>) {
         return;
     }
     let largest = |fields: std::ops::Range<usize>| {
-        let elements = fields.flat_map(|field| (0..3).filter_map(move |element| said.fields.element(field, element)));
+        let elements =
+            fields.flat_map(|field| (0..3).filter_map(move |element| said.fields.element(field, element)));
         let squares = elements.filter(|square| square.is_finite() && *square >= 0.0);
         squares.reduce(f64::max).map(|square| square.sqrt() as f32)
     };

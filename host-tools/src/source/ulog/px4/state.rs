@@ -33,10 +33,22 @@ pub(in crate::source::ulog) struct Said<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::source::ulog) enum Told {
     Observation(Observation),
-    Text { severity: u8, words: String },
-    Event { number: u32, severity: u8 },
-    Mode { number: u32, name: Option<&'static str> },
-    Utc { utc_us: u64, recorded_us: u64 },
+    Text {
+        severity: u8,
+        words: String,
+    },
+    Event {
+        number: u32,
+        severity: u8,
+    },
+    Mode {
+        number: u32,
+        name: Option<&'static str>,
+    },
+    Utc {
+        utc_us: u64,
+        recorded_us: u64,
+    },
     /// Why it is in failsafe, by name; empty where it is not.
     Failsafes(String),
 }
@@ -114,6 +126,7 @@ pub(super) struct Status {
 
 /// What topics said of motion.
 #[derive(Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "which topics a log has, none a state of the others")]
 pub(super) struct Motion {
     pub(super) combined: bool,
     pub(super) rate: Option<[f32; 3]>,

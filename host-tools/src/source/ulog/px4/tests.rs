@@ -266,7 +266,11 @@ fn the_throttle_is_that_of_the_motors_where_nothing_else_tells_it() {
         let wanted = [(4, floats(&[0.0, 0.0, -0.25]))];
         let wanted = ("vehicle_thrust_setpoint", "float[3] xyz;", if thrust { &wanted[..] } else { &[] });
         let hud = observations(&log(&[status, motors, wanted, position]), "Hud(").remove(0);
-        hud.split("throttle: Some(Fraction(").nth(1).and_then(|rest| rest.split(')').next()).expect("a throttle").to_owned()
+        hud.split("throttle: Some(Fraction(")
+            .nth(1)
+            .and_then(|rest| rest.split(')').next())
+            .expect("a throttle")
+            .to_owned()
     };
     assert_eq!((throttle(false).as_str(), throttle(true).as_str()), ("0.6", "0.25"));
 }

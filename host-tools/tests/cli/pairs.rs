@@ -1,0 +1,80 @@
+//! One flight as its autopilot logged it and as a telemetry port heard it, through the program.
+
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use super::support::{json, run, text};
+
+fn labelled(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/labelled").join(name)
+}
+
+fn uncompressed(name: &str) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let file = fs::File::open(labelled(name)).expect("a log");
+    flate2::read::GzDecoder::new(file).read_to_end(&mut bytes).expect("read");
+    bytes
+}
+
+/// What is wrong with the vehicle: check, instance, level, seconds since take-off.
+fn problems(dir: &Path, name: &str) -> Vec<(String, u64, String, f64)> {
+    let code = if name.contains("n03") { 0 } else { 4 };
+    let checked = json(&run(dir, &format!("check --json {}", labelled(name).display()), code));
+    let take_off = checked["flights"][0]["from_s"].as_f64().expect("a flight");
+    let problems = checked["problems"].as_array().expect("problems");
+    let word = |problem: &serde_json::Value, name: &str| problem[name].as_str().expect(name).to_owned();
+    let one = |problem: &serde_json::Value| {
+        let (instance, at) = (problem["instance"].as_u64(), problem["time_s"].as_f64());
+        let since = at.expect("a time") - take_off;
+        (word(problem, "check"), instance.expect("a number"), word(problem, "level"), since)
+    };
+    problems.iter().map(one).collect()
+}
+
+#[test]
+fn an_autopilots_log_and_a_recording_of_the_same_flight_are_judged_alike() {
+    let dir = tempfile::tempdir().expect("a directory");
+    // The shock of a crash is shorter than the time between two samples of a recording.
+    for (log, recording, only_in_log) in [
+        ("bin/f12_gps_jump.bin.gz", "f12_gps_jump.tlog.gz", ""),
+        ("bin/n03_wind9_gusty.bin.gz", "n03_wind9_gusty.tlog.gz", ""),
+        ("px4/p23_motor_dead_quad.cut.ulg.gz", "px4/p23_motor_dead_quad.tlog.gz", "impact"),
+    ] {
+        let (own, told) = (problems(dir.path(), log), problems(dir.path(), recording));
+        let own: Vec<_> = own.into_iter().filter(|(check, ..)| check != only_in_log).collect();
+        assert_eq!(own.len(), told.len(), "{log}: {own:?}\n{told:?}");
+        assert_eq!(log.contains("n03"), told.is_empty(), "{log}: {told:?}");
+        for (check, instance, level, at) in &told {
+            let same = own.iter().find(|one| (&one.0, &one.1, &one.2) == (check, instance, level));
+            let (.., other) = same.unwrap_or_else(|| panic!("{check} is not in {log}: {own:?}"));
+            assert!((other - at).abs() <= 1.0, "{check}: {other} s in {log}, {at} s in the recording");
+        }
+    }
+}
+
+#[test]
+fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_its_place() {
+    let dir = tempfile::tempdir().expect("a directory");
+    for (name, log) in
+        [("flight.bin", "bin/f12_gps_jump.bin.gz"), ("flight.ulg", "px4/p23_motor_dead_quad.cut.ulg.gz")]
+    {
+        let mut bytes = uncompressed(log);
+        let middle = bytes.len() / 2;
+        bytes[middle..middle + 1_000].fill(0xff);
+        fs::write(dir.path().join(name), bytes).expect("written");
+        let checked = json(&run(dir.path(), &format!("check --json {name}"), 3));
+        assert_eq!(checked["damaged"], true, "{name}");
+        let gaps = checked["gaps"].as_array().expect("gaps");
+        let place = |gap: &serde_json::Value| gap["place"].as_u64().unwrap_or(0);
+        let is_there = |gap: &&serde_json::Value| place(gap).abs_diff(middle as u64) < 1_000;
+        let gap = gaps.iter().find(is_there).unwrap_or_else(|| panic!("{name}: {gaps:?}"));
+        // What is left of the message in which it begins may look like one.
+        assert!(gap["bytes"].as_u64() >= Some(800), "{name}: {gap}");
+        // What lies before and behind it is judged.
+        let (from, to) = (checked["from_s"].as_f64(), checked["to_s"].as_f64());
+        assert!(to.zip(from).is_some_and(|(to, from)| to - from > 60.0), "{name}: {checked}");
+        let said = text(&run(dir.path(), &format!("check {name}"), 3));
+        assert!(said.contains(&place(gap).to_string()), "{name}: its place is for people too: {said}");
+    }
+}
