@@ -2,7 +2,8 @@
 
 usage: autopilot.py DIALECT.py AUTOPILOT_PORT GS_PORT PILOT        prints JSON
   AUTOPILOT_PORT, GS_PORT  the UDP ports at which `hums sim --input udpin:... --gs udpin:...` listens
-  PILOT                    what the pilot does when the action is announced: nothing, cancels, or on_ground: it never flew
+  PILOT                    what the pilot does when the action is announced: nothing, cancels, or on_ground: it never flew;
+                           two_systems: nothing, and the heartbeat of another vehicle, system 7, is forwarded, first of all
 
 The battery is empty from the fourth second on. The autopilot answers COMMAND_LONG, and does what it says. It prints
 
@@ -56,8 +57,9 @@ class World:
     def __init__(self, dialect, autopilot_port, gs_port, pilot):
         self.autopilot = Port(dialect, autopilot_port, 1, AUTOPILOT)
         self.station = Port(dialect, gs_port, 255, 190)
+        self.other = dialect.MAVLink(self.autopilot, srcSystem=7, srcComponent=AUTOPILOT)
         self.pilot, self.mode = pilot, GUIDED
-        self.commands, self.texts, self.cancel = [], [], None
+        self.commands, self.texts, self.cancel, self.beats = [], [], None, 0
         self.start = time.monotonic()
 
     def now_s(self):
@@ -65,6 +67,9 @@ class World:
 
     def fly(self):
         mav, boot_ms = self.autopilot.mav, int((time.monotonic() - self.start) * 1000)
+        if self.pilot == "two_systems" and self.beats % 10 == 0:
+            self.other.heartbeat_send(1, 3, 1 | ARMED, 10, 4)
+        self.beats += 1
         flies = self.pilot != "on_ground" and boot_ms > 1000
         mav.heartbeat_send(2, 3, 1 | (ARMED if flies else 0), self.mode, 4)
         height_mm = 20_000 if flies and boot_ms > 1500 else 0

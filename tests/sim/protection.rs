@@ -105,6 +105,13 @@ fn an_empty_battery_is_announced_counted_down_and_the_autopilot_told_once_and_it
 }
 
 #[test]
+fn with_another_vehicle_heard_first_on_the_port_the_command_is_for_ours() {
+    let outcome = fly(&format!("PROT_ACTION 2\nPROT_DELAY {DELAY_S}\n"), "two_systems");
+    let [asked] = &outcome.commands()[..] else { panic!("once: {}", outcome.said) };
+    assert_eq!((&asked["command"], &asked["target"]), (&21.into(), &serde_json::json!([1, 1])));
+}
+
+#[test]
 fn the_pilot_cancels_it_by_command_and_nothing_is_asked() {
     let outcome = fly(&format!("PROT_ACTION 1\nPROT_DELAY {DELAY_S}\n"), "cancels");
     let said = &outcome.said;

@@ -2,11 +2,14 @@
 //! empty. So a count is known, or it is not; then nothing follows from the voltage of a cell, and the pilot is told what to set.
 //!
 //! In this order:
-//! 1. the setting `BAT_CELLS`;
+//! 1. the setting `BAT_CELLS`, which is of every pack: for one whose voltage does not fit it (the second pack is another one) the
+//!    count is not known, unless its cells are reported one by one;
 //! 2. the cells that the battery reports one by one;
 //! 3. the autopilot's parameters, as far as the measured voltage does not contradict them;
 //! 4. the highest voltage since power-on, of a pack at rest, where only one count fits it: 3.5 to 4.4 V a cell;
-//! 5. the count of earlier flights, where it is one of several that fit. Packs are swapped: what does not fit is not believed.
+//! 5. the count of earlier flights, where it is one of several that fit and a cell has 3.7 V by it at rest. Packs are swapped: what
+//!    does not fit is not believed. A full pack of one cell less is told apart (a 5S after a 6S has 3.5 V a cell of six); one
+//!    of a cell more that is half empty is not (a 7S of 25.9 V after a 6S).
 //!
 //! A pack is another one when its voltage falls by a third while the vehicle is disarmed.
 
@@ -20,11 +23,15 @@ const SET_MAX: usize = 2;
 const CELL_HIGHEST_V: f32 = 4.4;
 /// A pack at rest that is flown with has more than this a cell: lithium polymer is nearly empty there, lithium ion below half.
 const CELL_RESTING_V: f32 = 3.5;
+/// A cell at rest has more than this by a count of earlier flights that one of several is chosen by.
+const CELL_CONFIRMED_V: f32 = 3.7;
 /// A cell has this at least: nearly empty, and under load.
 const CELL_EMPTY_V: f32 = 3.0;
 const CELL_LOADED_V: f32 = 2.8;
 /// A pack whose voltage falls below this part of its highest, disarmed, is another one.
 const ANOTHER: f32 = 0.7;
+/// Beside a stored count: the last flight did not know it.
+pub(crate) const DOUBTED: u8 = 0x80;
 /// Below this nothing is plugged in.
 const PLUGGED_V: f32 = 2.5;
 /// `ArduPilot`'s `BATT_LOW_VOLT` as delivered says nothing of the pack.
@@ -91,6 +98,8 @@ struct Pack {
     rested: bool,
     /// Of earlier flights; 0 for none.
     before: u8,
+    /// The last of these could not confirm it.
+    doubted: bool,
     /// 0: not known.
     count: u8,
 }
@@ -113,7 +122,7 @@ fn counts(volts: f32, from_v: f32, to_v: f32) -> Counts {
 
 impl Cells {
     pub(crate) const fn new() -> Self {
-        const PACK: Pack = Pack { highest_v: 0.0, id: 0, rested: false, before: 0, count: 0 };
+        const PACK: Pack = Pack { highest_v: 0.0, id: 0, rested: false, before: 0, doubted: false, count: 0 };
         Self { packs: [PACK; BATTERIES_MAX], settings: [[0.0; SETTINGS]; SET_MAX] }
     }
 
@@ -143,10 +152,12 @@ impl Cells {
         (0..BATTERIES_MAX).for_each(|place| self.count(place));
     }
 
-    /// The count of earlier flights.
+    /// The count of earlier flights, with [`DOUBTED`] where the last one did not know it.
     pub(crate) fn remember(&mut self, battery: usize, count: u8) {
         if let Some(pack) = self.packs.get_mut(battery) {
-            pack.before = if usize::from(count) <= COUNT_MAX { count } else { 0 };
+            let known = count & !DOUBTED;
+            pack.before = if usize::from(known) <= COUNT_MAX { known } else { 0 };
+            pack.doubted = count != known;
             self.count(battery);
         }
     }
@@ -170,7 +181,8 @@ impl Cells {
     }
 
     fn count(&mut self, battery: usize) {
-        let Some(Pack { highest_v, id, rested, before, .. }) = self.packs.get(battery).copied() else {
+        let Some(Pack { highest_v, id, rested, before, doubted, .. }) = self.packs.get(battery).copied()
+        else {
             return;
         };
         let lowest_v = if rested { CELL_EMPTY_V } else { CELL_LOADED_V };
@@ -183,7 +195,9 @@ impl Cells {
             _ => resting,
         };
         let is_sure = left.is_power_of_two() && (said || rested);
-        let confirmed = before > 0 && left >> before & 1 == 1;
+        // In the air a cell may have anything: only what was known up to then is believed.
+        let is_likely = if rested { highest_v >= f32::from(before) * CELL_CONFIRMED_V } else { !doubted };
+        let confirmed = before > 0 && left >> before & 1 == 1 && is_likely;
         if let Some(pack) = self.packs.get_mut(battery) {
             pack.count = match (is_sure, confirmed) {
                 (true, _) => left.trailing_zeros() as u8,
@@ -191,6 +205,14 @@ impl Cells {
                 (false, false) => 0,
             };
         }
+    }
+
+    /// Whether the highest voltage of the battery at a place may be that of so many cells.
+    pub(crate) fn fits(&self, battery: usize, count: u8) -> bool {
+        self.packs.get(battery).is_some_and(|pack| {
+            let lowest_v = if pack.rested { CELL_EMPTY_V } else { CELL_LOADED_V };
+            (lowest_v..=CELL_HIGHEST_V).contains(&(pack.highest_v / f32::from(count.max(1))))
+        })
     }
 
     /// How many; 0 where it is not known.
@@ -309,6 +331,35 @@ mod tests {
         let mut unfit = plugged(30.4);
         unfit.remember(0, 6);
         assert_eq!(unfit.of(0), 0);
+        // A full 5S after a 6S is no empty 6S. A 6S at 3.7 V is one.
+        for (pack_v, before, count) in [(21.1, 6, 0), (21.7, 6, 0), (22.3, 6, 6), (25.2, 7, 0), (50.4, 14, 0)]
+        {
+            let mut cells = plugged(pack_v);
+            cells.remember(0, before);
+            assert_eq!(cells.of(0), count, "{pack_v} V after {before}S");
+        }
+    }
+
+    #[test]
+    fn a_count_that_the_last_flight_did_not_confirm_is_not_believed_in_the_air() {
+        for (stored, count) in [(6, 6), (6 | DOUBTED, 0), (DOUBTED, 0), (0xFF, 0)] {
+            let mut cells = Cells::new();
+            cells.remember(0, stored);
+            cells.take_voltage(0, 0, 20.4, false, true);
+            assert_eq!(cells.of(0), count, "{stored}");
+            // Another time, at rest and full.
+            let mut cells = plugged(25.2);
+            cells.remember(0, stored);
+            assert_eq!(cells.of(0), if stored & 6 == 6 && stored != 0xFF { 6 } else { 0 }, "{stored}");
+        }
+    }
+
+    #[test]
+    fn a_setting_fits_a_pack_by_its_highest_voltage() {
+        let cells = plugged(12.6);
+        let fitting: Vec<u8> = (0..=24).filter(|count| cells.fits(0, *count)).collect();
+        assert_eq!(fitting, [3, 4], "and not 6");
+        assert!(!cells.fits(1, 6) && !cells.fits(9, 6), "nothing was heard of it");
     }
 
     #[test]

@@ -282,15 +282,17 @@ impl Derived {
     /// Cells of a battery: set, reported, or found ([`crate::cells`]). 0 where that is not known.
     pub(crate) fn cell_count(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> u8 {
         let set = params.get(Param::BatCells) as u8;
-        if set > 0 {
+        if set > 0 && self.cells.fits(battery, set) {
             return set;
         }
         let reported =
             vehicle.batteries.get(battery).and_then(Latest::get).map_or(0, Battery::cells_reported);
-        if reported > 1 {
-            return reported as u8;
+        match reported {
+            2.. => reported as u8,
+            // What contradicts the setting is not known: the setting may be wrong, or the pack empty.
+            _ if set > 0 => 0,
+            _ => self.cells.of(battery),
         }
-        self.cells.of(battery)
     }
 
     /// The lowest cell's voltage where cells are measured, the pack's share of it otherwise; what it would be without its sag

@@ -3,8 +3,12 @@
 //! An autopilot forwards what other systems say, so the first heartbeat on the port may be of another vehicle. The first
 //! one heard is taken at once, so that nothing waits; for [`SETTLES`] another one takes its place if it says far more.
 //! Then the choice stands until the vehicle has been silent for [`SILENT`]: the autopilot was changed, or its system id.
+//!
+//! A vehicle that makes no stream gives way to one that does, at any time. Autopilots may be silent until they are asked, so
+//! while more than one is heard and none streamed by itself each is asked in [`TURN`]s, and the choice does not stand before
+//! each has had its turn: the one at the port streams more than one that is heard over a radio.
 
-use crate::observation::Source;
+use crate::observation::{Autopilot, Source};
 use crate::time::{Instant, Span};
 
 /// Autopilots that are compared; more than these are not counted.
@@ -17,6 +21,10 @@ pub const SILENT: Span = Span::from_secs(30);
 const WINDOW: Span = Span::from_secs(10);
 /// Observations in a window that make a stream: heartbeats alone, one a second, are fewer.
 const STREAM_MIN: u16 = 20;
+/// How long each is asked: it is listened to for 5 s, and then asked for one message after the other, or for groups of them.
+const TURN: Span = Span::from_secs(15);
+/// Nobody is asked before. Who streams by then does it by itself.
+const UNASKED: Span = Span::from_secs(5);
 /// Another system has to say so many times more.
 const FAR_MORE: u16 = 2;
 
@@ -24,6 +32,7 @@ const FAR_MORE: u16 = 2;
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     source: Source,
+    autopilot: Autopilot,
     /// Observations in this window, and in the one before.
     now: u16,
     before: u16,
@@ -44,16 +53,56 @@ pub(crate) struct Election {
     window: Instant,
     /// When the first heartbeat was heard, or the vehicle was chosen anew.
     since: Option<Instant>,
+    /// When the first heartbeat was heard: turns are counted from there.
+    first: Instant,
+    /// The vehicle makes a stream.
+    streams: bool,
+    /// It did so before anybody was asked.
+    by_itself: bool,
+    /// The choice stands.
+    settled: bool,
 }
 
 impl Election {
     pub(crate) const fn new() -> Self {
-        Self { candidates: [None; CANDIDATES_MAX], window: Instant::ZERO, since: None }
+        Self {
+            candidates: [None; CANDIDATES_MAX],
+            window: Instant::ZERO,
+            since: None,
+            first: Instant::ZERO,
+            streams: false,
+            by_itself: false,
+            settled: false,
+        }
     }
 
     /// Whether the choice stands for as long as the vehicle is heard.
     pub(crate) fn is_settled(&self, now: Instant) -> bool {
-        self.since.is_some_and(|since| now.since(since) >= SETTLES)
+        self.settled || (self.lasts(now) >= SETTLES && self.heard(now).count() == 1)
+    }
+
+    /// Who is to be asked for streams now.
+    pub(crate) fn asks(&self, now: Instant, vehicle: Source) -> Option<(Source, Autopilot)> {
+        let count = self.heard(now).count();
+        let asked = if self.settled || count < 2 || self.is_decided(now) {
+            self.of(vehicle)
+        } else {
+            let turns = now.since(self.first).as_micros() / TURN.as_micros();
+            self.heard(now).nth(turns as usize % count)
+        };
+        asked.map(|candidate| (candidate.source, candidate.autopilot))
+    }
+
+    /// Whether nothing that is asked changes the choice any more.
+    fn is_decided(&self, now: Instant) -> bool {
+        let turns = self.heard(now).count() as u64;
+        let over = now.since(self.first).as_micros() >= turns * TURN.as_micros();
+        self.by_itself || (self.streams && (turns < 2 || over))
+    }
+
+    /// Who was heard of late.
+    fn heard(&self, now: Instant) -> impl Iterator<Item = &Candidate> {
+        self.candidates.iter().flatten().filter(move |candidate| now.since(candidate.heard) < SILENT)
     }
 
     /// How long the vehicle has been the vehicle.
@@ -61,38 +110,58 @@ impl Election {
         self.since.map_or(Span::ZERO, |since| now.since(since))
     }
 
-    /// Takes note of an observation; who the vehicle is from now on. `heartbeat`: it is an autopilot's heartbeat.
+    /// Takes note of an observation; who the vehicle is from now on. `heartbeat`: it is that of such an autopilot.
     pub(crate) fn hear(
         &mut self,
         at: Instant,
         vehicle: Option<Source>,
         source: Source,
-        heartbeat: bool,
+        heartbeat: Option<Autopilot>,
     ) -> Option<Source> {
         self.count(at, vehicle, source, heartbeat);
         let Some(vehicle) = vehicle else {
-            return heartbeat.then(|| self.choose(at, source));
+            heartbeat?;
+            self.first = at;
+            return Some(self.choose(at, source));
         };
+        if source == vehicle && self.settled {
+            return Some(vehicle);
+        }
         let mine = self.of(vehicle);
         let silent = mine.is_none_or(|mine| at.since(mine.heard) >= SILENT);
-        if source == vehicle || (self.is_settled(at) && !silent) {
+        let mine = mine.map_or(0, Candidate::says);
+        if source == vehicle {
+            self.note_stream(at, mine);
+            self.settled = self.lasts(at) >= SETTLES && self.is_decided(at);
+        }
+        if source == vehicle || (self.settled && !silent) {
             return Some(vehicle);
         }
         let says = self.of(source).map_or(0, Candidate::says);
-        let limit = if silent { 0 } else { mine.map_or(0, Candidate::says).saturating_mul(FAR_MORE) };
+        let limit = if silent || !self.streams { 0 } else { mine.saturating_mul(FAR_MORE) };
         Some(if says >= STREAM_MIN.max(limit) { self.choose(at, source) } else { vehicle })
     }
 
     fn choose(&mut self, at: Instant, source: Source) -> Source {
         self.since = Some(at);
+        (self.streams, self.by_itself, self.settled) = (false, false, false);
+        self.note_stream(at, self.of(source).map_or(0, Candidate::says));
         source
+    }
+
+    /// So much the vehicle says.
+    fn note_stream(&mut self, at: Instant, says: u16) {
+        if !self.streams && says >= STREAM_MIN {
+            self.streams = true;
+            self.by_itself = at.since(self.first) < UNASKED;
+        }
     }
 
     fn of(&self, source: Source) -> Option<&Candidate> {
         self.candidates.iter().flatten().find(|candidate| candidate.source == source)
     }
 
-    fn count(&mut self, at: Instant, vehicle: Option<Source>, source: Source, heartbeat: bool) {
+    fn count(&mut self, at: Instant, vehicle: Option<Source>, source: Source, heartbeat: Option<Autopilot>) {
         if at.since(self.window) >= WINDOW {
             self.window = at;
             for candidate in self.candidates.iter_mut().flatten() {
@@ -105,14 +174,16 @@ impl Election {
             let gone = |slot: &Option<Candidate>| {
                 slot.is_none_or(|old| at.since(old.heard) >= SILENT && Some(old.source) != vehicle)
             };
-            self.candidates.iter().position(gone).filter(|_| heartbeat)
+            self.candidates.iter().position(gone).filter(|_| heartbeat.is_some())
         });
         let Some(slot) = place.and_then(|place| self.candidates.get_mut(place)) else { return };
-        let fresh = Candidate { source, now: 0, before: 0, heard: at };
+        let autopilot = heartbeat.unwrap_or_default();
+        let fresh = Candidate { source, autopilot, now: 0, before: 0, heard: at };
         let candidate = slot.get_or_insert(fresh);
         if candidate.source != source {
             *candidate = fresh;
         }
+        candidate.autopilot = heartbeat.unwrap_or(candidate.autopilot);
         candidate.now = candidate.now.saturating_add(1);
         candidate.heard = at;
     }
@@ -135,7 +206,7 @@ mod tests {
         for now_ms in ms.step_by(100) {
             for (source, every_ms) in who {
                 if now_ms.is_multiple_of(*every_ms) {
-                    let heartbeat = now_ms.is_multiple_of(1_000);
+                    let heartbeat = now_ms.is_multiple_of(1_000).then_some(Autopilot::Px4);
                     vehicle = election.hear(Instant::from_millis(now_ms), vehicle, *source, heartbeat);
                 }
             }
@@ -146,7 +217,7 @@ mod tests {
     #[test]
     fn the_first_heartbeat_is_taken_at_once_and_one_that_streams_takes_its_place() {
         let mut election = Election::new();
-        let vehicle = election.hear(Instant::ZERO, None, OTHER, true);
+        let vehicle = election.hear(Instant::ZERO, None, OTHER, Some(Autopilot::Px4));
         assert_eq!(vehicle, Some(OTHER));
         // The other one's heartbeats are forwarded; ours streams.
         let vehicle = hear(&mut election, vehicle, 100..5_000, &[(OTHER, 1_000), (OURS, 100)]);
@@ -157,8 +228,8 @@ mod tests {
     #[test]
     fn nothing_but_a_heartbeat_makes_a_vehicle() {
         let mut election = Election::new();
-        assert_eq!(election.hear(Instant::ZERO, None, OURS, false), None);
-        assert_eq!(election.hear(Instant::ZERO, None, OURS, true), Some(OURS));
+        assert_eq!(election.hear(Instant::ZERO, None, OURS, None), None);
+        assert_eq!(election.hear(Instant::ZERO, None, OURS, Some(Autopilot::Px4)), Some(OURS));
     }
 
     #[test]
@@ -187,11 +258,59 @@ mod tests {
     }
 
     #[test]
+    fn a_stream_takes_the_place_of_a_vehicle_that_never_streamed_at_any_time() {
+        for from_ms in [12_000, 200_000] {
+            let mut election = Election::new();
+            let vehicle = hear(&mut election, None, 0..from_ms, &[(OTHER, 1_000), (OURS, 1_000)]);
+            assert_eq!(vehicle, Some(OTHER), "it was heard first");
+            assert!(!election.is_settled(Instant::from_millis(from_ms)));
+            let until_ms = from_ms + 3_000;
+            let vehicle = hear(&mut election, vehicle, from_ms..until_ms, &[(OTHER, 1_000), (OURS, 100)]);
+            assert_eq!(vehicle, Some(OURS));
+            let rest = until_ms..until_ms + 60_000;
+            assert_eq!(hear(&mut election, vehicle, rest, &[(OURS, 100), (OTHER, 100)]), Some(OURS));
+            assert!(election.is_settled(Instant::from_millis(until_ms + 60_000)));
+        }
+    }
+
+    /// Two minutes in which the other's heartbeat comes first, and each streams so often once it was asked for 6 s, and for good.
+    fn asked_in_turns(ours_ms: u64, others_ms: u64) -> (Option<Source>, Option<Source>, bool) {
+        let mut election = Election::new();
+        let (mut vehicle, mut asked) = (None, [(OTHER, 0), (OURS, 0)]);
+        for now_ms in (0..120_000).step_by(100) {
+            let now = Instant::from_millis(now_ms);
+            if let Some((source, _)) = vehicle.and_then(|vehicle| election.asks(now, vehicle))
+                && let Some((_, for_ms)) = asked.iter_mut().find(|(of, _)| *of == source)
+            {
+                *for_ms += 100;
+            }
+            let who = asked.map(|(of, for_ms)| {
+                let streams_ms = if of == OURS { ours_ms } else { others_ms };
+                (of, if for_ms > 6_000 { streams_ms } else { 1_000 })
+            });
+            vehicle = hear(&mut election, vehicle, now_ms..now_ms + 100, &who);
+        }
+        let end = Instant::from_millis(120_000);
+        let asks = vehicle.and_then(|vehicle| election.asks(end, vehicle));
+        (vehicle, asks.map(|(source, _)| source), election.is_settled(end))
+    }
+
+    #[test]
+    fn one_that_is_silent_until_it_is_asked_is_asked_though_another_was_heard_first() {
+        assert_eq!(asked_in_turns(100, 1_000), (Some(OURS), Some(OURS), true));
+        // The other one streams too, when it is asked: over a radio, so far less.
+        assert_eq!(asked_in_turns(100, 300), (Some(OURS), Some(OURS), true));
+        let (_, _, settled) = asked_in_turns(1_000, 1_000);
+        assert!(!settled, "nobody streams: they are asked on");
+    }
+
+    #[test]
     fn more_systems_than_places_leave_room_for_the_vehicle() {
         let mut election = Election::new();
         let mut vehicle = None;
         for system in 10..60 {
-            vehicle = election.hear(Instant::ZERO, vehicle, Source { system, component: 1 }, true);
+            let source = Source { system, component: 1 };
+            vehicle = election.hear(Instant::ZERO, vehicle, source, Some(Autopilot::Px4));
         }
         let vehicle = hear(&mut election, vehicle, 0..90_000, &[(OURS, 100)]);
         assert_eq!(vehicle, Some(OURS));

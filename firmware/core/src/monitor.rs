@@ -54,6 +54,8 @@ pub struct Monitor {
     happenings: Happenings,
     before_tick: Before,
     cells_told: bool,
+    /// The autopilot has been asked for all its parameters.
+    parameters_asked: bool,
 }
 
 /// What was so at the last tick.
@@ -83,7 +85,7 @@ impl Before {
 /// A phase that does not last this long is not told: speeds cross their limits back and forth.
 const PHASE_LASTS: Span = Span::from_secs(1);
 
-/// By then the autopilot's parameters have been asked for: where cells are not known now, they will not be.
+/// By then cells are told as not known, where nobody says that the autopilot's parameters were asked for.
 const CELLS_COME: Span = Span::from_secs(45);
 
 const _: () = assert!(size_of::<Monitor>() <= 14 * 1024);
@@ -113,6 +115,7 @@ impl Monitor {
             happenings: Happenings::new(),
             before_tick: Before::NOTHING,
             cells_told: false,
+            parameters_asked: false,
         }
     }
 
@@ -140,6 +143,7 @@ impl Monitor {
         self.derived = Derived::new();
         self.health = Health::new();
         self.protect = Protect::new();
+        self.parameters_asked = false;
         self.happenings.push(Happening::OtherVehicle);
     }
 
@@ -281,18 +285,24 @@ impl Monitor {
     /// Keeps the cells that are known for the next power-on, and tells once where they are not.
     fn step_cells(&mut self, now: Instant) {
         let Self { vehicle, derived, params, before, saving, happenings, cells_told, .. } = self;
+        let come = self.parameters_asked || vehicle.known_for(now) >= CELLS_COME;
         for (battery, kept) in before.cells.iter_mut().enumerate() {
             let count = derived.cell_count(vehicle, battery, params);
-            if count > 0 && count != *kept && vehicle.is_settled(now) {
-                *kept = count;
-                saving.hurry(ItemKey::Lifetime);
-            }
             let known = vehicle.batteries.get(battery).and_then(Latest::get);
             let counts = known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle);
             let unknown = count == 0 && counts && derived.cells().has_voltage(battery);
-            if unknown && !*cells_told && vehicle.known_for(now) >= CELLS_COME {
+            if unknown && come && !*cells_told {
                 *cells_told = true;
                 happenings.push(Happening::CellsUnknown);
+            }
+            let keeps = match count {
+                0 if unknown && come && *kept > 0 => *kept | cells::DOUBTED,
+                0 => *kept,
+                _ => count,
+            };
+            if keeps != *kept && vehicle.is_settled(now) {
+                *kept = keeps;
+                saving.hurry(ItemKey::Lifetime);
             }
         }
     }
@@ -302,6 +312,11 @@ impl Monitor {
         if let Some(place) = cells::known(name) {
             self.derived.cells_mut().take_setting(place, value);
         }
+    }
+
+    /// Each parameter that tells of cells has been asked for: where they are not known now, they will not be.
+    pub const fn parameters_asked(&mut self) {
+        self.parameters_asked = true;
     }
 
     fn step_protect(&mut self, now: Instant, event: Option<FlightEvent>) {

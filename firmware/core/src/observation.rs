@@ -295,8 +295,10 @@ pub struct Battery {
 /// What a battery feeds: `MAV_BATTERY_FUNCTION`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Feeds {
-    /// Motors, everything, or not said: the vehicle comes down without it.
+    /// Not said. Of the autopilot's own and of a battery's component that is the vehicle ([`crate::vehicle`]).
     #[default]
+    Unsaid,
+    /// Motors or everything: the vehicle comes down without it.
     Vehicle,
     /// Avionics only.
     Avionics,
@@ -317,7 +319,7 @@ impl Default for Battery {
             temperature: None,
             faults: 0,
             lithium: true,
-            feeds: Feeds::Vehicle,
+            feeds: Feeds::Unsaid,
             charge: 0,
         }
     }

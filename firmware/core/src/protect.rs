@@ -10,18 +10,21 @@
 //! Only in flight and armed. It is announced with a countdown; the pilot cancels it by changing the flight mode, by
 //! disarming, or by a command, and one cancel holds for the flight. Each step is a record, with the autopilot's answer.
 //!
-//! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: on multicopters
-//! and helicopters. Nothing is asked of a vehicle that returns or lands already, by its mode, by its landed state or because
-//! it sinks close above the ground. The control structure and what could go wrong with it are in docs/safety.md.
+//! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: multicopters,
+//! helicopters, and a VTOL that says that it hovers. Nothing is asked of a vehicle that returns or lands already, by its mode, by its
+//! landed state or because it sinks close above the ground. `ArduPlane` and PX4 tell a mission's landing by none of these:
+//! while the mission sinks in the last [`APPROACH_M`] it is waited ([`approaches`]). The control structure and what could go wrong with it are in docs/safety.md.
 
 use core::fmt::Write as _;
 
 use heapless::String;
 
-use crate::flight::{Flight, FlightEvent, Phase};
+use crate::flight::{self, Flight, FlightEvent, Phase};
 use crate::health::{Health, Level, Subsystem};
 use crate::latest::Latest;
-use crate::observation::{Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind};
+use crate::observation::{
+    Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
+};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::{BATTERIES_MAX, LANDED_STATE_AGE, Vehicle};
@@ -37,6 +40,10 @@ const ATTEMPTS_MAX: u8 = 3;
 const PROGRESS: Span = Span::from_secs(10);
 /// A mission's last item is reached this long before the autopilot leaves the mission by itself.
 const MISSION_ENDS: Span = Span::from_secs(3);
+/// A mission that sinks faster than this below this height, or did so of late (it flares), may be landing.
+const APPROACH_MPS: f32 = 0.5;
+const APPROACH_M: f32 = 40.0;
+const APPROACH_LASTS: Span = Span::from_secs(15);
 /// `MAV_RESULT_ACCEPTED`
 const ACCEPTED: u8 = 0;
 /// `MAV_RESULT_TEMPORARILY_REJECTED`: asked again.
@@ -223,6 +230,8 @@ pub struct Protect {
     state: State,
     request: Option<Request>,
     cancelled: bool,
+    /// When it came down as a mission's landing does.
+    approached_at: Option<Instant>,
 }
 
 /// What a step looks at.
@@ -249,7 +258,7 @@ impl Situation<'_> {
 impl Protect {
     /// Nothing to do.
     pub const fn new() -> Self {
-        Self { state: State::Idle, request: None, cancelled: false }
+        Self { state: State::Idle, request: None, cancelled: false, approached_at: None }
     }
 
     /// What is to be sent to the autopilot now, once.
@@ -270,11 +279,16 @@ impl Protect {
             self.state = State::Idle;
         }
         let cancelled = core::mem::take(&mut self.cancelled);
+        if approaches(situation) {
+            self.approached_at = Some(now);
+        }
+        let lands =
+            in_mission(vehicle) && self.approached_at.is_some_and(|at| now.since(at) < APPROACH_LASTS);
         match self.state {
             State::Done => None,
             State::Idle => {
                 let action = Action::from_number(params.get(Param::ProtAction) as u8)?;
-                let starts = situation.flies() && concerned(vehicle, health, params);
+                let starts = !lands && situation.flies() && concerned(vehicle, health, params);
                 starts.then(|| self.announce(situation, action)).flatten()
             }
             State::Counting { action, until, mode, told_s } => {
@@ -284,6 +298,11 @@ impl Protect {
                 let mode_now = vehicle.heartbeat.get().map_or(mode, |heartbeat| heartbeat.mode);
                 if mode_now != mode && !mission_ended(now, vehicle, mode, mode_now) {
                     return Some(self.done(action, Stage::CancelledByMode));
+                }
+                if lands {
+                    // Should it fly on, it is announced anew.
+                    self.state = State::Idle;
+                    return Some(Step { action, stage: Stage::AlreadyDone, detail: 0 });
                 }
                 if !concerned(vehicle, health, params) {
                     self.state = State::Idle;
@@ -301,7 +320,9 @@ impl Protect {
             State::Asking { action, attempt, at, .. } => self
                 .hear(situation, action, attempt, at)
                 .or_else(|| Self::ends(situation, cancelled).map(|stage| self.done(action, stage)))
-                .or_else(|| self.insist(now)),
+                .or_else(
+                    || if lands { Some(self.done(action, Stage::AlreadyDone)) } else { self.insist(now) },
+                ),
             State::Refused => match Self::ends(situation, cancelled) {
                 Some(stage) => Some(self.done(Action::Land, stage)),
                 None => Some(self.ask(now, Action::Land, 1)),
@@ -359,7 +380,7 @@ impl Protect {
             }
             ACCEPTED => self.state = State::Done,
             _ => {
-                let lands = action == Action::Return && vehicle.kind() == VehicleKind::Rotorcraft;
+                let lands = action == Action::Return && hovers(situation);
                 self.state = if lands { State::Refused } else { State::Done };
             }
         }
@@ -380,6 +401,30 @@ impl Protect {
     }
 }
 
+/// Whether it can come down where it is. A VTOL has to say that it hovers: a wind that stops it over the ground is no hover.
+fn hovers(situation: &Situation<'_>) -> bool {
+    let Situation { now, vehicle, .. } = *situation;
+    vehicle.hovers(now) == Some(true)
+        && (vehicle.kind() != VehicleKind::Vtol || vehicle.vtol == VtolState::Hover)
+}
+
+/// Whether it flies a mission whose landing the autopilot tells by no mode and no landed state. `ArduCopter` does tell it.
+fn in_mission(vehicle: &Vehicle) -> bool {
+    vehicle.heartbeat.get().is_some_and(|heartbeat| match (heartbeat.autopilot, vehicle.kind()) {
+        (Autopilot::Px4, _) => (heartbeat.mode >> 16) as u16 == 0x0404,
+        (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => heartbeat.mode == 10,
+        _ => false,
+    })
+}
+
+/// Whether it comes down as a mission's landing does. A mission that goes to a lower place looks the same, and is waited for too.
+fn approaches(situation: &Situation<'_>) -> bool {
+    let Situation { now, vehicle, .. } = *situation;
+    in_mission(vehicle)
+        && flight::climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps < -APPROACH_MPS)
+        && flight::height_m(now, vehicle).is_some_and(|height_m| height_m < APPROACH_M)
+}
+
 /// An answer to our command, and not to what somebody else asked.
 fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
     let system = vehicle.source.map_or(0, |source| source.system);
@@ -388,7 +433,8 @@ fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
 }
 
 /// Whether a check that `PROT_CHECK` names is critical: 0 an empty battery (by what remains or by its cells), from 1 on
-/// any check of a subsystem. A battery that feeds the avionics or the payload alone is no reason to come down.
+/// any check of a subsystem. A battery that feeds the avionics or the payload alone, or nobody knows what, is no reason to come
+/// down.
 fn concerned(vehicle: &Vehicle, health: &Health, params: &Params) -> bool {
     let chosen = params.get(Param::ProtCheck) as u8;
     health.levels().any(|(check, instance, level)| {
@@ -436,9 +482,9 @@ fn on_its_way(situation: &Situation<'_>) -> bool {
                 let [_, _, main, sub] = heartbeat.mode.to_le_bytes();
                 main == 4 && matches!(sub, 5 | 6 | 9)
             }
-            // ArduPlane: RTL, QLAND, QRTL, AUTOLAND.
+            // ArduPlane: RTL, QLAND, QRTL, LOITER_ALT_QLAND, AUTOLAND.
             (Autopilot::ArduPilot, VehicleKind::Plane | VehicleKind::Vtol) => {
-                matches!(heartbeat.mode, 11 | 20 | 21 | 26)
+                matches!(heartbeat.mode, 11 | 20 | 21 | 25 | 26)
             }
             // ArduCopter: RTL, LAND, SMART_RTL, AUTO_RTL.
             (Autopilot::ArduPilot, _) => matches!(heartbeat.mode, 6 | 9 | 21 | 27),

@@ -9,7 +9,7 @@ use crate::inertial::Inertial;
 use crate::latest::Latest;
 use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
-    GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
+    Feeds, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX,
     Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime, TelemetryRadio,
     VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
@@ -23,10 +23,11 @@ pub const RECEIVERS_MAX: usize = 2;
 pub(crate) const LANDED_STATE_AGE: Span = Span::from_secs(5);
 /// An attitude that was the wanted one at each sample for so long follows none.
 const LED: Span = Span::from_secs(5);
-/// A boot time that falls by more than this is a reboot, not reordering.
-const REBOOT_MS: u32 = 3_000;
-/// A fall from here is the end of the counter's range.
-const BOOT_END_MS: u32 = u32::MAX - 60_000;
+/// `MAV_COMP_ID_BATTERY`, `MAV_COMP_ID_BATTERY2`
+const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
+/// Boot times follow each other within this of the time that went by, microseconds: messages overtake each other and wait in line.
+/// One that falls by more is a reboot.
+const REBOOT_US: i64 = 3_000_000;
 
 /// One motor, put together from whichever ESC messages the vehicle sends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -113,8 +114,11 @@ pub struct Vehicle {
     /// How often another system has become the vehicle: everything else here is then of that one.
     pub changes: u32,
     election: Election,
-    /// The highest boot time since its last boot, milliseconds, and whether it was armed when it was told last.
-    boot_ms: Option<u32>,
+    /// The highest boot time since its last boot, milliseconds, and when it came.
+    boot: Option<(u32, Instant)>,
+    /// One that does not follow it, until the next one agrees with either.
+    odd_boot: Option<(u32, Instant)>,
+    /// Whether it was armed when a boot time was believed last.
     boot_armed: bool,
 }
 
@@ -175,7 +179,8 @@ impl Vehicle {
             rebooted_armed: false,
             changes: 0,
             election: Election::new(),
-            boot_ms: None,
+            boot: None,
+            odd_boot: None,
             boot_armed: false,
         }
     }
@@ -239,6 +244,11 @@ impl Vehicle {
         self.election.is_settled(now)
     }
 
+    /// Who is to be asked for streams: the vehicle, and until that is settled each autopilot on the port in turn.
+    pub fn asks(&self, now: Instant) -> Option<(Source, Autopilot)> {
+        self.election.asks(now, self.source?)
+    }
+
     /// For how long this has been the vehicle.
     pub fn known_for(&self, now: Instant) -> Span {
         self.election.lasts(now)
@@ -246,7 +256,10 @@ impl Vehicle {
 
     /// Takes an observation; `false` when it is not of this vehicle.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
-        let heartbeat = matches!(observation, Observation::Heartbeat(_));
+        let heartbeat = match observation {
+            Observation::Heartbeat(heartbeat) => Some(heartbeat.autopilot),
+            _ => None,
+        };
         let chosen = self.election.hear(at, self.source, source, heartbeat);
         if chosen != self.source {
             self.become_another(chosen);
@@ -325,23 +338,36 @@ impl Vehicle {
         self.time.set(at, time);
     }
 
-    /// A boot time that falls is a reboot. Messages overtake each other a little, and 32 bits of milliseconds end after
-    /// 49.7 days: neither is one.
+    /// A boot time that falls, and which the next one agrees with, is a reboot. One wrong time is none, nor are messages that
+    /// overtake each other a little, nor the end of 32 bits of milliseconds after 49.7 days.
     fn take_boot_time(&mut self, at: Instant, boot_ms: u32) {
-        let before = self.boot_ms.unwrap_or(0);
-        if before >= BOOT_END_MS {
-            self.boot_ms = Some(boot_ms);
-        } else if boot_ms.saturating_add(REBOOT_MS) < before {
+        // How far this one is ahead of an earlier one, and how far it should be.
+        let ahead_us = |(told_ms, told_at): (u32, Instant)| {
+            let ahead_ms = boot_ms.wrapping_sub(told_ms) as i32;
+            (i64::from(ahead_ms) * 1_000, at.since(told_at).as_micros() as i64)
+        };
+        if let Some((ahead, passed)) = self.boot.map(ahead_us)
+            && (-REBOOT_US..=passed + REBOOT_US).contains(&ahead)
+        {
+            if ahead > 0 {
+                self.boot = Some((boot_ms, at));
+            }
+            (self.odd_boot, self.boot_armed) = (None, self.armed());
+            return;
+        }
+        let agrees = |(ahead, passed): (i64, i64)| (ahead - passed).abs() <= REBOOT_US;
+        if !self.odd_boot.map(ahead_us).is_some_and(agrees) {
+            self.odd_boot = Some((boot_ms, at));
+            return;
+        }
+        if self.boot.map(ahead_us).is_some_and(|(ahead, _)| ahead < 0) {
             self.reboots = self.reboots.saturating_add(1);
             self.rebooted_at = Some(at);
             // As it was before: the first heartbeat after a restart may come before the time that shows it, and an autopilot's own
             // log of the next power-on may begin with its arming.
             self.rebooted_armed = self.boot_armed;
-            self.boot_ms = Some(boot_ms);
-        } else {
-            self.boot_ms = Some(before.max(boot_ms));
         }
-        self.boot_armed = self.armed();
+        (self.boot, self.odd_boot, self.boot_armed) = (Some((boot_ms, at)), None, self.armed());
     }
 
     fn note_led(&mut self, at: Instant, attitude: &Attitude) {
@@ -375,7 +401,14 @@ impl Vehicle {
         self.vibration.set(at, Vibration { scale, ..vibration });
     }
 
-    fn take_battery(&mut self, at: Instant, component: u8, battery: Battery) {
+    /// One that does not say what it feeds is the vehicle's if the autopilot or a battery of its own component tells of it; that of a
+    /// gimbal or a payload is not.
+    fn take_battery(&mut self, at: Instant, component: u8, mut battery: Battery) {
+        let is_own = BATTERY_COMPONENTS.contains(&component)
+            || self.source.is_some_and(|vehicle| vehicle.component == component);
+        if battery.feeds == Feeds::Unsaid && is_own {
+            battery.feeds = Feeds::Vehicle;
+        }
         let Self { batteries, battery_of, told_battery, .. } = self;
         *told_battery = batteries
             .iter()
@@ -460,7 +493,7 @@ mod tests {
     #[test]
     fn a_falling_boot_time_is_a_reboot_and_reordering_is_not() {
         let mut vehicle = known();
-        for boot_ms in [5_000, 6_000, 5_500, 7_000, 300] {
+        for boot_ms in [5_000, 6_000, 5_500, 7_000, 300, 400] {
             let time = SystemTime { boot_ms, utc_micros: None };
             vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::SystemTime(time));
         }
@@ -470,10 +503,46 @@ mod tests {
     #[test]
     fn attitude_alone_tells_a_reboot_and_the_end_of_the_counter_is_none() {
         let mut vehicle = known();
-        for boot_ms in [u32::MAX - 10, 5, 90_000, 90_400, 90_100, 1_000] {
+        for boot_ms in [u32::MAX - 10, 5, 90_000, 90_400, 90_100, 1_000, 1_100] {
             let attitude = Attitude { boot_ms: Some(boot_ms), ..Attitude::default() };
             vehicle.observe(Instant::from_millis(7), AUTOPILOT, &Observation::Attitude(attitude));
         }
         assert_eq!((vehicle.reboots, vehicle.rebooted_at), (1, Some(Instant::from_millis(7))));
+    }
+
+    /// The boot times of an autopilot that has run for 200 s, every tenth of a second, but for one of them.
+    fn reboots_with(odd_ms: u32, restarts: bool) -> (u32, Option<Instant>) {
+        let mut vehicle = known();
+        for step in 0..600 {
+            let ran_ms = if restarts && step >= 300 { step - 300 } else { 2_000 + step } * 100;
+            let boot_ms = if step == 200 { odd_ms } else { ran_ms };
+            let attitude = Attitude { boot_ms: Some(boot_ms), ..Attitude::default() };
+            let at = Instant::from_millis(u64::from(step) * 100);
+            vehicle.observe(at, AUTOPILOT, &Observation::Attitude(attitude));
+        }
+        (vehicle.reboots, vehicle.rebooted_at)
+    }
+
+    #[test]
+    fn one_wrong_boot_time_is_no_restart_and_a_restart_after_it_is_seen_within_a_second() {
+        for odd_ms in [0, 7, 100_000, 1_000_000, u32::MAX / 2, u32::MAX] {
+            assert_eq!(reboots_with(odd_ms, false), (0, None), "{odd_ms}");
+            assert_eq!(reboots_with(odd_ms, true), (1, Some(Instant::from_millis(30_100))), "{odd_ms}");
+        }
+    }
+
+    #[test]
+    fn a_battery_that_does_not_say_what_it_feeds_feeds_the_vehicle_if_its_component_does() {
+        for (component, feeds) in
+            [(1, Feeds::Vehicle), (180, Feeds::Vehicle), (181, Feeds::Vehicle), (154, Feeds::Unsaid)]
+        {
+            let mut vehicle = known();
+            let source = Source { system: 1, component };
+            vehicle.observe(Instant::ZERO, source, &Observation::Battery(Battery::default()));
+            assert_eq!(vehicle.batteries[0].get().map(|battery| battery.feeds), Some(feeds), "{component}");
+            let propels = Battery { feeds: Feeds::Vehicle, ..Battery::default() };
+            vehicle.observe(Instant::ZERO, source, &Observation::Battery(propels));
+            assert_eq!(vehicle.batteries[0].get().map(|battery| battery.feeds), Some(Feeds::Vehicle));
+        }
     }
 }

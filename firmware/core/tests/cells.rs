@@ -105,6 +105,72 @@ fn what_the_autopilot_the_setting_or_an_earlier_flight_tells_makes_it_known() {
 }
 
 #[test]
+fn packs_of_1_to_14_cells_are_critical_when_they_are_empty_and_not_before() {
+    for cells in [1, 2, 3, 4, 6, 7, 8, 10, 12, 14] {
+        let told = setting("BAT1_N_CELLS", cells as f32);
+        let n = cells as f32;
+        let mut monitor = Monitor::new(protected());
+        let outcome = fly(&mut monitor, 4.2 * n, 3.0 * n, &[told]);
+        assert_eq!(outcome.cells(), [(0, Level::Critical)], "{cells}S");
+        assert!(outcome.requests > 0 && outcome.told_ms.is_empty(), "{cells}S");
+        let outcome = fly(&mut Monitor::new(protected()), 4.2 * n, 3.7 * n, &[told]);
+        assert!(outcome.cells().is_empty() && outcome.requests == 0, "{cells}S");
+    }
+}
+
+#[test]
+fn a_setting_is_no_count_of_a_pack_that_it_does_not_fit() {
+    let mut set = protected();
+    set.set("BAT_CELLS", 6.0).unwrap();
+    let second = Battery { id: 1, voltage: Some(Volts(12.5)), ..Battery::default() };
+    let outcome = fly(&mut Monitor::new(set), 25.0, 23.0, &[Observation::Battery(second)]);
+    assert!(outcome.findings.is_empty() && outcome.requests == 0, "{:?}", outcome.findings);
+    assert_eq!(outcome.told_ms.len(), 1, "the second pack's cells are not known");
+    // The pack that it fits is judged by it.
+    let outcome = fly(&mut Monitor::new(set), 25.0, 18.0, &[Observation::Battery(second)]);
+    let levels: Vec<_> = outcome.cells().into_iter().map(|(_, level)| level).collect();
+    assert_eq!(levels, [Level::Critical]);
+}
+
+#[test]
+fn a_full_5s_after_a_flight_with_a_6s_is_no_empty_6s_on_the_ground_or_after_a_restart_in_the_air() {
+    let mut monitor = Monitor::new(protected());
+    fly(&mut monitor, 25.2, 24.0, &[setting("MOT_BAT_VOLT_MAX", 25.2)]);
+    let stored = |monitor: &Monitor| {
+        let mut item = [0; ITEM_BYTES_MAX];
+        let length = monitor.encode_item(ItemKey::Lifetime, &mut item);
+        let mut next = Monitor::new(protected());
+        next.restore(ItemKey::Lifetime, &item[..length]).unwrap();
+        next
+    };
+    let mut five = stored(&monitor);
+    let outcome = fly(&mut five, 21.1, 20.3, &[]);
+    let mut levels = outcome.cells().into_iter().map(|(_, level)| level);
+    assert!(levels.all(|level| level == Level::Stale) && outcome.requests == 0, "{:?}", outcome.findings);
+    assert_eq!(outcome.told_ms.len(), 1, "not known, and told");
+    let mut restarted = stored(&five);
+    for now_ms in (0..60_000).step_by(100) {
+        let now = Instant::from_millis(now_ms);
+        let mut quad = Quad { start_height: 30.0, height: 30.0, ..Quad::healthy() };
+        quad.battery.voltage = Some(Volts(20.0));
+        for observation in quad.says(now_ms) {
+            restarted.observe(now, AUTOPILOT, &observation);
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        restarted.tick(now, &link, &quad.recorder, &mut |finding| panic!("{finding:?}"));
+        assert_eq!(restarted.take_request(), None);
+    }
+}
+
+#[test]
+fn cells_that_are_not_known_are_told_as_soon_as_the_parameters_were_asked_for() {
+    let mut monitor = Monitor::new(Params::defaults());
+    monitor.parameters_asked();
+    let outcome = fly(&mut monitor, 25.2, 24.0, &[]);
+    assert!(matches!(outcome.told_ms[..], [0..1_000]), "{:?}", outcome.told_ms);
+}
+
+#[test]
 fn a_count_is_kept_for_the_next_power_on_and_only_confirms() {
     let mut monitor = Monitor::new(Params::defaults());
     fly(&mut monitor, 25.2, 22.0, &[setting("BAT1_N_CELLS", 6.0)]);

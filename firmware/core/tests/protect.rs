@@ -7,7 +7,7 @@ use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::observation::{
-    Autopilot, Battery, CommandAck, Feeds, LandedState, Observation, Source, VehicleKind,
+    Autopilot, Battery, CommandAck, Feeds, LandedState, Observation, Source, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
 use hums_core::protect::{Action, Request, Stage};
@@ -201,18 +201,110 @@ fn any_landing_under_way_is_left_alone() {
 
 #[test]
 fn a_mission_that_ends_during_the_countdown_cancels_nothing_and_a_pilot_who_leaves_it_does() {
-    for (reached, requests) in [(true, 3), (false, 0)] {
-        let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
-            quad.autopilot = Autopilot::Px4;
-            quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
-            quad.mode = if now_ms < FOUND_MS + 5_000 { 0x0404_0000 } else { 0x0304_0000 };
-            if reached && now_ms == FOUND_MS + 4_000 {
-                let item = Observation::MissionReached(12);
-                monitor.observe(Instant::from_millis(now_ms), AUTOPILOT, &item);
-            }
-        });
-        assert_eq!(outcome.requests.len(), requests, "{:?}", outcome.steps);
+    use Autopilot::{ArduPilot, Px4};
+    use VehicleKind::{Plane, Rotorcraft};
+    for (autopilot, kind, mission, after) in [
+        (Px4, Rotorcraft, 0x0404_0000, 0x0304_0000),
+        (Px4, Plane, 0x0404_0000, 0x0304_0000),
+        (ArduPilot, Plane, 10, 12),
+        (ArduPilot, Rotorcraft, 3, 5),
+        (ArduPilot, Rotorcraft, 3, 17),
+    ] {
+        for (reached, requests) in [(true, 3), (false, 0)] {
+            let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+                (quad.autopilot, quad.kind) = (autopilot, kind);
+                quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+                quad.mode = if now_ms < FOUND_MS + 5_000 { mission } else { after };
+                if reached && now_ms == FOUND_MS + 4_000 {
+                    let item = Observation::MissionReached(12);
+                    monitor.observe(Instant::from_millis(now_ms), AUTOPILOT, &item);
+                }
+            });
+            assert_eq!(
+                outcome.requests.len(),
+                requests,
+                "{autopilot:?} {kind:?} {after}: {:?}",
+                outcome.steps
+            );
+        }
     }
+}
+
+/// In the air by its landed state, in a mission or not, from 80 m down at 1.5 m/s from the fourth second on; it flares.
+fn sinks(now_ms: u64, quad: &mut Quad, (autopilot, kind, mode): (Autopilot, VehicleKind, u32)) {
+    (quad.autopilot, quad.kind, quad.mode) = (autopilot, kind, mode);
+    quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+    let sunk_m = now_ms.saturating_sub(4_000) as f32 * 0.001_5;
+    (quad.height, quad.climb) = match 80.0 - sunk_m {
+        low_m if low_m < 3.0 => (2.0, -0.2),
+        height_m => (height_m, if now_ms < 4_000 { 0.0 } else { -1.5 }),
+    };
+}
+
+#[test]
+fn a_missions_landing_that_no_landed_state_tells_is_left_alone() {
+    for vehicle in [
+        (Autopilot::ArduPilot, VehicleKind::Plane, 10),
+        (Autopilot::ArduPilot, VehicleKind::Vtol, 10),
+        (Autopilot::Px4, VehicleKind::Plane, 0x0404_0000),
+        (Autopilot::Px4, VehicleKind::Rotorcraft, 0x0404_0000),
+    ] {
+        let outcome = fly(&params(Action::Return), |now_ms, quad, _| sinks(now_ms, quad, vehicle));
+        assert!(outcome.requests.is_empty(), "{vehicle:?}: {:?}", outcome.steps);
+        // At 40 m. The touch-down follows; nothing is announced in the flare.
+        let last = outcome.steps.last().map(|(at_ms, stage, _)| (*at_ms, *stage));
+        assert!(matches!(last, Some((30_600..30_900, Stage::AlreadyDone))), "{vehicle:?}: {last:?}");
+    }
+    // A pilot who sinks is no mission, and a landing of ArduCopter's mission is told by its landed state.
+    for vehicle in
+        [(Autopilot::ArduPilot, VehicleKind::Plane, 5), (Autopilot::ArduPilot, VehicleKind::Rotorcraft, 3)]
+    {
+        let outcome = fly(&params(Action::Return), |now_ms, quad, _| sinks(now_ms, quad, vehicle));
+        assert_eq!(outcome.requests.len(), 3, "{vehicle:?}: {:?}", outcome.steps);
+    }
+}
+
+#[test]
+fn a_mission_that_only_goes_lower_is_waited_for_and_protected_where_it_flies_on() {
+    let outcome = fly(&params(Action::Return), |now_ms, quad, _| {
+        (quad.kind, quad.mode) = (VehicleKind::Plane, 10);
+        quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+        (quad.height, quad.climb) = if now_ms < 30_000 { (35.0, -1.0) } else { (20.0, 0.0) };
+    });
+    assert!(matches!(outcome.steps[0], (44_900..45_300, Stage::Announced, 10)), "{:?}", outcome.steps);
+    assert_eq!(outcome.requests.len(), 3);
+}
+
+#[test]
+fn a_vtol_that_says_that_it_hovers_is_landed_when_its_return_is_refused() {
+    for (vtol, commands) in [
+        (VtolState::Hover, vec![20, 21]),
+        (VtolState::Forward, vec![20]),
+        (VtolState::Transition, vec![20]),
+        (VtolState::Unknown, vec![20]),
+    ] {
+        let outcome = fly(&params(Action::Return), |now_ms, quad, monitor| {
+            (quad.kind, quad.type_number, quad.vtol) = (VehicleKind::Vtol, 22, vtol);
+            quad.landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+            ack(now_ms, monitor, ASKED_MS + 300, 20, 4, None);
+            ack(now_ms, monitor, ASKED_MS + 700, 21, 0, None);
+        });
+        let asked: Vec<_> = outcome.requests.iter().map(|(_, request)| request.command).collect();
+        assert_eq!(asked, commands, "{vtol:?}");
+    }
+}
+
+#[test]
+fn a_link_that_falls_silent_half_way_ends_nothing_and_a_pilot_who_takes_over_afterwards_is_left_alone() {
+    let outcome = fly(&params(Action::Return), |now_ms, quad, _| {
+        quad.silent = (FOUND_MS + 3_000..FOUND_MS + 6_000).contains(&now_ms);
+    });
+    assert_eq!(outcome.requests.len(), 3, "{:?}", outcome.steps);
+    let taken_over = fly(&params(Action::Return), |now_ms, quad, monitor| {
+        ack(now_ms, monitor, ASKED_MS + 300, 20, 0, None);
+        quad.mode = if (ASKED_MS + 500..ASKED_MS + 5_000).contains(&now_ms) { 6 } else { 4 };
+    });
+    assert_eq!(taken_over.requests.len(), 1, "{:?}", taken_over.steps);
 }
 
 #[test]
@@ -244,6 +336,16 @@ fn a_battery_of_the_payload_or_of_another_component_is_no_reason_to_come_down() 
         monitor.observe(Instant::from_millis(now_ms), gimbal, &Observation::Battery(battery));
     });
     assert!(payload.steps.is_empty(), "{:?}", payload.steps);
+    // One that does not say what it feeds: of a gimbal, and of a battery's own component.
+    for (component, comes_down) in [(154, false), (180, true), (181, true), (1, true)] {
+        let unsaid = fly(&params(Action::Land), |now_ms, quad, monitor| {
+            quad.battery.remaining = Some(Fraction(0.8));
+            let battery = Battery { id: 3, remaining: Some(Fraction(0.05)), ..Battery::default() };
+            let source = Source { system: 1, component };
+            monitor.observe(Instant::from_millis(now_ms), source, &Observation::Battery(battery));
+        });
+        assert_eq!(!unsaid.requests.is_empty(), comes_down, "{component}: {:?}", unsaid.steps);
+    }
     let other_vehicle = fly(&params(Action::Land), |now_ms, quad, monitor| {
         quad.battery.remaining = Some(Fraction(0.8));
         let battery = Battery { remaining: Some(Fraction(0.05)), ..Battery::default() };

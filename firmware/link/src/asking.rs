@@ -179,6 +179,19 @@ impl Asking {
         }
     }
 
+    /// Who is asked.
+    pub fn of(&self) -> Option<Source> {
+        self.vehicle.map(|(source, _)| source)
+    }
+
+    /// Whether it was asked for all parameters that it may have, and has answered or let the time for it go by.
+    pub fn has_parameters(&self, known: &Known) -> bool {
+        known.autopilot != Autopilot::Other
+            && self.of() == Some(known.source)
+            && self.window == ROUND
+            && self.parameter(known).is_none()
+    }
+
     /// A frame of the vehicle came.
     pub fn seen(&mut self, id: u32) {
         if let Some(index) = WANTED.iter().position(|wanted| wanted.0 == id) {

@@ -385,7 +385,7 @@ fn urgency(finding: &Finding) -> u8 {
 pub fn text(finding: &Finding) -> Text {
     let words = health::words(finding.check);
     let of = match finding.feeds {
-        Feeds::Vehicle => "",
+        Feeds::Vehicle | Feeds::Unsaid => "",
         Feeds::Avionics => "avionics ",
         Feeds::Payload => "payload ",
     };

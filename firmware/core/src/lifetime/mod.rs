@@ -152,7 +152,8 @@ pub struct Lifetime {
     pub boots: u32,
     /// Power-ons in which the airframe was heard.
     pub sessions: u32,
-    /// Cells of its batteries as they were known last; 0 not known. They confirm, and prove nothing.
+    /// Cells of its batteries as they were known last; 0 not known; with 128 added where they were not known since. They confirm, and
+    /// prove nothing.
     pub cells: [u8; BATTERIES_MAX],
     /// Every counter of usage.
     pub totals: Totals,

@@ -122,6 +122,29 @@ fn a_px4_is_asked_for_what_is_missing_and_left_alone_with_the_rest() {
 }
 
 #[test]
+fn both_autopilots_are_asked_for_the_landed_state_and_their_parameters_are_known_as_asked() {
+    for autopilot in [Autopilot::Px4, Autopilot::ArduPilot] {
+        let mut script = Script::new(autopilot);
+        let mut asking = Asking::new();
+        let known = Known {
+            source: Source { system: 1, component: 1 },
+            autopilot,
+            reboots: 0,
+            identified: true,
+            baud: 921_600,
+        };
+        script.run(&mut asking, 0, 6);
+        assert!(!asking.has_parameters(&known), "{autopilot:?}");
+        script.run(&mut asking, 6, 40);
+        assert_eq!(script.count(SET_MESSAGE_INTERVAL, 245), 1, "{autopilot:?}");
+        assert_eq!(script.rate(245), Some(2));
+        assert!(asking.has_parameters(&known), "none of them was answered: {autopilot:?}");
+        let other = Source { system: 7, component: 1 };
+        assert!(!asking.has_parameters(&Known { source: other, ..known }));
+    }
+}
+
+#[test]
 fn a_reboot_and_a_stream_that_falls_silent_are_asked_again() {
     let mut px4 = Script::new(Autopilot::Px4);
     let mut asking = Asking::new();

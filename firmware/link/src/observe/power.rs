@@ -38,9 +38,10 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
         lithium: battery.mavtype as u8 != LITHIUM_IRON && battery.mavtype as u8 != NICKEL,
         // MAV_BATTERY_FUNCTION
         feeds: match Fields(payload).u8(33) {
+            1 | 2 => Feeds::Vehicle,
             3 => Feeds::Avionics,
             4 => Feeds::Payload,
-            _ => Feeds::Vehicle,
+            _ => Feeds::Unsaid,
         },
         charge: Fields(payload).u8(40),
     })

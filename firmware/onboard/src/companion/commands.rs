@@ -45,6 +45,11 @@ pub(crate) const DENIED: u8 = 2;
 const UNSUPPORTED: u8 = 3;
 const FAILED: u8 = 4;
 
+/// Whether a command only asks for a message, and changes nothing.
+pub(crate) const fn only_asks(command: u16) -> bool {
+    matches!(command, MESSAGE | PROTOCOL | CAPABILITIES | PREFLIGHT)
+}
+
 /// Answers in line, and what commands decide.
 #[derive(Clone, Debug)]
 pub(crate) struct Commands {

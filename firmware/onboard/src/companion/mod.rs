@@ -140,7 +140,7 @@ impl Companion {
         sectors: &mut SectorsIn,
         gs: &mut GsIn,
     ) {
-        if book.monitor.vehicle().source == Some(frame.source()) {
+        if self.asking.of() == Some(frame.source()) {
             self.asking.seen(frame.id());
             if frame.id() == 22
                 && let Some(name) = Fields(frame.payload()).text(8, 16)
@@ -215,7 +215,7 @@ impl Companion {
                     Trust::Refused => commands::DENIED,
                     _ => self.commands.command(now, asker, command, params, book, sectors),
                 };
-                if result == commands::ACCEPTED {
+                if result == commands::ACCEPTED && !commands::only_asks(command) {
                     self.secure.changed(trust);
                 }
                 let is_broadcast = asked.target.1 == 0;
@@ -370,8 +370,12 @@ impl Companion {
             }
         }
         if params.get(Param::ApStreams) > 0.5 {
-            let known = known(monitor);
+            let known = known(now, monitor);
             asking.tick(now, known.as_ref(), &mut |packet| outlet.send(now, Class::Own, packet, &mut out));
+            let is_vehicle = |known: &Known| Some(known.source) == monitor.vehicle().source;
+            if known.filter(is_vehicle).is_some_and(|known| asking.has_parameters(&known)) {
+                monitor.parameters_asked();
+            }
         }
     }
 
@@ -409,13 +413,15 @@ impl Companion {
     }
 }
 
-fn known(monitor: &Monitor) -> Option<Known> {
+/// Who is asked: the vehicle, and each autopilot on the port in turn until it is settled which of them that is.
+fn known(now: Instant, monitor: &Monitor) -> Option<Known> {
     let vehicle = monitor.vehicle();
+    let (source, autopilot) = vehicle.asks(now)?;
     Some(Known {
-        source: vehicle.source?,
-        autopilot: vehicle.heartbeat.get()?.autopilot,
+        source,
+        autopilot,
         reboots: vehicle.reboots,
-        identified: vehicle.identity.get().is_some(),
+        identified: vehicle.identity.get().is_some() || vehicle.source != Some(source),
         baud: monitor.params().get(Param::ApBaud) as u32,
     })
 }

@@ -25,6 +25,7 @@ use hums_link::request::Port;
 use hums_link::signing::{KEY_BYTES, Key, Seal, Signing, Times, Verdict, stamp};
 use hums_store::Key as Item;
 
+use crate::persist::keeper::SIGNED_MAX;
 use crate::persist::{Handover, Keeper};
 use crate::queues::Path;
 
@@ -36,6 +37,8 @@ const TIMES_BYTES: usize = 24;
 pub(crate) const SETUP: u32 = 256;
 /// Times are stored no more often.
 const SAVE: Span = Span::from_secs(1);
+/// Nor than this while the store has little more than landing needs, and then [`SIGNED_MAX`] times at most.
+const SAVE_SCARCE: Span = Span::from_secs(60);
 /// Link ids: the summary stream and the answers at the ground station's port, and what goes to the autopilot.
 const LINKS: [u8; 2] = [0, 1];
 
@@ -71,6 +74,8 @@ pub(crate) struct Secure {
     key_due: bool,
     times_due: bool,
     saved_at: Option<Instant>,
+    /// Times stored since the store had more room than landing needs.
+    scarce: u8,
     /// Stamps of ours go on from here.
     last: u64,
     /// A key was set, and the time with it: both ways out begin anew.
@@ -89,6 +94,7 @@ impl Secure {
             key_due: false,
             times_due: false,
             saved_at: None,
+            scarce: 0,
             last: 0,
             reseal: false,
             remade: 0,
@@ -114,7 +120,10 @@ impl Secure {
 
     /// Hands over what is due, at every tick and at the end. `last` is the highest stamp that was signed with.
     pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) {
-        let Self { signing, times, key_due, times_due, saved_at, remade, .. } = self;
+        let Self { signing, times, key_due, times_due, saved_at, scarce, remade, .. } = self;
+        let has_room = handover.room() == Room::Enough;
+        *scarce = if has_room { 0 } else { *scarce };
+        let every = if has_room { SAVE } else { SAVE_SCARCE };
         if core::mem::replace(remade, handover.remade()) != handover.remade() {
             (*key_due, *times_due) = (signing.key().is_some(), signing.key().is_some());
         }
@@ -124,10 +133,11 @@ impl Secure {
         }
         // By time alone nothing is stored that landing needs the room for. After a power-off stamps may then begin below
         // the last one, and are refused until UTC is known.
-        if let Some(last) = last.filter(|_| handover.room() == Room::Enough) {
+        if let Some(last) = last.filter(|_| has_room) {
             *times_due |= times.keep_ahead(now, signing.clock.now(now), last);
         }
-        if *times_due && saved_at.is_none_or(|at| now.since(at) >= SAVE) {
+        let may = *scarce < SIGNED_MAX && saved_at.is_none_or(|at| now.since(at) >= every);
+        if *times_due && may {
             let mut bytes = [0; TIMES_BYTES];
             let numbers = [times.accepted, times.used, times.time];
             for (bytes, number) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(numbers) {
@@ -135,6 +145,7 @@ impl Secure {
             }
             if handover.put(Item::item(ITEM_TIMES), &bytes) {
                 (*times_due, *saved_at) = (false, Some(now));
+                *scarce += u8::from(!has_room);
             }
         }
     }
@@ -210,5 +221,54 @@ impl Secure {
                 (None, seal) => *last = seal.take().map_or(*last, |seal| seal.last().max(*last)),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::persist::{Kept, Mailbox, StoreStatus};
+    use hums_core::lifetime::ItemKey;
+    use hums_store::sim::SimFlash;
+
+    type Flash = SimFlash<16384>;
+
+    #[test]
+    fn signed_changes_all_day_leave_what_a_landing_needs_of_the_store() {
+        let mut flash = Flash::blank();
+        let (mailbox, status) = (Mailbox::new(), StoreStatus::new());
+        let (items_in, items_out) = mailbox.split();
+        let mut keeper = Keeper::mount(Some(&mut flash), items_out, &status);
+        let mut monitor = Box::new(Monitor::new(Params::defaults()));
+        let mut handover = Handover::new(items_in, &status, &mut monitor);
+        let mut secure = Secure::new();
+        secure.set_key(Instant::ZERO, Key([7; KEY_BYTES]), 1);
+        let mut scarce = 0;
+        for second in 1..86_400 {
+            secure.changed(Trust::Signed);
+            secure.times.time = second;
+            secure.save(Instant::from_millis(second * 1_000), None, &mut handover);
+            while keeper.service(false) == Kept::Took {
+                scarce += u32::from(handover.room() == Room::Reserve);
+            }
+        }
+        assert!((1..=u32::from(SIGNED_MAX) + 1).contains(&scarce), "{scarce}");
+        // A landing: what it needs is stored without an erase.
+        let landing = [
+            (ItemKey::Exceedances, 505),
+            (ItemKey::Baselines, 100),
+            (ItemKey::Session, 160),
+            (ItemKey::Session, 160),
+        ];
+        for (key, length) in landing {
+            assert!(handover.put(Item::item(key.number()), &[1; 512][..length]));
+            assert_eq!(keeper.service(false), Kept::Took, "{key:?}");
+        }
+        assert_eq!(status.read().refused, 0);
+        // What waited is stored once there is room again.
+        assert!(secure.times_due);
+        assert!(keeper.turn_ahead());
+        secure.save(Instant::from_millis(86_400_000), None, &mut handover);
+        assert!(!secure.times_due && keeper.service(false) == Kept::Took);
     }
 }

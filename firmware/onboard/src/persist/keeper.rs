@@ -15,9 +15,12 @@ use super::status::{Calm, StoreState, StoreStatus, count};
 const AHEAD: (usize, usize) = (5, 8);
 /// A sector with less than this part of it free is erased on the ground even while the autopilot talks.
 const SCARCE: (usize, usize) = (1, 4);
-/// What landing and disarming need: all exceedances, the baselines, and the session's counters twice.
+/// What landing and disarming need: all exceedances, the baselines and the session's counters twice; beside them the times of
+/// so many signed changes, 40 bytes each.
 const RESERVE: usize = 1_280;
-const _: () = assert!(Exceedances::BYTES + Baselines::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16 <= RESERVE);
+pub(crate) const SIGNED_MAX: u8 = 4;
+const LANDING: usize = Exceedances::BYTES + Baselines::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
+const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 
 /// What one call of [`Keeper::service`] did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
