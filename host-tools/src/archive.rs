@@ -25,10 +25,18 @@ pub const GZIP: [u8; 3] = [0x1f, 0x8b, 8];
 /// Where a tar's first header says what it is (POSIX.1-1988 and later, GNU).
 const USTAR_AT: usize = 257;
 
-/// What a file that begins so (some hundred bytes) is and what to do with it, where it is one of these.
+/// PX4's logs from before 2017 look like ArduPilot's, with a format of another kind: its `TIME` is a message of its own.
+const SDLOG2: &str = "is a log of PX4 from before 2017 (sdlog2, .px4log), which is not read; PX4's Tools/sdlog2/sdlog2_dump.py makes CSV of it";
+/// The first bytes of such a log and of ArduPilot's: the definition of definitions.
+const FMT: [u8; 3] = [0xA3, 0x95, 0x80];
+
+/// What a file that begins so (some hundred bytes, some thousand of a log) is and what to do with it, where it is one of these.
 pub fn hint(start: &[u8]) -> Option<&'static str> {
     if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| start.starts_with(magic)) {
         return Some(what);
+    }
+    if start.starts_with(&FMT) && start.windows(14).any(|window| window == b"TIMEQ\0\0\0\0\0\0\0\0\0") {
+        return Some(SDLOG2);
     }
     match *start.first_chunk()? {
         [b'B', b'Z', b'h', b'1'..=b'9'] => return Some(BZIP2),
@@ -53,6 +61,7 @@ mod tests {
             (b"\xff\xfeF\0M\0T\0", "UTF-16"),
             (b"ULogEnc\x01", "encrypted"),
             (&tar, "tar"),
+            (b"\xa3\x95\x80\x80\x59FMT\0BBnNZ\xa3\x95\x80\x81\x0bTIMEQ\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0StartTime", "sdlog2"),
         ] {
             assert!(hint(start).is_some_and(|words| words.contains(what)), "{what}");
         }

@@ -10,7 +10,7 @@ use super::paced::Paced;
 use super::raw::Raw;
 use super::said::Said;
 use super::stream::Source as _;
-use super::timeline::{Timeline, Wrong, is_wrong};
+use super::timeline::{STEP_BACK_US_MAX, Timeline, Wrong, is_wrong};
 use super::tlog::{Record, Records, TIME_BYTES, UTC_US_MIN};
 use crate::names::message_name;
 use crate::plural::count;
@@ -64,6 +64,19 @@ impl TlogReader {
     }
 }
 
+/// Whether a record's time is wrong: the times after it say so, or it stands alone at one end of the recording, ten
+/// minutes from all others or before them. A ground station's clock gives no single record such a time.
+fn is_wrong_time(before: Option<u64>, time_us: u64, after: &[u64]) -> bool {
+    const ALONE_US: u64 = 600_000_000;
+    match (before, after.first()) {
+        (Some(before), None) => {
+            time_us > before.saturating_add(ALONE_US) || time_us.saturating_add(STEP_BACK_US_MAX) < before
+        }
+        (None, Some(next)) if *next > time_us.saturating_add(ALONE_US) => after.len() > 1,
+        _ => is_wrong(before, time_us, after.iter().copied()) == Some(true),
+    }
+}
+
 impl Reader for TlogReader {
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
@@ -77,7 +90,7 @@ impl Reader for TlogReader {
                         (timeline.and_then(|timeline| timeline.recorded_us()), || self.records.times_after());
                     let is_jump = timeline.is_none_or(|timeline| timeline.is_jump(time_us));
                     // Where a wrong one is the first of all, the next one tells when the recording began.
-                    let time_us = if is_jump && is_wrong(before, time_us, after()) == Some(true) {
+                    let time_us = if is_jump && is_wrong_time(before, time_us, &after()) {
                         wrong.add(now, place);
                         before.or_else(|| after().first().copied()).unwrap_or(time_us)
                     } else {
@@ -290,6 +303,15 @@ mod tests {
             // The first record's time begins the recording, unless it is the wrong one.
             let end = if at == 0 { 198 } else { 199 };
             assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_time_at_either_end_moves_no_other_time() {
+        for (at, wrong, end) in [(199, 90_000, 198), (199, 100, 198), (0, 90_000, 198)] {
+            let mut times: Vec<u64> = (80_000..80_200).collect();
+            times[at] = if at == 0 { times[0] - wrong.min(70_000) } else { times[at] + wrong };
+            assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{at} {wrong}");
         }
     }
 

@@ -526,7 +526,7 @@ impl Walk {
                     }
                     self.passed_over.push(words);
                 }
-                if kind.is_file() && is_named_as_recording(&path) {
+                if kind.is_file() && hint(&start).is_none() && is_named_as_recording(&path) {
                     self.unknown += 1;
                     if self.remarks.len() < REMARKS_MAX {
                         self.remarks

@@ -15,8 +15,10 @@ pub const STEP_BACK_US_MAX: u64 = 1_000_000;
 /// A step forward beyond this is damage or a clock that was set; gaps of hours are real.
 pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
 
-/// So many of the times after a jump are asked whether it is one.
-pub const ASKED: usize = 5;
+/// So many of the times after a jump are asked whether it is one: eight damaged ones in a row are outvoted.
+pub const ASKED: usize = 16;
+/// Times that stand in a file side by side are out of order by so much at most, as a rule.
+const DISORDER_US: u64 = 200_000;
 
 /// Whether a time that is far from the one before it is wrong: the times after it go on from the one before it, and not
 /// from it. `None` where none of them tells. Of the first time of all (`before` is `None`): whether the next one and
@@ -33,7 +35,8 @@ pub fn is_wrong(before: Option<u64>, recorded: u64, after: impl IntoIterator<Ite
         }
         let disagrees = match before {
             Some(before) if recorded > before && time.saturating_add(STEP_BACK_US_MAX) < before => continue,
-            Some(before) => time.abs_diff(before) < time.abs_diff(recorded),
+            Some(before) if recorded > before => time.saturating_add(DISORDER_US) < recorded,
+            Some(before) => time.saturating_add(DISORDER_US) >= before,
             None => time.saturating_add(STEP_BACK_US_MAX) < recorded,
         };
         *(if disagrees { &mut wrong } else { &mut right }) += 1;
@@ -177,6 +180,13 @@ mod tests {
         assert_eq!(wrong(3, [3, 3, 4, 4, 4]), Some(false), "a restart");
         assert_eq!(wrong(108, [5, 6, 7, 8, 9]), None, "old values");
         assert_eq!(is_wrong(None, 30 * SECOND, after([2, 2, 2, 3, 3])), Some(true), "the first of all");
+        let set = |tenths: [u64; 5]| {
+            is_wrong(Some(100 * SECOND), 98_900_000, tenths.map(|tenth| tenth * SECOND / 10))
+        };
+        assert_eq!(set([991, 993, 995, 997, 999]), Some(false), "a clock that was set back by a second");
+        assert_eq!(set([1_001, 1_003, 1_005, 1_007, 1_009]), Some(true));
+        let run = [800, 800, 801, 801, 100, 100, 100, 101, 101, 101].map(|second| second * SECOND);
+        assert_eq!(is_wrong(Some(100 * SECOND), 800 * SECOND, run), Some(true), "the first of five");
         assert_eq!(is_wrong(None, SECOND, after([2, 2, 90, 91, 92])), Some(false));
         assert_eq!(is_wrong(Some(SECOND), 9 * SECOND, []), None, "the last of all");
     }

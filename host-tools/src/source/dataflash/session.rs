@@ -152,7 +152,7 @@ pub(super) struct Session<'w> {
     /// Messages and their bytes by type, those of a name that a type had before.
     counts: Vec<(u64, u64)>,
     counts_before: BTreeMap<String, (u64, u64)>,
-    epoch_us: Option<u64>,
+    epoch: Epoch,
     firmware: String,
     rows_refused: bool,
     /// What messages with a doubted time, or with none, have changed: it holds from the next message on whose time is
@@ -178,7 +178,7 @@ impl<'w> Session<'w> {
             needed: vec![None; 256],
             counts: vec![(0, 0); 256],
             counts_before: BTreeMap::new(),
-            epoch_us: None,
+            epoch: Epoch::default(),
             firmware: first.banner.unwrap_or_default(),
             rows_refused: false,
             later: None,
@@ -303,7 +303,7 @@ impl<'w> Session<'w> {
         ahead: Ahead<'_>,
         take: &mut Take<'_>,
     ) -> Result<()> {
-        let Self { want, formats, state, clock, handlers, epoch_us, firmware, later, wrong, .. } = self;
+        let Self { want, formats, state, clock, handlers, epoch, firmware, later, wrong, .. } = self;
         let Some(format) = formats.get(kind) else { return Ok(()) };
         let message = Message::new(format, body);
         let week = || message.unsigned(format.field("TimeMS").or_else(|| format.field("Time"))?);
@@ -315,7 +315,7 @@ impl<'w> Session<'w> {
         if when.restarted {
             take(when.at, Item::Restart)?;
             state.restart();
-            *epoch_us = None;
+            *epoch = Epoch::default();
         }
         if let Some(from) = clock.silence() {
             let (cause, words) = if state.is_armed() {
@@ -331,7 +331,7 @@ impl<'w> Session<'w> {
         }
         let craft = state.craft();
         let mut result = Ok(());
-        let mut said = Said { at: when.at, observations: want.observations, craft, epoch_us, firmware, take };
+        let mut said = Said { at: when.at, observations: want.observations, craft, epoch, firmware, take };
         let mut hand = |say: &Say<'_>| {
             if result.is_ok() {
                 result = said.hand(say);
@@ -454,12 +454,39 @@ fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): 
     sum.1 += bytes;
 }
 
+/// The UTC of time zero, as the GPS tells it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Epoch {
+    known_us: Option<u64>,
+    /// Another one that was told last.
+    other_us: Option<u64>,
+}
+
+impl Epoch {
+    /// Takes what was told; gives what is new. Once one is known, another one counts when it is told twice: one damaged bit
+    /// moves the date by years.
+    fn take(&mut self, epoch_us: u64) -> Option<u64> {
+        let is_near =
+            |other: Option<u64>| other.is_some_and(|other| other.abs_diff(epoch_us) < EPOCH_DIFFERS_US);
+        if is_near(self.known_us) {
+            self.other_us = None;
+            return None;
+        }
+        if self.known_us.is_some() && !is_near(self.other_us) {
+            self.other_us = Some(epoch_us);
+            return None;
+        }
+        *self = Self { known_us: Some(epoch_us), other_us: None };
+        Some(epoch_us)
+    }
+}
+
 /// Hands on what handlers say, as items.
 struct Said<'a, 't> {
     at: Instant,
     observations: bool,
     craft: Craft,
-    epoch_us: &'a mut Option<u64>,
+    epoch: &'a mut Epoch,
     firmware: &'a mut String,
     take: &'a mut Take<'t>,
 }
@@ -482,14 +509,10 @@ impl Said<'_, '_> {
                 words.clone_into(self.firmware);
                 Item::Fact(Fact { about: About::Firmware, words })
             }
-            Say::Utc(utc_us) => {
-                let epoch_us = utc_us.saturating_sub(self.at.as_micros());
-                if self.epoch_us.is_some_and(|known| known.abs_diff(epoch_us) < EPOCH_DIFFERS_US) {
-                    return Ok(());
-                }
-                *self.epoch_us = Some(epoch_us);
-                Item::Epoch(epoch_us)
-            }
+            Say::Utc(utc_us) => match self.epoch.take(utc_us.saturating_sub(self.at.as_micros())) {
+                Some(epoch_us) => Item::Epoch(epoch_us),
+                None => return Ok(()),
+            },
             Say::Lost(messages) => {
                 let messages = count(messages, "message");
                 let words = format!("{messages} that the autopilot's logger had no room for");

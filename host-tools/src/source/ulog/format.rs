@@ -292,12 +292,18 @@ fn written(field: &str) -> Option<Written> {
     Some(Written { kind: kind.to_owned(), array, name: name.to_owned() })
 }
 
-/// `type name` or `type[count] name`, as fields and the keys of values are written. PX4 writes empty lines as `char[0]`.
+/// `type name` or `type[count] name`, as fields are written. PX4 writes empty lines as `char[0]`.
 pub(super) fn typed(text: &str) -> Option<((&str, Option<u32>), &str)> {
+    split(text).filter(|(_, name)| is_name(name))
+}
+
+/// The same as the keys of values are written: some writers put spaces into their names (`char[11] Build Date`).
+pub(super) fn typed_key(text: &str) -> Option<((&str, Option<u32>), &str)> {
+    split(text).filter(|(_, name)| name.split(' ').all(is_name))
+}
+
+fn split(text: &str) -> Option<((&str, Option<u32>), &str)> {
     let (kind, name) = text.split_once(' ')?;
-    if !is_name(name) {
-        return None;
-    }
     let (kind, array) = match kind.split_once('[') {
         None => (kind, None),
         Some((kind, count)) => {
@@ -311,6 +317,13 @@ pub(super) fn typed(text: &str) -> Option<((&str, Option<u32>), &str)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_key_may_have_spaces_and_a_field_may_not() {
+        assert_eq!(typed_key("char[11] Build Date"), Some((("char", Some(11)), "Build Date")));
+        assert_eq!(typed("char[11] Build Date"), None);
+        assert_eq!(typed_key("char[11]  Date"), None);
+    }
 
     fn formats(texts: &[&str]) -> Formats {
         let mut formats = Formats::default();

@@ -5,7 +5,7 @@
 //! believed, the next place is searched at which a message can ([`Parser::find`]): the synchronisation message that the logger
 //! writes twice a second is one of them.
 
-use super::format::{Number, typed};
+use super::format::{Number, typed_key};
 
 /// Length and kind.
 pub(super) const HEADER_BYTES: usize = 3;
@@ -67,7 +67,7 @@ impl<'a> Keyed<'a> {
     fn of(body: &'a [u8]) -> Option<Self> {
         let (&key_bytes, rest) = body.split_first()?;
         let (key, value) = rest.split_at_checked(usize::from(key_bytes))?;
-        let ((kind, array), name) = typed(std::str::from_utf8(key).ok()?)?;
+        let ((kind, array), name) = typed_key(std::str::from_utf8(key).ok()?)?;
         Some(Self { name, number: Number::named(kind), array, value })
     }
 
