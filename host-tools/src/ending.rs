@@ -15,7 +15,7 @@ use crate::logs::Log;
 use crate::logs::reader::Summary;
 use crate::logs::strangers::{Others, Strange};
 use crate::plural::{are, count, noun};
-use crate::sessions::copy_words;
+use crate::sessions::{again_words, copy_words};
 use crate::utc::iso8601;
 
 /// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
@@ -153,6 +153,8 @@ pub struct Ending {
     pub before: SessionBefore,
     /// What of its name disagrees with what the logs hold.
     pub misnamed: Option<Misnamed>,
+    /// The name of the log of which it is a mere copy.
+    pub again: Option<String>,
 }
 
 /// A log whose files have another session's name.
@@ -218,6 +220,7 @@ impl Ending {
             proof,
             before: SessionBefore::NotNamed,
             misnamed: None,
+            again: None,
         }
     }
 
@@ -234,14 +237,28 @@ impl Ending {
         }
     }
 
+    /// That it is a mere copy of a log that was read too, as a part of a sentence.
+    pub fn again(&self) -> Option<String> {
+        self.again.as_deref().map(again_words)
+    }
+
+    /// Whether it is not to be counted: its session is there under another name.
+    pub const fn is_counted(&self) -> bool {
+        self.copy_of().is_none() && self.again.is_none()
+    }
+
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark.
     pub fn is_proved(&self) -> bool {
         self.unproved().is_empty()
     }
 
     /// Why it is not, as parts of sentences: what is lost or damaged, what is not proved, what of its files is not the log's.
+    /// What there is to say of a mere copy is said of its original.
     pub fn unproved(&self) -> Vec<String> {
         let mut all = Vec::new();
+        if self.again.is_some() {
+            return all;
+        }
         let (summary, blocks) = (&self.summary, &self.summary.blocks);
         let lost = summary.marks.lost;
         if summary.gaps > 0 || blocks.damaged > 0 || lost > 0 {
@@ -293,6 +310,15 @@ impl Ending {
         let told: Vec<_> = self.summary.strange.iter().filter(told).collect();
         let mut all: Vec<_> =
             told.iter().take(NAMED_MAX).map(|strange| self.strange_words(strange)).collect();
+        let gone = self.summary.files_gone;
+        if gone > 0 {
+            all.push(format!(
+                "the first {} of it {} not there: the recorder overwrites the oldest ones when a card is full; else they \
+                 were taken away",
+                count(gone, "file"),
+                if gone == 1 { "is" } else { "are" }
+            ));
+        }
         match self.misnamed {
             Some(Misnamed::Copy { of }) => all.push(format!("it {}", copy_words(of))),
             Some(Misnamed::Later { before }) => all.push(format!(

@@ -38,8 +38,9 @@ impl<T: Logged> Followed<T> {
         if let Some(ending) = next.ending() {
             has_sectors = ending.summary.session.is_some();
             ending.misnamed = self.misnamed(ending);
+            ending.again = self.sessions.again(&ending.name).map(str::to_owned);
             if let Some(before) = ending.summary.marks.before.filter(Before::has_end)
-                && ending.copy_of().is_none()
+                && ending.is_counted()
             {
                 self.tell(&before, ending);
             }

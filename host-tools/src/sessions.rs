@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use hums_blackbox::Header;
 
-use crate::logs::Log;
+use crate::logs::fingerprint::{Fingerprint, fingerprint};
+use crate::logs::{Log, Piece};
 
 /// Blocks that are searched for a log's first sector: what is read at once.
 const LOOK_BLOCKS: usize = 128;
@@ -16,20 +17,31 @@ pub struct Sessions {
     /// By what stands before the number in a log's name, and by the session that its sectors name: the number, and that of
     /// its first sector. Logs by arming share the session of a power-on, and their sectors are numbered on.
     logs: BTreeMap<(String, u32), Vec<(u32, u32)>>,
+    /// Of logs that hold the same as another one: the name of that.
+    again: BTreeMap<String, String>,
 }
 
 impl Sessions {
     /// Looks at the first sectors of these logs, by their names. What has no number is left out.
     pub fn of<'a>(logs: impl IntoIterator<Item = (&'a str, &'a Log)>) -> Self {
         let mut all: BTreeMap<_, Vec<(u32, u32)>> = BTreeMap::new();
+        let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
         for (name, log) in logs {
-            if let (card, Some(number)) = place(name)
-                && let Some(first) = first_sector(log)
-            {
+            let Some(first) = first_sector(log) else { continue };
+            let (card, number) = place(name);
+            alike.entry(first.session).or_default().push(Candidate { name, card, number, log });
+            if let Some(number) = number {
                 all.entry((card.to_owned(), first.session)).or_default().push((number, first.number));
             }
         }
-        Self { logs: all }
+        let again = alike.into_values().flat_map(copies).collect();
+        Self { logs: all, again }
+    }
+
+    /// The name of the log of which this one is a copy, sector by sector, or a copy of one of its files: under a name that
+    /// is no number, or on another card. It is not to be counted again.
+    pub fn again(&self, name: &str) -> Option<&str> {
+        self.again.get(name).map(String::as_str)
     }
 
     /// The numbers under which a session is there on a card.
@@ -54,6 +66,56 @@ impl Sessions {
     fn of_session(&self, card: &str, session: u32) -> &[(u32, u32)] {
         self.logs.get(&(card.to_owned(), session)).map_or(&[], Vec::as_slice)
     }
+}
+
+/// A log of a session of which others may be copies.
+struct Candidate<'a> {
+    name: &'a str,
+    card: &'a str,
+    number: Option<u32>,
+    log: &'a Log,
+}
+
+impl Candidate<'_> {
+    /// Whether one may be a copy of the other. Two numbers of one card cannot: one of them has lost its own session.
+    fn may_be_copy(&self, other: &Self) -> bool {
+        self.card != other.card || self.number.is_none() || other.number.is_none()
+    }
+
+    /// Of all of it, then of each file where there are several. What cannot be read is no copy; it is said where it is read.
+    fn fingerprints(&self) -> Vec<Fingerprint> {
+        let file = |piece: &Piece| Log { pieces: vec![piece.clone()], ..self.log.clone() };
+        let files = self.log.pieces.iter().map(file).filter(|_| self.log.pieces.len() > 1);
+        std::iter::once(self.log.clone()).chain(files).filter_map(|log| fingerprint(&log).ok()).collect()
+    }
+}
+
+/// Names of copies among the logs of one session, each with that of its original: a card's log before one of another name,
+/// one of more files before one of less.
+fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
+    let eligible =
+        |log: &Candidate<'_>| logs.iter().any(|other| log.name != other.name && log.may_be_copy(other));
+    if !logs.iter().any(eligible) {
+        return Vec::new();
+    }
+    logs.sort_by_key(|log| (log.number.is_none(), std::cmp::Reverse(log.log.pieces.len())));
+    let (mut originals, mut copies) = (Vec::<(Candidate<'_>, Vec<Fingerprint>)>::new(), Vec::new());
+    for log in logs {
+        let all = log.fingerprints();
+        let is_original = |(other, others): &&(Candidate<'_>, Vec<Fingerprint>)| {
+            log.may_be_copy(other) && all.first().is_some_and(|whole| others.contains(whole))
+        };
+        match originals.iter().find(is_original) {
+            Some((original, _)) => copies.push((log.name.to_owned(), original.name.to_owned())),
+            None => originals.push((log, all)),
+        }
+    }
+    copies
+}
+
+/// What is said of a copy.
+pub fn again_words(original: &str) -> String {
+    format!("is the same session as {original} once more (not counted)")
 }
 
 /// What is said of a log that holds the session of this number.

@@ -43,13 +43,14 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         let log = LogJson::new(overview);
         ok &= log.ok;
         worst = worst.max(log.verdict);
-        logs += u64::from(overview.ending.copy_of().is_none());
+        logs += u64::from(overview.ending.is_counted());
         if let Some(list) = &mut list {
             return list.element(&log);
         }
         let files = overview.ending.files.join(", ");
         output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
-        print(&log.checks)
+        print(&log.checks)?;
+        overview.ending.again().map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
     };
     side_by_side(&found.logs, Overview::verified, |overview| {
         followed.push(overview?).iter().try_for_each(&mut done)
@@ -110,6 +111,8 @@ struct LogJson {
     ok: bool,
     /// The session ended in order.
     closed: bool,
+    /// The name of the log of which it is a mere copy, which is not looked at again.
+    copy_of: Option<String>,
     /// What is known of its end.
     end: EndJson,
     /// All blocks of its files.
@@ -179,15 +182,20 @@ impl LogJson {
             check("recorder losses", contents.frames() + lost, lost, losses_detail(log)),
         ];
         checks.extend(ends(log));
+        let copy_of = ending.again.clone();
+        if copy_of.is_some() {
+            checks.clear();
+        }
         let ok = checks.iter().all(|check| check.failed == 0) && ending.is_proved();
         let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
-        let verdict = match (ok, ending.proof.is_whole()) {
+        let verdict = match (ok, ending.proof.is_whole() || copy_of.is_some()) {
             (true, true) => Verdict::Holds,
             (true, false) => Verdict::ToMark,
             (false, _) => Verdict::NotProved,
         };
-        Self { name: ending.name.clone(), ok, closed: summary.closed, end, blocks, checks, verdict }
+        let (name, closed) = (ending.name.clone(), summary.closed);
+        Self { name, ok, closed, copy_of, end, blocks, checks, verdict }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Recording by arming: what is around the times when the vehicle is armed is kept, and the rest is no damage.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -131,5 +132,111 @@ fn a_vehicle_that_is_never_armed_leaves_the_last_while() {
     assert!(output.iter().zip(&input[from..arming]).all(|(a, b)| a.bytes == b.bytes), "not its end");
     let kept_s = (input[arming - 1].time_us.unwrap() - input[from].time_us.unwrap()) as f64 / 1e6;
     assert!((10.0..35.0).contains(&kept_s), "{kept_s} s are kept");
+    hums(["verify".as_ref(), recording.image().as_os_str()]).expect_code(&[0]);
+}
+
+/// Each command that reads logs ends with this code; what all of them say.
+#[track_caller]
+fn readers(log: &Path, code: i32) -> String {
+    let dir = tempfile::tempdir().unwrap();
+    let (tables, pages) = (dir.path().join("tables/"), dir.path().join("pages/"));
+    let mut said = String::new();
+    for (command, out) in [
+        ("verify", None),
+        ("info", None),
+        ("check", None),
+        ("decode", Some(&tables)),
+        ("report", Some(&pages)),
+    ] {
+        let mut arguments: Vec<&OsStr> = vec![OsStr::new(command), log.as_os_str()];
+        if let Some(out) = out {
+            arguments.extend([OsStr::new("-o"), out.as_os_str()]);
+        }
+        if command == "decode" {
+            arguments.extend([OsStr::new("--format"), OsStr::new("csv")]);
+        }
+        let outcome = hums(arguments);
+        let told = format!("{}{}", outcome.text(), outcome.stderr);
+        // Findings are no damage.
+        let ended = outcome.code.map(|ended| if ended == 4 { 0 } else { ended });
+        assert_eq!(ended, Some(code), "hums {command}: {told}");
+        said.push_str(&told);
+    }
+    said
+}
+
+#[test]
+fn what_is_taken_from_a_log_by_arming_is_missing_and_not_called_disarmed() {
+    const SECTOR: usize = 512;
+    let dir = tempfile::tempdir().unwrap();
+    let params = params(dir.path(), "REC_MODE 1\nREC_BEFORE 30\n");
+    let recording = Recording::make(
+        Machine::Sim,
+        &own(FLIGHT),
+        &["--card-size", "64", "--params", &params.display().to_string()],
+    );
+    let copy = dir.path().join("copy");
+    fs::create_dir(&copy).unwrap();
+    fat::copy_files(&recording.image(), &copy);
+    let files = ["00001_00.HUM", "00001_01.HUM", "00001_02.HUM"].map(|name| copy.join(name));
+    let whole = files.each_ref().map(|file| fs::read(file).unwrap());
+    let said = readers(&copy, 0);
+    assert!(!said.contains("not recorded"), "all of it is there: {said}");
+    // The last sector of the first file, without what was set aside behind it.
+    let end = whole[0].chunks(SECTOR).rposition(|block| block.starts_with(&[0x48, 0xB1])).unwrap() + 1;
+    let cases: [(usize, std::ops::Range<usize>); 7] = [
+        (1, 0..usize::MAX),
+        (0, 0..usize::MAX),
+        (1, 1..usize::MAX),
+        (0, 1..usize::MAX),
+        (0, end - 9..end),
+        (0, end - 30..end),
+        (1, 0..64),
+    ];
+    for (file, blocks) in cases {
+        if blocks == (0..usize::MAX) {
+            fs::remove_file(&files[file]).unwrap();
+        } else {
+            let mut spoiled = whole[file].clone();
+            let end = spoiled.len().min(blocks.end.saturating_mul(SECTOR));
+            spoiled[blocks.start * SECTOR..end].fill(0);
+            fs::write(&files[file], spoiled).unwrap();
+        }
+        let said = readers(&copy, 3);
+        assert!(!said.contains("not recorded"), "{blocks:?} of file {file}: {said}");
+        assert!(said.contains("sectors lost") && !said.contains(" 0 frames missing"), "{said}");
+        fs::write(&files[file], &whole[file]).unwrap();
+    }
+    assert!(!readers(&copy, 0).contains("not recorded"));
+}
+
+#[test]
+fn what_a_file_of_the_ring_held_before_is_no_damage() {
+    let dir = tempfile::tempdir().unwrap();
+    let manifest = Manifest::own();
+    let data = fs::read(own(FLIGHT)).unwrap();
+    let input = manifest.frames_of(&own(FLIGHT), &data);
+    let first_us = input[0].time_us.unwrap();
+    // A quarter of the frames after the first five seconds: less than the first file held before it was written anew.
+    let frames = input.iter().enumerate().filter(|(index, frame)| match frame.time_us.unwrap() - first_us {
+        ..5_000_000 => true,
+        time_us => time_us < 18_000_000 && index % 4 == 0,
+    });
+    let frames: Vec<_> = frames.map(|(_, frame)| frame).collect();
+    let entry = |frame: &&Frame<'_>| [&frame.time_us.unwrap().to_be_bytes()[..], frame.bytes].concat();
+    let flight = dir.path().join("thin.tlog");
+    fs::write(&flight, frames.iter().flat_map(entry).collect::<Vec<u8>>()).unwrap();
+    let params = params(dir.path(), "REC_MODE 1\nREC_BEFORE 5\n");
+    let recording = Recording::make(
+        Machine::Sim,
+        &flight,
+        &["--card-size", "64", "--params", &params.display().to_string()],
+    );
+    let decoded = recording.decode(&[0]);
+    let output = decoded.frames(&manifest.seeds);
+    let from = frames.len() - output.len();
+    assert!(output.iter().zip(&frames[from..]).all(|(a, b)| a.bytes == b.bytes), "not its end");
+    let kept_s = (frames.last().unwrap().time_us.unwrap() - frames[from].time_us.unwrap()) as f64 / 1e6;
+    assert!((5.0..15.0).contains(&kept_s), "{kept_s} s are kept");
     hums(["verify".as_ref(), recording.image().as_os_str()]).expect_code(&[0]);
 }

@@ -87,6 +87,8 @@ pub struct Assembler {
     ahead: Deque<Step, AHEAD_MAX>,
     /// It does: they are given out.
     believed: bool,
+    /// The files before the first one are gone: it does not begin with number 0.
+    late: bool,
     ended: bool,
     first_number: Option<u32>,
     last_number: Option<u32>,
@@ -110,6 +112,24 @@ impl Assembler {
     /// For this session only.
     pub fn for_session(session: u32) -> Self {
         Self { session: Some(session), ..Self::default() }
+    }
+
+    /// Of a log whose first files are gone, as the names of the others tell. So its first file does not begin with number 0,
+    /// and lower numbers in it are left over: the recorder wrote a file of this session anew.
+    #[must_use]
+    pub fn beginning_late(self) -> Self {
+        Self { late: true, ..self }
+    }
+
+    /// Another file of the log begins: what is ahead in the first one is in its place. Call [`Self::next`] until it gives
+    /// `None` before the next block.
+    pub fn begin_file(&mut self) {
+        self.believed |= self.late && !self.has_begun();
+    }
+
+    /// Whether a sector is held or was given out.
+    const fn has_begun(&self) -> bool {
+        self.held.is_some() || self.last_number.is_some()
     }
 
     /// Takes the next block. Call [`Self::next`] until it gives `None` before the next one.
@@ -206,12 +226,16 @@ impl Assembler {
     /// A number that does not follow: perhaps the log goes on there.
     fn jumped(&mut self, mut step: Step) {
         // Before anything was given out, only a log that begins at number 0 tells which sectors are in their place: lower
-        // numbers behind a ring's oldest file are left over.
-        let is_in_place = u64::from(step.header.number) + 1 == self.counts.blocks;
-        let begun = self.held.is_some() || self.last_number.is_some();
+        // numbers in a ring's oldest file are left over.
+        let number = step.header.number;
+        let is_in_place = !self.late && u64::from(number) + 1 == self.counts.blocks;
+        let begun = self.has_begun();
+        // The recorder writes a file anew only when others lie between what it holds and the new sectors.
+        let first = self.ahead.front().map(|first| first.header.number);
+        let is_before = first == number.checked_add(1) && !step.header.partial;
         match self.ahead.back_mut() {
-            Some(last) if last.header.number > step.header.number && !begun && !is_in_place => {
-                self.counts.superseded += 1;
+            Some(last) if last.header.number > number && !begun && !is_in_place => {
+                *(if is_before { &mut self.counts.misplaced } else { &mut self.counts.superseded }) += 1;
                 return;
             }
             Some(last) if last.header.number == step.header.number => {

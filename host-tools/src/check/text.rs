@@ -131,7 +131,7 @@ impl Table {
     /// Adds a log.
     pub fn add(&mut self, checked: &Checked) {
         let judged = &checked.judged;
-        if checked.ending.as_ref().is_some_and(|ending| ending.copy_of().is_some()) {
+        if checked.ending.as_ref().is_some_and(|ending| !ending.is_counted()) {
             self.copies += 1;
             return;
         }

@@ -93,8 +93,9 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     }
     let mut inputs =
         Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
+    let sessions = sessions_of(&found.places);
     let Works { works, earlier } =
-        Works::of(&found.places, |name| appended(&args.output.join(name), "tlog"))?;
+        Works::of(&found.places, &sessions, |name| appended(&args.output.join(name), "tlog"))?;
     for (made, of) in &earlier {
         note!("{}: is what this command makes of {of}, and is not read", made.display());
         inputs.compare_only(made);
@@ -103,7 +104,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let standard_output = check_output(args, works.len(), formats)?;
     let native = check_forms(&works, formats)?;
     let selection = Selection::new(args, native)?;
-    let (logs, sessions) = (works.len(), sessions_of(&found.places));
+    let logs = works.len();
     let mut followed = Followed::new(sessions.clone());
     let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs, sessions };
     let taken = Mutex::new(BTreeSet::new());
@@ -208,7 +209,7 @@ impl Done {
         for remark in &self.remarks {
             note!("{remark}");
         }
-        for why in self.ending.iter().flat_map(Ending::unproved) {
+        for why in self.ending.iter().flat_map(|ending| ending.again().into_iter().chain(ending.unproved())) {
             note!("{}: {why}", self.name);
         }
         self.lines.iter().try_for_each(|line| output::line(&printable::word(line)))

@@ -13,7 +13,9 @@ use crate::files::{Folder, add_ends, digest, short};
 use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::board::board_of;
+use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
+use crate::sessions::Sessions;
 use crate::source::recording::Place;
 
 /// What tells a log from any other, read from its sectors' headers and its first records. Of a card's session it is
@@ -25,7 +27,7 @@ pub struct Traits {
     /// The board's unique id; none where the log does not begin with the record of its start.
     board: Option<[u8; 12]>,
     /// Of every sector's number and checksum: equal of copies only.
-    fingerprint: [u8; 16],
+    fingerprint: Fingerprint,
 }
 
 impl Traits {
@@ -36,22 +38,16 @@ impl Traits {
             return Ok(Self { fingerprint, ..Self::default() });
         };
         let mut groups = Groups::new(log);
-        let mut hash = Sha256::new();
+        let mut all = Fingerprinter::default();
         let mut board = None;
         let mut first = true;
         while let Some(group) = groups.next_group()? {
             if std::mem::take(&mut first) {
                 board = group.first().and_then(board_of);
             }
-            for step in &group {
-                hash.update(step.header.number.to_le_bytes());
-                // A sector's last four bytes are its checksum.
-                hash.update(step.sector.bytes().last_chunk::<4>().unwrap_or(&[0; 4]));
-            }
+            all.add(&group);
         }
-        let mut fingerprint = [0; 16];
-        fingerprint.iter_mut().zip(hash.finalize()).for_each(|(to, from)| *to = from);
-        Ok(Self { session: groups.session(), board, fingerprint })
+        Ok(Self { session: groups.session(), board, fingerprint: all.finish() })
     }
 
     /// Whether it begins with the record of a box's start.
@@ -134,10 +130,18 @@ impl Names {
     }
 }
 
-/// Names all logs of one command.
-pub fn names(logs: &[(&Place, Traits)]) -> Vec<Named> {
+/// Names all logs of one command. A mere copy has no name, wherever it stands before its original.
+pub fn names(logs: &[(&Place, Traits)], sessions: &Sessions) -> Vec<Named> {
     let mut names = Names::default();
-    logs.iter().enumerate().map(|(index, (log, traits))| names.name(index, log, traits)).collect()
+    let original = |log: &Place| {
+        let of = sessions.again(&log.name)?;
+        logs.iter().position(|(other, _)| other.name == of)
+    };
+    let name = |(index, (log, traits)): (usize, &(&Place, Traits))| match original(log) {
+        Some(of) => Named::Copy(of),
+        None => names.name(index, log, traits),
+    };
+    logs.iter().enumerate().map(name).collect()
 }
 
 /// Inputs without those that `hums decode` and `hums report` make and that are no recordings, and what is said of them:
@@ -227,12 +231,13 @@ mod tests {
             fingerprint: [fingerprint; 16],
         };
         let (first, second) = (log("00001"), log("00002"));
-        let named = names(&[
+        let logs = [
             (&first, traits(0x1a2b_3c4d, 1, None)),
             (&first, traits(0x1a2b_3c4d, 1, None)),
             (&first, traits(0x1a2b_3c4d, 2, None)),
             (&second, traits(5, 3, Some([0x3f; 12]))),
-        ]);
+        ];
+        let named = names(&logs, &Sessions::default());
         assert_eq!(
             named,
             [

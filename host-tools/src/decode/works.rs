@@ -10,6 +10,7 @@ use super::naming::{self, Named, Traits};
 use crate::files::FileId;
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::usage as usage_error;
+use crate::sessions::Sessions;
 use crate::source::recording::Place;
 
 /// A log, and what its files are called.
@@ -29,7 +30,7 @@ pub(super) struct Works<'a> {
 
 impl<'a> Works<'a> {
     /// Names the logs. `tlog` is where the tlog of a name goes.
-    pub(super) fn of(logs: &'a [Place], tlog: impl Fn(&str) -> PathBuf) -> Result<Self> {
+    pub(super) fn of(logs: &'a [Place], sessions: &Sessions, tlog: impl Fn(&str) -> PathBuf) -> Result<Self> {
         let mut traits = Vec::new();
         // A log that cannot be read is named all the same: reading it says why.
         side_by_side(
@@ -52,7 +53,7 @@ impl<'a> Works<'a> {
                 None => named.push((log, traits)),
             }
         }
-        let names = naming::names(&named);
+        let names = naming::names(&named, sessions);
         let works = named.into_iter().zip(names).map(|((log, traits), named)| Work { log, traits, named });
         Ok(Self { works: works.collect(), earlier })
     }

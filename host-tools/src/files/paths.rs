@@ -37,15 +37,17 @@ pub fn make_directory(dir: &Path) -> Result<()> {
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
-/// Refuses a directory that cannot be one: it, or what it is to lie in, is a file.
+/// Refuses a directory that cannot be one: it, or what it is to lie in, is a file, or a device such as `/dev/null`.
 fn check_directory(dir: &Path) -> Result<()> {
     // Without a slash at its end, with which a file is not found.
     let dir: PathBuf = dir.components().collect();
     // Nor where it is spelled through a folder that would be made on the way.
     let dir = folded(&dir).unwrap_or(dir);
-    match dir.ancestors().find(|folder| folder.is_file()) {
-        Some(file) => {
-            bail!("{}: is a file, and a directory is needed there; name another output", file.display())
+    let there = dir.ancestors().find_map(|folder| Some((folder, fs::metadata(folder).ok()?)));
+    match there.filter(|(_, about)| !about.is_dir()) {
+        Some((file, about)) => {
+            let what = if about.is_file() { "a file" } else { "no directory" };
+            bail!("{}: is {what}, and a directory is needed there; name another output", file.display())
         }
         None => Ok(()),
     }

@@ -98,6 +98,9 @@ fn heading(text: &mut String, log: &Overview) {
 fn ending(text: &mut String, log: &Overview) {
     let (ending, summary) = (&log.ending, &log.ending.summary);
     let _ = writeln!(text, "  end      {}", ending.words());
+    if let Some(words) = ending.again() {
+        let _ = writeln!(text, "  copy     {words}");
+    }
     let behind = behind_words(&summary.behind);
     if !behind.is_empty() {
         let _ = writeln!(text, "  behind   {behind}");

@@ -12,7 +12,7 @@ use hums_recorder::LogName;
 use super::card::{image, is_card, whole_file};
 use super::found::{Found, LOGS_MAX};
 use super::look::{Content, look};
-use super::places::Log;
+use super::places::{Log, segment_name};
 use crate::files::is_part;
 
 /// Folders deeper than this are not walked.
@@ -169,11 +169,4 @@ fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
         _ => {}
     }
     Ok(())
-}
-
-/// The segment that a file's name says it is: `00042_07.HUM` in any case of letters.
-pub fn segment_name(path: &Path) -> Option<LogName> {
-    let name = path.file_name()?.to_str()?.to_ascii_uppercase();
-    let (base, extension) = name.split_once('.')?;
-    LogName::from_short(base.as_bytes(), extension.as_bytes())
 }

@@ -22,6 +22,10 @@ pub struct Groups<'a> {
     group: Group,
     ended: bool,
     ends_short: bool,
+    /// The file of the last block.
+    file: usize,
+    /// The first block of a file, while what lies before it is given out.
+    first: Option<[u8; BLOCK_BYTES]>,
     /// None where the sectors of a session were searched for on a card: their places tell nothing.
     strangers: Option<Strangers>,
 }
@@ -30,12 +34,15 @@ impl<'a> Groups<'a> {
     /// The groups of a log.
     pub fn new(log: &'a Log) -> Self {
         let assembler = log.session.map_or_else(Assembler::new, Assembler::for_session);
+        let is_late = log.first_segment().is_some_and(|number| number > 0);
         Self {
             blocks: log.blocks(),
-            assembler,
+            assembler: if is_late { assembler.beginning_late() } else { assembler },
             group: Vec::new(),
             ended: false,
             ends_short: log.ends_short(),
+            file: 0,
+            first: None,
             strangers: log.session.is_none().then(|| Strangers::new(log.pieces.len())),
         }
     }
@@ -63,7 +70,16 @@ impl<'a> Groups<'a> {
     }
 
     fn next_block(&mut self) -> Result<()> {
-        match self.blocks.next_block()? {
+        let held = self.first.take();
+        let is_held = held.is_some();
+        let block = if is_held { held } else { self.blocks.next_block()? };
+        let (file, _) = self.blocks.place();
+        if !is_held && block.is_some() && file != std::mem::replace(&mut self.file, file) {
+            self.assembler.begin_file();
+            self.first = block;
+            return Ok(());
+        }
+        match block {
             Some(block) if is_empty(&block) => self.assembler.skip_empty(),
             Some(block) => self.feed(&block),
             None => {
@@ -85,6 +101,11 @@ impl<'a> Groups<'a> {
             BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, .. } => strangers.own(file),
             _ => {}
         }
+    }
+
+    /// Which of the log's files is read.
+    pub const fn file(&self) -> usize {
+        self.file
     }
 
     /// What of its files is not the log's, once all is read.

@@ -8,10 +8,12 @@ pub mod board;
 mod card;
 pub mod fat;
 pub mod find;
+pub mod fingerprint;
 mod folder;
 mod found;
 pub mod groups;
 pub mod in_order;
+mod late;
 mod look;
 mod marks;
 pub mod places;
@@ -22,8 +24,8 @@ pub mod strangers;
 
 pub use card::{Room, is_card, on_card, room};
 pub use find::{Content, Found, find};
-pub use folder::{passed_over, segment_name};
-pub use places::{Log, Piece};
+pub use folder::passed_over;
+pub use places::{Log, Piece, segment_name};
 
 impl Found {
     /// All files in which something was found.

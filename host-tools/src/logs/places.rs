@@ -1,9 +1,10 @@
 //! A log as a list of places, and the blocks that are there, streamed.
 
 use std::fs::File;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use hums_recorder::LogName;
 
 use super::fat::{Extent, ReadAt as _};
 
@@ -47,10 +48,24 @@ impl Log {
         last.is_some_and(|extent| extent.length % BLOCK_BYTES as u64 != 0)
     }
 
+    /// The number of its first file, where the files are segments by their names: the ring of a vehicle that is recorded by
+    /// arming, and a full card, take those before it. What was searched for on a card has none.
+    pub fn first_segment(&self) -> Option<u32> {
+        let name = self.files.first().filter(|_| self.session.is_none());
+        name.and_then(|name| segment_name(Path::new(name))).map(|name| name.segment)
+    }
+
     /// The blocks, in order.
     pub fn blocks(&self) -> Blocks<'_> {
         Blocks { log: self, piece: 0, extent: 0, offset: 0, begun: 0, file: None, buffer: Vec::new(), at: 0 }
     }
+}
+
+/// The segment that a file's name says it is: `00042_07.HUM` in any case of letters.
+pub fn segment_name(path: &Path) -> Option<LogName> {
+    let name = path.file_name()?.to_str()?.to_ascii_uppercase();
+    let (base, extension) = name.split_once('.')?;
+    LogName::from_short(base.as_bytes(), extension.as_bytes())
 }
 
 /// Streams a log's blocks. A last part of less than a block is padded with zeros: it is damaged either way.

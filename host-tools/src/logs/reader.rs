@@ -15,6 +15,7 @@ use hums_core::time::Instant;
 
 use super::groups::{Group, Groups};
 use super::in_order::{in_order, workers};
+use super::late::{Late, late};
 pub use super::marks::Marks;
 use super::places::Log;
 use super::strangers::Strange;
@@ -95,6 +96,8 @@ pub struct Summary {
     pub other_epoch_us: Option<u64>,
     /// What of its files is not the log's.
     pub strange: Vec<Strange>,
+    /// Files that are missing before its first one, where nothing proves that they were left out on purpose.
+    pub files_gone: u32,
 }
 
 impl Summary {
@@ -118,7 +121,12 @@ pub fn read<C: Collect>(
     mut progress: impl FnMut(u64),
 ) -> Result<Summary> {
     let mut groups = Groups::new(log);
-    let mut stitch = Stitch::default();
+    let mut stitch = Stitch {
+        late: late(log)?,
+        gathered: log.session.is_some(),
+        first_file: log.first_segment(),
+        ..Stitch::default()
+    };
     let workers = workers();
     let ahead_max = (workers * GROUPS_PER_WORKER).min(GROUPS_MAX);
     let next = || {
@@ -190,8 +198,8 @@ struct Decoded<C> {
     damaged_partial: u32,
     closed: bool,
     marks: Marks,
-    /// What its records say of what is kept: the first and the last one.
-    keeps: Option<(Keep, Keep)>,
+    /// What its first record about it says is kept.
+    keep: Option<Keep>,
     /// UTC at power-on by what it learned last, microseconds since 1970.
     epoch_us: Option<u64>,
 }
@@ -216,7 +224,7 @@ impl<C: Collect> Decoded<C> {
             damaged_partial: last.filter(|step| step.header.partial).map_or(0, |step| step.damaged),
             closed: last.is_some_and(|step| step.header.closed),
             marks: Marks::default(),
-            keeps: None,
+            keep: None,
             epoch_us: None,
         }
     }
@@ -260,7 +268,7 @@ impl<C: Collect> Decoded<C> {
                 self.frames += u32::from(matches!(entry, Entry::Frame { .. }));
                 match entry {
                     Entry::Record { record: Record::Keep(keep), .. } => {
-                        self.keeps = Some((self.keeps.map_or(keep, |(first, _)| first), keep));
+                        self.keep.get_or_insert(keep);
                     }
                     Entry::Record { record: Record::Clock(clock), .. } => {
                         self.epoch_us = Some(clock.epoch_micros());
@@ -293,8 +301,12 @@ struct Stitch {
     next_number: u32,
     cut: bool,
     damaged_partial: u32,
-    /// What the last record about it said is kept.
-    keep: Option<Keep>,
+    /// What is missing before the first group.
+    late: Option<Late>,
+    /// The sectors of a session were searched for on a card: what is left of several logs may be among them.
+    gathered: bool,
+    /// The number of the log's first file.
+    first_file: Option<u32>,
 }
 
 impl Stitch {
@@ -313,7 +325,14 @@ impl Stitch {
                 false if self.is_wanted(&group, begins_late) => Cause::Disarmed,
                 false => Cause::Missing,
             };
-            let missing = if begins_late { group.number } else { group.missing.max(u32::from(cut)) };
+            if begins_late && cause == Cause::Missing {
+                self.summary.files_gone = self.first_file.unwrap_or(0);
+            }
+            let missing = match self.late {
+                _ if !begins_late => group.missing.max(u32::from(cut)),
+                Some(late) => group.number.saturating_sub(late.from),
+                None => group.number,
+            };
             let gap = self.gap(cause);
             gap.sectors_lost = gap.sectors_lost.saturating_add(missing);
         }
@@ -348,18 +367,17 @@ impl Stitch {
         }
         // Only now the group is decoded to its end.
         self.summary.marks.add(&group.marks);
-        self.keep = group.keeps.map(|(_, last)| last).or(self.keep);
         self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         Ok(())
     }
 
-    /// Whether what is missing before this group was not kept, on purpose: a record before the gap or in this group
-    /// says so. Before a log's first group nothing is missing that such a log would have.
+    /// Whether what is missing before this group was not kept, on purpose. Within a log nothing is; where sectors were
+    /// gathered from a whole card, a record of the same while that began before them says so.
     fn is_wanted<C>(&self, group: &Decoded<C>, begins_late: bool) -> bool {
-        let before = self.keep.filter(|keep| !keep.all);
-        let after = group.keeps.map(|(first, _)| first);
-        begins_late && after.is_some()
-            || before.into_iter().chain(after).any(|keep| keep.from <= self.next_number)
+        if begins_late {
+            return self.late.is_some_and(|late| late.is_wanted);
+        }
+        self.gathered && group.keep.is_some_and(|keep| keep.from <= self.next_number)
     }
 
     /// Nothing of a group could be decoded.

@@ -69,7 +69,13 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
                 earlier.iter().zip(&found.places).filter(|(_, other)| are_of_one_card(place, other));
             let before: Vec<trend::Session> = on_card.filter_map(|(session, _)| session.clone()).collect();
             let traits = Traits::of(place)?;
-            match names.name(index, place, &traits) {
+            let original = overview.ending.again.as_deref();
+            let original = original.and_then(|of| found.places.iter().position(|place| place.name == of));
+            let named = match original.filter(|of| wanted.sessions.contains(of)) {
+                Some(of) => Named::Copy(of),
+                None => names.name(index, place, &traits),
+            };
+            match named {
                 Named::Copy(of) => {
                     let of = found.places.get(of).map_or("another log", |place| &place.name);
                     note!("{}: is a copy of {of}, whose page is written once", place.name);
@@ -82,12 +88,12 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             }
         }
         // Also of the sessions before, which the page compares with, and of those that were read for its end.
-        for why in overview.unproved() {
+        for why in overview.ending.again().into_iter().chain(overview.unproved()) {
             note!("{}: {why}", overview.ending.name);
         }
         outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
         // A session that is there twice counts once.
-        earlier.push(overview.ending.copy_of().is_none().then_some(this));
+        earlier.push(overview.ending.is_counted().then_some(this));
         Ok(())
     };
     side_by_side(found.places.get(..end).unwrap_or_default(), check::overview, |overview| {

@@ -308,9 +308,10 @@ mod tests {
 
     #[test]
     fn a_wrong_time_at_either_end_moves_no_other_time() {
-        for (at, wrong, end) in [(199, 90_000, 198), (199, 100, 198), (0, 90_000, 198)] {
+        for (at, wrong) in [(199, 170_000), (199, 100), (0, 10_000)] {
             let mut times: Vec<u64> = (80_000..80_200).collect();
-            times[at] = if at == 0 { times[0] - wrong.min(70_000) } else { times[at] + wrong };
+            times[at] = wrong;
+            let end = 198;
             assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{at} {wrong}");
         }
     }

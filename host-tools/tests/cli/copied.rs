@@ -415,6 +415,39 @@ fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
 }
 
 #[test]
+fn a_mere_copy_is_told_and_its_flight_counted_once() {
+    let dir = copied(1, "");
+    let log = dir.path().join("copied/00001_00.HUM");
+    for name in ["Copy of 00001_00.HUM", "00001_00 (1).HUM", "flight.hum"] {
+        fs::copy(&log, dir.path().join("copied").join(name)).expect("copied");
+    }
+    // The same card three times.
+    fs::copy(dir.path().join("card.img"), dir.path().join("again.img")).expect("copied");
+    for (inputs, out) in [("copied", "a"), ("card.img again.img copied", "b")] {
+        let (decode, report) = (format!("-o {out}/ --format csv"), format!("-o {out}-pages/"));
+        let commands =
+            [("verify", ""), ("info", ""), ("check", ""), ("decode", &decode), ("report", &report)];
+        for (command, flags) in commands {
+            let said = attempt(dir.path(), &format!("{command} {inputs} {flags}"));
+            let told = text(&said) + &String::from_utf8_lossy(&said.stderr);
+            assert!(matches!(said.status.code(), Some(0 | 4)), "{command}: {told}");
+            let words = ["is the same session as", "is a copy of"];
+            assert!(words.iter().any(|words| told.contains(words)), "{command}: {told}");
+        }
+        let said = text(&run(dir.path(), &format!("verify {inputs}"), 0));
+        assert!(said.contains("\n1 session: "), "{said}");
+        let said = text(&attempt(dir.path(), &format!("check {inputs}")));
+        assert!(said.contains("1 log checked") && said.contains("the same session once more"), "{said}");
+    }
+    // One that differs is a log as any other.
+    let mut copy = fs::read(&log).expect("there");
+    copy[20 * BLOCK + 100] ^= 1;
+    fs::write(dir.path().join("copied/flight.hum"), copy).expect("written");
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(said.contains("\n2 sessions: "), "{said}");
+}
+
+#[test]
 fn logs_that_were_renamed_or_exchanged_are_told_by_every_command() {
     let dir = copied(3, "");
     let at = |name: &str| dir.path().join("copied").join(name);

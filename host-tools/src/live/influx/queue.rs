@@ -162,7 +162,7 @@ impl Inner {
         if !self.told_full && !self.figures.trouble.is_empty() {
             self.told_full = true;
             note!(
-                "hums: {}: is full, and the database takes nothing ({}): reading the recording waits for it, until Ctrl-C",
+                "{}: is full, and the database takes nothing ({}): reading the recording waits for it, until Ctrl-C",
                 self.spool.path().display(),
                 self.figures.trouble
             );

@@ -16,7 +16,7 @@
 //! Numbers are little-endian. Nothing is synced to the disk: a kill loses nothing, a PC that loses its power what its
 //! system had not written yet.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -25,6 +25,7 @@ use crc::{CRC_32_ISCSI, Crc};
 
 use super::batch::Batch;
 use super::target::Database;
+use crate::files::PART;
 use crate::plural::are;
 
 const MAGIC: &[u8; 8] = b"HUMSPOOL";
@@ -43,7 +44,7 @@ static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 pub struct Spool {
     file: File,
     path: PathBuf,
-    /// The ring's size, and the one that it gets when it is empty.
+    /// The ring's size, and the one that it gets when it is empty or is made larger.
     size: u64,
     limit: u64,
     oldest: u64,
@@ -147,7 +148,72 @@ impl Spool {
             );
         }
         self.find_damage(bytes)?;
-        if self.is_empty() { Ok(self.reset()?) } else { Ok(()) }
+        if self.is_empty() {
+            return Ok(self.reset()?);
+        }
+        if self.size < self.limit
+            && let Err(error) = self.grow()
+        {
+            note!(
+                "{}: cannot be made larger ({error}): its limit stays {} bytes until nothing waits in it",
+                self.path.display(),
+                self.size
+            );
+        }
+        Ok(())
+    }
+
+    /// Makes the ring as large as the limit: what waits is written anew, beside the file, and takes its place when it is
+    /// whole. Until then a kill leaves the old one.
+    fn grow(&mut self) -> Result<()> {
+        let path = self.path.canonicalize()?;
+        let mut part = path.clone().into_os_string();
+        part.push(PART);
+        let part = PathBuf::from(part);
+        let file = File::options().read(true).write(true).create(true).truncate(true).open(&part)?;
+        let grown = self.copy_to(file).and_then(|new| {
+            fs::rename(&part, &path)?;
+            Ok(new)
+        });
+        match grown {
+            Ok(new) => {
+                *self = new;
+                Ok(())
+            }
+            Err(error) => {
+                // The next program writes it anew.
+                let _ = fs::remove_file(&part);
+                Err(error)
+            }
+        }
+    }
+
+    /// All that waits, in a file as large as the limit allows, which is locked.
+    fn copy_to(&mut self, file: File) -> Result<Self> {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => bail!("another program writes it"),
+            Err(TryLockError::Error(error)) => return Err(error.into()),
+            Ok(()) => {}
+        }
+        let mut new = Self {
+            file,
+            path: self.path.clone(),
+            size: self.limit,
+            limit: self.limit,
+            oldest: 0,
+            end: 0,
+            points: 0,
+            removed: 0,
+            database: self.database.clone(),
+            damage: self.damage,
+        };
+        new.reset()?;
+        let mut at = self.oldest;
+        while let Some((head, text)) = self.record(at)? {
+            at += head.bytes();
+            new.put(&Batch { text, points: u64::from(head.points) })?;
+        }
+        Ok(new)
     }
 
     /// What lies behind the last sound record and was one: of a file whose ring has not begun anew, any byte; otherwise
@@ -202,7 +268,8 @@ impl Spool {
         self.bytes() + (RECORD_BYTES + batch.text.len()) as u64 <= self.room()
     }
 
-    /// How many bytes may wait in it: its ring is as large as an earlier program's limit until it is empty.
+    /// How many bytes may wait in it: its ring is as large as an earlier program's limit until it is empty, where that was
+    /// higher, or where it could not be made larger.
     const fn room(&self) -> u64 {
         if self.size < self.limit { self.size } else { self.limit }
     }
@@ -502,6 +569,26 @@ mod tests {
         assert!(Spool::open(&path, 3_000, &database(1)).expect("a file").is_none());
         drop(first);
         open(&path, 3_000);
+    }
+
+    #[test]
+    fn a_larger_limit_holds_from_now_on_and_what_waits_is_there() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("spool");
+        let mut spool = open(&path, 3_000);
+        // More than fits, so that the ring has begun anew.
+        let lost: u64 = (0..20).map(|number| spool.put(&batch(number)).expect("room")).sum();
+        assert!(lost > 0);
+        let (points, oldest) = (spool.points(), spool.oldest().expect("it reads"));
+        drop(spool);
+        let mut spool = open(&path, 30_000);
+        assert_eq!((spool.points(), spool.oldest().expect("it reads")), (points, oldest));
+        assert!(Spool::open(&path, 30_000, &database(1)).expect("a file").is_none(), "it is in use");
+        assert_eq!((20..40).map(|number| spool.put(&batch(number)).expect("room")).sum::<u64>(), 0);
+        drop(spool);
+        let all = drain(&mut open(&path, 30_000));
+        assert!(all.ends_with(&(15..40).map(batch).collect::<Vec<_>>()[..]), "{}", all.len());
+        assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 1, "nothing is left beside it");
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod ahead;
 mod binary;
 mod buffer;
 mod clock;
+mod epoch;
 mod format;
 mod message;
 mod observe;

@@ -9,6 +9,7 @@ use hums_core::time::Instant;
 
 use super::ahead::Ahead;
 use super::clock::{Clock, Own};
+use super::epoch::Epoch;
 use super::format::{Defined, FMT_TYPE, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
 use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
@@ -22,8 +23,6 @@ use crate::source::timeline::Wrong;
 
 /// The autopilot: every log is of one.
 const SOURCE: Source = Source { system: 1, component: 1 };
-/// UTC is said again where it differs by more than the receiver's delay.
-const EPOCH_DIFFERS_US: u64 = 1_500_000;
 
 /// The columns of a message have 64 characters at most in a binary log; a text log may have been made of several.
 const DEFINITION_CHARACTERS_MAX: usize = 256;
@@ -452,33 +451,6 @@ fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): 
     let sum = counts.entry(name).or_default();
     sum.0 += count;
     sum.1 += bytes;
-}
-
-/// The UTC of time zero, as the GPS tells it.
-#[derive(Clone, Copy, Debug, Default)]
-struct Epoch {
-    known_us: Option<u64>,
-    /// Another one that was told last.
-    other_us: Option<u64>,
-}
-
-impl Epoch {
-    /// Takes what was told; gives what is new. Once one is known, another one counts when it is told twice: one damaged bit
-    /// moves the date by years.
-    fn take(&mut self, epoch_us: u64) -> Option<u64> {
-        let is_near =
-            |other: Option<u64>| other.is_some_and(|other| other.abs_diff(epoch_us) < EPOCH_DIFFERS_US);
-        if is_near(self.known_us) {
-            self.other_us = None;
-            return None;
-        }
-        if self.known_us.is_some() && !is_near(self.other_us) {
-            self.other_us = Some(epoch_us);
-            return None;
-        }
-        *self = Self { known_us: Some(epoch_us), other_us: None };
-        Some(epoch_us)
-    }
 }
 
 /// Hands on what handlers say, as items.

@@ -12,6 +12,7 @@ use std::io::{self, Read as _, Write as _};
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
+use hums_blackbox::{Cause, Gap};
 
 use self::compare::{Likeness, compare, is_same_session};
 use self::ftp::Ftp;
@@ -199,10 +200,14 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
     let found = logs::find(&[path.to_owned()], false)?;
     let mut outcome = Outcome::Done;
     for log in &found.logs {
-        let overview = Overview::verified(log)?;
+        let mut overview = Overview::verified(log)?;
+        // It was asked for alone.
+        overview.ending.summary.files_gone = 0;
         let (blocks, behind) = (overview.ending.summary.blocks, overview.ending.summary.behind);
         let is_further = segment_name(path).is_some_and(|name| name.segment > 0);
-        let begins_later = overview.contents.gaps.first().is_some_and(|gap| gap.from.is_none());
+        // What is missing before it, unless it was left out on purpose, which is no gap.
+        let is_before = |gap: &Gap| gap.from.is_none() && gap.cause != Cause::Disarmed;
+        let begins_later = overview.contents.gaps.first().is_some_and(is_before);
         let gaps = overview.ending.summary.gaps - u64::from(is_further && begins_later);
         let wrong = [
             (blocks.damaged, "damaged sectors"),
