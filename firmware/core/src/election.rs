@@ -5,7 +5,7 @@
 //! Then the choice stands until the vehicle has been silent for [`SILENT`]: the autopilot was changed, or its system id.
 //!
 //! A vehicle that makes no stream gives way to one that does, at any time. Autopilots may be silent until they are asked, so
-//! while more than one is heard and none streamed by itself each is asked in [`TURN`]s, and the choice does not stand before
+//! while more than one is heard and none streamed by itself each is asked in `TURN`s, and the choice does not stand before
 //! each has had its turn: the one at the port streams more than one that is heard over a radio.
 
 use crate::observation::{Autopilot, Source};

@@ -3,11 +3,11 @@
 //!
 //! An estimator that is fed by a gyro with an offset turns its attitude over while the vehicle stands. What really turns over turns
 //! fast, and what flies at a great tilt is carried with more than its weight, or falls. So an attitude far from level is contradicted
-//! where the force has been that of a level vehicle at rest for [`LASTS`], and nothing turned; and it is so until both agree again.
+//! where the force has been that of a level vehicle at rest for `LASTS`, and nothing turned; and it is so until both agree again.
 //!
 //! Motors that run shake a vehicle. How far the force steps from sample to sample is compared with what it did at rest.
 //!
-//! Forces are smoothed ([`SMOOTHING_S`]), because motors shake a vehicle that stands. Where the messages do not have both force and
+//! Forces are smoothed (`SMOOTHING_S`), because motors shake a vehicle that stands. Where the messages do not have both force and
 //! rates, nothing is said.
 
 use crate::observation::Imu;

@@ -13,7 +13,7 @@
 //! A return that is refused (no position) is followed by a landing, where the vehicle can land as it hangs: multicopters,
 //! helicopters, and a VTOL that says that it hovers. Nothing is asked of a vehicle that returns or lands already, by its mode, by its
 //! landed state or because it sinks close above the ground. `ArduPlane` and PX4 tell a mission's landing by none of these:
-//! while the mission sinks in the last [`APPROACH_M`] it is waited ([`approaches`]). The control structure and what could go wrong with it are in docs/safety.md.
+//! while the mission sinks in the last `APPROACH_M` it is waited (`approaches`). The control structure and what could go wrong with it are in docs/safety.md.
 
 use core::fmt::Write as _;
 
