@@ -33,7 +33,10 @@ const INPUTS: &[(&str, &str)] = &[
     ("esc_temperature", "ESC_INFO, ESC_TELEMETRY"),
     ("esc_failure", "ESC_INFO: failure flags; 1 any, 2 motor stuck or ESC failed"),
     ("esc_errors", "ESC_INFO: error count, a minute; wraps are no errors"),
-    ("motor_loss", "ESC_STATUS, ESC_TELEMETRY: current in percent of the others' mean, throttle above 20 %"),
+    (
+        "motor_loss",
+        "ESC_STATUS, ESC_TELEMETRY: current in percent of the others' mean, on rotors, throttle above 20 %",
+    ),
     (
         "motor_imbalance",
         "ESC_STATUS, ESC_TELEMETRY: speed against the middle one and the nearest other one, in steady flight",

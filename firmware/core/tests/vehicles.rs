@@ -15,7 +15,7 @@ use hums_core::observation::{
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::{Rpm, Volts};
+use hums_core::units::{Amperes, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 
 const OTHER: Source = Source { system: 7, component: 1 };
@@ -177,6 +177,29 @@ fn a_vtol_that_hovers_is_judged_as_what_hangs_on_rotors_and_on_its_wings_it_bank
             let mut vehicle = Quad { kind, type_number: 22, landed, vtol, mode: 10, ..Quad::healthy() };
             if (20_000..25_000).contains(&now_ms) {
                 vehicle.roll = 1.2;
+            }
+            vec![(AUTOPILOT, vehicle.says(now_ms))]
+        });
+        let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
+        checks.dedup();
+        assert_eq!(checks, expected, "{vtol:?}");
+    }
+}
+
+#[test]
+fn the_motors_that_lift_a_vtol_may_stop_when_it_flies_on_its_wings() {
+    for (vtol, expected) in [
+        (VtolState::Hover, vec!["motor_loss"]),
+        (VtolState::Forward, vec![]),
+        (VtolState::Transition, vec![]),
+    ] {
+        let mut monitor = Monitor::new(Params::defaults());
+        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+            let kind = VehicleKind::Vtol;
+            let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+            let mut vehicle = Quad { kind, type_number: 22, landed, vtol, mode: 10, ..Quad::healthy() };
+            if (20_000..25_000).contains(&now_ms) {
+                vehicle.escs[1].as_mut().unwrap().current = Some(Amperes(0.0));
             }
             vec![(AUTOPILOT, vehicle.says(now_ms))]
         });
