@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use hums_tests::fat;
 use hums_tests::flights::{Manifest, own};
@@ -13,11 +13,34 @@ use hums_tests::program::{Machine, Recording, hums};
 const FLIGHT: &str = "ap_quad_guided.tlog";
 const ARMED_BIT: u8 = 0x80;
 
-/// A file of parameters, in a folder that goes with it.
-fn params(dir: &Path, text: &str) -> PathBuf {
-    let path = dir.join("params");
-    fs::write(&path, text).unwrap();
-    path
+/// Records a flight by arming, with these settings besides.
+fn record(dir: &Path, flight: &Path, settings: &str) -> Recording {
+    let params = dir.join("params");
+    fs::write(&params, format!("REC_MODE 1\n{settings}")).unwrap();
+    Recording::make(Machine::Sim, flight, &["--card-size", "64", "--params", &params.display().to_string()])
+}
+
+/// A tlog of these frames, at the times when they came.
+fn tlog_of<'a>(frames: impl IntoIterator<Item = &'a Frame<'a>>) -> Vec<u8> {
+    let entry = |frame: &Frame<'_>| [&frame.time_us.unwrap().to_be_bytes()[..], frame.bytes].concat();
+    frames.into_iter().flat_map(entry).collect()
+}
+
+/// The end of what came is there, so many seconds of it, and the card holds.
+#[track_caller]
+fn assert_keeps_the_end(
+    recording: &Recording,
+    manifest: &Manifest,
+    input: &[&Frame<'_>],
+    seconds: &std::ops::Range<f64>,
+) {
+    let decoded = recording.decode(&[0]);
+    let output = decoded.frames(&manifest.seeds);
+    let from = input.len() - output.len();
+    assert!(output.iter().zip(&input[from..]).all(|(a, b)| a.bytes == b.bytes), "not its end");
+    let kept_s = (input.last().unwrap().time_us.unwrap() - input[from].time_us.unwrap()) as f64 / 1e6;
+    assert!(seconds.contains(&kept_s), "{kept_s} s are kept");
+    hums(["verify".as_ref(), recording.image().as_os_str()]).expect_code(&[0]);
 }
 
 /// Whether a frame is the autopilot's heartbeat, and whether it says armed.
@@ -45,12 +68,7 @@ fn tlogs(image: &Path, dir: &Path) -> Vec<Vec<u8>> {
 #[test]
 fn the_time_before_arming_is_kept_and_what_is_not_kept_is_told_as_such() {
     let dir = tempfile::tempdir().unwrap();
-    let params = params(dir.path(), "REC_MODE 1\nREC_BEFORE 5\n");
-    let recording = Recording::make(
-        Machine::Sim,
-        &own(FLIGHT),
-        &["--card-size", "64", "--params", &params.display().to_string()],
-    );
+    let recording = record(dir.path(), &own(FLIGHT), "REC_BEFORE 5\n");
     fat::assert_clean(&recording.image());
     let manifest = Manifest::own();
     let data = fs::read(own(FLIGHT)).unwrap();
@@ -89,12 +107,7 @@ fn each_armed_time_is_a_log_of_its_own() {
         .collect();
     let flight = dir.path().join("twice.tlog");
     fs::write(&flight, twice).unwrap();
-    let params = params(dir.path(), "REC_MODE 1\nREC_BEFORE 5\nREC_AFTER 5\n");
-    let recording = Recording::make(
-        Machine::Sim,
-        &flight,
-        &["--card-size", "64", "--params", &params.display().to_string()],
-    );
+    let recording = record(dir.path(), &flight, "REC_BEFORE 5\nREC_AFTER 5\n");
     let logs = tlogs(&recording.image(), dir.path());
     assert_eq!(logs.len(), 2, "two times armed");
     for tlog in &logs {
@@ -116,23 +129,11 @@ fn a_vehicle_that_is_never_armed_leaves_the_last_while() {
     let data = fs::read(own(FLIGHT)).unwrap();
     let input = manifest.frames_of(&own(FLIGHT), &data);
     let arming = input.iter().position(|frame| armed(frame) == Some(true)).expect("it is armed");
-    let entry = |frame: &Frame<'_>| [&frame.time_us.unwrap().to_be_bytes()[..], frame.bytes].concat();
-    let disarmed: Vec<u8> = input[..arming].iter().flat_map(entry).collect();
+    let disarmed: Vec<_> = input[..arming].iter().collect();
     let flight = dir.path().join("disarmed.tlog");
-    fs::write(&flight, disarmed).unwrap();
-    let params = params(dir.path(), "REC_MODE 1\nREC_BEFORE 10\n");
-    let recording = Recording::make(
-        Machine::Sim,
-        &flight,
-        &["--card-size", "64", "--params", &params.display().to_string()],
-    );
-    let decoded = recording.decode(&[0]);
-    let output = decoded.frames(&manifest.seeds);
-    let from = arming - output.len();
-    assert!(output.iter().zip(&input[from..arming]).all(|(a, b)| a.bytes == b.bytes), "not its end");
-    let kept_s = (input[arming - 1].time_us.unwrap() - input[from].time_us.unwrap()) as f64 / 1e6;
-    assert!((10.0..35.0).contains(&kept_s), "{kept_s} s are kept");
-    hums(["verify".as_ref(), recording.image().as_os_str()]).expect_code(&[0]);
+    fs::write(&flight, tlog_of(disarmed.iter().copied())).unwrap();
+    let recording = record(dir.path(), &flight, "REC_BEFORE 10\n");
+    assert_keeps_the_end(&recording, manifest, &disarmed, &(10.0..35.0));
 }
 
 /// Each command that reads logs ends with this code; what all of them say.
@@ -169,12 +170,7 @@ fn readers(log: &Path, code: i32) -> String {
 fn what_is_taken_from_a_log_by_arming_is_missing_and_not_called_disarmed() {
     const SECTOR: usize = 512;
     let dir = tempfile::tempdir().unwrap();
-    let params = params(dir.path(), "REC_MODE 1\nREC_BEFORE 30\n");
-    let recording = Recording::make(
-        Machine::Sim,
-        &own(FLIGHT),
-        &["--card-size", "64", "--params", &params.display().to_string()],
-    );
+    let recording = record(dir.path(), &own(FLIGHT), "REC_BEFORE 30\n");
     let copy = dir.path().join("copy");
     fs::create_dir(&copy).unwrap();
     fat::copy_files(&recording.image(), &copy);
@@ -223,20 +219,8 @@ fn what_a_file_of_the_ring_held_before_is_no_damage() {
         time_us => time_us < 18_000_000 && index % 4 == 0,
     });
     let frames: Vec<_> = frames.map(|(_, frame)| frame).collect();
-    let entry = |frame: &&Frame<'_>| [&frame.time_us.unwrap().to_be_bytes()[..], frame.bytes].concat();
     let flight = dir.path().join("thin.tlog");
-    fs::write(&flight, frames.iter().flat_map(entry).collect::<Vec<u8>>()).unwrap();
-    let params = params(dir.path(), "REC_MODE 1\nREC_BEFORE 5\n");
-    let recording = Recording::make(
-        Machine::Sim,
-        &flight,
-        &["--card-size", "64", "--params", &params.display().to_string()],
-    );
-    let decoded = recording.decode(&[0]);
-    let output = decoded.frames(&manifest.seeds);
-    let from = frames.len() - output.len();
-    assert!(output.iter().zip(&frames[from..]).all(|(a, b)| a.bytes == b.bytes), "not its end");
-    let kept_s = (frames.last().unwrap().time_us.unwrap() - frames[from].time_us.unwrap()) as f64 / 1e6;
-    assert!((5.0..15.0).contains(&kept_s), "{kept_s} s are kept");
-    hums(["verify".as_ref(), recording.image().as_os_str()]).expect_code(&[0]);
+    fs::write(&flight, tlog_of(frames.iter().copied())).unwrap();
+    let recording = record(dir.path(), &flight, "REC_BEFORE 5\n");
+    assert_keeps_the_end(&recording, manifest, &frames, &(5.0..15.0));
 }

@@ -162,6 +162,23 @@ fn an_autopilot_that_restarts_on_the_ground_is_counted_and_one_that_restarts_arm
     assert!(!restarted(true).is_empty());
 }
 
+/// Flies a VTOL that is this way by its own word, with something wrong from 20 to 25 s; the checks that found something.
+fn checks_of_a_vtol(vtol: VtolState, wrong: impl Fn(&mut Quad)) -> Vec<&'static str> {
+    let mut monitor = Monitor::new(Params::defaults());
+    let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
+        let kind = VehicleKind::Vtol;
+        let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+        let mut vehicle = Quad { kind, type_number: 22, landed, vtol, mode: 10, ..Quad::healthy() };
+        if (20_000..25_000).contains(&now_ms) {
+            wrong(&mut vehicle);
+        }
+        vec![(AUTOPILOT, vehicle.says(now_ms))]
+    });
+    let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
+    checks.dedup();
+    checks
+}
+
 #[test]
 fn a_vtol_that_hovers_is_judged_as_what_hangs_on_rotors_and_on_its_wings_it_banks_as_it_needs() {
     for (vtol, expected) in [
@@ -170,42 +187,19 @@ fn a_vtol_that_hovers_is_judged_as_what_hangs_on_rotors_and_on_its_wings_it_bank
         (VtolState::Transition, vec![]),
         (VtolState::Unknown, vec![]),
     ] {
-        let mut monitor = Monitor::new(Params::defaults());
-        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
-            let kind = VehicleKind::Vtol;
-            let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
-            let mut vehicle = Quad { kind, type_number: 22, landed, vtol, mode: 10, ..Quad::healthy() };
-            if (20_000..25_000).contains(&now_ms) {
-                vehicle.roll = 1.2;
-            }
-            vec![(AUTOPILOT, vehicle.says(now_ms))]
-        });
-        let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
-        checks.dedup();
-        assert_eq!(checks, expected, "{vtol:?}");
+        assert_eq!(checks_of_a_vtol(vtol, |vehicle| vehicle.roll = 1.2), expected, "{vtol:?}");
     }
 }
 
 #[test]
 fn the_motors_that_lift_a_vtol_may_stop_when_it_flies_on_its_wings() {
+    let stop = |vehicle: &mut Quad| vehicle.escs[1].as_mut().unwrap().current = Some(Amperes(0.0));
     for (vtol, expected) in [
         (VtolState::Hover, vec!["motor_loss"]),
         (VtolState::Forward, vec![]),
         (VtolState::Transition, vec![]),
     ] {
-        let mut monitor = Monitor::new(Params::defaults());
-        let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
-            let kind = VehicleKind::Vtol;
-            let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
-            let mut vehicle = Quad { kind, type_number: 22, landed, vtol, mode: 10, ..Quad::healthy() };
-            if (20_000..25_000).contains(&now_ms) {
-                vehicle.escs[1].as_mut().unwrap().current = Some(Amperes(0.0));
-            }
-            vec![(AUTOPILOT, vehicle.says(now_ms))]
-        });
-        let mut checks: Vec<_> = findings.iter().map(|finding| finding.check).collect();
-        checks.dedup();
-        assert_eq!(checks, expected, "{vtol:?}");
+        assert_eq!(checks_of_a_vtol(vtol, stop), expected, "{vtol:?}");
     }
 }
 
