@@ -9,8 +9,7 @@ use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
 use crate::trend::{Rate, Resistance};
-pub use crate::units::GRAVITY;
-use crate::units::MetresPerSecond2;
+use crate::units::{GRAVITY, MetresPerSecond2};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// No sensor that autopilots have measures more than 32 g an axis: beyond this it is garbage.
