@@ -6,7 +6,7 @@ DIALECT.py is made by pymavlink's mavgen. Each entry of labels.json gets four fi
 
   flights    from and to of each time in the air, in seconds since the first frame
   landings   how many of them ended on the ground without a crash
-  crash_s    when it hit the ground in a crash; null where it did not
+  crashes_s  when it hit the ground in a crash, each time
   battery_low_s  when the autopilot itself first called a battery low; null where it never did
 
 The rules:
@@ -87,7 +87,7 @@ class Flights:
         self.armed, self.plane, self.known = False, False, True
         self.heights, self.ground, self.receiver, self.receiver_ground = collections.deque(), None, None, None
         self.up_since = self.low_since = self.began = None
-        self.flights, self.landings, self.crash_s = [], 0, None
+        self.flights, self.landings, self.crashes_s = [], 0, []
         self.battery_low_s, self.rotors, self.throttle = None, False, 0
         self.falling, self.shock, self.speeds = None, -math.inf, collections.deque()
 
@@ -146,7 +146,7 @@ class Flights:
         self.known &= above > -DIFFER_M or not self.armed
         if self.compares and self.began is not None and None not in (self.receiver, self.receiver_ground):
             self.known &= abs((self.receiver - self.receiver_ground) - above) < DIFFER_M
-        if self.armed and self.began is None and (self.crash_s is None or at - self.crash_s >= WRECK_S):
+        if self.armed and self.began is None and (not self.crashes_s or at - self.crashes_s[-1] >= WRECK_S):
             if above > BEGAN_M:
                 self.up_since = at if self.up_since is None else self.up_since
                 if above > TAKEOFF_M and at - self.up_since >= TAKEOFF_S:
@@ -161,29 +161,30 @@ class Flights:
 
     def hit(self, at):
         flew = self.began is not None or self.falling is not None
-        if not flew or self.crash_s is not None or self.above(at) > HIT_M:
+        if not flew or self.above(at) > HIT_M:
             return
         sink = (self.heights[0][1] - self.heights[-1][1]) / HIT_S
         shocked = at - self.shock < HIT_S and max((speed for _, speed in self.speeds), default=math.inf) > HIT_G_M_S
         shocked &= not (self.plane and not self.rotors and sink < FLARED_M_S and self.throttle < IDLE)
         if sink > (HIT_PLANE_M_S if self.plane else HIT_M_S) or shocked or self.falling is not None:
-            self.crash_s, self.falling = at, None
+            self.crashes_s.append(at)
+            self.falling = None
             self.end(at, landed=False)
 
     def end(self, at, landed):
         if self.began is not None:
             self.flights.append([round(self.began, 2), round(at, 2)])
-            self.landings += landed and not (self.crash_s is not None and self.crash_s >= self.began)
+            self.landings += landed
         self.began = self.up_since = self.low_since = None
 
     def result(self, at):
-        if self.falling is not None and self.crash_s is None:
-            self.crash_s = self.falling
+        if self.falling is not None:
+            self.crashes_s.append(self.falling)
         self.end(at, landed=False)
         known = {"battery_low_s": self.battery_low_s}
         if self.known:
-            crash_s = None if self.crash_s is None else round(self.crash_s, 2)
-            known |= {"flights": self.flights, "landings": int(self.landings), "crash_s": crash_s}
+            crashes_s = [round(at, 2) for at in self.crashes_s]
+            known |= {"flights": self.flights, "landings": int(self.landings), "crashes_s": crashes_s}
         return known
 
 
@@ -197,7 +198,7 @@ def main(dialect_path, folder):
         for at, message in messages(dialect, os.path.join(folder, label["file"])):
             flights.take(at, message)
             last = at
-        for field in ("flights", "landings", "crash_s", "battery_low_s"):
+        for field in ("flights", "landings", "crash_s", "crashes_s", "battery_low_s"):
             label.pop(field, None)
         label.update(flights.result(last))
     with open(path, "w") as file:

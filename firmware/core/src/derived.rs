@@ -2,6 +2,7 @@
 //! imbalance of motors in steady flight, clips of late, load factor.
 
 use crate::cells::Cells;
+use crate::currents::Currents;
 use crate::flight::{Flight, FlightEvent};
 use crate::latest::{Latest, Reading};
 use crate::observation::{Battery, EscGroup, MOTORS_MAX, Observation};
@@ -63,6 +64,7 @@ pub struct Derived {
     cells: Cells,
     resistance: [Resistance; BATTERIES_MAX],
     motors: [MotorTrack; MOTORS_MAX],
+    currents: Currents,
     load_factor: Latest<f32>,
     /// When anything at all was heard of the vehicle.
     heard: Option<Instant>,
@@ -120,6 +122,7 @@ impl Derived {
             cells: Cells::new(),
             resistance: [Resistance::new(); BATTERIES_MAX],
             motors: [MOTOR; MOTORS_MAX],
+            currents: Currents::new(),
             load_factor: Latest::nothing(),
             heard: None,
             resumed: Instant::ZERO,
@@ -177,6 +180,7 @@ impl Derived {
                 for number in first..first.saturating_add(group.escs.len()).min(MOTORS_MAX) {
                     self.take_motor(at, vehicle, number);
                 }
+                self.currents.take(at, vehicle, flight.airborne());
             }
             _ => {}
         }
@@ -251,6 +255,11 @@ impl Derived {
         self.find_furthest();
         self.frames_lost.take(now, recorder.frames_lost);
         self.write_errors.take(now, recorder.write_errors);
+    }
+
+    /// What the motors take.
+    pub(crate) const fn currents(&self) -> &Currents {
+        &self.currents
     }
 
     /// What earlier flights found of a battery's internal resistance.

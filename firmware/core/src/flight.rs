@@ -8,8 +8,9 @@
 //!
 //! | what is known | in the air | on the ground again, for two seconds |
 //! |---|---|---|
-//! | a height above home or above the local origin | more than one metre above the place of arming | less than half a metre, and still |
+//! | a height above home or above the local origin | more than one metre above the place of arming | less than half a metre, and still; below the place of arming with less throttle than flies |
 //! | the speed of a plane or VTOL | faster than 8 m/s | as above |
+//! | the airspeed of a plane or VTOL, and its throttle | faster than 8 m/s with more than a fifth: wind alone is no flight | slower |
 //! | only the throttle (no position at all) | more than a fifth, and the displayed altitude rose by a metre | less than a tenth |
 //!
 //! The place of arming counts only where arming was seen. Whoever hears an armed vehicle first (a restart in the air) takes
@@ -286,7 +287,10 @@ impl Flight {
         let little = throttle.is_some_and(|throttle| throttle < enough);
         let low =
             self.height_above_start_m(now, vehicle).is_some_and(|height_m| height_m.abs() < TAKEOFF_HEIGHT_M);
-        if little && low && vehicle.hovers(now) == Some(true) {
+        // Of what stands, an estimator may drift away while its sensors rest.
+        let off = throttle.is_some_and(|throttle| throttle < IDLE_THROTTLE);
+        let rests = !self.airborne() && off && vehicle.inertial.is_level(now);
+        if ((little && low) || rests) && vehicle.hovers(now) == Some(true) {
             return true;
         }
         let moves = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() > MOVES_MPS);
@@ -314,9 +318,8 @@ impl Flight {
                     || ((shakes == Some(false) || vehicle.inertial.contradicts(now)) && within(STANDS_M))
             }
             Some(false) => {
-                let hud = vehicle.hud.within(now, MOTION_AGE);
-                let airspeed_mps = hud.and_then(|hud| hud.airspeed).map_or(0.0, |speed| speed.0);
-                let slow = airspeed_mps < PLANE_FLYING_MPS / 2.0 && ground_speed_mps(now, vehicle).is_some();
+                let air_mps = airspeed_mps(now, vehicle).unwrap_or(0.0);
+                let slow = air_mps < PLANE_FLYING_MPS / 2.0 && ground_speed_mps(now, vehicle).is_some();
                 let off = throttle.is_some_and(|throttle| throttle < FLYING_THROTTLE);
                 off && slow && height_m.is_some_and(|height_m| height_m < TAKEOFF_HEIGHT_M)
             }
@@ -337,22 +340,30 @@ impl Flight {
 
     fn seems_to_fly(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let speed_mps = ground_speed_mps(now, vehicle);
+        let throttle = throttle(now, vehicle);
+        let has_thrust = |least: f32| throttle.is_some_and(|throttle| throttle > least);
+        let is_fast =
+            |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps > PLANE_FLYING_MPS);
+        // Wind alone shows an airspeed on the ground.
+        let by_air = is_fast(airspeed_mps(now, vehicle)) && (self.airborne() || has_thrust(FLYING_THROTTLE));
+        let fast = has_wings(vehicle) && (is_fast(speed_mps) || by_air);
         let Some(height_m) = self.height_above_start_m(now, vehicle) else {
-            let fast = speed_mps.is_some_and(|speed_mps| has_wings(vehicle) && speed_mps > PLANE_FLYING_MPS);
-            let throttle = throttle(now, vehicle);
-            let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
-            let thrust = throttle.is_none_or(|throttle| throttle > enough);
+            // Without any word about height, speed or thrust it goes on with what it does.
+            if self.airborne() {
+                return fast || throttle.is_none_or(|throttle| throttle > IDLE_THROTTLE);
+            }
             // Motors are tried on the bench: the barometer says so.
             let rose = self.rise_m(now, vehicle).is_none_or(|rise_m| rise_m > TAKEOFF_HEIGHT_M);
-            // Without any word about height, speed or thrust it goes on with what it does.
-            return fast
-                || (thrust && (self.airborne() || (throttle.is_some() && rose && !has_wings(vehicle))));
+            return fast || (has_thrust(FLYING_THROTTLE) && rose && !has_wings(vehicle));
         };
-        let speed_mps = speed_mps.unwrap_or(0.0);
         if self.airborne() {
-            return height_m > LANDED_HEIGHT_M || speed_mps > STILL_MPS;
+            // It hovers over a valley.
+            let hangs = height_m < -LANDED_HEIGHT_M
+                && vehicle.hovers(now) == Some(true)
+                && has_thrust(FLYING_THROTTLE);
+            return height_m > LANDED_HEIGHT_M || speed_mps.unwrap_or(0.0) > STILL_MPS || by_air || hangs;
         }
-        height_m > TAKEOFF_HEIGHT_M || (has_wings(vehicle) && speed_mps > PLANE_FLYING_MPS)
+        height_m > TAKEOFF_HEIGHT_M || fast
     }
 }
 
@@ -375,6 +386,14 @@ pub(crate) fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let hud = vehicle.hud.within(now, MOTION_AGE);
     hud.and_then(|hud| hud.throttle).map(|throttle| throttle.0).filter(|part| part.is_finite())
+}
+
+/// The speed through the air, in m/s.
+fn airspeed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+    let hud = vehicle.hud.within(now, MOTION_AGE);
+    hud.and_then(|hud| hud.airspeed)
+        .map(|speed| speed.0)
+        .filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
 
 /// The altitude of the pilot's display, of the barometer where there is no position.
@@ -405,8 +424,8 @@ pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::{GlobalPosition, Heartbeat, Observation, Source, VtolState};
-    use crate::units::Metres;
+    use crate::observation::{GlobalPosition, Heartbeat, Hud, Observation, Source, VtolState};
+    use crate::units::{Fraction, Metres, MetresPerSecond};
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -535,5 +554,52 @@ mod tests {
             events.extend(flight.step(now, &vehicle).map(|event| (now_ms, event)));
         }
         assert_eq!(events, [(500, FlightEvent::Resumed)]);
+    }
+
+    /// Armed from 1 s on, without any position: its throttle and its airspeed, each until a time.
+    fn fly_by_hud(kind: VehicleKind, said: &[(u64, f32, f32)], height_m: Option<f32>) -> Vec<FlightEvent> {
+        let (mut vehicle, mut flight, mut events, mut now_ms) =
+            (Vehicle::unknown(), Flight::grounded(), Vec::new(), 0);
+        for (until_ms, throttle, airspeed_mps) in said {
+            while now_ms < *until_ms {
+                let now = Instant::from_millis(now_ms);
+                let heartbeat = Heartbeat { armed: now_ms >= 1_000, kind, ..Heartbeat::default() };
+                vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
+                let hud = Hud {
+                    throttle: Some(Fraction(*throttle)),
+                    airspeed: Some(MetresPerSecond(*airspeed_mps)),
+                    ..Hud::default()
+                };
+                vehicle.observe(now, AUTOPILOT, &Observation::Hud(hud));
+                if let Some(height_m) = height_m {
+                    // Down into a valley, where it stays.
+                    let height_m =
+                        if now_ms < 5_000 { 0.0 } else { (20.0 - now_ms as f32 / 500.0).max(height_m) };
+                    let relative_altitude = Metres(height_m);
+                    let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
+                    vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
+                }
+                events.extend(flight.step(now, &vehicle));
+                now_ms += 50;
+            }
+        }
+        events
+    }
+
+    #[test]
+    fn a_plane_without_a_position_flies_by_its_airspeed_and_a_wind_over_the_runway_is_no_flight() {
+        let flown = [(5_000, 0.0, 3.0), (40_000, 0.6, 18.0), (50_000, 0.0, 12.0), (60_000, 0.0, 2.0)];
+        let expected = [FlightEvent::TakeOff, FlightEvent::Landing];
+        assert_eq!(fly_by_hud(VehicleKind::Plane, &flown, None), expected);
+        assert_eq!(fly_by_hud(VehicleKind::Plane, &[(60_000, 0.0, 12.0)], None), []);
+    }
+
+    #[test]
+    fn a_multicopter_that_hovers_below_its_place_of_arming_flies_until_it_stands_there() {
+        let hovers = [(5_000, 0.0, 0.0), (60_000, 0.5, 0.0)];
+        assert_eq!(fly_by_hud(VehicleKind::Rotorcraft, &hovers, Some(-15.0)), [FlightEvent::TakeOff]);
+        let lands = [(5_000, 0.0, 0.0), (60_000, 0.5, 0.0), (80_000, 0.02, 0.0)];
+        let expected = [FlightEvent::TakeOff, FlightEvent::Landing];
+        assert_eq!(fly_by_hud(VehicleKind::Rotorcraft, &lands, Some(-15.0)), expected);
     }
 }

@@ -6,6 +6,7 @@ pub mod baseline;
 mod bytes;
 pub mod cells;
 pub mod component;
+mod currents;
 pub mod derived;
 pub mod election;
 pub mod exposure;

@@ -13,7 +13,7 @@
 //! | overturned | its top looks down, by more than 100 degrees of tilt, for 0.7 s; not in modes made for it | on rotors |
 //! | | it lies over by more than `MIS_OVERTURN`, by the force that carries it, within 5 s of throttle | on rotors |
 //! | sinking | faster than `MIS_SINK` for half a second; where the pilot has the throttle, at nearly full throttle only | on rotors |
-//! | | 7 m lost, faster than 1 m/s, at nearly full throttle, where the autopilot has it | everywhere |
+//! | | 7 m lost, faster than 1 m/s, at full throttle, where the autopilot has it | everywhere |
 //!
 //! ```text
 //!        seen in a flight            it lies still, or 10 s after disarming
@@ -51,7 +51,7 @@ const WATCHED: Span = Span::from_secs(10);
 /// A vehicle that still flies so long after the last thing seen goes on with its flight.
 const RECOVERED: Span = Span::from_secs(5);
 /// A shock stops something that was this fast.
-const IMPACT_MPS: f32 = 4.0;
+const IMPACT_MPS: f32 = 3.5;
 /// Legs take this from what comes down upright, at the fastest landing speeds that are set (2.5 m/s): harder is no landing.
 const LEGS_G: f32 = 4.0;
 const LEGS_MPS: f32 = 3.0;

@@ -35,7 +35,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("esc_errors", "ESC_INFO: error count, a minute; wraps are no errors"),
     (
         "motor_loss",
-        "ESC_STATUS, ESC_TELEMETRY: current in percent of the others' mean, on rotors, throttle above 20 %",
+        "ESC_STATUS, ESC_TELEMETRY: current in percent of the mean of the others that lift, on rotors, throttle above 20 %; not where half of them stand nearly still and nothing spins: the autopilot stops them to turn",
     ),
     (
         "motor_imbalance",
@@ -72,7 +72,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("mcu_temperature", "MCU_STATUS"),
     ("autopilot_reboot", "ATTITUDE, SYSTEM_TIME: a boot time that falls while it is armed, for 30 s"),
     ("autopilot_state", "HEARTBEAT: MAV_STATE"),
-    ("sensors", "SYS_STATUS: sensors present and enabled that are not healthy"),
+    ("sensors", "SYS_STATUS: sensors present and enabled that are not healthy, but for terrain data"),
     ("roll", "ATTITUDE, against ATTITUDE_TARGET or NAV_CONTROLLER_OUTPUT"),
     ("pitch", "ATTITUDE, against ATTITUDE_TARGET or NAV_CONTROLLER_OUTPUT"),
     ("recording", "our recorder: 1 not recording, 2 not recording while armed"),
@@ -94,7 +94,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("disarmed_in_air", "HEARTBEAT: disarmed out of a flight, and then it falls, sinks or glides"),
     (
         "sinking",
-        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; or a loss of 7 m with nearly full throttle",
+        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; or a loss of 7 m with full throttle",
     ),
     (
         "overturned",

@@ -1,34 +1,28 @@
-//! Speeds of motors against each other: which frames, what turns, what stands.
+//! Speeds and currents of motors against each other: which frames, what turns, what stands, what pushes.
 
 mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::observation::{Attitude, Esc, EscGroup, LandedState, Observation};
+use hums_core::observation::{Attitude, Esc, EscGroup, LandedState, Observation, VehicleKind, VtolState};
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::{Radians, RadiansPerSecond, Rpm};
+use hums_core::units::{Amperes, Radians, RadiansPerSecond, Rpm};
 
-/// A minute of flight with these speeds from 20 s on, turning with `yaw_rate` then; what is told of motors.
-fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8)> {
+/// A minute of flight; what is told of motors. `script` gives the vehicle, its ESCs and its yaw rate.
+fn told(script: impl Fn(u64) -> (Quad, Vec<Esc>, f32)) -> Vec<(&'static str, u8)> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
     for now_ms in (0..60_000).step_by(100) {
         let now = Instant::from_millis(now_ms);
-        let begun = now_ms >= 20_000;
-        let quad = vehicle.clone();
-        let esc = quad.escs[0].unwrap_or_default();
-        let rpm = |motor: usize| if begun { speeds[motor] } else { 5_000.0 };
+        let (quad, escs, yaw_rate) = script(now_ms);
         let group = |first: usize| EscGroup {
             first: first as u8,
-            escs: [0, 1, 2, 3].map(|place| {
-                let fitted = first + place < speeds.len();
-                fitted.then(|| Esc { rpm: Some(Rpm(rpm(first + place))), ..esc })
-            }),
+            escs: [0, 1, 2, 3].map(|place| escs.get(first + place).copied()),
         };
         let own = |said: &Observation| !matches!(said, Observation::Escs(_) | Observation::Attitude(_));
-        let rates = [0.0, 0.0, if begun { yaw_rate } else { 0.0 }].map(RadiansPerSecond);
+        let rates = [0.0, 0.0, yaw_rate].map(RadiansPerSecond);
         let attitude = Attitude { roll: Radians(0.02), rates: Some(rates), ..Attitude::default() };
         let more =
             [Observation::Attitude(attitude), Observation::Escs(group(0)), Observation::Escs(group(4))];
@@ -44,6 +38,22 @@ fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8
     }
     findings.dedup();
     findings
+}
+
+/// With these speeds from 20 s on, turning with `yaw_rate` then.
+fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8)> {
+    let esc = vehicle.escs[0].unwrap_or_default();
+    told(|now_ms| {
+        let begun = now_ms >= 20_000;
+        let rpm = |speed: &f32| Rpm(if begun { *speed } else { 5_000.0 });
+        let escs = speeds.iter().map(|speed| Esc { rpm: Some(rpm(speed)), ..esc }).collect();
+        (vehicle.clone(), escs, if begun { yaw_rate } else { 0.0 })
+    })
+}
+
+/// What ESCs say that tell nothing but their currents.
+fn escs_of(currents: &[f32]) -> Vec<Esc> {
+    currents.iter().map(|current| Esc { current: Some(Amperes(*current)), ..Esc::default() }).collect()
 }
 
 #[test]
@@ -81,4 +91,52 @@ fn motors_that_idle_on_the_ground_are_not_compared() {
     // The autopilot goes on to call it in the air.
     let stands = Quad { throttle: 0.02, height: 12.0, landed: Some(LandedState::InAir), ..Quad::healthy() };
     assert_eq!(flies(&stands, &[2_200.0, 2_050.0, 2_900.0, 800.0], 0.0), []);
+}
+
+/// A quadplane in the air from 2 s on, and what it flies on.
+fn quadplane(now_ms: u64, vtol: VtolState) -> Quad {
+    let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });
+    Quad { kind: VehicleKind::Vtol, type_number: 22, mode: 10, landed, vtol, ..Quad::healthy() }
+}
+
+#[test]
+fn the_motor_that_pushes_a_vtol_is_not_lost_while_it_hovers() {
+    let lifted = |pusher: f32| escs_of(&[5.0, 5.0, 5.0, 5.0, pusher]);
+    let hovers = |now_ms| (quadplane(now_ms, VtolState::Hover), lifted(0.0), 0.0);
+    assert_eq!(told(hovers), []);
+    // It helps against the wind for a while.
+    let helped = |now_ms| {
+        let pusher = if (10_000..30_000).contains(&now_ms) { 6.0 } else { 0.0 };
+        (quadplane(now_ms, VtolState::Hover), lifted(pusher), 0.0)
+    };
+    assert_eq!(told(helped), []);
+    // Heard first on its wings, and back in hover.
+    let returns = |now_ms| match now_ms {
+        0..20_000 => {
+            (quadplane(now_ms + 2_000, VtolState::Forward), escs_of(&[0.0, 0.0, 0.0, 0.0, 12.0]), 0.0)
+        }
+        20_000..25_000 => (quadplane(now_ms, VtolState::Transition), lifted(12.0), 0.0),
+        _ => (quadplane(now_ms, VtolState::Hover), lifted(if now_ms < 26_000 { 3.0 } else { 0.0 }), 0.0),
+    };
+    assert_eq!(told(returns), []);
+    // A motor that lifts is found, whatever pushes.
+    let lost = |now_ms| {
+        let escs = escs_of(&[5.0, 5.0, if now_ms < 40_000 { 5.0 } else { 0.1 }, 5.0, 0.0]);
+        (quadplane(now_ms, VtolState::Hover), escs, 0.0)
+    };
+    assert_eq!(told(lost), [("motor_loss", 2)]);
+}
+
+#[test]
+fn motors_that_the_autopilot_stops_to_turn_are_not_lost_and_a_vehicle_that_lost_them_spins() {
+    let turns = |yaw_rate: f32, currents: [f32; 4]| {
+        told(|now_ms| {
+            let begun = now_ms >= 20_000;
+            let escs = escs_of(if begun { &currents } else { &[5.0; 4] });
+            (quadplane(now_ms, VtolState::Hover), escs, if begun { yaw_rate } else { 0.0 })
+        })
+    };
+    assert_eq!(turns(0.3, [0.05, 0.2, 9.0, 8.0]), []);
+    assert_eq!(turns(2.0, [0.05, 0.2, 9.0, 8.0]).len(), 2, "two of four are lost");
+    assert_eq!(turns(0.3, [0.05, 4.0, 9.0, 8.0]), [("motor_loss", 0)], "one is lost");
 }

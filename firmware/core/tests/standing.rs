@@ -8,7 +8,7 @@ use hums_core::observation::{Hud, LandedState, Observation, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::Instant;
-use hums_core::units::{Fraction, Metres, MetresPerSecond};
+use hums_core::units::{Fraction, Metres, MetresPerSecond, RadiansPerSecond};
 use hums_core::usage::UsageCounter;
 
 /// Flights and landings of two minutes, of what a script says.
@@ -139,4 +139,36 @@ fn what_hovers_low_what_glides_and_what_falls_without_throttle_flies() {
         without_position(now_ms, throttle, None, climb)
     };
     assert_eq!(counts(sinks), (1, 0), "it descends without throttle");
+}
+
+#[test]
+fn an_estimator_that_drifts_away_while_the_sensors_rest_begins_no_second_flight() {
+    // As an ArduPlane's did: landed, left armed, and called landing again and again.
+    let drifts = |rests: bool| {
+        move |now_ms: u64| {
+            let flies = (10_000..60_000).contains(&now_ms);
+            let says = match now_ms {
+                ..10_000 => LandedState::OnGround,
+                10_000..60_000 => LandedState::InAir,
+                _ if (now_ms / 10_000).is_multiple_of(3) => LandedState::OnGround,
+                _ => LandedState::Landing,
+            };
+            let (height, throttle, climb) = match now_ms {
+                _ if flies => (12.0, 0.5, 0.0),
+                ..60_000 => (0.0, 0.0, 0.0),
+                _ => (-(now_ms as f32 - 60_000.0) / 500.0, 0.03, -2.0),
+            };
+            let quad = Quad { landed: Some(says), height, throttle, climb, ..called_in_air(now_ms) };
+            let mut said = quad.says(now_ms);
+            for said in &mut said {
+                if let Observation::Imu(imu) = said {
+                    let turns = if rests || now_ms < 60_000 { 0.0 } else { 2.0 };
+                    imu.rate = Some([turns, 0.0, 0.0].map(RadiansPerSecond));
+                }
+            }
+            said
+        }
+    };
+    assert_eq!(counts(drifts(true)), (1, 1));
+    assert_ne!(counts(drifts(false)), (1, 1), "what turns may fall");
 }

@@ -79,7 +79,7 @@ pub(super) const CHECKS: &[Check] = &[
         hysteresis: 5.0,
         debounce_critical: Span::from_millis(500),
         when: When::InFlight,
-        read: current_percent,
+        read: |inputs, motor| inputs.derived.currents().percent(inputs.now, inputs.vehicle, motor),
         ..ESC
     },
     Check {
@@ -135,30 +135,6 @@ fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {
 
 fn errors_per_minute(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
     Reading::new(motor(inputs, number)?.at, inputs.derived.esc_errors(number))
-}
-
-/// A motor's current in percent of the mean of the others, while the throttle asks for thrust and the vehicle hangs on its
-/// rotors: a VTOL stops those that lift when it flies on its wings, and an aeroplane's engines may differ. ESCs that do not
-/// measure current say zero for all, and then nothing follows.
-fn current_percent(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {
-    const FRESH: Span = Span::from_secs(2);
-    const CURRENT_MIN_A: f32 = 0.5;
-    const THROTTLE_MIN: f32 = 0.2;
-    let current = |number: usize| {
-        let motor = inputs.vehicle.motors.get(number)?;
-        let fresh = motor.moved_at.is_some_and(|at| inputs.now.since(at) <= FRESH);
-        motor.esc.current.map(|current| current.0).filter(|current| fresh && current.is_finite())
-    };
-    let own = current(usize::from(number))?;
-    let others = (0..MOTORS_MAX).filter(|other| *other != usize::from(number)).filter_map(current);
-    let (sum, count) = others.fold((0.0, 0_u8), |(sum, count), current| (sum + current, count + 1));
-    let mean = sum / f32::from(count);
-    let throttle = inputs.vehicle.hud.within(inputs.now, FRESH)?.throttle?.0;
-    let on_rotors = inputs.vehicle.hovers(inputs.now) == Some(true);
-    let asked = on_rotors && count >= 2 && mean > CURRENT_MIN_A && throttle > THROTTLE_MIN;
-    // Measured when this motor told it: a value that is held is one sample. Noise around zero may be negative.
-    let at = motor(inputs, number)?.moved_at?;
-    asked.then(|| Reading { at, value: own.max(0.0) / mean * 100.0 })
 }
 
 fn temperature_c(inputs: &Inputs<'_>, number: u8) -> Option<Reading> {

@@ -31,6 +31,8 @@ const SINKS: Span = Span::from_millis(500);
 const LOST_M: f32 = 7.0;
 /// What sinks slower than this with all its thrust follows a glide path against the wind, m/s: a height is forgotten so fast.
 const GLIDES_MPS: f32 = 1.0;
+/// All the throttle of a plane, which may need most of it on a steep path against the wind.
+const FULL_ON_WINGS: f32 = 0.97;
 /// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
 const PULL_OUT_G: f32 = 6.0;
 /// Below this part of the throttle that it hovers with, a fall is what the throttle asks for.
@@ -201,7 +203,9 @@ impl Mishap {
 
     fn take_sink(&mut self, at: Instant, sink_mps: f32, vehicle: &Vehicle, params: &Params) {
         let limit_mps = params.get(Param::MisSink);
-        let full = throttle(at, vehicle).is_some_and(|part| part >= FULL_THROTTLE);
+        let on_wings = vehicle.hovers(at) == Some(false);
+        let least = if on_wings { FULL_ON_WINGS } else { FULL_THROTTLE };
+        let full = throttle(at, vehicle).is_some_and(|part| part >= least);
         let told_to = has_pilots_throttle(vehicle);
         let lost_m = self.lose_height(at, full && !told_to, vehicle);
         let sinks = match vehicle.hovers(at) {

@@ -12,7 +12,7 @@
 //! | `end_s` | when the fault ended or the flight was over: nothing is counted after it |
 //! | `visible` | whether the messages show the fault at all |
 //! | `autopilot_texts` | what the autopilot said: second, `MAV_SEVERITY`, text |
-//! | `flights` | from and to of each time in the air; with it, `landings` and `crash_s` (null: none) |
+//! | `flights` | from and to of each time in the air; with it, `landings` and `crashes_s` |
 //! | `battery_low_s` | when the autopilot itself first called a battery low (null: never) |
 //!
 //! Other fields are passed over. Without `flights`, the flight takes no part in the count of flights, landings and mishaps.
@@ -49,7 +49,7 @@ pub(super) struct Label {
     #[serde(default)]
     pub(super) landings: u64,
     #[serde(default)]
-    pub(super) crash_s: Option<f64>,
+    pub(super) crashes_s: Vec<f64>,
     #[serde(default)]
     pub(super) battery_low_s: Option<f64>,
 }
@@ -88,8 +88,8 @@ impl Label {
     pub(super) fn explains(&self, alarm: &str, at_s: f64) -> bool {
         let of =
             |subsystem: Subsystem| checks().any(|check| check.name == alarm && check.subsystem == subsystem);
-        let crash = |crash_s: f64| (crash_s - CRASH_BEFORE_S..crash_s + CRASH_AFTER_S).contains(&at_s);
-        (self.crash_s.is_some_and(crash) && of(Subsystem::Mishap))
+        let crash = |crash_s: &f64| (crash_s - CRASH_BEFORE_S..crash_s + CRASH_AFTER_S).contains(&at_s);
+        (self.crashes_s.iter().any(crash) && of(Subsystem::Mishap))
             || (self.battery_low_s.is_some_and(|low_s| at_s >= low_s) && of(Subsystem::Power))
     }
 
@@ -137,7 +137,8 @@ mod tests {
     #[test]
     fn a_crash_and_a_battery_that_the_autopilot_calls_low_explain_their_alarms_and_no_others() {
         let text = FLIGHT.replace("20.5", "null");
-        let known = format!("[{text}, \"flights\": [[5, 30]], \"crash_s\": 30.0, \"battery_low_s\": 40.0}}]");
+        let known =
+            format!("[{text}, \"flights\": [[5, 30]], \"crashes_s\": [30.0], \"battery_low_s\": 40.0}}]");
         let label = &parse(&known).unwrap()[0];
         for (check, at_s, explained) in [
             ("impact", 31.5, true),

@@ -166,7 +166,7 @@ fn fault(alarms: &[Alarm], label: &Label) -> Option<Fault> {
 
 fn truth(label: &Label) -> Option<Counts> {
     let flights = label.flights.as_ref()?.len() as u64;
-    Some(Counts { flights, landings: label.landings, mishaps: u64::from(label.crash_s.is_some()) })
+    Some(Counts { flights, landings: label.landings, mishaps: label.crashes_s.len() as u64 })
 }
 
 /// What the odometer counted.

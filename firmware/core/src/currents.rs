@@ -1,0 +1,112 @@
+//! Whether a motor takes its share of the current while the vehicle hangs on its rotors.
+//!
+//! Only a motor that was seen lifting can be lost. A VTOL's motors that push stand still in hover and may help against the wind; its
+//! motors that lift stop on the wings. So while the vehicle is armed each motor is known as one that lifts or as one that does not:
+//!
+//! | seen in the air | then the motor |
+//! |---|---|
+//! | it takes its share in hover | lifts |
+//! | on a VTOL: nothing in its first sample of hover, or current on the wings | pushes, and is not judged until it is armed again |
+//!
+//! Where half of the motors that lift, or more, stand nearly still and the vehicle does not spin, its autopilot drives them there:
+//! a VTOL that turns against the wind stops its motors of one sense of rotation. A vehicle that lost two of four spins.
+
+use crate::latest::Reading;
+use crate::observation::{MOTORS_MAX, VehicleKind};
+use crate::time::{Instant, Span};
+use crate::vehicle::Vehicle;
+
+/// Currents that are older decide nothing.
+const FRESH: Span = Span::from_secs(2);
+/// ESCs that do not measure current say zero for all, and then nothing follows.
+const CURRENT_MIN_A: f32 = 0.5;
+/// PX4's motor failure check: below this throttle no motor is asked for much.
+const THROTTLE_MIN: f32 = 0.2;
+/// From this part of the mean of the others a motor takes its share; below [`IDLE_PART`] it stands nearly still.
+const SHARE_PART: f32 = 0.3;
+const IDLE_PART: f32 = 0.1;
+/// 60 degrees a second: what lost two motors of four spins faster within a moment.
+const SPINS_RAD_S: f32 = 1.05;
+
+/// What is known of the motors since the vehicle was armed, a bit for each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Currents {
+    lifts: u16,
+    pushes: u16,
+}
+
+const _: () = assert!(MOTORS_MAX <= 16);
+
+impl Currents {
+    pub(crate) const fn new() -> Self {
+        Self { lifts: 0, pushes: 0 }
+    }
+
+    /// ESCs told of themselves.
+    pub(crate) fn take(&mut self, now: Instant, vehicle: &Vehicle, airborne: bool) {
+        if !vehicle.armed() {
+            *self = Self::new();
+        }
+        if !airborne {
+            return;
+        }
+        let winged = vehicle.kind() == VehicleKind::Vtol;
+        for motor in 0..MOTORS_MAX {
+            let bit = 1 << motor;
+            let Some(own_a) = current_a(now, vehicle, motor) else { continue };
+            if vehicle.hovers(now) == Some(false) && own_a > CURRENT_MIN_A {
+                self.pushes |= bit;
+            }
+            let Some(part) = part_of_others(now, vehicle, motor, u16::MAX) else { continue };
+            if winged && part < IDLE_PART && self.lifts & bit == 0 {
+                self.pushes |= bit;
+            } else if part >= SHARE_PART {
+                self.lifts |= bit;
+            }
+        }
+    }
+
+    /// A motor's current in percent of the mean of the others that lift, while the throttle asks for thrust and the vehicle hangs
+    /// on its rotors; `None` for a motor that was not seen lifting.
+    pub(crate) fn percent(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+        let lifting = self.lifts & !self.pushes;
+        let judged = lifting & 1_u16.checked_shl(u32::from(motor))? != 0 && !self.is_driven_so(now, vehicle);
+        let part = part_of_others(now, vehicle, usize::from(motor), lifting).filter(|_| judged)?;
+        // Measured when this motor told it: a value that is held is one sample.
+        let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
+        Some(Reading { at, value: part * 100.0 })
+    }
+
+    /// Whether half of the motors that lift stand nearly still and the vehicle does not spin.
+    fn is_driven_so(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let lifting = self.lifts & !self.pushes;
+        let currents = || {
+            let lifts = |motor: &usize| lifting & (1 << motor) != 0;
+            (0..MOTORS_MAX).filter(lifts).filter_map(|motor| current_a(now, vehicle, motor))
+        };
+        let most_a = currents().fold(0.0, f32::max);
+        let idle = currents().filter(|current_a| *current_a < SHARE_PART * most_a).count();
+        let rates = vehicle.attitude.within(now, FRESH).and_then(|attitude| attitude.rates);
+        let spins = rates.is_none_or(|rates| rates.into_iter().any(|rate| rate.0.abs() > SPINS_RAD_S));
+        2 * idle >= currents().count() && !spins
+    }
+}
+
+/// What a motor takes, in amperes. Noise around zero may be negative.
+fn current_a(now: Instant, vehicle: &Vehicle, motor: usize) -> Option<f32> {
+    let motor = vehicle.motors.get(motor)?;
+    let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= FRESH);
+    motor.esc.current.map(|current| current.0.max(0.0)).filter(|current| fresh && current.is_finite())
+}
+
+/// A motor's current as a part of the mean of the others of `among`, while the throttle asks for thrust in hover.
+fn part_of_others(now: Instant, vehicle: &Vehicle, motor: usize, among: u16) -> Option<f32> {
+    let own_a = current_a(now, vehicle, motor)?;
+    let throttle = vehicle.hud.within(now, FRESH)?.throttle?.0;
+    let others = (0..MOTORS_MAX).filter(|other| *other != motor && among & (1 << other) != 0);
+    let others = others.filter_map(|other| current_a(now, vehicle, other));
+    let (sum_a, count) = others.fold((0.0, 0_u8), |(sum_a, count), current_a| (sum_a + current_a, count + 1));
+    let mean_a = sum_a / f32::from(count);
+    let asked = vehicle.hovers(now) == Some(true) && throttle > THROTTLE_MIN;
+    (asked && count >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
+}
