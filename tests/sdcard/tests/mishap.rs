@@ -13,8 +13,12 @@ const ATTITUDE: u32 = 30;
 const POSITION: u32 = 33;
 const LANDED: u32 = 245;
 
-/// What an autopilot says in a tenth of a second: in the air at 30 m, turning at `rate`.
-fn say(rig: &mut Rig, rate: f32) {
+/// `MAV_LANDED_STATE_ON_GROUND`, `MAV_LANDED_STATE_IN_AIR`
+const ON_GROUND: u8 = 1;
+const IN_AIR: u8 = 2;
+
+/// What an autopilot says in a tenth of a second: at 30 m, turning at `rate`, and its landed state.
+fn say(rig: &mut Rig, rate: f32, landed: u8) {
     let mut attitude = vec![0; 16];
     attitude.extend(rate.to_le_bytes());
     attitude.extend([0; 8]);
@@ -25,8 +29,7 @@ fn say(rig: &mut Rig, rate: f32) {
     }
     position.extend([0; 8]);
     rig.say(POSITION, &position);
-    // MAV_LANDED_STATE_IN_AIR
-    rig.say(LANDED, &[0, 2]);
+    rig.say(LANDED, &[0, landed]);
     let now_ms = rig.slot.now_ns() / MS;
     rig.run_to(now_ms + 100);
 }
@@ -39,11 +42,11 @@ fn a_mishap_is_on_the_card_within_200_ms_and_told_with_its_place() {
     rig.run_to(10_000);
     rig.assert_state(CardState::Recording);
     for _ in 0..50 {
-        say(&mut rig, 0.1);
+        say(&mut rig, 0.1, IN_AIR);
     }
     assert!(!rig.was_told("mishap", 0), "{:?}", rig.texts);
     while !rig.was_told("mishap", 0) {
-        say(&mut rig, 15.0);
+        say(&mut rig, 15.0, IN_AIR);
         assert!(rig.slot.now_ns() / MS < 17_000, "not told: {:?}", rig.texts);
     }
     rig.assert_told("HUMS: mishap at 47.397742,8.545594 30 m", 0);
@@ -56,5 +59,31 @@ fn a_mishap_is_on_the_card_within_200_ms_and_told_with_its_place() {
     assert_eq!(found.marks, [Resting::Mishap]);
     rig.run_to(told.as_millis() + 1_000);
     rig.assert_told("mishap: tumbling", 0);
+    for _ in 0..60 {
+        say(&mut rig, 15.0, IN_AIR);
+    }
+    let snapshots = read(&medium).snapshots.into_iter().filter(|(check, _)| check == "tumbling");
+    let halves: Vec<_> = snapshots.map(|(_, after)| after).collect();
+    assert_eq!(halves, [false, true], "the seconds before it and those after it");
     rig.finish_whole(&medium);
+}
+
+#[test]
+fn what_is_seen_on_the_bench_is_an_event_of_the_log_and_is_not_told() {
+    let medium = Medium::formatted(64 * MIB);
+    let mut rig = Rig::new(Model::new(Kind::Sdhc, medium.clone()));
+    for _ in 0..100 {
+        say(&mut rig, 0.1, ON_GROUND);
+    }
+    rig.armed = true;
+    for turned in [0.1, 15.0, 0.1, 15.0] {
+        for _ in 0..25 {
+            say(&mut rig, turned, ON_GROUND);
+        }
+    }
+    assert!(rig.texts.iter().all(|(_, text)| !text.contains("mishap")), "{:?}", rig.texts);
+    rig.finish_whole(&medium);
+    let events: Vec<_> =
+        read(&medium).events.into_iter().filter(|(number, _)| (15..=18).contains(number)).collect();
+    assert_eq!(events, [(18, "tumbling".to_owned())], "once for an arming");
 }

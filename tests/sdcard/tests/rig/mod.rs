@@ -64,6 +64,8 @@ pub struct Found {
     /// Numbers and texts of events, and why there are end marks.
     pub events: Vec<(u8, String)>,
     pub marks: Vec<Resting>,
+    /// Checks of snapshots, and whether each is of the time after the finding.
+    pub snapshots: Vec<(String, bool)>,
 }
 
 impl Rig {
@@ -365,6 +367,9 @@ fn take(reader: &mut LogReader, found: &mut Found) {
                 found.events.push((event.number, event.text.to_owned()));
             }
             Item::Record { record: Record::Mark(mark), .. } => found.marks.push(mark.why),
+            Item::Record { record: Record::Snapshot(snapshot), .. } => {
+                found.snapshots.push((snapshot.check.to_owned(), snapshot.after));
+            }
             Item::Record { .. } | Item::End(_) => {}
         }
     }

@@ -18,6 +18,8 @@ const NAMED_MIN: usize = 31;
 const WARNINGS_MAX: usize = 2;
 const CRITICAL_MAX: usize = 1;
 const GROUND_MAX: usize = 0;
+/// Flights whose flights, landings or mishaps were counted wrong at most.
+const MISCOUNTED_MAX: usize = 0;
 
 /// What came of all flights together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,6 +30,8 @@ struct Sums {
     warnings: usize,
     critical: usize,
     ground: usize,
+    counted: usize,
+    miscounted: usize,
 }
 
 pub(super) fn run() -> Result<String> {
@@ -42,6 +46,10 @@ pub(super) fn run() -> Result<String> {
             }
             sums.warnings += count(&one.alarms, Level::Warning, true) as usize;
             sums.critical += count(&one.alarms, Level::Critical, true) as usize;
+            if let Some((truth, counted)) = one.counts {
+                sums.counted += 1;
+                sums.miscounted += usize::from(truth != counted);
+            }
             sums.ground += one.alarms.iter().filter(|it| !it.in_air).count();
         }
     }
@@ -51,11 +59,12 @@ pub(super) fn run() -> Result<String> {
 
 impl Sums {
     fn text(&self) -> String {
-        let Self { faults, told, named, warnings, critical, ground } = self;
+        let Self { faults, told, named, warnings, critical, ground, counted, miscounted } = self;
         format!(
             "* faults, told, cause named: {faults}, {told} (at least {TOLD_MIN}), {named} (at least {NAMED_MIN})\n\
              * false warnings and criticals in the air: {warnings} (at most {WARNINGS_MAX}), {critical} (at most {CRITICAL_MAX})\n\
-             * false alarms on the ground: {ground} (at most {GROUND_MAX})\n"
+             * false alarms on the ground: {ground} (at most {GROUND_MAX})\n\
+             * flights, landings and mishaps counted: in {counted} flights, wrong in {miscounted} (at most {MISCOUNTED_MAX})\n"
         )
     }
 
@@ -66,6 +75,8 @@ impl Sums {
         let is_quiet =
             self.warnings <= WARNINGS_MAX && self.critical <= CRITICAL_MAX && self.ground == GROUND_MAX;
         ensure!(is_quiet, "more false alarms than before; {SHOWS}\n{}", self.text());
+        let counts = self.miscounted == MISCOUNTED_MAX;
+        ensure!(counts, "more flights are counted wrong than before; {SHOWS}\n{}", self.text());
         Ok(())
     }
 }
@@ -83,6 +94,8 @@ mod tests {
             warnings: WARNINGS_MAX,
             critical: CRITICAL_MAX,
             ground: GROUND_MAX,
+            counted: 86,
+            miscounted: MISCOUNTED_MAX,
         };
         assert!(good.check().is_ok());
         for (worse, said) in [
@@ -91,6 +104,7 @@ mod tests {
             (Sums { warnings: WARNINGS_MAX + 1, ..good }, "more false alarms"),
             (Sums { critical: CRITICAL_MAX + 1, ..good }, "more false alarms"),
             (Sums { ground: GROUND_MAX + 1, ..good }, "more false alarms"),
+            (Sums { miscounted: MISCOUNTED_MAX + 1, ..good }, "counted wrong"),
         ] {
             let error = format!("{:#}", worse.check().unwrap_err());
             assert!(error.contains(said) && error.contains("at least"), "{error}");
