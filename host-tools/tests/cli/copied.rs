@@ -72,18 +72,16 @@ fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_ev
     let dir = copied(2, "");
     all_say(dir.path(), "copied", 0, &[]);
     let noise: Vec<u8> = (0..SEGMENT as u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 21) as u8).collect();
-    for content in [vec![0; SEGMENT], noise, Vec::new(), vec![0xff; SEGMENT], b"hello".to_vec()] {
-        for name in ["00001_01.HUM", "00002_01.HUM", "00003_00.HUM"] {
-            let path = dir.path().join("copied").join(name);
-            fs::write(&path, &content).expect("written");
-            all_say(
-                dir.path(),
-                "copied",
-                3,
-                &[&format!("{name} has the name of a segment and holds nothing of ours")],
-            );
-            fs::remove_file(path).expect("removed");
-        }
+    let names = ["00001_01.HUM", "00002_01.HUM", "00003_00.HUM"];
+    let contents = [vec![0; SEGMENT], noise, Vec::new(), vec![0xff; SEGMENT], b"hello".to_vec()];
+    // Each content under the first name, each name with the first content.
+    let pairs = contents.iter().map(|content| (names[0], content));
+    for (name, content) in pairs.chain(names[1..].iter().map(|name| (*name, &contents[0]))) {
+        let path = dir.path().join("copied").join(name);
+        fs::write(&path, content).expect("written");
+        let told = format!("{name} has the name of a segment and holds nothing of ours");
+        all_say(dir.path(), "copied", 3, &[&told]);
+        fs::remove_file(path).expect("removed");
     }
     // The log itself, in place of its sectors.
     let path = dir.path().join("copied/00001_00.HUM");

@@ -1,6 +1,7 @@
 //! What the tests of the program share.
 
 use std::fs;
+use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -144,6 +145,27 @@ pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
                 .extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
         } else {
             found.push((name, fs::read(&path).expect("a file")));
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Which file it is, how long, and when it was changed last (`st_ctime`, which no program sets): one that has the same is untouched.
+pub(crate) type Stamp = (u64, u64, i64, i64);
+
+/// All files below a directory by name, without reading them: a card's image is large.
+pub(crate) fn stamps(dir: &Path) -> Vec<(String, Stamp)> {
+    let mut found = Vec::new();
+    let entries = fs::read_dir(dir).expect("a directory");
+    for path in entries.map(|entry| entry.expect("an entry").path()) {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if path.is_dir() {
+            let inner = stamps(&path).into_iter();
+            found.extend(inner.map(|(inner, stamp)| (format!("{name}/{inner}"), stamp)));
+        } else {
+            let of = fs::metadata(&path).expect("a file");
+            found.push((name, (of.ino(), of.len(), of.ctime(), of.ctime_nsec())));
         }
     }
     found.sort();
