@@ -169,6 +169,8 @@ pub struct Contents {
     pub stats: Option<Stats>,
     /// Gaps, in order, up to [`LISTED_MAX`].
     pub gaps: Vec<Gap>,
+    /// Of each of them where it is in the file and what was found there, in a recording that is no log of ours.
+    pub gap_words: Vec<(Option<u64>, String)>,
     /// Entries that are no frame at all.
     pub not_frames: u64,
     /// Frames that were verified on board, whose checksum fails here.

@@ -155,6 +155,13 @@ impl Monitor {
         self.usage.break_off();
     }
 
+    /// What comes next is of another recording of the vehicle, another day perhaps: the time that the autopilot has been up
+    /// tells of no restart.
+    pub fn begin_another_recording(&mut self) {
+        self.begin_anew();
+        self.vehicle.forget_boot();
+    }
+
     /// One step, every [`TICK`]: flight, checks, usage. Each change of a check's level is given to `findings`, once.
     pub fn tick(
         &mut self,

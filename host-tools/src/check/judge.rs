@@ -15,6 +15,7 @@ use hums_core::observation::Observation;
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
+use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;
 
 use super::clock::{Clock, SETTLE};
@@ -76,8 +77,6 @@ pub struct Judge {
     first: Option<Instant>,
     last: Instant,
     coverage: Coverage,
-    armed: Span,
-    was_armed: bool,
     /// What the monitor here found, and what the one on board did.
     here: Problems,
     board: Problems,
@@ -90,6 +89,7 @@ pub struct Judge {
     damages: u64,
     losses: u64,
     restarts: u64,
+    joints: Vec<Instant>,
 }
 
 impl Judge {
@@ -104,8 +104,6 @@ impl Judge {
             first: None,
             last: Instant::ZERO,
             coverage: Coverage::new(),
-            armed: Span::ZERO,
-            was_armed: false,
             here: Problems::default(),
             board: Problems::default(),
             checked_on_board: false,
@@ -117,6 +115,7 @@ impl Judge {
             damages: 0,
             losses: 0,
             restarts: 0,
+            joints: Vec::new(),
         }
     }
 
@@ -158,6 +157,7 @@ impl Judge {
             Item::Record(told) => self.told(told),
             Item::Gap(gap) => self.gap(gap),
             Item::Restart => self.restart(at),
+            Item::Joint => self.joint(at),
             Item::Frame(frame) if self.wire.is_some() => {
                 self.advance(at);
                 let at = self.clock.monitor(at);
@@ -196,6 +196,21 @@ impl Judge {
             self.monitor.begin_anew();
             self.flights.break_off();
         }
+    }
+
+    /// Another recording was joined on: it is judged by itself, from the time on at which all was told anew.
+    fn joint(&mut self, at: Instant) {
+        if self.first.is_some() {
+            self.advance(at);
+        }
+        self.restarts += 1;
+        if self.joints.len() < LISTED_MAX {
+            self.joints.push(at);
+        }
+        self.epochs.restart(at);
+        self.monitor.begin_another_recording();
+        self.flights.break_off();
+        self.clock.skip_to(at + SETTLE);
     }
 
     /// The autopilot stops its motors in the moment in which it says why: that is no state which lasts for as long as the
@@ -256,11 +271,6 @@ impl Judge {
                 details.tell(finding.check, here);
             }
         });
-        let armed = monitor.vehicle().armed();
-        if armed && self.was_armed {
-            self.armed = self.armed + TICK;
-        }
-        self.was_armed = armed;
         while let Some(happening) = self.monitor.take_happening() {
             match happening {
                 Happening::TakeOff => {
@@ -289,6 +299,7 @@ impl Judge {
             self.advance(self.last);
         }
         let mut flights = self.flights.end(&self.monitor);
+        let armed = armed(&self.monitor);
         let given = !self.limits.given.is_empty();
         let by = if self.checked_on_board && !given { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
@@ -307,7 +318,7 @@ impl Judge {
             monitor: &self.monitor,
             is_of_link: self.format.is_of_link(),
             on_the_wire: self.wire.is_some(),
-            armed: self.armed,
+            armed,
             arming: self.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty()),
             flew: !flights.is_empty(),
         });
@@ -330,20 +341,47 @@ impl Judge {
             facts: self.facts,
             epochs: self.epochs,
             span: self.first.map(|first| (first, last)),
-            armed: self.armed,
+            armed,
             flights,
             findings_count: problems.findings_count,
             findings: std::mem::take(&mut problems.findings),
             problems: problems.worst_first(),
             judged,
             not_judged,
-            remarks: self.details.remarks(),
+            remarks: joined(&self.joints).into_iter().chain(self.details.remarks()).collect(),
             gaps: self.gaps,
             damages: self.damages,
             losses: self.losses,
             restarts: self.restarts,
         }
     }
+}
+
+/// How long the vehicle was armed, as the usage counts it: without gaps.
+fn armed(monitor: &Monitor) -> Span {
+    let mut seconds = 0.0;
+    monitor.for_each_counter(|number, value| {
+        if number == UsageCounter::Armed as u8 {
+            seconds = value;
+        }
+    });
+    // Its sum is not exact.
+    Span::from_millis((seconds * 100.0).round() as u64 * 10)
+}
+
+/// That recordings were joined, as a sentence.
+fn joined(joints: &[Instant]) -> Option<String> {
+    const NAMED: usize = 3;
+    let named: Vec<String> =
+        joints.iter().take(NAMED).map(|at| format!("{:.1} s", at.as_secs_f64())).collect();
+    let more = if joints.len() > NAMED { " and later" } else { "" };
+    (!joints.is_empty()).then(|| {
+        format!(
+            "the file is {} recordings, joined at {}{more}: each is judged by itself",
+            joints.len() + 1,
+            named.join(", ")
+        )
+    })
 }
 
 /// Whether a check says anything in a recording of this format, judged here: one recording tells neither of earlier flights

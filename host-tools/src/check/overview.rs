@@ -68,6 +68,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     contents.epoch_us = judged.epochs.whole();
     count(&mut contents, format, summary);
     contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
+    contents.gap_words = judged.gaps.iter().map(|gap| (gap.place, gap.words.clone())).collect();
     let (first, last) = judged.span.unzip();
     let summary = reader::Summary {
         epoch_us: judged.epochs.whole(),

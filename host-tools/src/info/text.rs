@@ -215,6 +215,9 @@ fn gaps_text(text: &mut String, log: &Overview) {
             count(summary.blocks.damaged, "damaged sector")
         );
     }
+    if !own {
+        return foreign_gaps(text, log);
+    }
     for gap in contents.gaps.iter().filter(|gap| gap.cause == Cause::Disarmed).take(SHOWN_MAX) {
         let time = |at: Option<Instant>| at.map_or(0.0, Instant::as_secs_f64);
         let (from, to) = (time(gap.from), time(gap.to));
@@ -224,11 +227,6 @@ fn gaps_text(text: &mut String, log: &Overview) {
         let time = |at: Option<Instant>, none: &str| {
             at.map_or_else(|| none.to_owned(), |at| format!("{:.3} s", at.as_secs_f64()))
         };
-        if !own {
-            let (from, to) = (time(gap.from, "the beginning"), time(gap.to, "where it is read on"));
-            let _ = writeln!(text, "    from {from} to {to}: {}", foreign_words(gap.cause));
-            continue;
-        }
         let frames = gap
             .frames
             .map_or_else(|| "an unknown number of frames".to_owned(), |frames| count(frames, "frame"));
@@ -252,12 +250,25 @@ fn gaps_text(text: &mut String, log: &Overview) {
     }
 }
 
-/// Why something is missing in what another program recorded.
-fn foreign_words(cause: Cause) -> &'static str {
-    match cause {
-        Cause::Missing => "the recorder lost something, and says so",
-        _ => "the file is damaged or cut short",
+/// What is missing in a recording that is no log of ours: when, where in the file, and what was found there.
+fn foreign_gaps(text: &mut String, log: &Overview) {
+    let (summary, contents) = (&log.ending.summary, &log.contents);
+    for (gap, (place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {
+        let seconds = |at: Instant| format!("{:.3}", at.as_secs_f64());
+        let when = match (gap.from, gap.to) {
+            (Some(from), Some(to)) => format!("from {} to {} s", seconds(from), seconds(to)),
+            (Some(from), None) => format!("at {} s", seconds(from)),
+            (None, _) => "at the beginning".to_owned(),
+        };
+        let place = place.map_or_else(String::new, |place| format!("byte {place}: "));
+        let what = match gap.cause {
+            Cause::Missing => "lost by the recorder: ",
+            Cause::Disarmed => "",
+            _ => "damaged or cut short: ",
+        };
+        let _ = writeln!(text, "    {when}: {what}{place}{}", word(found));
     }
+    more(text, (summary.gaps + summary.losses).max(contents.gaps.len() as u64), contents.gaps.len());
 }
 
 /// Why something is missing.

@@ -47,6 +47,9 @@ pub enum Item<'a> {
     Gap(&'a Gap),
     /// The recording's clock began again: another power-on of what recorded it. Time goes on from where it was.
     Restart,
+    /// Another recording was joined on here: the recorder's clock and the autopilot's changed together. Its clock begins anew,
+    /// as with [`Item::Restart`], and nothing of before holds.
+    Joint,
 }
 
 /// A parameter and its value.

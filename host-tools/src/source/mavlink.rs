@@ -4,13 +4,16 @@ use anyhow::Result;
 use hums_core::time::Instant;
 use hums_link::framer::Framer;
 
+use super::boot::{JOINT_US, Joints, boot_ms};
+use super::clock::{Ahead, Clock, Reading, Rules, Stamp, Wrong};
+use super::doubt::Ends;
 use super::input::Input;
 use super::item::{Cause, Gap, Item, MessageCount, Reader, Summary, Take, Want};
 use super::paced::Paced;
 use super::raw::Raw;
 use super::said::Said;
 use super::stream::Source as _;
-use super::timeline::{STEP_BACK_US_MAX, Timeline, Wrong, is_wrong};
+use super::timeline::Timeline;
 use super::tlog::{Record, Records, TIME_BYTES, UTC_US_MIN};
 use crate::names::message_name;
 use crate::plural::count;
@@ -64,57 +67,67 @@ impl TlogReader {
     }
 }
 
-/// Whether a record's time is wrong: the times after it say so, or it stands alone at one end of the recording, ten
-/// minutes from all others or before them. A ground station's clock gives no single record such a time.
-fn is_wrong_time(before: Option<u64>, time_us: u64, after: &[u64]) -> bool {
-    const ALONE_US: u64 = 600_000_000;
-    match (before, after.first()) {
-        (Some(before), None) => {
-            time_us > before.saturating_add(ALONE_US) || time_us.saturating_add(STEP_BACK_US_MAX) < before
+/// Microseconds since 1970, by the clock of a ground station, which may be set; a link may be silent for seconds until its last
+/// frames come, and for longer after its first.
+const RULES: Rules = Rules {
+    from_first: true,
+    old_values: false,
+    ends: Ends { steady_us: 10_000_000, seldom_us: 60_000_000 },
+};
+
+/// The reading of a tlog.
+struct TlogReading {
+    clock: Clock,
+    joints: Joints,
+    wrong: Wrong,
+    now: Instant,
+}
+
+impl TlogReading {
+    /// Takes the time of a record, and hands on what it says of the clock.
+    fn time(&mut self, time_us: u64, place: u64, after: &Records<Input>, take: &mut Take<'_>) -> Result<()> {
+        let before = self.clock.recorded_us();
+        let stamp = |us| Stamp { us, series: 0 };
+        let ahead = |_: &dyn Fn(Stamp) -> bool| {
+            let (times, is_end) = after.times_after();
+            Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
+        };
+        let Reading::Sound(moment) = self.clock.take(stamp(time_us), ahead) else {
+            self.wrong.add(self.now, place);
+            return Ok(());
+        };
+        self.now = moment.at;
+        let is_joint = before.is_some_and(|before| {
+            let is_far = moment.restarted || time_us > before.saturating_add(JOINT_US);
+            is_far && self.joints.is_joint(before, time_us, after)
+        });
+        match (is_joint, moment.restarted) {
+            (true, _) => take(self.now, Item::Joint)?,
+            (false, true) => take(self.now, Item::Restart)?,
+            (false, false) if before.is_some() => return Ok(()),
+            (false, false) => {}
         }
-        (None, Some(next)) if *next > time_us.saturating_add(ALONE_US) => after.len() > 1,
-        _ => is_wrong(before, time_us, after.iter().copied()) == Some(true),
+        match time_us.checked_sub(self.now.as_micros()).filter(|_| time_us >= UTC_US_MIN) {
+            Some(epoch_us) => take(self.now, Item::Epoch(epoch_us)),
+            None => Ok(()),
+        }
     }
 }
 
 impl Reader for TlogReader {
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
-        let mut timeline: Option<Timeline> = None;
-        let mut wrong = Wrong::default();
-        let (mut place, mut now) = (0_u64, Instant::ZERO);
+        let mut reading = TlogReading {
+            clock: Clock::new(RULES),
+            joints: Joints::default(),
+            wrong: Wrong::default(),
+            now: Instant::ZERO,
+        };
+        let mut place = 0_u64;
         while let Some(record) = self.records.next_record()? {
             let bytes = match record {
                 Record::Frame { time_us, bytes } => {
-                    let (before, after) =
-                        (timeline.and_then(|timeline| timeline.recorded_us()), || self.records.times_after());
-                    let is_jump = timeline.is_none_or(|timeline| timeline.is_jump(time_us));
-                    // Where a wrong one is the first of all, the next one tells when the recording began.
-                    let time_us = if is_jump && is_wrong_time(before, time_us, &after()) {
-                        wrong.add(now, place);
-                        before.or_else(|| after().first().copied()).unwrap_or(time_us)
-                    } else {
-                        time_us
-                    };
-                    let timeline = match &mut timeline {
-                        Some(timeline) => timeline,
-                        none => {
-                            if time_us >= UTC_US_MIN {
-                                take(now, Item::Epoch(time_us))?;
-                            }
-                            none.insert(Timeline::from_first(time_us))
-                        }
-                    };
-                    let moment = timeline.at(time_us);
-                    now = moment.at;
-                    if moment.restarted {
-                        take(now, Item::Restart)?;
-                        if let Some(epoch_us) =
-                            time_us.checked_sub(now.as_micros()).filter(|_| time_us >= UTC_US_MIN)
-                        {
-                            take(now, Item::Epoch(epoch_us))?;
-                        }
-                    }
+                    reading.time(time_us, place, &self.records, take)?;
                     place += TIME_BYTES as u64;
                     bytes
                 }
@@ -125,18 +138,20 @@ impl Reader for TlogReader {
                         (Cause::Damaged, "of no record of the tlog")
                     };
                     let words = format!("{what}: {}", count(bytes.len(), "byte"));
-                    take(now, Item::Gap(&gap(now, cause, place, bytes.len(), words)))?;
+                    take(reading.now, Item::Gap(&gap(reading.now, cause, place, bytes.len(), words)))?;
                     bytes
                 }
             };
             place += bytes.len() as u64;
+            let TlogReading { joints, now, .. } = &mut reading;
             push(&mut framer, &bytes, true, &mut |frame| {
+                joints.frame(&frame);
                 counts.add(frame.id(), frame.bytes().len());
-                said.frame(now, &frame, want, take)
+                said.frame(*now, &frame, want, take)
             })?;
         }
-        if let Some(gap) = wrong.gap() {
-            take(now, Item::Gap(&gap))?;
+        if let Some(gap) = reading.wrong.gap() {
+            take(reading.now, Item::Gap(&gap))?;
         }
         said.end(take)?;
         Ok(counts.summary())
@@ -157,7 +172,7 @@ struct BootTimes {
 impl BootTimes {
     /// The time of a frame, and whether the autopilot's clock began again before it.
     fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, bool) {
-        let told = Self::boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
+        let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
         if let Some(boot_ms) = told {
             let boot_us = u64::from(boot_ms) * 1_000;
             if self.timeline.is_none() {
@@ -172,19 +187,6 @@ impl BootTimes {
 
     fn after_base(&self, at: Instant) -> Instant {
         Instant::from_micros(self.base.as_micros().saturating_add(at.as_micros()))
-    }
-
-    /// `time_boot_ms` of an autopilot's `SYSTEM_TIME`, `ATTITUDE` and `GLOBAL_POSITION_INT`; zeros at the end of a payload are not sent.
-    fn boot_ms(frame: &hums_link::Frame<'_>) -> Option<u32> {
-        /// `MAV_COMP_ID_AUTOPILOT1`
-        const AUTOPILOT: u8 = 1;
-        let offset = match frame.id() {
-            2 => 8,
-            30 | 33 => 0,
-            _ => return None,
-        };
-        let byte = |at: usize| frame.payload().get(offset + at).copied().unwrap_or(0);
-        (frame.component() == AUTOPILOT).then(|| u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]))
     }
 }
 
@@ -308,12 +310,72 @@ mod tests {
 
     #[test]
     fn a_wrong_time_at_either_end_moves_no_other_time() {
-        for (at, wrong) in [(199, 170_000), (199, 100), (0, 10_000)] {
-            let mut times: Vec<u64> = (80_000..80_200).collect();
-            times[at] = wrong;
-            let end = 198;
-            assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{at} {wrong}");
+        for count in [1, 2, 8] {
+            for (at, wrong) in [(200 - count, 170_000), (200 - count, 100), (0, 10_000), (0, 80_900)] {
+                let mut times: Vec<u64> = (80_000..80_200).collect();
+                times[at..at + count].fill(wrong);
+                let end = 199 - count as u64;
+                let told = told(&times);
+                assert_eq!(
+                    told,
+                    (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end),
+                    "{at} {wrong} {count}"
+                );
+            }
         }
+        // A link that was silent for some seconds before its last frames.
+        let late: Vec<u64> = (80_000..80_200).chain([80_250, 80_251]).collect();
+        assert_eq!(told(&late), (vec![], 0, 251));
+    }
+
+    #[test]
+    fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
+        // Twenty records a second; every ten seconds the clock falls by 1.1 to 1.4 s.
+        let mut times = Vec::new();
+        let mut from = 80_000;
+        for fall in [11, 14, 12, 13, 0] {
+            times.extend((0..200).map(|record| from + record / 2));
+            from += 99 - fall;
+        }
+        let (gaps, restarts, _) = told(&times);
+        assert_eq!((gaps, restarts), (vec![], 4));
+    }
+
+    /// What a tlog says of its clock: of attitudes at these seconds of the ground station's clock and of the autopilot's.
+    fn clock_of(times: &[(u64, u64)]) -> String {
+        let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+        let record = |(recorded, boot): &(u64, u64)| {
+            let time = (1_700_000_000 * SECOND + recorded * SECOND).to_be_bytes();
+            let packet = Packet::new(30).u32(0, *boot as u32 * 1_000);
+            [&time[..], encoder.frame(&mut buffer, &packet)].concat()
+        };
+        let bytes: Vec<u8> = times.iter().flat_map(record).collect();
+        let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
+        let mut told = String::new();
+        let read = reader.read(Want::default(), &mut |_, item| {
+            match item {
+                Item::Gap(_) => told += "gap ",
+                Item::Restart => told += "restart ",
+                Item::Joint => told += "joint ",
+                _ => {}
+            }
+            Ok(())
+        });
+        assert!(read.is_ok());
+        told
+    }
+
+    #[test]
+    fn two_recordings_that_were_joined_are_told_from_a_clock_that_was_set_and_from_a_long_silence() {
+        let part = |recorded: u64, boot: u64| (0..50).map(move |second| (recorded + second, boot + second));
+        let joined =
+            |recorded, boot| clock_of(&part(90_000, 100).chain(part(recorded, boot)).collect::<Vec<_>>());
+        assert_eq!(joined(90_000, 100), "joint ", "the same twice");
+        assert_eq!(joined(93_700, 100), "joint ", "an hour later, after another power-on");
+        assert_eq!(joined(50_000, 700), "joint ", "an earlier one, longer after its power-on");
+        assert_eq!(joined(50_000, 150), "restart ", "the clock was set");
+        assert_eq!(joined(93_700, 100 + 3_700), "", "an hour without a word");
+        assert_eq!(joined(90_200, 5), "", "a restart of the autopilot");
     }
 
     #[test]

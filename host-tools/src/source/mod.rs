@@ -21,7 +21,10 @@
 //! Times are microseconds since the first byte and never fall: see [`tlog`] for what happens to clocks that jumped.
 //! Everything streams: memory does not grow with the input.
 
+mod boot;
+pub mod clock;
 pub mod dataflash;
+pub mod doubt;
 pub mod input;
 pub mod item;
 pub mod live;

@@ -3,69 +3,14 @@
 //! A recording's clock may fall (another power-on in the same file, a clock that was set) and damage may make it say
 //! anything. A small step back is a reordering: what comes late counts as coming now. A larger one is a restart, after
 //! which time goes on from where it was. A step forward beyond a day is damage or a clock that was set: it counts for
-//! nothing, and if the clock stays there, time goes on from there.
+//! nothing, and if the clock stays there, time goes on from there. (Which times are wrong, [`super::doubt`] tells before.)
 
 use hums_core::time::Instant;
-
-use super::item::{Cause, Gap};
-use crate::plural::count;
 
 /// A step back beyond this is a clock that began again, not a reordering.
 pub const STEP_BACK_US_MAX: u64 = 1_000_000;
 /// A step forward beyond this is damage or a clock that was set; gaps of hours are real.
 pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
-
-/// So many of the times after a jump are asked whether it is one: eight damaged ones in a row are outvoted.
-pub const ASKED: usize = 16;
-/// Times that stand in a file side by side are out of order by so much at most, as a rule.
-const DISORDER_US: u64 = 200_000;
-
-/// Whether a time that is far from the one before it is wrong: the times after it go on from the one before it, and not
-/// from it. `None` where none of them tells. Of the first time of all (`before` is `None`): whether the next one and
-/// most others are before it.
-///
-/// One damaged bit makes such a time. A pause and a restart are confirmed by what comes after them. After a jump
-/// forward, times from before the jump's beginning tell nothing: a log begins with old values.
-pub fn is_wrong(before: Option<u64>, recorded: u64, after: impl IntoIterator<Item = u64>) -> Option<bool> {
-    let (mut wrong, mut right) = (0_usize, 0_usize);
-    for time in after.into_iter().take(ASKED) {
-        if before.is_none() && wrong == 0 && right > 0 {
-            // The clock went on from the first time, and fell later.
-            return Some(false);
-        }
-        let disagrees = match before {
-            Some(before) if recorded > before && time.saturating_add(STEP_BACK_US_MAX) < before => continue,
-            Some(before) if recorded > before => time.saturating_add(DISORDER_US) < recorded,
-            Some(before) => time.saturating_add(DISORDER_US) >= before,
-            None => time.saturating_add(STEP_BACK_US_MAX) < recorded,
-        };
-        *(if disagrees { &mut wrong } else { &mut right }) += 1;
-    }
-    (wrong + right > 0).then_some(wrong > right)
-}
-
-/// Messages with a wrong time: how many, and where the first one is.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Wrong {
-    count: u64,
-    first: Option<(Instant, u64)>,
-}
-
-impl Wrong {
-    /// One more, at this byte of the recording.
-    pub fn add(&mut self, at: Instant, place: u64) {
-        self.count += 1;
-        self.first.get_or_insert((at, place));
-    }
-
-    /// Tells them as damage; nothing where there are none.
-    pub fn gap(self) -> Option<Gap> {
-        let (at, place) = self.first?;
-        let words =
-            format!("{} with a wrong time, far from the times around it", count(self.count, "message"));
-        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
-    }
-}
 
 /// What a recorded time became.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,13 +32,19 @@ pub struct Timeline {
 impl Timeline {
     /// A clock whose first time is that of the stream: microseconds since a power-on. (One that counts from 1970 is
     /// made by [`Timeline::from_first`].)
-    pub fn new() -> Self {
-        Self::default()
+    pub const fn new() -> Self {
+        Self { last: None, restarts: 0 }
     }
 
     /// A clock whose first time, whatever it says, is the stream's time zero.
-    pub fn from_first(first_us: u64) -> Self {
+    pub const fn from_first(first_us: u64) -> Self {
         Self { last: Some((first_us, 0)), restarts: 0 }
+    }
+
+    /// Another recording goes on here, which begins at this time: time goes on from where it was.
+    pub fn begin_again(&mut self, recorded_us: u64) {
+        self.restarts += 1;
+        self.last = Some((recorded_us, self.now().as_micros()));
     }
 
     /// The next recorded time, in microseconds.
@@ -128,8 +79,11 @@ impl Timeline {
     }
 
     /// The latest recorded time.
-    pub fn recorded_us(&self) -> Option<u64> {
-        self.last.map(|(recorded_us, _)| recorded_us)
+    pub const fn recorded_us(&self) -> Option<u64> {
+        match self.last {
+            Some((recorded_us, _)) => Some(recorded_us),
+            None => None,
+        }
     }
 
     /// How often the clock fell or jumped.
@@ -168,27 +122,6 @@ mod tests {
             got,
             [(60 * SECOND, false), (61 * SECOND, false), (61 * SECOND, true), (62 * SECOND, false)]
         );
-    }
-
-    #[test]
-    fn a_time_is_wrong_where_the_times_after_it_go_on_from_the_one_before_it() {
-        let after = |seconds: [u64; 5]| seconds.map(|second| second * SECOND);
-        let wrong = |recorded: u64, seconds| is_wrong(Some(100 * SECOND), recorded * SECOND, after(seconds));
-        assert_eq!(wrong(108, [100, 100, 101, 101, 101]), Some(true));
-        assert_eq!(wrong(3, [100, 100, 101, 101, 101]), Some(true));
-        assert_eq!(wrong(108, [100, 108, 108, 109, 109]), Some(false), "a pause");
-        assert_eq!(wrong(3, [3, 3, 4, 4, 4]), Some(false), "a restart");
-        assert_eq!(wrong(108, [5, 6, 7, 8, 9]), None, "old values");
-        assert_eq!(is_wrong(None, 30 * SECOND, after([2, 2, 2, 3, 3])), Some(true), "the first of all");
-        let set = |tenths: [u64; 5]| {
-            is_wrong(Some(100 * SECOND), 98_900_000, tenths.map(|tenth| tenth * SECOND / 10))
-        };
-        assert_eq!(set([991, 993, 995, 997, 999]), Some(false), "a clock that was set back by a second");
-        assert_eq!(set([1_001, 1_003, 1_005, 1_007, 1_009]), Some(true));
-        let run = [800, 800, 801, 801, 100, 100, 100, 101, 101, 101].map(|second| second * SECOND);
-        assert_eq!(is_wrong(Some(100 * SECOND), 800 * SECOND, run), Some(true), "the first of five");
-        assert_eq!(is_wrong(None, SECOND, after([2, 2, 90, 91, 92])), Some(false));
-        assert_eq!(is_wrong(Some(SECOND), 9 * SECOND, []), None, "the last of all");
     }
 
     #[test]

@@ -9,15 +9,15 @@
 
 use std::io::{self, Read};
 
+use super::doubt::ASKED;
 use super::stream::{Chunk, Source, read_some};
-use super::timeline::ASKED;
 use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
 use crate::plural::count;
 
 pub(super) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
 /// Enough to see a record, and those after it that are asked whether its time is right.
-const LOOKAHEAD_BYTES: usize = (ASKED + 2) * (TIME_BYTES + FRAME_BYTES_MAX);
+const LOOKAHEAD_BYTES: usize = (2 * ASKED) * (TIME_BYTES + FRAME_BYTES_MAX);
 
 /// A step back beyond this is a clock that was set, not a reordering.
 const STEP_BACK_US_MAX: u64 = 1_000_000;
@@ -58,23 +58,40 @@ impl<R: Read> Records<R> {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
-    /// The times of the next few records.
-    pub(super) fn times_after(&self) -> Vec<u64> {
-        let (mut times, mut at) = (Vec::new(), 0);
-        while let Some(rest) = self.rest().get(at..LOOKAHEAD_BYTES.min(self.rest().len())) {
-            match record_at(rest, self.ended) {
-                Some((time_us, length)) => {
-                    times.push(time_us);
-                    at += TIME_BYTES + length;
-                }
-                None if rest.is_empty() => break,
-                None => at += 1,
+    /// The times of the next few records, and whether no more follow.
+    pub(super) fn times_after(&self) -> (Vec<u64>, bool) {
+        let mut times = Vec::with_capacity(ASKED);
+        let is_end = self.each_after(&mut |time_us, _| {
+            times.push(time_us);
+            times.len() < ASKED
+        });
+        (times, is_end)
+    }
+
+    /// What the first of the next frames tells that tells it, as far as they are here.
+    pub(super) fn frames_after<T>(&self, mut told: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
+        let mut found = None;
+        self.each_after(&mut |_, bytes| {
+            found = told(bytes);
+            found.is_none()
+        });
+        found
+    }
+
+    /// Hands on the next records until one says no; whether the input ends with them.
+    fn each_after(&self, each: &mut dyn FnMut(u64, &[u8]) -> bool) -> bool {
+        let mut rest = self.rest();
+        while !rest.is_empty() {
+            let Some((time_us, length)) = record_at(rest, self.ended) else {
+                rest = rest.get(1..).unwrap_or_default();
+                continue;
+            };
+            if !each(time_us, rest.get(TIME_BYTES..TIME_BYTES + length).unwrap_or_default()) {
+                return false;
             }
-            if times.len() >= ASKED {
-                break;
-            }
+            rest = rest.get(TIME_BYTES + length..).unwrap_or_default();
         }
-        times
+        self.ended
     }
 
     /// Whether the input ended with these bytes, which were the last that came, in the middle of a record.

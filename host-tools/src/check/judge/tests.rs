@@ -231,6 +231,37 @@ fn another_power_on_in_an_autopilots_own_log_ends_the_flight_of_before_and_a_gro
 }
 
 #[test]
+fn a_recording_that_was_joined_on_is_judged_by_itself() {
+    for (joint, findings) in [(Item::Joint, 0), (Item::Restart, 1)] {
+        let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+        let flight = |judge: &mut Judge, from_ms: u32| {
+            for second in 0..60_u32 {
+                let at = Instant::from_millis(u64::from(from_ms + second * 1_000));
+                judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(second > 5)));
+                let landed = if second > 10 { LandedState::InAir } else { LandedState::OnGround };
+                judge
+                    .item(at, Item::Observation(AUTOPILOT, &Observation::Landed(landed, VtolState::Unknown)));
+                let attitude = Attitude { boot_ms: Some(100_000 + second * 1_000), ..Attitude::default() };
+                judge.item(at, Item::Observation(AUTOPILOT, &Observation::Attitude(attitude)));
+            }
+        };
+        flight(&mut judge, 0);
+        judge.item(Instant::from_millis(60_000), joint);
+        flight(&mut judge, 60_000);
+        let judged = judge.end();
+        let told = judged.problems.iter().filter(|problem| problem.check == "autopilot_reboot").count();
+        assert_eq!(told, findings, "{:?}", judged.problems);
+        assert_eq!(judged.remarks.len(), 1 - findings, "{:?}", judged.remarks);
+        assert_eq!(judged.restarts, 1);
+        if findings == 0 {
+            assert!(judged.problems.is_empty(), "{:?}", judged.problems);
+            assert_eq!(judged.flights.len(), 2);
+            assert!(judged.remarks[0].contains("joined at 60.0 s"), "{:?}", judged.remarks);
+        }
+    }
+}
+
+#[test]
 fn trends_over_flights_are_not_judged_from_one_recording() {
     for format in [Format::DataFlash, Format::Tlog, Format::Hums] {
         let stored = VOCABULARY.iter().filter(|words| words.scope == Scope::Stored);

@@ -2,61 +2,86 @@
 
 use super::format::{Format, Formats, HEADER_BYTES};
 use super::message::{Body, Message};
+use super::stamp::{Week, stamp};
 use super::text;
-use crate::source::timeline::ASKED;
+use crate::source::clock::{self, Stamp};
+use crate::source::doubt::ASKED;
 
-/// Room for more than [`ASKED`] of the longest binary messages.
-pub(super) const AHEAD_BYTES: usize = 2_048;
+/// Room for more than [`ASKED`] of the longest binary messages, and for a second of the oldest logs, in which only GPS messages
+/// have times.
+pub(super) const AHEAD_BYTES: usize = 16 * 1_024;
+/// No message for so long: what follows is erased memory, not part of the log.
+const ERASED_BYTES: usize = 4 * 1_024;
 /// Fields of a line that are looked at.
 const VALUES_MAX: usize = 32;
 
 /// What follows a message in the file.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Ahead<'a> {
-    /// Of a binary log.
-    Bytes(&'a [u8]),
-    /// Of a text log.
-    Lines(&'a [u8]),
+pub(super) struct Ahead<'a> {
+    /// As much of it as is here: [`AHEAD_BYTES`] or more, if there are so many.
+    pub(super) bytes: &'a [u8],
+    /// It is a text log.
+    pub(super) is_text: bool,
+    /// Nothing follows these bytes.
+    pub(super) is_end: bool,
 }
 
 impl Ahead<'_> {
-    /// The first few times that messages tell there, in microseconds since power-on.
-    pub(super) fn times(self, formats: &Formats) -> Vec<u64> {
-        match self {
-            Self::Bytes(bytes) => of_bytes(bytes.get(..AHEAD_BYTES).unwrap_or(bytes), formats),
-            Self::Lines(bytes) => of_lines(bytes.get(..AHEAD_BYTES).unwrap_or(bytes), formats),
+    /// The first few times that messages tell there and that are asked for.
+    pub(super) fn stamps(self, formats: &Formats, week: Week, asks: &dyn Fn(Stamp) -> bool) -> clock::Ahead {
+        let bytes = self.bytes.get(..AHEAD_BYTES).unwrap_or(self.bytes);
+        let mut is_end = self.is_end && bytes.len() == self.bytes.len();
+        let mut stamps = Vec::with_capacity(ASKED);
+        let mut take = |message: &Message<'_>| {
+            stamps.extend(stamp(message, formats, week).filter(|stamp| asks(*stamp)));
+            stamps.len() < ASKED
+        };
+        if self.is_text {
+            of_lines(bytes, is_end, formats, &mut take);
+        } else {
+            let read = of_bytes(bytes, formats, &mut take);
+            is_end |= bytes.len() - read >= ERASED_BYTES;
         }
+        clock::Ahead { is_end: is_end && stamps.len() < ASKED, stamps }
     }
 }
 
-fn of_bytes(bytes: &[u8], formats: &Formats) -> Vec<u64> {
-    let (mut times, mut at) = (Vec::new(), 0);
-    while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty() && times.len() < ASKED) {
+/// Gives messages on until `take` has enough; where the last one of those that were looked at ends.
+fn of_bytes(bytes: &[u8], formats: &Formats, take: &mut dyn FnMut(&Message<'_>) -> bool) -> usize {
+    let (mut at, mut last) = (0, 0);
+    while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty()) {
         let &[0xA3, 0x95, kind, ..] = rest else {
             at += 1;
             continue;
         };
         let length = usize::from(formats.lengths.told[usize::from(kind)]);
-        let format = formats.get(kind).filter(|format| format.time.is_some());
-        if let (Some(format), Some(payload)) = (format, rest.get(HEADER_BYTES..length)) {
-            times.extend(Message::new(format, Body::Bytes(payload)).time_us());
+        if let (Some(format), Some(payload)) = (formats.get(kind), rest.get(HEADER_BYTES..length))
+            && !take(&Message::new(format, Body::Bytes(payload)))
+        {
+            return bytes.len();
         }
         at += length.max(1);
+        last = at.min(bytes.len());
     }
-    times
+    last
 }
 
-fn of_lines(bytes: &[u8], formats: &Formats) -> Vec<u64> {
+/// The same of lines.
+fn of_lines(bytes: &[u8], is_end: bool, formats: &Formats, take: &mut dyn FnMut(&Message<'_>) -> bool) {
+    let is_newline = |byte: &u8| matches!(byte, b'\n' | b'\r');
     // The last one may not be whole.
-    let whole = bytes.iter().rposition(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(0);
-    let lines = bytes.get(..whole).unwrap_or_default().split(|byte| matches!(byte, b'\n' | b'\r'));
-    lines.filter_map(|line| time_of_line(std::str::from_utf8(line).ok()?, formats)).take(ASKED).collect()
-}
-
-fn time_of_line(line: &str, formats: &Formats) -> Option<u64> {
-    let name = text::name(line);
-    let named = |format: &&Format| format.name == name && format.time.is_some();
-    let format = (0..=u8::MAX).filter_map(|kind| formats.get(kind)).find(named)?;
-    let values = text::values(line, format.fields.len().min(VALUES_MAX));
-    Message::new(format, Body::Words(&values)).time_us()
+    let whole = if is_end { bytes.len() } else { bytes.iter().rposition(is_newline).unwrap_or(0) };
+    for line in bytes.get(..whole).unwrap_or_default().split(is_newline) {
+        let Some((line, format)) = std::str::from_utf8(line).ok().and_then(|line| {
+            let name = text::name(line);
+            let named = |format: &&Format| format.name == name;
+            Some((line, (0..=u8::MAX).filter_map(|kind| formats.get(kind)).find(named)?))
+        }) else {
+            continue;
+        };
+        let values = text::values(line, format.fields.len().min(VALUES_MAX));
+        if !take(&Message::new(format, Body::Words(&values))) {
+            return;
+        }
+    }
 }

@@ -9,7 +9,7 @@
 
 use std::io::{self, Read};
 
-use super::ahead::AHEAD_BYTES;
+use super::ahead::{AHEAD_BYTES, Ahead};
 use super::buffer::Buffer;
 use super::format::{HEADER_BYTES, Lengths};
 
@@ -28,8 +28,8 @@ pub(super) enum Piece<'a> {
         payload: &'a [u8],
         /// Where it begins.
         place: u64,
-        /// What is here of the bytes after it.
-        after: &'a [u8],
+        /// What follows it.
+        after: Ahead<'a>,
     },
     /// Bytes that could not be read.
     Damage(Damage),
@@ -99,7 +99,9 @@ impl<R: Read> Binary<R> {
                         return Ok(Some(Piece::Damage(skipped.told(false))));
                     }
                     let place = self.place();
+                    let is_end = self.buffer.ended();
                     let (bytes, after) = self.buffer.take_before(length);
+                    let after = Ahead { bytes: after, is_text: false, is_end };
                     let kind = bytes.get(2).copied().unwrap_or_default();
                     let payload = bytes.get(HEADER_BYTES..).unwrap_or_default();
                     return Ok(Some(Piece::Message { kind, payload, place, after }));

@@ -17,6 +17,7 @@ mod format;
 mod message;
 mod observe;
 mod session;
+mod stamp;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -115,7 +116,7 @@ fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Res
     let mut window = Binary::new(bytes.window(FIRST_BYTES).context(CONTEXT)?);
     while let Some(piece) = window.next(first.lengths())? {
         if let Piece::Message { kind, payload, after, .. } = piece {
-            first.learn(kind, Body::Bytes(payload), Ahead::Bytes(after));
+            first.learn(kind, Body::Bytes(payload), after);
         }
     }
     let mut session = Session::new(first, want);
@@ -123,7 +124,7 @@ fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Res
         match piece {
             Piece::Message { kind, payload, place, after } => {
                 let length = (HEADER_BYTES + payload.len()) as u64;
-                session.message((kind, Body::Bytes(payload)), place, length, Ahead::Bytes(after), take)?;
+                session.message((kind, Body::Bytes(payload)), place, length, after, take)?;
             }
             Piece::Damage(Damage { place, bytes, at_end, words }) => {
                 let cause = if at_end { Cause::Cut } else { Cause::Damaged };
@@ -144,7 +145,7 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         }
         if let Ok(Some(kind)) = kinds.of(&line, first.formats()) {
             let values = values_of(&line, kind, first.formats());
-            first.learn(kind, Body::Words(&values), Ahead::Lines(line.after));
+            first.learn(kind, Body::Words(&values), ahead_of(&line));
             kinds.learn(kind, first.formats());
         }
     }
@@ -171,7 +172,7 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         }
         let values = values_of(&line, kind, session.formats());
         let body = (kind, Body::Words(&values));
-        session.message(body, line.place, line.bytes, Ahead::Lines(line.after), take)?;
+        session.message(body, line.place, line.bytes, ahead_of(&line), take)?;
         kinds.learn(kind, session.formats());
     }
     if let Some(Skipped { place, bytes, words, whole }) = skipped {
@@ -179,6 +180,11 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         session.gap(cause, Some(place), bytes, words, take)?;
     }
     session.end(take)
+}
+
+/// What follows a line.
+fn ahead_of<'a>(line: &Line<'a>) -> Ahead<'a> {
+    Ahead { bytes: line.after, is_text: true, is_end: line.is_end }
 }
 
 /// The values of a line of this type.

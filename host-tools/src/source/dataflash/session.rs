@@ -15,11 +15,11 @@ use super::message::{Body, Message};
 use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
 use super::table::{self, Tables};
 use crate::plural::count;
+use crate::source::clock::Wrong;
 use crate::source::item::{
     About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Want,
 };
-use crate::source::timeline::Wrong;
 
 /// The autopilot: every log is of one.
 const SOURCE: Source = Source { system: 1, component: 1 };
@@ -75,8 +75,8 @@ impl First {
         let Some(format) = formats.get(kind) else { return };
         let message = Message::new(format, body);
         if begins_us.is_none() {
-            let when = clock.at(&message, None, (ahead, formats));
-            *begins_us = when.boot_us.filter(|_| !when.own.is_doubted());
+            let when = clock.at(&message, ahead, formats);
+            *begins_us = when.boot_us.filter(|_| when.own == Own::Sound);
         }
         if let Some(resolved) = handlers.of(format).filter(|resolved| resolved.handler.is_fact) {
             observe::take(state, resolved, &message, (Instant::ZERO, None), &mut Out::new(&mut |_| ()));
@@ -305,9 +305,7 @@ impl<'w> Session<'w> {
         let Self { want, formats, state, clock, handlers, epoch, firmware, later, wrong, .. } = self;
         let Some(format) = formats.get(kind) else { return Ok(()) };
         let message = Message::new(format, body);
-        let week = || message.unsigned(format.field("TimeMS").or_else(|| format.field("Time"))?);
-        let week = if formats.has_boot_clock || format.name != "GPS" { None } else { week() };
-        let when = clock.at(&message, week, (ahead, formats));
+        let when = clock.at(&message, ahead, formats);
         if when.own == Own::Wrong {
             wrong.add(when.at, place);
         }
@@ -351,10 +349,10 @@ impl<'w> Session<'w> {
                 let after = state.standing();
                 // Without a time, disarming counts as of the message before it, and arming as of the next: a logger pauses
                 // in between.
-                let waits = if when.own.is_doubted() { after != before } else { after.arms(&before) };
+                let waits = if when.own == Own::Wrong { after != before } else { after.arms(&before) };
                 *later = waits.then_some(after);
                 state.stand(if waits { before } else { after });
-            } else if !when.own.is_doubted() {
+            } else if when.own != Own::Wrong {
                 observe::take(state, resolved, &message, (when.at, when.boot_us), &mut out);
             }
             if is_timed && is_said && want.observations {

@@ -22,6 +22,8 @@ pub(super) struct Line<'a> {
     pub(super) whole: bool,
     /// What is here of the bytes after it.
     pub(super) after: &'a [u8],
+    /// Nothing follows these.
+    pub(super) is_end: bool,
 }
 
 /// A reader of lines.
@@ -50,13 +52,14 @@ impl<R: Read> Lines<R> {
         let length = end.unwrap_or(searched.len());
         let next = length + usize::from(end.is_some());
         let place = self.0.place();
+        let is_end = self.0.ended();
         let (line, after) = self.0.take_before(next);
         let line = line.get(..length).unwrap_or_default();
         let words = std::str::from_utf8(line).map_or_else(
             |_| line.iter().map(|byte| char::from(*byte)).collect::<String>().into(),
             Cow::Borrowed,
         );
-        Ok(Some(Line { place, bytes: next as u64, words, whole: end.is_some(), after }))
+        Ok(Some(Line { place, bytes: next as u64, words, whole: end.is_some(), after, is_end }))
     }
 }
 

@@ -18,8 +18,6 @@ pub(super) const MAGIC: [u8; 7] = [b'U', b'L', b'o', b'g', 0x01, 0x12, 0x35];
 /// The longest message other than data that is looked for in damage: each byte may be the beginning of one, and to look
 /// through 65,536 bytes for each would take seconds a megabyte.
 const FOUND_BYTES_MAX: usize = 2_048;
-/// Messages after one that are looked at for their times.
-const DATA_AFTER_MAX: usize = 64;
 /// What a synchronisation message holds.
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 
@@ -297,19 +295,44 @@ fn header(rest: &[u8]) -> Option<(u8, usize)> {
 }
 
 /// The messages of data at the beginning of some bytes, with the numbers of their subscriptions, as far as each message
-/// follows the one before it; at most [`DATA_AFTER_MAX`] messages are looked at.
-pub(super) fn data_after(bytes: &[u8]) -> impl Iterator<Item = (u16, &[u8])> {
-    let mut rest = bytes;
-    let next = move || {
-        let (kind, body_bytes) = header(rest)?;
-        let body = rest.get(HEADER_BYTES..HEADER_BYTES + body_bytes)?;
-        rest = rest.get(HEADER_BYTES + body_bytes..)?;
-        Some((kind, body))
-    };
-    std::iter::from_fn(next).take(DATA_AFTER_MAX).filter_map(|(kind, body)| {
-        let (id, data) = body.split_first_chunk().filter(|_| kind == b'D')?;
-        Some((u16::from_le_bytes(*id), data))
-    })
+/// follows the one before it. So many messages at most are looked at.
+pub(super) const fn data_after(bytes: &[u8], messages: usize) -> DataAfter<'_> {
+    DataAfter { rest: bytes, left: messages }
+}
+
+/// See [`data_after`].
+pub(super) struct DataAfter<'a> {
+    rest: &'a [u8],
+    left: usize,
+}
+
+impl DataAfter<'_> {
+    /// Whether no message follows: the bytes end, or what is left is less than a message or begins with zeros. (There are more
+    /// bytes than the longest message has, or they are the last.)
+    pub(super) fn is_end(&self) -> bool {
+        /// Longer messages of data are rare.
+        const LESS_BYTES: usize = 2_048;
+        let zeros = self.rest.get(..LESS_BYTES).unwrap_or(self.rest).iter().all(|byte| *byte == 0);
+        let cut = self.rest.len() < LESS_BYTES
+            && header(self.rest).is_none_or(|(_, body_bytes)| self.rest.len() < HEADER_BYTES + body_bytes);
+        zeros || cut
+    }
+}
+
+impl<'a> Iterator for DataAfter<'a> {
+    type Item = (u16, &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            self.left = self.left.checked_sub(1)?;
+            let (kind, body_bytes) = header(self.rest).filter(|(kind, _)| *kind != 0)?;
+            let body = self.rest.get(HEADER_BYTES..HEADER_BYTES + body_bytes)?;
+            self.rest = self.rest.get(HEADER_BYTES + body_bytes..)?;
+            if let (b'D', Some((id, data))) = (kind, body.split_first_chunk()) {
+                return Some((u16::from_le_bytes(*id), data));
+            }
+        }
+    }
 }
 
 /// The time in the header of a file, where one stands.

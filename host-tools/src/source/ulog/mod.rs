@@ -10,15 +10,14 @@
 //! | `format` | definitions, and the places of fields that they make |
 //! | `topics` | which number is which topic |
 //! | `fields` | where the fields are that the mapping needs |
-//! | `clock` | recorded times as times that never fall |
+//! | `times` | the times of messages, and of those after them |
 //! | `rows` | every field, by its own name |
 //! | `px4` | what PX4's topics say, as observations: the same that the MAVLink edge makes of what PX4 sends |
 //! | `session` | one pass over all of it |
 //!
-//! Memory is bounded whatever the file says: a window of 576 KiB, 1,024 definitions with 32,768 fields, 4,096
+//! Memory is bounded whatever the file says: a window of 640 KiB, 1,024 definitions with 32,768 fields, 4,096
 //! subscriptions. Appended data (a crash dump) is read after what comes before it. Nothing here panics for any input.
 
-mod clock;
 mod fields;
 mod format;
 mod message;
@@ -29,6 +28,7 @@ mod session;
 mod testing;
 #[cfg(test)]
 mod tests;
+mod times;
 mod topics;
 mod window;
 

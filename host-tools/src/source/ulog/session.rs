@@ -7,22 +7,21 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use hums_core::time::Span;
 
-use super::clock::Clock;
 use super::fields::Fields;
 use super::format::Formats;
 use super::message::{
-    FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, beginning, data_after,
-    words as text_of,
+    FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, beginning, words as text_of,
 };
 use super::px4::{Px4, Said, Told};
 use super::rows;
+use super::times;
 use super::topics::Subscriptions;
 use super::window::Window;
+use crate::source::clock::{self, Clock, Reading, Stamp, Wrong};
 use crate::source::item::{
     About, Cause, Column, Event, Fact, Gap, Item, Kind, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Value, Want,
 };
-use crate::source::timeline::Wrong;
 
 /// What a look needs to see: the longest message and the header after it.
 const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + FILE_HEADER_BYTES;
@@ -30,6 +29,8 @@ const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + FILE_HEADER_BYTES;
 const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
 /// The incompatible flag that is known: data was appended.
 const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];
+/// Topics that PX4 keeps on its card, with the time of the boot at which they were made.
+const KEPT_OVER_BOOTS: [&str; 1] = ["mission"];
 /// Words of one piece of information at most.
 const WORDS_BYTES_MAX: usize = 256;
 
@@ -41,7 +42,8 @@ pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut T
     };
     window.consume(FILE_HEADER_BYTES);
     let mut session = Session::new(want, take);
-    session.clock.begin(time_us);
+    let first = times::first_in(window);
+    session.begin(0, time_us, &first, window.ended());
     loop {
         window.fill(LOOK_BYTES);
         let place = window.place();
@@ -134,7 +136,7 @@ impl<'a, 'b> Session<'a, 'b> {
             take,
             formats: Formats::default(),
             subscriptions: Subscriptions::default(),
-            clock: Clock::default(),
+            clock: Clock::new(times::RULES),
             px4: Px4::default(),
             own: OwnTables::new(want.rows),
             information: BTreeMap::new(),
@@ -219,7 +221,7 @@ impl<'a, 'b> Session<'a, 'b> {
             }
             Message::Text { level, time_us, words } => self.text(place, (level, time_us, words), after),
             Message::Dropout(milliseconds) => self.dropout(place, milliseconds),
-            Message::Beginning { time_us } => self.another(time_us),
+            Message::Beginning { time_us } => self.another(place, time_us, after),
             Message::Sync | Message::Unknown => Ok(()),
         }
     }
@@ -309,18 +311,20 @@ impl<'a, 'b> Session<'a, 'b> {
             self.strays.0 += 1;
             return Ok(());
         };
-        let recorded = subscription.take(data, bytes);
-        let recorded = recorded.filter(|&recorded| !self.is_wrong(recorded, place, after));
-        if recorded.is_some_and(|recorded| self.clock.take(recorded)) {
-            (self.take)(self.clock.now(), Item::Restart)?;
-        }
-        let now = self.clock.now();
+        let recorded = subscription.take(data, bytes).filter(|&recorded| recorded > 0);
+        let stamp = recorded.map(|us| times::stamp(id, us));
+        let is_wrong = match stamp {
+            Some(stamp) => self.time(stamp, place, after)?,
+            None => false,
+        };
+        let recorded = recorded.filter(|_| !is_wrong);
+        let (now, latest) = (self.clock.now(), self.recorded());
         let Some(subscription) = self.subscriptions.get_mut(id) else { return Ok(()) };
         if let Some(table) = &subscription.table {
             let values = rows::values(&subscription.layout, subscription.instance, data);
             (self.take)(now, Item::Row(Row { table, values: &values }))?;
         }
-        let recorded = recorded.unwrap_or_else(|| self.clock.recorded());
+        let recorded = recorded.unwrap_or(latest);
         if let Some((topic, slots)) = &subscription.topic
             && subscription
                 .observed_us
@@ -333,22 +337,42 @@ impl<'a, 'b> Session<'a, 'b> {
                 &Said { at: now, recorded_us: recorded, instance: subscription.instance, fields },
             );
         }
-        self.px4.step(now, self.clock.recorded());
+        self.px4.step(now, latest);
         self.hand_on()
     }
 
-    /// Whether the time of the message at hand is wrong; counts those.
-    fn is_wrong(&mut self, recorded: u64, place: u64, after: &[u8]) -> bool {
-        if !self.clock.is_doubtful(recorded) {
-            return false;
-        }
+    /// Takes the time of the message at hand: whether it is wrong. Wrong ones are counted, except those of a topic that
+    /// PX4 keeps over a boot, until it tells the time of this one.
+    fn time(&mut self, stamp: Stamp, place: u64, after: &[u8]) -> Result<bool> {
         let subscriptions = &self.subscriptions;
-        let times = data_after(after).filter_map(|(id, data)| subscriptions.time(id, data));
-        let is_wrong = self.clock.is_wrong(recorded, times);
+        let ahead = |asks: &dyn Fn(Stamp) -> bool| times::ahead(subscriptions, after, asks);
+        match self.clock.take(stamp, ahead) {
+            Reading::Sound(moment) if moment.restarted => (self.take)(moment.at, Item::Restart)?,
+            Reading::Sound(_) | Reading::Old => {}
+            Reading::Wrong { known } => {
+                let topic = stamp.series.checked_sub(1).and_then(|id| self.subscriptions.name(id));
+                if known || topic.is_none_or(|topic| !KEPT_OVER_BOOTS.contains(&topic)) {
+                    self.wrong.add(self.clock.now(), place);
+                }
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The latest time as the log has it.
+    fn recorded(&self) -> u64 {
+        self.clock.recorded_us().unwrap_or(0)
+    }
+
+    /// A log begins at this time, if its first data do; `true` where another one came before it.
+    fn begin(&mut self, place: u64, time_us: u64, first: &[u64], is_end: bool) -> bool {
+        let (time_us, is_wrong) = clock::beginning(time_us, first, is_end);
+        let again = self.clock.begin_log(time_us);
         if is_wrong {
             self.wrong.add(self.clock.now(), place);
         }
-        is_wrong
+        again
     }
 
     /// What the mapping has made.
@@ -380,7 +404,8 @@ impl<'a, 'b> Session<'a, 'b> {
 
     /// UTC at the autopilot's boot becomes UTC at time zero.
     fn epoch(&mut self, boot_us: i128) -> Result<()> {
-        match u64::try_from(boot_us + self.clock.zero()) {
+        let zero_us = i128::from(self.recorded()) - i128::from(self.clock.now().as_micros());
+        match u64::try_from(boot_us + zero_us) {
             Ok(epoch) => self.tell(Item::Epoch(epoch)),
             Err(_) => Ok(()),
         }
@@ -395,8 +420,8 @@ impl<'a, 'b> Session<'a, 'b> {
 
     fn text(&mut self, place: u64, (level, time_us, words): (u8, u64, &[u8]), after: &[u8]) -> Result<()> {
         self.tell_facts()?;
-        if !self.is_wrong(time_us, place, after) && self.clock.take(time_us) {
-            self.tell(Item::Restart)?;
+        if time_us > 0 {
+            self.time(times::of_text(time_us), place, after)?;
         }
         self.say(level, text_of(words).trim_end())
     }
@@ -428,12 +453,12 @@ impl<'a, 'b> Session<'a, 'b> {
     }
 
     /// Another log was joined on: nothing of the first one holds.
-    fn another(&mut self, time_us: u64) -> Result<()> {
+    fn another(&mut self, place: u64, time_us: u64, after: &[u8]) -> Result<()> {
         self.formats = Formats::default();
         self.subscriptions.clear();
         self.px4 = Px4::default();
         self.told_facts = false;
-        self.clock.begin(time_us);
+        self.begin(place, time_us, &times::first(after), false);
         self.tell(Item::Restart)
     }
 

@@ -89,6 +89,74 @@ fn one_wrong_time_is_damage_and_changes_no_other_time() {
     assert_eq!(log(&after), (0, None, end + 5 * SECOND));
 }
 
+/// A log of twenty topics that begins at 60 s: the old value of every third topic, then all of them every 20 ms.
+fn beginning(wrong: impl Fn(usize, u64) -> u64) -> Vec<u8> {
+    let mut writer = Writer::new(60 * SECOND).format(POSITION);
+    for id in 0..20 {
+        writer = writer.subscribe(id, id as u8, "position");
+    }
+    let mut index = 0;
+    for round in 0..20_u64 {
+        for id in 0..20_u16 {
+            let is_old = round == 0 && id % 3 == 1;
+            let time = if is_old { u64::from(id) * SECOND } else { 60 * SECOND + round * 20_000 };
+            writer = writer.data(id, wrong(index, time), &position(1.0, 1));
+            index += 1;
+        }
+    }
+    writer.bytes
+}
+
+#[test]
+fn a_wrong_time_among_the_old_values_that_a_log_begins_with_moves_no_other_time() {
+    let end = |log: &[u8]| read(log).items.iter().map(|(at, _)| *at).max();
+    let clean = beginning(|_, time| time);
+    assert_eq!((read(&clean).gaps.len(), end(&clean)), (0, Some(60 * SECOND + 380_000)));
+    for at in [0, 1, 2, 7, 19, 30, 200] {
+        for shift in [2 * SECOND, 5 * SECOND, 9 * SECOND, 700 * SECOND] {
+            for count in [1, 3, 8] {
+                let wrong =
+                    |index, time| if (at..at + count).contains(&index) { 60 * SECOND + shift } else { time };
+                let log = beginning(wrong);
+                let read = read(&log);
+                assert_eq!(end(&log), end(&clean), "{at} {shift} {count}");
+                assert_eq!((read.of("restart").len(), read.gaps.len()), (0, 1), "{at} {shift} {count}");
+                assert!(read.gaps[0].words.starts_with(&format!("{count} message")), "{:?}", read.gaps);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrong_time_in_the_header_moves_no_other_time() {
+    let end = |log: &[u8]| read(log).items.iter().map(|(at, _)| *at).max();
+    let clean = beginning(|_, time| time);
+    for shift in [8, 700, 1 << 30] {
+        let mut log = clean.clone();
+        log[8..16].copy_from_slice(&((60 + shift) * SECOND).to_le_bytes());
+        assert_eq!((end(&log), read(&log).gaps.len()), (end(&clean), 1), "{shift}");
+    }
+}
+
+#[test]
+fn a_clock_that_falls_by_a_little_more_than_a_second_is_a_restart() {
+    for fall in [1_050_000, 1_500_000, 5_000_000] {
+        let log = beginning(|index, time| if index < 200 { time } else { time - fall });
+        let read = read(&log);
+        assert_eq!((read.of("restart").len(), read.gaps.len()), (1, 0), "{fall}");
+    }
+}
+
+#[test]
+fn a_topic_that_is_kept_over_a_boot_is_no_damage() {
+    let log = small().format("mission:uint64_t timestamp;float x;").subscribe(9, 0, "mission");
+    let log = (0..30_u64).fold(log.data(9, 1_194 * SECOND, &[0; 4]), |log, number| {
+        log.data(0, 3 * SECOND + number * 20_000, &position(1.0, 1))
+    });
+    let read = read(&log.bytes);
+    assert_eq!((read.gaps.len(), read.of("restart").len()), (0, 0), "{:?}", read.gaps);
+}
+
 #[test]
 fn a_dropout_is_a_gap_with_its_length_and_no_damage() {
     let read = read(&small().dropout(73).data(0, 4 * SECOND, &position(0.0, 0)).bytes);

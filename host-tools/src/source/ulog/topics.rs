@@ -77,6 +77,11 @@ impl Subscriptions {
         self.numbered.get(usize::from(id))?.as_ref()?.time(data)
     }
 
+    /// The topic of a subscription.
+    pub(super) fn name(&self, id: usize) -> Option<&str> {
+        Some(&self.numbered.get(id)?.as_ref()?.layout.name)
+    }
+
     /// What does not fit, as the end of a sentence.
     pub(super) fn add(
         &mut self,

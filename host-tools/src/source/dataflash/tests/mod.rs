@@ -58,7 +58,7 @@ impl Seen {
             Item::Gap(gap) => {
                 self.gaps.push((gap.cause, gap.place.unwrap_or(u64::MAX), gap.bytes, gap.words.clone()));
             }
-            Item::Restart => self.restarts += 1,
+            Item::Restart | Item::Joint => self.restarts += 1,
             Item::Parameter(parameter) => self.said.push(format!("{}={}", parameter.name, parameter.value)),
             Item::Text(text) => self.said.push(text.words.to_owned()),
             Item::Mode(mode) => self.said.push(mode.name.unwrap_or("?").to_owned()),
@@ -372,12 +372,11 @@ fn failsafes_are_in_force_by_name_until_they_are_resolved_or_it_is_disarmed() {
 #[test]
 fn another_power_on_in_one_file_is_a_restart_and_time_goes_on() {
     let mut log = Writer::new();
-    log.attitudes(100..103);
-    log.attitudes(1..4);
+    log.attitudes(100..110);
+    log.attitudes(1..13);
     let seen = seen(&log.bytes);
     assert_eq!(seen.restarts, 1);
-    // The second message of the new clock confirms the first one.
-    assert_eq!(seen.last.as_millis(), 104_000);
+    assert_eq!(seen.last.as_millis(), 109_000 + 11_000);
 }
 
 #[test]

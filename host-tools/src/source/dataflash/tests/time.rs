@@ -60,6 +60,52 @@ fn a_wrong_time_of_the_first_message_is_no_restart() {
 }
 
 #[test]
+fn wrong_times_of_the_first_messages_move_no_other_time() {
+    for count in 1..=8_usize {
+        for seconds in [40.0, 700.0, 1e7] {
+            let mut log = begun();
+            let first = log.bytes.len();
+            tenths(&mut log, 11..100);
+            for message in 0..count {
+                // No attitude is among the first nine.
+                set_time(&mut log, first + message * 12, seconds);
+            }
+            let (gaps, restarts, end) = told(&log.bytes);
+            assert_eq!((gaps.len(), restarts, end), (1, 0, 9_900), "{count} {seconds}");
+            assert!(gaps[0].1.starts_with(&format!("{count} message")), "{gaps:?}");
+            assert_eq!(seen(&log.bytes).gaps[0].1, first as u64);
+        }
+    }
+}
+
+#[test]
+fn a_wrong_time_of_the_last_messages_is_told_and_a_saved_parameter_after_half_a_minute_is_not_wrong() {
+    for (count, shift) in [(1, 8.4), (1, 700.0), (1, -2.0), (2, 3.0), (5, 60.0), (8, -9.0)] {
+        let mut log = begun();
+        tenths(&mut log, 11..300 - count);
+        let last = log.bytes.len();
+        tenths(&mut log, 300 - count..300);
+        for message in 0..count {
+            let tenth = (300 - count + message) as f64 / 10.0;
+            // Of the last tenths, those of whole seconds would have an attitude each.
+            set_time(&mut log, last + message as usize * 12, tenth + shift);
+        }
+        let (gaps, restarts, end) = told(&log.bytes);
+        assert_eq!((gaps.len(), restarts, end), (1, 0, 29_900 - count * 100), "{count} {shift} {gaps:?}");
+        assert_eq!(seen(&log.bytes).gaps[0].1, last as u64);
+    }
+    let mut log = begun();
+    log.format(152, "PARM", "QNf", "TimeUS,Name,Value");
+    tenths(&mut log, 10..300);
+    for seconds in [61_u64, 92] {
+        log.raw(152, &[&(seconds * 1_000_000).to_le_bytes(), &[b'A'; 16], &1_f32.to_le_bytes()]);
+    }
+    let (gaps, restarts, end) = told(&log.bytes);
+    assert!(gaps.iter().all(|gap| gap.0 == Cause::NotKept) && gaps.len() == 2, "{gaps:?}");
+    assert_eq!((restarts, end), (0, 92_000));
+}
+
+#[test]
 fn a_pause_and_a_restart_are_seen_with_their_first_message() {
     let mut log = begun();
     tenths(&mut log, 10..200);

@@ -1,0 +1,336 @@
+//! A recording's clock: recorded times as times that never fall, and which of them do not count.
+//!
+//! Every reader of a format with recorded times asks here, message by message. A time within a second of the latest one
+//! counts, and is a reordering where it is earlier. Any other is a jump, and is put to [`super::doubt`]: it is wrong, or a
+//! pause, or the clock began again.
+//!
+//! **Old values.** A `ULog` begins with the value that each topic had last, which may be minutes old, and some topics are never
+//! told anew, or late. Where a format has such ([`Rules::old_values`]), a time that is behind is *old*, not wrong, unless it is
+//! also behind the time that the same series told before: it counts as now, and is not asked about others.
+
+use hums_core::time::Instant;
+
+use super::doubt::{DISORDER_US, Ends, Question, RUN, Time};
+use super::item::{Cause, Gap};
+use super::timeline::{Moment, STEP_BACK_US_MAX, STEP_FORWARD_US_MAX, Timeline};
+use crate::plural::count;
+
+/// Messages of a series are steady where they are no further apart than this, ...
+const STEADY_US: u64 = 500_000;
+/// ... so many in a row.
+const STEADY_MIN: u8 = 32;
+/// So many times have to be there, most of them before a log's own beginning, until that one is wrong.
+pub const BEGINNING_ASKED: usize = 64;
+/// Series that are followed; what is beyond them counts as one that comes seldom.
+const SERIES_MAX: usize = 65_537;
+
+/// A time as a message tells it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    /// Microseconds, by whatever clock the recording has.
+    pub us: u64,
+    /// Of which messages it is one: a type of message, a topic. Small numbers.
+    pub series: usize,
+}
+
+/// The times that follow a message in the file.
+#[derive(Clone, Debug, Default)]
+pub struct Ahead {
+    /// Up to [`super::doubt::ASKED`] of those that were asked for.
+    pub stamps: Vec<Stamp>,
+    /// Nothing follows them.
+    pub is_end: bool,
+}
+
+/// What differs between formats.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules {
+    /// The first time is the stream's time zero, whatever it says; otherwise times count from a power-on.
+    pub from_first: bool,
+    /// A time that is behind may be an old value.
+    pub old_values: bool,
+    /// How the recording's ends are judged.
+    pub ends: Ends,
+}
+
+/// When a log began that says so itself, and whether that is wrong: most of its first times (some are old values) are
+/// before it, or a day behind it. Then it began where many follow each other.
+pub fn beginning(told: u64, first: &[u64], is_end: bool) -> (u64, bool) {
+    let fits = |time: u64| {
+        time.saturating_add(STEP_BACK_US_MAX) >= told && time <= told.saturating_add(STEP_FORWARD_US_MAX)
+    };
+    let first: Vec<u64> = first.iter().copied().filter(|time| *time > 0).collect();
+    let enough = if is_end { RUN as usize + 1 } else { BEGINNING_ASKED };
+    let fitting = first.iter().filter(|time| fits(**time)).count();
+    if first.len() < enough || fitting * 4 > first.len() {
+        return (told, false);
+    }
+    // Old values are from any time; those of the log follow each other.
+    let followed = |time: u64| {
+        first.iter().filter(|other| (time..=time.saturating_add(STEP_BACK_US_MAX)).contains(*other)).count()
+    };
+    let most = first.iter().map(|time| followed(*time)).max().unwrap_or(0);
+    let began = first.iter().copied().filter(|time| followed(*time) * 2 >= most).min();
+    (began.unwrap_or(told), true)
+}
+
+/// What a message's time is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// It counts.
+    Sound(Moment),
+    /// It is an old value, and counts as now.
+    Old,
+    /// The times around it say that it is wrong. Whether one of the same series had counted before it.
+    Wrong {
+        /// A time of the same series has counted.
+        known: bool,
+    },
+}
+
+/// What is known of messages of a kind.
+#[derive(Clone, Copy, Debug, Default)]
+struct Series {
+    /// The latest time, be it old or not.
+    last_us: Option<u64>,
+    /// How many came in a row without a pause.
+    steady: u8,
+    /// One has counted.
+    known: bool,
+}
+
+/// Follows the times of a recording.
+#[derive(Clone, Debug)]
+pub struct Clock {
+    rules: Rules,
+    timeline: Timeline,
+    /// A message has told a time that counts.
+    begun: bool,
+    series: Vec<Series>,
+}
+
+impl Clock {
+    /// Before the first time.
+    pub const fn new(rules: Rules) -> Self {
+        Self { rules, timeline: Timeline::new(), begun: false, series: Vec::new() }
+    }
+
+    /// The first message is known to tell this time: it has been looked for.
+    pub fn begin(&mut self, us: u64) {
+        self.timeline.at(us);
+    }
+
+    /// The log says itself when it began; `true` where another one came before it, which time goes on from.
+    pub fn begin_log(&mut self, us: u64) -> bool {
+        let again = self.timeline.recorded_us().is_some();
+        if again {
+            self.timeline.begin_again(us);
+        } else {
+            self.timeline.at(us);
+        }
+        self.series.clear();
+        again
+    }
+
+    /// The time of a message. `ahead` is asked where it is a jump, for the stamps that it is given a yes to.
+    pub fn take(&mut self, stamp: Stamp, ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> Ahead) -> Reading {
+        if !self.timeline.is_jump(stamp.us) {
+            return Reading::Sound(self.count(stamp));
+        }
+        if self.is_old(stamp) {
+            self.note(stamp);
+            return Reading::Old;
+        }
+        let ahead = ahead(&|stamp| !self.is_old(stamp));
+        let time = |stamp: &Stamp| Time { us: stamp.us, steady: self.is_steady(stamp.series) };
+        let times: Vec<Time> = std::iter::once(&stamp).chain(&ahead.stamps).map(time).collect();
+        let before = self.timeline.recorded_us();
+        let question = Question { before, times: &times, is_end: ahead.is_end, ends: self.rules.ends };
+        if !question.is_wrong() {
+            return Reading::Sound(self.count(stamp));
+        }
+        let known = self.series(stamp.series).known;
+        if before.is_some_and(|before| stamp.us < before) {
+            // A topic that falls back to an old value stays there.
+            self.note(stamp);
+        }
+        Reading::Wrong { known }
+    }
+
+    /// A time that counts.
+    fn count(&mut self, stamp: Stamp) -> Moment {
+        if self.rules.from_first && !self.begun {
+            self.timeline = Timeline::from_first(stamp.us);
+        }
+        let moment = self.timeline.at(stamp.us);
+        if moment.restarted {
+            self.series.clear();
+        }
+        self.begun = true;
+        if let Some(series) = self.note(stamp) {
+            series.known = true;
+        }
+        moment
+    }
+
+    fn note(&mut self, stamp: Stamp) -> Option<&mut Series> {
+        if stamp.series >= self.series.len() && stamp.series < SERIES_MAX {
+            self.series.resize(stamp.series + 1, Series::default());
+        }
+        let series = self.series.get_mut(stamp.series)?;
+        let goes_on = series.last_us.is_some_and(|last| stamp.us.saturating_sub(last) <= STEADY_US);
+        series.steady = if goes_on { series.steady.saturating_add(1) } else { 0 };
+        series.last_us = Some(stamp.us);
+        Some(series)
+    }
+
+    fn series(&self, series: usize) -> Series {
+        self.series.get(series).copied().unwrap_or_default()
+    }
+
+    /// Whether a time is behind, and that of a topic which has told nothing later.
+    fn is_old(&self, stamp: Stamp) -> bool {
+        let Some(now) = self.timeline.recorded_us().filter(|_| self.rules.old_values) else { return false };
+        let last_us = self.series(stamp.series).last_us;
+        stamp.us.saturating_add(STEP_BACK_US_MAX) < now
+            && last_us.is_none_or(|last| stamp.us.saturating_add(DISORDER_US) >= last)
+    }
+
+    /// Whether messages of a series came again and again until now.
+    fn is_steady(&self, series: usize) -> bool {
+        let series = self.series(series);
+        series.steady >= STEADY_MIN
+            && series
+                .last_us
+                .zip(self.timeline.recorded_us())
+                .is_some_and(|(last, now)| last.saturating_add(STEADY_US) >= now)
+    }
+
+    /// Whether a message has told a time that counts.
+    pub const fn has_begun(&self) -> bool {
+        self.begun
+    }
+
+    /// The latest time.
+    pub fn now(&self) -> Instant {
+        self.timeline.now()
+    }
+
+    /// The latest time as it was recorded.
+    pub const fn recorded_us(&self) -> Option<u64> {
+        self.timeline.recorded_us()
+    }
+}
+
+/// Messages with a wrong time: how many, and where the first one is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wrong {
+    count: u64,
+    first: Option<(Instant, u64)>,
+}
+
+impl Wrong {
+    /// One more, at this byte of the recording.
+    pub fn add(&mut self, at: Instant, place: u64) {
+        self.count += 1;
+        self.first.get_or_insert((at, place));
+    }
+
+    /// Tells them as damage; nothing where there are none.
+    pub fn gap(self) -> Option<Gap> {
+        let (at, place) = self.first?;
+        let words =
+            format!("{} with a wrong time, far from the times around it", count(self.count, "message"));
+        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: u64 = 1_000_000;
+    const RULES: Rules = Rules {
+        from_first: false,
+        old_values: true,
+        ends: Ends { steady_us: SECOND, seldom_us: 3_600 * SECOND },
+    };
+
+    /// What becomes of times of one series after another: the latest time in seconds, and what each is worth.
+    fn read(clock: &mut Clock, stamps: &[(usize, f64)]) -> (f64, String) {
+        let stamps: Vec<Stamp> = stamps
+            .iter()
+            .map(|&(series, seconds)| Stamp { us: (seconds * 1e6).round() as u64, series })
+            .collect();
+        let mut worth = String::new();
+        for (index, &stamp) in stamps.iter().enumerate() {
+            let rest = stamps.get(index + 1..).unwrap_or_default();
+            let ahead = |asks: &dyn Fn(Stamp) -> bool| Ahead {
+                stamps: rest.iter().copied().filter(|stamp| asks(*stamp)).take(24).collect(),
+                is_end: rest.len() <= 24,
+            };
+            worth.push(match clock.take(stamp, ahead) {
+                Reading::Sound(Moment { restarted: false, .. }) => '.',
+                Reading::Sound(_) => 'R',
+                Reading::Old => 'o',
+                Reading::Wrong { .. } => 'W',
+            });
+        }
+        (clock.now().as_secs_f64(), worth)
+    }
+
+    #[test]
+    fn old_values_at_a_logs_beginning_count_as_now_and_a_wrong_time_between_them_is_seen() {
+        let mut clock = Clock::new(RULES);
+        clock.begin_log(60 * SECOND);
+        let first = [(1, 3.0), (2, 60.1), (3, 8.5), (4, 65.1), (3, 9.0), (5, 60.1), (6, 60.2), (2, 60.2)];
+        let more = (0..30).map(|index| (2, 60.3 + f64::from(index) / 100.0));
+        let (end, worth) = read(&mut clock, &first.into_iter().chain(more).collect::<Vec<_>>());
+        assert_eq!((end, &worth[..8]), (60.59, "o.oWo..."));
+        assert!(worth[8..].chars().all(|worth| worth == '.'), "{worth}");
+    }
+
+    #[test]
+    fn a_topic_that_falls_behind_its_own_time_is_wrong_once_and_old_from_then_on() {
+        let mut clock = Clock::new(RULES);
+        let stamps: Vec<(usize, f64)> = (0..100)
+            .flat_map(|index| {
+                let now = 60.0 + f64::from(index) / 50.0;
+                [(1, now), (2, if index < 50 { now } else { 7.0 })]
+            })
+            .collect();
+        let (end, worth) = read(&mut clock, &stamps);
+        assert_eq!((end, worth.matches('W').count(), worth.matches('o').count()), (61.98, 1, 49), "{worth}");
+        assert_eq!(worth.matches('R').count(), 0);
+    }
+
+    #[test]
+    fn a_clock_that_falls_for_good_is_a_restart_though_some_topics_are_slow() {
+        for fall in [1.05, 1.5, 5.0, 59.0] {
+            let mut clock = Clock::new(RULES);
+            let stamps: Vec<(usize, f64)> = (0..200)
+                .flat_map(|index| {
+                    let now = 60.0 + f64::from(index) / 50.0 - if index < 100 { 0.0 } else { fall };
+                    let slow = (index % 60 == 0).then_some((2, now - 0.003));
+                    [Some((1, now)), slow].into_iter().flatten().collect::<Vec<_>>()
+                })
+                .collect();
+            let (end, worth) = read(&mut clock, &stamps);
+            assert_eq!(worth.matches('R').count(), 1, "{fall} {worth}");
+            assert!((end - 63.96).abs() < 0.03, "{fall} {end}");
+        }
+    }
+
+    #[test]
+    fn a_beginning_that_all_times_are_before_is_wrong_and_one_that_some_follow_is_not() {
+        let first: Vec<u64> = (0..100).map(|index| 60 * SECOND + index * 1_000).collect();
+        for (began, wrong) in [(60, false), (50, false), (68, true)] {
+            let (at, is_wrong) = beginning(began * SECOND, &first, false);
+            assert_eq!((at == began * SECOND, is_wrong), (!wrong, wrong), "{began}");
+            assert!(!is_wrong || first.contains(&at));
+        }
+        assert!(beginning(SECOND, &first.iter().map(|time| time + (1 << 50)).collect::<Vec<_>>(), false).1);
+        assert!(!beginning(68 * SECOND, &first[..20], false).1, "they may be old");
+        assert!(beginning(68 * SECOND, &first[..20], true).1);
+    }
+}
