@@ -5,15 +5,17 @@
 //! found. Without these the log is proved up to its last end mark (a disarming or a landing), as long as the vehicle did
 //! not move on after it.
 
-use hums_blackbox::BlockCounts;
+use std::path::Path;
+
 use hums_blackbox::record::{Before, Found, Resting};
+use hums_blackbox::{BlockCounts, PAGE_SECTORS};
 use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::hex::hex;
-use crate::logs::Log;
 use crate::logs::reader::Summary;
 use crate::logs::strangers::{Others, Strange};
+use crate::logs::{Log, segment_name};
 use crate::plural::{are, count, noun};
 use crate::sessions::{again_words, copy_words};
 use crate::utc::iso8601;
@@ -34,13 +36,24 @@ pub enum Proof {
     /// Nothing: it has no end mark, or the vehicle was armed or took off after the last one.
     #[default]
     None,
-    /// The next start on the card found more than is there now: so many sectors, and frames where they were counted.
+    /// There was more than is there now: so many sectors, and frames where they were counted.
     Short {
         /// Sectors that are missing.
         sectors: u32,
         /// Frames that are missing.
         frames: Option<u32>,
+        /// Who tells.
+        by: Teller,
     },
+}
+
+/// What tells where a log ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Teller {
+    /// The next start on the card.
+    NextStart,
+    /// The next log of the same power-on, which was recorded by arming.
+    NextLog,
 }
 
 impl Proof {
@@ -54,7 +67,7 @@ impl Proof {
             let counted = (next.found == Found::Frames).then_some(next.frames);
             let frames = counted.zip(summary.frames_end).map(|(there, here)| there.wrapping_sub(here));
             let frames = frames.filter(|missing| *missing < 1 << 31);
-            return Self::Short { sectors: next.sectors - sectors, frames };
+            return Self::Short { sectors: next.sectors - sectors, frames, by: Teller::NextStart };
         }
         if summary.closed {
             return Self::Closed;
@@ -126,10 +139,14 @@ impl Proof {
                     "not proved to its end: it has no landing, no disarming and no orderly end".to_owned()
                 }
             },
-            Self::Short { sectors, frames } => {
+            Self::Short { sectors, frames, by } => {
                 let frames =
                     frames.map_or_else(String::new, |frames| format!(", {}", count(frames, "frame")));
-                format!("{} missing at its end{frames}: the next start found them", count(sectors, "sector"))
+                let by = match by {
+                    Teller::NextStart => "the next start found them",
+                    Teller::NextLog => "the next log of the same power-on begins after them",
+                };
+                format!("{} missing at its end{frames}: {by}", count(sectors, "sector"))
             }
         }
     }
@@ -151,10 +168,14 @@ pub struct Ending {
     pub proof: Proof,
     /// What became of the session that was recorded on the card just before this one.
     pub before: SessionBefore,
+    /// How it follows the log before it of the same power-on, where it was recorded by arming.
+    pub power_on: PowerOn,
     /// What of its name disagrees with what the logs hold.
     pub misnamed: Option<Misnamed>,
     /// The name of the log of which it is a mere copy.
     pub again: Option<String>,
+    /// It is what newer sessions left of one that no file holds any more.
+    pub left_over: bool,
 }
 
 /// A log whose files have another session's name.
@@ -209,6 +230,77 @@ impl SessionBefore {
     }
 }
 
+/// How a log follows the one before it of the same power-on. A vehicle that is recorded by arming has several logs of a
+/// power-on, whose sectors are numbered on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PowerOn {
+    /// It is the first one, or nothing tells.
+    #[default]
+    First,
+    /// It goes on where the one before it ends.
+    Follows,
+    /// It is not the first one, and the ones before are not among what was read. Nothing tells that they should be: the
+    /// oldest logs make room for new ones.
+    NotRead,
+    /// Logs that were recorded before it are not there.
+    Missing {
+        /// The number of the last one that is there, if one is.
+        after: Option<u32>,
+        /// Sectors that were recorded meanwhile. Of those of a vehicle that waited disarmed not all were kept.
+        sectors: u32,
+        /// Frames until it begins.
+        frames: Option<u32>,
+        /// Seconds until it begins.
+        seconds: Option<f64>,
+    },
+    /// No sector is missing between it and the log of this number, and its own number is not the next one.
+    Renamed {
+        /// The number.
+        after: u32,
+    },
+    /// Its sectors were recorded before the end of the log of this lower number.
+    Disordered {
+        /// The number.
+        after: u32,
+    },
+}
+
+impl PowerOn {
+    /// What is wrong, as a part of a sentence.
+    pub fn wrong(self) -> Option<String> {
+        match self {
+            Self::First | Self::Follows | Self::NotRead => None,
+            Self::Missing { after, sectors, frames, seconds } => {
+                let after = after.map_or_else(String::new, |after| format!(" after session {after:05}"));
+                let frames =
+                    frames.map_or_else(String::new, |frames| format!(", {}", count(frames, "frame")));
+                let seconds = seconds.map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
+                Some(format!(
+                    "what was recorded just before it{after} in the same power-on is not there: up to {}{frames}{seconds}",
+                    count(sectors, "sector")
+                ))
+            }
+            Self::Renamed { after } => Some(format!(
+                "it goes on where session {after:05} of the same power-on ends, so its number is not its own: files were \
+                 renamed"
+            )),
+            Self::Disordered { after } => Some(format!(
+                "its sectors were recorded before the end of session {after:05} of the same power-on: files were renamed, \
+                 exchanged or copied"
+            )),
+        }
+    }
+
+    /// What there is to say where nothing is wrong.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Follows => "it goes on where the one before it ends",
+            Self::NotRead => "the logs before it are not among what was read",
+            _ => "",
+        }
+    }
+}
+
 impl Ending {
     /// A log by itself; [`crate::followed`] adds what later ones tell of it.
     pub fn of(log: &Log, summary: Summary) -> Self {
@@ -219,8 +311,10 @@ impl Ending {
             summary,
             proof,
             before: SessionBefore::NotNamed,
+            power_on: PowerOn::default(),
             misnamed: None,
             again: None,
+            left_over: log.left_over,
         }
     }
 
@@ -242,6 +336,17 @@ impl Ending {
         self.again.as_deref().map(again_words)
     }
 
+    /// That it is left over, as a part of a sentence.
+    pub fn left_over_words(&self) -> Option<String> {
+        self.left_over.then(|| {
+            format!(
+                "is left over from before: no file holds it any more; {} can be read, and what is missing was deleted or \
+                 written over",
+                count(self.summary.frames, "frame")
+            )
+        })
+    }
+
     /// Whether it is not to be counted: its session is there under another name.
     pub const fn is_counted(&self) -> bool {
         self.copy_of().is_none() && self.again.is_none()
@@ -256,7 +361,7 @@ impl Ending {
     /// What there is to say of a mere copy is said of its original.
     pub fn unproved(&self) -> Vec<String> {
         let mut all = Vec::new();
-        if self.again.is_some() {
+        if self.again.is_some() || self.left_over {
             return all;
         }
         let (summary, blocks) = (&self.summary, &self.summary.blocks);
@@ -287,13 +392,16 @@ impl Ending {
         all.extend(self.strange());
         all.extend(self.newer());
         all.extend(self.before.gone());
+        all.extend(self.power_on.wrong());
         all
     }
 
     /// Blocks behind the last sector that are neither empty nor sectors of any log, where nothing proves that the log ends
-    /// before them.
+    /// before them, and no more of them than a card's page has: a page of the log that went wrong looks so. What was on a
+    /// card before the box used it goes on behind that.
     pub fn noise(&self) -> Option<String> {
-        let number = Some(self.summary.behind.foreign).filter(|number| *number > 0)?;
+        let number =
+            Some(self.summary.behind.foreign).filter(|number| (1..=PAGE_SECTORS as u64).contains(number))?;
         (!self.proof.is_whole() && self.summary.session.is_some()).then(|| {
             format!(
                 "{} {} behind its last sector: damaged sectors, or what other files left there",
@@ -305,8 +413,13 @@ impl Ending {
 
     /// What of its files is not the log's.
     pub fn strange(&self) -> Vec<String> {
-        // A file that the next start found empty was made when the power went.
-        let told = |strange: &&Strange| !(strange.hollow && self.proof == Proof::NextStart(None));
+        // A file that the next start found empty was made when the power went; so was one that was to be written anew.
+        let last = self.files.len().saturating_sub(1);
+        let is_usual = |strange: &Strange| {
+            strange.hollow && self.proof == Proof::NextStart(None)
+                || strange.older && strange.file == last && !self.summary.closed
+        };
+        let told = |strange: &&Strange| !is_usual(strange) || strange.others.is_some();
         let told: Vec<_> = self.summary.strange.iter().filter(told).collect();
         let mut all: Vec<_> =
             told.iter().take(NAMED_MAX).map(|strange| self.strange_words(strange)).collect();
@@ -329,12 +442,49 @@ impl Ending {
         if told.len() > NAMED_MAX {
             all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
         }
+        all.extend(self.joined());
+        all.extend(self.misnumbered());
         all
+    }
+
+    /// A later log of the same power-on follows in its files.
+    fn joined(&self) -> Option<String> {
+        self.summary.joined.map(|joined| {
+            format!(
+                "{} behind its end, from number {} on, of a later log of the same power-on: logs were joined into one \
+                 file; only the first is read: give each by itself",
+                are(joined.sectors, "sector"),
+                joined.first
+            )
+        })
+    }
+
+    /// Names of its files that do not follow each other. The recorder numbers them one by one, and only the first ones may
+    /// be missing.
+    fn misnumbered(&self) -> Option<String> {
+        let segment = |name: &String| segment_name(Path::new(name)).map(|name| name.segment);
+        let first = self.files.first().filter(|_| self.summary.is_renamed).map(|file| {
+            format!("{file} begins as the first file of its log, and has not the number of one: files were renamed")
+        });
+        let jump = || {
+            self.files.iter().zip(self.files.iter().skip(1)).find_map(|(before, after)| {
+                let follows = segment(before)?.checked_add(1)? == segment(after)?;
+                (!follows).then(|| {
+                    format!("no file is there between {before} and {after}: one was taken away, or files were renamed")
+                })
+            })
+        };
+        first.or_else(jump)
     }
 
     fn strange_words(&self, strange: &Strange) -> String {
         let file = self.files.get(strange.file).map_or("a file", String::as_str);
         match strange.others {
+            None if strange.older => {
+                format!(
+                    "all sectors in {file} are older than the log's first one: files were renamed or exchanged"
+                )
+            }
             None => format!("{file} has the name of a segment and holds nothing of ours"),
             Some(others) if strange.hollow => format!(
                 "{file} has the name of a segment of this log and holds {}{}",
@@ -450,7 +600,7 @@ impl EndJson {
     pub fn new(ending: &Ending) -> Self {
         let (proof, summary) = (ending.proof, &ending.summary);
         let (sectors_missing, frames_missing) = match proof {
-            Proof::Short { sectors, frames } => (sectors, frames),
+            Proof::Short { sectors, frames, .. } => (sectors, frames),
             _ => (0, Some(0)),
         };
         let mark = summary.marks.last.map(|(at, why)| MarkJson {
@@ -524,7 +674,7 @@ mod tests {
         let strange = |hollow| Ending {
             files: vec!["00001_00.HUM".to_owned()],
             summary: Summary {
-                strange: vec![Strange { file: 0, hollow, others: Some(others) }],
+                strange: vec![Strange { file: 0, hollow, older: false, others: Some(others) }],
                 ..Summary::default()
             },
             ..Ending::default()

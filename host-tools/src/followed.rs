@@ -3,11 +3,12 @@
 //! The recorder notes at each start where the session before ended on that card. A log is therefore held back until the
 //! next ones were read: a file that was made when the power went has no sector, and says nothing.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use hums_blackbox::record::Before;
+use hums_core::time::Instant;
 
-use crate::ending::{Ending, Misnamed, Proof, SessionBefore};
+use crate::ending::{Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
 use crate::sessions::{Sessions, place};
 
 /// Logs held back at most; so many after a log may say something of its end.
@@ -24,12 +25,25 @@ pub trait Logged {
 pub struct Followed<T> {
     held: VecDeque<T>,
     sessions: Sessions,
+    /// The latest log of each power-on, by card and session.
+    latest: BTreeMap<(String, u32), Latest>,
+}
+
+/// A log of a power-on that may have more of them.
+#[derive(Clone, Copy, Debug)]
+struct Latest {
+    number: u32,
+    /// The number of its last whole sector and one.
+    end: u32,
+    /// Frames of the power-on up to its end, modulo 2^32.
+    frames_end: Option<u32>,
+    last: Option<Instant>,
 }
 
 impl<T: Logged> Followed<T> {
     /// Of logs whose first sectors were looked at.
     pub const fn new(sessions: Sessions) -> Self {
-        Self { held: VecDeque::new(), sessions }
+        Self { held: VecDeque::new(), sessions, latest: BTreeMap::new() }
     }
 
     /// Takes the next log; gives those of which nothing more will be said, in order.
@@ -43,6 +57,9 @@ impl<T: Logged> Followed<T> {
                 && ending.is_counted()
             {
                 self.tell(&before, ending);
+            }
+            if ending.is_counted() {
+                self.follow(ending);
             }
         }
         self.held.push_back(next);
@@ -66,6 +83,82 @@ impl<T: Logged> Followed<T> {
         let before = ending.summary.marks.before.filter(Before::has_end)?;
         let is_later = place(&ending.name).1.is_some_and(|number| number <= before.number);
         (is_later && before.session != session).then_some(Misnamed::Later { before: before.number })
+    }
+
+    /// How a log follows the one before it of the same power-on.
+    fn follow(&mut self, next: &mut Ending) {
+        let (card, Some(number)) = place(&next.name) else { return };
+        let summary = &next.summary;
+        let (Some(session), Some(first), Some(last)) =
+            (summary.session, summary.first_number, summary.last_number)
+        else {
+            return;
+        };
+        let key = (card.to_owned(), session);
+        // Where the card was out for a moment, the next log has all of the sector that was in progress.
+        let end = last.wrapping_add(u32::from(!summary.ends_partial));
+        let earlier = self.latest.get(&key).copied();
+        next.power_on = match earlier {
+            Some(earlier) => self.after(&earlier, next, number, first),
+            None => self.begins(next, number),
+        };
+        // Where logs are out of order, those that follow are held against what goes further.
+        let latest = Latest { number, end, frames_end: next.summary.frames_end, last: next.summary.last };
+        let latest = earlier.filter(|earlier| earlier.end > end).unwrap_or(latest);
+        self.latest.insert(key, Latest { number, ..latest });
+    }
+
+    /// Of a log that is not the first one of its power-on.
+    fn after(&mut self, earlier: &Latest, next: &Ending, number: u32, first: u32) -> PowerOn {
+        let (card, _) = place(&next.name);
+        let after = earlier.number;
+        // What the vehicle sent before it was armed is kept from here on at most.
+        let from = next.summary.keep.map_or(first, |keep| keep.from.min(first));
+        if first < earlier.end {
+            return PowerOn::Disordered { after };
+        }
+        let absent = self.sessions.absent(card, after, number);
+        let missing = from.saturating_sub(earlier.end);
+        let frames = next.summary.frames_before.zip(earlier.frames_end);
+        let frames = frames.map(|(here, there)| here.wrapping_sub(there)).filter(|frames| *frames < 1 << 31);
+        match (missing, absent) {
+            (0, 0) => PowerOn::Follows,
+            (0, _) => PowerOn::Renamed { after },
+            (_, 0) if self.shorten(next, missing, frames.filter(|_| from == first)) => PowerOn::Follows,
+            _ => {
+                let seconds = next.summary.first.zip(earlier.last);
+                let seconds = seconds.map(|(first, last)| first.since(last).as_micros() as f64 / 1e6);
+                PowerOn::Missing { after: Some(after), sectors: missing, frames, seconds }
+            }
+        }
+    }
+
+    /// The end of the log before `next` is missing; whether that log is at hand.
+    fn shorten(&mut self, next: &Ending, sectors: u32, frames: Option<u32>) -> bool {
+        let is_before = |log: &&mut Ending| {
+            log.summary.session == next.summary.session && place(&log.name).0 == place(&next.name).0
+        };
+        let held = self.held.iter_mut().filter_map(Logged::ending);
+        let Some(log) = held.rev().find(is_before) else { return false };
+        log.proof = Proof::Short { sectors, frames, by: Teller::NextLog };
+        true
+    }
+
+    /// Of the first log of a power-on that is there.
+    fn begins(&self, next: &Ending, number: u32) -> PowerOn {
+        let (card, _) = place(&next.name);
+        let (Some(keep), Some(before)) = (next.summary.keep, next.summary.marks.before) else {
+            return PowerOn::First;
+        };
+        // Its boot record names the number before the first one of the power-on.
+        if keep.from == 0 || self.sessions.absent(card, before.number, number) == 0 {
+            return PowerOn::First;
+        }
+        if !self.sessions.has_older(card, number) {
+            return PowerOn::NotRead;
+        }
+        let (frames, seconds) = (next.summary.frames_before, next.summary.first.map(Instant::as_secs_f64));
+        PowerOn::Missing { after: None, sectors: keep.from, frames, seconds }
     }
 
     /// What the start of `next` found of the log before it.

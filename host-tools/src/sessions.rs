@@ -1,7 +1,7 @@
 //! Which session each number of a card holds. The first sector of each log tells it, so it is known before the logs are
 //! read: a log that was copied, renamed or exchanged with another one is found wherever it stands.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use hums_blackbox::Header;
 
@@ -19,6 +19,8 @@ pub struct Sessions {
     logs: BTreeMap<(String, u32), Vec<(u32, u32)>>,
     /// Of logs that hold the same as another one: the name of that.
     again: BTreeMap<String, String>,
+    /// The numbers of all logs of each card, also of those without a sector.
+    numbers: BTreeMap<String, BTreeSet<u32>>,
 }
 
 impl Sessions {
@@ -26,16 +28,20 @@ impl Sessions {
     pub fn of<'a>(logs: impl IntoIterator<Item = (&'a str, &'a Log)>) -> Self {
         let mut all: BTreeMap<_, Vec<(u32, u32)>> = BTreeMap::new();
         let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
+        let mut numbers: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
         for (name, log) in logs {
-            let Some(first) = first_sector(log) else { continue };
             let (card, number) = place(name);
+            if let Some(number) = number {
+                numbers.entry(card.to_owned()).or_default().insert(number);
+            }
+            let Some(first) = first_sector(log) else { continue };
             alike.entry(first.session).or_default().push(Candidate { name, card, number, log });
             if let Some(number) = number {
                 all.entry((card.to_owned(), first.session)).or_default().push((number, first.number));
             }
         }
         let again = alike.into_values().flat_map(copies).collect();
-        Self { logs: all, again }
+        Self { logs: all, again, numbers }
     }
 
     /// The name of the log of which this one is a copy, sector by sector, or a copy of one of its files: under a name that
@@ -47,6 +53,18 @@ impl Sessions {
     /// The numbers under which a session is there on a card.
     pub fn numbers(&self, card: &str, session: u32) -> Vec<u32> {
         self.of_session(card, session).iter().map(|(number, _)| *number).collect()
+    }
+
+    /// How many of the numbers between these two no log of a card has.
+    pub fn absent(&self, card: &str, after: u32, before: u32) -> u32 {
+        let (first, end) = (after.saturating_add(1), before.max(after.saturating_add(1)));
+        let there = self.numbers.get(card).map_or(0, |numbers| numbers.range(first..end).count());
+        (end - first).saturating_sub(there as u32)
+    }
+
+    /// Whether a card has a log of a lower number.
+    pub fn has_older(&self, card: &str, number: u32) -> bool {
+        self.numbers.get(card).is_some_and(|numbers| numbers.range(..number).next().is_some())
     }
 
     /// The lower number under which the log of this name is there too.

@@ -5,11 +5,11 @@ use hums_blackbox::Cause;
 use serde::Serialize;
 
 use crate::cli;
-use crate::ending::{BlocksJson, EndJson, SessionBefore, behind_words};
+use crate::ending::{BlocksJson, EndJson, PowerOn, SessionBefore, behind_words};
 use crate::followed::Followed;
 use crate::info::json::images_json;
 use crate::logs::side_by_side::side_by_side;
-use crate::logs::{self, find::Image};
+use crate::logs::{self, Found, find::Image};
 use crate::outcome::Outcome;
 use crate::output;
 use crate::plural::count;
@@ -36,10 +36,8 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
             image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
         }
     }
-    let named = found.logs.iter().map(|log| (log.name.as_str(), log));
-    let mut followed = Followed::new(Sessions::of(named));
     let mut worst = Verdict::Holds;
-    let mut done = |overview: &Overview| {
+    verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
         ok &= log.ok;
         worst = worst.max(log.verdict);
@@ -50,12 +48,9 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         let files = overview.ending.files.join(", ");
         output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
         print(&log.checks)?;
-        overview.ending.again().map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
-    };
-    side_by_side(&found.logs, Overview::verified, |overview| {
-        followed.push(overview?).iter().try_for_each(&mut done)
+        let words = overview.ending.again().or_else(|| overview.ending.left_over_words());
+        words.map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
     })?;
-    followed.finish().try_for_each(|overview| done(&overview))?;
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
@@ -64,6 +59,16 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         output::line(&format!("{logs}: {}", worst.words()))?;
     }
     Ok(Outcome::lossy(!ok))
+}
+
+/// Reads all logs that were found through, and hands each on in their order, with what the others tell of it.
+pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<()> {
+    let named = found.logs.iter().map(|log| (log.name.as_str(), log));
+    let mut followed = Followed::new(Sessions::of(named));
+    side_by_side(&found.logs, Overview::verified, |overview| {
+        followed.push(overview?).iter().try_for_each(&mut done)
+    })?;
+    followed.finish().try_for_each(|overview| done(&overview))
 }
 
 /// What can be said of a log.
@@ -113,6 +118,8 @@ struct LogJson {
     closed: bool,
     /// The name of the log of which it is a mere copy, which is not looked at again.
     copy_of: Option<String>,
+    /// It is what newer sessions left of one that no file holds any more: what is missing in it is no damage.
+    left_over: bool,
     /// What is known of its end.
     end: EndJson,
     /// All blocks of its files.
@@ -183,24 +190,26 @@ impl LogJson {
         ];
         checks.extend(ends(log));
         let copy_of = ending.again.clone();
-        if copy_of.is_some() {
+        let is_told_only = copy_of.is_some() || ending.left_over;
+        if is_told_only {
             checks.clear();
         }
         let ok = checks.iter().all(|check| check.failed == 0) && ending.is_proved();
         let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
-        let verdict = match (ok, ending.proof.is_whole() || copy_of.is_some()) {
+        let verdict = match (ok, ending.proof.is_whole() || is_told_only) {
             (true, true) => Verdict::Holds,
             (true, false) => Verdict::ToMark,
             (false, _) => Verdict::NotProved,
         };
         let (name, closed) = (ending.name.clone(), summary.closed);
-        Self { name, ok, closed, copy_of, end, blocks, checks, verdict }
+        let left_over = ending.left_over;
+        Self { name, ok, closed, copy_of, left_over, end, blocks, checks, verdict }
     }
 }
 
 /// What the log says of its end and of its place.
-fn ends(log: &Overview) -> [Check; 5] {
+fn ends(log: &Overview) -> [Check; 6] {
     let ending = &log.ending;
     let summary = &ending.summary;
     let blocks = &summary.blocks;
@@ -234,13 +243,22 @@ fn ends(log: &Overview) -> [Check; 5] {
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
         check("end", 1, u64::from(!holds), format!("{}; {behind}", ending.words())),
         check("session before", before_checked, before_failed, before),
+        power_on(ending.power_on),
     ]
+}
+
+/// How it follows the log before it of the same power-on.
+fn power_on(power_on: PowerOn) -> Check {
+    let wrong = power_on.wrong();
+    let checked = u64::from(!matches!(power_on, PowerOn::First | PowerOn::NotRead));
+    let detail = wrong.clone().unwrap_or_else(|| power_on.words().to_owned());
+    Check { name: "same power-on", checked, failed: u64::from(wrong.is_some()), detail }
 }
 
 fn gaps_detail(log: &Overview) -> String {
     let not_kept = match log.ending.summary.not_kept {
         0 => String::new(),
-        times => format!("not recorded while disarmed: {}; ", count(times, "time")),
+        times => format!("not recorded while disarmed: {}{}; ", count(times, "time"), kept_words(log)),
     };
     match log.ending.summary.gaps {
         0 => not_kept,
@@ -248,6 +266,13 @@ fn gaps_detail(log: &Overview) -> String {
     }
     .trim_end_matches("; ")
     .to_owned()
+}
+
+/// What is known of where a log begins that lacks what came before.
+fn kept_words(log: &Overview) -> String {
+    log.ending.summary.keep.map_or_else(String::new, |keep| {
+        format!(" (the last {} s at least are kept; whether more was kept, nothing tells)", keep.seconds)
+    })
 }
 
 fn newer(log: &Overview) -> String {

@@ -2,16 +2,18 @@
 
 use std::ffi::OsStr;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hums_tests::fat;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::{self, Frame};
 use hums_tests::program::{Machine, Recording, hums};
+use tempfile::TempDir;
 
 /// The vehicle is armed after some 44 s.
 const FLIGHT: &str = "ap_quad_guided.tlog";
 const ARMED_BIT: u8 = 0x80;
+const SECTOR: usize = 512;
 
 /// Records a flight by arming, with these settings besides.
 fn record(dir: &Path, flight: &Path, settings: &str) -> Recording {
@@ -168,7 +170,6 @@ fn readers(log: &Path, code: i32) -> String {
 
 #[test]
 fn what_is_taken_from_a_log_by_arming_is_missing_and_not_called_disarmed() {
-    const SECTOR: usize = 512;
     let dir = tempfile::tempdir().unwrap();
     let recording = record(dir.path(), &own(FLIGHT), "REC_BEFORE 30\n");
     let copy = dir.path().join("copy");
@@ -204,6 +205,182 @@ fn what_is_taken_from_a_log_by_arming_is_missing_and_not_called_disarmed() {
         fs::write(&files[file], &whole[file]).unwrap();
     }
     assert!(!readers(&copy, 0).contains("not recorded"));
+}
+
+/// A vehicle that is armed three times in one power-on, of which every fourth frame came.
+fn three_times_armed(dir: &Path) -> PathBuf {
+    let manifest = Manifest::own();
+    let data = fs::read(own(FLIGHT)).unwrap();
+    let input = manifest.frames_of(&own(FLIGHT), &data);
+    let (first, last) = (input[0].time_us.unwrap(), input.last().unwrap().time_us.unwrap());
+    let kept = |index: usize, frame: &Frame<'_>| index.is_multiple_of(4) || frame.id == 0;
+    let entry = |later: u64, frame: &Frame<'_>| {
+        [&(frame.time_us.unwrap() + later).to_be_bytes()[..], frame.bytes].concat()
+    };
+    let once = |nth: u64| {
+        let later = nth * (last - first + 10_000_000);
+        input
+            .iter()
+            .enumerate()
+            .filter(|(index, frame)| kept(*index, frame))
+            .map(move |(_, frame)| entry(later, frame))
+    };
+    let flight = dir.join("three.tlog");
+    fs::write(&flight, (0..3).flat_map(once).flatten().collect::<Vec<u8>>()).unwrap();
+    flight
+}
+
+/// The blocks of a file up to its last sector and the copy behind it.
+fn used(file: &[u8]) -> &[u8] {
+    let end = file.chunks(SECTOR).rposition(|block| block.starts_with(&[0x48, 0xB1])).unwrap() + 1;
+    &file[..end * SECTOR]
+}
+
+/// What is wrong with the logs in a folder, as `verify` says it.
+#[track_caller]
+fn verified(folder: &Path, code: i32, case: &str) -> String {
+    let verify = hums(["verify".as_ref(), folder.as_os_str()]);
+    assert_eq!(verify.code, Some(code), "{case}: {}", verify.text());
+    verify.text().lines().filter(|line| line.contains("FAILED")).collect::<Vec<_>>().join("\n")
+}
+
+/// A file of a log.
+type Segment = (PathBuf, Vec<u8>);
+
+/// The logs of one power-on, copied off the card.
+struct PowerOn {
+    _dir: TempDir,
+    folder: PathBuf,
+    whole: Vec<Segment>,
+    /// The files of the three armed times.
+    logs: [Vec<Segment>; 3],
+}
+
+impl PowerOn {
+    fn record() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let recording = record(dir.path(), &three_times_armed(dir.path()), "REC_BEFORE 5\nREC_AFTER 5\n");
+        let folder = dir.path().join("copy");
+        fs::create_dir(&folder).unwrap();
+        fat::copy_files(&recording.image(), &folder);
+        let mut files: Vec<_> = fs::read_dir(&folder).unwrap().map(|file| file.unwrap().path()).collect();
+        files.retain(|file| file.extension().is_some_and(|extension| extension == "HUM"));
+        files.sort();
+        let segment = |file: PathBuf| (file.clone(), used(&fs::read(file).unwrap()).to_vec());
+        let whole: Vec<Segment> = files.into_iter().map(segment).collect();
+        let logs = [1, 2, 3].map(|log| {
+            let name = format!("{log:05}_");
+            let is_of = |(path, _): &&Segment| path.file_name().unwrap().to_string_lossy().starts_with(&name);
+            whole.iter().filter(is_of).cloned().collect::<Vec<_>>()
+        });
+        assert!(
+            logs[0].len() > 1 && logs[1].len() == 2 && logs[2].len() == 2,
+            "the recording is another one"
+        );
+        Self { _dir: dir, folder, whole, logs }
+    }
+
+    /// These files are all that there is.
+    fn put(&self, files: &[Segment]) {
+        fs::remove_dir_all(&self.folder).unwrap();
+        fs::create_dir(&self.folder).unwrap();
+        for (path, bytes) in files {
+            fs::write(path, bytes).unwrap();
+        }
+    }
+
+    /// The second log is joined to the first one, and is there by itself too.
+    fn joined(&self) -> Vec<Segment> {
+        let [one, two, three] = &self.logs;
+        let (path, last) = one.last().unwrap();
+        let joined = [&last[..], &two[0].1, &two[1].1].concat();
+        [&one[..one.len() - 1], &[(path.clone(), joined)], two, three].concat()
+    }
+
+    /// Files under other names, and what is said of them.
+    fn renamed(&self) -> Vec<(Vec<Segment>, &'static str)> {
+        let [one, two, three] = &self.logs;
+        let (first, last) = (&two[0], &two[1]);
+        let fourth = self.folder.join("00004_00.HUM");
+        let higher = self.folder.join("00002_40.HUM");
+        let as_other = |to: &Segment, from: &Segment| (to.0.clone(), from.1.clone());
+        let exchanged = [
+            as_other(first, &three[0]),
+            as_other(last, &three[1]),
+            as_other(&three[0], first),
+            as_other(&three[1], last),
+        ];
+        vec![
+            (
+                [&one[..1], &[(fourth.clone(), one[1].1.clone())], two, three].concat(),
+                "were recorded before the end of session 00003",
+            ),
+            (
+                [&one[..], two, three, &[(fourth, last.1.clone())]].concat(),
+                "were recorded before the end of session 00003",
+            ),
+            ([&one[..], &exchanged].concat(), "were recorded before the end of session 00002"),
+            (
+                [&one[..], &[as_other(first, last), as_other(last, first)], three].concat(),
+                "are older than the log's first one",
+            ),
+            (
+                [&one[..], &two[..1], &[(higher, last.1.clone())], three].concat(),
+                "00002_40.HUM: one was taken away, or files were renamed",
+            ),
+        ]
+    }
+
+    /// Sectors of the second log's first file that are not there, or twice, and what is said of that.
+    fn damaged(&self) -> Vec<(Vec<Segment>, &'static str)> {
+        let [one, two, three] = &self.logs;
+        let (path, first) = &two[0];
+        let doubled = [&first[..first.len() - 2 * SECTOR], &first[4 * SECTOR..]].concat();
+        let mut zeroed = first.clone();
+        zeroed[..SECTOR].fill(0);
+        let with = |bytes: Vec<u8>| [&one[..], &[(path.clone(), bytes)], &two[1..], three].concat();
+        vec![
+            ([&one[..], &two[1..], three].concat(), "sector sequence"),
+            (with(zeroed), "sector sequence"),
+            (with(doubled), "sectors that are there twice"),
+        ]
+    }
+
+    /// Frames of all its logs.
+    fn frames(&self, code: i32) -> u64 {
+        let info = hums(["info".as_ref(), "--json".as_ref(), self.folder.as_os_str()]).expect_code(&[code]);
+        let info: serde_json::Value = serde_json::from_str(&info.text()).unwrap();
+        info["logs"].as_array().unwrap().iter().map(|log| log["frames"].as_u64().unwrap()).sum()
+    }
+}
+
+#[test]
+fn what_is_taken_from_the_logs_of_one_power_on_or_mixed_up_is_told() {
+    let power_on = PowerOn::record();
+    let folder = &power_on.folder;
+    let [one, two, three] = &power_on.logs;
+    power_on.put(&power_on.whole);
+    verified(folder, 0, "all of it");
+    let frames = power_on.frames(0);
+
+    // All of a log.
+    power_on.put(&[&one[..], three].concat());
+    let said = readers(folder, 3);
+    assert!(said.contains("after session 00001 in the same power-on is not there: up to "), "{said}");
+    power_on.put(&[&two[..], three].concat());
+    verified(folder, 0, "the oldest logs make room");
+
+    // What is joined is read once: from its own file.
+    power_on.put(&power_on.joined());
+    let said = readers(folder, 3);
+    assert!(said.contains("of a later log of the same power-on: logs were joined into one file"), "{said}");
+    assert_eq!(power_on.frames(3), frames);
+
+    for (nth, (files, words)) in power_on.renamed().into_iter().chain(power_on.damaged()).enumerate() {
+        power_on.put(&files);
+        let said = verified(folder, 3, &format!("case {nth}: {words}"));
+        assert!(said.contains(words), "case {nth}, {words}: {said}");
+    }
 }
 
 #[test]

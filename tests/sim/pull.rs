@@ -2,11 +2,14 @@
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use hums_tests::flights::own;
+use hums_tests::frames;
 use hums_tests::live::Running;
 use hums_tests::program::{command, hums};
 use tempfile::TempDir;
@@ -68,7 +71,7 @@ fn two_cards_are_never_made_into_one_log() {
     let one = first.switch_off();
     let second = board(other);
     let told = pull(&second, &output, &[LOG]).expect_code(&[0]).stderr;
-    assert!(told.contains("is of another log of this name; it begins anew"), "{told}");
+    assert!(told.contains("is of another log of this name, or was changed; it begins anew"), "{told}");
     assert_on_card(&output.join(LOG), &other_card);
     let whole = fs::read(output.join(LOG)).unwrap();
 
@@ -138,4 +141,90 @@ fn a_log_in_work_that_has_grown_is_completed() {
     assert!(second.len() > first.len() && second.starts_with(&first));
     let dir = board.switch_off();
     assert_on_card(&log, &fs::read(dir.path().join("card.img")).unwrap());
+}
+
+/// Between a client and a board, as if the board's firmware did not know `CalcFileCRC32`: the client's opcode 14 reaches the
+/// board as one that nobody knows, and the refusal of that comes back as a refusal of opcode 14. Gives its port.
+fn without_checksums(board: u16) -> u16 {
+    const OPCODE: usize = 10 + 3 + 3;
+    const OF: usize = OPCODE + 2;
+    let (client, board_side) =
+        (UdpSocket::bind("127.0.0.1:0").unwrap(), UdpSocket::bind("127.0.0.1:0").unwrap());
+    board_side.connect(("127.0.0.1", board)).unwrap();
+    let port = client.local_addr().unwrap().port();
+    let (to_client, to_board) = (client.try_clone().unwrap(), board_side.try_clone().unwrap());
+    let asks = Arc::new(Mutex::new(None));
+    let answers = Arc::clone(&asks);
+    // Both end with the test's program.
+    std::thread::spawn(move || {
+        let mut buffer = [0; 2048];
+        while let Ok((length, from)) = client.recv_from(&mut buffer) {
+            *asks.lock().unwrap() = Some(from);
+            exchange(&mut buffer[..length], OPCODE, 14, 200);
+            let _ = to_board.send(&buffer[..length]);
+        }
+    });
+    std::thread::spawn(move || {
+        let mut buffer = [0; 2048];
+        // An error is a board that is not there yet.
+        loop {
+            let Ok(length) = board_side.recv(&mut buffer) else { continue };
+            exchange(&mut buffer[..length], OF, 200, 14);
+            if let Some(from) = *answers.lock().unwrap() {
+                let _ = to_client.send_to(&buffer[..length], from);
+            }
+        }
+    });
+    port
+}
+
+/// In each `FILE_TRANSFER_PROTOCOL` of a datagram: this byte, where it has this value, gets that one.
+fn exchange(datagram: &mut [u8], place: usize, from: u8, to: u8) {
+    const ID: [u8; 3] = [110, 0, 0];
+    const SEED: u8 = 84;
+    let mut at = 0;
+    while let Some([0xFD, length, ..]) = datagram.get(at..) {
+        let end = 10 + usize::from(*length);
+        let Some(frame) = datagram.get_mut(at..at + end + 2) else { return };
+        if frame[7..10] == ID && end > place && frame[place] == from {
+            frame[place] = to;
+            let sum = frames::checksum(&frame[1..end], SEED).to_le_bytes();
+            frame[end..].copy_from_slice(&sum);
+        }
+        at += end + 2;
+    }
+}
+
+#[test]
+fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_counts() {
+    let (dir, card) = card(0..30_000, "1");
+    let board = board(dir);
+    let port = without_checksums(board.port);
+    let home = tempfile::tempdir().unwrap();
+    let output = home.path().join("logs");
+    let pull = || {
+        let address = format!("udpout:127.0.0.1:{port}");
+        hums(["pull", "--link", &address, LOG, "-o", output.to_str().unwrap()])
+    };
+    // What a kill has left before anything came is of no other log.
+    fs::create_dir(&output).unwrap();
+    let part = output.join(format!(".{LOG}.pull.hums-part"));
+    fs::write(&part, "").unwrap();
+    let told = pull().expect_code(&[0]).stderr;
+    assert!(
+        told.contains("the board's firmware computes no checksum") && !told.contains("another log"),
+        "{told}"
+    );
+    assert_on_card(&output.join(LOG), &card);
+
+    // It goes on with what has the same ends; that its middle was changed, the sectors tell.
+    let whole = fs::read(output.join(LOG)).unwrap();
+    fs::remove_file(output.join(LOG)).unwrap();
+    let mut begun = whole[..whole.len() - 1024].to_vec();
+    let middle = begun.len() / 2 + 100;
+    begun[middle] ^= 1;
+    fs::write(&part, &begun).unwrap();
+    let told = pull().expect_code(&[3]).stderr;
+    assert!(told.contains(&format!("goes on after {} bytes", begun.len())), "{told}");
+    assert!(told.contains("damaged sectors: 1"), "{told}");
 }

@@ -230,16 +230,20 @@ impl Assembler {
         let number = step.header.number;
         let is_in_place = !self.late && u64::from(number) + 1 == self.counts.blocks;
         let begun = self.has_begun();
-        // The recorder writes a file anew only when others lie between what it holds and the new sectors.
+        // The recorder writes a file anew only when others lie between what it holds and the new sectors: what is left over
+        // in it is older than its first new one by more than one.
         let first = self.ahead.front().map(|first| first.header.number);
-        let is_before = first == number.checked_add(1) && !step.header.partial;
+        let is_left_over = step.header.partial || first.is_none_or(|first| number.saturating_add(1) < first);
         match self.ahead.back_mut() {
             Some(last) if last.header.number > number && !begun && !is_in_place => {
-                *(if is_before { &mut self.counts.misplaced } else { &mut self.counts.superseded }) += 1;
+                let counts = &mut self.counts;
+                *(if is_left_over { &mut counts.superseded } else { &mut counts.misplaced }) += 1;
                 return;
             }
-            Some(last) if last.header.number == step.header.number => {
-                self.counts.superseded += 1;
+            Some(last) if last.header.number == number => {
+                let is_copy = last.header.partial || step.header.partial;
+                let counts = &mut self.counts;
+                *(if is_copy { &mut counts.superseded } else { &mut counts.misplaced }) += 1;
                 replace(last, &step);
                 return;
             }

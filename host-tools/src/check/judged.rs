@@ -13,6 +13,9 @@ use super::problem::Problem;
 use crate::source::item::{About, Gap};
 use crate::source::told::Finding;
 
+/// The verdict where few checks had something to judge.
+pub const TOO_LITTLE: &str = "too_little";
+
 /// Who judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JudgedBy {
@@ -77,7 +80,7 @@ impl Judged {
     pub fn verdict(&self) -> &'static str {
         match self.worst() {
             None => "unknown",
-            Some(Level::Ok) if self.is_little() => "too_little",
+            Some(Level::Ok) if self.is_little() => TOO_LITTLE,
             Some(level) => level.name(),
         }
     }

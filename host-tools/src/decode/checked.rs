@@ -7,7 +7,7 @@ use hums_core::time::Instant;
 
 use super::row::{Cell, CellType, Row};
 use crate::check::judge::{Heard, Limits};
-use crate::check::judged::{Judged, JudgedBy};
+use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
 use crate::check::recording;
 use crate::source::recording::Place;
 use crate::source::told::Finding;
@@ -57,14 +57,25 @@ impl Checked {
         self.findings.iter().map(|finding| (finding.at, finding_row(finding, self.by)))
     }
 
-    /// The row of the log.
-    pub fn row(&self) -> Row {
+    /// The row of the log; where only a part of it is wanted, of the findings in that part.
+    pub fn row(&self, part: Option<&dyn Fn(Instant) -> bool>) -> Row {
+        let (verdict, findings) = match part.filter(|_| self.by == HUMS) {
+            None => (self.verdict, self.count),
+            Some(is_wanted) => {
+                let mut part = OnBoard::default();
+                let wanted = self.findings.iter().filter(|finding| is_wanted(finding.at));
+                wanted.for_each(|finding| part.add(finding.level));
+                // That too little was judged is so of every part.
+                let is_judged = part.verdict() != Level::Ok.name() || self.verdict != TOO_LITTLE;
+                (if is_judged { part.verdict() } else { TOO_LITTLE }, part.count)
+            }
+        };
         let number = |count| Cell::Count(count);
-        row(self.by, self.verdict, self.count, number(self.judged), number(self.not_judged))
+        row(self.by, verdict, findings, number(self.judged), number(self.not_judged))
     }
 }
 
-/// The findings of a log's own monitor, counted.
+/// The findings of a log's own monitor, or of a part of a log, counted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OnBoard {
     count: u64,
@@ -87,15 +98,18 @@ impl OnBoard {
         self.worst = self.worst.max(next.worst);
     }
 
-    /// The row of the log. What its monitor could not judge is not in the record.
-    pub fn row(&self) -> Row {
-        // As `hums check` calls it: what is only worth knowing is nothing wrong.
-        let verdict = match Level::ALL.get(usize::from(self.worst)) {
+    /// The worst, as `hums check` calls it: what is only worth knowing is nothing wrong.
+    fn verdict(self) -> &'static str {
+        match Level::ALL.get(usize::from(self.worst)) {
             Some(level @ (Level::Warning | Level::Critical)) => level.name(),
             _ => Level::Ok.name(),
-        };
+        }
+    }
+
+    /// The row of the log. What its monitor could not judge is not in the record.
+    pub fn row(&self) -> Row {
         let unknown = || Cell::Unknown(CellType::Count);
-        row(BOARD, verdict, self.count, unknown(), unknown())
+        row(BOARD, self.verdict(), self.count, unknown(), unknown())
     }
 }
 

@@ -218,7 +218,9 @@ impl Collect for Collected<'_> {
     fn entry(&mut self, entry: &Entry<'_>) {
         let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = *entry;
         let wanted = self.context.selection.has_time(at, self.context.epoch_us);
-        if let Entry::Record { record: Record::Finding(finding), .. } = entry {
+        if let Entry::Record { record: Record::Finding(finding), .. } = entry
+            && wanted
+        {
             self.on_board.add(finding.level);
         }
         match entry {

@@ -209,7 +209,15 @@ impl Done {
         for remark in &self.remarks {
             note!("{remark}");
         }
-        for why in self.ending.iter().flat_map(|ending| ending.again().into_iter().chain(ending.unproved())) {
+        let said = |ending: &Ending| {
+            ending
+                .again()
+                .into_iter()
+                .chain(ending.left_over_words())
+                .chain(ending.unproved())
+                .collect::<Vec<_>>()
+        };
+        for why in self.ending.iter().flat_map(said) {
             note!("{}: {why}", self.name);
         }
         self.lines.iter().try_for_each(|line| output::line(&printable::word(line)))

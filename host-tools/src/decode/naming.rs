@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 use crate::files::{Folder, add_ends, digest, short};
 use crate::hex::hex;
 use crate::logs::Log;
-use crate::logs::board::board_of;
+use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
 use crate::sessions::Sessions;
@@ -40,10 +40,11 @@ impl Traits {
         let mut groups = Groups::new(log);
         let mut all = Fingerprinter::default();
         let mut board = None;
-        let mut first = true;
+        let mut headings = HEADING_GROUPS;
         while let Some(group) = groups.next_group()? {
-            if std::mem::take(&mut first) {
-                board = group.first().and_then(board_of);
+            if headings > 0 {
+                headings -= 1;
+                board = board.or_else(|| board_of(&group));
             }
             all.add(&group);
         }
@@ -222,6 +223,7 @@ mod tests {
                 files: vec![format!("somewhere/{name}_00.HUM")],
                 pieces: Vec::new(),
                 session: None,
+                left_over: false,
             };
             Place::log(name.to_owned(), log)
         };

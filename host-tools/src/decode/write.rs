@@ -194,7 +194,10 @@ impl<'a> Writers<'a> {
                 collected.rows(at, &[row]);
             }
         }
-        let row = context.checked.as_ref().map_or_else(|| self.on_board.row(), Checked::row);
+        let is_wanted = |at| context.selection.has_time(at, context.epoch_us);
+        let part: Option<&dyn Fn(Instant) -> bool> =
+            if context.selection.has_limits() { Some(&is_wanted) } else { None };
+        let row = context.checked.as_ref().map_or_else(|| self.on_board.row(), |checked| checked.row(part));
         collected.rows(last.unwrap_or(Instant::ZERO), &[row]);
         self.put(collected)?;
         Ok(context.checked.as_ref().and_then(Checked::not_checked))

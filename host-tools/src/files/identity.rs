@@ -101,17 +101,49 @@ fn place(path: &Path) -> io::Result<PathBuf> {
     Ok(folder.canonicalize().or_else(|_| std::path::absolute(folder))?.join(name))
 }
 
+/// Links in a row that are followed: as many as Linux follows.
+const LINKS_MAX: usize = 40;
+
 /// What a link leads to, through as many links as there are, also where nothing is there yet.
 pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
-    /// As many as Linux follows.
-    const LINKS_MAX: usize = 40;
     let mut path = path.to_owned();
     for _ in 0..LINKS_MAX {
         if !path.is_symlink() {
             return Ok(path);
         }
-        let to = fs::read_link(&path)?;
-        path = path.parent().unwrap_or(Path::new("")).join(to);
+        path = linked(&path)?;
     }
     Err(io::Error::other("too many links"))
+}
+
+/// Where one link leads to.
+fn linked(path: &Path) -> io::Result<PathBuf> {
+    let to = fs::read_link(path)?;
+    Ok(path.parent().unwrap_or(Path::new("")).join(to))
+}
+
+/// Whether a path means something that this process has open, as `/dev/stdout` and `/dev/fd/3` do: what the shell opened,
+/// also where that is a regular file. What is only spelled through `/proc` is none: `/proc/self/cwd/FILE` is a file.
+pub(super) fn is_descriptor(path: &Path) -> bool {
+    let mut path = path.to_owned();
+    for _ in 0..LINKS_MAX {
+        if path.parent().is_some_and(is_own_descriptors) {
+            return true;
+        }
+        match linked(&path) {
+            Ok(to) => path = to,
+            Err(_) => return false,
+        }
+    }
+    false
+}
+
+/// Whether a folder is the one of this process's descriptors: `/proc/PID/fd`, or a thread's, `/proc/PID/task/TID/fd`.
+fn is_own_descriptors(folder: &Path) -> bool {
+    let Ok(folder) = folder.canonicalize() else { return false };
+    let own = PathBuf::from(format!("/proc/{}", std::process::id()));
+    folder.strip_prefix(own).is_ok_and(|rest| {
+        let parts: Vec<_> = rest.iter().filter_map(|part| part.to_str()).collect();
+        matches!(parts[..], ["fd"] | ["task", _, "fd"])
+    })
 }

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::identity::without_links;
+use super::identity::{is_descriptor, without_links};
 use super::inputs::Inputs;
 use super::kind::{Found, Kind, Origin};
 use super::part::{lock, lock_folder_of, remove_stale, rename_new, sync_folder_of};
-use super::paths::{begun_of, cannot_write, part_of, settle};
+use super::paths::{aside_of, begun_of, cannot_write, part_of, settle};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
 
@@ -96,7 +96,7 @@ impl Output {
         let target = without_links(path).with_context(|| cannot_write(path))?;
         if let Ok(about) = fs::metadata(path) {
             check(path, &about)?;
-            if !about.is_file() || is_stream(path) {
+            if !about.is_file() || is_descriptor(path) {
                 bail!("{}: is no regular file, and what was begun cannot go on in it", path.display());
             }
         }
@@ -111,11 +111,19 @@ impl Output {
         if part.path.is_symlink() {
             fs::remove_file(&part.path).with_context(|| cannot_write(path))?;
         }
-        let file = File::options().read(true).append(true).create(true).open(&part.path);
-        let file = file.with_context(|| cannot_write(path))?;
+        let file = open_to_go_on(&part.path, path)?;
         let bytes = file.metadata().with_context(|| cannot_write(path))?.len();
-        lock(&file, path)?;
         Ok((Self::new(To::File(file), path, Some(part)), bytes))
+    }
+
+    /// Begins anew what [`Output::resume`] gave, and keeps what an earlier run has left until the file is whole.
+    pub fn set_aside(&mut self) -> Result<()> {
+        let Some(part) = &self.part else { return Ok(()) };
+        let renamed = fs::rename(&part.path, aside_of(&part.target)?);
+        settle(renamed, &self.path)?;
+        let file = open_to_go_on(&part.path, &self.path)?;
+        self.to = BufWriter::with_capacity(BUFFER_BYTES, To::File(file));
+        Ok(())
     }
 
     /// Removes a file that an earlier run made, and that is no input.
@@ -176,8 +184,20 @@ impl Output {
             return settle(Err(error), &self.path);
         }
         sync_folder_of(&part.target);
+        if part.resumed {
+            // There is none, mostly.
+            let _ = fs::remove_file(aside_of(&part.target)?);
+        }
         Ok(())
     }
+}
+
+/// A part that an earlier run may have begun, to be gone on with.
+fn open_to_go_on(part: &Path, path: &Path) -> Result<File> {
+    let file = File::options().read(true).append(true).create(true).open(part);
+    let file = file.with_context(|| cannot_write(path))?;
+    lock(&file, path)?;
+    Ok(file)
 }
 
 impl Write for Output {
@@ -232,7 +252,7 @@ impl Part {
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
         check(path, &about)?;
-        if !about.is_file() || is_stream(path) {
+        if !about.is_file() || is_descriptor(path) {
             return Ok(Place::Stream);
         }
         if about.len() > 0 {
@@ -310,12 +330,6 @@ fn check_kind(path: &Path, kind: &Kind, of: Option<&str>) -> Result<Found> {
         path.display(),
         kind.words
     )
-}
-
-/// `/dev/stdout` and its like are what the shell opened, also where that is a regular file.
-fn is_stream(path: &Path) -> bool {
-    cfg!(unix)
-        && ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc"].iter().any(|stream| path.starts_with(stream))
 }
 
 #[cfg(unix)]

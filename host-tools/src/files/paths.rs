@@ -21,6 +21,11 @@ pub(super) fn begun_of(target: &Path) -> Result<PathBuf> {
     beside(target, &format!(".pull{PART}"))
 }
 
+/// What was begun of another log of the same name, beside it, until the log is whole.
+pub(super) fn aside_of(target: &Path) -> Result<PathBuf> {
+    beside(target, &format!(".pull-other{PART}"))
+}
+
 fn beside(target: &Path, ending: &str) -> Result<PathBuf> {
     let Some(name) = target.file_name() else {
         bail!("{}: is no name of a file", target.display());

@@ -134,6 +134,17 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
     output.write_all(b"onetwothree").expect("written");
     output.finish().expect("whole");
     assert_eq!(fs::read(&path).expect("there"), b"onetwothree", "what was there was its beginning");
+    // What is of another log stays until the new one is whole.
+    let (mut output, _) = Output::resume(&path).expect("created");
+    output.write_all(b"of another log").expect("written");
+    drop(output);
+    let (mut output, _) = Output::resume(&path).expect("goes on");
+    output.set_aside().expect("begun anew");
+    output.write_all(b"onetwothree").expect("written");
+    let aside = dir.path().join(".log.pull-other.hums-part");
+    assert_eq!(fs::read(&aside).expect("there"), b"of another log");
+    output.finish().expect("whole");
+    assert!(!aside.exists());
     let (mut output, _) = Output::resume(&path).expect("created");
     output.write_all(b"another, and longer").expect("written");
     output.finish().expect_err("what is there is no beginning of it");
@@ -192,6 +203,39 @@ fn what_is_no_regular_file_is_written_as_it_is() {
     assert!(!Path::new("/dev/null").is_file());
     let dir = create(Path::new("/")).expect_err("a directory").to_string();
     assert!(dir.contains("is a directory"), "{dir}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_file_that_is_spelled_through_proc_is_a_file_and_a_descriptor_is_written_as_it_is() {
+    use std::os::fd::AsRawFd as _;
+    let dir = furnished();
+    let old = dir.path().join("old");
+    let pid = std::process::id();
+    let inner = old.strip_prefix("/").expect("absolute").to_str().expect("a name");
+    let spellings =
+        ["/proc/self/root", "/proc/thread-self/root", "/dev/fd/../root", &format!("/proc/{pid}/root")]
+            .map(|root| Path::new(root).join(inner));
+    for path in spellings {
+        let refused = write(&path, &Inputs::none(), "new").expect_err("it has another content");
+        assert!(refused.contains("is there already with other content"), "{}: {refused}", path.display());
+        assert_eq!(fs::read(&old).expect("there"), b"what was there", "{}", path.display());
+        write(&path, &Inputs::none().replacing(true), "what was there").expect("the same");
+    }
+    // What is open is appended to.
+    let open = fs::File::options().append(true).open(&old).expect("opened");
+    std::os::unix::fs::symlink(format!("/dev/fd/{}", open.as_raw_fd()), dir.path().join("link"))
+        .expect("a link");
+    let number = open.as_raw_fd();
+    for path in [
+        format!("/dev/fd/{number}"),
+        format!("/proc/self/fd/{number}"),
+        format!("/proc/thread-self/fd/{number}"),
+    ] {
+        write(Path::new(&path), &Inputs::none(), "+").expect("written");
+    }
+    write(&dir.path().join("link"), &Inputs::none(), "+").expect("written");
+    assert_eq!(fs::read(&old).expect("there"), b"what was there++++");
 }
 
 /// A folder with one table of this text.

@@ -111,6 +111,9 @@ fn ending(text: &mut String, log: &Overview) {
     if let Some(gone) = ending.before.gone() {
         let _ = writeln!(text, "  before   {gone}");
     }
+    for words in ending.left_over_words().into_iter().chain(ending.power_on.wrong()) {
+        let _ = writeln!(text, "  place    {words}");
+    }
     for strange in ending.noise().into_iter().chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }

@@ -9,10 +9,10 @@ use anyhow::{Context as _, Result, bail};
 use hums_blackbox::Header;
 use hums_recorder::layout::{Layout, LayoutError};
 
-use super::fat::{CardFile, Extent, ReadAt as _, Volume};
+use super::fat::{CardFile, Extent, ReadAt as _, Volume, Walk};
 use super::found::{Found, Image, belong};
 use super::places::{BLOCK_BYTES, Log, Piece};
-use super::scan::{Scan, scan};
+use super::scan::{Files, Scan, scan};
 use crate::card::{ReadOnlyImage, length};
 
 /// A file that is a log, or a segment of one.
@@ -21,7 +21,13 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     let length = length.with_context(|| format!("{}: cannot be read", path.display()))?;
     let stem = path.file_stem().map_or_else(|| "log".into(), |stem| stem.to_string_lossy().into_owned());
     let piece = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
-    Ok(Log { name: stem, files: vec![path.display().to_string()], pieces: vec![piece], session: None })
+    Ok(Log {
+        name: stem,
+        files: vec![path.display().to_string()],
+        pieces: vec![piece],
+        session: None,
+        left_over: false,
+    })
 }
 
 /// Whether the file system of a card can be read there.
@@ -64,74 +70,83 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
     let file = File::open(path).with_context(context)?;
     let device = ReadOnlyImage::new(file.try_clone().with_context(context)?).with_context(context)?;
     let mut about = Image { path: path.to_owned(), ..Image::default() };
-    let (before, more) = (found.logs.len(), found.logs_more);
-    let mut renamed: Vec<String> = Vec::new();
+    let mut files = Vec::new();
     match Layout::read(&device) {
         Ok(layout) => {
             let walk = Volume::new(&file, layout).and_then(Volume::walk).with_context(context)?;
-            about.damage = walk.damage;
-            about.lost_clusters = walk.lost_clusters;
-            if about.damage.is_empty() && has_sector(path, walk.lost)? {
-                let clusters = belong(walk.lost_clusters);
-                about.damage.push(format!(
-                    "{clusters}, with sectors of logs in them: an entry of a directory is lost"
-                ));
-            }
-            // Older logs are deleted to make room; the newest one is what a card is read for.
-            let newest = walk.files.iter().filter_map(|file| Some(file.name?.session)).max();
-            if let (Some(newest), Some((deleted, place))) = (newest, walk.deleted)
-                && deleted.session > newest % 10_000
-                && has_sector(path, vec![place])?
-            {
-                about.damage.push(format!(
-                    "session {:05}, which is newer than all that are there, was deleted",
-                    newest / 10_000 * 10_000 + deleted.session
-                ));
-            }
-            about.deleted_logs = walk.deleted_logs;
-            renamed
-                .extend(walk.files.iter().filter(|file| file.name.is_none()).map(|file| file.path.clone()));
-            found.add(sessions_of(path, &walk.files));
+            files = by_file_system(path, walk, &mut about)?;
         }
         Err(error) => {
             let cut = cut_short(&file, &device).with_context(context)?;
             about.damage.push(cut.unwrap_or_else(|| error.to_string()));
         }
     }
-    let knows_none = about.damage.is_empty() && found.logs.len() == before;
     // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead.
-    if salvage || found.logs.len() == before || !about.damage.is_empty() {
-        found.logs.truncate(before);
-        found.logs_more = more;
-        let Scan { logs, left_out } = scan(path, length(&file).with_context(context)?)?;
-        if left_out > 0 {
-            about.damage.push(format!(
-                "{left_out} sectors of small or scattered sessions are left out: there are too many of them"
-            ));
-        }
-        if logs.is_empty() && !about.damage.is_empty() {
-            bail!(
-                "{}: {}; and no block of it is a sector of a HUMS log",
-                path.display(),
-                about.damage.join("; ")
-            );
-        }
-        about.searched = true;
-        about.scanned = !logs.is_empty();
-        if about.scanned && knows_none {
-            about.damage.push("its file system knows of no log, and sectors of logs are there".to_owned());
-        }
-        found.add(logs);
+    if salvage || files.is_empty() || !about.damage.is_empty() {
+        let length = length(&file).with_context(context)?;
+        found.add(by_blocks(path, length, &sessions_of(path, &files), &mut about)?);
     } else {
-        for name in renamed {
+        for name in files.iter().filter(|file| file.name.is_none()).map(|file| &file.path) {
             found.remark(format!(
                 "{}: {name} begins as a log and has not the name of a segment: it is read as a log of its own",
                 path.display()
             ));
         }
+        found.add(sessions_of(path, &files));
     }
     found.images.push(about);
     Ok(())
+}
+
+/// The files of logs that a card's file system knows, and what is wrong with it.
+fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<CardFile>> {
+    about.damage = walk.damage;
+    about.lost_clusters = walk.lost_clusters;
+    if about.damage.is_empty() && has_sector(path, walk.lost)? {
+        let clusters = belong(walk.lost_clusters);
+        about
+            .damage
+            .push(format!("{clusters}, with sectors of logs in them: an entry of a directory is lost"));
+    }
+    // Older logs are deleted to make room; the newest one is what a card is read for.
+    let newest = walk.files.iter().filter_map(|file| Some(file.name?.session)).max();
+    if let (Some(newest), Some((deleted, place))) = (newest, walk.deleted)
+        && deleted.session > newest % 10_000
+        && has_sector(path, vec![place])?
+    {
+        about.damage.push(format!(
+            "session {:05}, which is newer than all that are there, was deleted",
+            newest / 10_000 * 10_000 + deleted.session
+        ));
+    }
+    about.deleted_logs = walk.deleted_logs;
+    Ok(walk.files)
+}
+
+/// The sessions of which there are sectors anywhere; `known` are the logs that the file system knows of.
+fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Result<Vec<Log>> {
+    let is_sound = about.damage.is_empty();
+    let knows_none = known.is_empty() && is_sound;
+    let files = if is_sound { Files::of(known)? } else { Files::default() };
+    let Scan { logs, left_out } = scan(path, length, &files)?;
+    if left_out > 0 {
+        about.damage.push(format!(
+            "{left_out} sectors of small or scattered sessions are left out: there are too many of them"
+        ));
+    }
+    if logs.is_empty() && !about.damage.is_empty() {
+        bail!(
+            "{}: {}; and no block of it is a sector of a HUMS log",
+            path.display(),
+            about.damage.join("; ")
+        );
+    }
+    about.searched = true;
+    about.scanned = !logs.is_empty();
+    if about.scanned && knows_none {
+        about.damage.push("its file system knows of no log, and sectors of logs are there".to_owned());
+    }
+    Ok(logs)
 }
 
 /// Says of an image that ends before its first partition does that it is cut short. Its volume is then not what is wrong.
@@ -156,6 +171,7 @@ fn has_sector(path: &Path, extents: Vec<Extent>) -> Result<bool> {
         files: Vec::new(),
         pieces: vec![Piece { path: path.to_owned(), extents }],
         session: None,
+        left_over: false,
     };
     let mut blocks = lost.blocks();
     while let Some(block) = blocks.next_block()? {
@@ -175,7 +191,7 @@ fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     let log = |name: String, segments: &[&CardFile]| {
         let files = segments.iter().map(|file| file.path.clone()).collect();
         let piece = |file: &&CardFile| Piece { path: path.to_owned(), extents: file.extents.clone() };
-        Log { name, files, pieces: segments.iter().map(piece).collect(), session: None }
+        Log { name, files, pieces: segments.iter().map(piece).collect(), session: None, left_over: false }
     };
     let session = |(session, mut segments): (u32, Vec<&CardFile>)| {
         segments.sort_by_key(|file| file.name);

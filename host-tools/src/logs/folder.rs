@@ -62,7 +62,8 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
             segments.sort();
             let name =
                 if prefix.is_empty() { format!("{session:05}") } else { format!("{prefix}/{session:05}") };
-            let mut log = Log { name, files: Vec::new(), pieces: Vec::new(), session: None };
+            let mut log =
+                Log { name, files: Vec::new(), pieces: Vec::new(), session: None, left_over: false };
             for (_, path) in segments {
                 if found.is_known(&path) {
                     found.remark(format!(

@@ -1,8 +1,11 @@
 //! A log's blocks as groups of sectors, each of which decodes by itself: the unit of parallel work.
 
+use std::collections::VecDeque;
+
 use anyhow::Result;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
 
+use super::board::{HEADING_GROUPS, heading};
 use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::strangers::{Strange, Strangers};
 
@@ -15,11 +18,26 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
+/// A later log of the same power-on, in the files of a log that ended in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Joined {
+    /// The number of its first sector.
+    pub first: u32,
+    /// How many sectors of it there are.
+    pub sectors: u64,
+}
+
 /// Streams a log's groups.
 pub struct Groups<'a> {
     blocks: Blocks<'a>,
     assembler: Assembler,
     group: Group,
+    /// Groups that were looked at and not given out.
+    ahead: VecDeque<Group>,
+    /// The group given out last ends the log in order.
+    is_closed: bool,
+    /// Another log follows, and is not read.
+    joined: Option<Joined>,
     ended: bool,
     ends_short: bool,
     /// The file of the last block.
@@ -39,6 +57,9 @@ impl<'a> Groups<'a> {
             blocks: log.blocks(),
             assembler: if is_late { assembler.beginning_late() } else { assembler },
             group: Vec::new(),
+            ahead: VecDeque::new(),
+            is_closed: false,
+            joined: None,
             ended: false,
             ends_short: log.ends_short(),
             file: 0,
@@ -47,8 +68,47 @@ impl<'a> Groups<'a> {
         }
     }
 
-    /// The next group; `None` at the end.
+    /// The next group; `None` at the end. A log that is recorded by arming ends in order while the power-on goes on: what
+    /// follows it in its files is the next log, and was joined to it.
     pub fn next_group(&mut self) -> Result<Option<Group>> {
+        if std::mem::take(&mut self.is_closed) && self.begins_file()? {
+            self.skip_joined()?;
+            return Ok(None);
+        }
+        let group = match self.ahead.pop_front() {
+            Some(group) => Some(group),
+            None => self.read_group()?,
+        };
+        let last = group.as_ref().and_then(|group| group.last());
+        // The sectors that were gathered from a whole card are those of all logs of a power-on.
+        self.is_closed = self.strangers.is_some() && last.is_some_and(|last| last.header.closed);
+        Ok(group)
+    }
+
+    /// Whether what follows is the beginning of a file: it says who records. A vehicle that is armed again at the very moment
+    /// in which its log ends goes on in the same file.
+    fn begins_file(&mut self) -> Result<bool> {
+        while self.ahead.len() < HEADING_GROUPS
+            && let Some(group) = self.read_group()?
+        {
+            self.ahead.push_back(group);
+        }
+        Ok(self.ahead.iter().any(|group| heading(group).is_some()))
+    }
+
+    /// Passes over what is left.
+    fn skip_joined(&mut self) -> Result<()> {
+        while let Some(group) = match self.ahead.pop_front() {
+            Some(group) => Some(group),
+            None => self.read_group()?,
+        } {
+            let first = group.first().map_or(0, |first| first.header.number);
+            self.joined.get_or_insert(Joined { first, sectors: 0 }).sectors += group.len() as u64;
+        }
+        Ok(())
+    }
+
+    fn read_group(&mut self) -> Result<Option<Group>> {
         loop {
             let Some(step) = self.assembler.next() else {
                 if self.ended {
@@ -98,19 +158,19 @@ impl<'a> Groups<'a> {
         let (file, at) = self.blocks.place();
         match seen {
             BlockCounts { stale: 1.., .. } => strangers.other(file, at, block),
-            BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, .. } => strangers.own(file),
+            BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, .. } => strangers.own(file, block),
             _ => {}
         }
     }
 
-    /// Which of the log's files is read.
-    pub const fn file(&self) -> usize {
-        self.file
+    /// What of its files is not the log's, once all is read; `first` is the number of its first sector.
+    pub fn strange(&self, first: u32) -> Vec<Strange> {
+        self.strangers.as_ref().map_or_else(Vec::new, |strangers| strangers.strange(first))
     }
 
-    /// What of its files is not the log's, once all is read.
-    pub fn strange(&self) -> Vec<Strange> {
-        self.strangers.as_ref().map_or_else(Vec::new, Strangers::strange)
+    /// What was joined to it, once all is read.
+    pub const fn joined(&self) -> Option<Joined> {
+        self.joined
     }
 
     /// What was seen so far.

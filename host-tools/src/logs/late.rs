@@ -1,22 +1,28 @@
 //! Whether what a log lacks before its first sector was left out on purpose.
 //!
-//! While a vehicle that is recorded by arming is disarmed, the recorder keeps the last while in a ring of files, and writes
-//! the oldest one anew. So a log that lacks its first files may be whole. But the ring keeps at least as many seconds as the
-//! record of what is kept says: where less lies between the log's first sector and the arming, somebody else took a file.
+//! While a vehicle that is recorded by arming is disarmed, the recorder keeps the last while in a ring of files. When it
+//! begins a file, it writes the oldest one anew, if the second oldest began long enough ago (`hums_recorder::ring`). So a log
+//! that lacks its first files may be whole: then a later file of the ring was begun, and when that was, the first one that is
+//! left held the last while. Where no file says so, somebody else took one. The first file of a log is never left out before
+//! others are: a log that has it and begins later was recorded on a card that came later, and says so.
 //! Between a log's first sector and its last one nothing is ever left out: after an arming the next log begins.
 
 use anyhow::Result;
-use hums_blackbox::record::Keep;
-use hums_blackbox::{Entry, GroupDecoder, Header, Outline, Record};
+use hums_blackbox::record::{Keep, Lost};
+use hums_blackbox::{Entry, GroupDecoder, Header, Outline, Record, Sector};
 use hums_core::time::{Instant, Span};
 
 use super::groups::{Group, Groups};
-use super::places::Log;
+use super::places::{BLOCK_BYTES, Log};
 
 /// Files of a full ring but for one, of which the oldest goes however little the others hold.
 const RING_FILES: usize = 15;
-/// Where power went, what the ring holds may end so much before the time at which its oldest file went.
-const SLACK: Span = Span::from_secs(5);
+/// The ring counts from when a file is begun on the card, and the log tells when its first group began. Between both lie the
+/// time in which a sector fills, of which a copy is written each 150 ms, and the longest pause of a card that is not given
+/// up (8 s: `hums_recorder::spi`).
+const SLACK: Span = Span::from_secs(10);
+/// Numbers of the events that say that a card came or went.
+const CARD: [u8; 2] = [6, 7];
 
 /// What a log lacks that begins with another sector than the first one of its session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +31,8 @@ pub(super) struct Late {
     pub(super) from: u32,
     /// All from there on was left out on purpose.
     pub(super) is_wanted: bool,
+    /// Nothing is missing, and yet its first file has not the name of a first one.
+    pub(super) is_renamed: bool,
 }
 
 /// `None` where the log begins with its session, or its first group does not say that only the last while is kept.
@@ -32,33 +40,81 @@ pub(super) fn late(log: &Log) -> Result<Option<Late>> {
     let mut groups = Groups::new(log);
     let Some(group) = groups.next_group()? else { return Ok(None) };
     let first = group.first().map(|step| step.header);
-    let Some(first) = first.filter(|first| first.number > 0 && first.starts_group()) else { return Ok(None) };
+    let segment = log.first_segment();
+    let Some(first) = first.filter(Header::starts_group) else { return Ok(None) };
+    if first.number == 0 && segment.is_none_or(|segment| segment == 0) {
+        return Ok(None);
+    }
     let mut seen = Seen::default();
-    let mut decoder = Box::new(GroupDecoder::new());
-    let mut more = seen.take(&group, &mut decoder);
+    seen.take(&group);
     let Some(keep) = seen.keep.filter(|keep| keep.from <= first.number) else { return Ok(None) };
-    if keep.from == first.number || log.session.is_some() {
-        return Ok(Some(Late { from: keep.from, is_wanted: true }));
+    let late = |is_wanted| Some(Late { from: keep.from, is_wanted, is_renamed: false });
+    let lacks_none = keep.from == first.number;
+    if log.session.is_some() || (lacks_none && segment.is_none_or(|segment| segment == 0)) {
+        return Ok(late(true));
     }
     if !begins_with(log, &first)? {
-        return Ok(Some(Late { from: keep.from, is_wanted: false }));
+        return Ok(late(false));
     }
-    let is_first = log.first_segment() == Some(0);
-    while more && !is_first {
-        more = match groups.next_group()? {
-            Some(group) => seen.take(&group, &mut decoder),
-            None => false,
-        };
-    }
-    let is_wanted = is_first || seen.is_enough() || groups.file() >= RING_FILES;
-    Ok(Some(Late { from: keep.from, is_wanted }))
+    let is_wanted = match segment {
+        Some(0) => seen.go_on(&mut groups, |seen| seen.card)?.card,
+        Some(_) => was_written_anew(log, &first, &mut groups, &mut seen, keep)?,
+        // Of one file of another name nobody knows where others were begun.
+        None => seen.go_on(&mut groups, |seen| seen.seconds() >= keep.seconds)?.seconds() >= keep.seconds,
+    };
+    Ok(Some(Late {
+        from: keep.from,
+        is_wanted: is_wanted || lacks_none,
+        is_renamed: lacks_none && !is_wanted,
+    }))
 }
 
-/// Whether this sector, or a copy of it, lies where a log's first one does.
+/// Whether the ring gave away a file before the first one that is left.
+fn was_written_anew(
+    log: &Log,
+    first: &Header,
+    groups: &mut Groups<'_>,
+    seen: &mut Seen,
+    keep: Keep,
+) -> Result<bool> {
+    let Some(start) = seen.start else { return Ok(false) };
+    let enough = Span::from_secs(u64::from(keep.seconds));
+    let is_enough = |at: Option<Instant>| at.is_none_or(|at| at.since(start) + SLACK >= enough);
+    let mut begun = begun(log, first)?.into_iter().skip(1).enumerate();
+    let Some((_, at)) = begun.find(|(nth, at)| is_enough(*at) || nth + 1 >= RING_FILES) else {
+        return Ok(false);
+    };
+    // Files that were begun after the arming are none of the ring's. One without a sector was begun when power went.
+    let at = at.unwrap_or(Instant::from_micros(u64::MAX));
+    let armed = seen.go_on(groups, |seen| seen.last.is_some_and(|last| last > at))?.all;
+    Ok(armed.is_none_or(|armed| at <= armed))
+}
+
+/// When the first group of each file began, where that is known.
+fn begun(log: &Log, first: &Header) -> Result<Vec<Option<Instant>>> {
+    let mut all = Vec::new();
+    for piece in &log.pieces {
+        let one = Log { pieces: vec![piece.clone()], ..log.clone() };
+        all.push(one.blocks().next_block()?.and_then(|block| start_of(&block, first)));
+    }
+    Ok(all)
+}
+
+/// When the group began whose first sector this is. What a file held before is of another session, or older.
+fn start_of(block: &[u8; BLOCK_BYTES], first: &Header) -> Option<Instant> {
+    let header = Header::read(block).ok().filter(Header::starts_group)?;
+    if header.session != first.session || header.number < first.number {
+        return None;
+    }
+    Some(Instant::from_millis(Sector::from_bytes(*block).preamble()?.start_ms))
+}
+
+/// Whether this sector lies where a log's first one does: in the first block, or a copy of it in the second one.
 fn begins_with(log: &Log, first: &Header) -> Result<bool> {
     let mut blocks = log.blocks();
-    for _ in 0..2 {
+    for is_second in [false, true] {
         let header = blocks.next_block()?.and_then(|block| Header::read(&block).ok());
+        let header = header.filter(|header| header.partial || !is_second);
         if header.is_some_and(|header| (header.session, header.number) == (first.session, first.number)) {
             return Ok(true);
         }
@@ -67,56 +123,74 @@ fn begins_with(log: &Log, first: &Header) -> Result<bool> {
 }
 
 /// What was read of the time before the arming.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Seen {
+    decoder: Box<GroupDecoder>,
     start: Option<Instant>,
     last: Option<Instant>,
     /// The first record of what is kept.
     keep: Option<Keep>,
-    /// A record said that everything is kept from now on.
-    all: bool,
+    /// When a record said that everything is kept from now on.
+    all: Option<Instant>,
+    /// A card came or went, or there was none.
+    card: bool,
+    is_broken: bool,
 }
 
 impl Seen {
-    /// Takes the next group; whether more is to be read.
-    fn take(&mut self, group: &Group, decoder: &mut GroupDecoder) -> bool {
-        let is_broken = self.start.is_some() && group.first().is_some_and(|step| step.missing > 0);
-        if is_broken {
-            return false;
+    /// Reads on until there is enough, the vehicle is armed, or something is missing.
+    fn go_on(&mut self, groups: &mut Groups<'_>, enough: impl Fn(&Self) -> bool) -> Result<&Self> {
+        while !enough(self) && self.all.is_none() && !self.is_broken {
+            match groups.next_group()? {
+                Some(group) => self.take(&group),
+                None => break,
+            }
+        }
+        Ok(self)
+    }
+
+    /// Takes the next group.
+    fn take(&mut self, group: &Group) {
+        self.is_broken |= self.start.is_some() && group.first().is_some_and(|step| step.missing > 0);
+        if self.is_broken {
+            return;
         }
         for step in group {
-            if decoder.push(&step.header, &step.sector).is_err() {
-                return false;
+            if self.decoder.push(&step.header, &step.sector).is_err() {
+                self.is_broken = true;
+                return;
             }
-            self.start.get_or_insert(Instant::from_millis(decoder.preamble().start_ms));
-            while let Some(outline) = decoder.next_outline() {
-                let Ok(outline) = outline else { return false };
-                self.entry(&outline);
-                if self.all || self.is_enough() {
-                    return false;
+            self.start.get_or_insert(Instant::from_millis(self.decoder.preamble().start_ms));
+            while let Some(outline) = self.decoder.next_outline() {
+                let (at, record) = match outline {
+                    Ok(Outline::Frame { at, .. } | Outline::Whole(Entry::Frame { at, .. })) => (at, None),
+                    Ok(Outline::Whole(Entry::Record { at, record })) => (at, Some(record)),
+                    Err(_) => {
+                        self.is_broken = true;
+                        return;
+                    }
+                };
+                self.last = Some(at);
+                match record {
+                    Some(Record::Keep(keep)) => {
+                        self.keep.get_or_insert(keep);
+                        if keep.all {
+                            self.all.get_or_insert(at);
+                        }
+                    }
+                    Some(Record::Event(event)) => self.card |= CARD.contains(&event.number),
+                    Some(Record::Loss(loss)) => self.card |= loss.what == Lost::Card,
+                    _ => {}
                 }
             }
         }
-        true
     }
 
-    fn entry(&mut self, outline: &Outline<'_>) {
-        match outline {
-            Outline::Frame { at, .. } | Outline::Whole(Entry::Frame { at, .. }) => self.last = Some(*at),
-            Outline::Whole(Entry::Record { at, record }) => {
-                self.last = Some(*at);
-                if let Record::Keep(keep) = record {
-                    self.keep.get_or_insert(*keep);
-                    self.all |= keep.all;
-                }
-            }
-        }
-    }
-
-    /// Whether as much was read as the ring keeps at least.
-    fn is_enough(&self) -> bool {
-        let Some(((start, last), keep)) = self.start.zip(self.last).zip(self.keep) else { return false };
-        let slack = if self.all { Span::ZERO } else { SLACK };
-        last.since(start) + slack >= Span::from_secs(u64::from(keep.seconds))
+    /// Seconds before the arming, or before the last entry, rounded up: what the ring holds may end a little before the time
+    /// at which its oldest file went.
+    fn seconds(&self) -> u32 {
+        let end = self.all.or(self.last.map(|last| last + SLACK));
+        let span = self.start.zip(end).map_or(Span::ZERO, |(start, end)| end.since(start));
+        u32::try_from(span.as_millis() / 1000).unwrap_or(u32::MAX)
     }
 }

@@ -34,6 +34,9 @@ pub struct Log {
     pub pieces: Vec<Piece>,
     /// What its sectors name as their session, where a scan told it; otherwise that of the first sector counts.
     pub session: Option<u32>,
+    /// It is what is left of a session that no file of a sound file system holds any more: sectors that a newer one has not
+    /// written over.
+    pub left_over: bool,
 }
 
 impl Log {

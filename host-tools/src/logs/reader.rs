@@ -13,7 +13,7 @@ use hums_blackbox::record::Keep;
 use hums_blackbox::{BlockCounts, Cause, Entry, Gap, GroupDecoder, GroupError, Outline, Record};
 use hums_core::time::Instant;
 
-use super::groups::{Group, Groups};
+use super::groups::{Group, Groups, Joined};
 use super::in_order::{in_order, workers};
 use super::late::{Late, late};
 pub use super::marks::Marks;
@@ -86,8 +86,16 @@ pub struct Summary {
     pub epoch_us: Option<u64>,
     /// What its records tell of it: end marks, losses, the log before.
     pub marks: Marks,
+    /// The number of the first sector.
+    pub first_number: Option<u32>,
     /// The number of the last sector.
     pub last_number: Option<u32>,
+    /// Of that there is only a copy that was made while it was in progress.
+    pub ends_partial: bool,
+    /// Frames of the session before its first group, modulo 2^32.
+    pub frames_before: Option<u32>,
+    /// What its first group says is kept, where not all is.
+    pub keep: Option<Keep>,
     /// Frames of the session up to its end, modulo 2^32.
     pub frames_end: Option<u32>,
     /// What lies behind the last sector.
@@ -98,6 +106,10 @@ pub struct Summary {
     pub strange: Vec<Strange>,
     /// Files that are missing before its first one, where nothing proves that they were left out on purpose.
     pub files_gone: u32,
+    /// None of its first sectors is missing, and its first file has not the name of a first one.
+    pub is_renamed: bool,
+    /// A later log of the same power-on, which was joined to it.
+    pub joined: Option<Joined>,
 }
 
 impl Summary {
@@ -121,8 +133,9 @@ pub fn read<C: Collect>(
     mut progress: impl FnMut(u64),
 ) -> Result<Summary> {
     let mut groups = Groups::new(log);
+    let late = late(log)?;
     let mut stitch = Stitch {
-        late: late(log)?,
+        late,
         gathered: log.session.is_some(),
         first_file: log.first_segment(),
         ..Stitch::default()
@@ -144,11 +157,14 @@ pub fn read<C: Collect>(
     stitch.end(groups.damaged_at_end(), deliver)?;
     let mut summary = stitch.summary;
     summary.frames_end = stitch.expected;
+    summary.ends_partial = stitch.cut;
     summary.behind = groups.behind();
     summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();
-    summary.strange = groups.strange();
+    summary.strange = groups.strange(summary.first_number.unwrap_or(0));
+    summary.joined = groups.joined();
+    summary.is_renamed = late.is_some_and(|late| late.is_renamed);
     Ok(summary)
 }
 
@@ -337,6 +353,7 @@ impl Stitch {
             gap.sectors_lost = gap.sectors_lost.saturating_add(missing);
         }
         self.summary.closed = group.closed;
+        self.summary.first_number.get_or_insert(group.number);
         self.summary.last_number = Some(group.number.wrapping_add(group.sectors).wrapping_sub(1));
         self.next_number = group.number.wrapping_add(group.sectors);
         match group.begun {
@@ -355,6 +372,10 @@ impl Stitch {
                 hand_on(&mut group, new, deliver)?;
                 self.expected = Some(frames_before.wrapping_add(group.frames));
                 self.summary.first = self.summary.first.or(Some(start));
+                self.summary.frames_before.get_or_insert(frames_before);
+                if self.summary.groups == 0 {
+                    self.summary.keep = group.keep;
+                }
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);

@@ -3,7 +3,7 @@
 //! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card that has more is not ours or was
 //! made to take our memory: of too many sessions those with the most sectors stay, and what is left out is counted.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::Result;
@@ -91,10 +91,69 @@ impl Sessions {
     }
 }
 
-/// Looks at every block of `length` bytes.
-pub(super) fn scan(path: &Path, length: u64) -> Result<Scan> {
+/// The files of a sound file system: what a file of one log holds of others is left over.
+#[derive(Debug, Default)]
+pub(super) struct Files {
+    sessions: BTreeSet<u32>,
+    /// By the block where each extent begins.
+    extents: BTreeMap<u64, FileExtent>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct FileExtent {
+    blocks: u64,
+    session: u32,
+    /// The number of the sector that belongs into its first block.
+    number: u32,
+}
+
+impl Files {
+    /// Of these logs' files, each with the session of the log and where its first block is sound the number in there.
+    pub(super) fn of(logs: &[Log]) -> Result<Self> {
+        let mut files = Self::default();
+        for piece in logs.iter().flat_map(|log| &log.pieces) {
+            let one = Log {
+                name: String::new(),
+                files: Vec::new(),
+                pieces: vec![piece.clone()],
+                session: None,
+                left_over: false,
+            };
+            let Some(Ok(first)) = one.blocks().next_block()?.map(|block| Header::read(&block)) else {
+                continue;
+            };
+            files.sessions.insert(first.session);
+            let mut number = first.number;
+            for extent in &piece.extents {
+                let blocks = extent.length / BLOCK_BYTES as u64;
+                let place = FileExtent { blocks, session: first.session, number };
+                files.extents.insert(extent.start / BLOCK_BYTES as u64, place);
+                number = number.wrapping_add(blocks as u32);
+            }
+        }
+        Ok(files)
+    }
+
+    /// Whether a run is no more than what is left over in a file that was written anew.
+    fn is_left_over(&self, session: u32, run: &Run) -> bool {
+        let Some((start, file)) = self.extents.range(..=run.start).next_back() else { return false };
+        let at = run.start - start;
+        // A copy of a sector in progress may lie one block further than its own place.
+        let own = u64::from(run.number.wrapping_sub(file.number));
+        at < file.blocks && (session != file.session || at.wrapping_sub(own) > 1)
+    }
+}
+
+/// Looks at every block of `length` bytes. Of the sessions of `files` what is left over in newer files is left out.
+pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     let everything = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
-    let all = Log { name: String::new(), files: Vec::new(), pieces: vec![everything], session: None };
+    let all = Log {
+        name: String::new(),
+        files: Vec::new(),
+        pieces: vec![everything],
+        session: None,
+        left_over: false,
+    };
     let mut blocks: Blocks<'_> = all.blocks();
     let mut sessions = Sessions::default();
     // A card of 128 GB takes minutes.
@@ -113,7 +172,12 @@ pub(super) fn scan(path: &Path, length: u64) -> Result<Scan> {
     sessions.make_room();
     let Sessions { runs, left_out, .. } = sessions;
     let block_bytes = BLOCK_BYTES as u64;
+    let has_files = !files.sessions.is_empty();
     let log = |(session, mut runs): (u32, Vec<Run>)| {
+        let is_known = files.sessions.contains(&session);
+        if is_known {
+            runs.retain(|run| !files.is_left_over(session, run));
+        }
         runs.sort_unstable_by_key(|run| (run.number, run.start));
         let extent = |run: &Run| Extent {
             start: run.start * block_bytes,
@@ -121,7 +185,13 @@ pub(super) fn scan(path: &Path, length: u64) -> Result<Scan> {
         };
         let piece = Piece { path: path.to_owned(), extents: runs.iter().map(extent).collect() };
         let files = vec![path.display().to_string()];
-        Log { name: format!("session-{session:08x}"), files, pieces: vec![piece], session: Some(session) }
+        Log {
+            name: format!("session-{session:08x}"),
+            files,
+            pieces: vec![piece],
+            session: Some(session),
+            left_over: !is_known && has_files,
+        }
     };
     let mut logs: Vec<Log> = runs.into_iter().map(log).collect();
     // As they were recorded, mostly: what a next log tells of the one before needs their order.
@@ -159,7 +229,7 @@ mod tests {
             }
         }
         let length = u64::from(others + 40) * 512;
-        let Scan { logs, left_out } = scan(file.path(), length).expect("a file");
+        let Scan { logs, left_out } = scan(file.path(), length, &Files::default()).expect("a file");
         assert_eq!(logs.len(), SESSIONS_MAX);
         assert_eq!(left_out, u64::from(others + 1) - SESSIONS_MAX as u64);
         let flight = logs.iter().find(|log| log.session == Some(7)).expect("the flight");

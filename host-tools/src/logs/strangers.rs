@@ -17,6 +17,8 @@ pub struct Strange {
     pub file: usize,
     /// It holds none of the log's sectors.
     pub hollow: bool,
+    /// All sectors of the log in it are older than its first one.
+    pub older: bool,
     /// Sectors of other sessions: all of a hollow file, otherwise those that a recycled file cannot have.
     pub others: Option<Others>,
 }
@@ -48,7 +50,7 @@ impl Others {
         others.several |= session != others.session;
         if header.number == 0 && others.first == at {
             let sector = Sector::from_bytes(*block);
-            others.board = board_of(&Step { header: *header, sector, missing: 0, damaged: 0 });
+            others.board = board_of(&[Step { header: *header, sector, missing: 0, damaged: 0 }]);
         }
     }
 }
@@ -61,8 +63,8 @@ pub(super) struct Strangers {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct File {
-    /// A sector of the log is in it.
-    own: bool,
+    /// The highest number of the log's sectors that are in it.
+    own: Option<u32>,
     /// All sectors of other sessions, and those that a recycled file cannot have.
     others: Option<Others>,
     misplaced: Option<Others>,
@@ -74,17 +76,17 @@ impl Strangers {
         Self { files: vec![File::default(); files] }
     }
 
-    /// A sector of the log lies in this file.
-    pub(super) fn own(&mut self, file: usize) {
+    /// This block of a file is a sector of the log.
+    pub(super) fn own(&mut self, file: usize, block: &[u8; SECTOR_BYTES]) {
         if let Some(file) = self.files.get_mut(file) {
-            file.own = true;
+            file.own = file.own.max(Some(Sector::from_bytes(*block).number()));
         }
     }
 
     /// This block of a file is a sector of another session, if it is sound.
     pub(super) fn other(&mut self, file: usize, at: u64, block: &[u8; SECTOR_BYTES]) {
         let (Some(file), Ok(header)) = (self.files.get_mut(file), Header::read(block)) else { return };
-        if !file.own {
+        if file.own.is_none() {
             Others::add(&mut file.others, at, &header, block);
         }
         if u64::from(header.number) + u64::from(header.partial) < at {
@@ -92,11 +94,12 @@ impl Strangers {
         }
     }
 
-    /// The files of which something is to be told.
-    pub(super) fn strange(&self) -> Vec<Strange> {
+    /// The files of which something is to be told, of a log whose first sector has this number.
+    pub(super) fn strange(&self, first: u32) -> Vec<Strange> {
         let strange = |(index, file): (usize, &File)| {
-            let others = if file.own { file.misplaced } else { file.others };
-            (!file.own || others.is_some()).then_some(Strange { file: index, hollow: !file.own, others })
+            let (hollow, older) = (file.own.is_none(), file.own.is_some_and(|highest| highest < first));
+            let others = if hollow { file.others } else { file.misplaced };
+            (hollow || older || others.is_some()).then_some(Strange { file: index, hollow, older, others })
         };
         self.files.iter().enumerate().filter_map(strange).collect()
     }

@@ -100,7 +100,7 @@ fn filters_choose_by_time_and_by_message() {
     let decode = |more: &str| {
         let line = format!("decode flight.hum -o - --format jsonl --message ATTITUDE {more}");
         let lines = text(&run(dir.path(), &line, 0));
-        // Who checked the vehicle is of the whole log.
+        // Who checked the vehicle stands behind the rest.
         lines.lines().filter(|line| !line.contains("HUMS_CHECKED")).collect::<Vec<_>>().join("\n")
     };
     let all = decode("");
@@ -159,6 +159,17 @@ fn a_recording_that_nobody_checked_has_the_findings_of_this_program_and_says_so(
             (&last["fields"]["verdict"], last["fields"]["findings"].as_u64()),
             (&"critical".into(), Some(found.len() as u64))
         );
+        // Of a part, what was found in it.
+        let until = format!(
+            "decode {input} -o - --format jsonl --to {}",
+            found[2].split(' ').nth(2).expect("a time")
+        );
+        let part = text(&run(at, &until, 0));
+        let checked: serde_json::Value =
+            serde_json::from_str(part.lines().last().expect("a line")).expect("JSON");
+        let there = findings_of(&part).len();
+        assert!((3..found.len()).contains(&there), "{there} of {}", found.len());
+        assert_eq!(checked["fields"]["findings"].as_u64(), Some(there as u64), "{checked}");
         run(at, &format!("decode {input} -o {input}.out --format csv,influx"), 0);
         let tables: Vec<_> = fs::read_dir(at.join(format!("{input}.out"))).expect("made").collect();
         assert_eq!(tables.len(), 2, "tables and points");

@@ -193,7 +193,13 @@ impl Subject {
         fs::write(self.path(), bytes)?;
         let extents = vec![Extent { start: 0, length: bytes.len() as u64 }];
         let pieces = vec![Piece { path: self.path(), extents }];
-        Ok(Log { name: "00001".into(), files: vec!["00001_00.HUM".into()], pieces, session: None })
+        Ok(Log {
+            name: "00001".into(),
+            files: vec!["00001_00.HUM".into()],
+            pieces,
+            session: None,
+            left_over: false,
+        })
     }
 
     /// So many damages, of all kinds in turn; the first misses in words.

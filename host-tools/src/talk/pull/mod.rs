@@ -134,15 +134,16 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     }
 }
 
-/// How much of the log an earlier run has left that can be gone on with; what is of another log is thrown away.
+/// How much of the log an earlier run has left that can be gone on with; what is of another log is thrown away once this one
+/// is whole.
 fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<u32> {
     let part = file.part().to_owned();
     let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
-    if bytes <= length && compare(ftp, name, &part, bytes)? != Likeness::Other {
+    if bytes == 0 || bytes <= length && compare(ftp, name, &part, bytes)? != Likeness::Other {
         return Ok(bytes);
     }
-    note!("{name}: what was begun is of another log of this name; it begins anew");
-    file.begin_anew()?;
+    note!("{name}: what was begun is of another log of this name, or was changed; it begins anew");
+    file.set_aside()?;
     Ok(0)
 }
 
