@@ -35,7 +35,7 @@ pub fn hint(start: &[u8]) -> Option<&'static str> {
     if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| start.starts_with(magic)) {
         return Some(what);
     }
-    if start.starts_with(&FMT) && start.windows(14).any(|window| window == b"TIMEQ\0\0\0\0\0\0\0\0\0") {
+    if start.starts_with(&FMT) && is_sdlog2(start) {
         return Some(SDLOG2);
     }
     match *start.first_chunk()? {
@@ -45,6 +45,19 @@ pub fn hint(start: &[u8]) -> Option<&'static str> {
         _ => {}
     }
     start.get(USTAR_AT..).is_some_and(|start| start.starts_with(b"ustar")).then_some(TAR)
+}
+
+/// Whether a message `TIME` of one column is defined: `start` is 64 KiB of each log, so only the first byte is looked for in all.
+fn is_sdlog2(start: &[u8]) -> bool {
+    const TIME: &[u8] = b"TIMEQ\0\0\0\0\0\0\0\0\0";
+    let mut rest = start;
+    while let Some(at) = rest.iter().position(|byte| *byte == b'T') {
+        if rest.get(at..).is_some_and(|rest| rest.starts_with(TIME)) {
+            return true;
+        }
+        rest = rest.get(at + 1..).unwrap_or_default();
+    }
+    false
 }
 
 #[cfg(test)]
