@@ -47,17 +47,11 @@ pub fn hint(start: &[u8]) -> Option<&'static str> {
     start.get(USTAR_AT..).is_some_and(|start| start.starts_with(b"ustar")).then_some(TAR)
 }
 
-/// Whether a message `TIME` of one column is defined: `start` is 64 KiB of each log, so only the first byte is looked for in all.
+/// Whether a message `TIME` of one column is defined: all definitions stand first, 50 of 89 bytes.
 fn is_sdlog2(start: &[u8]) -> bool {
-    const TIME: &[u8] = b"TIMEQ\0\0\0\0\0\0\0\0\0";
-    let mut rest = start;
-    while let Some(at) = rest.iter().position(|byte| *byte == b'T') {
-        if rest.get(at..).is_some_and(|rest| rest.starts_with(TIME)) {
-            return true;
-        }
-        rest = rest.get(at + 1..).unwrap_or_default();
-    }
-    false
+    const DEFINITIONS_BYTES: usize = 16 * 1_024;
+    let start = start.get(..DEFINITIONS_BYTES).unwrap_or(start);
+    start.windows(14).any(|window| window == b"TIMEQ\0\0\0\0\0\0\0\0\0")
 }
 
 #[cfg(test)]

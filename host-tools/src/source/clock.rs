@@ -150,7 +150,7 @@ impl Clock {
             return Reading::Sound(self.count(stamp));
         }
         let known = self.series(stamp.series).known;
-        if before.is_some_and(|before| stamp.us < before) {
+        if self.rules.old_values && before.is_some_and(|before| stamp.us < before) {
             // A topic that falls back to an old value stays there.
             self.note(stamp);
         }

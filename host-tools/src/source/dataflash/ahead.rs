@@ -7,9 +7,10 @@ use super::text;
 use crate::source::clock::{self, Stamp};
 use crate::source::doubt::ASKED;
 
-/// Room for more than [`ASKED`] of the longest binary messages, and for a second of the oldest logs, in which only GPS messages
+/// Room for more than [`ASKED`] of the longest binary messages, for all definitions, which stand between the first messages of
+/// today, and for a second of the oldest logs, in which only GPS messages
 /// have times.
-pub(super) const AHEAD_BYTES: usize = 16 * 1_024;
+pub(super) const AHEAD_BYTES: usize = 64 * 1_024;
 /// No message for so long: what follows is erased memory, not part of the log.
 const ERASED_BYTES: usize = 4 * 1_024;
 /// Fields of a line that are looked at.

@@ -8,13 +8,10 @@ use super::window::Window;
 use crate::source::clock::{Ahead, BEGINNING_ASKED, Rules, Stamp};
 use crate::source::doubt::{ASKED, Ends};
 
-/// Microseconds since the autopilot's boot. A log begins with old values; topics are logged every ten seconds at least, or once
-/// only.
-pub(super) const RULES: Rules = Rules {
-    from_first: false,
-    old_values: true,
-    ends: Ends { steady_us: 1_000_000, seldom_us: 3_600_000_000 },
-};
+/// Microseconds since the autopilot's boot. A log begins with old values; the logger does not pause, but drops out for a second
+/// or two.
+pub(super) const RULES: Rules =
+    Rules { from_first: false, old_values: true, ends: Ends { steady_us: 1_000_000, seldom_us: 10_000_000 } };
 /// How much of a log is looked at for the first messages of data: definitions come before them, 100 to 200 KiB.
 const FIRST_BYTES: usize = 512 * 1024;
 /// Messages after one that are looked at for their times.
