@@ -18,8 +18,9 @@ enum State {
     Fresh,
     /// Everything is kept.
     All,
-    /// From this sector on, the last while.
-    Last { from: u32 },
+    /// From this sector on, the last so many seconds. A change of `REC_BEFORE` counts from the next disarming on: what was
+    /// dropped is not there any more.
+    Last { from: u32, seconds: u32 },
 }
 
 /// Decides what is kept.
@@ -58,7 +59,6 @@ impl Keeping {
         let by_arming = params.get(Param::RecMode) > 0.5;
         let lately = self.armed_at.is_some_and(|at| armed || now.since(at) < span(Param::RecAfter));
         let (before, all) = (span(Param::RecBefore), !by_arming || lately);
-        let keep = |all, from| Keep { all, from, seconds: (before.as_millis() / 1000) as u32 };
         match self.state {
             State::Fresh | State::All if all => self.state = State::All,
             State::Fresh | State::All => {
@@ -66,18 +66,19 @@ impl Keeping {
                 let is_fresh = self.state == State::Fresh;
                 if is_fresh || sectors.with_reserve(|sink| writer.finish(sink)) {
                     let from = writer.counters().sectors as u32;
+                    let seconds = (before.as_millis() / 1000) as u32;
                     card.wait_from(from, before);
-                    self.state = State::Last { from };
-                    self.due = Some(keep(false, from));
+                    self.state = State::Last { from, seconds };
+                    self.due = Some(Keep { all: false, from, seconds });
                 }
             }
-            State::Last { from } if all => {
+            State::Last { from, seconds } if all => {
                 card.keep_all();
                 self.state = State::All;
-                self.due = Some(keep(true, from));
+                self.due = Some(Keep { all, from, seconds });
             }
-            State::Last { from } if writer.counters().groups != self.group => {
-                self.due = Some(keep(false, from));
+            State::Last { from, seconds } if writer.counters().groups != self.group => {
+                self.due = Some(Keep { all, from, seconds });
             }
             State::Last { .. } => {}
         }
