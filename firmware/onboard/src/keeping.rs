@@ -96,3 +96,37 @@ impl Keeping {
         before != 0 && before != self.files
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use hums_blackbox::{Entry, GroupDecoder, Header};
+
+    use super::*;
+    use crate::queues::Queues;
+
+    #[test]
+    fn the_record_says_what_storage_was_told_also_where_the_parameter_was_changed_meanwhile() {
+        let (mut queues, mut writer) = (Box::new(Queues::new()), Box::new(Writer::new()));
+        let mut ends = queues.split();
+        let (card, mut params, mut keeping) = (CardStatus::new(), Params::defaults(), Keeping::new());
+        params.set("REC_MODE", 1.0).expect("a parameter");
+        for (ms, armed, before) in [(0, false, 15.0), (50, false, 60.0), (100, true, 60.0)] {
+            params.set("REC_BEFORE", before).expect("a parameter");
+            let now = Instant::from_millis(ms);
+            keeping.tick(now, &params, armed, &card, &mut writer, &mut ends.sectors_in);
+        }
+        assert!(ends.sectors_in.with_reserve(|sink| writer.finish(sink)));
+        let (mut decoder, mut said) = (Box::new(GroupDecoder::new()), Vec::new());
+        while let Some(sector) = ends.sectors_out.oldest() {
+            let mut sector = *sector;
+            sector.seal(1);
+            let header = Header::read(sector.bytes()).expect("a sector");
+            decoder.push(&header, &sector).expect("in order");
+            while let Some(Ok(Entry::Record { record: Record::Keep(keep), .. })) = decoder.next_entry() {
+                said.push((keep.all, keep.seconds));
+            }
+            ends.sectors_out.drop_oldest();
+        }
+        assert_eq!(said, [(false, 15), (true, 15)]);
+    }
+}
