@@ -115,8 +115,16 @@ fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Res
     let mut first = First::default();
     let mut window = Binary::new(bytes.window(FIRST_BYTES).context(CONTEXT)?);
     while let Some(piece) = window.next(first.lengths())? {
-        if let Piece::Message { kind, payload, after, .. } = piece {
-            first.learn(kind, Body::Bytes(payload), after);
+        if let Piece::Message { kind, payload, .. } = piece {
+            first.learn(kind, Body::Bytes(payload));
+        }
+    }
+    let mut window = Binary::new(bytes.window(FIRST_BYTES).context(CONTEXT)?);
+    while let Some(piece) = window.next(first.lengths())? {
+        if let Piece::Message { kind, payload, after, .. } = piece
+            && first.begins(kind, Body::Bytes(payload), after)
+        {
+            break;
         }
     }
     let mut session = Session::new(first, want);
@@ -145,8 +153,16 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         }
         if let Ok(Some(kind)) = kinds.of(&line, first.formats()) {
             let values = values_of(&line, kind, first.formats());
-            first.learn(kind, Body::Words(&values), ahead_of(&line));
+            first.learn(kind, Body::Words(&values));
             kinds.learn(kind, first.formats());
+        }
+    }
+    let mut window = Lines::new(lines.window(FIRST_BYTES).context(CONTEXT)?);
+    while let Some(line) = window.next()? {
+        let Ok(Some(kind)) = kinds.of(&line, first.formats()) else { continue };
+        let values = values_of(&line, kind, first.formats());
+        if first.begins(kind, Body::Words(&values), ahead_of(&line)) {
+            break;
         }
     }
     let (mut session, mut kinds) = (Session::new(first, want), Kinds::default());

@@ -66,21 +66,29 @@ impl First {
     }
 
     /// Takes a message.
-    pub(super) fn learn(&mut self, kind: u8, body: Body<'_>, ahead: Ahead<'_>) {
+    pub(super) fn learn(&mut self, kind: u8, body: Body<'_>) {
         if let Some((defined, _)) = defined_by(&self.formats, kind, body) {
             self.handlers.forget(defined);
         }
         define(&mut self.formats, kind, body);
-        let Self { formats, state, clock, handlers, begins_us, .. } = self;
+        let Self { formats, state, handlers, .. } = self;
         let Some(format) = formats.get(kind) else { return };
         let message = Message::new(format, body);
-        if begins_us.is_none() {
-            let when = clock.at(&message, ahead, formats);
-            *begins_us = when.boot_us.filter(|_| when.own == Own::Sound);
-        }
         if let Some(resolved) = handlers.of(format).filter(|resolved| resolved.handler.is_fact) {
             observe::take(state, resolved, &message, (Instant::ZERO, None), &mut Out::new(&mut |_| ()));
         }
+    }
+}
+
+impl First {
+    /// After all was learned, the messages again: whether this one tells when the log begins. (Definitions stand between the
+    /// first messages, so only now can those after them be asked.)
+    pub(super) fn begins(&mut self, kind: u8, body: Body<'_>, ahead: Ahead<'_>) -> bool {
+        let Self { formats, clock, begins_us, .. } = self;
+        let Some(format) = formats.get(kind) else { return false };
+        let when = clock.at(&Message::new(format, body), ahead, formats);
+        *begins_us = when.boot_us.filter(|_| when.own == Own::Sound);
+        begins_us.is_some()
     }
 }
 
