@@ -339,3 +339,16 @@ fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
         assert_eq!(check.alarm_only, due || flags.contains(&check.name), "{}", check.name);
     }
 }
+
+#[test]
+fn a_radio_that_tells_nothing_of_an_end_has_no_margin_there() {
+    let cases: [(Fault, bool); 3] = [
+        (|_, more| radio(more, [0, 225], [0, 60]), false),
+        (|_, more| radio(more, [90, 0], [40, 0]), false),
+        (|_, more| radio(more, [0, 90], [30, 40]), true),
+    ];
+    for (number, (says, told)) in cases.into_iter().enumerate() {
+        let findings = fly(&LIMITS, says);
+        assert_eq!(findings.iter().any(|finding| finding.check == "radio_margin"), told, "{number}");
+    }
+}

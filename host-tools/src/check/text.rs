@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use hums_core::health::{Level, Side, vocabulary};
+use hums_core::health::{Level, Side, Subsystem, vocabulary};
 use hums_core::time::{Instant, Span};
 
 use super::checked::Checked;
@@ -386,13 +386,15 @@ fn sentence(group: &[&Problem]) -> String {
     } else if first.limit.is_finite() && state.is_none() {
         let _ = write!(text, " (limit {}{unit})", short(first.limit));
     }
-    if first.lasted > Span::ZERO || first.lasting {
+    // A mishap is a moment: its level stays until the next arming.
+    let is_moment = first.subsystem == Subsystem::Mishap;
+    if (first.lasted > Span::ZERO || first.lasting) && !is_moment {
         let _ = write!(text, ", for {}", clock(first.lasted));
     }
     if first.times > 1 {
         let _ = write!(text, " in {} times", first.times);
     }
-    if first.lasting {
+    if first.lasting && !is_moment {
         text.push_str(", to the end");
     }
     let _ = write!(text, " [{}]", first.check);

@@ -326,6 +326,10 @@ impl State {
 
     /// How long it must be good before the level falls.
     fn clear(&self, check: &Check) -> Span {
+        // What its detector ended is over: what it sees next is another mishap, and told.
+        if check.subsystem == Subsystem::Mishap {
+            return CLEAR;
+        }
         let most = if check.when == When::Always { CLEAR_MAX_ALWAYS } else { CLEAR_MAX };
         self.repeats.grown(CLEAR).min(most)
     }

@@ -93,11 +93,15 @@ fn rc_rssi(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     Reading::new(slot.at(), slot.get()?.rssi.map(f32::from))
 }
 
-/// The weaker end's signal above its noise.
+/// The weaker end's signal above its noise. An end that tells 0 of both tells nothing: a radio that does not measure, or one that
+/// was never heard.
 fn radio_margin(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let slot = &inputs.vehicle.radio;
     let radio = slot.get()?;
-    let margin = |rssi: Option<u8>, noise: Option<u8>| Some(f32::from(rssi?) - f32::from(noise?));
+    let margin = |rssi: Option<u8>, noise: Option<u8>| {
+        let (rssi, noise) = (rssi?, noise?);
+        ((rssi, noise) != (0, 0)).then(|| f32::from(rssi) - f32::from(noise))
+    };
     let ends = [margin(radio.rssi, radio.noise), margin(radio.remote_rssi, radio.remote_noise)];
     Reading::new(slot.at(), ends.into_iter().flatten().reduce(f32::min))
 }

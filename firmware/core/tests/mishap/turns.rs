@@ -138,3 +138,15 @@ fn what_its_own_rotors_turn_over_is_told_though_it_never_flew_and_what_a_hand_tu
         assert!(by_hand.told().is_empty(), "{of:?}: {:?}", by_hand.findings);
     }
 }
+
+#[test]
+fn what_turns_over_after_each_arming_is_told_each_time() {
+    let stands =
+        Quad { landed: Some(LandedState::OnGround), height: 0.0, throttle: 0.0, ..hovering(ROTORS[0]) };
+    let outcome = fly(&stands, |ms, quad, motion| match ms % 13_000 {
+        since @ ..6_000 => flips(quad, motion, since, 0.4),
+        // Stood up again, armed again.
+        since => (quad.armed, quad.throttle, quad.height) = (since > 8_000, 0.0, 0.0),
+    });
+    assert_eq!(outcome.told(), ["overturned"; 3], "{:?}", outcome.changes);
+}
