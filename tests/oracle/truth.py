@@ -17,8 +17,8 @@ The rules:
              later flies once more
   crash      it came below 1.5 m with a sink speed of more than 3 m/s in the second before (6 m/s for a plane), or with more
              than 4 g within a second and a speed of more than 1.5 m/s before (a simulator's legs are hard), or was disarmed above 5 m;
-             a plane without rotors that touches at less than 3.05 m/s of sink lands, however it skids and whether it goes on
-             (CS-23.473: a landing gear takes 10 ft/s)
+             a plane without rotors that touches at less than 3.05 m/s of sink (CS-23.473: a landing gear takes 10 ft/s) lands,
+             however it skids, where it has no throttle, or goes on where it is 2 m up again before it stands
   landing    a flight that ended by disarming or by standing for 8 s, without a crash
 
   battery    BATTERY_STATUS.charge_state is MAV_BATTERY_CHARGE_STATE_LOW or worse, up to UNHEALTHY
@@ -42,9 +42,9 @@ HIT_M, HIT_S, HIT_M_S, HIT_PLANE_M_S, HIT_G, HIT_G_M_S, GEAR_M_S = 1.5, 1.0, 3.0
 DISARMED_M = 5.0
 WRECK_S = 5.0
 LOST_S, DIFFER_M = 3.0, 8.0
-HEARTBEAT, GPS_RAW_INT, SCALED_IMU, RAW_IMU, GLOBAL_POSITION_INT, HIGHRES_IMU, BATTERY_STATUS, \
-    EXTENDED_SYS_STATE = KINDS = 0, 24, 26, 27, 33, 105, 147, 245
-CHARGE_LOW, CHARGE_UNHEALTHY = 2, 6
+HEARTBEAT, GPS_RAW_INT, SCALED_IMU, RAW_IMU, GLOBAL_POSITION_INT, HIGHRES_IMU, BATTERY_STATUS, VFR_HUD, \
+    EXTENDED_SYS_STATE = KINDS = 0, 24, 26, 27, 33, 105, 147, 74, 245
+CHARGE_LOW, CHARGE_UNHEALTHY, IDLE = 2, 6, 10
 GRAVITY = 9.80665
 ARMED, AUTOPILOTS, PLANES = 128, (3, 12), (1, 19, 20, 21, 22, 23, 24, 25)
 
@@ -89,7 +89,7 @@ class Flights:
         self.heights, self.ground, self.receiver, self.receiver_ground = collections.deque(), None, None, None
         self.up_since = self.low_since = self.began = None
         self.flights, self.landings, self.crashes_s = [], 0, []
-        self.battery_low_s, self.rotors = None, False
+        self.battery_low_s, self.rotors, self.throttle, self.struck = None, False, 0, None
         self.falling, self.shock, self.speeds = None, -math.inf, collections.deque()
 
     def take(self, at, message):
@@ -97,6 +97,8 @@ class Flights:
         if kind == "HEARTBEAT":
             if message.autopilot in AUTOPILOTS and message.get_srcComponent() == 1:
                 self.heartbeat(at, bool(message.base_mode & ARMED), message.type)
+        elif kind == "VFR_HUD":
+            self.throttle = message.throttle
         elif kind == "EXTENDED_SYS_STATE":
             self.rotors = message.vtol_state != 0
         elif kind == "BATTERY_STATUS":
@@ -153,6 +155,8 @@ class Flights:
             else:
                 self.up_since = None
         self.hit(at)
+        if above > TAKEOFF_M:
+            self.struck = None
         if self.began is not None:
             self.low_since = None if above > LANDED_M else self.low_since if self.low_since is not None else at
             if self.low_since is not None and at - self.low_since >= LANDED_S:
@@ -164,17 +168,22 @@ class Flights:
             return
         sink = (self.heights[0][1] - self.heights[-1][1]) / HIT_S
         shocked = at - self.shock < HIT_S and max((speed for _, speed in self.speeds), default=math.inf) > HIT_G_M_S
-        shocked &= not (self.plane and not self.rotors and sink < GEAR_M_S)
+        if shocked and self.plane and not self.rotors and sink < GEAR_M_S:
+            shocked = False
+            if self.throttle >= IDLE and self.struck is None:
+                self.struck = at
         if sink > (HIT_PLANE_M_S if self.plane else HIT_M_S) or shocked or self.falling is not None:
             self.crashes_s.append(at)
             self.falling = None
             self.end(at, landed=False)
 
     def end(self, at, landed):
+        if self.struck is not None:
+            self.crashes_s.append(self.struck)
         if self.began is not None:
             self.flights.append([round(self.began, 2), round(at, 2)])
-            self.landings += landed
-        self.began = self.up_since = self.low_since = None
+            self.landings += landed and self.struck is None
+        self.began = self.up_since = self.low_since = self.struck = None
 
     def result(self, at):
         if self.falling is not None:
