@@ -8,7 +8,7 @@
 //!
 //! | what is known | in the air | on the ground again, for two seconds |
 //! |---|---|---|
-//! | a height above home or above the local origin | more than one metre above the place of arming | less than half a metre, and still; below the place of arming with less throttle than flies |
+//! | a height above home or above the local origin | more than one metre above the place of arming | less than half a metre, and still; 2 m below the place of arming with less throttle than flies |
 //! | the speed of a plane or VTOL | faster than 8 m/s | as above |
 //! | the airspeed of a plane or VTOL, and its throttle | faster than 8 m/s with more than a fifth: wind alone is no flight | slower |
 //! | only the throttle (no position at all) | more than a fifth, and the displayed altitude rose by a metre | less than a tenth |
@@ -358,9 +358,8 @@ impl Flight {
         };
         if self.airborne() {
             // It hovers over a valley.
-            let hangs = height_m < -LANDED_HEIGHT_M
-                && vehicle.hovers(now) == Some(true)
-                && has_thrust(FLYING_THROTTLE);
+            let hangs =
+                height_m < -STANDS_M && vehicle.hovers(now) == Some(true) && has_thrust(FLYING_THROTTLE);
             return height_m > LANDED_HEIGHT_M || speed_mps.unwrap_or(0.0) > STILL_MPS || by_air || hangs;
         }
         height_m > TAKEOFF_HEIGHT_M || fast
