@@ -397,11 +397,11 @@ impl Ending {
     }
 
     /// Blocks behind the last sector that are neither empty nor sectors of any log, where nothing proves that the log ends
-    /// before them, and no more of them than a card's page has: a page of the log that went wrong looks so. What was on a
-    /// card before the box used it goes on behind that.
+    /// before them: sectors of the log that went wrong look so. What was on a card before the box used it is more than a card's
+    /// page, and goes on to the end of the last file.
     pub fn noise(&self) -> Option<String> {
-        let number =
-            Some(self.summary.behind.foreign).filter(|number| (1..=PAGE_SECTORS as u64).contains(number))?;
+        let is_older = |number: u64| number > PAGE_SECTORS as u64 && self.summary.ends_foreign;
+        let number = Some(self.summary.behind.foreign).filter(|number| *number > 0 && !is_older(*number))?;
         (!self.proof.is_whole() && self.summary.session.is_some()).then(|| {
             format!(
                 "{} {} behind its last sector: damaged sectors, or what other files left there",
@@ -683,5 +683,19 @@ mod tests {
         let whom = "of another session (box 3f3f3f3f3f3f3f3f3f3f3f3f, session 1a2b3c4d)";
         assert!(joined.starts_with(&format!("sectors 400 to 699 of 00001_00.HUM are {whom}: ")), "{joined}");
         assert!(hollow.ends_with(&format!("holds 300 sectors {whom}")), "{hollow}");
+    }
+
+    #[test]
+    fn noise_behind_a_log_is_damage_unless_it_is_what_was_on_the_card_before() {
+        let noise = |foreign, ends_foreign| {
+            let behind = BlockCounts { foreign, ..BlockCounts::default() };
+            let summary = Summary { session: Some(1), behind, ends_foreign, ..Summary::default() };
+            Ending { summary, ..Ending::default() }.noise()
+        };
+        assert!(noise(0, false).is_none());
+        for (foreign, ends_foreign) in [(1, false), (32, true), (100, false), (10_000, false)] {
+            assert!(noise(foreign, ends_foreign).is_some(), "{foreign}");
+        }
+        assert!(noise(10_000, true).is_none(), "an old film");
     }
 }

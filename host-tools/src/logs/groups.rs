@@ -40,6 +40,8 @@ pub struct Groups<'a> {
     joined: Option<Joined>,
     ended: bool,
     ends_short: bool,
+    /// The last block is no sector of any log.
+    ends_foreign: bool,
     /// The file of the last block.
     file: usize,
     /// The first block of a file, while what lies before it is given out.
@@ -60,6 +62,7 @@ impl<'a> Groups<'a> {
             ahead: VecDeque::new(),
             is_closed: false,
             joined: None,
+            ends_foreign: false,
             ended: false,
             ends_short: log.ends_short(),
             file: 0,
@@ -140,7 +143,10 @@ impl<'a> Groups<'a> {
             return Ok(());
         }
         match block {
-            Some(block) if is_empty(&block) => self.assembler.skip_empty(),
+            Some(block) if is_empty(&block) => {
+                self.ends_foreign = false;
+                self.assembler.skip_empty();
+            }
             Some(block) => self.feed(&block),
             None => {
                 self.ended = true;
@@ -153,8 +159,9 @@ impl<'a> Groups<'a> {
     fn feed(&mut self, block: &[u8; BLOCK_BYTES]) {
         let before = self.assembler.counts();
         self.assembler.feed(block);
-        let Some(strangers) = &mut self.strangers else { return };
         let seen = self.assembler.counts().since(&before);
+        self.ends_foreign = seen.foreign > 0;
+        let Some(strangers) = &mut self.strangers else { return };
         let (file, at) = self.blocks.place();
         match seen {
             BlockCounts { stale: 1.., .. } => strangers.other(file, at, block),
@@ -181,6 +188,11 @@ impl<'a> Groups<'a> {
     /// What lies behind the last sector.
     pub const fn behind(&self) -> BlockCounts {
         self.assembler.behind_last()
+    }
+
+    /// Whether the last block of all is no sector of any log.
+    pub const fn ends_foreign(&self) -> bool {
+        self.ends_foreign
     }
 
     /// The latest power-on that sectors of other sessions tell, microseconds since 1970.
