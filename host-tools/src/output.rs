@@ -2,12 +2,21 @@
 //! `println!` would panic.
 
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
 use serde::Serialize;
 
 use crate::outcome::ReaderGone;
 use crate::printable;
+
+/// What a command makes goes to standard output itself.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// What a command makes goes to standard output: results are printed on standard error from now on.
+pub fn leave_standard_output() {
+    TAKEN.store(true, Ordering::Relaxed);
+}
 
 /// Prints one line, or several; what the world put into it obeys no terminal.
 pub fn line(text: &str) -> Result<()> {
@@ -25,6 +34,9 @@ pub fn note(text: &str) {
 }
 
 fn raw_line(text: &str) -> Result<()> {
+    if TAKEN.load(Ordering::Relaxed) {
+        return settle(io::stderr().lock().write_all(format!("{text}\n").as_bytes()));
+    }
     let mut out = io::stdout().lock();
     settle(out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()))
 }
@@ -75,6 +87,9 @@ fn indented(value: &impl Serialize, by: &str) -> Result<String> {
 }
 
 fn print(text: &str) -> Result<()> {
+    if TAKEN.load(Ordering::Relaxed) {
+        return settle(io::stderr().lock().write_all(text.as_bytes()));
+    }
     settle(io::stdout().lock().write_all(text.as_bytes()))
 }
 

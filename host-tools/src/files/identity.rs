@@ -75,6 +75,21 @@ fn standard<T>(_: T) -> Option<FileId> {
     None
 }
 
+/// Whether an open file, pipe or terminal is what standard output is.
+#[cfg(unix)]
+pub(super) fn is_standard_output(file: &fs::File) -> bool {
+    use std::os::fd::AsFd as _;
+    let Ok(output) = io::stdout().as_fd().try_clone_to_owned() else { return false };
+    let output = fs::File::from(output).metadata().map(|about| node_of(&about));
+    let file = file.metadata().map(|about| node_of(&about));
+    output.ok().zip(file.ok()).is_some_and(|(output, file)| output == file)
+}
+
+#[cfg(not(unix))]
+pub(super) fn is_standard_output(_: &fs::File) -> bool {
+    false
+}
+
 /// A path without the `missing/..` in it; `None` where there is none.
 pub(super) fn folded(path: &Path) -> Option<PathBuf> {
     let (mut kept, mut is_folded) = (PathBuf::new(), false);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::identity::{is_descriptor, without_links};
+use super::identity::{is_descriptor, is_standard_output, without_links};
 use super::inputs::Inputs;
 use super::kind::{Found, Kind, Origin};
 use super::part::{lock, lock_folder_of, remove_stale, rename_new, sync_folder_of};
@@ -148,6 +148,10 @@ impl Output {
     /// What is no regular file is written as it is. Appending does no harm where it leads to a regular file after all.
     fn direct(path: &Path) -> Result<Self> {
         let file = File::options().append(true).open(path).with_context(|| cannot_write(path))?;
+        // The results that the command prints are not to stand in what it makes.
+        if is_standard_output(&file) {
+            crate::output::leave_standard_output();
+        }
         Ok(Self::new(To::File(file), path, None))
     }
 

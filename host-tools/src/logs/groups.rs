@@ -40,8 +40,8 @@ pub struct Groups<'a> {
     joined: Option<Joined>,
     ended: bool,
     ends_short: bool,
-    /// The last block is no sector of any log.
-    ends_foreign: bool,
+    /// So many blocks at the end of all are no sectors of any log.
+    foreign_at_end: u64,
     /// The file of the last block.
     file: usize,
     /// The first block of a file, while what lies before it is given out.
@@ -62,7 +62,7 @@ impl<'a> Groups<'a> {
             ahead: VecDeque::new(),
             is_closed: false,
             joined: None,
-            ends_foreign: false,
+            foreign_at_end: 0,
             ended: false,
             ends_short: log.ends_short(),
             file: 0,
@@ -144,7 +144,7 @@ impl<'a> Groups<'a> {
         }
         match block {
             Some(block) if is_empty(&block) => {
-                self.ends_foreign = false;
+                self.foreign_at_end = 0;
                 self.assembler.skip_empty();
             }
             Some(block) => self.feed(&block),
@@ -160,7 +160,7 @@ impl<'a> Groups<'a> {
         let before = self.assembler.counts();
         self.assembler.feed(block);
         let seen = self.assembler.counts().since(&before);
-        self.ends_foreign = seen.foreign > 0;
+        self.foreign_at_end = if seen.foreign > 0 { self.foreign_at_end + 1 } else { 0 };
         let Some(strangers) = &mut self.strangers else { return };
         let (file, at) = self.blocks.place();
         match seen {
@@ -190,9 +190,9 @@ impl<'a> Groups<'a> {
         self.assembler.behind_last()
     }
 
-    /// Whether the last block of all is no sector of any log.
-    pub const fn ends_foreign(&self) -> bool {
-        self.ends_foreign
+    /// How many blocks at the end of all are no sectors of any log.
+    pub const fn foreign_at_end(&self) -> u64 {
+        self.foreign_at_end
     }
 
     /// The latest power-on that sectors of other sessions tell, microseconds since 1970.

@@ -100,8 +100,8 @@ pub struct Summary {
     pub frames_end: Option<u32>,
     /// What lies behind the last sector.
     pub behind: BlockCounts,
-    /// What lies there and is of no log goes on to the end of the files.
-    pub ends_foreign: bool,
+    /// How many blocks up to the end of its files are no sectors of any log.
+    pub foreign_at_end: u64,
     /// The latest power-on of another session whose sectors lie among this one's or behind it, microseconds since 1970.
     pub other_epoch_us: Option<u64>,
     /// What of its files is not the log's.
@@ -161,7 +161,7 @@ pub fn read<C: Collect>(
     summary.frames_end = stitch.expected;
     summary.ends_partial = stitch.cut;
     summary.behind = groups.behind();
-    summary.ends_foreign = groups.ends_foreign();
+    summary.foreign_at_end = groups.foreign_at_end();
     summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();

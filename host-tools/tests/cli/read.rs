@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use crate::support::{flight, frames, frames_of, json, named, px4, recorded, run, text};
+use crate::support::{flight, frames, frames_of, hums, json, named, px4, recorded, run, text};
 
 /// A packed log of the PX4 flight.
 fn packed(dir: &Path) {
@@ -19,6 +19,30 @@ fn a_packed_recording_comes_back_frame_for_frame() {
         run(dir.path(), &format!("pack {} -o {name}.hum", input.display()), 0);
         run(dir.path(), &format!("decode {name}.hum -o {name} --format tlog"), 0);
         assert_eq!(frames_of(&dir.path().join(name)), frames_of(&input), "{name}");
+    }
+}
+
+#[test]
+fn what_is_made_on_standard_output_by_its_path_is_nothing_but_that() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), &format!("pack {} -o few.hum", flight("px4_hil_quad_low.tlog").display()), 0);
+    for (line, made) in [
+        ("decode few.hum --format tlog -o", "a.tlog"),
+        ("decode few.hum --format jsonl --message ATTITUDE -o", "a.jsonl"),
+        ("pack PX4 -o", "few.hum"),
+    ] {
+        if made != "few.hum" {
+            run(dir.path(), &format!("{line} {made}"), 0);
+        }
+        let whole = fs::read(dir.path().join(made)).expect("made");
+        let piped = run(dir.path(), &format!("{line} /dev/stdout"), 0);
+        assert!(piped.stdout == whole, "{line} into a pipe");
+        let file = fs::File::create(dir.path().join("redirected")).expect("made");
+        let words = line.split_whitespace().map(|word| if word == "PX4" { px4() } else { word.into() });
+        let mut command = std::process::Command::new(hums().get_program());
+        let status = command.current_dir(dir.path()).args(words).arg("/dev/stdout").stdout(file).status();
+        assert!(status.expect("it runs").success());
+        assert!(fs::read(dir.path().join("redirected")).expect("there") == whole, "{line} into a file");
     }
 }
 

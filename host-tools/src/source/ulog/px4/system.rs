@@ -461,7 +461,7 @@ impl Px4 {
         self.heartbeat();
         self.landed();
         let boot_ms = (recorded_us / 1_000) as u32;
-        let utc_micros = self.system.utc_offset_us.map(|offset| offset + recorded_us);
+        let utc_micros = self.system.utc_offset_us.map(|offset| offset.saturating_add(recorded_us));
         self.observe(Observation::SystemTime(SystemTime { utc_micros, boot_ms }));
         if let Some(takeoff_us) = self.system.status.and_then(|status| status.takeoff_us) {
             let takeoff_boot_ms = (takeoff_us / 1_000).min(u64::from(u32::MAX)) as u32;
