@@ -11,6 +11,8 @@
 //! Where half of the motors that lift, or more, stand nearly still and the vehicle does not spin, its autopilot drives them there:
 //! a VTOL that turns against the wind stops its motors of one sense of rotation. A vehicle that lost two of four spins.
 
+use core::ops::Range;
+
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, VehicleKind};
 use crate::time::{Instant, Span};
@@ -42,23 +44,28 @@ impl Currents {
         Self { lifts: 0, pushes: 0 }
     }
 
-    /// ESCs told of themselves.
-    pub(crate) fn take(&mut self, now: Instant, vehicle: &Vehicle, airborne: bool) {
+    /// The ESCs of these motors told of themselves.
+    pub(crate) fn take(&mut self, now: Instant, vehicle: &Vehicle, airborne: bool, motors: Range<usize>) {
         if !vehicle.armed() {
             *self = Self::new();
         }
-        if !airborne {
+        let of_group = !(u16::MAX << motors.end) & (u16::MAX << motors.start);
+        let on_wings = vehicle.hovers(now) == Some(false);
+        let known = if on_wings { self.pushes } else { self.lifts | self.pushes };
+        // Mostly all is known: this is done with each message of an ESC.
+        if !airborne || of_group & !known == 0 {
             return;
         }
+        let total = Total::of(now, vehicle, u16::MAX);
         let winged = vehicle.kind() == VehicleKind::Vtol;
-        for motor in 0..MOTORS_MAX {
+        for motor in motors.filter(|motor| known & (1 << motor) == 0) {
             let bit = 1 << motor;
             let Some(own_a) = current_a(now, vehicle, motor) else { continue };
-            if vehicle.hovers(now) == Some(false) && own_a > CURRENT_MIN_A {
+            if on_wings && own_a > CURRENT_MIN_A {
                 self.pushes |= bit;
             }
-            let Some(part) = part_of_others(now, vehicle, motor, u16::MAX) else { continue };
-            if winged && part < IDLE_PART && self.lifts & bit == 0 {
+            let Some(part) = total.part(now, vehicle, own_a) else { continue };
+            if winged && part < IDLE_PART {
                 self.pushes |= bit;
             } else if part >= SHARE_PART {
                 self.lifts |= bit;
@@ -70,8 +77,12 @@ impl Currents {
     /// on its rotors; `None` for a motor that was not seen lifting.
     pub(crate) fn percent(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let lifting = self.lifts & !self.pushes;
-        let judged = lifting & 1_u16.checked_shl(u32::from(motor))? != 0 && !self.is_driven_so(now, vehicle);
-        let part = part_of_others(now, vehicle, usize::from(motor), lifting).filter(|_| judged)?;
+        let own_a = current_a(now, vehicle, usize::from(motor))?;
+        let lifts = lifting & 1_u16.checked_shl(u32::from(motor))? != 0;
+        let part = Total::of(now, vehicle, if lifts { lifting } else { 0 }).part(now, vehicle, own_a)?;
+        if part < SHARE_PART && self.is_driven_so(now, vehicle) {
+            return None;
+        }
         // Measured when this motor told it: a value that is held is one sample.
         let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
         Some(Reading { at, value: part * 100.0 })
@@ -99,14 +110,27 @@ fn current_a(now: Instant, vehicle: &Vehicle, motor: usize) -> Option<f32> {
     motor.esc.current.map(|current| current.0.max(0.0)).filter(|current| fresh && current.is_finite())
 }
 
-/// A motor's current as a part of the mean of the others of `among`, while the throttle asks for thrust in hover.
-fn part_of_others(now: Instant, vehicle: &Vehicle, motor: usize, among: u16) -> Option<f32> {
-    let own_a = current_a(now, vehicle, motor)?;
-    let throttle = vehicle.hud.within(now, FRESH)?.throttle?.0;
-    let others = (0..MOTORS_MAX).filter(|other| *other != motor && among & (1 << other) != 0);
-    let others = others.filter_map(|other| current_a(now, vehicle, other));
-    let (sum_a, count) = others.fold((0.0, 0_u8), |(sum_a, count), current_a| (sum_a + current_a, count + 1));
-    let mean_a = sum_a / f32::from(count);
-    let asked = vehicle.hovers(now) == Some(true) && throttle > THROTTLE_MIN;
-    (asked && count >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
+/// What several motors take together.
+struct Total {
+    sum_a: f32,
+    count: u8,
+}
+
+impl Total {
+    fn of(now: Instant, vehicle: &Vehicle, among: u16) -> Self {
+        let motors = (0..MOTORS_MAX).filter(|motor| among & (1 << motor) != 0);
+        let currents = motors.filter_map(|motor| current_a(now, vehicle, motor));
+        let (sum_a, count) =
+            currents.fold((0.0, 0), |(sum_a, count), current_a| (sum_a + current_a, count + 1));
+        Self { sum_a, count }
+    }
+
+    /// The current of one of them as a part of the mean of the others, while the throttle asks for thrust in hover.
+    fn part(&self, now: Instant, vehicle: &Vehicle, own_a: f32) -> Option<f32> {
+        let throttle = vehicle.hud.within(now, FRESH)?.throttle?.0;
+        let others = self.count.checked_sub(1)?;
+        let mean_a = (self.sum_a - own_a) / f32::from(others);
+        let asked = vehicle.hovers(now) == Some(true) && throttle > THROTTLE_MIN;
+        (asked && others >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
+    }
 }

@@ -175,12 +175,13 @@ impl Derived {
             }
             Observation::Parameter(place, value) => self.cells.take_setting(*place, *value),
             Observation::Escs(group) => {
-                let first = usize::from(group.first);
+                let first = usize::from(group.first).min(MOTORS_MAX);
+                let motors = first..first.saturating_add(group.escs.len()).min(MOTORS_MAX);
                 self.take_errors(at, group);
-                for number in first..first.saturating_add(group.escs.len()).min(MOTORS_MAX) {
+                for number in motors.clone() {
                     self.take_motor(at, vehicle, number);
                 }
-                self.currents.take(at, vehicle, flight.airborne());
+                self.currents.take(at, vehicle, flight.airborne(), motors);
             }
             _ => {}
         }
