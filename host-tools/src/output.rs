@@ -34,11 +34,8 @@ pub fn note(text: &str) {
 }
 
 fn raw_line(text: &str) -> Result<()> {
-    if TAKEN.load(Ordering::Relaxed) {
-        return settle(io::stderr().lock().write_all(format!("{text}\n").as_bytes()));
-    }
-    let mut out = io::stdout().lock();
-    settle(out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()))
+    print(&format!("{text}\n"))?;
+    settle(io::stdout().lock().flush())
 }
 
 /// Prints one JSON object, indented.

@@ -77,9 +77,11 @@ impl Currents {
     /// on its rotors; `None` for a motor that was not seen lifting.
     pub(crate) fn percent(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let lifting = self.lifts & !self.pushes;
+        if lifting & 1_u16.checked_shl(u32::from(motor))? == 0 {
+            return None;
+        }
         let own_a = current_a(now, vehicle, usize::from(motor))?;
-        let lifts = lifting & 1_u16.checked_shl(u32::from(motor))? != 0;
-        let part = Total::of(now, vehicle, if lifts { lifting } else { 0 }).part(now, vehicle, own_a)?;
+        let part = Total::of(now, vehicle, lifting).part(now, vehicle, own_a)?;
         if part < SHARE_PART && self.is_driven_so(now, vehicle) {
             return None;
         }

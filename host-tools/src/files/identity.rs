@@ -65,9 +65,14 @@ impl FileId {
 
 #[cfg(unix)]
 fn standard(stream: impl std::os::fd::AsFd) -> Option<FileId> {
-    let file = fs::File::from(stream.as_fd().try_clone_to_owned().ok()?);
-    let about = file.metadata().ok().filter(fs::Metadata::is_file)?;
+    let about = about(stream).filter(fs::Metadata::is_file)?;
     Some(FileId::Existing(node_of(&about)))
+}
+
+/// What is known of a stream that is open.
+#[cfg(unix)]
+fn about(stream: impl std::os::fd::AsFd) -> Option<fs::Metadata> {
+    fs::File::from(stream.as_fd().try_clone_to_owned().ok()?).metadata().ok()
 }
 
 #[cfg(not(unix))]
@@ -78,11 +83,7 @@ fn standard<T>(_: T) -> Option<FileId> {
 /// Whether an open file, pipe or terminal is what standard output is.
 #[cfg(unix)]
 pub(super) fn is_standard_output(file: &fs::File) -> bool {
-    use std::os::fd::AsFd as _;
-    let Ok(output) = io::stdout().as_fd().try_clone_to_owned() else { return false };
-    let output = fs::File::from(output).metadata().map(|about| node_of(&about));
-    let file = file.metadata().map(|about| node_of(&about));
-    output.ok().zip(file.ok()).is_some_and(|(output, file)| output == file)
+    about(io::stdout()).zip(about(file)).is_some_and(|(output, file)| node_of(&output) == node_of(&file))
 }
 
 #[cfg(not(unix))]

@@ -136,19 +136,7 @@ pub(crate) fn furnished() -> TempDir {
 
 /// Everything that a directory has, by name.
 pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut found = Vec::new();
-    let entries = fs::read_dir(dir).expect("a directory");
-    for path in entries.map(|entry| entry.expect("an entry").path()) {
-        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-        if path.is_dir() {
-            found
-                .extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
-        } else {
-            found.push((name, fs::read(&path).expect("a file")));
-        }
-    }
-    found.sort();
-    found
+    each_file(dir, |path| fs::read(path).expect("a file"))
 }
 
 /// Which file it is, how long, and when it was changed last (`st_ctime`, which no program sets): one that has the same is untouched.
@@ -156,16 +144,23 @@ pub(crate) type Stamp = (u64, u64, i64, i64);
 
 /// All files below a directory by name, without reading them: a card's image is large.
 pub(crate) fn stamps(dir: &Path) -> Vec<(String, Stamp)> {
+    each_file(dir, |path| {
+        let of = fs::metadata(path).expect("a file");
+        (of.ino(), of.len(), of.ctime(), of.ctime_nsec())
+    })
+}
+
+/// All files below a directory by name, in order, and what there is to say of each.
+fn each_file<T: Ord>(dir: &Path, of: impl Fn(&Path) -> T + Copy) -> Vec<(String, T)> {
     let mut found = Vec::new();
     let entries = fs::read_dir(dir).expect("a directory");
     for path in entries.map(|entry| entry.expect("an entry").path()) {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         if path.is_dir() {
-            let inner = stamps(&path).into_iter();
-            found.extend(inner.map(|(inner, stamp)| (format!("{name}/{inner}"), stamp)));
+            let inner = each_file(&path, of).into_iter();
+            found.extend(inner.map(|(inner, of)| (format!("{name}/{inner}"), of)));
         } else {
-            let of = fs::metadata(&path).expect("a file");
-            found.push((name, (of.ino(), of.len(), of.ctime(), of.ctime_nsec())));
+            found.push((name, of(&path)));
         }
     }
     found.sort();

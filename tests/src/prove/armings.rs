@@ -25,6 +25,7 @@ use tempfile::TempDir;
 use super::card::{BLOCK, Card};
 use super::figures::{Figures, Labels};
 use super::options::Options;
+use super::pages::Tally;
 use super::record::{Frame, Record};
 use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
@@ -54,18 +55,9 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
         Ok(subject.damage_often(share, options.seed.wrapping_add(index as u64)))
     });
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
-    let mut all = Tally::default();
-    for (place, kind) in Kind::ALL.into_iter().enumerate() {
-        let mut sum = Tally::default();
-        for (tallies, _) in &outcomes {
-            sum.add(&tallies[place]);
-        }
-        all.add(&sum);
-        let numbers =
-            [sum.damages, sum.noticed, sum.told, sum.missed, sum.lost_max].map(|one| one.to_string());
-        let [damages, noticed, told, missed, lost] = numbers;
-        figures.row([kind.name().to_owned(), damages, noticed, told, missed, lost]);
-    }
+    let all = Tally::tabulate(&mut figures, Kind::ALL.map(Kind::name), |kind| {
+        outcomes.iter().map(move |(tallies, _)| &tallies[kind])
+    });
     figures.fact("damages", all.damages);
     figures.fact("of them noticed: `verify` does not call all of it good", all.noticed);
     figures.fact("of them called good, and what is said is so", all.told);
@@ -118,27 +110,6 @@ impl Kind {
             Self::PageCopied => "a page in the place of another one",
             Self::PageTwice => "a page there twice",
         }
-    }
-}
-
-/// What became of the damages of one kind.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tally {
-    damages: u64,
-    noticed: u64,
-    /// Called good, and so far as it is said, it is.
-    told: u64,
-    missed: u64,
-    lost_max: u64,
-}
-
-impl Tally {
-    fn add(&mut self, other: &Self) {
-        self.damages += other.damages;
-        self.noticed += other.noticed;
-        self.told += other.told;
-        self.missed += other.missed;
-        self.lost_max = self.lost_max.max(other.lost_max);
     }
 }
 

@@ -86,18 +86,9 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
         subject.damage_often(other, share, options.seed.wrapping_add(index as u64))
     });
     let outcomes: Vec<_> = outcomes.collect();
-    let mut all = pages::Tally::default();
-    for (place, kind) in pages::Kind::ALL.into_iter().enumerate() {
-        let mut sum = pages::Tally::default();
-        for one in &outcomes {
-            sum.add(&one.tallies[place].1);
-        }
-        all.add(&sum);
-        let numbers =
-            [sum.damages, sum.noticed, sum.told, sum.missed, sum.lost_max].map(|one| one.to_string());
-        let [damages, noticed, told, missed, lost] = numbers;
-        figures.row([kind.name().to_owned(), damages, noticed, told, missed, lost]);
-    }
+    let all = pages::Tally::tabulate(figures, pages::Kind::ALL.map(pages::Kind::name), |kind| {
+        outcomes.iter().map(move |one| &one.tallies[kind].1)
+    });
     figures.fact("damaged pages and ends", all.damages);
     figures.fact("of them noticed: `verify` does not call it good", all.noticed);
     figures.fact("of them read as the other session, and told", all.other);

@@ -20,6 +20,7 @@ use hums_blackbox::{Header, PAGE_SECTORS};
 use tempfile::TempDir;
 
 use super::card::{BLOCK, Card};
+use super::figures::Figures;
 use super::record::{Frame, Record};
 use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
@@ -90,7 +91,7 @@ pub(super) struct Tally {
     pub(super) damages: u64,
     /// `verify` does not call it good.
     pub(super) noticed: u64,
-    /// `verify` calls it whole up to an end mark, and it is.
+    /// `verify` calls it whole up to an end mark, or good so far as it says, and it is.
     pub(super) told: u64,
     /// Read as the other session, because its sector is the first one.
     pub(super) other: u64,
@@ -108,6 +109,25 @@ impl Tally {
         self.missed += other.missed;
         self.lost_max = self.lost_max.max(other.lost_max);
         self.frames += other.frames;
+    }
+
+    /// A row for each kind of damage, of the sum over all that was damaged, and the sum of all; `of` gives a kind's tallies.
+    pub(super) fn tabulate<'a, I: Iterator<Item = &'a Self>>(
+        figures: &mut Figures,
+        kinds: impl IntoIterator<Item = &'static str>,
+        of: impl Fn(usize) -> I,
+    ) -> Self {
+        let mut all = Self::default();
+        for (kind, name) in kinds.into_iter().enumerate() {
+            let mut sum = Self::default();
+            of(kind).for_each(|one| sum.add(one));
+            all.add(&sum);
+            let numbers =
+                [sum.damages, sum.noticed, sum.told, sum.missed, sum.lost_max].map(|one| one.to_string());
+            let [damages, noticed, told, missed, lost] = numbers;
+            figures.row([name.to_owned(), damages, noticed, told, missed, lost]);
+        }
+        all
     }
 }
 
