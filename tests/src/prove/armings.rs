@@ -49,7 +49,8 @@ pub(super) const LABELS: Labels = Labels {
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let mut figures = Figures::new(&LABELS);
-    let share = options.runs(2_000, 30).div_ceil(OWN.len() as u64);
+    // Of each kind one in each flight at least.
+    let share = options.runs(2_000, 40).div_ceil(OWN.len() as u64);
     let outcomes = OWN.into_par_iter().enumerate().with_max_len(1).map(|(index, flight)| {
         let subject = Subject::record(flight).context(flight)?;
         Ok(subject.damage_often(share, options.seed.wrapping_add(index as u64)))
