@@ -155,11 +155,12 @@ impl Monitor {
         self.usage.break_off();
     }
 
-    /// What comes next is of another recording of the vehicle, another day perhaps: the time that the autopilot has been up
-    /// tells of no restart.
+    /// What comes next is of another recording, of another day or another vehicle: nothing holds but what was counted.
     pub fn begin_another_recording(&mut self) {
-        self.begin_anew();
-        self.vehicle.forget_boot();
+        self.usage.break_off();
+        self.vehicle = Vehicle::unknown();
+        self.begin_with_another();
+        self.cells_told = false;
     }
 
     /// One step, every [`TICK`]: flight, checks, usage. Each change of a check's level is given to `findings`, once.

@@ -338,11 +338,6 @@ impl Vehicle {
         self.time.set(at, time);
     }
 
-    /// The next boot time is the first.
-    pub(crate) fn forget_boot(&mut self) {
-        (self.boot, self.odd_boot, self.boot_armed) = (None, None, false);
-    }
-
     /// A boot time that falls, and which the next one agrees with, is a reboot. One wrong time is none, nor are messages that
     /// overtake each other a little, nor the end of 32 bits of milliseconds after 49.7 days.
     fn take_boot_time(&mut self, at: Instant, boot_ms: u32) {

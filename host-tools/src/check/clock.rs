@@ -24,9 +24,9 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// The recording's time of the next step, which is `at` where there was none yet.
+    /// The recording's time of the next step, which is `at`, or up to a step later, where there was none yet.
     pub(super) fn begin(&mut self, at: Instant) -> Instant {
-        *self.next.get_or_insert(at)
+        *self.next.get_or_insert(whole(at))
     }
 
     /// The next step up to a time of the recording, if there is one more.
@@ -38,7 +38,7 @@ impl Clock {
 
     /// The next step is at this time, if that is later: both times go on.
     pub(super) fn skip_to(&mut self, at: Instant) {
-        self.next = self.next.max(Some(at));
+        self.next = self.next.max(Some(whole(at)));
     }
 
     /// The recording has nothing from here to there: the monitor's time stands still. What comes before was stepped.
@@ -47,7 +47,7 @@ impl Clock {
         let Some(next) = self.next.filter(|_| length > Span::ZERO) else { return };
         self.behind = self.behind + length;
         self.gap_end = to;
-        self.next = Some(next.max(to + if length >= SETTLE { SETTLE } else { TICK }));
+        self.next = Some(next.max(whole(to + if length >= SETTLE { SETTLE } else { TICK })));
     }
 
     /// The monitor's time at a time of the recording; it never falls.
@@ -67,6 +67,12 @@ impl Clock {
     pub(super) fn recording(now: Instant, steps: Instant, earlier: Instant) -> Instant {
         Instant::from_micros(now.as_micros().saturating_sub(steps.since(earlier).as_micros()))
     }
+}
+
+/// The first whole step at a time or after it. Steps are at the same times whatever message a recording begins with, and
+/// whatever is damaged in it.
+fn whole(at: Instant) -> Instant {
+    Instant::from_micros(at.as_micros().div_ceil(TICK.as_micros()).saturating_mul(TICK.as_micros()))
 }
 
 #[cfg(test)]
@@ -92,11 +98,21 @@ mod tests {
         assert_eq!(steps(&mut clock, ms(1_120)), [(1_000, 1_000), (1_050, 1_050), (1_100, 1_100)]);
         clock.pause(ms(1_120), ms(21_120));
         assert_eq!(clock.monitor(ms(21_130)), ms(1_130), "it goes on where the gap ends");
-        assert_eq!(steps(&mut clock, ms(22_110)), []);
-        assert_eq!(steps(&mut clock, ms(22_170)), [(22_120, 2_120), (22_170, 2_170)]);
-        assert_eq!(Clock::recording(ms(22_170), ms(2_170), ms(2_150)), ms(22_150));
-        clock.pause(ms(22_170), ms(22_270));
-        assert_eq!(steps(&mut clock, ms(22_330)), [(22_320, 2_220)], "a short one has no second after it");
+        assert_eq!(steps(&mut clock, ms(22_140)), []);
+        assert_eq!(steps(&mut clock, ms(22_200)), [(22_150, 2_150), (22_200, 2_200)]);
+        assert_eq!(Clock::recording(ms(22_200), ms(2_200), ms(2_150)), ms(22_150));
+        clock.pause(ms(22_210), ms(22_310));
+        assert_eq!(steps(&mut clock, ms(22_430)), [(22_400, 2_300)], "a short one has no second after it");
+    }
+
+    #[test]
+    fn steps_are_at_the_same_times_whatever_message_is_the_first() {
+        let first = |at| {
+            let mut clock = Clock::default();
+            clock.begin(ms(at));
+            steps(&mut clock, ms(1_200)).last().map(|(at, _)| *at)
+        };
+        assert_eq!((first(1_000), first(1_007), first(1_049)), (Some(1_200), Some(1_200), Some(1_200)));
     }
 
     #[test]

@@ -27,6 +27,10 @@ pub(super) struct Details {
     batteries: Vec<(u8, u8)>,
     /// Autopilots in the order in which they came.
     autopilots: Vec<Heard>,
+    /// What was said of recordings that another one was joined to.
+    earlier: Vec<String>,
+    /// The autopilots of those.
+    others: Vec<Heard>,
 }
 
 /// An autopilot that was heard, as far as one is told from another.
@@ -48,6 +52,33 @@ const AUTOPILOT: u8 = 1;
 const TOLD_APART_MAX: usize = 32;
 
 impl Details {
+    /// Another recording begins.
+    pub(super) fn begin_another(&mut self) {
+        /// Sentences that are kept.
+        const KEPT_MAX: usize = 8;
+        let mut earlier = self.of_parts();
+        earlier.truncate(KEPT_MAX);
+        let others = self.all_autopilots();
+        *self = Self { earlier, others, ..Self::default() };
+    }
+
+    /// The autopilots of all recordings of a file, each once: one may tell who it is in one of them only.
+    fn all_autopilots(&self) -> Vec<Heard> {
+        let mut all = self.others.clone();
+        for heard in &self.autopilots {
+            let known = all.iter().position(|known| {
+                (known.system, known.autopilot) == (heard.system, heard.autopilot)
+                    && (known.uid == heard.uid || known.uid == 0 || heard.uid == 0)
+            });
+            if let Some(known) = known.and_then(|at| all.get_mut(at)) {
+                known.uid = known.uid.max(heard.uid);
+            } else if all.len() < TOLD_APART_MAX {
+                all.push(*heard);
+            }
+        }
+        all
+    }
+
     /// These failsafes are in force from here on.
     pub(super) fn failsafes(&mut self, words: &str, problems: &mut Problems) {
         words.clone_into(&mut self.failsafes);
@@ -101,17 +132,22 @@ impl Details {
 
     /// Says that the recording is of more than one vehicle: files that were joined, or a ground station of several.
     fn vehicles(&self) -> Option<String> {
-        let words = |heard: &Heard| {
-            let uid = if heard.uid == 0 { String::new() } else { format!(", uid {:016x}", heard.uid) };
-            format!("system {} ({}{uid})", heard.system, autopilot_name(heard.autopilot))
-        };
-        let all: Vec<String> = self.autopilots.iter().map(words).collect();
-        (all.len() > 1).then(|| {
+        (self.autopilots.len() > 1).then(|| {
             format!(
                 "more than one vehicle is in it: {}; one system id is judged, as if it were one vehicle: give each \
                  vehicle's recording by itself",
-                all.join(", ")
+                named(&self.autopilots)
             )
+        })
+    }
+
+    /// Says that the recordings that were joined are of different vehicles.
+    fn vehicles_of_parts(&self) -> Option<String> {
+        let all = self.all_autopilots();
+        let is_new = self.autopilots.len() < 2 && !self.others.is_empty() && all.len() > 1;
+        is_new.then(|| {
+            let named = named(&all);
+            format!("more than one vehicle is in it: {named}; what it says of the vehicle is of the last one")
         })
     }
 
@@ -123,15 +159,27 @@ impl Details {
         }
     }
 
-    /// What there is more of than the monitor has room for.
+    /// What else there is to say of the vehicles, and what there is more of than the monitor has room for.
     pub(super) fn remarks(&self) -> Vec<String> {
+        self.of_parts().into_iter().chain(self.vehicles_of_parts()).collect()
+    }
+
+    /// The same of each recording of a file.
+    fn of_parts(&self) -> Vec<String> {
         let beyond = self.batteries.get(BATTERIES_MAX..).unwrap_or_default();
         let words = |(component, id): &(u8, u8)| {
             let number = u16::from(*id) + 1;
             let of = if *component == 1 { String::new() } else { format!(" of component {component}") };
             format!("battery {number}{of} is not judged: the monitor follows {BATTERIES_MAX} batteries")
         };
-        self.vehicles().into_iter().chain(beyond.iter().map(words)).collect()
+        let mut remarks = self.earlier.clone();
+        let new = self.vehicles().into_iter().chain(beyond.iter().map(words));
+        new.for_each(|new| {
+            if !remarks.contains(&new) {
+                remarks.push(new);
+            }
+        });
+        remarks
     }
 
     /// A check's level has changed, or what it is of.
@@ -148,6 +196,15 @@ impl Details {
             _ => {}
         }
     }
+}
+
+/// Autopilots as words.
+fn named(autopilots: &[Heard]) -> String {
+    let words = |heard: &Heard| {
+        let uid = if heard.uid == 0 { String::new() } else { format!(", uid {:016x}", heard.uid) };
+        format!("system {} ({}{uid})", heard.system, autopilot_name(heard.autopilot))
+    };
+    autopilots.iter().map(words).collect::<Vec<_>>().join(", ")
 }
 
 /// The findings of an emergency that is over at once: the state (`MAV_STATE`), and its end.

@@ -71,6 +71,13 @@ impl Flights {
         (self.open, self.crashed) = (false, false);
     }
 
+    /// Nobody knows whether it was disarmed in the air.
+    pub(super) fn forget_disarming(&mut self) {
+        for flight in &mut self.list {
+            flight.disarmed_at_m = None;
+        }
+    }
+
     /// A mishap began or ended.
     pub(super) fn mishap(&mut self, change: Change, monitor: &Monitor) {
         match change {
@@ -84,12 +91,18 @@ impl Flights {
         }
     }
 
-    /// The recording has ended.
-    pub(super) fn end(mut self, monitor: &Monitor) -> Vec<Flight> {
+    /// A recording has ended, and perhaps another one begins.
+    pub(super) fn end_of_recording(&mut self, monitor: &Monitor) {
         if !monitor.flight().airborne() {
             // On the ground, still armed: what is over is the recording, and the flight too.
             self.landing();
         }
+        self.break_off();
+    }
+
+    /// All has ended.
+    pub(super) fn end(mut self, monitor: &Monitor) -> Vec<Flight> {
+        self.end_of_recording(monitor);
         self.list
     }
 }

@@ -69,6 +69,8 @@ impl Limits {
 /// Judges a recording, item by item.
 pub struct Judge {
     monitor: Box<Monitor>,
+    /// As it was when the last part of the file ended in which an autopilot was heard.
+    earlier: Option<Box<Monitor>>,
     limits: Limits,
     format: Format,
     /// The sequence numbers of the frames, where the recording was heard on the monitor's wire.
@@ -97,6 +99,7 @@ impl Judge {
     pub fn new(limits: &Limits, format: Format) -> Self {
         Self {
             monitor: Box::new(Monitor::new(limits.params)),
+            earlier: None,
             limits: limits.clone(),
             format,
             wire: None,
@@ -198,18 +201,26 @@ impl Judge {
         }
     }
 
-    /// Another recording was joined on: it is judged by itself, from the time on at which all was told anew.
+    /// Another recording was joined on, of another day or another vehicle: it is judged by itself, from the time on at which all
+    /// was told anew. What was found and counted stays.
     fn joint(&mut self, at: Instant) {
         if self.first.is_some() {
             self.advance(at);
         }
+        self.here.break_off(at, self.clock.behind());
+        if self.monitor.vehicle().source.is_some() {
+            self.earlier = Some(self.monitor.clone());
+        }
+        self.distrust_disarming();
+        self.facts.clear();
+        self.details.begin_another();
         self.restarts += 1;
         if self.joints.len() < LISTED_MAX {
             self.joints.push(at);
         }
         self.epochs.restart(at);
+        self.flights.end_of_recording(&self.monitor);
         self.monitor.begin_another_recording();
-        self.flights.break_off();
         self.clock.skip_to(at + SETTLE);
     }
 
@@ -293,25 +304,41 @@ impl Judge {
         self.wire.as_mut().map_or_else(LinkReading::default, |wire| wire.reading(steps, source))
     }
 
+    /// Where arming is guessed from the throttle, one that is closed in the air is no disarming.
+    fn distrust_disarming(&mut self) {
+        if self.facts.get(&About::Arming).is_some_and(|words| !words.is_empty()) {
+            self.here.drop_checks(|check| check == DISARMED);
+            self.flights.forget_disarming();
+        }
+    }
+
+    /// The worst values of what the monitor followed.
+    fn peaks(&mut self, at: Instant) {
+        let steps = self.clock.monitor(at);
+        for exceedance in self.monitor.exceedances().iter(steps) {
+            self.here.peak(exceedance.check.name, exceedance.instance, exceedance.session.peak);
+        }
+    }
+
     /// The recording has ended.
     pub fn end(mut self) -> Judged {
         if self.first.is_some() {
             self.advance(self.last);
         }
-        let mut flights = self.flights.end(&self.monitor);
+        self.distrust_disarming();
+        if self.monitor.vehicle().source.is_none()
+            && let Some(earlier) = self.earlier.take()
+        {
+            self.monitor = earlier;
+        }
+        self.peaks(self.last);
+        let flights = self.flights.end(&self.monitor);
         let armed = armed(&self.monitor);
         let given = !self.limits.given.is_empty();
         let by = if self.checked_on_board && !given { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
             // Nobody knows where it was heard: a packed recording may be that of a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
-        }
-        if self.facts.get(&About::Arming).is_some_and(|words| !words.is_empty()) {
-            // Arming is guessed from the throttle here: a throttle that is closed in the air is no disarming.
-            self.here.drop_checks(|check| check == DISARMED);
-            for flight in &mut flights {
-                flight.disarmed_at_m = None;
-            }
         }
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
@@ -325,14 +352,11 @@ impl Judge {
         let last = self.last;
         let mut problems = match by {
             JudgedBy::Board => self.board,
-            JudgedBy::Here => {
-                let steps = self.clock.monitor(last);
-                for exceedance in self.monitor.exceedances().iter(steps) {
-                    self.here.peak(exceedance.check.name, exceedance.instance, exceedance.session.peak);
-                }
-                self.here
-            }
+            JudgedBy::Here => self.here,
         };
+        let unchecked = self.facts.remove(&About::Unchecked);
+        let remarks =
+            joined(&self.joints).into_iter().chain(self.details.remarks()).chain(unchecked).collect();
         let behind = if by == JudgedBy::Board { Span::ZERO } else { self.clock.behind() };
         problems.end(last, behind);
         Judged {
@@ -348,7 +372,7 @@ impl Judge {
             problems: problems.worst_first(),
             judged,
             not_judged,
-            remarks: joined(&self.joints).into_iter().chain(self.details.remarks()).collect(),
+            remarks,
             gaps: self.gaps,
             damages: self.damages,
             losses: self.losses,

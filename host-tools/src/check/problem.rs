@@ -150,6 +150,15 @@ impl Problems {
         self.open.retain(|(check, _), _| !out(check));
     }
 
+    /// What was wrong is so no more: nobody knows how it ended.
+    pub(super) fn break_off(&mut self, at: Instant, gaps: Span) {
+        for (problem, since) in self.open.values_mut() {
+            if let Some(since) = since.take() {
+                problem.lasted = problem.lasted + lasted(since, at, gaps);
+            }
+        }
+    }
+
     /// Nothing follows.
     pub(super) fn end(&mut self, at: Instant, gaps: Span) {
         for (problem, since) in self.open.values_mut() {

@@ -4,7 +4,10 @@
 //! autopilot's messages tell its time since its power-on: where that goes on, the recording does; where it changes too, a
 //! vehicle did not restart in the air just when a clock was set: it is another recording.
 
+use std::collections::VecDeque;
+
 use super::input::Input;
+use super::timeline::STEP_BACK_US_MAX;
 use super::tlog::Records;
 use crate::mavlink::frame;
 
@@ -33,18 +36,92 @@ fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> {
 }
 
 /// Follows the autopilots' time.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Joints {
     /// Of whichever autopilot told it last: its system, and its time since power-on.
     last: Option<(u8, u32)>,
+    /// By how much the recorder's clock was ahead of the autopilots' when they told their last few times, microseconds.
+    ahead: VecDeque<(u8, i64)>,
+    /// By how much the recorder's clock was set back last, microseconds, until it is set again.
+    fell_us: Option<i64>,
 }
 
+/// So many of an autopilot's times are kept, ...
+const KEPT: usize = 24;
+/// ... and of more than so many the least but two counts.
+const MANY: usize = 6;
+/// After a jump the autopilot's times are asked for this long.
+const ASKED_MS: u32 = 5_000;
+/// No link holds back more.
+const HELD_BACK_US: i64 = 10_000_000;
+
 impl Joints {
-    /// A frame of the recording.
-    pub(super) fn frame(&mut self, frame: &hums_link::Frame<'_>) {
-        if let Some(boot_ms) = boot_ms(frame) {
-            self.last = Some((frame.system(), boot_ms));
+    /// A frame of the recording, which came at this time of the recorder's clock.
+    pub(super) fn frame(&mut self, time_us: Option<u64>, frame: &hums_link::Frame<'_>) {
+        let Some(boot_ms) = boot_ms(frame) else { return };
+        let system = frame.system();
+        if self.last.is_some_and(|(last, before)| last == system && falls(before, boot_ms)) {
+            self.ahead.clear();
         }
+        self.last = Some((system, boot_ms));
+        if let Some(time_us) = time_us {
+            if self.ahead.len() >= KEPT {
+                self.ahead.pop_front();
+            }
+            self.ahead.push_back((system, ahead_us(time_us, boot_ms)));
+        }
+    }
+
+    /// Another recording begins.
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The recorder's clock was set from one time to another, while so much passed.
+    pub(super) fn set(&mut self, before_us: u64, time_us: u64, passed_us: u64) {
+        let set_us = i128::from(time_us) - i128::from(before_us) - i128::from(passed_us);
+        let set_us = i64::try_from(set_us).unwrap_or(0);
+        self.fell_us = set_us.checked_neg().filter(|fell_us| *fell_us > 0);
+        self.ahead.iter_mut().for_each(|(_, ahead)| *ahead = ahead.saturating_add(set_us));
+    }
+
+    /// Where the recorder's clock was set from one time to another while the autopilot's went on: how much time passed,
+    /// microseconds. A frame may come late, by as much as a link holds back, and never early: so a clock that falls was set, and
+    /// one that jumps forward was where it jumps by more, or by as much as it fell before.
+    pub(super) fn elapsed_us(&self, before_us: u64, time_us: u64, after: &Records<Input>) -> Option<u64> {
+        let (system, before_ms) = self.last?;
+        let jump_us = i64::try_from(i128::from(time_us) - i128::from(before_us)).ok()?;
+        let is_regained = |us: i64| self.fell_us.is_some_and(|fell| us.abs_diff(fell) < STEP_BACK_US_MAX / 2);
+        if jump_us > 0 && jump_us < HELD_BACK_US && !is_regained(jump_us) {
+            return None;
+        }
+        let (mut ahead, mut first_ms, mut seen_ms, mut last_us) = (Vec::new(), None, 0, time_us);
+        let mut falls = false;
+        after.each_after(&mut |recorded_us, bytes| {
+            // It is set again.
+            falls |=
+                recorded_us.saturating_add(STEP_BACK_US_MAX) < std::mem::replace(&mut last_us, recorded_us);
+            if falls {
+                return false;
+            }
+            if let frame::Peek::Frame(frame) = frame::peek(bytes)
+                && frame.system == system
+                && let Some(boot_ms) = boot_ms_of(frame.id, frame.component, frame.payload)
+            {
+                let first_ms = *first_ms.get_or_insert(boot_ms);
+                seen_ms = boot_ms.saturating_sub(first_ms);
+                ahead.push(ahead_us(recorded_us, boot_ms));
+            }
+            seen_ms < ASKED_MS
+        });
+        let passed_ms = i64::from(first_ms?) - i64::from(before_ms);
+        let known = self.ahead.iter().filter(|(of, _)| *of == system).map(|(_, ahead)| *ahead);
+        let set_us = least(ahead)?.checked_sub(least(known.collect())?)?;
+        let is_set = set_us < -(STEP_BACK_US_MAX as i64) || set_us > HELD_BACK_US || is_regained(set_us);
+        let goes_on = (-DISORDER_MS..=TOLD_MS).contains(&passed_ms);
+        let passed_us = jump_us.saturating_sub(set_us);
+        let fits = (-DISORDER_MS * 1_000..=TOLD_MS * 1_000).contains(&passed_us);
+        (is_set && goes_on && fits).then(|| u64::try_from(passed_us).unwrap_or(0))
     }
 
     /// Whether another recording begins where the recorder's clock goes from one time to another: the autopilot's does not
@@ -63,4 +140,20 @@ impl Joints {
         let with_it = i128::from(boot).abs_diff(recorder) <= TOLD_MS as u128;
         boot < -DISORDER_MS || (boot > TOLD_MS && !with_it)
     }
+}
+
+/// Whether the time since power-on falls: another power-on.
+fn falls(before_ms: u32, boot_ms: u32) -> bool {
+    i64::from(boot_ms) < i64::from(before_ms) - DISORDER_MS
+}
+
+/// By how much the recorder's clock is ahead of the autopilot's. (Recorded times are below 9e15.)
+fn ahead_us(time_us: u64, boot_ms: u32) -> i64 {
+    i64::try_from(time_us).unwrap_or(i64::MAX).saturating_sub(i64::from(boot_ms) * 1_000)
+}
+
+/// The least but two, which may be wrong.
+fn least(mut ahead: Vec<i64>) -> Option<i64> {
+    ahead.sort_unstable();
+    ahead.get(if ahead.len() > MANY { 2 } else { 0 }).copied()
 }

@@ -134,8 +134,19 @@ impl Clock {
 
     /// The time of a message. `ahead` is asked where it is a jump, for the stamps that it is given a yes to.
     pub fn take(&mut self, stamp: Stamp, ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> Ahead) -> Reading {
+        self.take_beside(stamp, ahead, || None)
+    }
+
+    /// The same beside another clock, which knows better how much time passed: `passed` is asked where the time is a jump and
+    /// is not wrong; it tells microseconds, where this clock was set.
+    pub fn take_beside(
+        &mut self,
+        stamp: Stamp,
+        ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> Ahead,
+        passed: impl FnOnce() -> Option<u64>,
+    ) -> Reading {
         if !self.timeline.is_jump(stamp.us) {
-            return Reading::Sound(self.count(stamp));
+            return Reading::Sound(self.count(stamp, None));
         }
         if self.is_old(stamp) {
             self.note(stamp);
@@ -147,7 +158,7 @@ impl Clock {
         let before = self.timeline.recorded_us();
         let question = Question { before, times: &times, is_end: ahead.is_end, ends: self.rules.ends };
         if !question.is_wrong() {
-            return Reading::Sound(self.count(stamp));
+            return Reading::Sound(self.count(stamp, passed()));
         }
         let known = self.series(stamp.series).known;
         if self.rules.old_values && before.is_some_and(|before| stamp.us < before) {
@@ -157,12 +168,15 @@ impl Clock {
         Reading::Wrong { known }
     }
 
-    /// A time that counts.
-    fn count(&mut self, stamp: Stamp) -> Moment {
+    /// A time that counts; where the clock was set, so much passed before it.
+    fn count(&mut self, stamp: Stamp, passed_us: Option<u64>) -> Moment {
         if self.rules.from_first && !self.begun {
             self.timeline = Timeline::from_first(stamp.us);
         }
-        let moment = self.timeline.at(stamp.us);
+        let moment = match passed_us {
+            Some(passed_us) => self.timeline.set(stamp.us, passed_us),
+            None => self.timeline.at(stamp.us),
+        };
         if moment.restarted {
             self.series.clear();
         }

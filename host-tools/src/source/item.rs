@@ -119,6 +119,8 @@ pub enum About {
     Emergency,
     /// How arming is known, where the recording does not tell it: a sentence. Empty where it does.
     Arming,
+    /// What of the recording nobody can say whether it is damaged: a sentence.
+    Unchecked,
 }
 
 /// The columns of the rows of one name. In one recording a name has one table for ever: a definition that changes its

@@ -5,10 +5,11 @@ use hums_core::time::Instant;
 use hums_link::framer::Framer;
 
 use super::boot::{JOINT_US, Joints, boot_ms};
+use super::checksums::Checksums;
 use super::clock::{Ahead, Clock, Reading, Rules, Stamp, Wrong};
 use super::doubt::Ends;
 use super::input::Input;
-use super::item::{Cause, Gap, Item, MessageCount, Reader, Summary, Take, Want};
+use super::item::{About, Cause, Fact, Gap, Item, MessageCount, Reader, Summary, Take, Want};
 use super::paced::Paced;
 use super::raw::Raw;
 use super::said::Said;
@@ -63,7 +64,7 @@ pub struct TlogReader {
 impl TlogReader {
     /// Reads from `input`.
     pub fn new(input: Input) -> Self {
-        Self { records: Records::new(input) }
+        Self { records: Records::ahead(input) }
     }
 }
 
@@ -81,36 +82,54 @@ struct TlogReading {
     joints: Joints,
     wrong: Wrong,
     now: Instant,
+    /// The time of the record at hand, where it is not wrong.
+    time_us: Option<u64>,
 }
 
 impl TlogReading {
-    /// Takes the time of a record, and hands on what it says of the clock.
-    fn time(&mut self, time_us: u64, place: u64, after: &Records<Input>, take: &mut Take<'_>) -> Result<()> {
-        let before = self.clock.recorded_us();
+    /// Takes the time of a record, and hands on what it says of the clock; whether another recording begins.
+    fn time(
+        &mut self,
+        time_us: u64,
+        place: u64,
+        after: &Records<Input>,
+        take: &mut Take<'_>,
+    ) -> Result<bool> {
+        let (before, reached) = (self.clock.recorded_us(), self.now);
         let stamp = |us| Stamp { us, series: 0 };
         let ahead = |_: &dyn Fn(Stamp) -> bool| {
             let (times, is_end) = after.times_after();
             Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
         };
-        let Reading::Sound(moment) = self.clock.take(stamp(time_us), ahead) else {
+        let joints = &self.joints;
+        let passed = || joints.elapsed_us(before?, time_us, after);
+        let Reading::Sound(moment) = self.clock.take_beside(stamp(time_us), ahead, passed) else {
             self.wrong.add(self.now, place);
-            return Ok(());
+            self.time_us = None;
+            return Ok(false);
         };
-        self.now = moment.at;
+        (self.now, self.time_us) = (moment.at, Some(time_us));
         let is_joint = before.is_some_and(|before| {
             let is_far = moment.restarted || time_us > before.saturating_add(JOINT_US);
             is_far && self.joints.is_joint(before, time_us, after)
         });
+        let passed_us = moment.at.since(reached).as_micros();
+        match before.filter(|_| moment.restarted) {
+            _ if is_joint => self.joints.forget(),
+            Some(before) => self.joints.set(before, time_us, passed_us),
+            None => {}
+        }
         match (is_joint, moment.restarted) {
             (true, _) => take(self.now, Item::Joint)?,
             (false, true) => take(self.now, Item::Restart)?,
-            (false, false) if before.is_some() => return Ok(()),
+            (false, false) if before.is_some() => return Ok(false),
             (false, false) => {}
         }
         match time_us.checked_sub(self.now.as_micros()).filter(|_| time_us >= UTC_US_MIN) {
-            Some(epoch_us) => take(self.now, Item::Epoch(epoch_us)),
-            None => Ok(()),
+            Some(epoch_us) => take(self.now, Item::Epoch(epoch_us))?,
+            None => {}
         }
+        Ok(is_joint)
     }
 }
 
@@ -122,13 +141,20 @@ impl Reader for TlogReader {
             joints: Joints::default(),
             wrong: Wrong::default(),
             now: Instant::ZERO,
+            time_us: None,
         };
+        let mut checksums = Checksums::default();
         let mut place = 0_u64;
         while let Some(record) = self.records.next_record()? {
             let bytes = match record {
                 Record::Frame { time_us, bytes } => {
-                    reading.time(time_us, place, &self.records, take)?;
+                    if reading.time(time_us, place, &self.records, take)? {
+                        // Nothing that was said before holds.
+                        said.end(take)?;
+                        (framer, said) = (Framer::new(), Said::default());
+                    }
                     place += TIME_BYTES as u64;
+                    checksums.begin(reading.now, place, &bytes);
                     bytes
                 }
                 Record::Noise(bytes) => {
@@ -143,12 +169,20 @@ impl Reader for TlogReader {
                 }
             };
             place += bytes.len() as u64;
-            let TlogReading { joints, now, .. } = &mut reading;
+            let TlogReading { joints, now, time_us, .. } = &mut reading;
             push(&mut framer, &bytes, true, &mut |frame| {
-                joints.frame(&frame);
+                checksums.frame(&frame);
+                joints.frame(*time_us, &frame);
                 counts.add(frame.id(), frame.bytes().len());
                 said.frame(*now, &frame, want, take)
             })?;
+            checksums.end();
+        }
+        if let Some(gap) = checksums.gap() {
+            take(reading.now, Item::Gap(&gap))?;
+        }
+        if let Some(words) = checksums.words() {
+            take(reading.now, Item::Fact(Fact { about: About::Unchecked, words: &words }))?;
         }
         if let Some(gap) = reading.wrong.gap() {
             take(reading.now, Item::Gap(&gap))?;
@@ -265,150 +299,4 @@ fn push(
 }
 
 #[cfg(test)]
-mod tests {
-    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
-    use hums_link::packet::Packet;
-
-    use super::*;
-    use crate::mavlink::frame::tests::HEARTBEAT;
-
-    const SECOND: u64 = 1_000_000;
-
-    /// Of a tlog with these times, in tenths of seconds: gaps, restarts, and the last time in tenths.
-    fn told(tenths: &[u64]) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
-        let record = |tenth: &u64| {
-            [&(1_700_000_000 * SECOND + tenth * SECOND / 10).to_be_bytes()[..], &HEARTBEAT].concat()
-        };
-        let bytes: Vec<u8> = tenths.iter().flat_map(record).collect();
-        let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
-        let (mut gaps, mut restarts, mut last) = (Vec::new(), 0, Instant::ZERO);
-        let summary = reader.read(Want { frames: true, ..Want::default() }, &mut |at, item| {
-            match item {
-                Item::Gap(gap) => gaps.push((gap.cause, gap.place)),
-                Item::Restart => restarts += 1,
-                _ => {}
-            }
-            last = at;
-            Ok(())
-        });
-        assert!(summary.is_ok());
-        (gaps, restarts, last.as_millis() / 100)
-    }
-
-    #[test]
-    fn one_wrong_time_is_damage_and_changes_no_other_time() {
-        let usual: Vec<u64> = (1_000..1_200).collect();
-        assert_eq!(told(&usual), (vec![], 0, 199));
-        for (at, wrong) in [(100, 1_130), (100, 1_400), (100, 9_000), (100, 100), (0, 1_500)] {
-            let mut times = usual.clone();
-            times[at] = wrong;
-            // The first record's time begins the recording, unless it is the wrong one.
-            let end = if at == 0 { 198 } else { 199 };
-            assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn a_wrong_time_at_either_end_moves_no_other_time() {
-        for count in [1, 2, 8] {
-            for (at, wrong) in [(200 - count, 170_000), (200 - count, 100), (0, 10_000), (0, 80_900)] {
-                let mut times: Vec<u64> = (80_000..80_200).collect();
-                times[at..at + count].fill(wrong);
-                let end = 199 - count as u64;
-                let told = told(&times);
-                assert_eq!(
-                    told,
-                    (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end),
-                    "{at} {wrong} {count}"
-                );
-            }
-        }
-        // A link that was silent for some seconds before its last frames.
-        let late: Vec<u64> = (80_000..80_200).chain([80_250, 80_251]).collect();
-        assert_eq!(told(&late), (vec![], 0, 251));
-    }
-
-    #[test]
-    fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
-        // Twenty records a second; every ten seconds the clock falls by 1.1 to 1.4 s.
-        let mut times = Vec::new();
-        let mut from = 80_000;
-        for fall in [11, 14, 12, 13, 0] {
-            times.extend((0..200).map(|record| from + record / 2));
-            from += 99 - fall;
-        }
-        let (gaps, restarts, _) = told(&times);
-        assert_eq!((gaps, restarts), (vec![], 4));
-    }
-
-    /// What a tlog says of its clock: of attitudes at these seconds of the ground station's clock and of the autopilot's.
-    fn clock_of(times: &[(u64, u64)]) -> String {
-        let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
-        let record = |(recorded, boot): &(u64, u64)| {
-            let time = (1_700_000_000 * SECOND + recorded * SECOND).to_be_bytes();
-            let packet = Packet::new(30).u32(0, *boot as u32 * 1_000);
-            [&time[..], encoder.frame(&mut buffer, &packet)].concat()
-        };
-        let bytes: Vec<u8> = times.iter().flat_map(record).collect();
-        let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
-        let mut told = String::new();
-        let read = reader.read(Want::default(), &mut |_, item| {
-            match item {
-                Item::Gap(_) => told += "gap ",
-                Item::Restart => told += "restart ",
-                Item::Joint => told += "joint ",
-                _ => {}
-            }
-            Ok(())
-        });
-        assert!(read.is_ok());
-        told
-    }
-
-    #[test]
-    fn two_recordings_that_were_joined_are_told_from_a_clock_that_was_set_and_from_a_long_silence() {
-        let part = |recorded: u64, boot: u64| (0..50).map(move |second| (recorded + second, boot + second));
-        let joined =
-            |recorded, boot| clock_of(&part(90_000, 100).chain(part(recorded, boot)).collect::<Vec<_>>());
-        assert_eq!(joined(90_000, 100), "joint ", "the same twice");
-        assert_eq!(joined(93_700, 100), "joint ", "an hour later, after another power-on");
-        assert_eq!(joined(50_000, 700), "joint ", "an earlier one, longer after its power-on");
-        assert_eq!(joined(50_000, 150), "restart ", "the clock was set");
-        assert_eq!(joined(93_700, 100 + 3_700), "", "an hour without a word");
-        assert_eq!(joined(90_200, 5), "", "a restart of the autopilot");
-    }
-
-    #[test]
-    fn a_clock_that_was_set_and_a_silence_are_none() {
-        let set: Vec<u64> = (1_000..1_100).chain(500..600).collect();
-        assert_eq!(told(&set), (vec![], 1, 99 + 99));
-        let silent: Vec<u64> = (1_000..1_100).chain(1_500..1_600).collect();
-        assert_eq!(told(&silent), (vec![], 0, 599));
-    }
-
-    /// The times, in milliseconds, of attitudes that tell these times since the autopilot's boot, and how often it restarted.
-    fn read(component: u8, boot_ms: &[u32]) -> (Vec<u64>, usize) {
-        let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
-        let frame = |boot_ms: &u32| encoder.frame(&mut buffer, &Packet::new(30).u32(0, *boot_ms)).to_vec();
-        let bytes: Vec<u8> = boot_ms.iter().flat_map(frame).collect();
-        let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
-        let (mut times, mut restarts) = (Vec::new(), 0);
-        let want = Want { frames: true, ..Want::default() };
-        let mut take = |at: Instant, item: Item<'_>| {
-            times.extend(matches!(item, Item::Frame(_)).then(|| at.as_millis()));
-            restarts += usize::from(matches!(item, Item::Restart));
-            Ok(())
-        };
-        reader.read(want, &mut take).expect("memory");
-        (times, restarts)
-    }
-
-    #[test]
-    fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_line_brings_them() {
-        let (times, restarts) = read(1, &[60_000, 61_000, 75_500, 75_400, 900, 1_900]);
-        let since_first: Vec<u64> = times.iter().map(|at| at - times[0]).collect();
-        assert_eq!((since_first, restarts), (vec![0, 1_000, 15_500, 15_500, 15_500, 16_500], 1));
-        let (times, restarts) = read(100, &[60_000, 61_000, 75_500]);
-        assert!(times.len() == 3 && times[2] < 20 && restarts == 0, "no autopilot says so: {times:?}");
-    }
-}
+mod tests;

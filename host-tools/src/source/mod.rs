@@ -22,6 +22,7 @@
 //! Everything streams: memory does not grow with the input.
 
 mod boot;
+mod checksums;
 pub mod clock;
 pub mod dataflash;
 pub mod doubt;

@@ -47,6 +47,14 @@ impl Timeline {
         self.last = Some((recorded_us, self.now().as_micros()));
     }
 
+    /// The clock was set to this time, and so much passed meanwhile.
+    pub fn set(&mut self, recorded_us: u64, passed_us: u64) -> Moment {
+        self.restarts += 1;
+        let at = self.now().as_micros().saturating_add(passed_us);
+        self.last = Some((recorded_us, at));
+        Moment { at: Instant::from_micros(at), restarted: true }
+    }
+
     /// The next recorded time, in microseconds.
     pub fn at(&mut self, recorded_us: u64) -> Moment {
         let Some((before, reached)) = self.last else {

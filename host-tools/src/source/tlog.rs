@@ -16,8 +16,12 @@ use crate::plural::count;
 
 pub(super) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
-/// Enough to see a record, and those after it that are asked whether its time is right.
-const LOOKAHEAD_BYTES: usize = (2 * ASKED) * (TIME_BYTES + FRAME_BYTES_MAX);
+/// Enough to see a record and the header of the next one.
+const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
+/// Enough to see those after it too that are asked whether its time is right, behind damage as well.
+const AHEAD_BYTES: usize = 256 * 1024;
+/// No record for so long: what follows is no part of the log.
+const NOTHING_BYTES: usize = 64 * 1024;
 
 /// A step back beyond this is a clock that was set, not a reordering.
 const STEP_BACK_US_MAX: u64 = 1_000_000;
@@ -46,12 +50,19 @@ pub struct Records<R> {
     buffer: Vec<u8>,
     at: usize,
     ended: bool,
+    /// How much is kept of what follows.
+    ahead_bytes: usize,
 }
 
 impl<R: Read> Records<R> {
-    /// Reads from `input`.
+    /// Reads from `input`, no further than needs be: somebody may be writing it.
     pub fn new(input: R) -> Self {
-        Self { input, buffer: Vec::new(), at: 0, ended: false }
+        Self { input, buffer: Vec::new(), at: 0, ended: false, ahead_bytes: RECORD_BYTES }
+    }
+
+    /// Reads from `input`, and further on, so that those that follow can be asked.
+    pub(super) fn ahead(input: R) -> Self {
+        Self { ahead_bytes: AHEAD_BYTES, ..Self::new(input) }
     }
 
     fn rest(&self) -> &[u8] {
@@ -78,20 +89,22 @@ impl<R: Read> Records<R> {
         found
     }
 
-    /// Hands on the next records until one says no; whether the input ends with them.
-    fn each_after(&self, each: &mut dyn FnMut(u64, &[u8]) -> bool) -> bool {
-        let mut rest = self.rest();
+    /// Hands on the next records until one says no; whether the recording ends with them.
+    pub(super) fn each_after(&self, each: &mut dyn FnMut(u64, &[u8]) -> bool) -> bool {
+        let (mut rest, mut nothing) = (self.rest(), 0);
         while !rest.is_empty() {
             let Some((time_us, length)) = record_at(rest, self.ended) else {
                 rest = rest.get(1..).unwrap_or_default();
+                nothing += 1;
                 continue;
             };
             if !each(time_us, rest.get(TIME_BYTES..TIME_BYTES + length).unwrap_or_default()) {
                 return false;
             }
             rest = rest.get(TIME_BYTES + length..).unwrap_or_default();
+            nothing = 0;
         }
-        self.ended
+        self.ended || nothing >= NOTHING_BYTES
     }
 
     /// Whether the input ended with these bytes, which were the last that came, in the middle of a record.
@@ -104,12 +117,13 @@ impl<R: Read> Records<R> {
     }
 
     fn fill(&mut self) -> io::Result<()> {
-        if self.ended || self.rest().len() >= LOOKAHEAD_BYTES {
+        if self.ended || self.rest().len() >= self.ahead_bytes {
             return Ok(());
         }
         self.buffer.drain(..self.at);
         self.at = 0;
-        while self.buffer.len() < LOOKAHEAD_BYTES && !self.ended {
+        // Twice as much: what is left is not moved for each chunk.
+        while self.buffer.len() < 2 * self.ahead_bytes && !self.ended {
             let old = self.buffer.len();
             self.buffer.resize(old + BUFFER_BYTES, 0);
             let got = read_some(&mut self.input, self.buffer.get_mut(old..).unwrap_or_default())?;

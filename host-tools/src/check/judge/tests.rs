@@ -246,6 +246,8 @@ fn a_recording_that_was_joined_on_is_judged_by_itself() {
             }
         };
         flight(&mut judge, 0);
+        // A vehicle with another one's ESCs would miss their word.
+        escs(&mut judge, if findings == 0 { 50_000 } else { 60_000 }, 60_000);
         judge.item(Instant::from_millis(60_000), joint);
         flight(&mut judge, 60_000);
         let judged = judge.end();

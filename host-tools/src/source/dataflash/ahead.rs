@@ -1,5 +1,9 @@
 //! The times of the next messages: what tells whether a jump of the clock is one, or one damaged time.
 
+use std::collections::BTreeMap;
+
+use super::binary::BEGINNING;
+use super::definition::definition;
 use super::format::{Format, Formats, HEADER_BYTES};
 use super::message::{Body, Message};
 use super::stamp::{Week, stamp};
@@ -8,13 +12,14 @@ use crate::source::clock::{self, Stamp};
 use crate::source::doubt::ASKED;
 
 /// Room for more than [`ASKED`] of the longest binary messages, for all definitions, which stand between the first messages of
-/// today, and for a second of the oldest logs, in which only GPS messages
-/// have times.
-pub(super) const AHEAD_BYTES: usize = 64 * 1_024;
+/// today, for a second of the oldest logs, in which only GPS messages have times, and for damage.
+pub(super) const AHEAD_BYTES: usize = 256 * 1_024;
 /// No message for so long: what follows is erased memory, not part of the log.
 const ERASED_BYTES: usize = 4 * 1_024;
 /// Fields of a line that are looked at.
 const VALUES_MAX: usize = 32;
+/// Definitions that are looked at.
+const DEFINED_MAX: usize = 256;
 
 /// What follows a message in the file.
 #[derive(Clone, Copy, Debug)]
@@ -38,51 +43,73 @@ impl Ahead<'_> {
             stamps.len() < ASKED
         };
         if self.is_text {
-            of_lines(bytes, is_end, formats, &mut take);
+            is_end |= of_lines(bytes, is_end, formats, &mut take);
         } else {
-            let read = of_bytes(bytes, formats, &mut take);
-            is_end |= bytes.len() - read >= ERASED_BYTES;
+            let (read, begins) = of_bytes(bytes, formats, &mut take);
+            is_end |= begins || bytes.len() - read >= ERASED_BYTES;
         }
         clock::Ahead { is_end: is_end && stamps.len() < ASKED, stamps }
     }
 }
 
-/// Gives messages on until `take` has enough; where the last one of those that were looked at ends.
-fn of_bytes(bytes: &[u8], formats: &Formats, take: &mut dyn FnMut(&Message<'_>) -> bool) -> usize {
+/// Gives messages on until `take` has enough or another log begins; where the last one of those that were looked at ends, and
+/// whether another log begins there. Messages may be defined between them.
+fn of_bytes(bytes: &[u8], formats: &Formats, take: &mut dyn FnMut(&Message<'_>) -> bool) -> (usize, bool) {
     let (mut at, mut last) = (0, 0);
+    let mut defined: BTreeMap<u8, Format> = BTreeMap::new();
     while let Some(rest) = bytes.get(at..).filter(|rest| !rest.is_empty()) {
         let &[0xA3, 0x95, kind, ..] = rest else {
             at += 1;
             continue;
         };
-        let length = usize::from(formats.lengths.told[usize::from(kind)]);
-        if let (Some(format), Some(payload)) = (formats.get(kind), rest.get(HEADER_BYTES..length))
-            && !take(&Message::new(format, Body::Bytes(payload)))
-        {
-            return bytes.len();
+        if rest.starts_with(BEGINNING) {
+            return (last, true);
+        }
+        let format = defined.get(&kind).or_else(|| formats.get(kind));
+        let told = formats.lengths.told[usize::from(kind)];
+        let length = usize::from(defined.get(&kind).map_or(told, |format| format.length));
+        if let (Some(format), Some(payload)) = (format, rest.get(HEADER_BYTES..length)) {
+            let message = Message::new(format, Body::Bytes(payload));
+            if !take(&message) {
+                return (bytes.len(), false);
+            }
+            if let Some(new) = definition(&message).filter(|new| formats.get(new.kind).is_none()) {
+                defined.insert(new.kind, new);
+            }
         }
         at += length.max(1);
         last = at.min(bytes.len());
     }
-    last
+    (last, false)
 }
 
-/// The same of lines.
-fn of_lines(bytes: &[u8], is_end: bool, formats: &Formats, take: &mut dyn FnMut(&Message<'_>) -> bool) {
+/// The same of lines; whether another log begins.
+fn of_lines(
+    bytes: &[u8],
+    is_end: bool,
+    formats: &Formats,
+    take: &mut dyn FnMut(&Message<'_>) -> bool,
+) -> bool {
     let is_newline = |byte: &u8| matches!(byte, b'\n' | b'\r');
     // The last one may not be whole.
     let whole = if is_end { bytes.len() } else { bytes.iter().rposition(is_newline).unwrap_or(0) };
+    let mut defined: BTreeMap<String, Format> = BTreeMap::new();
     for line in bytes.get(..whole).unwrap_or_default().split(is_newline) {
-        let Some((line, format)) = std::str::from_utf8(line).ok().and_then(|line| {
-            let name = text::name(line);
-            let named = |format: &&Format| format.name == name;
-            Some((line, (0..=u8::MAX).filter_map(|kind| formats.get(kind)).find(named)?))
-        }) else {
-            continue;
-        };
+        let Ok(line) = std::str::from_utf8(line) else { continue };
+        if text::beginning(line).is_some() {
+            return true;
+        }
+        let name = text::name(line);
+        let known = || (0..=u8::MAX).filter_map(|kind| formats.get(kind)).find(|format| format.name == name);
+        let Some(format) = known().or_else(|| defined.get(name)) else { continue };
         let values = text::values(line, format.fields.len().min(VALUES_MAX));
-        if !take(&Message::new(format, Body::Words(&values))) {
-            return;
+        let message = Message::new(format, Body::Words(&values));
+        if !take(&message) {
+            return false;
+        }
+        if let Some(new) = definition(&message).filter(|_| defined.len() < DEFINED_MAX) {
+            defined.insert(new.name.clone(), new);
         }
     }
+    false
 }

@@ -11,9 +11,11 @@ use std::io::{self, Read};
 
 use super::ahead::{AHEAD_BYTES, Ahead};
 use super::buffer::Buffer;
-use super::format::{HEADER_BYTES, Lengths};
+use super::format::{FMT_BYTES, FMT_TYPE, HEADER_BYTES, Lengths};
 
 const HEAD: [u8; 2] = [0xA3, 0x95];
+/// How a log begins: FMT defines itself.
+pub(super) const BEGINNING: &[u8] = &[0xA3, 0x95, FMT_TYPE, FMT_TYPE, FMT_BYTES];
 /// The longest message, and the head of the one after it.
 const LOOKAHEAD_BYTES: usize = 2 * 258;
 
@@ -73,7 +75,7 @@ impl<R: Read> Binary<R> {
         Self { buffer: Buffer::new(input), skipped: None }
     }
 
-    /// The first bytes, without reading on.
+    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.buffer.window(bytes)
     }

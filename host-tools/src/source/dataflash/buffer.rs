@@ -6,6 +6,8 @@ use crate::source::stream::read_some;
 
 /// Read at once: pages that are touched for the first time cost a small log more than its messages.
 const CHUNK_BYTES: usize = 64 * 1024;
+/// Where less is wanted, so much more is read: what is left is not moved for each chunk.
+const MORE_BYTES: usize = 256 * 1024;
 
 /// The part of a file that is read, and where in it the reading stands.
 pub(super) struct Buffer<R> {
@@ -23,10 +25,10 @@ impl<R: Read> Buffer<R> {
         Self { input, bytes: Vec::new(), at: 0, base: 0, ended: false }
     }
 
-    /// The first bytes, without reading on.
+    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.fill(bytes)?;
-        Ok(&self.bytes)
+        Ok(self.rest())
     }
 
     /// How far the reading is, in bytes.
@@ -64,7 +66,8 @@ impl<R: Read> Buffer<R> {
         self.bytes.drain(..self.at);
         self.base += self.at as u64;
         self.at = 0;
-        while self.bytes.len() < wanted && !self.ended {
+        let goal = if wanted < MORE_BYTES { wanted + MORE_BYTES } else { wanted };
+        while self.bytes.len() < goal && !self.ended {
             let old = self.bytes.len();
             self.bytes.resize(old + CHUNK_BYTES, 0);
             let got = read_some(&mut self.input, self.bytes.get_mut(old..).unwrap_or_default());

@@ -69,6 +69,14 @@ impl Clock {
         self.times.begin(first_us);
     }
 
+    /// Another log begins, at this time if that is known: time goes on from where it was.
+    pub(super) fn begin_another(&mut self, first_us: Option<u64>) {
+        (self.week_first_us, self.silence) = (None, None);
+        if let Some(first_us) = first_us {
+            self.times.begin_log(first_us);
+        }
+    }
+
     /// Whether a message has told a time.
     pub(super) const fn has_begun(&self) -> bool {
         self.times.has_begun()

@@ -351,10 +351,10 @@ impl Formats {
         self.get(self.newest?)
     }
 
-    /// For a file that is read again from its beginning: the units are known, the messages are not.
+    /// For a file that is read again from its beginning: the units are known, and whether it has a clock; the messages are not.
     pub(super) fn begun_again(self) -> Self {
-        let Self { units, unit_names, multipliers, .. } = self;
-        Self { units, unit_names, multipliers, ..Self::new() }
+        let Self { units, unit_names, multipliers, has_boot_clock, .. } = self;
+        Self { units, unit_names, multipliers, has_boot_clock, ..Self::new() }
     }
 
     /// Takes a definition. That of FMT itself stands.

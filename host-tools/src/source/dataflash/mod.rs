@@ -12,6 +12,7 @@ mod ahead;
 mod binary;
 mod buffer;
 mod clock;
+mod definition;
 mod epoch;
 mod format;
 mod message;
@@ -109,27 +110,18 @@ impl Reader for DataFlash {
 /// Names of a text log at most: a file may define them for ever.
 const NAMES_MAX: usize = 4_096;
 const CONTEXT: &str = "the log cannot be read on";
+/// A text log begins with a banner, or the menu of an old console, which is no damage of a log that it was joined to.
+const BANNER_BYTES_MAX: u64 = 4_096;
+const CUT_LINE: &str = "a line that the beginning of another log cuts off";
 
 fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
     let mut bytes = Binary::new(input);
-    let mut first = First::default();
-    let mut window = Binary::new(bytes.window(FIRST_BYTES).context(CONTEXT)?);
-    while let Some(piece) = window.next(first.lengths())? {
-        if let Piece::Message { kind, payload, .. } = piece {
-            first.learn(kind, Body::Bytes(payload));
-        }
-    }
-    let mut window = Binary::new(bytes.window(FIRST_BYTES).context(CONTEXT)?);
-    while let Some(piece) = window.next(first.lengths())? {
-        if let Piece::Message { kind, payload, after, .. } = piece
-            && first.begins(kind, Body::Bytes(payload), after)
-        {
-            break;
-        }
-    }
-    let mut session = Session::new(first, want);
+    let mut session = Session::new(first_of_bytes(&mut bytes)?, want);
     while let Some(piece) = bytes.next(session.lengths()).context(CONTEXT)? {
         match piece {
+            Piece::Message { kind, payload, .. } if session.is_another(kind, Body::Bytes(payload)) => {
+                session.begin_another(first_of_bytes(&mut bytes)?, take)?;
+            }
             Piece::Message { kind, payload, place, after } => {
                 let length = (HEADER_BYTES + payload.len()) as u64;
                 session.message((kind, Body::Bytes(payload)), place, length, after, take)?;
@@ -143,40 +135,68 @@ fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Res
     session.end(take)
 }
 
-fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
-    let mut lines = Lines::new(input);
-    let (mut first, mut kinds) = (First::default(), Kinds::default());
-    let mut window = Lines::new(lines.window(FIRST_BYTES).context(CONTEXT)?);
-    while let Some(line) = window.next()? {
-        if !kinds.begun {
-            first.banner(&line.words);
-        }
-        if let Ok(Some(kind)) = kinds.of(&line, first.formats()) {
-            let values = values_of(&line, kind, first.formats());
-            first.learn(kind, Body::Words(&values));
-            kinds.learn(kind, first.formats());
+/// Looks through the first part of a log.
+fn first_of_bytes(bytes: &mut Binary<impl std::io::Read>) -> Result<First> {
+    let bytes = bytes.window(FIRST_BYTES).context(CONTEXT)?;
+    let (mut first, mut window, mut end) = (First::default(), Binary::new(bytes), u64::MAX);
+    while let Some(piece) = window.next(first.lengths())? {
+        if let Piece::Message { kind, payload, place, .. } = piece {
+            if first.is_another(kind, Body::Bytes(payload)) {
+                end = place;
+                break;
+            }
+            first.learn(kind, Body::Bytes(payload));
         }
     }
-    let mut window = Lines::new(lines.window(FIRST_BYTES).context(CONTEXT)?);
-    while let Some(line) = window.next()? {
-        let Ok(Some(kind)) = kinds.of(&line, first.formats()) else { continue };
-        let values = values_of(&line, kind, first.formats());
-        if first.begins(kind, Body::Words(&values), ahead_of(&line)) {
+    let mut window = Binary::new(bytes);
+    while let Some(piece) = window.next(first.lengths())? {
+        if let Piece::Message { kind, payload, after, place } = piece
+            && (place >= end || first.begins(kind, Body::Bytes(payload), after))
+        {
             break;
         }
     }
-    let (mut session, mut kinds) = (Session::new(first, want), Kinds::default());
+    Ok(first)
+}
+
+fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    let mut lines = Lines::new(input);
+    let (mut session, mut kinds) = (Session::new(first_of_lines(&mut lines)?, want), Kinds::default());
     session.tell_banner(take)?;
     let mut skipped: Option<Skipped> = None;
     while let Some(line) = lines.next().context(CONTEXT)? {
+        if let Some(at) = text::beginning(&line.words).filter(|_| session.is_timed()) {
+            // What stands right before it is its banner, or the end of a line of the log before.
+            let (place, cut) = (line.place, at as u64);
+            if cut > 0 {
+                session.gap(Cause::Cut, Some(place), cut, CUT_LINE.to_owned(), take)?;
+            }
+            let mut first = first_of_lines(&mut lines)?;
+            if let Some(Skipped { place, bytes, words, firmware, .. }) = skipped.take() {
+                if bytes > BANNER_BYTES_MAX {
+                    session.gap(Cause::Damaged, Some(place), bytes, words, take)?;
+                }
+                firmware.iter().for_each(|words| first.banner(words));
+            }
+            session.begin_another(first, take)?;
+            kinds = Kinds { begun: true, ..Kinds::default() };
+            continue;
+        }
         let kind = match kinds.of(&line, session.formats()) {
             Ok(Some(kind)) => kind,
             Ok(None) => continue,
             Err(words) => {
-                let skipped =
-                    skipped.get_or_insert(Skipped { place: line.place, bytes: 0, words, whole: true });
+                let skipped = skipped.get_or_insert(Skipped {
+                    place: line.place,
+                    bytes: 0,
+                    words,
+                    whole: true,
+                    firmware: None,
+                });
                 skipped.bytes += line.bytes;
                 skipped.whole = line.whole;
+                let firmware = Some(line.words.trim()).filter(|words| is_firmware(words));
+                skipped.firmware = firmware.map(str::to_owned).or_else(|| skipped.firmware.take());
                 continue;
             }
         };
@@ -191,11 +211,41 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         session.message(body, line.place, line.bytes, ahead_of(&line), take)?;
         kinds.learn(kind, session.formats());
     }
-    if let Some(Skipped { place, bytes, words, whole }) = skipped {
+    if let Some(Skipped { place, bytes, words, whole, .. }) = skipped {
         let cause = if whole { Cause::Damaged } else { Cause::Cut };
         session.gap(cause, Some(place), bytes, words, take)?;
     }
     session.end(take)
+}
+
+/// Looks through the first part of a log.
+fn first_of_lines(lines: &mut Lines<impl std::io::Read>) -> Result<First> {
+    let bytes = lines.window(FIRST_BYTES).context(CONTEXT)?;
+    let (mut first, mut kinds, mut end) = (First::default(), Kinds::default(), u64::MAX);
+    let mut window = Lines::new(bytes);
+    while let Some(line) = window.next()? {
+        if first.is_timed() && text::beginning(&line.words).is_some() {
+            end = line.place;
+            break;
+        }
+        if !kinds.begun {
+            first.banner(&line.words);
+        }
+        if let Ok(Some(kind)) = kinds.of(&line, first.formats()) {
+            let values = values_of(&line, kind, first.formats());
+            first.learn(kind, Body::Words(&values));
+            kinds.learn(kind, first.formats());
+        }
+    }
+    let mut window = Lines::new(bytes);
+    while let Some(line) = window.next()?.filter(|line| line.place < end) {
+        let Ok(Some(kind)) = kinds.of(&line, first.formats()) else { continue };
+        let values = values_of(&line, kind, first.formats());
+        if first.begins(kind, Body::Words(&values), ahead_of(&line)) {
+            break;
+        }
+    }
+    Ok(first)
 }
 
 /// What follows a line.
@@ -220,6 +270,8 @@ struct Skipped {
     bytes: u64,
     words: String,
     whole: bool,
+    /// The firmware that one of them names: the banner of a log that was joined on.
+    firmware: Option<String>,
 }
 
 /// The types of the names that lines begin with.

@@ -9,8 +9,9 @@ use hums_core::time::Instant;
 
 use super::ahead::Ahead;
 use super::clock::{Clock, Own};
+use super::definition::{byte, definition, is_of_itself, words};
 use super::epoch::Epoch;
-use super::format::{Defined, FMT_TYPE, Format, Formats, Lengths, Role};
+use super::format::{Defined, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
 use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
 use super::table::{self, Tables};
@@ -24,8 +25,8 @@ use crate::source::item::{
 /// The autopilot: every log is of one.
 const SOURCE: Source = Source { system: 1, component: 1 };
 
-/// The columns of a message have 64 characters at most in a binary log; a text log may have been made of several.
-const DEFINITION_CHARACTERS_MAX: usize = 256;
+/// Logs that were joined in one file at most: what comes after them counts as of the last one.
+const JOINTS_MAX: u32 = 1_000;
 
 /// What the first part of a file tells of all of it.
 pub(super) struct First {
@@ -35,6 +36,8 @@ pub(super) struct First {
     handlers: Handlers,
     /// The first time that a message tells.
     begins_us: Option<u64>,
+    /// A message that has a time has come.
+    timed: bool,
     /// The firmware, where a text log names it before its first message.
     banner: Option<String>,
 }
@@ -42,7 +45,8 @@ pub(super) struct First {
 impl Default for First {
     fn default() -> Self {
         let (formats, state, clock) = (Formats::new(), State::default(), Clock::default());
-        Self { formats, state, clock, handlers: Handlers::default(), begins_us: None, banner: None }
+        let handlers = Handlers::default();
+        Self { formats, state, clock, handlers, begins_us: None, timed: false, banner: None }
     }
 }
 
@@ -65,14 +69,25 @@ impl First {
         }
     }
 
+    /// Whether a message that has a time has come.
+    pub(super) const fn is_timed(&self) -> bool {
+        self.timed
+    }
+
+    /// Whether another log begins with this message.
+    pub(super) fn is_another(&self, kind: u8, body: Body<'_>) -> bool {
+        self.timed && begins_a_log(&self.formats, kind, body)
+    }
+
     /// Takes a message.
     pub(super) fn learn(&mut self, kind: u8, body: Body<'_>) {
         if let Some((defined, _)) = defined_by(&self.formats, kind, body) {
             self.handlers.forget(defined);
         }
         define(&mut self.formats, kind, body);
-        let Self { formats, state, handlers, .. } = self;
+        let Self { formats, state, handlers, timed, .. } = self;
         let Some(format) = formats.get(kind) else { return };
+        *timed |= tells_time(format);
         let message = Message::new(format, body);
         if let Some(resolved) = handlers.of(format).filter(|resolved| resolved.handler.is_fact) {
             observe::take(state, resolved, &message, (Instant::ZERO, None), &mut Out::new(&mut |_| ()));
@@ -92,6 +107,17 @@ impl First {
     }
 }
 
+/// Whether messages of a type tell the time, be it only the receiver's.
+fn tells_time(format: &Format) -> bool {
+    format.time.is_some() || format.name == "GPS"
+}
+
+/// Whether a message is the first one of a log.
+fn begins_a_log(formats: &Formats, kind: u8, body: Body<'_>) -> bool {
+    let fmt = formats.get(kind).filter(|format| format.role == Role::Fmt);
+    fmt.is_some_and(|format| is_of_itself(&Message::new(format, body)))
+}
+
 /// The type that a definition is of, and its name until now.
 fn defined_by(formats: &Formats, kind: u8, body: Body<'_>) -> Option<(u8, String)> {
     let format = formats.get(kind).filter(|format| format.role == Role::Fmt)?;
@@ -103,47 +129,29 @@ fn defined_by(formats: &Formats, kind: u8, body: Body<'_>) -> Option<(u8, String
 fn define(formats: &mut Formats, kind: u8, body: Body<'_>) -> Option<Defined> {
     let format = formats.get(kind)?;
     let message = Message::new(format, body);
-    let byte = |name: &str| {
-        let number = message.signed(format.field(name)?)?;
-        // A character: signed in the file.
-        u8::try_from(number).or_else(|_| i8::try_from(number).map(|number| number as u8)).ok()
-    };
-    let words = |name: &str| message.text(format.field(name)?).map(|words| shortened(&words));
     match format.role {
         Role::Other => None,
         Role::Fmt => {
-            // An old FMT lacks the name of its last column.
-            let columns = words("Columns")
-                .or_else(|| message.text(4).map(|words| shortened(&words)))
-                .unwrap_or_default();
-            let (kind, length) = (byte("Type")?, byte("Length")?);
-            // A text log's lines have no length, whatever it says of one.
-            let length = if message.is_words() && kind != FMT_TYPE { 0 } else { length };
-            let (name, characters) = (words("Name")?, words("Format")?);
-            Some(formats.define(Format::new(kind, length, &name, characters.as_bytes(), &columns)))
+            let new = definition(&message)?;
+            Some(formats.define(new))
         }
         Role::Unit => {
-            let (id, name) = (byte("Id")?, words("Label")?);
+            let (id, name) = (byte(&message, "Id")?, words(&message, "Label")?);
             formats.define_unit(id, &name);
             None
         }
         Role::Mult => {
-            let (id, factor) = (byte("Id")?, message.number(format.field("Mult")?)?);
+            let (id, factor) = (byte(&message, "Id")?, message.number(format.field("Mult")?)?);
             formats.define_multiplier(id, factor);
             None
         }
         Role::Fmtu => {
-            let (kind, units) = (byte("FmtType")?, words("UnitIds")?);
-            let multipliers = words("MultIds").unwrap_or_default();
+            let (kind, units) = (byte(&message, "FmtType")?, words(&message, "UnitIds")?);
+            let multipliers = words(&message, "MultIds").unwrap_or_default();
             formats.define_units(kind, &units, &multipliers);
             None
         }
     }
-}
-
-/// No longer than in a binary log's definitions: a text log's lines may be of any length.
-fn shortened(words: &str) -> String {
-    words.chars().take(DEFINITION_CHARACTERS_MAX).collect()
 }
 
 /// One reading of a log.
@@ -166,6 +174,9 @@ pub(super) struct Session<'w> {
     /// known.
     later: Option<Standing>,
     wrong: Wrong,
+    /// A message that has a time has come since the log at hand began.
+    timed: bool,
+    joints: u32,
 }
 
 impl<'w> Session<'w> {
@@ -190,6 +201,44 @@ impl<'w> Session<'w> {
             rows_refused: false,
             later: None,
             wrong: Wrong::default(),
+            timed: false,
+            joints: 0,
+        }
+    }
+
+    /// Whether another log begins with this message: it was joined on.
+    pub(super) fn is_another(&self, kind: u8, body: Body<'_>) -> bool {
+        self.is_timed() && begins_a_log(&self.formats, kind, body)
+    }
+
+    /// Whether a message that has a time has come since the log at hand began.
+    pub(super) const fn is_timed(&self) -> bool {
+        self.timed && self.joints < JOINTS_MAX
+    }
+
+    /// Another log begins, of which this much is known: nothing of the one before holds.
+    pub(super) fn begin_another(&mut self, first: First, take: &mut Take<'_>) -> Result<()> {
+        self.count_by_name();
+        let First { formats, state, begins_us, banner, .. } = first;
+        self.formats = formats.begun_again();
+        self.state = State::new(state.facts());
+        self.handlers = Handlers::default();
+        self.needed.fill(None);
+        self.epoch = Epoch::default();
+        self.firmware = banner.unwrap_or_default();
+        (self.later, self.timed) = (None, false);
+        self.joints += 1;
+        self.clock.begin_another(begins_us);
+        take(self.clock.now(), Item::Joint)?;
+        self.tell_banner(take)
+    }
+
+    /// Messages by their names: another log has other types.
+    fn count_by_name(&mut self) {
+        for (kind, count) in (0..=u8::MAX).zip(&mut self.counts) {
+            if let Some(format) = self.formats.get(kind).filter(|_| count.0 > 0) {
+                add(&mut self.counts_before, format.name.clone(), std::mem::take(count));
+            }
         }
     }
 
@@ -232,6 +281,7 @@ impl<'w> Session<'w> {
                 if matches!(body, Body::Bytes(_)) || !self.formats.is_only_long(kind) {
                     self.tell_odd(kind, place, take)?;
                 }
+                self.timed |= self.formats.get(kind).is_some_and(tells_time);
                 let needed = self.needs(kind);
                 if let Some(slot) = self.needed.get_mut(index) {
                     *slot = Some(needed);
@@ -429,19 +479,15 @@ impl<'w> Session<'w> {
         let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();
         // The clock follows only what is wanted.
         let has_time = |(kind, (count, _)): (u8, &(u64, u64))| {
-            let format = self.formats.get(kind).filter(|_| *count > 0);
-            format.is_some_and(|format| format.time.is_some() || format.name == "GPS")
+            self.formats.get(kind).filter(|_| *count > 0).is_some_and(tells_time)
         };
-        let timed = self.clock.has_begun() || (0..=u8::MAX).zip(&self.counts).any(has_time);
+        let timed =
+            self.joints > 0 || self.clock.has_begun() || (0..=u8::MAX).zip(&self.counts).any(has_time);
         if !timed && messages > 0 {
             let words = format!("none of {messages} messages has a time: nothing in the log can be judged");
             self.gap(Cause::NoTimes, None, 0, words, take)?;
         }
-        for (kind, count) in (0..=u8::MAX).zip(std::mem::take(&mut self.counts)) {
-            if let Some(format) = self.formats.get(kind).filter(|_| count.0 > 0) {
-                add(&mut self.counts_before, format.name.clone(), count);
-            }
-        }
+        self.count_by_name();
         let told = |(name, (count, bytes))| MessageCount { name, count, bytes };
         Ok(Summary { messages: self.counts_before.into_iter().map(told).collect(), ending: None })
     }

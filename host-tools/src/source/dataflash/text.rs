@@ -35,7 +35,7 @@ impl<R: Read> Lines<R> {
         Self(Buffer::new(input))
     }
 
-    /// The first bytes, without reading on.
+    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.0.window(bytes)
     }
@@ -69,6 +69,11 @@ pub(super) fn values(line: &str, columns: usize) -> Vec<&str> {
         Some((_, rest)) if columns > 0 => rest.splitn(columns, ',').collect(),
         _ => Vec::new(),
     }
+}
+
+/// Where a log begins in a line: FMT defines itself. (What stands before it is the end of a log that another was joined to.)
+pub(super) fn beginning(line: &str) -> Option<usize> {
+    line.find("FMT, 128, 89, FMT")
 }
 
 /// The name of a line.

@@ -154,6 +154,8 @@ impl Parser<'_> {
             return if could_be(kind, body_bytes) { Found::Cut } else { Found::Nothing };
         };
         match self.believe(kind, body) {
+            // A log that was cut and had another one joined on: its last message is not whole.
+            Belief::Sure(_) if self.swallows_a_beginning(rest, bytes) => Found::Nothing,
             Belief::Sure(message) => Found::Message(message, bytes),
             Belief::Likely(message) if self.goes_on(rest.get(bytes..).unwrap_or_default()) => {
                 Found::Message(message, bytes)
@@ -200,6 +202,13 @@ impl Parser<'_> {
                 .and_then(|id| (self.fits)(u16::from_le_bytes(id.try_into().ok()?), bytes.checked_sub(2)?));
             could_be(kind, bytes) && known != Some(false)
         })
+    }
+
+    /// Whether another log begins within these first bytes, where no message follows them.
+    fn swallows_a_beginning(&self, rest: &[u8], bytes: usize) -> bool {
+        let inside = rest.get(HEADER_BYTES..bytes + MAGIC.len() - 1).unwrap_or_default();
+        !self.goes_on(rest.get(bytes..).unwrap_or_default())
+            && inside.windows(MAGIC.len()).any(|window| window == MAGIC)
     }
 
     fn believe<'a>(&self, kind: u8, body: &'a [u8]) -> Belief<'a> {
@@ -295,28 +304,14 @@ fn header(rest: &[u8]) -> Option<(u8, usize)> {
 }
 
 /// The messages of data at the beginning of some bytes, with the numbers of their subscriptions, as far as each message
-/// follows the one before it. So many messages at most are looked at.
-pub(super) const fn data_after(bytes: &[u8], messages: usize) -> DataAfter<'_> {
-    DataAfter { rest: bytes, left: messages }
+/// follows the one before it.
+pub(super) const fn data_after(bytes: &[u8]) -> DataAfter<'_> {
+    DataAfter { rest: bytes }
 }
 
 /// See [`data_after`].
 pub(super) struct DataAfter<'a> {
     rest: &'a [u8],
-    left: usize,
-}
-
-impl DataAfter<'_> {
-    /// Whether no message follows: the bytes end, or what is left is less than a message or begins with zeros. (There are more
-    /// bytes than the longest message has, or they are the last.)
-    pub(super) fn is_end(&self) -> bool {
-        /// Longer messages of data are rare.
-        const LESS_BYTES: usize = 2_048;
-        let zeros = self.rest.get(..LESS_BYTES).unwrap_or(self.rest).iter().all(|byte| *byte == 0);
-        let cut = self.rest.len() < LESS_BYTES
-            && header(self.rest).is_none_or(|(_, body_bytes)| self.rest.len() < HEADER_BYTES + body_bytes);
-        zeros || cut
-    }
 }
 
 impl<'a> Iterator for DataAfter<'a> {
@@ -324,7 +319,6 @@ impl<'a> Iterator for DataAfter<'a> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            self.left = self.left.checked_sub(1)?;
             let (kind, body_bytes) = header(self.rest).filter(|(kind, _)| *kind != 0)?;
             let body = self.rest.get(HEADER_BYTES..HEADER_BYTES + body_bytes)?;
             self.rest = self.rest.get(HEADER_BYTES + body_bytes..)?;

@@ -15,7 +15,7 @@
 //! | `px4` | what PX4's topics say, as observations: the same that the MAVLink edge makes of what PX4 sends |
 //! | `session` | one pass over all of it |
 //!
-//! Memory is bounded whatever the file says: a window of 640 KiB, 1,024 definitions with 32,768 fields, 4,096
+//! Memory is bounded whatever the file says: a window of 768 KiB, 1,024 definitions with 32,768 fields, 4,096
 //! subscriptions. Appended data (a crash dump) is read after what comes before it. Nothing here panics for any input.
 
 mod fields;

@@ -23,8 +23,8 @@ use crate::source::item::{
     Text, Value, Want,
 };
 
-/// What a look needs to see: the longest message and the header after it.
-const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + FILE_HEADER_BYTES;
+/// What a look needs to see: the longest message, and what follows it.
+const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + times::AHEAD_BYTES;
 /// What a search for the next message needs to see.
 const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
 /// The incompatible flag that is known: data was appended.
@@ -36,7 +36,7 @@ const WORDS_BYTES_MAX: usize = 256;
 
 /// Reads a log from its beginning to its end.
 pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
-    window.fill(LOOK_BYTES);
+    window.fill(FILE_HEADER_BYTES);
     let Some(time_us) = beginning(window.rest()) else {
         bail!("is no PX4 log: a ULog begins with 16 bytes of header, and this does not");
     };
@@ -110,6 +110,8 @@ struct Session<'a, 'b> {
     told_facts: bool,
     /// Where data was appended and not yet reached, the first one first.
     appended: Vec<u64>,
+    /// Where the log at hand begins in the file.
+    base: u64,
     /// Messages of data whose subscription is not known, and where the first one is.
     strays: (u64, u64),
     /// The words that were told last: a topic and a logged string may have the same.
@@ -142,6 +144,7 @@ impl<'a, 'b> Session<'a, 'b> {
             information: BTreeMap::new(),
             told_facts: false,
             appended: Vec::new(),
+            base: 0,
             strays: (0, 0),
             last_words: String::new(),
             wrong: Wrong::default(),
@@ -243,6 +246,7 @@ impl<'a, 'b> Session<'a, 'b> {
             return Ok(());
         }
         for offset in appended.into_iter().filter(|&offset| offset != 0) {
+            let offset = offset.saturating_add(self.base);
             if offset > place && self.appended.last().is_none_or(|&last| offset > last) {
                 self.appended.push(offset);
             } else {
@@ -454,12 +458,16 @@ impl<'a, 'b> Session<'a, 'b> {
 
     /// Another log was joined on: nothing of the first one holds.
     fn another(&mut self, place: u64, time_us: u64, after: &[u8]) -> Result<()> {
+        self.tell_facts()?;
         self.formats = Formats::default();
         self.subscriptions.clear();
         self.px4 = Px4::default();
+        self.information.clear();
+        self.last_words.clear();
         self.told_facts = false;
+        self.base = place;
         self.begin(place, time_us, &times::first(after), false);
-        self.tell(Item::Restart)
+        self.tell(Item::Joint)
     }
 
     /// Who made the log, once all of it has been told.

@@ -136,7 +136,8 @@ fn told(item: &Item<'_>) -> String {
             format!("row {} {}", row.table.name, values.join(","))
         }
         Item::Gap(gap) => format!("gap {:?} {}", gap.cause, gap.words),
-        Item::Restart | Item::Joint => "restart".to_owned(),
+        Item::Restart => "restart".to_owned(),
+        Item::Joint => "joint".to_owned(),
         Item::Frame(_) | Item::Record(_) => unreachable!("a ULog has neither"),
     }
 }

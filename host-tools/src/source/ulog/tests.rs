@@ -139,6 +139,29 @@ fn a_wrong_time_in_the_header_moves_no_other_time() {
 }
 
 #[test]
+fn a_wrong_time_right_before_a_damaged_place_moves_no_other_time() {
+    let clean = beginning(|_, time| time);
+    let end = |log: &[u8]| read(log).items.iter().map(|(at, _)| *at).max();
+    for shift in [12, 33, 1 << 40] {
+        let log = beginning(|index, time| if index == 200 { time + shift * SECOND } else { time });
+        // Each message of data has 18 bytes, and the first one follows the subscriptions.
+        let next = log.len() - (400 - 201) * 18;
+        // Its header; three blocks of a card, and half of the wrong time; all to the end.
+        for (from, bytes) in [(next, 3), (next - 4, 1_536), (next, 6_000)] {
+            let mut log = log.clone();
+            let to = log.len().min(from + bytes);
+            log[from..to].fill(0xFF);
+            let read = read(&log);
+            let restarts = read.of("restart").len();
+            let right = if to == log.len() { 60 * SECOND + 180_000 } else { 60 * SECOND + 380_000 };
+            assert_eq!((restarts, end(&log)), (0, Some(right)), "{shift} {bytes}");
+            assert!(read.of("gap").iter().any(|gap| gap.contains("wrong time")), "{:?}", read.gaps);
+        }
+    }
+    assert_eq!(end(&clean), Some(60 * SECOND + 380_000));
+}
+
+#[test]
 fn a_clock_that_falls_by_a_little_more_than_a_second_is_a_restart() {
     for fall in [1_050_000, 1_500_000, 5_000_000] {
         let log = beginning(|index, time| if index < 200 { time } else { time - fall });
@@ -284,15 +307,20 @@ fn damage_costs_what_it_hit_and_says_where() {
 }
 
 #[test]
-fn a_log_that_was_joined_to_another_is_a_restart_with_its_own_definitions() {
+fn a_log_that_was_joined_to_another_is_another_recording_with_its_own_definitions() {
     let mut log = small().bytes;
     let other = Writer::new(SECOND)
         .format("position:uint64_t timestamp;double x;")
         .subscribe(0, 0, "position")
         .data(0, 2 * SECOND, &1.25_f64.to_le_bytes());
+    // One that was cut, too: the header is not the rest of its last message.
+    let cut = [&log[..log.len() - 5], &other.bytes].concat();
+    let told = read(&cut);
+    assert_eq!((told.of("joint").len(), told.of("row position_2")), (1, vec!["0,2000000,1.25"]));
+    assert_eq!(told.of("gap"), ["Damaged 13 bytes that are no messages"]);
     log.extend(other.bytes);
     let read = read(&log);
-    assert_eq!((read.of("restart").len(), read.gaps.len()), (1, 0), "{:?}", read.gaps);
+    assert_eq!((read.of("joint").len(), read.of("restart").len(), read.gaps.len()), (1, 0, 0));
     assert_eq!(read.of("row position_2"), ["0,2000000,1.25"]);
     // A second and a bit after the last of the first one.
     assert_eq!(read.items.last().map(|(at, _)| *at), Some(3 * SECOND + 900_000));

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use super::message::{DataAfter, data_after};
+use super::message::{DataAfter, Found, MESSAGE_BYTES_MAX, Message, Parser, data_after};
 use super::topics::Subscriptions;
 use super::window::Window;
 use crate::source::clock::{Ahead, BEGINNING_ASKED, Rules, Stamp};
@@ -14,8 +14,12 @@ pub(super) const RULES: Rules =
     Rules { from_first: false, old_values: true, ends: Ends { steady_us: 1_000_000, seldom_us: 10_000_000 } };
 /// How much of a log is looked at for the first messages of data: definitions come before them, 100 to 200 KiB.
 const FIRST_BYTES: usize = 512 * 1024;
+/// How much of what follows a jump of the time is looked at, damage too.
+pub(super) const AHEAD_BYTES: usize = 256 * 1024;
+/// No message for so long: what follows is erased memory, not part of the log. Longer than any message.
+const NOTHING_BYTES: usize = 2 * MESSAGE_BYTES_MAX;
 /// Messages after one that are looked at for their times.
-const MESSAGES_MAX: usize = 256;
+const MESSAGES_MAX: usize = 1_024;
 /// The series of texts; a topic's is its number and one.
 const TEXTS: usize = 0;
 
@@ -29,22 +33,42 @@ pub(super) const fn of_text(us: u64) -> Stamp {
     Stamp { us, series: TEXTS }
 }
 
-/// The next times that are asked for. A topic with the time zero tells none.
+/// The next times that are asked for; what is damaged between them is passed over. A topic with the time zero tells none.
+/// (There are [`AHEAD_BYTES`] and the longest message, or `after` is all that there is.)
 pub(super) fn ahead(subscriptions: &Subscriptions, after: &[u8], asks: &dyn Fn(Stamp) -> bool) -> Ahead {
-    let (mut stamps, mut messages) = (Vec::with_capacity(ASKED), data_after(after, MESSAGES_MAX));
-    while stamps.len() < ASKED {
-        let Some((id, data)) = messages.next() else { break };
-        let told = subscriptions.time(id, data).filter(|us| *us > 0).map(|us| stamp(id, us));
-        stamps.extend(told.filter(|stamp| asks(*stamp)));
+    let fits = |id: u16, bytes: usize| subscriptions.fits(id, bytes);
+    let parser = Parser { fits: &fits };
+    let is_all = after.len() < AHEAD_BYTES;
+    let (mut stamps, mut messages, mut at, mut last) = (Vec::with_capacity(ASKED), 0, 0, 0);
+    while stamps.len() < ASKED
+        && messages < MESSAGES_MAX
+        && let Some(rest) = after.get(at..).filter(|rest| !rest.is_empty())
+    {
+        match parser.look(rest) {
+            Found::Message(Message::Beginning { .. }, _) => return Ahead { stamps, is_end: true },
+            Found::Message(message, bytes) => {
+                if let Message::Data { id, data } = message {
+                    let told = subscriptions.time(id, data).filter(|us| *us > 0).map(|us| stamp(id, us));
+                    stamps.extend(told.filter(|stamp| asks(*stamp)));
+                }
+                at += bytes;
+                (messages, last) = (messages + 1, at);
+            }
+            _ => match parser.find(rest, 1, is_all) {
+                Ok(skipped) => at += skipped,
+                Err(_) => break,
+            },
+        }
     }
-    Ahead { is_end: stamps.len() < ASKED && messages.is_end(), stamps }
+    let nothing = after.len() - last >= NOTHING_BYTES;
+    Ahead { is_end: stamps.len() < ASKED && messages < MESSAGES_MAX && (is_all || nothing), stamps }
 }
 
 /// The times of the first messages of data in these bytes, as many as tell when a log began. (The time stands first in each
 /// topic of PX4.)
 pub(super) fn first(bytes: &[u8]) -> Vec<u64> {
     let time = |(_, data): (u16, &[u8])| data.first_chunk().map(|time| u64::from_le_bytes(*time));
-    let messages: DataAfter<'_> = data_after(bytes, usize::MAX);
+    let messages: DataAfter<'_> = data_after(bytes);
     messages.filter_map(time).take(4 * BEGINNING_ASKED).collect()
 }
 

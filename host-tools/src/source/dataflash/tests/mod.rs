@@ -4,6 +4,7 @@ mod arming;
 mod equality;
 mod estimator;
 mod hostile;
+mod joined;
 mod names;
 mod pause;
 mod time;
@@ -25,6 +26,7 @@ struct Seen {
     said: Vec<String>,
     gaps: Vec<(Cause, u64, u64, String)>,
     restarts: usize,
+    joints: Vec<u64>,
     tables: Vec<(String, Vec<(String, String)>)>,
     last: Instant,
 }
@@ -58,7 +60,8 @@ impl Seen {
             Item::Gap(gap) => {
                 self.gaps.push((gap.cause, gap.place.unwrap_or(u64::MAX), gap.bytes, gap.words.clone()));
             }
-            Item::Restart | Item::Joint => self.restarts += 1,
+            Item::Restart => self.restarts += 1,
+            Item::Joint => self.joints.push(at.as_millis()),
             Item::Parameter(parameter) => self.said.push(format!("{}={}", parameter.name, parameter.value)),
             Item::Text(text) => self.said.push(text.words.to_owned()),
             Item::Mode(mode) => self.said.push(mode.name.unwrap_or("?").to_owned()),

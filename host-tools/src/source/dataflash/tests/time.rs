@@ -50,6 +50,28 @@ fn one_wrong_time_is_damage_and_neither_a_restart_nor_a_gap_nor_later_times() {
 }
 
 #[test]
+fn a_wrong_time_before_definitions_of_what_follows_and_before_damage_moves_no_other_time() {
+    for (definitions, damage) in [(200, 0), (0, 40_000), (100, 3)] {
+        let mut log = begun();
+        tenths(&mut log, 10..200);
+        let message = log.bytes.len();
+        log.attitudes(20..21);
+        log.bytes.extend(vec![0xFF; damage]);
+        for number in 0..definitions {
+            log.format(1 + (number % 100) as u8, "NONE", "QB", "TimeUS,I");
+        }
+        log.format(152, "NEW", "QB", "TimeUS,I");
+        for tenth in 201..300_u64 {
+            log.raw(152, &[&(tenth * 100_000).to_le_bytes(), &[0]]);
+        }
+        set_time(&mut log, message, 53.6);
+        let (gaps, restarts, end) = told(&log.bytes);
+        assert_eq!((restarts, end), (0, 29_900), "{definitions} {damage}");
+        assert!(gaps.iter().any(|gap| gap.1 == WRONG), "{gaps:?}");
+    }
+}
+
+#[test]
 fn a_wrong_time_of_the_first_message_is_no_restart() {
     let mut log = begun();
     let message = log.bytes.len();

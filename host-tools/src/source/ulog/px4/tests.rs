@@ -310,3 +310,21 @@ fn each_topic_that_serves_is_in_the_document_and_each_other_that_is_asked_for_is
         assert!(super::topic(name).is_some() != is_row, "{name}: serves, or is told to be rows only");
     }
 }
+
+#[test]
+fn utc_beyond_all_numbers_is_no_panic() {
+    const UTC_US: u64 = 1_700_000_000_000_000;
+    let mut writer = Writer::new(SECOND)
+        .format(&format!("vehicle_status:uint64_t timestamp;{STATUS}"))
+        .format("sensor_gps:uint64_t timestamp;uint64_t time_utc_usec;uint8_t fix_type;")
+        .subscribe(0, 0, "vehicle_status")
+        .subscribe(1, 0, "sensor_gps")
+        .data(0, SECOND, &[1, 4, 0, 2])
+        .data(1, SECOND, &[&UTC_US.to_le_bytes()[..], &[3]].concat());
+    for number in 0..40 {
+        writer = writer.data(0, u64::MAX - 40 * SECOND + number * SECOND, &[1, 4, 0, 2]);
+    }
+    let read = read(&writer.bytes);
+    let told = observations(&read, "SystemTime(");
+    assert!(told.last().is_some_and(|last| last.contains(&u64::MAX.to_string())), "{told:?}");
+}

@@ -1,0 +1,65 @@
+//! Frames of a ground station's log whose checksum does not fit: they are not read, and that is told.
+
+use hums_core::time::Instant;
+use hums_link::Check;
+
+use super::item::{Cause, Gap};
+use crate::mavlink::frame::{Peek, peek};
+use crate::plural::count;
+
+/// Which records' frames have a checksum that does not fit. Of an id that is not known, or is known by another definition, nobody
+/// can say.
+#[derive(Debug, Default)]
+pub(super) struct Checksums {
+    /// Of the record at hand, whether the message is known; `None` once its frame has come.
+    waits: Option<bool>,
+    /// Where the record at hand is.
+    at: Instant,
+    place: u64,
+    /// Frames that are damaged, and where the first one is.
+    damaged: u64,
+    first: Option<(Instant, u64)>,
+    /// Frames that nobody can check.
+    unchecked: u64,
+}
+
+impl Checksums {
+    /// A record with these bytes of a frame.
+    pub(super) fn begin(&mut self, at: Instant, place: u64, bytes: &[u8]) {
+        let Peek::Frame(frame) = peek(bytes) else { return };
+        (self.waits, self.at, self.place) = (Some(frame.message().is_some()), at, place);
+    }
+
+    /// A frame that is one.
+    pub(super) fn frame(&mut self, frame: &hums_link::Frame<'_>) {
+        self.waits = None;
+        self.unchecked += u64::from(frame.check() == Check::Unverified);
+    }
+
+    /// The record is over.
+    pub(super) fn end(&mut self) {
+        match self.waits.take() {
+            Some(true) => {
+                self.damaged += 1;
+                self.first.get_or_insert((self.at, self.place));
+            }
+            Some(false) => self.unchecked += 1,
+            None => {}
+        }
+    }
+
+    /// Those that are damaged.
+    pub(super) fn gap(&self) -> Option<Gap> {
+        let (at, place) = self.first?;
+        let words = format!("{} with a wrong checksum, which are not read", count(self.damaged, "frame"));
+        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
+    }
+
+    /// Those that nobody can check, as a sentence.
+    pub(super) fn words(&self) -> Option<String> {
+        (self.unchecked > 0).then(|| {
+            let frames = count(self.unchecked, "frame");
+            format!("{frames} of messages that this program has no definition of: whether they are damaged is not known")
+        })
+    }
+}

@@ -1,0 +1,44 @@
+//! What an FMT message defines.
+
+use super::format::{FMT_TYPE, Format, Role};
+use super::message::Message;
+
+/// The columns of a message have 64 characters at most in a binary log; a text log may have been made of several.
+const DEFINITION_CHARACTERS_MAX: usize = 256;
+
+/// What a message defines, where it is an FMT.
+pub(super) fn definition(message: &Message<'_>) -> Option<Format> {
+    let format = message.format();
+    if format.role != Role::Fmt {
+        return None;
+    }
+    // An old FMT lacks the name of its last column.
+    let columns = words(message, "Columns")
+        .or_else(|| message.text(4).map(|words| shortened(&words)))
+        .unwrap_or_default();
+    let (kind, length) = (byte(message, "Type")?, byte(message, "Length")?);
+    // A text log's lines have no length, whatever it says of one.
+    let length = if message.is_words() && kind != FMT_TYPE { 0 } else { length };
+    let (name, characters) = (words(message, "Name")?, words(message, "Format")?);
+    Some(Format::new(kind, length, &name, characters.as_bytes(), &columns))
+}
+
+/// Whether a message defines FMT itself: a log begins with it.
+pub(super) fn is_of_itself(message: &Message<'_>) -> bool {
+    message.format().role == Role::Fmt && message.unsigned(0) == Some(FMT_TYPE.into())
+}
+
+/// A byte; characters have a sign in the file.
+pub(super) fn byte(message: &Message<'_>, name: &str) -> Option<u8> {
+    let number = message.signed(message.format().field(name)?)?;
+    u8::try_from(number).or_else(|_| i8::try_from(number).map(|number| number as u8)).ok()
+}
+
+/// Words, no longer than in a binary log's definitions: a text log's lines may be of any length.
+pub(super) fn words(message: &Message<'_>, name: &str) -> Option<String> {
+    message.text(message.format().field(name)?).map(|words| shortened(&words))
+}
+
+fn shortened(words: &str) -> String {
+    words.chars().take(DEFINITION_CHARACTERS_MAX).collect()
+}

@@ -1,0 +1,219 @@
+//! Recordings of a ground station, as they should be and as they should not.
+
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+
+use super::*;
+use crate::mavlink::frame::tests::HEARTBEAT;
+
+const SECOND: u64 = 1_000_000;
+
+fn record(tenth: &u64) -> Vec<u8> {
+    [&(1_700_000_000 * SECOND + tenth * SECOND / 10).to_be_bytes()[..], &HEARTBEAT].concat()
+}
+
+/// Of a tlog with these times, in tenths of seconds: gaps, restarts, and the last time in tenths.
+fn told(tenths: &[u64]) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
+    told_of(tenths.iter().flat_map(record).collect())
+}
+
+/// The same of the bytes of one.
+fn told_of(bytes: Vec<u8>) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
+    let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
+    let (mut gaps, mut restarts, mut last) = (Vec::new(), 0, Instant::ZERO);
+    let summary = reader.read(Want { frames: true, ..Want::default() }, &mut |at, item| {
+        match item {
+            Item::Gap(gap) => gaps.push((gap.cause, gap.place)),
+            Item::Restart => restarts += 1,
+            _ => {}
+        }
+        last = at;
+        Ok(())
+    });
+    assert!(summary.is_ok());
+    (gaps, restarts, last.as_millis() / 100)
+}
+
+#[test]
+fn one_wrong_time_is_damage_and_changes_no_other_time() {
+    let usual: Vec<u64> = (1_000..1_200).collect();
+    assert_eq!(told(&usual), (vec![], 0, 199));
+    for (at, wrong) in [(100, 1_130), (100, 1_400), (100, 9_000), (100, 100), (0, 1_500)] {
+        let mut times = usual.clone();
+        times[at] = wrong;
+        // The first record's time begins the recording, unless it is the wrong one.
+        let end = if at == 0 { 198 } else { 199 };
+        assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{wrong}");
+    }
+}
+
+#[test]
+fn a_wrong_time_at_either_end_moves_no_other_time() {
+    for count in [1, 2, 8] {
+        for (at, wrong) in [(200 - count, 170_000), (200 - count, 100), (0, 10_000), (0, 80_900)] {
+            let mut times: Vec<u64> = (80_000..80_200).collect();
+            times[at..at + count].fill(wrong);
+            let end = 199 - count as u64;
+            let told = told(&times);
+            assert_eq!(told, (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{at} {wrong} {count}");
+        }
+    }
+    // A link that was silent for some seconds before its last frames.
+    let late: Vec<u64> = (80_000..80_200).chain([80_250, 80_251]).collect();
+    assert_eq!(told(&late), (vec![], 0, 251));
+}
+
+#[test]
+fn a_wrong_time_before_a_damaged_stretch_and_before_zeros_moves_no_other_time() {
+    for (at, damage, end) in [(100, vec![0xFF; 60_000], 199), (199, vec![0; 20_000], 198)] {
+        let mut times: Vec<u64> = (1_000..1_200).collect();
+        times[at] += 336;
+        let (before, after) = times.split_at(at + 1);
+        let bytes =
+            [before.iter().flat_map(record).collect(), damage, after.iter().flat_map(record).collect()];
+        let (gaps, restarts, last) = told_of(bytes.concat());
+        assert!(gaps.contains(&(Cause::Damaged, Some(at as u64 * 29))), "{gaps:?}");
+        assert_eq!((restarts, last), (0, end));
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
+    // Twenty records a second; every ten seconds the clock falls by 1.1 to 1.4 s.
+    let mut times = Vec::new();
+    let mut from = 80_000;
+    for fall in [11, 14, 12, 13, 0] {
+        times.extend((0..200).map(|record| from + record / 2));
+        from += 99 - fall;
+    }
+    let (gaps, restarts, _) = told(&times);
+    assert_eq!((gaps, restarts), (vec![], 4));
+}
+
+/// What a tlog says of its clock: of attitudes at these seconds of the ground station's clock and of the autopilot's.
+fn clock_of(times: &[(u64, u64)]) -> String {
+    let tenths: Vec<(u64, u64)> = times.iter().map(|(recorded, boot)| (recorded * 10, boot * 10)).collect();
+    clock_of_tenths(&tenths).0
+}
+
+/// The same of tenths of seconds, and when the last one is.
+fn clock_of_tenths(times: &[(u64, u64)]) -> (String, u64) {
+    let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+    let record = |(recorded, boot): &(u64, u64)| {
+        let time = (1_700_000_000 * SECOND + recorded * SECOND / 10).to_be_bytes();
+        let packet = Packet::new(30).u32(0, *boot as u32 * 100);
+        [&time[..], encoder.frame(&mut buffer, &packet)].concat()
+    };
+    let bytes: Vec<u8> = times.iter().flat_map(record).collect();
+    let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
+    let (mut told, mut last) = (String::new(), Instant::ZERO);
+    let read = reader.read(Want { frames: true, ..Want::default() }, &mut |at, item| {
+        last = at;
+        match item {
+            Item::Gap(_) => told += "gap ",
+            Item::Restart => told += "restart ",
+            Item::Joint => told += "joint ",
+            _ => {}
+        }
+        Ok(())
+    });
+    assert!(read.is_ok());
+    (told, last.as_millis() / 100)
+}
+
+#[test]
+fn two_recordings_that_were_joined_are_told_from_a_clock_that_was_set_and_from_a_long_silence() {
+    let part = |recorded: u64, boot: u64| (0..50).map(move |second| (recorded + second, boot + second));
+    let joined =
+        |recorded, boot| clock_of(&part(90_000, 100).chain(part(recorded, boot)).collect::<Vec<_>>());
+    assert_eq!(joined(90_000, 100), "joint ", "the same twice");
+    assert_eq!(joined(93_700, 100), "joint ", "an hour later, after another power-on");
+    assert_eq!(joined(50_000, 700), "joint ", "an earlier one, longer after its power-on");
+    assert_eq!(joined(50_000, 150), "restart ", "the clock was set");
+    assert_eq!(joined(93_700, 100 + 3_700), "", "an hour without a word");
+    assert_eq!(joined(90_200, 5), "", "a restart of the autopilot");
+}
+
+#[test]
+fn what_passed_is_told_by_the_autopilot_where_the_ground_stations_clock_is_set() {
+    let part = |recorded: u64, from: u64, to: u64| (from..to).map(move |boot| (recorded + boot, boot));
+    for (set, forward_told) in [(15, false), (50, false), (150, true), (6_000, true), (400_000, true)] {
+        let forward: Vec<_> = part(9_000, 1_000, 1_500).chain(part(9_000 + set, 1_500, 2_000)).collect();
+        // A link may hold back as much as ten seconds.
+        let told = if forward_told { ("restart ", 999) } else { ("", 999 + set) };
+        assert_eq!(clock_of_tenths(&forward), (told.0.to_owned(), told.1), "{set}");
+        let back: Vec<_> = part(900_000 + set, 1_000, 1_500).chain(part(900_000, 1_500, 2_000)).collect();
+        assert_eq!(clock_of_tenths(&back), ("restart ".to_owned(), 999), "{set}");
+    }
+    // It swings to and fro.
+    let swings: Vec<_> =
+        (0..20).flat_map(|turn| part(9_000 + (turn + 1) % 2 * 15, turn * 50, turn * 50 + 50)).collect();
+    assert_eq!(clock_of_tenths(&swings), ("restart ".repeat(19), 999));
+    // A link that is silent, and then brings what it held back.
+    let held = (1_500..1_560).map(|boot| (9_000 + 1_560, boot));
+    let silent: Vec<_> = part(9_000, 1_000, 1_500).chain(held).chain(part(9_000, 1_560, 2_000)).collect();
+    assert_eq!(clock_of_tenths(&silent), (String::new(), 999));
+}
+
+#[test]
+fn a_frame_with_a_wrong_checksum_is_damage_and_one_of_an_unknown_message_cannot_be_checked() {
+    let mut bytes: Vec<u8> = (1_000..1_040).flat_map(|tenth| record(&tenth)).collect();
+    bytes[10 * 29 + 20] ^= 4;
+    bytes[12 * 29 + 22] ^= 1;
+    // The second byte of a message's number.
+    for at in [20, 21, 22] {
+        bytes[at * 29 + 8 + 9] = 200;
+    }
+    let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
+    let mut said = Vec::new();
+    let read = reader.read(Want::default(), &mut |_, item| {
+        match item {
+            Item::Gap(gap) => said.push(format!("{:?} {:?} {}", gap.cause, gap.place, gap.words)),
+            Item::Fact(fact) => said.push(format!("{:?} {}", fact.about, fact.words)),
+            _ => {}
+        }
+        Ok(())
+    });
+    assert!(read.is_ok());
+    assert_eq!(
+        said,
+        [
+            "Damaged Some(298) 2 frames with a wrong checksum, which are not read",
+            "Unchecked 3 frames of messages that this program has no definition of: whether they are damaged is not known",
+        ]
+    );
+}
+
+#[test]
+fn a_clock_that_was_set_and_a_silence_are_none() {
+    let set: Vec<u64> = (1_000..1_100).chain(500..600).collect();
+    assert_eq!(told(&set), (vec![], 1, 99 + 99));
+    let silent: Vec<u64> = (1_000..1_100).chain(1_500..1_600).collect();
+    assert_eq!(told(&silent), (vec![], 0, 599));
+}
+
+/// The times, in milliseconds, of attitudes that tell these times since the autopilot's boot, and how often it restarted.
+fn read(component: u8, boot_ms: &[u32]) -> (Vec<u64>, usize) {
+    let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
+    let frame = |boot_ms: &u32| encoder.frame(&mut buffer, &Packet::new(30).u32(0, *boot_ms)).to_vec();
+    let bytes: Vec<u8> = boot_ms.iter().flat_map(frame).collect();
+    let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
+    let (mut times, mut restarts) = (Vec::new(), 0);
+    let want = Want { frames: true, ..Want::default() };
+    let mut take = |at: Instant, item: Item<'_>| {
+        times.extend(matches!(item, Item::Frame(_)).then(|| at.as_millis()));
+        restarts += usize::from(matches!(item, Item::Restart));
+        Ok(())
+    };
+    reader.read(want, &mut take).expect("memory");
+    (times, restarts)
+}
+
+#[test]
+fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_line_brings_them() {
+    let (times, restarts) = read(1, &[60_000, 61_000, 75_500, 75_400, 900, 1_900]);
+    let since_first: Vec<u64> = times.iter().map(|at| at - times[0]).collect();
+    assert_eq!((since_first, restarts), (vec![0, 1_000, 15_500, 15_500, 15_500, 16_500], 1));
+    let (times, restarts) = read(100, &[60_000, 61_000, 75_500]);
+    assert!(times.len() == 3 && times[2] < 20 && restarts == 0, "no autopilot says so: {times:?}");
+}
