@@ -125,9 +125,8 @@ impl TlogReading {
             (false, false) if before.is_some() => return Ok(false),
             (false, false) => {}
         }
-        match time_us.checked_sub(self.now.as_micros()).filter(|_| time_us >= UTC_US_MIN) {
-            Some(epoch_us) => take(self.now, Item::Epoch(epoch_us))?,
-            None => {}
+        if let Some(epoch_us) = time_us.checked_sub(self.now.as_micros()).filter(|_| time_us >= UTC_US_MIN) {
+            take(self.now, Item::Epoch(epoch_us))?;
         }
         Ok(is_joint)
     }

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::binary::BEGINNING;
 use super::definition::definition;
-use super::format::{Format, Formats, HEADER_BYTES};
+use super::format::{BEGINNING, Format, Formats, HEADER_BYTES};
 use super::message::{Body, Message};
 use super::stamp::{Week, stamp};
 use super::text;

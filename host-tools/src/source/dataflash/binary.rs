@@ -11,11 +11,9 @@ use std::io::{self, Read};
 
 use super::ahead::{AHEAD_BYTES, Ahead};
 use super::buffer::Buffer;
-use super::format::{FMT_BYTES, FMT_TYPE, HEADER_BYTES, Lengths};
+use super::format::{HEADER_BYTES, Lengths};
 
 const HEAD: [u8; 2] = [0xA3, 0x95];
-/// How a log begins: FMT defines itself.
-pub(super) const BEGINNING: &[u8] = &[0xA3, 0x95, FMT_TYPE, FMT_TYPE, FMT_BYTES];
 /// The longest message, and the head of the one after it.
 const LOOKAHEAD_BYTES: usize = 2 * 258;
 

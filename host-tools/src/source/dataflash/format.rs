@@ -11,6 +11,8 @@ pub(super) const HEADER_BYTES: usize = 3;
 pub(super) const FMT_TYPE: u8 = 128;
 /// Length of FMT with its header.
 pub(super) const FMT_BYTES: u8 = 89;
+/// How a binary log begins: FMT defines itself.
+pub(super) const BEGINNING: &[u8] = &[0xA3, 0x95, FMT_TYPE, FMT_TYPE, FMT_BYTES];
 /// Columns of one message at most: the format string has 16 characters.
 const FIELDS_MAX: usize = 16;
 

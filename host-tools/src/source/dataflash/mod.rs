@@ -30,7 +30,7 @@ use anyhow::{Context as _, Result, bail};
 
 use self::ahead::Ahead;
 use self::binary::{Binary, Damage, Piece};
-use self::format::{FMT_TYPE, HEADER_BYTES};
+use self::format::{BEGINNING, FMT_TYPE, HEADER_BYTES};
 use self::message::Body;
 pub(super) use self::observe::is_firmware;
 use self::session::{First, Session};
@@ -55,8 +55,7 @@ pub enum Form {
 
 /// Whether a file that begins so is such a log, whatever follows: `FMT` is defined first, by itself.
 pub fn begins(start: &[u8]) -> Option<Form> {
-    const OWN: &[u8] = &[0xa3, 0x95, FMT_TYPE, FMT_TYPE, 89];
-    if start.starts_with(OWN) {
+    if start.starts_with(BEGINNING) {
         Some(Form::Binary)
     } else {
         start.starts_with(b"FMT, 128, 89, FMT").then_some(Form::Text)
@@ -176,7 +175,9 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
                 if bytes > BANNER_BYTES_MAX {
                     session.gap(Cause::Damaged, Some(place), bytes, words, take)?;
                 }
-                firmware.iter().for_each(|words| first.banner(words));
+                if let Some(firmware) = firmware {
+                    first.banner(&firmware);
+                }
             }
             session.begin_another(first, take)?;
             kinds = Kinds { begun: true, ..Kinds::default() };
