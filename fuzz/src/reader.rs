@@ -48,6 +48,6 @@ pub fn check(data: &[u8]) {
     assert_eq!(end.gaps, gaps);
     let seen = end.blocks;
     let ours = seen.sectors + seen.superseded + seen.misplaced + seen.damaged;
-    let kinds = ours + seen.stale + seen.empty + seen.erased + seen.foreign;
+    let kinds = ours + seen.stale + seen.unsound + seen.empty + seen.erased + seen.foreign;
     assert_eq!((seen.blocks, kinds), (blocks.len() as u64, blocks.len() as u64));
 }

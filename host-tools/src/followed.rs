@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 use hums_blackbox::record::Before;
 use hums_core::time::Instant;
 
-use crate::ending::{Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
+use crate::ending::{BegunAnew, Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
 use crate::sessions::{Sessions, place};
 
 /// Logs held back at most; so many after a log may say something of its end.
@@ -53,12 +53,15 @@ impl<T: Logged> Followed<T> {
             has_sectors = ending.summary.session.is_some();
             ending.misnamed = self.misnamed(ending);
             ending.again = self.sessions.again(&ending.name).map(str::to_owned);
+            let begun_anew = self.sessions.begun_anew(&ending.name);
+            ending.begun_anew = begun_anew.map(|of| BegunAnew { of, is_confirmed: false });
             if let Some(before) = ending.summary.marks.before.filter(Before::has_end)
                 && ending.is_counted()
+                && begun_anew.is_none()
             {
                 self.tell(&before, ending);
             }
-            if ending.is_counted() {
+            if ending.is_counted() && begun_anew.is_none() {
                 self.follow(ending);
             }
         }
@@ -81,8 +84,17 @@ impl<T: Logged> Followed<T> {
             return Some(Misnamed::Copy { of });
         }
         let before = ending.summary.marks.before.filter(Before::has_end)?;
-        let is_later = place(&ending.name).1.is_some_and(|number| number <= before.number);
-        (is_later && before.session != session).then_some(Misnamed::Later { before: before.number })
+        let (card, number) = place(&ending.name);
+        let number = number.filter(|_| before.session != session)?;
+        if number <= before.number {
+            return Some(Misnamed::Later { before: before.number });
+        }
+        // The recorder gives a power-on's first log the next number. A number that no file has any more is of a log that was
+        // older than this one, and then the one before is not there either.
+        let is_first = ending.summary.first_number == Some(0);
+        let is_there = self.sessions.numbers(card, before.session).contains(&before.number);
+        let absent = self.sessions.absent(card, before.number, number);
+        (is_first && is_there && absent > 0).then_some(Misnamed::Ahead { before: before.number })
     }
 
     /// How a log follows the one before it of the same power-on.
@@ -178,12 +190,19 @@ impl<T: Logged> Followed<T> {
         match held.iter_mut().rev().find(|log| log.summary.session == Some(before.session)) {
             Some(log) => {
                 log.proof = Proof::of(&log.summary, Some(before));
+                if let Some(anew) =
+                    log.begun_anew.as_mut().filter(|_| place(&log.name).1 == Some(before.number))
+                {
+                    anew.is_confirmed = true;
+                }
                 next.before = SessionBefore::There;
             }
             None if numbers.contains(&before.number) => next.before = SessionBefore::There,
             None if is_looked_at => next.before = SessionBefore::Gone(before.number),
             None => next.before = SessionBefore::NotLookedFor(before.number),
         }
+        // What the recorder had begun to write anew is told there.
+        let elsewhere = elsewhere.filter(|there| self.sessions.begun_anew_number(card, *there).is_none());
         if let Some(there) = elsewhere {
             next.before = SessionBefore::Elsewhere { number: before.number, there };
         }
@@ -195,5 +214,61 @@ impl<T: Logged> Followed<T> {
                 log.proof = Proof::NextStart(None);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use hums_blackbox::Sector;
+    use hums_blackbox::record::Found;
+
+    use super::*;
+    use crate::logs::find::find_in;
+
+    impl Logged for Ending {
+        fn ending(&mut self) -> Option<&mut Ending> {
+            Some(self)
+        }
+    }
+
+    /// The first sector of a session with this number.
+    fn sector(session: u32, number: u32) -> [u8; 512] {
+        let mut bytes = [0; 512];
+        bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+        bytes[11..15].copy_from_slice(&number.to_le_bytes());
+        let mut sector = Sector::from_bytes(bytes);
+        sector.seal(session);
+        *sector.bytes()
+    }
+
+    #[test]
+    fn a_file_that_was_to_be_written_anew_is_no_finding_once_the_next_start_found_it_so() {
+        let dir = tempfile::tempdir().expect("a folder");
+        for (name, session, number) in [(5, 7, 100), (6, 8, 0), (7, 7, 0), (8, 9, 0)] {
+            fs::write(dir.path().join(format!("{name:05}_00.HUM")), sector(session, number)).expect("room");
+        }
+        let found = find_in(dir.path(), false).expect("a folder");
+        let mut followed = Followed::new(Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log))));
+        let mut done = Vec::new();
+        for (log, session) in found.logs.iter().zip([7, 8, 7, 9]) {
+            let mut ending = Ending::of(log, crate::logs::reader::Summary::default());
+            ending.summary.session = Some(session);
+            if session == 9 {
+                let before = Before { found: Found::Frames, number: 7, session: 7, ..Before::default() };
+                ending.summary.marks.before = Some(before);
+            }
+            if session == 7 && log.name == "00007" {
+                let alone =
+                    Ending { begun_anew: Some(BegunAnew { of: 4, is_confirmed: false }), ..ending.clone() };
+                assert!(!alone.is_proved(), "nobody has confirmed it");
+            }
+            done.extend(followed.push(ending));
+        }
+        done.extend(followed.finish());
+        let anew = done.iter().filter_map(|log| Some((log.name.as_str(), log.begun_anew?, log.is_proved())));
+        let wanted = BegunAnew { of: 4, is_confirmed: true };
+        assert_eq!(anew.collect::<Vec<_>>(), [("00007", wanted, true)]);
     }
 }

@@ -60,7 +60,7 @@ use outcome::Outcome;
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
     match Cli::try_parse_from(arguments) {
-        Ok(cli) => outcome::exit_code(command(&cli.command)),
+        Ok(cli) => outcome::exit_code(files::check_standard_output().and_then(|()| command(&cli.command))),
         Err(error) => {
             // Help and version go to standard output and are no failure; a reader that has gone is none either.
             let _ = error.print();

@@ -99,6 +99,7 @@ pub fn settle(result: io::Result<()>) -> Result<()> {
 }
 
 /// Standard output as a writer that reports a broken pipe as [`ReaderGone`] inside the `io::Error`.
+#[derive(Debug)]
 pub struct Stdout(io::Stdout);
 
 impl Stdout {

@@ -4,8 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use hums_blackbox::Header;
+use hums_blackbox::record::{Before, Boot};
 
+use crate::logs::board::{HEADING_GROUPS, find_boot};
 use crate::logs::fingerprint::{Fingerprint, fingerprint};
+use crate::logs::groups::Groups;
 use crate::logs::{Log, Piece};
 
 /// Blocks that are searched for a log's first sector: what is read at once.
@@ -21,6 +24,8 @@ pub struct Sessions {
     again: BTreeMap<String, String>,
     /// The numbers of all logs of each card, also of those without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
+    /// By card and number: the number of the session whose file the recorder had begun to write anew under this one.
+    begun_anew: BTreeMap<(String, u32), u32>,
 }
 
 impl Sessions {
@@ -29,10 +34,13 @@ impl Sessions {
         let mut all: BTreeMap<_, Vec<(u32, u32)>> = BTreeMap::new();
         let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
         let mut numbers: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
+        let mut oldest: BTreeMap<&str, (u32, &Log)> = BTreeMap::new();
         for (name, log) in logs {
             let (card, number) = place(name);
             if let Some(number) = number {
                 numbers.entry(card.to_owned()).or_default().insert(number);
+                let oldest = oldest.entry(card).or_insert((number, log));
+                *oldest = if number < oldest.0 { (number, log) } else { *oldest };
             }
             let Some(first) = first_sector(log) else { continue };
             alike.entry(first.session).or_default().push(Candidate { name, card, number, log });
@@ -41,7 +49,25 @@ impl Sessions {
             }
         }
         let again = alike.into_values().flat_map(copies).collect();
-        Self { logs: all, again, numbers }
+        let mut sessions = Self { logs: all, again, numbers, begun_anew: BTreeMap::new() };
+        for (card, (number, log)) in oldest {
+            if let Some((there, of)) = sessions.find_begun_anew(card, number, log) {
+                sessions.begun_anew.insert((card.to_owned(), there), of);
+            }
+        }
+        sessions
+    }
+
+    /// The number of the session that a log's file held when the recorder had begun to write it anew. A full card's oldest file
+    /// gets the next name before its first sector is written.
+    pub fn begun_anew(&self, name: &str) -> Option<u32> {
+        let (card, number) = place(name);
+        self.begun_anew_number(card, number?)
+    }
+
+    /// The same by card and number.
+    pub fn begun_anew_number(&self, card: &str, number: u32) -> Option<u32> {
+        self.begun_anew.get(&(card.to_owned(), number)).copied()
     }
 
     /// The name of the log of which this one is a copy, sector by sector, or a copy of one of its files: under a name that
@@ -81,9 +107,40 @@ impl Sessions {
         self.copy_of(name, first_sector(log)?.session)
     }
 
+    /// The number under which a card has what was its oldest log before this one, and the number that it had; `oldest` is the
+    /// lowest number that is there. What is left of it is older than the oldest log: it begins before that one in the same
+    /// power-on, or the oldest log names it as the session before. Its new name is the one after another log's.
+    fn find_begun_anew(&self, card: &str, oldest: u32, log: &Log) -> Option<(u32, u32)> {
+        let first = first_sector(log)?;
+        let of_session = self.of_session(card, first.session).iter();
+        let earlier = of_session.filter(|(_, number)| *number < first.number).map(|(there, _)| *there).next();
+        let (there, of) = if let Some(there) = earlier {
+            (there, oldest.checked_sub(1)?)
+        } else {
+            let before = before(log).filter(|before| before.number < oldest)?;
+            match self.of_session(card, before.session) {
+                [(there, _)] => (*there, before.number),
+                _ => return None,
+            }
+        };
+        (self.absent(card, there.checked_sub(2)?, there) == 0).then_some((there, of))
+    }
+
     fn of_session(&self, card: &str, session: u32) -> &[(u32, u32)] {
         self.logs.get(&(card.to_owned(), session)).map_or(&[], Vec::as_slice)
     }
+}
+
+/// The session before a log on its card and how it ended, where the beginning of the log tells that.
+fn before(log: &Log) -> Option<Before> {
+    let mut groups = Groups::new(log);
+    let end_of = |boot: &Boot<'_>| Some(boot.before).filter(Before::has_end);
+    for _ in 0..HEADING_GROUPS {
+        if let Some(before) = find_boot(&groups.next_group().ok()??, end_of) {
+            return Some(before);
+        }
+    }
+    None
 }
 
 /// A log of a session of which others may be copies.

@@ -5,7 +5,7 @@ use hums_blackbox::Cause;
 use serde::Serialize;
 
 use crate::cli;
-use crate::ending::{BlocksJson, EndJson, PowerOn, SessionBefore, behind_words};
+use crate::ending::{BegunAnew, BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words};
 use crate::followed::Followed;
 use crate::info::json::images_json;
 use crate::logs::side_by_side::side_by_side;
@@ -14,7 +14,7 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path, word};
-use crate::sessions::Sessions;
+use crate::sessions::{Sessions, place};
 use crate::summary::Overview;
 
 /// Runs `hums verify`.
@@ -23,7 +23,7 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     for remark in &found.remarks {
         note!("{remark}");
     }
-    let (mut ok, mut logs) = (!found.is_cut(), 0_u64);
+    let (mut ok, mut logs, mut without_earlier) = (!found.is_cut(), 0_u64, WithoutEarlier::default());
     // The list is printed as it is made: a folder may have ten thousand logs.
     let begin = || output::JsonList::begin("images", &images_json(&found.images), "logs");
     let mut list = args.json.then(begin).transpose()?;
@@ -42,23 +42,55 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         ok &= log.ok;
         worst = worst.max(log.verdict);
         logs += u64::from(overview.ending.is_counted());
+        if overview.ending.is_without_earlier() {
+            without_earlier.add(&overview.ending.name);
+        }
         if let Some(list) = &mut list {
             return list.element(&log);
         }
         let files = overview.ending.files.join(", ");
         output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
         print(&log.checks)?;
-        let words = overview.ending.again().or_else(|| overview.ending.left_over_words());
-        words.map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
+        overview.ending.aside().map_or(Ok(()), |words| output::line(&format!("  {}", word(&words))))
     })?;
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
         let logs = count(logs, "session");
         let worst = if ok { worst } else { Verdict::NotProved };
-        output::line(&format!("{logs}: {}", worst.words()))?;
+        output::line(&format!("{logs}: {}", without_earlier.verdict(worst)))?;
     }
     Ok(Outcome::lossy(!ok))
+}
+
+/// The first log of each card of which those before it were not read: the first one's name, and how many more there are.
+#[derive(Default)]
+struct WithoutEarlier {
+    first: Option<String>,
+    more: u64,
+    card: Option<String>,
+}
+
+impl WithoutEarlier {
+    fn add(&mut self, log: &str) {
+        let (card, _) = place(log);
+        if self.card.as_deref() != Some(card) {
+            self.more += u64::from(self.first.is_some());
+            self.card = Some(card.to_owned());
+            self.first.get_or_insert_with(|| log.to_owned());
+        }
+    }
+
+    /// What is said of all logs: no more than of those that were read.
+    fn verdict(&self, worst: Verdict) -> String {
+        let Some(first) = &self.first else { return worst.words().to_owned() };
+        let words = if worst == Verdict::Holds { "all that was read holds" } else { worst.words() };
+        let more = match self.more {
+            0 => String::new(),
+            more => format!(" and before {}", count(more, "more log")),
+        };
+        format!("{words}; the logs before {}{more} were not read", word(first))
+    }
 }
 
 /// Reads all logs that were found through, and hands each on in their order, with what the others tell of it.
@@ -122,6 +154,8 @@ struct LogJson {
     left_over: bool,
     /// What is known of its end.
     end: EndJson,
+    /// The number of the session that its file held when the recorder had just begun to write it anew.
+    begun_anew: Option<u32>,
     /// All blocks of its files.
     blocks: BlocksJson,
     checks: Vec<Check>,
@@ -190,9 +224,11 @@ impl LogJson {
         ];
         checks.extend(ends(log));
         let copy_of = ending.again.clone();
-        let is_told_only = copy_of.is_some() || ending.left_over;
+        let is_told_only = ending.aside().is_some();
         if is_told_only {
             checks.clear();
+        } else if let Some(anew) = ending.begun_anew {
+            checks = vec![check("files", ending.files.len() as u64, 1, anew.words())];
         }
         let ok = checks.iter().all(|check| check.failed == 0) && ending.is_proved();
         let end = EndJson::new(ending);
@@ -203,8 +239,8 @@ impl LogJson {
             (false, _) => Verdict::NotProved,
         };
         let (name, closed) = (ending.name.clone(), summary.closed);
-        let left_over = ending.left_over;
-        Self { name, ok, closed, copy_of, left_over, end, blocks, checks, verdict }
+        let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew: BegunAnew| anew.of));
+        Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
     }
 }
 
@@ -220,6 +256,8 @@ fn ends(log: &Overview) -> [Check; 6] {
         (words, false) => format!("behind its last sector: {words}"),
         (words, true) => format!("behind its last sector: {words}; some are of a session that began later"),
     };
+    let among = among_words(summary);
+    let among = if among.is_empty() { among } else { format!("; before it: {among}") };
     let gone = ending.before.gone();
     let (before_checked, before_failed) = match ending.before {
         SessionBefore::NotNamed | SessionBefore::NotLookedFor(_) => (0, 0),
@@ -241,7 +279,7 @@ fn ends(log: &Overview) -> [Check; 6] {
         check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, twice),
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
-        check("end", 1, u64::from(!holds), format!("{}; {behind}", ending.words())),
+        check("end", 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
         check("session before", before_checked, before_failed, before),
         power_on(ending.power_on),
     ]

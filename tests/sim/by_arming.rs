@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use hums_blackbox::Sector;
 use hums_tests::fat;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::{self, Frame};
@@ -297,6 +298,38 @@ impl PowerOn {
         [&one[..one.len() - 1], &[(path.clone(), joined)], two, three].concat()
     }
 
+    /// A file joined to another one, and what is said of it: of another card, whose numbers go on, behind a log that ended in
+    /// order and behind a file that is not its last one; and of the same power-on, between two of a log's files.
+    fn joined_within(&self) -> Vec<(Vec<Segment>, &'static str)> {
+        let [one, two, three] = &self.logs;
+        let foreign = |(_, bytes): &Segment| {
+            let sectors = bytes.as_chunks::<SECTOR>().0.iter().map(|sector| {
+                let mut sector = Sector::from_bytes(*sector);
+                sector.seal(7);
+                *sector.bytes()
+            });
+            sectors.flatten().collect::<Vec<u8>>()
+        };
+        let with = |file: usize, behind: &[u8]| {
+            let mut files = one.clone();
+            files[file].1.extend(behind);
+            [&files[..], two, three].concat()
+        };
+        let (last, other) = (one.len() - 1, foreign(&three[0]));
+        let longest = (0..last).max_by_key(|file| one[*file].1.len()).unwrap();
+        let sectors = one.iter().map(|(_, bytes)| bytes.len() / SECTOR).collect::<Vec<_>>();
+        assert!(sectors[longest] > 4 && sectors[last] > 4, "the recording is another one: {sectors:?}");
+        let words = "are of another session (session 00000007): logs were joined into one file";
+        vec![
+            (with(last, &other), words),
+            (with(longest, &other), words),
+            (
+                with(longest, &three[0].1),
+                "of another file of the same power-on: logs were joined into one file",
+            ),
+        ]
+    }
+
     /// Files under other names, and what is said of them.
     fn renamed(&self) -> Vec<(Vec<Segment>, &'static str)> {
         let [one, two, three] = &self.logs;
@@ -373,10 +406,30 @@ fn what_is_taken_from_the_logs_of_one_power_on_or_mixed_up_is_told() {
     // What is joined is read once: from its own file.
     power_on.put(&power_on.joined());
     let said = readers(folder, 3);
-    assert!(said.contains("of a later log of the same power-on: logs were joined into one file"), "{said}");
+    assert!(said.contains("of another file of the same power-on: logs were joined into one file"), "{said}");
     assert_eq!(power_on.frames(3), frames);
 
-    for (nth, (files, words)) in power_on.renamed().into_iter().chain(power_on.damaged()).enumerate() {
+    // A full card's oldest file was given the next name, and power went before anything was written into it.
+    power_on
+        .put(&[&two[..], three, &[(folder.join("00004_00.HUM"), one.last().unwrap().1.clone())]].concat());
+    let said = readers(folder, 3);
+    assert!(
+        said.contains("begun to write this file anew when power went: what is in it is session 00001"),
+        "{said}"
+    );
+    assert!(!said.contains("renamed, exchanged or copied"), "{said}");
+    let page = folder.with_extension("html");
+    let said =
+        hums(["report".as_ref(), folder.as_os_str(), "-o".as_ref(), page.as_os_str()]).expect_code(&[3]);
+    assert!(said.text().contains("session 00003"), "{}", said.text());
+
+    let joined = power_on.joined_within();
+    for (nth, (files, _)) in joined.iter().enumerate() {
+        power_on.put(files);
+        assert_eq!(power_on.frames(3), frames, "joined {nth}");
+    }
+    let others = power_on.renamed().into_iter().chain(power_on.damaged());
+    for (nth, (files, words)) in others.chain(joined).enumerate() {
         power_on.put(&files);
         let said = verified(folder, 3, &format!("case {nth}: {words}"));
         assert!(said.contains(words), "case {nth}, {words}: {said}");

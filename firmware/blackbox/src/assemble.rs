@@ -32,8 +32,11 @@ pub struct BlockCounts {
     pub misplaced: u64,
     /// Blocks of this session, as far as can be told, that fail their check: torn or damaged.
     pub damaged: u64,
-    /// Sectors of another session, sound or not: left over from an earlier file.
+    /// Sound sectors of another session: left over from an earlier file.
     pub stale: u64,
+    /// Blocks that begin as a sector and fail the check of one, and are not of this session as far as can be told: of an
+    /// older one, or of none.
+    pub unsound: u64,
     /// All zeros.
     pub empty: u64,
     /// All ones: erased.
@@ -55,6 +58,7 @@ impl BlockCounts {
             misplaced: self.misplaced - before.misplaced,
             damaged: self.damaged - before.damaged,
             stale: self.stale - before.stale,
+            unsound: self.unsound - before.unsound,
             empty: self.empty - before.empty,
             erased: self.erased - before.erased,
             foreign: self.foreign - before.foreign,
@@ -153,6 +157,11 @@ impl Assembler {
     pub const fn skip_empty(&mut self) {
         self.counts.blocks += 1;
         self.counts.empty += 1;
+    }
+
+    /// Takes a block that belongs to another file, which counts among all blocks only.
+    pub const fn pass_over(&mut self) {
+        self.counts.blocks += 1;
     }
 
     /// The next sector that is known to be in order and the fullest of its number; `None`: feed the next block.
@@ -349,7 +358,7 @@ impl Assembler {
                 if is_own {
                     self.counts.damaged += 1;
                 } else {
-                    self.counts.stale += 1;
+                    self.counts.unsound += 1;
                 }
                 self.bad_blocks = self.bad_blocks.saturating_add(1);
             }

@@ -25,8 +25,8 @@ impl Checked {
         let is_empty = self.ending.as_ref().is_some_and(|ending| ending.summary.session.is_none());
         // Too little to judge is no damage: it is said, and what was judged counts.
         let nobody = self.judged.worst().is_none() && !is_empty;
-        let is_copy = self.ending.as_ref().is_some_and(|ending| ending.again.is_some());
-        let lossy = !is_copy && (self.judged.damages > 0 || nobody || !self.unproved().is_empty());
+        let lossy =
+            self.aside().is_none() && (self.judged.damages > 0 || nobody || !self.unproved().is_empty());
         Outcome::lossy(lossy).and(if wrong { Outcome::Findings } else { Outcome::Done })
     }
 
@@ -35,8 +35,8 @@ impl Checked {
         self.ending.as_ref().map_or_else(Vec::new, Ending::unproved)
     }
 
-    /// That it is a mere copy of a log that was read too, as a part of a sentence.
-    pub fn again(&self) -> Option<String> {
-        self.ending.as_ref().and_then(Ending::again)
+    /// What it is, where its losses do not count: see [`Ending::aside`].
+    pub fn aside(&self) -> Option<String> {
+        self.ending.as_ref().and_then(Ending::aside)
     }
 }

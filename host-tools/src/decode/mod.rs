@@ -54,7 +54,7 @@ use hums_core::time::Instant;
 
 use crate::cli;
 use crate::ending::Ending;
-use crate::files::{Folder, Inputs, appended, check_parent, says_directory};
+use crate::files::{Folder, Inputs, appended, check_parent, means_standard_output, says_directory};
 use crate::followed::{Followed, Logged};
 use crate::logs::reader::{self, Summary};
 use crate::logs::side_by_side::side_by_side;
@@ -138,7 +138,7 @@ const FILE_NAMES: [&str; 5] = ["tlog", "jsonl", "lp", "csv", "parquet"];
 /// Whether the output is standard output; an error where what is asked for does not go there, or into the file that it
 /// names.
 fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<bool> {
-    let standard_output = args.output == Path::new("-");
+    let standard_output = means_standard_output(&args.output);
     if standard_output && (logs != 1 || !formats.is_single_file()) {
         let why = match logs {
             1 => "these formats are more than that".to_owned(),
@@ -209,14 +209,7 @@ impl Done {
         for remark in &self.remarks {
             note!("{remark}");
         }
-        let said = |ending: &Ending| {
-            ending
-                .again()
-                .into_iter()
-                .chain(ending.left_over_words())
-                .chain(ending.unproved())
-                .collect::<Vec<_>>()
-        };
+        let said = |ending: &Ending| ending.aside().into_iter().chain(ending.unproved()).collect::<Vec<_>>();
         for why in self.ending.iter().flat_map(said) {
             note!("{}: {why}", self.name);
         }

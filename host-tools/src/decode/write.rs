@@ -1,6 +1,6 @@
 //! The files of the output formats.
 
-use std::io::{BufWriter, Write};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -20,7 +20,6 @@ use super::thesis::Thesis;
 use crate::files::{Folder, Kind, Origin, Output, appended, make_parent, settle};
 use crate::logs::reader::Deliver;
 use crate::made;
-use crate::output::Stdout;
 use crate::plural::count;
 
 /// A table of gaps beside a tlog.
@@ -31,47 +30,28 @@ const GAPS: Kind = Kind {
 };
 
 /// A single file, open.
-enum Single {
-    Standard(BufWriter<Stdout>),
-    File(Output),
-}
+struct Single(Output);
 
 impl Single {
     fn open(destination: &Destination, extension: &str, context: &Context, kind: &Kind) -> Result<Self> {
-        match destination.path(extension) {
-            None => {
-                context.inputs.refuse_standard_output()?;
-                Ok(Self::Standard(BufWriter::new(Stdout::new())))
-            }
-            Some(path) => Self::file(&path, context, kind),
-        }
+        let path = destination.path(extension);
+        Self::file(path.as_deref().unwrap_or(Path::new("-")), context, kind)
     }
 
     fn file(path: &Path, context: &Context, kind: &Kind) -> Result<Self> {
         context.inputs.refuse(path)?;
         make_parent(path)?;
-        Ok(Self::File(Output::create(path, &context.inputs, kind, context.of.as_deref())?))
+        Ok(Self(Output::create(path, &context.inputs, kind, context.of.as_deref())?))
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
-        match self {
-            Self::Standard(out) => settle(out.write_all(bytes), Path::new("standard output")),
-            Self::File(file) => settle(file.write_all(bytes), file.path()),
-        }
+        settle(self.0.write_all(bytes), self.0.path())
     }
 
     /// All of it is there; gives its name.
-    fn finish(self) -> Result<PathBuf> {
-        match self {
-            Self::Standard(mut out) => {
-                settle(out.flush(), Path::new("standard output"))?;
-                Ok(PathBuf::from("standard output"))
-            }
-            Self::File(mut file) => {
-                file.finish()?;
-                Ok(file.path().to_owned())
-            }
-        }
+    fn finish(mut self) -> Result<PathBuf> {
+        self.0.finish()?;
+        Ok(self.0.path().to_owned())
     }
 }
 

@@ -4,6 +4,10 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use anyhow::Result;
+
+use crate::outcome::usage;
+
 /// A file's identity.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FileId {
@@ -138,20 +142,65 @@ fn linked(path: &Path) -> io::Result<PathBuf> {
     Ok(path.parent().unwrap_or(Path::new("")).join(to))
 }
 
-/// Whether a path means something that this process has open, as `/dev/stdout` and `/dev/fd/3` do: what the shell opened,
-/// also where that is a regular file. What is only spelled through `/proc` is none: `/proc/self/cwd/FILE` is a file.
-pub(super) fn is_descriptor(path: &Path) -> bool {
+/// The number of what this process has open, where a path means that, as `/dev/stdout` and `/dev/fd/3` do: what the shell
+/// opened, also where that is a regular file. What is only spelled through `/proc` is none: `/proc/self/cwd/FILE` is a file.
+pub(super) fn descriptor(path: &Path) -> Option<u32> {
     let mut path = path.to_owned();
     for _ in 0..LINKS_MAX {
         if path.parent().is_some_and(is_own_descriptors) {
-            return true;
+            return path.file_name()?.to_str()?.parse().ok();
         }
-        match linked(&path) {
-            Ok(to) => path = to,
-            Err(_) => return false,
-        }
+        path = linked(&path).ok()?;
     }
-    false
+    None
+}
+
+/// The descriptor of standard output.
+const STANDARD_OUTPUT: u32 = 1;
+
+/// Whether a path means standard output: `-` does, and `/dev/stdout`.
+pub fn means_standard_output(path: &Path) -> bool {
+    path == Path::new("-") || descriptor(path) == Some(STANDARD_OUTPUT)
+}
+
+/// Refuses to write to a file that is open and has bytes where it would be written: somebody opened it without emptying
+/// it (`1<>FILE`), and it is not ours to overwrite. What is open to append is appended to.
+pub(super) fn refuse_overwriting(number: u32) -> Result<()> {
+    // Only Linux tells; elsewhere no path means a descriptor.
+    let place = PathBuf::from(format!("/proc/self/fd/{number}"));
+    let about = fs::metadata(&place).ok().filter(fs::Metadata::is_file);
+    let open = fs::read_to_string(format!("/proc/self/fdinfo/{number}")).ok();
+    let Some((about, open)) = about.zip(open) else { return Ok(()) };
+    let field = |name: &str| open.lines().find_map(|line| line.strip_prefix(name)).map(str::trim);
+    let at = field("pos:").and_then(|at| at.parse().ok()).unwrap_or(0_u64);
+    let flags = field("flags:").and_then(|flags| u32::from_str_radix(flags, 8).ok()).unwrap_or(0);
+    if appends(flags) || at >= about.len() {
+        return Ok(());
+    }
+    let which =
+        if number == STANDARD_OUTPUT { "standard output".to_owned() } else { format!("descriptor {number}") };
+    let file = fs::read_link(&place).unwrap_or(place);
+    Err(usage(format!(
+        "{which}: goes into {}, which has something in it where it would be written; nothing was written; open it with > \
+         or >>",
+        file.display()
+    )))
+}
+
+/// Refuses a standard output that would be written over what is there.
+pub fn check_standard_output() -> Result<()> {
+    refuse_overwriting(STANDARD_OUTPUT)
+}
+
+/// Whether what is open with these flags is written at its end.
+#[cfg(unix)]
+fn appends(flags: u32) -> bool {
+    flags & rustix::fs::OFlags::APPEND.bits() != 0
+}
+
+#[cfg(not(unix))]
+const fn appends(_: u32) -> bool {
+    true
 }
 
 /// Whether a folder is the one of this process's descriptors: `/proc/PID/fd`, or a thread's, `/proc/PID/task/TID/fd`.

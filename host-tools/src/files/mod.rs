@@ -1,7 +1,8 @@
 //! The files that commands write. [`Output`] and [`Folder`] are the only things in this program that make, empty or
 //! rename files of the user's. They never touch an input ([`Inputs`]). A file that is there is never replaced by other
 //! content, unless the user says `--replace`; then it is the old one or the whole new one, whatever happens while it
-//! is written.
+//! is written. What somebody opened for us (standard output, which `-` means, or `/dev/fd/3`) is written as it is, and
+//! never over bytes that are in it.
 //!
 //! Two kinds of files are updated in place by design and are not made here: a simulated card's image (`--sd`) and the
 //! simulated board's flash (`--store`). A test in `host-tools/tests/cli/inputs.rs` holds every other file to this module.
@@ -19,7 +20,7 @@ mod there;
 
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
-pub use identity::FileId;
+pub use identity::{FileId, check_standard_output, means_standard_output};
 pub use inputs::Inputs;
 pub use kind::{Kind, Origin};
 pub use output::Output;

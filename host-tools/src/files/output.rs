@@ -6,13 +6,17 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::identity::{is_descriptor, is_standard_output, without_links};
+use super::identity::{
+    check_standard_output, descriptor, is_standard_output, means_standard_output, refuse_overwriting,
+    without_links,
+};
 use super::inputs::Inputs;
 use super::kind::{Found, Kind, Origin};
 use super::part::{lock, lock_folder_of, remove_stale, rename_new, sync_folder_of};
 use super::paths::{aside_of, begun_of, cannot_write, part_of, settle};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
+use crate::output::Stdout;
 
 /// Room for a group's lines of a busy message.
 const BUFFER_BYTES: usize = 16 * 1024;
@@ -22,7 +26,7 @@ const BUFFER_BYTES: usize = 16 * 1024;
 ///
 /// A file that is there and has a byte in it is never replaced by other content, unless the user says so: what is
 /// written is compared with it, and the first byte that differs is an error ([`Differs`]). What is no regular file (a
-/// FIFO, `/dev/null`, `/dev/stdout`) is written as it is.
+/// FIFO, `/dev/null`) and what somebody opened for us (`-`, `/dev/stdout`, `/dev/fd/3`) is written as it is.
 #[derive(Debug)]
 pub struct Output {
     to: BufWriter<To>,
@@ -36,6 +40,7 @@ pub struct Output {
 enum To {
     File(File),
     There(There),
+    Standard(Stdout),
 }
 
 /// What becomes the file when it is whole.
@@ -68,6 +73,9 @@ impl Output {
     /// Begins a file, which is none of the inputs. Its folder must be there. `kind` is what the command makes, `of` the log
     /// that it makes it of, where that has a name.
     pub fn create(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Self> {
+        if means_standard_output(path) {
+            return Self::standard(path, inputs);
+        }
         match Part::of(path, inputs, kind, of)? {
             Place::Free(part) => Self::begin(path, part),
             Place::Taken => {
@@ -82,6 +90,9 @@ impl Output {
     /// Refuses a file that is there with something in it: for what a run makes beside changing something else, where
     /// comparing would come too late.
     pub fn check_new(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<()> {
+        if means_standard_output(path) {
+            return inputs.refuse_standard_output();
+        }
         match Part::of(path, inputs, kind, None)? {
             Place::Taken if matches!(kind.origin, Origin::Unknown) => Err(Differs::original(path).into()),
             Place::Taken => Err(Differs::new(path).into()),
@@ -96,7 +107,7 @@ impl Output {
         let target = without_links(path).with_context(|| cannot_write(path))?;
         if let Ok(about) = fs::metadata(path) {
             check(path, &about)?;
-            if !about.is_file() || is_descriptor(path) {
+            if !about.is_file() || descriptor(path).is_some() {
                 bail!("{}: is no regular file, and what was begun cannot go on in it", path.display());
             }
         }
@@ -145,8 +156,17 @@ impl Output {
         Ok(Self::new(To::File(file), path, Some(part)))
     }
 
+    fn standard(path: &Path, inputs: &Inputs) -> Result<Self> {
+        inputs.refuse_standard_output()?;
+        check_standard_output()?;
+        // The results that the command prints are not to stand in what it makes.
+        crate::output::leave_standard_output();
+        Ok(Self::new(To::Standard(Stdout::new()), path, None))
+    }
+
     /// What is no regular file is written as it is. Appending does no harm where it leads to a regular file after all.
     fn direct(path: &Path) -> Result<Self> {
+        descriptor(path).map_or(Ok(()), refuse_overwriting)?;
         let file = File::options().append(true).open(path).with_context(|| cannot_write(path))?;
         // The results that the command prints are not to stand in what it makes.
         if is_standard_output(&file) {
@@ -169,7 +189,7 @@ impl Output {
     pub fn begin_anew(&mut self) -> Result<()> {
         let emptied = self.to.flush().and_then(|()| match self.to.get_ref() {
             To::File(file) => file.set_len(0),
-            To::There(_) => Ok(()),
+            To::There(_) | To::Standard(_) => Ok(()),
         });
         settle(emptied, &self.path)
     }
@@ -180,6 +200,7 @@ impl Output {
         let file = match self.to.get_mut() {
             To::There(there) => return settle(there.end(), &self.path),
             To::File(file) => file,
+            To::Standard(_) => return Ok(()),
         };
         let Some(part) = self.part.take() else { return Ok(()) };
         let placed = file.sync_all().and_then(|()| part.place(file));
@@ -219,6 +240,7 @@ impl Write for To {
         match self {
             Self::File(file) => file.write(bytes),
             Self::There(there) => there.compare(bytes).map(|()| bytes.len()),
+            Self::Standard(out) => out.write(bytes),
         }
     }
 
@@ -226,6 +248,7 @@ impl Write for To {
         match self {
             Self::File(file) => file.flush(),
             Self::There(_) => Ok(()),
+            Self::Standard(out) => out.flush(),
         }
     }
 }
@@ -256,7 +279,7 @@ impl Part {
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
         check(path, &about)?;
-        if !about.is_file() || is_descriptor(path) {
+        if !about.is_file() || descriptor(path).is_some() {
             return Ok(Place::Stream);
         }
         if about.len() > 0 {

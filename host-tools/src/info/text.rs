@@ -11,7 +11,7 @@ use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
 use super::wear;
-use crate::ending::behind_words;
+use crate::ending::{BegunAnew, among_words, behind_words};
 use crate::logs;
 use crate::plural::count;
 use crate::printable::{path, word};
@@ -98,12 +98,13 @@ fn heading(text: &mut String, log: &Overview) {
 fn ending(text: &mut String, log: &Overview) {
     let (ending, summary) = (&log.ending, &log.ending.summary);
     let _ = writeln!(text, "  end      {}", ending.words());
-    if let Some(words) = ending.again() {
-        let _ = writeln!(text, "  copy     {words}");
-    }
     let behind = behind_words(&summary.behind);
     if !behind.is_empty() {
         let _ = writeln!(text, "  behind   {behind}");
+    }
+    let among = among_words(summary);
+    if !among.is_empty() {
+        let _ = writeln!(text, "  among    {among}");
     }
     if ending.has_newer() {
         text.push_str("           some of them are of a session that began later: two logs are mixed here\n");
@@ -111,7 +112,8 @@ fn ending(text: &mut String, log: &Overview) {
     if let Some(gone) = ending.before.gone() {
         let _ = writeln!(text, "  before   {gone}");
     }
-    for words in ending.left_over_words().into_iter().chain(ending.power_on.wrong()) {
+    let anew = ending.begun_anew.map(BegunAnew::words);
+    for words in ending.aside().or(anew).into_iter().chain(ending.power_on.wrong()) {
         let _ = writeln!(text, "  place    {words}");
     }
     for strange in ending.noise().into_iter().chain(ending.strange()) {

@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 
 use anyhow::Result;
-use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
+use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Step};
 
-use super::board::{HEADING_GROUPS, heading};
+use super::board::{Board, HEADING_GROUPS, heading};
+use super::joined::Joints;
 use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::strangers::{Strange, Strangers};
 
@@ -18,13 +19,32 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
-/// A later log of the same power-on, in the files of a log that ended in order.
+/// Who recorded the file that begins where `blocks` are, if one begins there.
+fn begins_here(blocks: &Blocks<'_>) -> Result<Option<Board>> {
+    let rest = blocks.from_here();
+    let mut groups = Groups { strangers: None, joints: None, ..Groups::new(&rest) };
+    for _ in 0..HEADING_GROUPS {
+        // What lies behind a gap is no part of what begins here.
+        let group = groups
+            .next_group()?
+            .filter(|group| group.first().is_some_and(|first| first.header.starts_group()));
+        let Some(group) = group else { break };
+        if let Some(board) = heading(&group) {
+            return Ok(Some(board));
+        }
+    }
+    Ok(None)
+}
+
+/// Another log of the same power-on in the files of a log, which is not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Joined {
     /// The number of its first sector.
     pub first: u32,
     /// How many sectors of it there are.
     pub sectors: u64,
+    /// It was joined to one of the files; otherwise it follows the log, which ended in order.
+    pub is_within: bool,
 }
 
 /// Streams a log's groups.
@@ -48,6 +68,8 @@ pub struct Groups<'a> {
     first: Option<[u8; BLOCK_BYTES]>,
     /// None where the sectors of a session were searched for on a card: their places tell nothing.
     strangers: Option<Strangers>,
+    /// The same.
+    joints: Option<Joints>,
 }
 
 impl<'a> Groups<'a> {
@@ -68,6 +90,7 @@ impl<'a> Groups<'a> {
             file: 0,
             first: None,
             strangers: log.session.is_none().then(|| Strangers::new(log.pieces.len())),
+            joints: log.session.is_none().then(Joints::default),
         }
     }
 
@@ -106,7 +129,8 @@ impl<'a> Groups<'a> {
             None => self.read_group()?,
         } {
             let first = group.first().map_or(0, |first| first.header.number);
-            self.joined.get_or_insert(Joined { first, sectors: 0 }).sectors += group.len() as u64;
+            let joined = Joined { first, sectors: 0, is_within: false };
+            self.joined.get_or_insert(joined).sectors += group.len() as u64;
         }
         Ok(())
     }
@@ -147,7 +171,7 @@ impl<'a> Groups<'a> {
                 self.foreign_at_end = 0;
                 self.assembler.skip_empty();
             }
-            Some(block) => self.feed(&block),
+            Some(block) => self.feed(&block)?,
             None => {
                 self.ended = true;
                 self.assembler.end();
@@ -156,18 +180,34 @@ impl<'a> Groups<'a> {
         Ok(())
     }
 
-    fn feed(&mut self, block: &[u8; BLOCK_BYTES]) {
+    fn feed(&mut self, block: &[u8; BLOCK_BYTES]) -> Result<()> {
+        let joined = match &mut self.joints {
+            Some(joints) => joints.look(self.blocks.place(), block, || begins_here(&self.blocks))?,
+            None => None,
+        };
+        if joined.is_some()
+            && let Ok(header) = Header::read(block)
+            && Some(header.session) == self.assembler.session()
+        {
+            let joined = Joined { first: header.number, sectors: 0, is_within: true };
+            self.joined.get_or_insert(joined).sectors += 1;
+            self.assembler.pass_over();
+            return Ok(());
+        }
         let before = self.assembler.counts();
         self.assembler.feed(block);
         let seen = self.assembler.counts().since(&before);
         self.foreign_at_end = if seen.foreign > 0 { self.foreign_at_end + 1 } else { 0 };
-        let Some(strangers) = &mut self.strangers else { return };
+        let Some(strangers) = &mut self.strangers else { return Ok(()) };
         let (file, at) = self.blocks.place();
         match seen {
-            BlockCounts { stale: 1.., .. } => strangers.other(file, at, block),
-            BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, .. } => strangers.own(file, block),
+            BlockCounts { stale: 1.., .. } => strangers.other(file, at, block, joined),
+            BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, unsound: 0, .. } => {
+                strangers.own(file, block);
+            }
             _ => {}
         }
+        Ok(())
     }
 
     /// What of its files is not the log's, once all is read; `first` is the number of its first sector.

@@ -35,23 +35,24 @@ pub(super) struct Late {
     pub(super) is_renamed: bool,
 }
 
-/// `None` where the log begins with its session, or its first group does not say that only the last while is kept.
+/// `None` where the log begins with its session in a file of that name, or its first group does not say that only the last while is kept.
 pub(super) fn late(log: &Log) -> Result<Option<Late>> {
     let mut groups = Groups::new(log);
     let Some(group) = groups.next_group()? else { return Ok(None) };
     let first = group.first().map(|step| step.header);
     let segment = log.first_segment();
     let Some(first) = first.filter(Header::starts_group) else { return Ok(None) };
-    if first.number == 0 && segment.is_none_or(|segment| segment == 0) {
-        return Ok(None);
+    let is_further = segment.is_some_and(|segment| segment > 0);
+    if first.number == 0 {
+        return Ok(is_further.then_some(Late { from: 0, is_wanted: true, is_renamed: true }));
     }
     let mut seen = Seen::default();
     seen.take(&group);
     let Some(keep) = seen.keep.filter(|keep| keep.from <= first.number) else { return Ok(None) };
     let late = |is_wanted| Some(Late { from: keep.from, is_wanted, is_renamed: false });
     let lacks_none = keep.from == first.number;
-    if log.session.is_some() || (lacks_none && segment.is_none_or(|segment| segment == 0)) {
-        return Ok(late(true));
+    if log.session.is_some() || lacks_none {
+        return Ok(Some(Late { from: keep.from, is_wanted: true, is_renamed: is_further }));
     }
     if !begins_with(log, &first)? {
         return Ok(late(false));
@@ -62,11 +63,7 @@ pub(super) fn late(log: &Log) -> Result<Option<Late>> {
         // Of one file of another name nobody knows where others were begun.
         None => seen.go_on(&mut groups, |seen| seen.seconds() >= keep.seconds)?.seconds() >= keep.seconds,
     };
-    Ok(Some(Late {
-        from: keep.from,
-        is_wanted: is_wanted || lacks_none,
-        is_renamed: lacks_none && !is_wanted,
-    }))
+    Ok(late(is_wanted))
 }
 
 /// Whether the ring gave away a file before the first one that is left.

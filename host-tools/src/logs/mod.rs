@@ -13,6 +13,7 @@ mod folder;
 mod found;
 pub mod groups;
 pub mod in_order;
+mod joined;
 mod late;
 mod look;
 mod marks;

@@ -104,6 +104,28 @@ impl Blocks<'_> {
         (self.piece, (self.begun + self.at as u64).saturating_sub(1) / BLOCK_BYTES as u64)
     }
 
+    /// The same file from the last block on, as a log of its own.
+    pub fn from_here(&self) -> Log {
+        let (piece, at) = self.place();
+        let mut skipped = at * BLOCK_BYTES as u64;
+        let rest = |extent: &Extent| {
+            let less = skipped.min(extent.length);
+            skipped -= less;
+            Extent { start: extent.start + less, length: extent.length - less }
+        };
+        let pieces = self.log.pieces.get(piece).map(|piece| Piece {
+            path: piece.path.clone(),
+            extents: piece.extents.iter().map(rest).filter(|extent| extent.length > 0).collect(),
+        });
+        Log {
+            name: String::new(),
+            files: Vec::new(),
+            pieces: pieces.into_iter().collect(),
+            session: None,
+            left_over: false,
+        }
+    }
+
     fn refill(&mut self) -> Result<bool> {
         loop {
             let Some(piece) = self.log.pieces.get(self.piece) else { return Ok(false) };

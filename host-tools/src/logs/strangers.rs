@@ -4,11 +4,12 @@
 //! The recorder writes a file from its beginning, so the first sector of a file is at block 0, and the sector at block `n`
 //! has at least the number `n`; a copy of a sector in progress may lie one block further. When the file is recycled, that
 //! is still so of what is left of the older session behind the newer one. A sector with a lower number did not come there
-//! that way: logs were joined into one file, or the file was made where a deleted log lay.
+//! that way: logs were joined into one file, or the file was made where a deleted log lay. Nor did sectors with which a
+//! file of a log begins, behind a file's beginning: the record of who records stands there (`joined`).
 
 use hums_blackbox::{Header, SECTOR_BYTES, Sector, Step};
 
-use super::board::board_of;
+use super::board::{Board, board_of};
 
 /// A file of which something is to be told.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,20 +36,26 @@ pub struct Others {
     /// The session of the first one.
     pub session: u32,
     /// The unique id of the box that recorded it, where its first sector is there.
-    pub board: Option<[u8; 12]>,
+    pub board: Option<Board>,
     /// There are sectors of further sessions.
     pub several: bool,
 }
 
 impl Others {
-    fn add(all: &mut Option<Self>, at: u64, header: &Header, block: &[u8; SECTOR_BYTES]) {
+    fn add(
+        all: &mut Option<Self>,
+        at: u64,
+        header: &Header,
+        block: &[u8; SECTOR_BYTES],
+        board: Option<Board>,
+    ) {
         let session = header.session;
-        let new = Self { sectors: 0, first: at, last: at, session, board: None, several: false };
+        let new = Self { sectors: 0, first: at, last: at, session, board, several: false };
         let others = all.get_or_insert(new);
         others.sectors += 1;
         others.last = at;
         others.several |= session != others.session;
-        if header.number == 0 && others.first == at {
+        if header.number == 0 && others.first == at && board.is_none() {
             let sector = Sector::from_bytes(*block);
             others.board = board_of(&[Step { header: *header, sector, missing: 0, damaged: 0 }]);
         }
@@ -83,14 +90,16 @@ impl Strangers {
         }
     }
 
-    /// This block of a file is a sector of another session, if it is sound.
-    pub(super) fn other(&mut self, file: usize, at: u64, block: &[u8; SECTOR_BYTES]) {
+    /// This block of a file is a sector of another session, if it is sound; `joined` where another file was joined to this one
+    /// before it.
+    pub(super) fn other(&mut self, file: usize, at: u64, block: &[u8; SECTOR_BYTES], joined: Option<Board>) {
         let (Some(file), Ok(header)) = (self.files.get_mut(file), Header::read(block)) else { return };
         if file.own.is_none() {
-            Others::add(&mut file.others, at, &header, block);
+            Others::add(&mut file.others, at, &header, block, None);
         }
-        if u64::from(header.number) + u64::from(header.partial) < at {
-            Others::add(&mut file.misplaced, at, &header, block);
+        if joined.is_some() || u64::from(header.number) + u64::from(header.partial) < at {
+            let board = joined.filter(|board| *board != [0; 12]);
+            Others::add(&mut file.misplaced, at, &header, block, board);
         }
     }
 

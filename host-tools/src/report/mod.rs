@@ -35,6 +35,7 @@ use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path as shown, word};
+use crate::sessions::Sessions;
 use crate::source::recording::{Place, find, sessions_of};
 use crate::summary::Overview;
 
@@ -52,7 +53,8 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     if let Some(place) = found.places.iter().find(|place| place.is_standard()) {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
-    let wanted = wanted(args, &found.places)?;
+    let sessions = sessions_of(&found.places);
+    let wanted = wanted(args, &found.places, &sessions)?;
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).replacing(args.replace);
     inputs.refuse(&args.output)?;
     // Of each session only what later ones are compared with is kept.
@@ -60,7 +62,7 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
     let mut kept = Kept::default();
     // The next start on the card tells how a session ended.
     let end = found.places.len().min(*wanted.sessions.end() + 1 + HELD_MAX);
-    let mut followed = Followed::new(sessions_of(&found.places));
+    let mut followed = Followed::new(sessions);
     let mut names = Names::default();
     let mut done = |overview: Overview| {
         let (index, this) = (earlier.len(), trend::Session::of(&overview));
@@ -88,12 +90,13 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
             }
         }
         // Also of the sessions before, which the page compares with, and of those that were read for its end.
-        for why in overview.ending.again().into_iter().chain(overview.unproved()) {
+        for why in overview.ending.aside().into_iter().chain(overview.unproved()) {
             note!("{}: {why}", overview.ending.name);
         }
         outcome = outcome.and(Outcome::lossy(!overview.is_proved()));
-        // A session that is there twice counts once.
-        earlier.push(overview.ending.is_counted().then_some(this));
+        // A session that is there twice counts once, and what a file held before is older than its name says.
+        let counts = overview.ending.is_counted() && overview.ending.begun_anew.is_none();
+        earlier.push(counts.then_some(this));
         Ok(())
     };
     side_by_side(found.places.get(..end).unwrap_or_default(), check::overview, |overview| {
@@ -152,7 +155,7 @@ struct Wanted {
     directory: bool,
 }
 
-fn wanted(args: &cli::Report, logs: &[Place]) -> Result<Wanted> {
+fn wanted(args: &cli::Report, logs: &[Place], sessions: &Sessions) -> Result<Wanted> {
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
     };
@@ -169,7 +172,12 @@ fn wanted(args: &cli::Report, logs: &[Place]) -> Result<Wanted> {
             index..=index
         }
         None if directory => 0..=last,
-        None => last..=last,
+        None => {
+            // What a file held that was to be written anew is not the last one, whatever its name says.
+            let is_own = |log: &Place| sessions.begun_anew(&log.name).is_none();
+            let last = logs.iter().rposition(is_own).unwrap_or(last);
+            last..=last
+        }
     };
     Ok(Wanted { sessions, output: args.output.clone(), directory })
 }

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::cli::Run;
 use crate::endpoint::Endpoint;
-use crate::files::{FileId, Inputs, Output};
+use crate::files::{FileId, Inputs, Output, means_standard_output};
 use crate::made;
 use crate::outcome::usage;
 
@@ -24,6 +24,9 @@ pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> 
         Some(Endpoint::File(path)) => Some(path.as_path()),
         _ => None,
     };
+    if run.gs == Some(Endpoint::Standard) && tap.is_some_and(means_standard_output) {
+        return Err(usage("--gs - and --tap - both want standard output; give one of them a file"));
+    }
     for output in gs.into_iter().chain(tap) {
         // A run also changes the card, so that it is too late to compare while it goes on.
         Output::check_new(output, &inputs, &made::RAW)?;

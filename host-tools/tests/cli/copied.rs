@@ -458,6 +458,19 @@ fn logs_that_were_renamed_or_exchanged_are_told_by_every_command() {
     assert!(said.contains("FAILED  session before     1 checked, 1 failed"), "{said}");
     fs::rename(at("00009_00.HUM"), at("00001_00.HUM")).expect("renamed");
     all_say(dir.path(), "copied", 0, &[]);
+    // The newest one under a number that is not the next one; a first file under the number of a further one.
+    for (one, other, words) in [
+        (
+            "00003_00.HUM",
+            "00099_00.HUM",
+            "it was recorded just after session 00002, so its number is not its own",
+        ),
+        ("00001_00.HUM", "00001_07.HUM", "00001_07.HUM begins as the first file of its log"),
+    ] {
+        fs::rename(at(one), at(other)).expect("renamed");
+        all_say(dir.path(), "copied", 3, &[words]);
+        fs::rename(at(other), at(one)).expect("renamed");
+    }
     // The oldest one and the newest one exchanged.
     fs::rename(at("00001_00.HUM"), at("other")).expect("renamed");
     fs::rename(at("00003_00.HUM"), at("00001_00.HUM")).expect("renamed");
@@ -494,6 +507,16 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     all_say(dir.path(), "copied", 3, &["1 block that is no sector"]);
     let said = text(&run(dir.path(), "verify copied", 3));
     assert!(said.contains("FAILED  end "), "{said}");
+    // The head of a sector makes none: what fails the check is of nobody.
+    let mut forged = log.clone();
+    forged[last * BLOCK..(last + 1) * BLOCK].iter_mut().enumerate().for_each(noise);
+    forged[last * BLOCK..][..2].copy_from_slice(&[0x48, 0xb1]);
+    fs::write(&path, forged).expect("written");
+    let said = text(&run(dir.path(), "verify copied", 3));
+    assert!(
+        said.contains("1 block with the head of a sector") && !said.contains("of another session"),
+        "{said}"
+    );
     // What a card held before the box used it, films for instance, goes on behind that, and is no finding.
     let mut film = log.clone();
     film[last * BLOCK..].iter_mut().enumerate().for_each(noise);

@@ -1,7 +1,7 @@
 //! `hums pull`: the board's logs over MAVLink FTP, burst by burst; what a burst lost is read piece by piece.
 //!
-//! A download that was interrupted is gone on with, once the board has confirmed that what is there is the beginning of
-//! its log; at the end the whole is compared, and read through as `hums verify` does. A file that is there already is
+//! A download that was interrupted is gone on with, once what is there was compared with the beginning of the board's
+//! log (by its checksum, or where the board's firmware computes none by its ends); at the end the whole is compared, and read through as `hums verify` does. A file that is there already is
 //! left only if it is the same log.
 
 mod compare;
@@ -67,17 +67,21 @@ fn pull(ftp: &mut Ftp, name: &str, path: &Path) -> Result<bool> {
         return Ok(false);
     }
     let (mut file, _) = Output::resume(path)?;
-    let mut have = begun(ftp, name, &mut file, length)?;
+    let (mut have, mut likeness) = begun(ftp, name, &mut file, length)?;
     if let There::Beginning(bytes) = there
         && have < bytes
     {
         file.begin_anew()?;
         let mut shorter = File::open(path)?.take(u64::from(bytes));
         settle(io::copy(&mut shorter, &mut file).map(|_| ()), path)?;
-        have = bytes;
+        (have, likeness) = (bytes, Likeness::Same);
     }
     if have > 0 {
-        note!("{name}: goes on after {have} bytes, which the board confirms");
+        let who = match likeness {
+            Likeness::SameEnds => "of which the first and the last 512 agree with the board's log",
+            Likeness::Same | Likeness::Other => "which the board confirms by their checksum",
+        };
+        note!("{name}: goes on after {have} bytes, {who}");
     }
     fetch(ftp, name, &mut file, have, length)?;
     if !is_whole(ftp, name, &mut file, length)? {
@@ -134,17 +138,18 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     }
 }
 
-/// How much of the log an earlier run has left that can be gone on with; what is of another log is thrown away once this one
-/// is whole.
-fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<u32> {
+/// How much of the log an earlier run has left that can be gone on with, and what says so; what is of another log is thrown
+/// away once this one is whole.
+fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u32, Likeness)> {
     let part = file.part().to_owned();
     let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
-    if bytes == 0 || bytes <= length && compare(ftp, name, &part, bytes)? != Likeness::Other {
-        return Ok(bytes);
+    let likeness = if bytes <= length { compare(ftp, name, &part, bytes)? } else { Likeness::Other };
+    if likeness != Likeness::Other {
+        return Ok((bytes, likeness));
     }
     note!("{name}: what was begun is of another log of this name, or was changed; it begins anew");
     file.set_aside()?;
-    Ok(0)
+    Ok((0, likeness))
 }
 
 /// Brings what is missing.
@@ -215,6 +220,10 @@ fn verify(name: &str, path: &Path) -> Result<Outcome> {
             (blocks.misplaced.saturating_sub(behind.misplaced), "sectors where others belong"),
             (blocks.stale.saturating_sub(behind.stale), "sectors of another session"),
             (blocks.foreign.saturating_sub(behind.foreign), "blocks that are no sectors"),
+            (
+                blocks.unsound.saturating_sub(behind.unsound),
+                "blocks that begin as a sector and fail its check",
+            ),
             (gaps, "gaps"),
             (overview.contents.bad_frames, "frames that fail their checksum"),
         ];

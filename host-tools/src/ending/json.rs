@@ -1,0 +1,107 @@
+//! The end of a log as JSON.
+
+use hums_blackbox::BlockCounts;
+use hums_core::time::Instant;
+use serde::Serialize;
+
+use super::log::Ending;
+use super::proof::{Proof, seconds_after};
+use crate::utc::iso8601;
+
+/// The end of a log as JSON.
+#[derive(Debug, Serialize)]
+pub struct EndJson {
+    /// What proves it: `closed`, `next_start`, `mark`, `none`, `short`.
+    proof: &'static str,
+    /// The same in words.
+    words: String,
+    /// The last end mark.
+    mark: Option<MarkJson>,
+    /// How many end marks there are.
+    marks: u64,
+    /// Seconds after the last end mark, whose end nothing proves.
+    after_mark_s: Option<f64>,
+    /// When the vehicle was armed or took off after the last end mark, seconds since power-on.
+    moved_s: Option<f64>,
+    /// Sectors and frames that the next start found and that are gone.
+    sectors_missing: u32,
+    frames_missing: Option<u32>,
+    /// What lies behind the last sector.
+    behind: BlocksJson,
+    /// Sectors of a session that began later lie in it.
+    newer_session: bool,
+    /// Why the log is not called whole, as sentences; none where it is.
+    not_proved: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct MarkJson {
+    why: &'static str,
+    time_s: f64,
+    time_utc: Option<String>,
+}
+
+impl EndJson {
+    /// The end of this log.
+    pub fn new(ending: &Ending) -> Self {
+        let (proof, summary) = (ending.proof, &ending.summary);
+        let (sectors_missing, frames_missing) = match proof {
+            Proof::Short { sectors, frames, .. } => (sectors, frames),
+            _ => (0, Some(0)),
+        };
+        let mark = summary.marks.last.map(|(at, why)| MarkJson {
+            why: why.name(),
+            time_s: at.as_secs_f64(),
+            time_utc: summary.epoch_us.map(|epoch| iso8601(epoch.saturating_add(at.as_micros()))),
+        });
+        let after = summary.marks.last.and_then(|(at, _)| seconds_after(summary, at));
+        Self {
+            proof: proof.name(),
+            words: proof.words(summary),
+            mark,
+            marks: summary.marks.count,
+            after_mark_s: after,
+            moved_s: summary.marks.moved.map(Instant::as_secs_f64),
+            sectors_missing,
+            frames_missing,
+            behind: BlocksJson::new(&summary.behind),
+            newer_session: ending.has_newer(),
+            not_proved: ending.unproved(),
+        }
+    }
+}
+
+/// Blocks of 512 bytes, by what they are.
+#[derive(Debug, Serialize)]
+pub struct BlocksJson {
+    blocks: u64,
+    /// Copies of a sector in progress, and what the file held before from this session.
+    superseded: u64,
+    misplaced: u64,
+    damaged: u64,
+    other_session: u64,
+    zero: u64,
+    erased: u64,
+    /// They begin as a sector and fail the check of one, and are not of this session as far as can be told.
+    unsound: u64,
+    foreign: u64,
+    newer_format: u64,
+}
+
+impl BlocksJson {
+    /// These counts.
+    pub const fn new(counts: &BlockCounts) -> Self {
+        Self {
+            blocks: counts.blocks,
+            superseded: counts.superseded,
+            misplaced: counts.misplaced,
+            damaged: counts.damaged,
+            other_session: counts.stale,
+            zero: counts.empty,
+            erased: counts.erased,
+            unsound: counts.unsound,
+            foreign: counts.foreign,
+            newer_format: counts.other_version,
+        }
+    }
+}

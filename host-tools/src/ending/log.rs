@@ -1,0 +1,149 @@
+//! A log that was read: what tells whether it is whole.
+
+use super::files::Files;
+use super::place::{BegunAnew, Misnamed, PowerOn, SessionBefore};
+use super::proof::Proof;
+use crate::logs::Log;
+use crate::logs::reader::Summary;
+use crate::plural::{are, count, noun};
+use crate::sessions::again_words;
+
+/// A log that was read: what tells whether it is whole, for every command alike.
+#[derive(Clone, Debug, Default)]
+pub struct Ending {
+    /// Its name.
+    pub name: String,
+    /// The files that hold it.
+    pub files: Vec<String>,
+    /// What the reader saw.
+    pub summary: Summary,
+    /// What is known of its end.
+    pub proof: Proof,
+    /// What became of the session that was recorded on the card just before this one.
+    pub before: SessionBefore,
+    /// How it follows the log before it of the same power-on, where it was recorded by arming.
+    pub power_on: PowerOn,
+    /// What of its name disagrees with what the logs hold.
+    pub misnamed: Option<Misnamed>,
+    /// Power went when the recorder began to write its file anew, which holds what it held before.
+    pub begun_anew: Option<BegunAnew>,
+    /// The name of the log of which it is a mere copy.
+    pub again: Option<String>,
+    /// It is what newer sessions left of one that no file holds any more.
+    pub left_over: bool,
+}
+
+impl Ending {
+    /// A log by itself; [`crate::followed`] adds what later ones tell of it.
+    pub fn of(log: &Log, summary: Summary) -> Self {
+        let proof = Proof::of(&summary, None);
+        let (name, files, left_over) = (log.name.clone(), log.files.clone(), log.left_over);
+        Self { name, files, summary, proof, left_over, ..Self::default() }
+    }
+
+    /// How the log ends, as a part of a sentence.
+    pub fn words(&self) -> String {
+        self.proof.words(&self.summary)
+    }
+
+    /// The number under which the same session is there too, of a log that is not to be counted again.
+    pub const fn copy_of(&self) -> Option<u32> {
+        match self.misnamed {
+            Some(Misnamed::Copy { of }) => Some(of),
+            _ => None,
+        }
+    }
+
+    /// What it is, where it is no log of its own whose losses count: a mere copy of another one, what is left over of a
+    /// session, or what a file held before.
+    pub fn aside(&self) -> Option<String> {
+        let left_over = || {
+            format!(
+                "is left over from before: no file holds it any more; {} can be read, and what is missing was deleted or \
+                 written over",
+                count(self.summary.frames, "frame")
+            )
+        };
+        let begun_anew = self.begun_anew.filter(|anew| anew.is_confirmed);
+        let again = self.again.as_deref().map(again_words);
+        again.or_else(|| self.left_over.then(left_over)).or_else(|| begun_anew.map(BegunAnew::words))
+    }
+
+    /// Whether it is to be counted: its session is not there under another name.
+    pub const fn is_counted(&self) -> bool {
+        self.copy_of().is_none() && self.again.is_none()
+    }
+
+    /// Whether logs that were recorded before it on its card are not among what was read.
+    pub const fn is_without_earlier(&self) -> bool {
+        matches!(self.before, SessionBefore::NotLookedFor(_)) || matches!(self.power_on, PowerOn::NotRead)
+    }
+
+    /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark.
+    pub fn is_proved(&self) -> bool {
+        self.unproved().is_empty()
+    }
+
+    /// Why it is not, as parts of sentences: what is lost or damaged, what is not proved, what of its files is not the log's.
+    /// What there is to say of a mere copy is said of its original.
+    pub fn unproved(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        if self.aside().is_some() {
+            return all;
+        }
+        if let Some(anew) = self.begun_anew {
+            return vec![anew.words()];
+        }
+        let (summary, blocks) = (&self.summary, &self.summary.blocks);
+        let lost = summary.marks.lost;
+        if summary.gaps > 0 || blocks.damaged > 0 || lost > 0 {
+            all.push(format!(
+                "{}, {} missing, {}, {} or {} lost while recording",
+                count(summary.gaps, "gap"),
+                summary.missing_words(),
+                count(blocks.damaged, "damaged sector"),
+                count(lost, "frame"),
+                noun(lost, "record")
+            ));
+        }
+        if blocks.misplaced > 0 {
+            all.push(format!("{} there twice, or where others belong", are(blocks.misplaced, "sector")));
+        }
+        if summary.marks.wrong > 0 {
+            all.push(format!(
+                "{} of another number of frames than were read",
+                count(summary.marks.wrong, "end mark")
+            ));
+        }
+        if !self.proof.holds() && summary.session.is_some() {
+            all.push(self.words());
+        }
+        all.extend(self.noise());
+        all.extend(self.strange());
+        all.extend(self.file().newer());
+        all.extend(self.before.gone());
+        all.extend(self.power_on.wrong());
+        all
+    }
+
+    fn file(&self) -> Files<'_> {
+        Files { names: &self.files, summary: &self.summary, proof: self.proof }
+    }
+
+    /// Blocks behind the last sector that are no sectors, where nothing proves that the log ends before them.
+    pub fn noise(&self) -> Option<String> {
+        self.file().noise()
+    }
+
+    /// What of its files is not the log's, and what of its name.
+    pub fn strange(&self) -> Vec<String> {
+        let mut all = self.file().strange();
+        all.extend(self.misnamed.map(Misnamed::words));
+        all
+    }
+
+    /// Whether sectors of a session that began later lie in the log's files.
+    pub fn has_newer(&self) -> bool {
+        self.file().has_newer()
+    }
+}

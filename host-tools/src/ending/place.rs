@@ -1,0 +1,168 @@
+//! A log's place among the logs of its card: what its boot record and its sectors' numbers say against its name.
+
+use crate::plural::count;
+use crate::sessions::copy_words;
+
+/// A log whose files have another session's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Misnamed {
+    /// The same session is there under this lower number.
+    Copy {
+        /// The number.
+        of: u32,
+    },
+    /// It was recorded after the session of this number, which is its own or a higher one.
+    Later {
+        /// The number.
+        before: u32,
+    },
+    /// The session of this number was recorded just before it, so its own number is the next one.
+    Ahead {
+        /// The number.
+        before: u32,
+    },
+}
+
+impl Misnamed {
+    /// What disagrees, as a part of a sentence.
+    pub fn words(self) -> String {
+        match self {
+            Self::Copy { of } => format!("it {}", copy_words(of)),
+            Self::Later { before } => format!(
+                "it was recorded after session {before:05}, so its number is not its own: files were renamed or exchanged"
+            ),
+            Self::Ahead { before } => format!(
+                "it was recorded just after session {before:05}, so its number is not its own: files were renamed"
+            ),
+        }
+    }
+}
+
+/// A file of a full card that the recorder has given a new name, to write it anew, and whose old content is still there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BegunAnew {
+    /// The number of the session that it held: the oldest one of the card.
+    pub of: u32,
+    /// The next start found that content under the new name. Without it, files may have been renamed.
+    pub is_confirmed: bool,
+}
+
+impl BegunAnew {
+    /// What it is, as a part of a sentence.
+    pub fn words(self) -> String {
+        let Self { of, is_confirmed } = self;
+        let end = if is_confirmed { "as the next start found it" } else { "or files were renamed" };
+        format!(
+            "the recorder had just begun to write this file anew when power went: what is in it is session {of:05}, which \
+             is the oldest one, and nothing of its own is there; {end}"
+        )
+    }
+}
+
+/// The session that was recorded on a card just before a log, as the log's boot record names it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SessionBefore {
+    /// No boot record names one.
+    #[default]
+    NotNamed,
+    /// It was read too.
+    There,
+    /// It is not among what was read, and nothing tells that it should be: the oldest logs make room for new ones.
+    NotLookedFor(u32),
+    /// It is not there, and an older log of the card is; or its files hold another session.
+    Gone(u32),
+    /// It is there under another number: files were renamed or exchanged.
+    Elsewhere {
+        /// Its number.
+        number: u32,
+        /// The number under which it is there.
+        there: u32,
+    },
+}
+
+impl SessionBefore {
+    /// What is missing, as a part of a sentence.
+    pub fn gone(self) -> Option<String> {
+        match self {
+            Self::Gone(number) => Some(format!(
+                "session {number:05}, which was recorded just before it, is not there under that number"
+            )),
+            Self::Elsewhere { number, there } => Some(format!(
+                "session {number:05}, which was recorded just before it, is there under the name {there:05}: files were \
+                 renamed or exchanged"
+            )),
+            Self::NotNamed | Self::There | Self::NotLookedFor(_) => None,
+        }
+    }
+}
+
+/// How a log follows the one before it of the same power-on. A vehicle that is recorded by arming has several logs of a
+/// power-on, whose sectors are numbered on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PowerOn {
+    /// It is the first one, or nothing tells.
+    #[default]
+    First,
+    /// It goes on where the one before it ends.
+    Follows,
+    /// It is not the first one, and the ones before are not among what was read. Nothing tells that they should be: the
+    /// oldest logs make room for new ones.
+    NotRead,
+    /// Logs that were recorded before it are not there.
+    Missing {
+        /// The number of the last one that is there, if one is.
+        after: Option<u32>,
+        /// Sectors that were recorded meanwhile. Of those of a vehicle that waited disarmed not all were kept.
+        sectors: u32,
+        /// Frames until it begins.
+        frames: Option<u32>,
+        /// Seconds until it begins.
+        seconds: Option<f64>,
+    },
+    /// No sector is missing between it and the log of this number, and its own number is not the next one.
+    Renamed {
+        /// The number.
+        after: u32,
+    },
+    /// Its sectors were recorded before the end of the log of this lower number.
+    Disordered {
+        /// The number.
+        after: u32,
+    },
+}
+
+impl PowerOn {
+    /// What is wrong, as a part of a sentence.
+    pub fn wrong(self) -> Option<String> {
+        match self {
+            Self::First | Self::Follows | Self::NotRead => None,
+            Self::Missing { after, sectors, frames, seconds } => {
+                let after = after.map_or_else(String::new, |after| format!(" after session {after:05}"));
+                let frames =
+                    frames.map_or_else(String::new, |frames| format!(", {}", count(frames, "frame")));
+                let seconds = seconds.map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
+                Some(format!(
+                    "what was recorded just before it{after} in the same power-on is not there: up to {}{frames}{seconds}",
+                    count(sectors, "sector")
+                ))
+            }
+            Self::Renamed { after } => Some(format!(
+                "it goes on where session {after:05} of the same power-on ends, so its number is not its own: files were \
+                 renamed"
+            )),
+            Self::Disordered { after } => Some(format!(
+                "its sectors were recorded before the end of session {after:05} of the same power-on: files were renamed, \
+                 exchanged or copied"
+            )),
+        }
+    }
+
+    /// What there is to say where nothing is wrong.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Follows => "it goes on where the one before it ends",
+            Self::NotRead => "the logs before it are not among what was read",
+            _ => "",
+        }
+    }
+}

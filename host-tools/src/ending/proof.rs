@@ -1,0 +1,148 @@
+//! What proves how a log ends.
+
+use hums_blackbox::record::{Before, Found, Resting};
+use hums_core::time::Instant;
+
+use crate::logs::reader::Summary;
+use crate::plural::count;
+use crate::utc::iso8601;
+
+/// What proves how a log ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Proof {
+    /// Its last sector says that the session was ended in order.
+    Closed,
+    /// The next start on the card found that it ends there; with when the vehicle was armed or took off, if power went
+    /// then: what the card did not take any more nobody knows.
+    NextStart(Option<Instant>),
+    /// It is whole to its last end mark.
+    Mark(Instant, Resting),
+    /// Nothing: it has no end mark, or the vehicle was armed or took off after the last one.
+    #[default]
+    None,
+    /// There was more than is there now: so many sectors, and frames where they were counted.
+    Short {
+        /// Sectors that are missing.
+        sectors: u32,
+        /// Frames that are missing.
+        frames: Option<u32>,
+        /// Who tells.
+        by: Teller,
+    },
+}
+
+/// What tells where a log ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Teller {
+    /// The next start on the card.
+    NextStart,
+    /// The next log of the same power-on, which was recorded by arming.
+    NextLog,
+}
+
+impl Proof {
+    /// What proves it, by what was read of the log and what the next start on the card recorded, if that is known.
+    pub fn of(summary: &Summary, next: Option<&Before>) -> Self {
+        let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
+        let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
+        if let Some(next) = next
+            && next.sectors > sectors
+        {
+            let counted = (next.found == Found::Frames).then_some(next.frames);
+            let frames = counted.zip(summary.frames_end).map(|(there, here)| there.wrapping_sub(here));
+            let frames = frames.filter(|missing| *missing < 1 << 31);
+            return Self::Short { sectors: next.sectors - sectors, frames, by: Teller::NextStart };
+        }
+        if summary.closed {
+            return Self::Closed;
+        }
+        if next.is_some_and(|next| next.sectors == sectors) {
+            return Self::NextStart(summary.marks.moved);
+        }
+        match summary.marks.last {
+            Some((at, why)) if summary.marks.moved.is_none() => Self::Mark(at, why),
+            _ => Self::None,
+        }
+    }
+
+    /// Whether nothing is known to be missing at the end, up to the last end mark at least.
+    pub const fn holds(self) -> bool {
+        matches!(self, Self::Closed | Self::NextStart(None) | Self::Mark(..))
+    }
+
+    /// Whether all of the end is proved.
+    pub const fn is_whole(self) -> bool {
+        matches!(self, Self::Closed | Self::NextStart(None))
+    }
+
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Closed => "closed",
+            Self::NextStart(_) => "next_start",
+            Self::Mark(..) => "mark",
+            Self::None => "none",
+            Self::Short { .. } => "short",
+        }
+    }
+
+    /// How the log ends, as a part of a sentence.
+    pub fn words(self, summary: &Summary) -> String {
+        let moment = |at| moment(summary, at);
+        match self {
+            Self::Closed => "ended in order".to_owned(),
+            Self::NextStart(None) if summary.session.is_none() => {
+                "nothing was written into it, as the next start found".to_owned()
+            }
+            Self::NextStart(None) => "whole to its end, as the next start found it".to_owned(),
+            Self::NextStart(Some(moved)) => format!(
+                "whole to its end, as the next start found it; armed or in the air since {} when power went: what was \
+                 not written then is not known",
+                moment(moved)
+            ),
+            Self::Mark(at, why) => match seconds_after(summary, at).unwrap_or(0.0) {
+                ..0.05 => format!("whole to the {} at {}; its end cannot be proved", why.words(), moment(at)),
+                after => format!(
+                    "whole to the {} at {}; after it {after:.1} s, whose end cannot be proved",
+                    why.words(),
+                    moment(at)
+                ),
+            },
+            Self::None => match (summary.marks.moved, summary.marks.last) {
+                (Some(moved), Some((at, why))) => format!(
+                    "not proved to its end: armed or in the air since {}, without a landing or a disarming after it \
+                     (the last was the {} at {})",
+                    moment(moved),
+                    why.words(),
+                    moment(at)
+                ),
+                (Some(moved), None) => format!(
+                    "not proved to its end: armed or in the air since {}, without a landing or a disarming after it",
+                    moment(moved)
+                ),
+                (None, _) => {
+                    "not proved to its end: it has no landing, no disarming and no orderly end".to_owned()
+                }
+            },
+            Self::Short { sectors, frames, by } => {
+                let frames =
+                    frames.map_or_else(String::new, |frames| format!(", {}", count(frames, "frame")));
+                let by = match by {
+                    Teller::NextStart => "the next start found them",
+                    Teller::NextLog => "the next log of the same power-on begins after them",
+                };
+                format!("{} missing at its end{frames}: {by}", count(sectors, "sector"))
+            }
+        }
+    }
+}
+
+/// From a time to the log's last entry.
+pub(super) fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
+    summary.last.map(|last| last.since(at).as_micros() as f64 / 1e6)
+}
+
+/// A time in UTC where it is known, otherwise in seconds since power-on.
+fn moment(summary: &Summary, at: Instant) -> String {
+    let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
+    utc.map_or_else(|| format!("{:.3} s", at.as_secs_f64()), |utc| iso8601(utc / 1000 * 1000))
+}

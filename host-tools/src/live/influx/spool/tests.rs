@@ -1,0 +1,176 @@
+use super::*;
+
+fn batch(number: u64) -> Batch {
+    let lines = 20 + number as usize % 7;
+    Batch { text: format!("m value={number} {number}\n").repeat(lines).into_bytes(), points: lines as u64 }
+}
+
+fn database(number: u64) -> Database {
+    Database { number, name: format!("http://{number}/write") }
+}
+
+fn open(path: &Path, limit: u64) -> Spool {
+    Spool::open(path, limit, &database(1)).expect("a file").expect("nobody else has it")
+}
+
+#[test]
+fn points_for_another_database_are_not_given_to_this_one() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    open(&path, 3_000).put(&batch(0)).expect("room");
+    let before = std::fs::read(&path).expect("a file");
+    let refused = format!("{:#}", Spool::open(&path, 3_000, &database(2)).expect_err("another database"));
+    assert!(refused.contains("20 points are in it for another database, http://1/write"), "{refused}");
+    assert!(refused.contains("name another file"), "{refused}");
+    assert_eq!(std::fs::read(&path).expect("a file"), before);
+    drain(&mut open(&path, 3_000));
+    // An empty one is anybody's; so is one whose making was cut off.
+    let mut other = Spool::open(&path, 3_000, &database(2)).expect("a file").expect("free");
+    other.put(&batch(0)).expect("room");
+    drop(other);
+    assert!(Spool::open(&path, 3_000, &database(1)).is_err());
+    std::fs::write(&path, MAGIC).expect("room");
+    assert!(open(&path, 3_000).is_empty());
+}
+
+fn drain(spool: &mut Spool) -> Vec<Batch> {
+    let mut taken = Vec::new();
+    while let Some(batch) = spool.oldest().expect("it reads") {
+        taken.push(batch);
+        spool.drop_oldest().expect("it is there");
+    }
+    taken
+}
+
+#[test]
+fn what_waits_is_found_again_in_order_wherever_the_ring_begins() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    let mut spool = open(&path, 3_000);
+    let mut number = 0;
+    let mut expected = std::collections::VecDeque::new();
+    for round in 0..200 {
+        for _ in 0..round % 4 {
+            expected.push_back(batch(number));
+            let lost = spool.put(&batch(number)).expect("room");
+            number += 1;
+            let mut gone = 0;
+            while gone < lost {
+                gone += expected.pop_front().expect("it was there").points;
+            }
+            assert_eq!(gone, lost, "whole batches, the oldest first");
+        }
+        if round % 3 == 0 && !spool.is_empty() {
+            assert_eq!(spool.oldest().expect("it reads"), expected.pop_front());
+            spool.drop_oldest().expect("it is there");
+        }
+        if round % 5 == 0 {
+            // As a kill leaves it.
+            drop(spool);
+            spool = open(&path, 3_000);
+        }
+        let points: u64 = expected.iter().map(|batch| batch.points).sum();
+        assert_eq!((spool.points(), spool.is_empty()), (points, expected.is_empty()), "round {round}");
+        assert!(path.metadata().expect("a file").len() <= 3_000 + HEADER_BYTES);
+    }
+    assert_eq!(drain(&mut spool), Vec::from(expected));
+    assert_eq!(path.metadata().expect("a file").len(), HEADER_BYTES, "the room is given back");
+}
+
+#[test]
+fn a_record_that_was_cut_off_ends_it_and_those_before_are_there() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    let mut spool = open(&path, 100_000);
+    for number in 0..5 {
+        spool.put(&batch(number)).expect("room");
+    }
+    drop(spool);
+    let whole = std::fs::read(&path).expect("a file");
+    let last = RECORD_BYTES + batch(4).text.len();
+    for cut in [1, 30, last - RECORD_BYTES + 3, last - 1] {
+        std::fs::write(&path, &whole[..whole.len() - cut]).expect("room");
+        let mut spool = open(&path, 100_000);
+        // Of a record with its head its points are known.
+        let points = if last - cut < RECORD_BYTES { 0 } else { batch(4).points };
+        assert_eq!(spool.damage(), Damage { points, bytes: (last - cut) as u64 }, "{cut} bytes less");
+        assert_eq!(drain(&mut spool), (0..4).map(batch).collect::<Vec<_>>(), "{cut} bytes less");
+        drop(spool);
+        assert_eq!(open(&path, 100_000).damage(), Damage::default(), "it is told once");
+    }
+    let mut spoiled = whole.clone();
+    let at = whole.len() - 10;
+    spoiled[at] ^= 1;
+    std::fs::write(&path, spoiled).expect("room");
+    assert_eq!(open(&path, 100_000).damage(), Damage { points: batch(4).points, bytes: last as u64 });
+    assert_eq!(drain(&mut open(&path, 100_000)).len(), 4);
+    // One in the middle: those behind it are not reached either.
+    let mut spoiled = whole;
+    spoiled[HEADER_BYTES as usize + RECORD_BYTES + 5] ^= 1;
+    std::fs::write(&path, spoiled).expect("room");
+    let points: u64 = (0..5).map(|number| batch(number).points).sum();
+    assert_eq!(open(&path, 100_000).damage().points, points);
+}
+
+#[test]
+fn a_foreign_file_is_left_alone_and_one_in_use_is_not_shared() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("thesis.txt");
+    for text in ["months of work, and much longer than a header is", "short"] {
+        std::fs::write(&path, text).expect("room");
+        assert!(Spool::open(&path, 3_000, &database(1)).is_err());
+        assert_eq!(std::fs::read_to_string(&path).expect("a file"), text);
+    }
+    let path = dir.path().join("spool");
+    let first = open(&path, 3_000);
+    assert!(Spool::open(&path, 3_000, &database(1)).expect("a file").is_none());
+    drop(first);
+    open(&path, 3_000);
+}
+
+#[test]
+fn a_larger_limit_holds_from_now_on_and_what_waits_is_there() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    let mut spool = open(&path, 3_000);
+    // More than fits, so that the ring has begun anew.
+    let lost: u64 = (0..20).map(|number| spool.put(&batch(number)).expect("room")).sum();
+    assert!(lost > 0);
+    let (points, oldest) = (spool.points(), spool.oldest().expect("it reads"));
+    drop(spool);
+    let mut spool = open(&path, 30_000);
+    assert_eq!((spool.points(), spool.oldest().expect("it reads")), (points, oldest));
+    assert!(Spool::open(&path, 30_000, &database(1)).expect("a file").is_none(), "it is in use");
+    assert_eq!((20..40).map(|number| spool.put(&batch(number)).expect("room")).sum::<u64>(), 0);
+    drop(spool);
+    let all = drain(&mut open(&path, 30_000));
+    assert!(all.ends_with(&(15..40).map(batch).collect::<Vec<_>>()[..]), "{}", all.len());
+    assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 1, "nothing is left beside it");
+}
+
+#[test]
+fn a_limit_below_what_is_found_lets_nothing_be_added_and_nothing_be_lost() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("spool");
+    let mut spool = open(&path, 10_000);
+    (0..10).for_each(|number| assert_eq!(spool.put(&batch(number)).expect("room"), 0));
+    drop(spool);
+    let mut spool = open(&path, 900);
+    let before = path.metadata().expect("a file").len();
+    assert!(spool.is_over_limit() && !spool.has_room(&batch(10)));
+    assert_eq!(spool.put(&batch(10)).expect("counted"), batch(10).points, "the new one goes");
+    assert_eq!(
+        (spool.points(), path.metadata().expect("a file").len()),
+        ((0..10).map(|n| batch(n).points).sum(), before)
+    );
+    // Below the limit it counts as any other.
+    for number in 0..9 {
+        assert_eq!(spool.oldest().expect("it reads"), Some(batch(number)));
+        spool.drop_oldest().expect("it is there");
+    }
+    assert!(!spool.is_over_limit() && spool.put(&batch(10)).expect("room") == 0);
+    assert!(spool.put(&batch(11)).expect("room") > 0 && spool.bytes() <= 900);
+    assert_eq!(drain(&mut spool).last(), Some(&batch(11)));
+    spool.put(&batch(0)).expect("room");
+    assert!((1..4).map(|number| spool.put(&batch(number)).expect("room")).sum::<u64>() > 0);
+}
