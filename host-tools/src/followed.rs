@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, VecDeque};
 use hums_blackbox::record::Before;
 use hums_core::time::Instant;
 
-use crate::ending::{BegunAnew, Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
-use crate::sessions::{Sessions, place};
+use crate::ending::{Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
+use crate::logs::sessions::{Sessions, place};
 
 /// Logs held back at most; so many after a log may say something of its end.
 pub const HELD_MAX: usize = 4;
@@ -53,15 +53,14 @@ impl<T: Logged> Followed<T> {
             has_sectors = ending.summary.session.is_some();
             ending.misnamed = self.misnamed(ending);
             ending.again = self.sessions.again(&ending.name).map(str::to_owned);
-            let begun_anew = self.sessions.begun_anew(&ending.name);
-            ending.begun_anew = begun_anew.map(|of| BegunAnew { of, is_confirmed: false });
+            ending.begun_anew = self.sessions.begun_anew(&ending.name);
             if let Some(before) = ending.summary.marks.before.filter(Before::has_end)
                 && ending.is_counted()
-                && begun_anew.is_none()
+                && ending.begun_anew.is_none()
             {
                 self.tell(&before, ending);
             }
-            if ending.is_counted() && begun_anew.is_none() {
+            if ending.is_counted() && ending.begun_anew.is_none() {
                 self.follow(ending);
             }
         }
@@ -177,6 +176,14 @@ impl<T: Logged> Followed<T> {
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(Logged::ending).collect();
+        // The start looked at the log's last file, which was to be written anew and held another session's sectors.
+        let named = (card, Some(before.number));
+        if let Some(log) = held.iter_mut().find(|log| place(&log.name) == named)
+            && log.confirm_begun_anew(before.session)
+        {
+            next.before = SessionBefore::There;
+            return;
+        }
         // Its place is between a log that was read and the next one, on the same card; or a log of its number is there, and
         // is another session.
         let is_looked_at = |name: &str| {
@@ -190,11 +197,6 @@ impl<T: Logged> Followed<T> {
         match held.iter_mut().rev().find(|log| log.summary.session == Some(before.session)) {
             Some(log) => {
                 log.proof = Proof::of(&log.summary, Some(before));
-                if let Some(anew) =
-                    log.begun_anew.as_mut().filter(|_| place(&log.name).1 == Some(before.number))
-                {
-                    anew.is_confirmed = true;
-                }
                 next.before = SessionBefore::There;
             }
             None if numbers.contains(&before.number) => next.before = SessionBefore::There,
@@ -219,56 +221,38 @@ impl<T: Logged> Followed<T> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
-    use hums_blackbox::Sector;
     use hums_blackbox::record::Found;
 
     use super::*;
-    use crate::logs::find::find_in;
+    use crate::logs::strangers::{Others, Strange};
 
     impl Logged for Ending {
-        fn ending(&mut self) -> Option<&mut Ending> {
+        fn ending(&mut self) -> Option<&mut Self> {
             Some(self)
         }
     }
 
-    /// The first sector of a session with this number.
-    fn sector(session: u32, number: u32) -> [u8; 512] {
-        let mut bytes = [0; 512];
-        bytes[..2].copy_from_slice(&[0x48, 0xb1]);
-        bytes[11..15].copy_from_slice(&number.to_le_bytes());
-        let mut sector = Sector::from_bytes(bytes);
-        sector.seal(session);
-        *sector.bytes()
-    }
-
     #[test]
-    fn a_file_that_was_to_be_written_anew_is_no_finding_once_the_next_start_found_it_so() {
-        let dir = tempfile::tempdir().expect("a folder");
-        for (name, session, number) in [(5, 7, 100), (6, 8, 0), (7, 7, 0), (8, 9, 0)] {
-            fs::write(dir.path().join(format!("{name:05}_00.HUM")), sector(session, number)).expect("room");
-        }
-        let found = find_in(dir.path(), false).expect("a folder");
-        let mut followed = Followed::new(Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log))));
-        let mut done = Vec::new();
-        for (log, session) in found.logs.iter().zip([7, 8, 7, 9]) {
-            let mut ending = Ending::of(log, crate::logs::reader::Summary::default());
-            ending.summary.session = Some(session);
-            if session == 9 {
-                let before = Before { found: Found::Frames, number: 7, session: 7, ..Before::default() };
-                ending.summary.marks.before = Some(before);
-            }
-            if session == 7 && log.name == "00007" {
-                let alone =
-                    Ending { begun_anew: Some(BegunAnew { of: 4, is_confirmed: false }), ..ending.clone() };
-                assert!(!alone.is_proved(), "nobody has confirmed it");
-            }
-            done.extend(followed.push(ending));
-        }
+    fn a_last_file_that_was_to_be_written_anew_is_no_finding_once_the_next_start_found_it_so() {
+        let others = Others { sectors: 9, first: 0, last: 8, session: 7, board: None, several: false };
+        let strange = vec![Strange { file: 1, hollow: true, older: false, others: Some(others) }];
+        let mut log = Ending {
+            name: "00006".to_owned(),
+            files: vec!["00006_00.HUM".to_owned(), "00006_01.HUM".to_owned()],
+            ..Ending::default()
+        };
+        log.summary.session = Some(8);
+        log.summary.strange = strange;
+        assert!(log.strange().join("").contains("had just begun to write it anew"), "{:?}", log.strange());
+        let mut next = Ending { name: "00007".to_owned(), ..Ending::default() };
+        next.summary.session = Some(9);
+        let before = Before { found: Found::Frames, number: 6, session: 7, ..Before::default() };
+        next.summary.marks.before = Some(before);
+        let mut followed = Followed::new(Sessions::default());
+        let mut done = followed.push(log);
+        done.extend(followed.push(next));
         done.extend(followed.finish());
-        let anew = done.iter().filter_map(|log| Some((log.name.as_str(), log.begun_anew?, log.is_proved())));
-        let wanted = BegunAnew { of: 4, is_confirmed: true };
-        assert_eq!(anew.collect::<Vec<_>>(), [("00007", wanted, true)]);
+        assert_eq!(done[0].strange(), Vec::<String>::new());
+        assert_eq!(done[1].before, SessionBefore::There);
     }
 }

@@ -37,7 +37,6 @@ pub mod report;
 pub mod rng;
 pub mod run;
 pub mod series;
-pub mod sessions;
 pub mod sink;
 pub mod source;
 pub mod states;

@@ -5,16 +5,16 @@ use hums_blackbox::Cause;
 use serde::Serialize;
 
 use crate::cli;
-use crate::ending::{BegunAnew, BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words};
+use crate::ending::{BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words};
 use crate::followed::Followed;
 use crate::info::json::images_json;
+use crate::logs::sessions::{BegunAnew, Sessions, place};
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
 use crate::outcome::Outcome;
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path, word};
-use crate::sessions::{Sessions, place};
 use crate::summary::Overview;
 
 /// Runs `hums verify`.

@@ -15,7 +15,7 @@ use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
-use crate::sessions::Sessions;
+use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
 /// What tells a log from any other, read from its sectors' headers and its first records. Of a card's session it is

@@ -8,9 +8,9 @@ use anyhow::Result;
 use super::context::Formats;
 use super::naming::{self, Named, Traits};
 use crate::files::FileId;
+use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::usage as usage_error;
-use crate::sessions::Sessions;
 use crate::source::recording::Place;
 
 /// A log, and what its files are called.

@@ -1,12 +1,13 @@
 //! A log that was read: what tells whether it is whole.
 
 use super::files::Files;
-use super::place::{BegunAnew, Misnamed, PowerOn, SessionBefore};
+use super::place::{Misnamed, PowerOn, SessionBefore};
 use super::proof::Proof;
 use crate::logs::Log;
 use crate::logs::reader::Summary;
+use crate::logs::sessions::{BegunAnew, again_words};
+use crate::logs::strangers::Strange;
 use crate::plural::{are, count, noun};
-use crate::sessions::again_words;
 
 /// A log that was read: what tells whether it is whole, for every command alike.
 #[derive(Clone, Debug, Default)]
@@ -124,6 +125,20 @@ impl Ending {
         all.extend(self.before.gone());
         all.extend(self.power_on.wrong());
         all
+    }
+
+    /// The next start found sectors of this session in the log's last file. Whether that has none of the log's own, because it
+    /// was to be written anew, which is no finding then.
+    pub fn confirm_begun_anew(&mut self, session: u32) -> bool {
+        let last = self.files.len().saturating_sub(1);
+        let strange = &mut self.summary.strange;
+        let is_it = |strange: &Strange| {
+            let others = strange.others.filter(|others| others.session == session && !others.several);
+            strange.hollow && strange.file == last && last > 0 && others.is_some()
+        };
+        let before = strange.len();
+        strange.retain(|strange| !is_it(strange));
+        strange.len() < before
     }
 
     fn file(&self) -> Files<'_> {

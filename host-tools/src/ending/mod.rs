@@ -14,5 +14,5 @@ mod proof;
 pub use files::{among_words, behind_words};
 pub use json::{BlocksJson, EndJson};
 pub use log::Ending;
-pub use place::{BegunAnew, Misnamed, PowerOn, SessionBefore};
+pub use place::{Misnamed, PowerOn, SessionBefore};
 pub use proof::{Proof, Teller};

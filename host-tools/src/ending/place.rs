@@ -1,7 +1,7 @@
 //! A log's place among the logs of its card: what its boot record and its sectors' numbers say against its name.
 
+use crate::logs::sessions::copy_words;
 use crate::plural::count;
-use crate::sessions::copy_words;
 
 /// A log whose files have another session's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,27 +35,6 @@ impl Misnamed {
                 "it was recorded just after session {before:05}, so its number is not its own: files were renamed"
             ),
         }
-    }
-}
-
-/// A file of a full card that the recorder has given a new name, to write it anew, and whose old content is still there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BegunAnew {
-    /// The number of the session that it held: the oldest one of the card.
-    pub of: u32,
-    /// The next start found that content under the new name. Without it, files may have been renamed.
-    pub is_confirmed: bool,
-}
-
-impl BegunAnew {
-    /// What it is, as a part of a sentence.
-    pub fn words(self) -> String {
-        let Self { of, is_confirmed } = self;
-        let end = if is_confirmed { "as the next start found it" } else { "or files were renamed" };
-        format!(
-            "the recorder had just begun to write this file anew when power went: what is in it is session {of:05}, which \
-             is the oldest one, and nothing of its own is there; {end}"
-        )
     }
 }
 

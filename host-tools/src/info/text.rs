@@ -11,8 +11,9 @@ use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
 use super::wear;
-use crate::ending::{BegunAnew, among_words, behind_words};
+use crate::ending::{among_words, behind_words};
 use crate::logs;
+use crate::logs::sessions::BegunAnew;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::states;

@@ -13,6 +13,7 @@ use super::fat::{CardFile, Extent, ReadAt as _, Volume, Walk};
 use super::found::{Found, Image, belong};
 use super::places::{BLOCK_BYTES, Log, Piece};
 use super::scan::{Files, Scan, scan};
+use super::sessions::Sessions;
 use crate::card::{ReadOnlyImage, length};
 
 /// A file that is a log, or a segment of one.
@@ -84,7 +85,12 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
     // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead.
     if salvage || files.is_empty() || !about.damage.is_empty() {
         let length = length(&file).with_context(context)?;
-        found.add(by_blocks(path, length, &sessions_of(path, &files), &mut about)?);
+        let known = sessions_of(path, &files);
+        let is_sound = about.damage.is_empty();
+        found.add(by_blocks(path, length, &known, &mut about)?);
+        if is_sound {
+            about.damage.extend(begun_anew(&known));
+        }
     } else {
         for name in files.iter().filter(|file| file.name.is_none()).map(|file| &file.path) {
             found.remark(format!(
@@ -147,6 +153,17 @@ fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Resu
         about.damage.push("its file system knows of no log, and sectors of logs are there".to_owned());
     }
     Ok(logs)
+}
+
+/// Files that the recorder had just begun to write anew, as sentences: what is in them is found by its sectors too, and not
+/// that nothing of their own is there.
+fn begun_anew(known: &[Log]) -> Vec<String> {
+    let sessions = Sessions::of(known.iter().map(|log| (log.name.as_str(), log)));
+    let words = |log: &Log| {
+        let anew = sessions.begun_anew(&log.name).filter(|anew| !anew.is_confirmed)?;
+        Some(format!("{}: {}", log.files.join(", "), anew.words()))
+    };
+    known.iter().filter_map(words).collect()
 }
 
 /// Says of an image that ends before its first partition does that it is cut short. Its volume is then not what is wrong.

@@ -20,6 +20,7 @@ mod marks;
 pub mod places;
 pub mod reader;
 mod scan;
+pub mod sessions;
 pub mod side_by_side;
 pub mod strangers;
 

@@ -28,6 +28,7 @@ use crate::cli;
 use crate::decode::naming::{Named, Names, Traits, without_made};
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{Followed, HELD_MAX};
+use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
 use crate::made;
@@ -35,7 +36,6 @@ use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path as shown, word};
-use crate::sessions::Sessions;
 use crate::source::recording::{Place, find, sessions_of};
 use crate::summary::Overview;
 

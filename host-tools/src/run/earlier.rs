@@ -9,9 +9,9 @@ use hums_core::params::ParamSpec;
 use hums_recorder::recorder::SEGMENT_BYTES_MAX;
 
 use crate::cli;
+use crate::logs::sessions::first_session;
 use crate::logs::{self, Log, Room};
 use crate::outcome::usage;
-use crate::sessions::first_session;
 
 /// The recorder makes a segment as long as this part of a card at most, so that a small card holds several.
 const SEGMENTS_MIN: u64 = 16;

@@ -17,11 +17,11 @@ use super::{dataflash, ulog};
 use crate::archive;
 use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
+use crate::logs::sessions::Sessions;
 use crate::logs::{self, Content, Log};
 use crate::outcome::usage;
 use crate::plural::count;
 use crate::printable;
-use crate::sessions::Sessions;
 
 /// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
 pub const RAW_BAUD: u32 = 115_200;

@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use hums_blackbox::Header;
 use hums_blackbox::record::{Before, Boot};
 
-use crate::logs::board::{HEADING_GROUPS, find_boot};
-use crate::logs::fingerprint::{Fingerprint, fingerprint};
-use crate::logs::groups::Groups;
-use crate::logs::{Log, Piece};
+use super::board::{HEADING_GROUPS, find_boot};
+use super::fingerprint::{Fingerprint, fingerprint};
+use super::groups::Groups;
+use super::places::{Log, Piece};
 
 /// Blocks that are searched for a log's first sector: what is read at once.
 const LOOK_BLOCKS: usize = 128;
@@ -24,18 +24,19 @@ pub struct Sessions {
     again: BTreeMap<String, String>,
     /// The numbers of all logs of each card, also of those without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
-    /// By card and number: the number of the session whose file the recorder had begun to write anew under this one.
-    begun_anew: BTreeMap<(String, u32), u32>,
+    /// By card and number.
+    begun_anew: BTreeMap<(String, u32), BegunAnew>,
 }
 
 impl Sessions {
     /// Looks at the first sectors of these logs, by their names. What has no number is left out.
     pub fn of<'a>(logs: impl IntoIterator<Item = (&'a str, &'a Log)>) -> Self {
+        let logs: Vec<(&str, &Log)> = logs.into_iter().collect();
         let mut all: BTreeMap<_, Vec<(u32, u32)>> = BTreeMap::new();
         let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
         let mut numbers: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
         let mut oldest: BTreeMap<&str, (u32, &Log)> = BTreeMap::new();
-        for (name, log) in logs {
+        for &(name, log) in &logs {
             let (card, number) = place(name);
             if let Some(number) = number {
                 numbers.entry(card.to_owned()).or_default().insert(number);
@@ -52,21 +53,28 @@ impl Sessions {
         let mut sessions = Self { logs: all, again, numbers, begun_anew: BTreeMap::new() };
         for (card, (number, log)) in oldest {
             if let Some((there, of)) = sessions.find_begun_anew(card, number, log) {
-                sessions.begun_anew.insert((card.to_owned(), there), of);
+                let later = logs.iter().filter_map(|(name, log)| {
+                    let (other, number) = place(name);
+                    Some((number.filter(|number| other == card && *number > there)?, log))
+                });
+                // The next start looked at what was there.
+                let next = later.min_by_key(|(number, _)| *number).and_then(|(_, log)| before(log));
+                let is_confirmed = next.is_some_and(|next| next.number == there);
+                sessions.begun_anew.insert((card.to_owned(), there), BegunAnew { of, is_confirmed });
             }
         }
         sessions
     }
 
-    /// The number of the session that a log's file held when the recorder had begun to write it anew. A full card's oldest file
-    /// gets the next name before its first sector is written.
-    pub fn begun_anew(&self, name: &str) -> Option<u32> {
+    /// What a log's file held when the recorder had just begun to write it anew, if it had. A full card's oldest file gets the
+    /// next name before its first sector is written.
+    pub fn begun_anew(&self, name: &str) -> Option<BegunAnew> {
         let (card, number) = place(name);
         self.begun_anew_number(card, number?)
     }
 
     /// The same by card and number.
-    pub fn begun_anew_number(&self, card: &str, number: u32) -> Option<u32> {
+    pub fn begun_anew_number(&self, card: &str, number: u32) -> Option<BegunAnew> {
         self.begun_anew.get(&(card.to_owned(), number)).copied()
     }
 
@@ -141,6 +149,27 @@ fn before(log: &Log) -> Option<Before> {
         }
     }
     None
+}
+
+/// A file of a full card that the recorder has given a new name, to write it anew, and whose old content is still there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BegunAnew {
+    /// The number of the session that it held: the oldest one of the card.
+    pub of: u32,
+    /// The next start found that content under the new name. Without it, files may have been renamed.
+    pub is_confirmed: bool,
+}
+
+impl BegunAnew {
+    /// What it is, as a part of a sentence.
+    pub fn words(self) -> String {
+        let Self { of, is_confirmed } = self;
+        let end = if is_confirmed { "as the next start found it" } else { "or files were renamed" };
+        format!(
+            "the recorder had just begun to write this file anew when power went: what is in it is session {of:05}, which \
+             is the oldest one, and nothing of its own is there; {end}"
+        )
+    }
 }
 
 /// A log of a session of which others may be copies.
@@ -218,4 +247,83 @@ fn first_sector(log: &Log) -> Option<Header> {
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use hums_blackbox::record::Found;
+    use hums_blackbox::{Record, Sector, SectorSink, Writer};
+    use hums_core::time::Instant;
+
+    use super::*;
+    use crate::logs::find::find_in;
+
+    /// The first sector of a session with this number.
+    fn sector(session: u32, number: u32) -> Vec<u8> {
+        let mut bytes = [0; 512];
+        bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+        bytes[11..15].copy_from_slice(&number.to_le_bytes());
+        sealed(Sector::from_bytes(bytes), session)
+    }
+
+    fn sealed(mut sector: Sector, session: u32) -> Vec<u8> {
+        sector.seal(session);
+        sector.bytes().to_vec()
+    }
+
+    #[derive(Default)]
+    struct Sink(Vec<Sector>);
+
+    impl SectorSink for Sink {
+        fn room(&self) -> usize {
+            usize::MAX
+        }
+
+        fn put(&mut self, sector: &Sector) {
+            self.0.push(*sector);
+        }
+    }
+
+    /// A log of which the start found this session under this number.
+    fn after(number: u32, session: u32) -> Vec<u8> {
+        let (mut writer, mut sink) = (Box::new(Writer::new()), Sink::default());
+        let before = Before { found: Found::Frames, number, session, ..Before::default() };
+        let boot = Record::Boot(Boot { before, ..Boot::default() });
+        writer.record(Instant::ZERO, &boot, &mut sink).expect("room");
+        writer.finish(&mut sink);
+        sink.0.into_iter().flat_map(|sector| sealed(sector, 9)).collect()
+    }
+
+    #[test]
+    fn a_file_that_was_to_be_written_anew_is_known_and_the_next_start_confirms_it() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let write = |name: u32, bytes: Vec<u8>| {
+            fs::write(dir.path().join(format!("{name:05}_00.HUM")), bytes).expect("room");
+        };
+        let anew = || {
+            let found = find_in(dir.path(), false).expect("a folder");
+            let sessions = Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log)));
+            found
+                .logs
+                .iter()
+                .filter_map(|log| Some((log.name.clone(), sessions.begun_anew(&log.name)?)))
+                .collect::<Vec<_>>()
+        };
+        // The beginning of the power-on whose second log is the oldest one that is there.
+        write(5, sector(7, 100));
+        write(6, sector(8, 0));
+        write(7, sector(7, 0));
+        assert_eq!(anew(), [("00007".to_owned(), BegunAnew { of: 4, is_confirmed: false })]);
+        write(8, after(7, 7));
+        assert_eq!(anew(), [("00007".to_owned(), BegunAnew { of: 4, is_confirmed: true })]);
+        // No log has the number before it: somebody gave it that name.
+        fs::remove_file(dir.path().join("00006_00.HUM")).expect("there");
+        assert_eq!(anew(), []);
+        // All of the power-on before the oldest one that is there.
+        write(5, after(4, 7));
+        write(6, sector(8, 0));
+        assert_eq!(anew(), [("00007".to_owned(), BegunAnew { of: 4, is_confirmed: true })]);
+    }
 }
