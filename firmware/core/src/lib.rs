@@ -2,8 +2,10 @@
 //! Knows no MAVLink, no card and no executor; time comes in as an argument.
 #![cfg_attr(not(test), no_std)]
 
+pub mod alert;
 pub mod baseline;
 mod bytes;
+pub mod cause;
 pub mod cells;
 pub mod component;
 mod currents;

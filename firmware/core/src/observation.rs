@@ -4,6 +4,7 @@
 //! extension fields that read as zero); from here on nobody needs to know where a value came from, but for the few
 //! quantities that the two autopilots define differently, which say so ([`VibrationScale`], [`EstimatorScale`]).
 
+use crate::cause::{Alert, Causes};
 use crate::units::{
     AmpereHours, Amperes, Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
     Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
@@ -558,6 +559,10 @@ pub enum Observation {
     MissionReached(u16),
     /// `COMMAND_ACK`
     CommandAck(CommandAck),
+    /// `STATUSTEXT` or `EVENT` that says that something is wrong.
+    Alert(Alert),
+    /// `HIGH_LATENCY2`: what has failed.
+    Failing(Causes),
     /// `PARAM_VALUE` of a parameter that is in [`crate::cells::KNOWN`], by its place there, and its value.
     Parameter(u8, f32),
     /// `FLIGHT_INFORMATION`: the number of the flight and its take-off, milliseconds since boot (0 not yet).

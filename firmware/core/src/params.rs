@@ -136,7 +136,8 @@ params! {
     RadioRssiWarn "RADIO_RSSI_WARN" "" 0.0 0.0 254.0 "device scale; 0 is off";
     RebootCrit "AP_REBOOT_CRIT" "" 0.5 0.0 100.0 "1: the autopilot restarted within 30 s";
     StateCrit "AP_STATE_CRIT" "" 4.5 0.0 10.0 "MAV_STATE: 5 is critical, 6 emergency";
-    SensorsWarn "AP_SENSORS_WARN" "" 0.5 0.0 32.0 "sensors that SYS_STATUS calls unhealthy";
+    AlertWarn "AP_ALERT_WARN" "" 0.5 0.0 3.0 "1: the autopilot says that something is wrong";
+    AlertCrit "AP_ALERT_CRIT" "" 1.5 0.0 3.0 "2: what it says is one to act on at once";
     HardLanding "HARD_LANDING" "m/s" 2.0 0.1 20.0 "four times ArduPilot's LAND_SPEED of 0.5 m/s";
     BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: as the autopilot has it (BATT_CAPACITY, BAT1_CAPACITY)";
     GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";

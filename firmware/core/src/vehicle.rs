@@ -4,6 +4,7 @@
 //! are recorded and judged by nobody. Bounded: [`BATTERIES_MAX`] batteries, [`MOTORS_MAX`] motors; what is
 //! beyond is recorded only.
 
+use crate::alert::Alerts;
 use crate::election::Election;
 use crate::inertial::Inertial;
 use crate::latest::Latest;
@@ -49,6 +50,8 @@ pub struct Vehicle {
     pub heartbeat: Latest<Heartbeat>,
     /// `SYS_STATUS`
     pub system: Latest<SystemStatus>,
+    /// What it says itself is wrong.
+    pub alerts: Alerts,
     /// `SYSTEM_TIME`
     pub time: Latest<SystemTime>,
     /// Receivers by instance.
@@ -135,6 +138,7 @@ impl Vehicle {
             source: None,
             heartbeat: Latest::nothing(),
             system: Latest::nothing(),
+            alerts: Alerts::new(),
             time: Latest::nothing(),
             gnss: [const { Latest::nothing() }; RECEIVERS_MAX],
             gnss_integrity: [const { Latest::nothing() }; RECEIVERS_MAX],
@@ -285,7 +289,12 @@ impl Vehicle {
     fn take(&mut self, at: Instant, component: u8, observation: &Observation) {
         match *observation {
             Observation::Heartbeat(heartbeat) => self.heartbeat.set(at, heartbeat),
-            Observation::SystemStatus(system) => self.system.set(at, system),
+            Observation::SystemStatus(system) => {
+                if let Some(unhealthy) = system.unhealthy {
+                    self.alerts.take_sensors(at, unhealthy);
+                }
+                self.system.set(at, system);
+            }
             Observation::SystemTime(time) => self.take_time(at, time),
             Observation::Gnss(gnss) => set_instance(&mut self.gnss, gnss.instance, at, gnss),
             Observation::GnssIntegrity(integrity) => {
@@ -314,7 +323,10 @@ impl Vehicle {
             Observation::TelemetryRadio(radio) => self.radio.set(at, radio),
             Observation::Rails(rails) => self.rails.set(at, rails),
             Observation::Battery(battery) => self.take_battery(at, component, battery),
-            Observation::Estimator(estimator) => self.estimator.set(at, estimator),
+            Observation::Estimator(estimator) => {
+                self.alerts.take_estimator(at, &estimator);
+                self.estimator.set(at, estimator);
+            }
             Observation::Vibration(vibration) => self.take_vibration(at, vibration),
             Observation::Escs(group) => self.take_escs(at, &group),
             Observation::Engine(engine) => self.engine.set(at, engine),
@@ -325,6 +337,8 @@ impl Vehicle {
             Observation::Processor(processor) => self.processor.set(at, processor),
             Observation::Identity(identity) => self.identity.set(at, identity),
             Observation::CommandAck(ack) => self.command_ack.set(at, ack),
+            Observation::Alert(alert) => self.alerts.tell(at, alert, self.armed()),
+            Observation::Failing(causes) => self.alerts.take_failures(at, causes),
             Observation::MissionReached(item) => self.mission_reached.set(at, item),
             Observation::SpeedSensors(_)
             | Observation::MissionCurrent(_)

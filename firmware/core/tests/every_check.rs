@@ -6,6 +6,7 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
+use hums_core::cause::{Alert, Cause};
 use hums_core::health::{self, Finding, Level, checks};
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Gnss, Heartbeat, Observation,
@@ -55,7 +56,7 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 54] = [
+const FAULTS: [(&str, u8, Level, Fault); 95] = [
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
@@ -138,7 +139,48 @@ const FAULTS: [(&str, u8, Level, Fault); 54] = [
         let kind = VehicleKind::Rotorcraft;
         more.push(Observation::Heartbeat(Heartbeat { armed: true, kind, state: 5, ..Heartbeat::default() }));
     }),
-    ("sensors", 0, Level::Warning, |quad, _| quad.system.unhealthy = Some(0x20)),
+    ("battery_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Power, false))),
+    ("battery_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Power, true))),
+    ("drive_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Propulsion, false))),
+    ("drive_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Propulsion, true))),
+    ("vibration_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Vibration, false))),
+    ("vibration_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Vibration, true))),
+    ("gyro_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Gyro, false))),
+    ("gyro_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Gyro, true))),
+    ("accel_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Accelerometer, false))),
+    ("accel_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Accelerometer, true))),
+    ("compass_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Compass, false))),
+    ("compass_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Compass, true))),
+    ("baro_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Barometer, false))),
+    ("baro_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Barometer, true))),
+    ("airspeed_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Airspeed, false))),
+    ("airspeed_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Airspeed, true))),
+    ("gnss_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Gnss, false))),
+    ("gnss_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Gnss, true))),
+    ("ranging_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Ranging, false))),
+    ("ranging_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Ranging, true))),
+    ("terrain_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Terrain, false))),
+    ("terrain_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Terrain, true))),
+    ("ekf_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Estimator, false))),
+    ("ekf_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Estimator, true))),
+    ("rc_alert", 0, Level::Warning, |_, more| more.push(said(Cause::RemoteControl, false))),
+    ("rc_alert", 0, Level::Critical, |_, more| more.push(said(Cause::RemoteControl, true))),
+    ("gcs_alert", 0, Level::Warning, |_, more| more.push(said(Cause::GroundStation, false))),
+    ("gcs_alert", 0, Level::Critical, |_, more| more.push(said(Cause::GroundStation, true))),
+    ("processor_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Processor, false))),
+    ("processor_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Processor, true))),
+    ("logging_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Logging, false))),
+    ("logging_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Logging, true))),
+    ("fence_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Fence, false))),
+    ("fence_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Fence, true))),
+    ("failsafe_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Failsafe, false))),
+    ("failsafe_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Failsafe, true))),
+    ("autopilot_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Other, false))),
+    ("autopilot_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Other, true))),
+    ("attitude_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Attitude, false))),
+    ("attitude_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Attitude, true))),
+    ("crash_alert", 0, Level::Warning, |_, more| more.push(said(Cause::Crash, false))),
+    ("crash_alert", 0, Level::Critical, |_, more| more.push(said(Cause::Crash, true))),
     ("roll", 0, Level::Critical, |quad, _| quad.roll = -1.2),
     ("pitch", 0, Level::Critical, |_, more| {
         more.push(Observation::Attitude(Attitude { pitch: Radians(1.2), ..Attitude::default() }));
@@ -192,6 +234,11 @@ fn cells(quad: &mut Quad, lowest_v: f32) {
 
 fn rail(more: &mut Vec<Observation>, volts: f32) {
     more.push(Observation::Rails(Rails { vcc: Some(Volts(volts)), servo: None }));
+}
+
+/// What the autopilot says in a text or an event.
+fn said(cause: Cause, critical: bool) -> Observation {
+    Observation::Alert(Alert { cause, critical })
 }
 
 fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
@@ -332,11 +379,11 @@ fn what_a_check_says_is_its_own() {
 
 #[test]
 fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
-    let flags =
-        ["batt_fault", "esc_failure", "autopilot_reboot", "autopilot_state", "sensors", "disarmed_in_air"];
+    let flags = ["batt_fault", "esc_failure", "autopilot_reboot", "autopilot_state", "disarmed_in_air"];
     for check in checks() {
         let due = DUE.iter().any(|(name, _)| *name == check.name);
-        assert_eq!(check.alarm_only, due || flags.contains(&check.name), "{}", check.name);
+        let flag = flags.contains(&check.name) || check.name.ends_with("_alert");
+        assert_eq!(check.alarm_only, due || flag, "{}", check.name);
     }
 }
 

@@ -424,7 +424,7 @@ fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_tha
 }
 
 /// Checks of whole numbers that have no way of saying that they are unknown, of ages, and of ourselves.
-const KNOWN_ANYWAY: [&str; 9] = [
+const KNOWN_ANYWAY: [&str; 8] = [
     "batt_fault",
     "esc_silent",
     "clipping",
@@ -432,7 +432,6 @@ const KNOWN_ANYWAY: [&str; 9] = [
     "frames_lost",
     "autopilot_reboot",
     "autopilot_state",
-    "sensors",
     "gps_fix",
 ];
 

@@ -304,8 +304,8 @@ fn a_recorder_that_stops_on_the_ground_is_a_warning() {
 }
 
 #[test]
-fn a_failed_check_before_arming_is_no_sensor() {
-    assert_eq!(fly(|_, quad| quad.system.unhealthy = Some(1 << 28 | 1 << 16)), []);
+fn what_is_checked_before_arming_and_heights_of_the_ground_are_no_sensors() {
+    assert_eq!(fly(|_, quad| quad.system.unhealthy = Some(1 << 28 | 1 << 22)), []);
 }
 
 #[test]

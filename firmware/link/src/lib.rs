@@ -3,6 +3,7 @@
 
 pub mod asking;
 pub mod encode;
+pub mod events;
 pub mod frame;
 pub mod framer;
 pub mod ftp;

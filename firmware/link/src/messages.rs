@@ -40,6 +40,11 @@ pub(crate) fn param_request_read(name: &str, system: u8, component: u8) -> Packe
     Packet::new(20).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name)
 }
 
+/// `REQUEST_EVENT`: these again, please.
+pub(crate) fn request_event(first: u16, last: u16, system: u8, component: u8) -> Packet {
+    Packet::new(412).u16(0, first).u16(2, last).u8(4, system).u8(5, component)
+}
+
 /// `PARAM_VALUE`
 pub fn param_value(name: &str, value: f32, index: u16, count: u16) -> Packet {
     Packet::new(22).f32(0, value).u16(4, count).u16(6, index).text(8, 16, name).u8(24, REAL32)
@@ -115,6 +120,7 @@ mod tests {
             named_int(Instant::from_millis(1), "HUMS_STATE", -1),
             param_value(name, 1.0, 1, 2),
             param_request_read(name, 1, 1),
+            request_event(1, 2, 1, 1),
             command_ack(512, 3, 255, 190),
             command_long(511, &[1.0; 9], 1, 1),
             request_data_stream(1, 4, 1, 1),

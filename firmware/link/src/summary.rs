@@ -383,7 +383,9 @@ fn urgency(finding: &Finding) -> u8 {
 /// A finding in words a pilot understands, for instance `HUMS: battery low 14.9 % (limit 15)`, or of a battery that does not
 /// keep the vehicle up `HUMS: payload battery low #2 14.9 %`.
 pub fn text(finding: &Finding) -> Text {
-    let words = health::words(finding.check);
+    let check = health::check_named(finding.check);
+    let words = check.map_or(finding.check, |check| check.words);
+    let (instances, is_flag) = check.map_or((0, false), |check| (check.instances, check.is_flag));
     let of = match finding.feeds {
         Feeds::Vehicle | Feeds::Unsaid => "",
         Feeds::Avionics => "avionics ",
@@ -393,11 +395,13 @@ pub fn text(finding: &Finding) -> Text {
     let Finding { value, limit, unit, .. } = *finding;
     // Room is for what tells something.
     let digits = if value.abs() < 1_000.0 { 2 } else { 0 };
-    match (finding.level, health::instances(finding.check)) {
+    match (finding.level, instances) {
         (Level::Ok, 0 | 1) => Text::new(format_args!("HUMS: ok again: {words}")),
         (Level::Ok, _) => Text::new(format_args!("HUMS: ok again: {of}{words} #{number}")),
         (Level::Stale, 0 | 1) => Text::new(format_args!("HUMS: no data: {words}")),
         (Level::Stale, _) => Text::new(format_args!("HUMS: no data: {of}{words} #{number}")),
+        (_, 0 | 1) if is_flag => Text::new(format_args!("HUMS: {words}")),
+        _ if is_flag => Text::new(format_args!("HUMS: {of}{words} #{number}")),
         (_, 0 | 1) => Text::new(format_args!("HUMS: {words} {value:.digits$} {unit} (limit {limit})")),
         _ if !of.is_empty() => Text::new(format_args!("HUMS: {of}{words} #{number} {value:.digits$} {unit}")),
         _ => Text::new(format_args!("HUMS: {words} #{number} {value:.digits$} {unit} (limit {limit})")),

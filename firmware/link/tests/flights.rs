@@ -233,11 +233,11 @@ fn the_faults_that_show_in_the_telemetry_of_the_faulty_flight_are_found() {
     // throughout, enough for a flight), and its vibration stays at 15 m/s2, half of the limit.
     let expected = [
         ("cell_voltage", Level::Critical, 260.7, 260.9),
-        // Two heartbeats, one a second, say so.
+        // Its texts, and two heartbeats, one a second, say so.
+        ("battery_alert", Level::Warning, 265.7, 266.0),
         ("autopilot_state", Level::Critical, 266.5, 267.5),
         // The autopilot calls the battery low.
         ("batt_state", Level::Warning, 267.8, 268.5),
-        ("sensors", Level::Warning, 267.8, 268.5),
     ];
     assert_eq!(alarms.len(), expected.len(), "{alarms:?}");
     for ((at_s, check, level), (name, expected_level, from_s, to_s)) in alarms.into_iter().zip(expected) {

@@ -2,6 +2,8 @@
 //! people.
 
 use hums_core::Monitor;
+use hums_core::alert::HOLDS;
+use hums_core::cause::{Alert, Cause, Causes};
 use hums_core::health::{Level, checks};
 use hums_core::observation::{AutopilotIdentity, Heartbeat, Source, SystemStatus};
 use hums_core::params::{Param, Params};
@@ -15,14 +17,14 @@ use crate::states;
 
 /// The check of the autopilot's own state.
 pub(super) const FAILSAFE: &str = "autopilot_state";
-/// The check of the autopilot's sensors.
-const SENSORS: &str = "sensors";
 
 /// What is so now.
 #[derive(Debug, Default)]
 pub(super) struct Details {
     failsafes: String,
     sensors: u32,
+    /// What the autopilot said last of each cause, and when.
+    said: [Option<(Instant, String)>; Cause::COUNT],
     /// Batteries in the order in which they came: component and id.
     batteries: Vec<(u8, u8)>,
     /// Autopilots in the order in which they came.
@@ -97,8 +99,18 @@ impl Details {
             && let Some(unhealthy) = status.unhealthy.filter(|unhealthy| *unhealthy != self.sensors)
         {
             self.sensors = unhealthy;
-            self.tell(SENSORS, problems);
+            for cause in Cause::ALL {
+                self.tell(cause.check(), problems);
+            }
         }
+    }
+
+    /// The autopilot says in words that something is wrong.
+    pub(super) fn said(&mut self, at: Instant, alert: Alert, words: &str, problems: &mut Problems) {
+        if let Some(said) = self.said.get_mut(alert.cause as usize) {
+            *said = Some((at, words.to_owned()));
+        }
+        self.tell(alert.cause.check(), problems);
     }
 
     /// An autopilot tells what it is.
@@ -182,6 +194,21 @@ impl Details {
         remarks
     }
 
+    /// What the autopilot's alert was of: its words of late, and the sensors that it calls unhealthy.
+    fn tell_alert(&self, check: &str, problems: &mut Problems) {
+        let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.check() == check) else { return };
+        let of = |bit: &u32| self.sensors & bit != 0 && Causes::of_sensors(*bit).has(cause);
+        for bit in (0..u32::BITS).map(|bit| 1 << bit).filter(of) {
+            states::sensors(bit).for_each(|name| problems.detail(check, name));
+        }
+        let said = self.said.get(cause as usize).and_then(Option::as_ref);
+        if let Some((at, words)) = said
+            && problems.open_since(check).is_some_and(|since| since.since(*at) <= HOLDS)
+        {
+            problems.detail(check, words);
+        }
+    }
+
     /// A check's level has changed, or what it is of.
     pub(super) fn tell(&self, check: &str, problems: &mut Problems) {
         if !problems.is_open(check) {
@@ -192,8 +219,7 @@ impl Details {
                 let names = self.failsafes.split(", ").filter(|name| !name.is_empty());
                 names.for_each(|name| problems.detail(check, name));
             }
-            SENSORS => states::sensors(self.sensors).for_each(|name| problems.detail(check, name)),
-            _ => {}
+            _ => self.tell_alert(check, problems),
         }
     }
 }

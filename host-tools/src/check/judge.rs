@@ -8,6 +8,8 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
+use hums_core::alert;
+use hums_core::cause::Alert;
 use hums_core::happening::Happening;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
@@ -25,7 +27,7 @@ use super::epochs::Epochs;
 use super::flights::Flights;
 use super::judged::{Judged, JudgedBy};
 use super::problem::{LISTED_MAX, Problems};
-use crate::source::item::{About, Fact, Gap, Item};
+use crate::source::item::{About, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 
@@ -171,7 +173,21 @@ impl Judge {
             Item::Parameter(parameter) => {
                 self.monitor.learn_parameter(parameter.name, parameter.value as f32);
             }
-            Item::Frame(_) | Item::Text(_) | Item::Mode(_) | Item::Event(_) | Item::Row(_) => {}
+            Item::Text(Text { severity, words, .. }) => {
+                let severity = Some(severity).filter(|_| self.format != Format::DataFlash);
+                self.said(at, alert::of_text(severity, words.as_bytes()), words);
+            }
+            Item::Event(Event { number, severity, words }) => {
+                self.said(at, alert::of_event(number, severity, &[]), words);
+            }
+            Item::Frame(_) | Item::Mode(_) | Item::Row(_) => {}
+        }
+    }
+
+    /// The autopilot says something in words.
+    fn said(&mut self, at: Instant, alert: Option<Alert>, words: &str) {
+        if let Some(alert) = alert.filter(|_| !words.is_empty()) {
+            self.details.said(at, alert, words, &mut self.here);
         }
     }
 

@@ -134,6 +134,11 @@ impl Problems {
         self.open.get(&(check.to_owned(), 0)).is_some_and(|(_, since)| since.is_some())
     }
 
+    /// Since when it is wrong, while it is.
+    pub(super) fn open_since(&self, check: &str) -> Option<Instant> {
+        self.open.get(&(check.to_owned(), 0)).and_then(|(_, since)| since.map(|(since, _)| since))
+    }
+
     /// What a check of several is of, while it is wrong.
     pub(super) fn detail(&mut self, check: &str, name: &str) {
         let Some((problem, Some(_))) = self.open.get_mut(&(check.to_owned(), 0)) else { return };

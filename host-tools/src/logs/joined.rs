@@ -22,6 +22,8 @@ const HEAD: [u8; 2] = [b'H', 0xb0 | hums_blackbox::VERSION];
 #[derive(Debug, Default)]
 pub(super) struct Joints {
     file: usize,
+    /// Where the file's own first group begins: the same again is a copy of it, and no other file.
+    first: Option<[u8; SECTOR_BYTES]>,
     /// The last sector so far in the file.
     last: Option<Found>,
     looks: u32,
@@ -64,7 +66,13 @@ impl Joints {
         let sector = Sector::from_bytes(*block);
         let next = Found { session: sector.session(), number: sector.number(), at };
         let breaks = self.last.replace(next).is_some_and(|last| !last.goes_on(&next));
-        if breaks && sector.starts_group() && at > FIRST_GROUP_MAX && self.looks < LOOKS_MAX {
+        if sector.starts_group() && at <= FIRST_GROUP_MAX {
+            self.first = Some(*block);
+        } else if breaks
+            && sector.starts_group()
+            && self.looks < LOOKS_MAX
+            && self.first.as_ref() != Some(block)
+        {
             self.looks += 1;
             self.found = heading()?;
         }

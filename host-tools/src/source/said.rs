@@ -1,6 +1,7 @@
 //! What MAVLink frames say, as items: observations, parameters, modes, and texts put together from their parts.
 
 use anyhow::Result;
+use hums_core::alert::event_name;
 use hums_core::observation::{Autopilot, Observation};
 use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
@@ -8,8 +9,8 @@ use hums_link::packet::Fields;
 use hums_link::{Check, Frame, observe};
 
 use super::dataflash::is_firmware;
-use super::item::{About, Fact, Item, Mode, Parameter, Take, Text, Want};
-use crate::mavlink::ids::{PARAM_VALUE, STATUSTEXT};
+use super::item::{About, Event, Fact, Item, Mode, Parameter, Take, Text, Want};
+use crate::mavlink::ids::{EVENT, PARAM_VALUE, STATUSTEXT};
 use crate::statustext::{self, Texts};
 
 /// `MAV_COMP_ID_AUTOPILOT1`
@@ -39,17 +40,17 @@ impl Said {
             return Ok(());
         }
         match frame.id() {
-            STATUSTEXT => self.text(at, frame, take),
-            PARAM_VALUE if frame.component() != COMPONENT => parameter(at, frame, self.autopilot, take),
-            _ => {
-                let Some((source, observation)) = observe(frame) else { return Ok(()) };
-                if let Observation::Heartbeat(heartbeat) = &observation {
-                    self.autopilot = heartbeat.autopilot;
-                    take(at, Item::Mode(Mode { number: heartbeat.mode, name: None }))?;
-                }
-                if want.observations { take(at, Item::Observation(source, &observation)) } else { Ok(()) }
-            }
+            STATUSTEXT => self.text(at, frame, take)?,
+            EVENT => event(at, frame, take)?,
+            PARAM_VALUE if frame.component() != COMPONENT => parameter(at, frame, self.autopilot, take)?,
+            _ => {}
         }
+        let Some((source, observation)) = observe(frame) else { return Ok(()) };
+        if let Observation::Heartbeat(heartbeat) = &observation {
+            self.autopilot = heartbeat.autopilot;
+            take(at, Item::Mode(Mode { number: heartbeat.mode, name: None }))?;
+        }
+        if want.observations { take(at, Item::Observation(source, &observation)) } else { Ok(()) }
     }
 
     /// Nothing follows.
@@ -81,6 +82,14 @@ fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
         take(text.at, Item::Fact(Fact { about: About::Firmware, words }))?;
     }
     take(text.at, Item::Text(Text { source: text.source, severity: text.severity, words }))
+}
+
+/// `EVENT`: its number, its name where that is known, and its level outside. From 8 on it is not for people.
+fn event(at: Instant, frame: &Frame<'_>, take: &mut Take<'_>) -> Result<()> {
+    let fields = Fields(frame.payload());
+    let (number, severity) = (fields.u32(0), fields.u8(12) & 0xF);
+    let words = event_name(number).unwrap_or_default();
+    if severity < 8 { take(at, Item::Event(Event { number, severity, words })) } else { Ok(()) }
 }
 
 /// `PARAM_VALUE`. An integer is the bits of the float at PX4, and a number like any other at ArduPilot

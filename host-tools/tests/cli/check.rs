@@ -75,7 +75,7 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         assert!(screen.contains(words), "{words}\n{screen}");
     }
     let first =
-        screen.find("cell voltage").expect("the worst") < screen.find("sensor health").expect("a warning");
+        screen.find("cell voltage").expect("the worst") < screen.find("alert: battery").expect("a warning");
     assert!(first, "worst first: {screen}");
     assert!(screen.lines().count() < 45, "one screen: {screen}");
 }

@@ -6,9 +6,10 @@
 //! be wanted and is the attitude itself, sample by sample, is no word about what is wanted.
 
 use super::check::{Check, Side, When};
-use super::common::STALE;
+use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::modes::{is_banked_by_hand, is_made_to_turn};
 use crate::observation::{Attitude, VehicleKind, Wanted};
@@ -38,6 +39,7 @@ const ROLL: Check = Check {
     stale_after: STALE,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll, |wanted| wanted.roll),
 };
 
@@ -49,6 +51,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, |wanted| wanted.pitch),
         ..ROLL
     },
+    alert::<{ Cause::Attitude as usize }>("attitude alert", Subsystem::Attitude),
 ];
 
 fn degrees(

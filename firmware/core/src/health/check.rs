@@ -79,6 +79,8 @@ pub struct Check {
     /// Its silence says nothing: a flag that is not set, a restart that did not happen. Such a check can make its part
     /// of the vehicle worse, and never by itself make it healthy.
     pub alarm_only: bool,
+    /// Its value is a flag or the number of a state, which tells a pilot nothing: the words alone are told.
+    pub is_flag: bool,
     /// Reads the value; `None` while it has never been measured.
     pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,
 }

@@ -4,6 +4,7 @@ use super::check::{Check, Side, When};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::baseline::Quantity;
+use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::Span;
@@ -12,6 +13,31 @@ use crate::time::Span;
 pub(super) const STALE: Option<Span> = Some(Span::from_secs(5));
 /// For streams that come at 0.5 Hz.
 pub(super) const STALE_SLOW: Option<Span> = Some(Span::from_secs(12));
+
+/// What the autopilot itself says is wrong with `CAUSE`, the number of a [`Cause`]: 1 a warning, 2 critical.
+pub(super) const fn alert<const CAUSE: usize>(words: &'static str, subsystem: Subsystem) -> Check {
+    Check {
+        name: Cause::ALL[CAUSE].check(),
+        words,
+        subsystem,
+        unit: "",
+        side: Side::Above,
+        warn: Some(Param::AlertWarn),
+        critical: Some(Param::AlertCrit),
+        hysteresis: 0.0,
+        debounce_warn: Span::ZERO,
+        debounce_critical: Span::ZERO,
+        when: When::Armed,
+        stale_after: None,
+        instances: 1,
+        // That it says nothing is no word about its health.
+        alarm_only: true,
+        is_flag: true,
+        read: |inputs, _| {
+            Reading::new(Some(inputs.now), inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE]))
+        },
+    }
+}
 
 /// Of a subsystem's components, the one that is nearest to its limit.
 pub(super) const fn due(subsystem: Subsystem) -> Check {
@@ -31,6 +57,7 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         instances: 1,
         // That a part is not due does not make its subsystem healthy.
         alarm_only: true,
+        is_flag: false,
         read: match subsystem {
             Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
             Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),

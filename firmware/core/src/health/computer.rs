@@ -1,9 +1,10 @@
 //! The autopilot's processor.
 
 use super::check::{Check, Side, When};
-use super::common::STALE;
+use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::Span;
@@ -23,6 +24,7 @@ const LOAD: Check = Check {
     stale_after: STALE,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: load_percent,
 };
 
@@ -39,6 +41,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "autopilot_reboot",
+        is_flag: true,
         words: "autopilot reboot",
         unit: "",
         warn: None,
@@ -52,6 +55,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "autopilot_state",
+        is_flag: true,
         words: "autopilot failsafe",
         unit: "",
         warn: None,
@@ -66,18 +70,11 @@ pub(super) const CHECKS: &[Check] = &[
         },
         ..LOAD
     },
-    Check {
-        name: "sensors",
-        words: "sensors unhealthy",
-        unit: "",
-        warn: Some(Param::SensorsWarn),
-        critical: None,
-        hysteresis: 0.0,
-        when: When::Armed,
-        alarm_only: true,
-        read: unhealthy_sensors,
-        ..LOAD
-    },
+    alert::<{ Cause::Processor as usize }>("processor alert", Subsystem::Computer),
+    alert::<{ Cause::Logging as usize }>("autopilot not logging", Subsystem::Computer),
+    alert::<{ Cause::Fence as usize }>("geofence breached", Subsystem::Computer),
+    alert::<{ Cause::Failsafe as usize }>("failsafe", Subsystem::Computer),
+    alert::<{ Cause::Other as usize }>("autopilot alert", Subsystem::Computer),
 ];
 
 fn load_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
@@ -92,17 +89,6 @@ fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let vehicle = inputs.vehicle;
     let value = f32::from(u8::from(vehicle.rebooted_armed && vehicle.rebooted_at.is_some_and(recently)));
     Some(Reading { at: inputs.now, value })
-}
-
-/// How many. The bits for the pre-arm checks (28), the receiver (16) and the terrain (22) say nothing about a sensor: the heights of
-/// the ground come from a card or a ground station, and an autopilot that needs them says so itself.
-fn unhealthy_sensors(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
-    const NOT_SENSORS: u32 = 0x1041_0000;
-    let slot = &inputs.vehicle.system;
-    Reading::new(
-        slot.at(),
-        slot.get()?.unhealthy.map(|unhealthy| (unhealthy & !NOT_SENSORS).count_ones() as f32),
-    )
 }
 
 fn temperature_c(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -25,6 +25,7 @@ const ENGINE: Check = Check {
     stale_after: STALE,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: |inputs, _| read(inputs, |engine| engine.cylinder_head.map(|temperature| temperature.0)),
 };
 

@@ -1,9 +1,10 @@
 //! The autopilot's, the pilot's and the ground station's links.
 
 use super::check::{Check, Side, When};
-use super::common::STALE;
+use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::Span;
@@ -23,6 +24,7 @@ const HEARTBEAT: Check = Check {
     stale_after: None,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: heartbeat_age_s,
 };
 
@@ -77,6 +79,8 @@ pub(super) const CHECKS: &[Check] = &[
         read: radio_margin,
         ..RADIO
     },
+    alert::<{ Cause::RemoteControl as usize }>("RC lost", Subsystem::Link),
+    alert::<{ Cause::GroundStation as usize }>("ground station lost", Subsystem::Link),
 ];
 
 fn heartbeat_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -2,8 +2,9 @@
 //! on.
 
 use super::check::{Check, Side, When};
-use super::common::STALE;
+use super::common::{STALE, alert};
 use super::finding::Subsystem;
+use crate::cause::Cause;
 use crate::mishap::Kind;
 use crate::params::Param;
 use crate::time::Span;
@@ -23,6 +24,7 @@ const FREE_FALL: Check = Check {
     stale_after: STALE,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: |inputs, _| inputs.mishap.reading(Kind::FreeFall, inputs.now, inputs.vehicle),
 };
 
@@ -69,4 +71,5 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.mishap.reading(Kind::Overturned, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
+    alert::<{ Cause::Crash as usize }>("crash or termination", Subsystem::Mishap),
 ];

@@ -24,7 +24,7 @@ mod vocabulary;
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
-pub use tables::{checks, instances, words};
+pub use tables::{check_named, checks, instances, words};
 pub use vocabulary::{Scope, VOCABULARY, Words, vocabulary};
 
 use crate::params::Param;

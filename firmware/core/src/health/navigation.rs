@@ -1,9 +1,10 @@
 //! Estimator and GNSS.
 
 use super::check::{Check, Side, When};
-use super::common::STALE;
+use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
 use crate::params::Param;
@@ -25,6 +26,7 @@ const ESTIMATOR: Check = Check {
     stale_after: STALE,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
 };
 
@@ -85,6 +87,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_fix",
+        is_flag: true,
         words: "GPS fix lost",
         warn: None,
         critical: Some(Param::GpsFixCrit),
@@ -93,6 +96,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_jamming",
+        is_flag: true,
         words: "GPS jamming",
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
@@ -103,6 +107,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_spoofing",
+        is_flag: true,
         words: "GPS spoofing",
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
@@ -111,6 +116,15 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, receiver| integrity(inputs, receiver, |_, spoofing| spoofing),
         ..GNSS
     },
+    alert::<{ Cause::Gyro as usize }>("gyro alert", Subsystem::Navigation),
+    alert::<{ Cause::Accelerometer as usize }>("accelerometer alert", Subsystem::Navigation),
+    alert::<{ Cause::Compass as usize }>("compass alert", Subsystem::Navigation),
+    alert::<{ Cause::Barometer as usize }>("barometer alert", Subsystem::Navigation),
+    alert::<{ Cause::Airspeed as usize }>("airspeed alert", Subsystem::Navigation),
+    alert::<{ Cause::Gnss as usize }>("GPS alert", Subsystem::Navigation),
+    alert::<{ Cause::Ranging as usize }>("rangefinder alert", Subsystem::Navigation),
+    alert::<{ Cause::Terrain as usize }>("terrain data alert", Subsystem::Navigation),
+    alert::<{ Cause::Estimator as usize }>("EKF alert", Subsystem::Navigation),
 ];
 
 fn estimator(

@@ -1,9 +1,10 @@
 //! Batteries and rails.
 
 use super::check::{Check, Side, When};
-use super::common::{STALE, STALE_SLOW, due};
+use super::common::{STALE, STALE_SLOW, alert, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
+use crate::cause::Cause;
 use crate::latest::{Latest, Reading};
 use crate::observation::Feeds;
 use crate::params::Param;
@@ -27,6 +28,7 @@ const BATTERY: Check = Check {
     stale_after: STALE_SLOW,
     instances: BATTERIES,
     alarm_only: false,
+    is_flag: false,
     read: remaining_percent,
 };
 
@@ -91,6 +93,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "batt_fault",
+        is_flag: true,
         words: "battery fault",
         unit: "",
         side: Side::Above,
@@ -114,6 +117,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "batt_state",
+        is_flag: true,
         words: "autopilot: battery low",
         unit: "",
         side: Side::Above,
@@ -163,6 +167,7 @@ pub(super) const CHECKS: &[Check] = &[
         ..BATTERY
     },
     Check { name: "battery_due", words: "battery due", ..due(Subsystem::Power) },
+    alert::<{ Cause::Power as usize }>("battery alert", Subsystem::Power),
 ];
 
 /// What the battery feeds that a check is of.

@@ -1,10 +1,11 @@
 //! Motors, ESCs and propellers.
 
 use super::check::{Check, Side, When};
-use super::common::{STALE_SLOW, departure, due};
+use super::common::{STALE_SLOW, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::baseline::Quantity;
+use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::MOTORS_MAX;
 use crate::params::Param;
@@ -26,6 +27,7 @@ const ESC: Check = Check {
     stale_after: None,
     instances: MOTORS_MAX as u8,
     alarm_only: false,
+    is_flag: false,
     read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
 };
 
@@ -47,6 +49,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "esc_failure",
+        is_flag: true,
         words: "ESC failure",
         unit: "",
         warn: Some(Param::EscFailWarn),
@@ -127,6 +130,7 @@ pub(super) const CHECKS: &[Check] = &[
         ..ESC
     },
     Check { name: "drive_due", words: "motor/prop/ESC due", ..due(Subsystem::Propulsion) },
+    alert::<{ Cause::Propulsion as usize }>("motor alert", Subsystem::Propulsion),
 ];
 
 fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {

@@ -24,6 +24,7 @@ const STATE: Check = Check {
     stale_after: None,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: stopped_rank,
 };
 

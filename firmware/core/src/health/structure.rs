@@ -1,10 +1,11 @@
 //! Vibration, clipping and load factor.
 
 use super::check::{Check, Side, When};
-use super::common::{STALE, departure, due};
+use super::common::{STALE, alert, departure, due};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::baseline::Quantity;
+use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::VibrationScale;
 use crate::params::Param;
@@ -25,6 +26,7 @@ const VIBRATION: Check = Check {
     stale_after: STALE,
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: per_axis,
 };
 
@@ -82,6 +84,7 @@ pub(super) const CHECKS: &[Check] = &[
         ..VIBRATION
     },
     Check { name: "airframe_due", words: "airframe due", ..due(Subsystem::Structure) },
+    alert::<{ Cause::Vibration as usize }>("vibration alert", Subsystem::Structure),
 ];
 
 fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

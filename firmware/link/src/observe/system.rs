@@ -1,5 +1,7 @@
 //! The autopilot itself, its links, its words.
 
+use hums_core::alert;
+use hums_core::cause::{Alert, Causes};
 use hums_core::cells;
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, Processor, RadioControl,
@@ -10,6 +12,7 @@ use mavlink::dialects::ardupilotmega as ap;
 
 use super::fields::{current, percent, read, unix_time, unless, voltage};
 use crate::packet::Fields;
+use crate::text::TEXT_BYTES_MAX;
 
 /// A vehicle is one whose autopilot is not INVALID; some ground stations and companions claim one nevertheless, so
 /// types that cannot be vehicles are left out too. Type, autopilot and state are bytes 4, 5 and 7: read as they are,
@@ -123,6 +126,32 @@ pub(super) fn parameter(payload: &[u8]) -> Option<Observation> {
     let bits = value.to_bits();
     let value = if (1..1 << 16).contains(&bits) { bits as f32 } else { value };
     Some(Observation::Parameter(place, value))
+}
+
+/// `STATUSTEXT` that says that something is wrong. Of a text in several parts the first counts: it names what it is about.
+pub(super) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
+    const TEXT: usize = 1;
+    const SEVERITY_MAX: u8 = 7;
+    let fields = Fields(payload);
+    let (severity, part) = (fields.u8(0), fields.u8(53));
+    if severity > SEVERITY_MAX || part > 0 {
+        return None;
+    }
+    let text = payload.get(TEXT..payload.len().min(TEXT + TEXT_BYTES_MAX))?;
+    let text = text.split(|byte| *byte == 0).next().filter(|text| !text.is_empty())?;
+    alert::of_text(Some(severity), text)
+}
+
+/// `EVENT` of PX4 that says that something is wrong: number, level outside (the low nibble), arguments.
+pub(super) fn alert_of_event(payload: &[u8]) -> Option<Alert> {
+    const ARGUMENTS: usize = 13;
+    let fields = Fields(payload);
+    alert::of_event(fields.u32(0), fields.u8(12) & 0xF, payload.get(ARGUMENTS..).unwrap_or_default())
+}
+
+/// `HIGH_LATENCY2`: its failure flags.
+pub(super) fn failing(payload: &[u8]) -> Causes {
+    Causes::of_failure_flags(Fields(payload).u16(22))
 }
 
 /// Read as it is: the list of commands grows faster than any definition.

@@ -1,4 +1,5 @@
 //! The traps, one by one. Payloads are built by the typed encoders.
+use hums_core::cause::{Alert, Cause, Causes};
 use hums_core::observation::{
     Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
 };
@@ -9,6 +10,10 @@ use proptest::prelude::*;
 
 use super::fields::unix_time;
 use super::*;
+use crate::packet::Packet;
+
+/// `commander_failsafe_enter_hold` of PX4's event definitions.
+const FAILSAFE_HOLD: u32 = 13_704_694;
 
 /// What the message says, as sent: MAVLink 2, zeros at the end left out.
 fn said<M: MessageData>(message: &M) -> Option<Observation> {
@@ -49,6 +54,25 @@ fn the_wanted_attitude_is_told_in_degrees_and_as_a_quaternion() {
     let [roll, pitch] = wanted(said(&target)).unwrap();
     assert!(roll.abs() < 1e-3 && (pitch + 30.0).abs() < 1e-3, "{roll} {pitch}");
     assert_eq!(wanted(said(&ap::ATTITUDE_TARGET_DATA { q: [0.0; 4], ..target })), None, "nothing yet");
+}
+
+#[test]
+fn what_the_autopilot_says_is_wrong_is_read_of_texts_events_and_flags() {
+    let text = |severity: u8, words: &str, part: u8| {
+        let packet = Packet::new(253).u8(0, severity).text(1, 50, words).u8(53, part);
+        by_id(253, packet.payload())
+    };
+    let warning = |cause| Some(Observation::Alert(Alert { cause, critical: false }));
+    assert_eq!(text(2, "EKF3 lane switch 1", 0), warning(Cause::Estimator));
+    assert_eq!(text(2, "of a longer text", 1), None, "its first part said it");
+    assert_eq!((text(6, "EKF3 lane switch 1", 0), text(2, "", 0), text(200, "x", 0)), (None, None, None));
+    assert_eq!(by_id(253, &[1, 0xFF, b'!']), warning(Cause::Other), "no UTF-8");
+    // commander_failsafe_enter_hold; level 2 outside, 5 in the log; its cause is a lost remote control.
+    let event = Packet::new(410).u32(0, 1 << 24 | FAILSAFE_HOLD).u8(12, 0x52).u8(13 + 7, 1);
+    assert_eq!(by_id(410, event.payload()), warning(Cause::RemoteControl));
+    let flags = Packet::new(235).u16(22, 8 | 4096);
+    let causes = Causes::NONE.with(Cause::Accelerometer).with(Cause::Estimator);
+    assert_eq!(by_id(235, flags.payload()), Some(Observation::Failing(causes)));
 }
 
 #[test]
@@ -244,9 +268,9 @@ fn unverified_frames_are_not_observed() {
     assert!(observe(&Frame::parse(&other).expect("a frame")).is_none());
 }
 
-const USED: [u32; 37] = [
+const USED: [u32; 39] = [
     0, 1, 2, 22, 24, 26, 27, 29, 30, 32, 33, 42, 46, 65, 74, 77, 105, 109, 116, 124, 125, 129, 147, 148, 193,
-    225, 226, 230, 241, 245, 253, 264, 290, 291, 339, 441, 11_030,
+    225, 226, 230, 235, 241, 245, 253, 264, 290, 291, 339, 410, 441, 11_030,
 ];
 
 proptest! {

@@ -88,11 +88,15 @@ const ALL: &[(u32, usize, u64)] = &[
 #[test]
 fn a_finding_reads_as_a_sentence_and_fits() {
     assert_eq!(text(&finding(Level::Warning)).as_str(), "HUMS: battery low #1 14.90 % (limit 15)");
+    let flag = |check| text(&Finding { check, unit: "", value: 1.0, limit: 0.5, ..finding(Level::Warning) });
+    assert_eq!(flag("gnss_alert").as_str(), "HUMS: GPS alert");
+    assert_eq!(flag("esc_failure").as_str(), "HUMS: ESC failure #1");
     for check in health::checks() {
         for level in Level::ALL {
             let finding = Finding { check: check.name, unit: check.unit, value: -1234.5, ..finding(level) };
             let told = text(&finding);
-            let has_end = matches!(level, Level::Ok | Level::Stale) || told.as_str().ends_with(')');
+            let plain = check.is_flag || matches!(level, Level::Ok | Level::Stale);
+            let has_end = plain || told.as_str().ends_with(')');
             assert!(has_end && told.as_str().len() <= 50, "{}", told.as_str());
         }
     }

@@ -20,6 +20,7 @@ use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, protect};
 use hums_link::asking::{Asking, Known};
 use hums_link::encode::COMPONENT;
+use hums_link::events::Events;
 use hums_link::frame::Frame;
 use hums_link::messages;
 use hums_link::outlet::{Class, Outlet};
@@ -55,6 +56,7 @@ pub(crate) struct Companion {
     /// The autopilot port's way out.
     outlet: Outlet,
     asking: Asking,
+    events: Events,
     commands: Commands,
     heartbeat_at: Option<Instant>,
     library: Library,
@@ -74,6 +76,7 @@ impl Companion {
                 WAITING_BYTES,
             ),
             asking: Asking::new(),
+            events: Events::new(),
             commands: Commands::new(),
             heartbeat_at: None,
             library: Library::new(),
@@ -142,6 +145,7 @@ impl Companion {
     ) {
         if self.asking.of() == Some(frame.source()) {
             self.asking.seen(frame.id());
+            self.events.heard(frame.id(), frame.payload());
             if frame.id() == 22
                 && let Some(name) = Fields(frame.payload()).text(8, 16)
             {
@@ -346,7 +350,7 @@ impl Companion {
     }
 
     fn tell_autopilot(&mut self, now: Instant, monitor: &mut Monitor, gs: &mut GsIn) {
-        let Self { outlet, asking, heartbeat_at, protect, .. } = self;
+        let Self { outlet, asking, events, heartbeat_at, protect, .. } = self;
         if let Some(request) = monitor.take_request() {
             *protect = Some(request);
         }
@@ -372,6 +376,9 @@ impl Companion {
         if params.get(Param::ApStreams) > 0.5 {
             let known = known(now, monitor);
             asking.tick(now, known.as_ref(), &mut |packet| outlet.send(now, Class::Own, packet, &mut out));
+            if let Some(known) = known {
+                events.tick(now, known.source, &mut |packet| outlet.send(now, Class::Own, packet, &mut out));
+            }
             let is_vehicle = |known: &Known| Some(known.source) == monitor.vehicle().source;
             if known.filter(is_vehicle).is_some_and(|known| asking.has_parameters(&known)) {
                 monitor.parameters_asked();

@@ -5,6 +5,9 @@ use std::io::Read;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
+use hums_core::alert::{self, event_name};
+use hums_core::cause::{self, Alert};
+use hums_core::observation::Observation;
 use hums_core::time::Span;
 
 use super::fields::Fields;
@@ -22,6 +25,9 @@ use crate::source::item::{
     About, Cause, Column, Event, Fact, Gap, Item, Kind, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Value, Want,
 };
+
+/// An event that is older than this when it comes tells of what was before the log.
+const OLD_US: u64 = 1_000_000;
 
 /// What a look needs to see: the longest message, and what follows it.
 const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + times::AHEAD_BYTES;
@@ -338,7 +344,13 @@ impl<'a, 'b> Session<'a, 'b> {
             let fields = Fields::new(slots, data);
             self.px4.take(
                 topic,
-                &Said { at: now, recorded_us: recorded, instance: subscription.instance, fields },
+                &Said {
+                    at: now,
+                    recorded_us: recorded,
+                    is_old: latest.saturating_sub(recorded) > OLD_US,
+                    instance: subscription.instance,
+                    fields,
+                },
             );
         }
         self.px4.step(now, latest);
@@ -399,7 +411,11 @@ impl<'a, 'b> Session<'a, 'b> {
             Told::Observation(_) if !self.want.observations => Ok(()),
             Told::Observation(observation) => self.tell(Item::Observation(source, &observation)),
             Told::Text { severity, words } => self.say(severity, &words),
-            Told::Event { number, severity } => self.tell(Item::Event(Event { number, severity, words: "" })),
+            Told::Event { number, severity, arguments, is_old } => {
+                let words = event_name(number).unwrap_or_default();
+                self.tell(Item::Event(Event { number, severity, words }))?;
+                self.alert(alert::of_event(number, severity, &arguments).filter(|_| !is_old))
+            }
             Told::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
             Told::Failsafes(words) => self.tell(Item::Fact(Fact { about: About::Failsafes, words: &words })),
             Told::Utc { utc_us, recorded_us } => self.epoch(i128::from(utc_us) - i128::from(recorded_us)),
@@ -430,13 +446,23 @@ impl<'a, 'b> Session<'a, 'b> {
         self.say(level, text_of(words).trim_end())
     }
 
+    /// What the autopilot says is wrong.
+    fn alert(&mut self, alert: Option<Alert>) -> Result<()> {
+        let Some(alert) = alert.filter(|_| self.want.observations) else { return Ok(()) };
+        let source = self.px4.source();
+        self.tell(Item::Observation(source, &Observation::Alert(alert)))
+    }
+
     fn say(&mut self, severity: u8, words: &str) -> Result<()> {
         if words.is_empty() || words == self.last_words {
             return Ok(());
         }
         words.clone_into(&mut self.last_words);
         let source = self.px4.source();
-        self.tell(Item::Text(Text { source, severity, words }))
+        self.tell(Item::Text(Text { source, severity, words }))?;
+        // A console's line that no table knows is not for a pilot, however severe.
+        let alert = alert::of_text(Some(severity), without_module(words).as_bytes());
+        self.alert(alert.filter(|alert| alert.cause != cause::Cause::Other))
     }
 
     fn dropout(&mut self, place: u64, milliseconds: u16) -> Result<()> {
@@ -535,4 +561,9 @@ impl OwnTables {
             information: table("information", &[("key", text), ("text", text), ("number", number)]),
         }
     }
+}
+
+/// Words without the module that they come from, which stands before them in brackets.
+fn without_module(words: &str) -> &str {
+    words.strip_prefix('[').and_then(|words| words.split_once("] ")).map_or(words, |(_, words)| words)
 }

@@ -148,7 +148,7 @@ mod tests {
             ("roll", 31.0, false),
             ("batt_remaining", 41.0, true),
             ("batt_remaining", 39.0, false),
-            ("sensors", 41.0, false),
+            ("baro_alert", 41.0, false),
         ] {
             assert_eq!(label.explains(check, at_s), explained, "{check} {at_s}");
         }

@@ -200,12 +200,12 @@ mod tests {
     fn a_fault_is_told_by_what_rises_while_it_lasts_and_named_by_a_check_of_its_class() {
         let alarms = [
             alarm("gps_hdop", Level::Warning, 59.0),
-            alarm("sensors", Level::Warning, 62.5),
+            alarm("ekf_alert", Level::Warning, 62.5),
             alarm("gps_fix", Level::Critical, 64.0),
             alarm("batt_remaining", Level::Critical, 91.0),
         ];
         let gnss = fault(&alarms, &label("gnss")).unwrap();
-        assert_eq!(gnss.told, Some(alarm("sensors", Level::Warning, 2.5)));
+        assert_eq!(gnss.told, Some(alarm("ekf_alert", Level::Warning, 2.5)));
         assert_eq!(gnss.named, Some(alarm("gps_fix", Level::Critical, 4.0)));
         let power = fault(&alarms, &label("power")).unwrap();
         assert_eq!(

@@ -12,10 +12,11 @@ use super::outcome::count;
 use super::sets::find_all;
 
 /// Faults that are told at least, of those that the messages show, and those whose cause is named.
-const TOLD_MIN: usize = 56;
-const NAMED_MIN: usize = 31;
-/// False warnings and false criticals in the air at most, and false alarms on the ground.
-const WARNINGS_MAX: usize = 2;
+const TOLD_MIN: usize = 59;
+const NAMED_MIN: usize = 50;
+/// False warnings and false criticals in the air at most, and false alarms on the ground. The third warning repeats a failsafe that PX4 declared before the labelled fault (p39); the
+/// critical one is the same failsafe.
+const WARNINGS_MAX: usize = 3;
 const CRITICAL_MAX: usize = 1;
 const GROUND_MAX: usize = 0;
 /// Flights whose flights, landings or mishaps were counted wrong at most.

@@ -17,6 +17,7 @@ const CHECK: Check = Check {
     stale_after: Some(Span::from_secs(1)),
     instances: 1,
     alarm_only: false,
+    is_flag: false,
     read: |_, _| None,
 };
 

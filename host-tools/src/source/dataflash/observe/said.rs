@@ -1,5 +1,6 @@
 //! What a log says in words and numbers of its own: parameters, texts, modes, events, errors, arming.
 
+use hums_core::alert;
 use hums_core::observation::{AutopilotIdentity, Observation};
 
 use super::handler::{Given, Handler};
@@ -89,6 +90,10 @@ fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
             _ => {}
         }
     }
+    // A log keeps no severity of its texts.
+    if let Some(alert) = alert::of_text(None, words.as_bytes()) {
+        out.observe(&Observation::Alert(alert));
+    }
     out.say(&Say::Text(INFO, &words));
 }
 
@@ -160,6 +165,9 @@ fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
     if subsystem == CRASH_CHECK && code != 0 {
         out.say(&Say::Emergency(words::subsystem(CRASH_CHECK)));
+    }
+    if let Some(alert) = words::alert(subsystem, code) {
+        out.observe(&Observation::Alert(alert));
     }
     let severity = if code == 0 { NOTICE } else { ERROR };
     let number = u32::from(subsystem) << 8 | u32::from(code);

@@ -1,6 +1,8 @@
 //! Numbers of `ArduPilot` in words: vehicles, modes, events, errors. Sources: `AP_Logger.h` (`LogEvent`,
 //! `LogErrorSubsystem`), `mode.h` of `ArduCopter`, `defines.h` of `ArduPlane`, `mode.h` of Rover and `ArduSub`.
 
+use hums_core::cause::{Alert, Cause};
+
 /// Which firmware wrote the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::source::dataflash) enum Craft {
@@ -280,6 +282,31 @@ pub(super) fn error(subsystem: u8, code: u8) -> String {
         (_, code) => return format!("{name}: code {code}"),
     };
     format!("{name}: {words}")
+}
+
+/// What an ERR says is wrong with the vehicle.
+pub(super) fn alert(subsystem: u8, code: u8) -> Option<Alert> {
+    let (cause, critical) = match subsystem {
+        _ if code == 0 => return None,
+        3 => (Cause::Compass, false),
+        4 => (Cause::Ranging, false),
+        5 => (Cause::RemoteControl, false),
+        6 => (Cause::Power, false),
+        7 | 11 => (Cause::Gnss, false),
+        8 => (Cause::GroundStation, false),
+        9 => (Cause::Fence, false),
+        CRASH_CHECK => (Cause::Crash, true),
+        16 | 31 => (Cause::Estimator, false),
+        17 => (Cause::Estimator, true),
+        18 => (Cause::Barometer, false),
+        19 | 30 => (Cause::Processor, false),
+        23 => (Cause::Terrain, false),
+        25 => (Cause::Propulsion, false),
+        26 | 27 => (Cause::Other, false),
+        29 => (Cause::Vibration, false),
+        _ => return None,
+    };
+    Some(Alert { cause, critical })
 }
 
 const SUBSYSTEMS: &[(u8, &str)] = &[

@@ -25,9 +25,14 @@ pub(in crate::source::ulog) struct Said<'a> {
     pub(in crate::source::ulog) at: Instant,
     /// Microseconds since the autopilot's boot.
     pub(in crate::source::ulog) recorded_us: u64,
+    /// It was said before the log began, or long before what came last.
+    pub(in crate::source::ulog) is_old: bool,
     pub(in crate::source::ulog) instance: u8,
     pub(in crate::source::ulog) fields: Fields<'a>,
 }
+
+/// Bytes of an event's arguments that are looked at.
+pub(in crate::source::ulog) const ARGUMENTS: usize = 8;
 
 /// What comes of messages.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +45,8 @@ pub(in crate::source::ulog) enum Told {
     Event {
         number: u32,
         severity: u8,
+        arguments: [u8; ARGUMENTS],
+        is_old: bool,
     },
     Mode {
         number: u32,

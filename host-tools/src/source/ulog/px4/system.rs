@@ -120,7 +120,13 @@ pub(super) const TOPICS: &[Topic] = &[
         fields: &["command", "result"],
         take: ack,
     },
-    Topic { name: "event", instances: 1, every_us: 0, fields: &["id", "log_levels"], take: event },
+    Topic {
+        name: "event",
+        instances: 1,
+        every_us: 0,
+        fields: &["id", "log_levels", "arguments"],
+        take: event,
+    },
     Topic {
         name: "log_message",
         instances: 1,
@@ -405,7 +411,9 @@ fn event(px4: &mut Px4, said: &Said<'_>) {
     if let Some(number) = said.fields.count(0)
         && severity < 8
     {
-        px4.told.push(Told::Event { number: number as u32, severity });
+        let argument = |at| said.fields.element(2, at).unwrap_or(0.0) as u8;
+        let arguments = std::array::from_fn(argument);
+        px4.told.push(Told::Event { number: number as u32, severity, arguments, is_old: said.is_old });
     }
 }
 

@@ -1,0 +1,132 @@
+use super::*;
+
+const T0: Instant = Instant::from_millis(1_000);
+
+fn after(seconds: u64) -> Instant {
+    T0 + Span::from_secs(seconds)
+}
+
+#[test]
+fn texts_are_told_by_what_they_mean() {
+    let warn = |cause| Some(Alert::warning(cause));
+    let act = |cause| Some(Alert::critical(cause));
+    for (severity, text, said) in [
+        (2, "EKF3 lane switch 1", warn(Cause::Estimator)),
+        (2, "EKF Failsafe: changed to LAND Mode", act(Cause::Estimator)),
+        (2, "EKF Failsafe Cleared", None),
+        (2, "GPS Glitch or Compass error", warn(Cause::Estimator)),
+        (2, "GPS Glitch", warn(Cause::Gnss)),
+        (2, "GPS Glitch cleared", None),
+        (2, "Error compass variance", warn(Cause::Compass)),
+        (2, "PreArm: Compass not healthy", None),
+        (2, "Arm: Gyros inconsistent", None),
+        (0, "Potential Thrust Loss (2)", warn(Cause::Propulsion)),
+        (0, "Crash: Disarming", act(Cause::Crash)),
+        (4, "Radio Failsafe - Disarming", warn(Cause::RemoteControl)),
+        (4, "Radio Failsafe Cleared", None),
+        (4, "Battery 1 is low 10.50V used 100 mAh", warn(Cause::Power)),
+        (3, "Airspeed sensor 1 failure. Disabling", warn(Cause::Airspeed)),
+        (2, "Vibration compensation ON", warn(Cause::Vibration)),
+        (2, "Vibration compensation OFF", None),
+        (2, "Auto mission changed, restarted command", None),
+        (2, "Preflight Fail: Attitude failure (roll)", act(Cause::Attitude)),
+        (2, "Accel 0 clipping, not safe to fly!\t", warn(Cause::Vibration)),
+        (3, "MAG #0 failed:  TIMEOUT!", warn(Cause::Compass)),
+        (2, "Failsafe activated\t", warn(Cause::Failsafe)),
+        (2, "Flux capacitor drained", warn(Cause::Other)),
+        (4, "Flux capacitor low", None),
+        (6, "EKF3 IMU0 is using GPS", None),
+    ] {
+        assert_eq!(of_text(Some(severity), text.as_bytes()), said, "{text}");
+    }
+    assert_eq!(of_text(None, b"Flux capacitor drained"), None, "a log that keeps no severity");
+    assert_eq!(of_text(None, b"EKF3 IMU0 is using GPS"), None, "names a part and is mild");
+    assert_eq!(of_text(None, b"GPS Glitch"), warn(Cause::Gnss));
+}
+
+#[test]
+fn patterns_fit_what_they_say_and_never_panic() {
+    for text in ["", "^", "*", "e", "EKF", "\u{0}\u{ff}", "esc"] {
+        let _ = of_text(Some(0), text.as_bytes());
+    }
+    assert_eq!(of_text(Some(4), b"Descending"), None, "^esc is a beginning");
+}
+
+#[test]
+fn an_event_tells_its_cause_by_its_number_and_its_arguments() {
+    // commander_failsafe_enter_hold: modes, action, delay, cause.
+    let hold = 1 << 24 | 0x00FF_FFFF & fnv("commander_failsafe_enter_hold");
+    for (cause, told) in
+        [(1, Cause::RemoteControl), (2, Cause::GroundStation), (3, Cause::Power), (0, Cause::Failsafe)]
+    {
+        let said = of_event(hold, 2, &[0, 0, 0, 0, 5, 5, 0, cause]);
+        assert_eq!(said, Some(Alert::warning(told)), "{cause}");
+    }
+    assert_eq!(of_event(hold, 2, &[]), Some(Alert::warning(Cause::Failsafe)), "cut short");
+    assert_eq!(of_event(7, 2, &[]), Some(Alert::warning(Cause::Other)), "not known and severe");
+    assert_eq!(of_event(7, 3, &[]), None, "not known");
+}
+
+fn fnv(name: &str) -> u32 {
+    name.bytes().fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
+#[test]
+fn what_was_said_holds_for_a_while_and_only_while_armed() {
+    let mut alerts = Alerts::new();
+    assert_eq!(alerts.level(T0, Cause::Gnss), None);
+    alerts.tell(T0, Alert::warning(Cause::Gnss), false);
+    assert_eq!(alerts.level(T0, Cause::Gnss), None, "said before arming");
+    alerts.tell(T0, Alert::critical(Cause::Gnss), true);
+    alerts.tell(after(5), Alert::warning(Cause::Gnss), true);
+    for (seconds, level) in [(0, 2.0), (14, 2.0), (15, 2.0), (16, 0.0)] {
+        assert_eq!(alerts.level(after(seconds), Cause::Gnss), Some(level), "{seconds} s");
+    }
+    assert_eq!(alerts.level(after(5), Cause::Gyro), None, "of the gyro nothing was said");
+}
+
+#[test]
+fn flags_count_when_two_messages_have_them_and_while_they_come() {
+    const COMPASS: u32 = 1 << 2;
+    let mut alerts = Alerts::new();
+    for (seconds, bits, level) in
+        [(0, 0, 0.0), (1, COMPASS, 0.0), (2, COMPASS, 1.0), (3, 0, 0.0), (4, COMPASS, 0.0), (5, COMPASS, 1.0)]
+    {
+        alerts.take_sensors(after(seconds), bits);
+        assert_eq!(alerts.level(after(seconds), Cause::Compass), Some(level), "{seconds} s");
+    }
+    assert_eq!(alerts.level(after(10), Cause::Compass), Some(1.0));
+    assert_eq!(alerts.level(after(11), Cause::Compass), Some(0.0), "no message for more than 5 s");
+}
+
+#[test]
+fn a_remote_control_is_lost_only_where_there_was_one() {
+    const RECEIVER: u32 = 1 << 16;
+    let mut alerts = Alerts::new();
+    let mut says = |second, bits| {
+        alerts.take_sensors(after(second), bits);
+        alerts.level(after(second), Cause::RemoteControl)
+    };
+    assert_eq!([says(0, RECEIVER), says(1, RECEIVER)], [Some(0.0); 2], "never switched on");
+    assert_eq!([says(2, 0), says(3, RECEIVER), says(4, RECEIVER)], [Some(0.0), Some(0.0), Some(1.0)]);
+}
+
+#[test]
+fn the_estimators_flags_are_read_on_either_scale() {
+    const GOOD: u16 = 0x37F;
+    let says = |scale, flags: [u16; 3]| {
+        let mut alerts = Alerts::new();
+        for (second, flags) in (0..).zip(flags) {
+            alerts.take_estimator(after(second), &Estimator { scale, flags, ..Estimator::default() });
+        }
+        let level = |cause| alerts.level(after(2), cause) == Some(1.0);
+        (level(Cause::Gnss), level(Cause::Accelerometer), level(Cause::Estimator))
+    };
+    let (px4, ardupilot) = (EstimatorScale::TestRatio, EstimatorScale::Variance);
+    assert_eq!(says(px4, [GOOD; 3]), (false, false, false));
+    assert_eq!(says(px4, [GOOD, GOOD | 1 << 10, GOOD | 1 << 10]), (true, false, false));
+    assert_eq!(says(px4, [GOOD, GOOD | 1 << 11, GOOD | 1 << 11]), (false, true, false));
+    assert_eq!(says(ardupilot, [GOOD, GOOD | 1 << 15, GOOD | 1 << 15]), (true, false, false));
+    assert_eq!(says(ardupilot, [GOOD, 0xA7, 0xA7]), (false, false, true), "position lost");
+    assert_eq!(says(ardupilot, [0xA7; 3]), (false, false, false), "it had none from the beginning");
+}

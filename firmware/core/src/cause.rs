@@ -1,0 +1,212 @@
+//! Causes: what is wrong, as an autopilot sees it, in terms that people know; and the flags that say so by themselves.
+
+/// What is wrong, as the autopilot sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Cause {
+    /// Gyro.
+    Gyro,
+    /// Accelerometer.
+    Accelerometer,
+    /// Compass.
+    Compass,
+    /// Barometer.
+    Barometer,
+    /// Airspeed sensor.
+    Airspeed,
+    /// Satellite navigation: no fix, glitches, jamming, spoofing.
+    Gnss,
+    /// Rangefinder, optical flow, vision, proximity.
+    Ranging,
+    /// Heights of the ground.
+    Terrain,
+    /// The estimator: it doubts or has lost attitude, velocity, position or height.
+    Estimator,
+    /// The attitude is not what it should be.
+    Attitude,
+    /// Motors, propellers, ESCs, engine.
+    Propulsion,
+    /// Batteries and supplies.
+    Power,
+    /// The pilot's remote control.
+    RemoteControl,
+    /// Ground station or companion computer.
+    GroundStation,
+    /// The geofence is breached.
+    Fence,
+    /// Vibration or clipping.
+    Vibration,
+    /// The autopilot's own log or storage.
+    Logging,
+    /// The autopilot's processor or firmware.
+    Processor,
+    /// A crash, a parachute, flight termination.
+    Crash,
+    /// A failsafe whose cause is not said.
+    Failsafe,
+    /// Something severe that no table knows.
+    Other,
+}
+
+impl Cause {
+    /// How many there are.
+    pub const COUNT: usize = 21;
+
+    /// All causes, by number.
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Gyro,
+        Self::Accelerometer,
+        Self::Compass,
+        Self::Barometer,
+        Self::Airspeed,
+        Self::Gnss,
+        Self::Ranging,
+        Self::Terrain,
+        Self::Estimator,
+        Self::Attitude,
+        Self::Propulsion,
+        Self::Power,
+        Self::RemoteControl,
+        Self::GroundStation,
+        Self::Fence,
+        Self::Vibration,
+        Self::Logging,
+        Self::Processor,
+        Self::Crash,
+        Self::Failsafe,
+        Self::Other,
+    ];
+
+    /// The name of the check that tells it.
+    pub const fn check(self) -> &'static str {
+        match self {
+            Self::Gyro => "gyro_alert",
+            Self::Accelerometer => "accel_alert",
+            Self::Compass => "compass_alert",
+            Self::Barometer => "baro_alert",
+            Self::Airspeed => "airspeed_alert",
+            Self::Gnss => "gnss_alert",
+            Self::Ranging => "ranging_alert",
+            Self::Terrain => "terrain_alert",
+            Self::Estimator => "ekf_alert",
+            Self::Attitude => "attitude_alert",
+            Self::Propulsion => "drive_alert",
+            Self::Power => "battery_alert",
+            Self::RemoteControl => "rc_alert",
+            Self::GroundStation => "gcs_alert",
+            Self::Fence => "fence_alert",
+            Self::Vibration => "vibration_alert",
+            Self::Logging => "logging_alert",
+            Self::Processor => "processor_alert",
+            Self::Crash => "crash_alert",
+            Self::Failsafe => "failsafe_alert",
+            Self::Other => "autopilot_alert",
+        }
+    }
+}
+
+/// What the autopilot says once, in a text or an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Alert {
+    /// What is wrong.
+    pub cause: Cause,
+    /// Whether somebody has to act now.
+    pub critical: bool,
+}
+
+impl Alert {
+    pub(crate) const fn warning(cause: Cause) -> Self {
+        Self { cause, critical: false }
+    }
+
+    pub(crate) const fn critical(cause: Cause) -> Self {
+        Self { cause, critical: true }
+    }
+}
+
+/// What a table says of a text or an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Meaning {
+    /// Something is wrong.
+    Wrong(Alert),
+    /// Nothing is wrong in flight: about arming, set-up, a command, or the end of what was wrong.
+    Fine,
+    /// It is in no table.
+    Unknown,
+}
+
+/// A set of causes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Causes(u32);
+
+const _: () = assert!(Cause::COUNT <= 32);
+
+impl Causes {
+    /// None.
+    pub const NONE: Self = Self(0);
+
+    /// With one more.
+    #[must_use]
+    pub const fn with(self, cause: Cause) -> Self {
+        Self(self.0 | 1 << cause as u32)
+    }
+
+    /// Whether it has this one.
+    pub const fn has(self, cause: Cause) -> bool {
+        self.0 & 1 << cause as u32 != 0
+    }
+
+    pub(crate) const fn both(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    fn of_bits(bits: u32, table: &[(u32, Cause)]) -> Self {
+        let set = table.iter().filter(|(bit, _)| bits & bit != 0);
+        set.fold(Self::NONE, |causes, (_, cause)| causes.with(*cause))
+    }
+
+    /// What bits of `MAV_SYS_STATUS_SENSOR` that are not healthy say (source: `common.xml`). Pre-arm checks (28) say nothing in
+    /// flight, the heights of the ground (22) come from a card or a ground station, and an autopilot that needs them says so itself.
+    pub fn of_sensors(unhealthy: u32) -> Self {
+        const SENSORS: &[(u32, Cause)] = &[
+            (1 | 1 << 17, Cause::Gyro),
+            (1 << 1 | 1 << 18, Cause::Accelerometer),
+            (1 << 2 | 1 << 19, Cause::Compass),
+            (1 << 3, Cause::Barometer),
+            (1 << 4, Cause::Airspeed),
+            (1 << 5, Cause::Gnss),
+            // Optical flow, vision, laser, an external truth, proximity, obstacle avoidance.
+            (1 << 6 | 1 << 7 | 1 << 8 | 1 << 9 | 1 << 26 | 1 << 29, Cause::Ranging),
+            // Control of rate, attitude, yaw, height and position; the attitude reference.
+            (1 << 10 | 1 << 11 | 1 << 12 | 1 << 13 | 1 << 14 | 1 << 21, Cause::Estimator),
+            // Motor outputs, reversed motors, propulsion.
+            (1 << 15 | 1 << 23 | 1 << 30, Cause::Propulsion),
+            (1 << 16, Cause::RemoteControl),
+            (1 << 20, Cause::Fence),
+            (1 << 24, Cause::Logging),
+            (1 << 25, Cause::Power),
+            (1 << 27, Cause::GroundStation),
+        ];
+        Self::of_bits(unhealthy, SENSORS)
+    }
+
+    /// What `HIGH_LATENCY2.failure_flags` say (`HL_FAILURE_FLAG` of `common.xml`).
+    pub fn of_failure_flags(flags: u16) -> Self {
+        const FLAGS: &[(u32, Cause)] = &[
+            (1, Cause::Gnss),
+            (2, Cause::Airspeed),
+            (4, Cause::Barometer),
+            (8, Cause::Accelerometer),
+            (16, Cause::Gyro),
+            (32, Cause::Compass),
+            (64, Cause::Terrain),
+            (128, Cause::Power),
+            (256, Cause::RemoteControl),
+            (512, Cause::GroundStation),
+            (1024, Cause::Propulsion),
+            (2048, Cause::Fence),
+            (4096, Cause::Estimator),
+        ];
+        Self::of_bits(u32::from(flags), FLAGS)
+    }
+}
