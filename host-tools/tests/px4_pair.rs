@@ -58,7 +58,7 @@ fn a_log_and_a_recording_of_the_same_flight_have_the_same_findings_within_a_seco
     let log = found("p23_motor_dead_quad.cut.ulg.gz");
     let recording = found("p23_motor_dead_quad.tlog.gz");
     // What would only echo the mishap is quiet.
-    assert_eq!(recording.len(), 4, "{recording:?}");
+    assert_eq!(recording.len(), 6, "{recording:?}");
     // The shock is shorter than the time between two samples of the recording.
     let only_in_log = |&&(check, ..): &&(&str, u8, Level, f64)| check == "impact";
     assert_eq!(log.iter().filter(only_in_log).count(), 1, "{log:?}");

@@ -12,12 +12,14 @@ mod texts;
 
 pub use events::name as event_name;
 
-use crate::cause::{Alert, Cause, Causes, Meaning};
+use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
 use crate::observation::{Estimator, EstimatorScale};
 use crate::time::{Instant, Span};
 
 /// How long a text or an event is said to be so. PX4 tells its failing checks again when they change, some 2 s apart.
 pub const HOLDS: Span = Span::from_secs(10);
+/// What the autopilot says of a crash comes at most so long after it disarmed: heartbeats are a second apart.
+const DISARMED: Span = Span::from_secs(2);
 /// Flags come at 1 Hz or faster where they come at all.
 const FLAGS_AGE: Span = Span::from_secs(5);
 
@@ -50,7 +52,8 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
 }
 
 /// What the estimator's flags say (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`), where it had attitude and position before.
-/// Bits that both have: 0 attitude, 3 and 4 position. PX4: 10 GPS glitch, 11 accelerometer error. ArduPilot: 15 GPS glitching.
+/// Bits that both have: 0 attitude, 3 and 4 position. PX4: 10 GPS glitch, 11 accelerometer error. ArduPilot: 15 GPS glitching,
+/// which it also sets where there is no GPS.
 fn of_estimator(estimator: &Estimator, had_both: bool) -> Causes {
     const PX4_GLITCH: u16 = 1 << 10;
     const PX4_ACCELEROMETER: u16 = 1 << 11;
@@ -62,7 +65,7 @@ fn of_estimator(estimator: &Estimator, had_both: bool) -> Causes {
     };
     let lost = had_both && !has_both(flags);
     let said = [
-        (flags & glitch != 0, Cause::Gnss),
+        (had_both && flags & glitch != 0, Cause::Gnss),
         (flags & accelerometer != 0, Cause::Accelerometer),
         (lost, Cause::Estimator),
     ];
@@ -96,14 +99,16 @@ impl Flags {
     }
 }
 
-/// What the autopilot says is wrong, now.
+/// What the autopilot says is wrong, now. Only what is said while it is armed counts: before, it is about arming.
 #[derive(Clone, Copy, Debug)]
 pub struct Alerts {
-    /// Of each cause, until when what was said once holds, milliseconds; and whether it is critical.
-    told: [Option<(u32, bool)>; Cause::COUNT],
+    /// Of each cause, until when what was said once holds, milliseconds; and how bad it is.
+    told: [Option<(u32, Urgency)>; Cause::COUNT],
     sensors: Flags,
     failures: Flags,
     estimator: Flags,
+    armed: bool,
+    armed_at: Option<Instant>,
     /// The receiver of the remote control was healthy once: one that never was is not fitted or not switched on.
     had_remote_control: bool,
     /// The estimator had attitude and position.
@@ -117,19 +122,37 @@ impl Alerts {
             sensors: Flags::NONE,
             failures: Flags::NONE,
             estimator: Flags::NONE,
+            armed: false,
+            armed_at: None,
             had_remote_control: false,
             had_both: false,
         }
     }
 
-    /// A text or an event. What is said while nothing may turn is about arming.
-    pub(crate) fn tell(&mut self, at: Instant, alert: Alert, armed: bool) {
-        if !armed {
-            return;
+    /// A heartbeat: with each arming all begins anew.
+    pub(crate) const fn take_armed(&mut self, at: Instant, armed: bool) {
+        if armed && !self.armed {
+            let Self { had_remote_control, had_both, .. } = *self;
+            *self = Self { had_remote_control, had_both, ..Self::new() };
         }
-        let Some(place) = self.told.get_mut(alert.cause as usize) else { return };
-        let held = place.is_some_and(|(until, critical)| critical && !is_past(at, until));
-        *place = Some(((at + HOLDS).as_millis() as u32, alert.critical || held));
+        self.armed = armed;
+        if armed {
+            self.armed_at = Some(at);
+        }
+    }
+
+    /// A text or an event. An autopilot that crashes disarms with the word.
+    pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
+        let crashed = alert.cause == Cause::Crash
+            && self.armed_at.is_some_and(|armed_at| at.since(armed_at) <= DISARMED);
+        let Some(place) = self.told.get_mut(alert.cause as usize).filter(|_| self.armed || crashed) else {
+            return;
+        };
+        let held = place.filter(|(until, _)| !is_past(at, *until)).map(|(_, urgency)| urgency);
+        *place = match alert.urgency {
+            Urgency::Over => place.map(|_| (at.as_millis() as u32, Urgency::Over)),
+            urgency => Some(((at + HOLDS).as_millis() as u32, held.unwrap_or(urgency).max(urgency))),
+        };
     }
 
     /// `SYS_STATUS`: sensors that are present and enabled and not healthy.
@@ -150,16 +173,18 @@ impl Alerts {
         self.estimator.take(at, of_estimator(estimator, self.had_both));
     }
 
-    /// How bad the autopilot says it is: 0 not at all, 1 a warning, 2 critical; `None` where nothing was ever said.
-    pub fn level(&self, now: Instant, cause: Cause) -> Option<f32> {
+    /// How bad the autopilot says it is, as [`Urgency`] numbers it; `None` where nothing was ever said. In a mishap flags only echo it.
+    pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
         let told = self.told.get(cause as usize).copied().flatten();
-        let told = told.map(|(until, critical)| if is_past(now, until) { 0 } else { 1 + u8::from(critical) });
+        let told = told.map(|(until, urgency)| if is_past(now, until) { Urgency::Over } else { urgency });
         let all = [&self.sensors, &self.failures, &self.estimator];
         let known = all.iter().any(|flags| flags.at.is_some());
-        let flagged = all.iter().any(|flags| flags.has(now, cause))
+        let flagged = self.armed
+            && !in_mishap
+            && all.iter().any(|flags| flags.has(now, cause))
             && (cause != Cause::RemoteControl || self.had_remote_control);
-        let flagged = known.then_some(u8::from(flagged));
-        told.max(flagged).map(f32::from)
+        let flagged = known.then_some(if flagged { Urgency::Warning } else { Urgency::Over });
+        told.max(flagged).map(|urgency| f32::from(urgency as u8))
     }
 }
 

@@ -110,17 +110,33 @@ impl Cause {
 pub struct Alert {
     /// What is wrong.
     pub cause: Cause,
-    /// Whether somebody has to act now.
-    pub critical: bool,
+    /// How bad it is.
+    pub urgency: Urgency,
+}
+
+/// How bad it is. The numbers are the values of the checks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Urgency {
+    /// It is over.
+    Over = 0,
+    /// Worth knowing.
+    Warning = 1,
+    /// Somebody has to act now.
+    Critical = 2,
 }
 
 impl Alert {
     pub(crate) const fn warning(cause: Cause) -> Self {
-        Self { cause, critical: false }
+        Self { cause, urgency: Urgency::Warning }
+    }
+
+    pub(crate) const fn over(cause: Cause) -> Self {
+        Self { cause, urgency: Urgency::Over }
     }
 
     pub(crate) const fn critical(cause: Cause) -> Self {
-        Self { cause, critical: true }
+        Self { cause, urgency: Urgency::Critical }
     }
 }
 

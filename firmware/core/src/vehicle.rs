@@ -288,7 +288,10 @@ impl Vehicle {
 
     fn take(&mut self, at: Instant, component: u8, observation: &Observation) {
         match *observation {
-            Observation::Heartbeat(heartbeat) => self.heartbeat.set(at, heartbeat),
+            Observation::Heartbeat(heartbeat) => {
+                self.alerts.take_armed(at, heartbeat.armed);
+                self.heartbeat.set(at, heartbeat);
+            }
             Observation::SystemStatus(system) => {
                 if let Some(unhealthy) = system.unhealthy {
                     self.alerts.take_sensors(at, unhealthy);
@@ -337,7 +340,7 @@ impl Vehicle {
             Observation::Processor(processor) => self.processor.set(at, processor),
             Observation::Identity(identity) => self.identity.set(at, identity),
             Observation::CommandAck(ack) => self.command_ack.set(at, ack),
-            Observation::Alert(alert) => self.alerts.tell(at, alert, self.armed()),
+            Observation::Alert(alert) => self.alerts.tell(at, alert),
             Observation::Failing(causes) => self.alerts.take_failures(at, causes),
             Observation::MissionReached(item) => self.mission_reached.set(at, item),
             Observation::SpeedSensors(_)

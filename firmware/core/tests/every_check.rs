@@ -6,7 +6,7 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::cause::{Alert, Cause};
+use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::health::{self, Finding, Level, checks};
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Engine, Esc, EscGroup, EstimatorScale, Gnss, Heartbeat, Observation,
@@ -238,7 +238,8 @@ fn rail(more: &mut Vec<Observation>, volts: f32) {
 
 /// What the autopilot says in a text or an event.
 fn said(cause: Cause, critical: bool) -> Observation {
-    Observation::Alert(Alert { cause, critical })
+    let urgency = if critical { Urgency::Critical } else { Urgency::Warning };
+    Observation::Alert(Alert { cause, urgency })
 }
 
 fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {

@@ -132,6 +132,8 @@ impl Recording<'_> {
             };
         }
         match words.scope {
+            // Its silence says nothing, good or bad.
+            Scope::Said if !seen.level => return Verdict::NotMeant,
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
             Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
             _ if autopilot.is_none() => return not("no heartbeat of an autopilot"),

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use hums_core::Monitor;
 use hums_core::alert;
-use hums_core::cause::Alert;
+use hums_core::cause::{Alert, Urgency};
 use hums_core::happening::Happening;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
@@ -186,7 +186,7 @@ impl Judge {
 
     /// The autopilot says something in words.
     fn said(&mut self, at: Instant, alert: Option<Alert>, words: &str) {
-        if let Some(alert) = alert.filter(|_| !words.is_empty()) {
+        if let Some(alert) = alert.filter(|alert| alert.urgency > Urgency::Over && !words.is_empty()) {
             self.details.said(at, alert, words, &mut self.here);
         }
     }

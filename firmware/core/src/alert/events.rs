@@ -40,6 +40,10 @@ const fn act(name: &'static str, cause: Cause) -> Row {
     (name, Says::Is(Meaning::Wrong(Alert::critical(cause))))
 }
 
+const fn over(name: &'static str, cause: Cause) -> Row {
+    (name, Says::Is(Meaning::Wrong(Alert::over(cause))))
+}
+
 /// Severe in its own words, and nothing that is wrong with the vehicle.
 const fn fine(name: &'static str) -> Row {
     (name, Says::Is(Meaning::Fine))
@@ -100,11 +104,6 @@ const EVENTS: &[Row] = &[
     warn("check_estimator_vert_vel_not_stable", Cause::Estimator),
     warn("check_estimator_low_position_accuracy", Cause::Estimator),
     warn("check_estimator_position_failure_imminent", Cause::Estimator),
-    warn("check_modes_angular_velocity", Cause::Estimator),
-    warn("check_modes_attitude", Cause::Estimator),
-    warn("check_modes_global_pos", Cause::Estimator),
-    warn("check_modes_local_alt", Cause::Estimator),
-    warn("check_modes_local_pos", Cause::Estimator),
     act("check_failure_detector_roll", Cause::Attitude),
     act("check_failure_detector_pitch", Cause::Attitude),
     act("check_failure_detector_alt", Cause::Attitude),
@@ -128,11 +127,15 @@ const EVENTS: &[Row] = &[
     warn("check_power_oc_periph", Cause::Power),
     warn("check_power_oc_report", Cause::Power),
     act("commander_low_bat_shutdown", Cause::Power),
+    act("commander_low_bat_shutdown_failed", Cause::Power),
     warn("commander_failsafe_enter_low_bat", Cause::Power),
     warn("commander_failsafe_enter_low_flight_time_warn", Cause::Power),
     act("commander_failsafe_enter_crit_bat_warn", Cause::Power),
     act("commander_failsafe_enter_crit_low_bat_warn", Cause::Power),
     warn("commander_rc_lost", Cause::RemoteControl),
+    over("commander_rc_regained", Cause::RemoteControl),
+    over("commander_dl_regained", Cause::GroundStation),
+    over("check_estimator_gnss_fusion_started", Cause::Gnss),
     warn("commander_gcs_lost", Cause::GroundStation),
     warn("commander_mission_comp_lost", Cause::GroundStation),
     warn("commander_high_latency_lost", Cause::GroundStation),
@@ -165,6 +168,11 @@ const EVENTS: &[Row] = &[
     act("vtol_att_ctrl_quadchute_tout", Cause::Crash),
     act("vtol_att_ctrl_quadchute_trans_alt_err", Cause::Crash),
     // Which mode may not be flown now, and why arming is refused: not that anything broke.
+    fine("check_modes_angular_velocity"),
+    fine("check_modes_attitude"),
+    fine("check_modes_global_pos"),
+    fine("check_modes_local_alt"),
+    fine("check_modes_local_pos"),
     fine("check_modes_manual_control"),
     fine("check_modes_mission"),
     fine("check_modes_offboard_signal"),

@@ -10,29 +10,36 @@ fn after(seconds: u64) -> Instant {
 fn texts_are_told_by_what_they_mean() {
     let warn = |cause| Some(Alert::warning(cause));
     let act = |cause| Some(Alert::critical(cause));
+    let over = |cause| Some(Alert::over(cause));
     for (severity, text, said) in [
         (2, "EKF3 lane switch 1", warn(Cause::Estimator)),
         (2, "EKF Failsafe: changed to LAND Mode", act(Cause::Estimator)),
-        (2, "EKF Failsafe Cleared", None),
+        (2, "EKF Failsafe Cleared", over(Cause::Estimator)),
         (2, "GPS Glitch or Compass error", warn(Cause::Estimator)),
         (2, "GPS Glitch", warn(Cause::Gnss)),
-        (2, "GPS Glitch cleared", None),
+        (2, "GPS Glitch cleared", over(Cause::Gnss)),
         (2, "Error compass variance", warn(Cause::Compass)),
         (2, "PreArm: Compass not healthy", None),
         (2, "Arm: Gyros inconsistent", None),
         (0, "Potential Thrust Loss (2)", warn(Cause::Propulsion)),
         (0, "Crash: Disarming", act(Cause::Crash)),
         (4, "Radio Failsafe - Disarming", warn(Cause::RemoteControl)),
-        (4, "Radio Failsafe Cleared", None),
+        (4, "Radio Failsafe Cleared", over(Cause::RemoteControl)),
         (4, "Battery 1 is low 10.50V used 100 mAh", warn(Cause::Power)),
         (3, "Airspeed sensor 1 failure. Disabling", warn(Cause::Airspeed)),
         (2, "Vibration compensation ON", warn(Cause::Vibration)),
-        (2, "Vibration compensation OFF", None),
+        (2, "Vibration compensation OFF", over(Cause::Vibration)),
         (2, "Auto mission changed, restarted command", None),
         (2, "Preflight Fail: Attitude failure (roll)", act(Cause::Attitude)),
         (2, "Accel 0 clipping, not safe to fly!\t", warn(Cause::Vibration)),
         (3, "MAG #0 failed:  TIMEOUT!", warn(Cause::Compass)),
         (2, "Failsafe activated\t", warn(Cause::Failsafe)),
+        (2, "[load_mon] gps low on stack! (100 bytes left)", warn(Cause::Processor)),
+        (3, "Rangefinder: no data, using baro", warn(Cause::Ranging)),
+        (4, "RC Short Failsafe: switched to CIRCLE", warn(Cause::RemoteControl)),
+        (2, "Compass needs calibration - Land now!", warn(Cause::Compass)),
+        (4, "Crash check disabled", None),
+        (4, "Terrain: clamping offset -22 to -15", None),
         (2, "Flux capacitor drained", warn(Cause::Other)),
         (4, "Flux capacitor low", None),
         (6, "EKF3 IMU0 is using GPS", None),
@@ -71,41 +78,73 @@ fn fnv(name: &str) -> u32 {
     name.bytes().fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
+/// Alerts of a vehicle that is armed.
+fn armed() -> Alerts {
+    let mut alerts = Alerts::new();
+    alerts.take_armed(T0, true);
+    alerts
+}
+
 #[test]
 fn what_was_said_holds_for_a_while_and_only_while_armed() {
     let mut alerts = Alerts::new();
-    assert_eq!(alerts.level(T0, Cause::Gnss), None);
-    alerts.tell(T0, Alert::warning(Cause::Gnss), false);
-    assert_eq!(alerts.level(T0, Cause::Gnss), None, "said before arming");
-    alerts.tell(T0, Alert::critical(Cause::Gnss), true);
-    alerts.tell(after(5), Alert::warning(Cause::Gnss), true);
+    assert_eq!(alerts.level(T0, Cause::Gnss, false), None);
+    alerts.tell(T0, Alert::warning(Cause::Gnss));
+    assert_eq!(alerts.level(T0, Cause::Gnss, false), None, "said before arming");
+    alerts.take_armed(T0, true);
+    alerts.tell(T0, Alert::critical(Cause::Gnss));
+    alerts.tell(after(5), Alert::warning(Cause::Gnss));
     for (seconds, level) in [(0, 2.0), (14, 2.0), (15, 2.0), (16, 0.0)] {
-        assert_eq!(alerts.level(after(seconds), Cause::Gnss), Some(level), "{seconds} s");
+        assert_eq!(alerts.level(after(seconds), Cause::Gnss, false), Some(level), "{seconds} s");
     }
-    assert_eq!(alerts.level(after(5), Cause::Gyro), None, "of the gyro nothing was said");
+    assert_eq!(alerts.level(after(5), Cause::Gyro, false), None, "of the gyro nothing was said");
+    alerts.tell(after(20), Alert::warning(Cause::Gnss));
+    alerts.tell(after(21), Alert::over(Cause::Gnss));
+    assert_eq!(alerts.level(after(22), Cause::Gnss, false), Some(0.0), "it is over by its own word");
+    alerts.tell(after(23), Alert::warning(Cause::Gnss));
+    alerts.take_armed(after(24), false);
+    assert_eq!(alerts.level(after(24), Cause::Gnss, false), Some(1.0), "it was said while armed");
+    alerts.take_armed(after(25), true);
+    assert_eq!(alerts.level(after(25), Cause::Gnss, false), None, "another arming");
+}
+
+#[test]
+fn a_crash_is_heard_though_the_autopilot_disarms_with_the_word() {
+    let mut alerts = armed();
+    alerts.take_armed(after(1), false);
+    alerts.tell(after(1), Alert::warning(Cause::Gnss));
+    alerts.tell(after(2), Alert::critical(Cause::Crash));
+    assert_eq!(
+        (alerts.level(after(2), Cause::Crash, false), alerts.level(after(2), Cause::Gnss, false)),
+        (Some(2.0), None)
+    );
+    let mut alerts = armed();
+    alerts.take_armed(after(1), false);
+    alerts.tell(after(5), Alert::critical(Cause::Crash));
+    assert_eq!(alerts.level(after(5), Cause::Crash, false), None, "long after");
 }
 
 #[test]
 fn flags_count_when_two_messages_have_them_and_while_they_come() {
     const COMPASS: u32 = 1 << 2;
-    let mut alerts = Alerts::new();
+    let mut alerts = armed();
     for (seconds, bits, level) in
         [(0, 0, 0.0), (1, COMPASS, 0.0), (2, COMPASS, 1.0), (3, 0, 0.0), (4, COMPASS, 0.0), (5, COMPASS, 1.0)]
     {
         alerts.take_sensors(after(seconds), bits);
-        assert_eq!(alerts.level(after(seconds), Cause::Compass), Some(level), "{seconds} s");
+        assert_eq!(alerts.level(after(seconds), Cause::Compass, false), Some(level), "{seconds} s");
     }
-    assert_eq!(alerts.level(after(10), Cause::Compass), Some(1.0));
-    assert_eq!(alerts.level(after(11), Cause::Compass), Some(0.0), "no message for more than 5 s");
+    assert_eq!(alerts.level(after(10), Cause::Compass, false), Some(1.0));
+    assert_eq!(alerts.level(after(11), Cause::Compass, false), Some(0.0), "no message for more than 5 s");
 }
 
 #[test]
 fn a_remote_control_is_lost_only_where_there_was_one() {
     const RECEIVER: u32 = 1 << 16;
-    let mut alerts = Alerts::new();
+    let mut alerts = armed();
     let mut says = |second, bits| {
         alerts.take_sensors(after(second), bits);
-        alerts.level(after(second), Cause::RemoteControl)
+        alerts.level(after(second), Cause::RemoteControl, false)
     };
     assert_eq!([says(0, RECEIVER), says(1, RECEIVER)], [Some(0.0); 2], "never switched on");
     assert_eq!([says(2, 0), says(3, RECEIVER), says(4, RECEIVER)], [Some(0.0), Some(0.0), Some(1.0)]);
@@ -115,16 +154,17 @@ fn a_remote_control_is_lost_only_where_there_was_one() {
 fn the_estimators_flags_are_read_on_either_scale() {
     const GOOD: u16 = 0x37F;
     let says = |scale, flags: [u16; 3]| {
-        let mut alerts = Alerts::new();
+        let mut alerts = armed();
         for (second, flags) in (0..).zip(flags) {
             alerts.take_estimator(after(second), &Estimator { scale, flags, ..Estimator::default() });
         }
-        let level = |cause| alerts.level(after(2), cause) == Some(1.0);
+        let level = |cause| alerts.level(after(2), cause, false) == Some(1.0);
         (level(Cause::Gnss), level(Cause::Accelerometer), level(Cause::Estimator))
     };
     let (px4, ardupilot) = (EstimatorScale::TestRatio, EstimatorScale::Variance);
     assert_eq!(says(px4, [GOOD; 3]), (false, false, false));
     assert_eq!(says(px4, [GOOD, GOOD | 1 << 10, GOOD | 1 << 10]), (true, false, false));
+    assert_eq!(says(ardupilot, [0x80A7; 3]), (false, false, false), "no GPS, and the glitch bit set");
     assert_eq!(says(px4, [GOOD, GOOD | 1 << 11, GOOD | 1 << 11]), (false, true, false));
     assert_eq!(says(ardupilot, [GOOD, GOOD | 1 << 15, GOOD | 1 << 15]), (true, false, false));
     assert_eq!(says(ardupilot, [GOOD, 0xA7, 0xA7]), (false, false, true), "position lost");

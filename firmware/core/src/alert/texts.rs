@@ -14,6 +14,11 @@ const fn act(pattern: &'static str, cause: Cause) -> Row {
     (pattern, Meaning::Wrong(Alert::critical(cause)), Where::Everywhere)
 }
 
+/// The end of what was wrong.
+const fn over(pattern: &'static str, cause: Cause) -> Row {
+    (pattern, Meaning::Wrong(Alert::over(cause)), Where::Everywhere)
+}
+
 /// Only the name of a part, which mild texts have too.
 const fn broad(pattern: &'static str, cause: Cause) -> Row {
     (pattern, Meaning::Wrong(Alert::warning(cause)), Where::Severe)
@@ -40,14 +45,30 @@ const TEXTS: &[Row] = &[
     fine("^arming"),
     fine("disarm denied"),
     fine("disarming denied"),
+    over("radio failsafe clear", Cause::RemoteControl),
+    over("throttle failsafe off", Cause::RemoteControl),
+    over("gcs failsafe clear", Cause::GroundStation),
+    over("ekf failsafe clear", Cause::Estimator),
+    over("gps glitch clear", Cause::Gnss),
+    over("glitch clear", Cause::Estimator),
+    over("compensation off", Cause::Vibration),
     fine("clear"),
     fine("regained"),
     fine("recover"),
-    fine("compensation off"),
     fine("failsafe off"),
     fine("event off"),
     fine("crash dump"),
     fine("crashdump"),
+    fine("disabled"),
+    fine("returned to"),
+    fine("re-enabled"),
+    fine("data ok"),
+    fine(": ok"),
+    fine("ok again"),
+    fine("unsupported"),
+    fine("clamping"),
+    fine("hit ground"),
+    warn("compass needs calib", Cause::Compass),
     fine("calib"),
     fine("initiali"),
     fine("ground start"),
@@ -78,6 +99,7 @@ const TEXTS: &[Row] = &[
     fine("script"),
     // Mishaps and what ends a flight.
     act("crash", Cause::Crash),
+    act("ditching", Cause::Crash),
     warn("hard landing", Cause::Crash),
     act("parachute*releas", Cause::Crash),
     act("parachute*deploy", Cause::Crash),
@@ -86,6 +108,8 @@ const TEXTS: &[Row] = &[
     warn("thrust loss", Cause::Propulsion),
     act("motor*fail", Cause::Propulsion),
     act("engine*stop", Cause::Propulsion),
+    act("engine*fail", Cause::Propulsion),
+    act("lost motor", Cause::Propulsion),
     warn("yaw imbalance", Cause::Propulsion),
     broad("prop", Cause::Propulsion),
     warn("esc*fail", Cause::Propulsion),
@@ -112,7 +136,9 @@ const TEXTS: &[Row] = &[
     // Links.
     warn("radio failsafe", Cause::RemoteControl),
     warn("rc failsafe", Cause::RemoteControl),
-    warn("rc*failsafe on", Cause::RemoteControl),
+    warn("rc*failsafe", Cause::RemoteControl),
+    warn("failsafe. short event", Cause::RemoteControl),
+    warn("failsafe. long event", Cause::RemoteControl),
     warn("throttle failsafe on", Cause::RemoteControl),
     warn("failsafe - *event on", Cause::RemoteControl),
     broad("manual control", Cause::RemoteControl),
@@ -133,7 +159,10 @@ const TEXTS: &[Row] = &[
     warn("lane switch", Cause::Estimator),
     warn("emergency yaw", Cause::Estimator),
     warn("stopped aiding", Cause::Estimator),
-    fine("ekf primary changed"),
+    warn("ekf primary changed", Cause::Estimator),
+    warn("primary ekf changed", Cause::Estimator),
+    warn("hgt timeout", Cause::Estimator),
+    warn("dead reckoning", Cause::Estimator),
     warn("ekf bad", Cause::Estimator),
     warn("bad ahrs", Cause::Estimator),
     warn("not stable", Cause::Estimator),
@@ -142,6 +171,12 @@ const TEXTS: &[Row] = &[
     warn("no longer valid", Cause::Estimator),
     warn("position error", Cause::Estimator),
     // Sensors.
+    warn("low on stack", Cause::Processor),
+    broad("rangefinder", Cause::Ranging),
+    broad("distance sensor", Cause::Ranging),
+    broad("lidar", Cause::Ranging),
+    broad("optflow", Cause::Ranging),
+    broad("optical flow", Cause::Ranging),
     broad("compass", Cause::Compass),
     warn("mag *fail", Cause::Compass),
     broad("magnet", Cause::Compass),
@@ -156,15 +191,11 @@ const TEXTS: &[Row] = &[
     broad("accel", Cause::Accelerometer),
     warn("error pos", Cause::Estimator),
     warn("error vel", Cause::Estimator),
-    broad("rangefinder", Cause::Ranging),
-    broad("distance sensor", Cause::Ranging),
-    broad("lidar", Cause::Ranging),
-    broad("optflow", Cause::Ranging),
-    broad("optical flow", Cause::Ranging),
     broad("terrain", Cause::Terrain),
     // The rest of the autopilot.
     warn("fence*breach", Cause::Fence),
     warn("geofence violation", Cause::Fence),
+    warn("log file", Cause::Logging),
     broad("logg", Cause::Logging),
     broad("sd card", Cause::Logging),
     warn("cpu load", Cause::Processor),

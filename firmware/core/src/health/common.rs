@@ -27,14 +27,18 @@ pub(super) const fn alert<const CAUSE: usize>(words: &'static str, subsystem: Su
         hysteresis: 0.0,
         debounce_warn: Span::ZERO,
         debounce_critical: Span::ZERO,
-        when: When::Armed,
+        // Only what is said while it is armed counts; a mishap does not silence it, and it is told at its own time.
+        when: When::Always,
         stale_after: None,
         instances: 1,
         // That it says nothing is no word about its health.
         alarm_only: true,
         is_flag: true,
         read: |inputs, _| {
-            Reading::new(Some(inputs.now), inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE]))
+            Reading::new(
+                Some(inputs.now),
+                inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE], inputs.mishap.is_going()),
+            )
         },
     }
 }

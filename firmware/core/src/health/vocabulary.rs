@@ -17,6 +17,8 @@ pub enum Scope {
     Wire,
     /// The monitor's own recorder.
     Recorder,
+    /// What the autopilot says is wrong: that it says nothing cannot be judged.
+    Said,
     /// What the monitor on board has stored of earlier flights, or of parts that wear.
     Stored,
 }
@@ -87,7 +89,7 @@ vocabulary! {
     "battery_due" Stored "battery life", "", needs "battery registered with the monitor on board";
     "A battery has reached the end of its life."; "Replace it, and tell the monitor.";
 
-    "battery_alert" Vehicle "autopilot's alert: battery", "", needs "texts, events or health flags of the autopilot";
+    "battery_alert" Said "autopilot's alert: battery", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a battery or a supply was low or had failed.";
     "Read its messages of that time; check pack, power module and wiring.";
 
@@ -112,7 +114,7 @@ vocabulary! {
     "drive_due" Stored "life of motors, propellers, ESCs", "", needs "motor, propeller or ESC registered with the monitor on board";
     "A motor, propeller or ESC has reached the end of its life."; "Replace it, and tell the monitor.";
 
-    "drive_alert" Vehicle "autopilot's alert: motors", "", needs "texts, events or health flags of the autopilot";
+    "drive_alert" Said "autopilot's alert: motors", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a motor, propeller or ESC had failed or gave too little thrust.";
     "Do not fly until motors, propellers and ESCs are checked.";
 
@@ -142,7 +144,7 @@ vocabulary! {
     "airframe_due" Stored "airframe life", "", needs "airframe registered with the monitor on board";
     "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
-    "vibration_alert" Vehicle "autopilot's alert: vibration", "", needs "texts, events or health flags of the autopilot";
+    "vibration_alert" Said "autopilot's alert: vibration", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that vibration or clipping disturbed it.";
     "Balance propellers and motors, and check the autopilot's mounting.";
 
@@ -166,30 +168,30 @@ vocabulary! {
     "gps_spoofing" Vehicle "GPS spoofing", "GPS", needs "jamming or spoofing state of a GPS receiver";
     "The receiver detected false signals: its position could be wrong."; "Do not depend on GPS there.";
 
-    "gyro_alert" Vehicle "autopilot's alert: gyro", "", needs "texts, events or health flags of the autopilot";
+    "gyro_alert" Said "autopilot's alert: gyro", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a gyro had failed or could not be trusted."; "Do not fly until the autopilot's gyros are checked.";
-    "accel_alert" Vehicle "autopilot's alert: accelerometer", "", needs "texts, events or health flags of the autopilot";
+    "accel_alert" Said "autopilot's alert: accelerometer", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an accelerometer had failed or could not be trusted.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "compass_alert" Vehicle "autopilot's alert: compass", "", needs "texts, events or health flags of the autopilot";
+    "compass_alert" Said "autopilot's alert: compass", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a compass had failed or could not be trusted.";
     "Check the compass, its wiring, its calibration and currents or magnets near it.";
-    "baro_alert" Vehicle "autopilot's alert: barometer", "", needs "texts, events or health flags of the autopilot";
+    "baro_alert" Said "autopilot's alert: barometer", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a barometer had failed or could not be trusted.";
     "Check the barometer, its cover and the airflow at it.";
-    "airspeed_alert" Vehicle "autopilot's alert: airspeed", "", needs "texts, events or health flags of the autopilot";
+    "airspeed_alert" Said "autopilot's alert: airspeed", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an airspeed sensor had failed or could not be trusted.";
     "Check the pitot tube for water and dirt, its hoses and its calibration.";
-    "gnss_alert" Vehicle "autopilot's alert: GPS", "", needs "texts, events or health flags of the autopilot";
+    "gnss_alert" Said "autopilot's alert: GPS", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that GPS was lost, jammed, spoofed or not to be trusted.";
     "Check the antenna's view, wiring and sources of interference.";
-    "ranging_alert" Vehicle "autopilot's alert: rangefinder", "", needs "texts, events or health flags of the autopilot";
+    "ranging_alert" Said "autopilot's alert: rangefinder", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a rangefinder, optical flow, vision or proximity sensor had failed.";
     "Check that sensor and its wiring.";
-    "terrain_alert" Vehicle "autopilot's alert: terrain data", "", needs "texts, events or health flags of the autopilot";
+    "terrain_alert" Said "autopilot's alert: terrain data", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it lacked the heights of the ground, or could hit it.";
     "Load terrain data before the flight; check the mission's heights.";
-    "ekf_alert" Vehicle "autopilot's alert: estimator", "", needs "texts, events or health flags of the autopilot";
+    "ekf_alert" Said "autopilot's alert: estimator", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that its estimator doubted or had lost attitude, velocity, position or height.";
     "Look at compass, GPS, barometer and vibration at that time.";
 
@@ -204,9 +206,9 @@ vocabulary! {
     "radio_margin" Vehicle "telemetry signal above noise", "", needs "telemetry radio status";
     "The telemetry radio's signal was hardly above the noise."; "Check antennas, range and sources of interference.";
 
-    "rc_alert" Vehicle "autopilot's alert: remote control", "", needs "texts, events or health flags of the autopilot";
+    "rc_alert" Said "autopilot's alert: remote control", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the remote control was lost."; "Check transmitter, receiver, antennas and range.";
-    "gcs_alert" Vehicle "autopilot's alert: ground station", "", needs "texts, events or health flags of the autopilot";
+    "gcs_alert" Said "autopilot's alert: ground station", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the ground station or a companion was lost."; "Check the telemetry link and its range.";
 
     "load" Vehicle "processor load", "", needs "processor load";
@@ -217,16 +219,16 @@ vocabulary! {
     "The autopilot restarted."; "In flight: do not fly until the supply and the firmware are checked.";
     "autopilot_state" Vehicle "autopilot failsafe", "", needs "state of the autopilot";
     "The autopilot declared a failsafe or an emergency."; "Read its messages of that time; mend the cause they name.";
-    "processor_alert" Vehicle "autopilot's alert: processor", "", needs "texts, events or health flags of the autopilot";
+    "processor_alert" Said "autopilot's alert: processor", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that its processor or firmware had a problem.";
     "Keep its log and tell the firmware's makers; lower logging and stream rates.";
-    "logging_alert" Vehicle "autopilot's alert: its log", "", needs "texts, events or health flags of the autopilot";
+    "logging_alert" Said "autopilot's alert: its log", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it could not write its own log."; "Check the autopilot's card.";
-    "fence_alert" Vehicle "autopilot's alert: geofence", "", needs "texts, events or health flags of the autopilot";
+    "fence_alert" Said "autopilot's alert: geofence", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the geofence was breached."; "Check the fence and the flight at that time.";
-    "failsafe_alert" Vehicle "autopilot's alert: failsafe", "", needs "texts, events or health flags of the autopilot";
+    "failsafe_alert" Said "autopilot's alert: failsafe", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a failsafe acted."; "Read its messages of that time; mend the cause they name.";
-    "autopilot_alert" Vehicle "autopilot's alert", "", needs "texts, events or health flags of the autopilot";
+    "autopilot_alert" Said "autopilot's alert", "", needs "texts, events or health flags of the autopilot";
     "The autopilot gave a severe message that no table here knows."; "Read its messages of that time.";
 
     "roll" Vehicle "roll angle", "", needs "attitude";
@@ -234,7 +236,7 @@ vocabulary! {
     "pitch" Vehicle "pitch angle", "", needs "attitude";
     "The vehicle pitched further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
 
-    "attitude_alert" Vehicle "autopilot's alert: attitude", "", needs "texts, events or health flags of the autopilot";
+    "attitude_alert" Said "autopilot's alert: attitude", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it had lost control of attitude or height.";
     "Do not fly until motors, propellers and sensors are checked.";
 
@@ -268,7 +270,7 @@ vocabulary! {
     "overturned" Vehicle "overturned", "", needs "attitude of a vehicle on rotors";
     "The vehicle turned over, or lay over, while its motors ran.";
     "Inspect the vehicle; check motor order, propellers and calibration.";
-    "crash_alert" Vehicle "autopilot's alert: crash", "", needs "texts, events or health flags of the autopilot";
+    "crash_alert" Said "autopilot's alert: crash", "", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it crashed, released its parachute or ended the flight.";
     "Do not fly until the whole vehicle is inspected.";
 }

@@ -1,5 +1,5 @@
 //! The traps, one by one. Payloads are built by the typed encoders.
-use hums_core::cause::{Alert, Cause, Causes};
+use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::observation::{
     Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
 };
@@ -62,7 +62,7 @@ fn what_the_autopilot_says_is_wrong_is_read_of_texts_events_and_flags() {
         let packet = Packet::new(253).u8(0, severity).text(1, 50, words).u8(53, part);
         by_id(253, packet.payload())
     };
-    let warning = |cause| Some(Observation::Alert(Alert { cause, critical: false }));
+    let warning = |cause| Some(Observation::Alert(Alert { cause, urgency: Urgency::Warning }));
     assert_eq!(text(2, "EKF3 lane switch 1", 0), warning(Cause::Estimator));
     assert_eq!(text(2, "of a longer text", 1), None, "its first part said it");
     assert_eq!((text(6, "EKF3 lane switch 1", 0), text(2, "", 0), text(200, "x", 0)), (None, None, None));

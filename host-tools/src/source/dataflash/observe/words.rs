@@ -1,7 +1,7 @@
 //! Numbers of `ArduPilot` in words: vehicles, modes, events, errors. Sources: `AP_Logger.h` (`LogEvent`,
 //! `LogErrorSubsystem`), `mode.h` of `ArduCopter`, `defines.h` of `ArduPlane`, `mode.h` of Rover and `ArduSub`.
 
-use hums_core::cause::{Alert, Cause};
+use hums_core::cause::{Alert, Cause, Urgency};
 
 /// Which firmware wrote the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -284,29 +284,28 @@ pub(super) fn error(subsystem: u8, code: u8) -> String {
     format!("{name}: {words}")
 }
 
-/// What an ERR says is wrong with the vehicle.
+/// What an ERR says is wrong with the vehicle, or is no longer (code 0).
 pub(super) fn alert(subsystem: u8, code: u8) -> Option<Alert> {
-    let (cause, critical) = match subsystem {
-        _ if code == 0 => return None,
-        3 => (Cause::Compass, false),
-        4 => (Cause::Ranging, false),
-        5 => (Cause::RemoteControl, false),
-        6 => (Cause::Power, false),
-        7 | 11 => (Cause::Gnss, false),
-        8 => (Cause::GroundStation, false),
-        9 => (Cause::Fence, false),
-        CRASH_CHECK => (Cause::Crash, true),
-        16 | 31 => (Cause::Estimator, false),
-        17 => (Cause::Estimator, true),
-        18 => (Cause::Barometer, false),
-        19 | 30 => (Cause::Processor, false),
-        23 => (Cause::Terrain, false),
-        25 => (Cause::Propulsion, false),
-        26 | 27 => (Cause::Other, false),
-        29 => (Cause::Vibration, false),
+    let (cause, urgency) = match subsystem {
+        3 => (Cause::Compass, Urgency::Warning),
+        4 => (Cause::Ranging, Urgency::Warning),
+        5 => (Cause::RemoteControl, Urgency::Warning),
+        6 => (Cause::Power, Urgency::Warning),
+        7 | 11 => (Cause::Gnss, Urgency::Warning),
+        8 => (Cause::GroundStation, Urgency::Warning),
+        9 => (Cause::Fence, Urgency::Warning),
+        CRASH_CHECK => (Cause::Crash, Urgency::Critical),
+        16 | 24 | 31 => (Cause::Estimator, Urgency::Warning),
+        17 => (Cause::Estimator, Urgency::Critical),
+        18 => (Cause::Barometer, Urgency::Warning),
+        19 | 30 => (Cause::Processor, Urgency::Warning),
+        23 => (Cause::Terrain, Urgency::Warning),
+        25 => (Cause::Propulsion, Urgency::Warning),
+        26 | 27 => (Cause::Other, Urgency::Warning),
+        29 => (Cause::Vibration, Urgency::Warning),
         _ => return None,
     };
-    Some(Alert { cause, critical })
+    Some(Alert { cause, urgency: if code == 0 { Urgency::Over } else { urgency } })
 }
 
 const SUBSYSTEMS: &[(u8, &str)] = &[
