@@ -235,7 +235,8 @@ mod tests {
     #[test]
     fn a_last_file_that_was_to_be_written_anew_is_no_finding_once_the_next_start_found_it_so() {
         let others = Others { sectors: 9, first: 0, last: 8, session: 7, board: None, several: false };
-        let strange = vec![Strange { file: 1, hollow: true, older: false, others: Some(others) }];
+        let strange =
+            vec![Strange { file: 1, hollow: true, older: false, others: Some(others), shift: None }];
         let mut log = Ending {
             name: "00006".to_owned(),
             files: vec!["00006_00.HUM".to_owned(), "00006_01.HUM".to_owned()],

@@ -8,7 +8,7 @@ use super::proof::Proof;
 use crate::hex::hex;
 use crate::logs::reader::Summary;
 use crate::logs::segment_name;
-use crate::logs::strangers::{Others, Strange};
+use crate::logs::strangers::{Others, Shift, Strange};
 use crate::plural::{are, count};
 
 /// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
@@ -70,6 +70,7 @@ impl Files<'_> {
         let is_empty = strange.hollow && self.proof == Proof::NextStart(None);
         match strange.others {
             Some(others) => is_empty && self.is_begun_anew(strange, &others),
+            None if strange.shift.is_some() => false,
             None => is_empty || strange.older && self.is_last(strange) && !self.summary.closed,
         }
     }
@@ -127,7 +128,13 @@ impl Files<'_> {
                     "all sectors in {file} are older than the log's first one: files were renamed or exchanged"
                 )
             }
-            None => format!("{file} has the name of a segment and holds nothing of ours"),
+            None => match strange.shift {
+                Some(Shift { at, blocks }) => format!(
+                    "from block {at} of {file} on its sectors lie {} too far back: something was put before them",
+                    count(blocks, "block")
+                ),
+                None => format!("{file} has the name of a segment and holds nothing of ours"),
+            },
             Some(others) if strange.hollow => format!(
                 "{file} has the name of a segment of this log and holds {}{}{}",
                 count(others.sectors, "sector"),
@@ -228,7 +235,7 @@ mod tests {
             several: false,
         };
         let words = |hollow| {
-            let strange = vec![Strange { file: 0, hollow, older: false, others: Some(others) }];
+            let strange = vec![Strange { file: 0, hollow, older: false, others: Some(others), shift: None }];
             let summary = Summary { strange, ..Summary::default() };
             Files { names: &["00001_00.HUM".to_owned()], summary: &summary, proof: Proof::None }
                 .strange()

@@ -14,10 +14,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::identity::without_links;
 use super::inputs::Inputs;
 use super::part::{is_written, lock, lock_folder_of, sync_folder_of};
-use super::paths::{cannot_write, make_parent, part_of, settle};
+use super::paths::{cannot_write, make_parent, part_of, settle, target_of};
 use super::stamp::{STAMP, Stamp, foreign};
 use super::there::There;
 use crate::outcome::Differs;
@@ -75,7 +74,7 @@ impl Folder {
     pub fn create(path: &Path, inputs: &Inputs, made_of: &str) -> Result<Self> {
         inputs.refuse(path)?;
         make_parent(path)?;
-        let target = without_links(path).with_context(|| cannot_write(path))?;
+        let target = target_of(path)?;
         let _beginning = lock_folder_of(&target);
         restore(&target)?;
         let to = if Self::is_free(path) {

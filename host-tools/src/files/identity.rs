@@ -136,6 +136,15 @@ pub(super) fn without_links(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many links"))
 }
 
+/// Whether what a path leads to is what lies at `target`, which is [`without_links`] of it. What nothing is at yet may be made
+/// there, and what is neither a file nor a folder is written as it is.
+pub(super) fn leads_to(path: &Path, target: &Path) -> bool {
+    let Ok(about) = fs::metadata(path) else { return true };
+    let is_ours = descriptor(path).is_some() && !about.is_dir();
+    let is_kept = about.is_file() || about.is_dir();
+    is_ours || !is_kept || node(path).ok() == node(target).ok()
+}
+
 /// Where one link leads to.
 fn linked(path: &Path) -> io::Result<PathBuf> {
     let to = fs::read_link(path)?;

@@ -8,12 +8,11 @@ use anyhow::{Context as _, Result, bail};
 
 use super::identity::{
     check_standard_output, descriptor, is_standard_output, means_standard_output, refuse_overwriting,
-    without_links,
 };
 use super::inputs::Inputs;
 use super::kind::{Found, Kind, Origin};
 use super::part::{lock, lock_folder_of, remove_stale, rename_new, sync_folder_of};
-use super::paths::{aside_of, begun_of, cannot_write, part_of, settle};
+use super::paths::{aside_of, begun_of, cannot_write, part_of, settle, target_of};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
 use crate::output::Stdout;
@@ -104,7 +103,7 @@ impl Output {
     /// Goes on with what an earlier run has left of a file, and says how many bytes that is. Dropped before its end it
     /// stays for the next one. In the end it replaces a file that is its beginning, and no other. Only for regular files.
     pub fn resume(path: &Path) -> Result<(Self, u64)> {
-        let target = without_links(path).with_context(|| cannot_write(path))?;
+        let target = target_of(path)?;
         if let Ok(about) = fs::metadata(path) {
             check(path, &about)?;
             if !about.is_file() || descriptor(path).is_some() {
@@ -265,7 +264,7 @@ impl Part {
     /// The part of a file that is to be written.
     fn of(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Place> {
         inputs.refuse(path)?;
-        let target = without_links(path).with_context(|| cannot_write(path))?;
+        let target = target_of(path)?;
         // A table beside a file is shorter where that has become whole.
         let keeps_longer = !matches!(kind.origin, Origin::Ours);
         let part = |target: PathBuf, permissions, replaces_beginning| -> Result<Place> {

@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::identity::without_links;
-use super::paths::{PART, cannot_write, part_of};
+use super::paths::{PART, cannot_write, part_of, target_of};
 
 /// Whether a name is that of a file or a folder that is not whole: readers pass it over.
 pub fn is_part(path: &Path) -> bool {
@@ -50,7 +49,7 @@ pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
 /// Makes a file that has its name only once `fill` has filled it, and gives it, locked, for reading and writing. A run
 /// that is killed before leaves nothing of this name.
 pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Result<File> {
-    let target = without_links(path).with_context(|| cannot_write(path))?;
+    let target = target_of(path)?;
     let part = part_of(&target)?;
     let beginning = lock_folder_of(&target);
     remove_stale(&part, path)?;

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::identity::folded;
+use super::identity::{folded, leads_to, without_links};
+use crate::outcome::usage;
 
 /// How the name of a file or a folder ends that is not whole yet.
 pub const PART: &str = ".hums-part";
@@ -24,6 +25,21 @@ pub(super) fn begun_of(target: &Path) -> Result<PathBuf> {
 /// What was begun of another log of the same name, beside it, until the log is whole.
 pub(super) fn aside_of(target: &Path) -> Result<PathBuf> {
     beside(target, &format!(".pull-other{PART}"))
+}
+
+/// The path that is written where this one is named: without links, so that a link stays one. What a link in `/proc` says
+/// (`/proc/PID/fd/3`) may be another file than the one it leads to: that one was deleted, or has its name elsewhere.
+pub(super) fn target_of(path: &Path) -> Result<PathBuf> {
+    let target = without_links(path).with_context(|| cannot_write(path))?;
+    if leads_to(path, &target) {
+        return Ok(target);
+    }
+    Err(usage(format!(
+        "{}: is a link to something that has not the name it says, {}: it was deleted, or is another process's; nothing was \
+         written; name the output by its own path",
+        path.display(),
+        target.display()
+    )))
 }
 
 fn beside(target: &Path, ending: &str) -> Result<PathBuf> {

@@ -238,6 +238,34 @@ fn a_file_that_is_spelled_through_proc_is_a_file_and_a_descriptor_is_written_as_
     assert_eq!(fs::read(&old).expect("there"), b"what was there++++");
 }
 
+/// Its name may be another file's by now: what lies there is none of the output.
+#[test]
+#[cfg(target_os = "linux")]
+fn what_another_process_has_open_is_written_only_where_it_has_the_name_that_its_link_says() {
+    use std::process::{Command, Stdio};
+    let dir = furnished();
+    let (old, opened) = (dir.path().join("old"), dir.path().join("opened"));
+    fs::write(&opened, "").expect("written");
+    let open = fs::File::open(&opened).expect("opened");
+    let mut waits = Command::new("sleep");
+    let mut other = waits.arg("60").stdin(Stdio::from(open)).spawn().expect("started");
+    let path = Path::new("/proc").join(other.id().to_string()).join("fd/0");
+    std::os::unix::fs::symlink(&path, dir.path().join("link")).expect("a link");
+    let inputs = Inputs::of([&old]).replacing(true);
+    write(&path, &inputs, "new").expect("it is the file of that name");
+    // The one that is open was replaced; then there is another one with the name that the link gives, and then an input.
+    let deleted = fs::read_link(&path).expect("a link");
+    for at in [None, Some(&old)] {
+        at.map_or(Ok(()), |at| fs::hard_link(at, &deleted)).expect("a link");
+        for path in [&path, &dir.path().join("link")] {
+            let refused = write(path, &inputs, "newer").expect_err("the name is another file's");
+            assert!(refused.contains("it was deleted, or is another process's"), "{refused}");
+            assert_eq!(fs::read(&old).expect("there"), b"what was there");
+        }
+    }
+    other.kill().and_then(|()| other.wait()).expect("ended");
+}
+
 /// A folder with one table of this text.
 fn make(path: &Path, inputs: &Inputs, text: &str) -> Result<(), String> {
     let make = || -> anyhow::Result<()> {

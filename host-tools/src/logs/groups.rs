@@ -203,16 +203,17 @@ impl<'a> Groups<'a> {
         match seen {
             BlockCounts { stale: 1.., .. } => strangers.other(file, at, block, joined),
             BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, unsound: 0, .. } => {
-                strangers.own(file, block);
+                strangers.own(file, at, block);
             }
             _ => {}
         }
         Ok(())
     }
 
-    /// What of its files is not the log's, once all is read; `first` is the number of its first sector.
-    pub fn strange(&self, first: u32) -> Vec<Strange> {
-        self.strangers.as_ref().map_or_else(Vec::new, |strangers| strangers.strange(first))
+    /// What of its files is not the log's, once all is read; `first` is the number of its first sector, before which none is missing where
+    /// `is_first`.
+    pub fn strange(&self, first: u32, is_first: bool) -> Vec<Strange> {
+        self.strangers.as_ref().map_or_else(Vec::new, |strangers| strangers.strange(first, is_first))
     }
 
     /// What was joined to it, once all is read.
@@ -221,8 +222,10 @@ impl<'a> Groups<'a> {
     }
 
     /// What was seen so far.
-    pub const fn counts(&self) -> BlockCounts {
-        self.assembler.counts()
+    pub fn counts(&self) -> BlockCounts {
+        let (counts, shifts) =
+            (self.assembler.counts(), self.strangers.as_ref().map_or(0, Strangers::shifts));
+        BlockCounts { misplaced: counts.misplaced + shifts, ..counts }
     }
 
     /// What lies behind the last sector.

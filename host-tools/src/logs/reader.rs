@@ -165,7 +165,8 @@ pub fn read<C: Collect>(
     summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();
-    summary.strange = groups.strange(summary.first_number.unwrap_or(0));
+    let first = summary.first_number.unwrap_or(0);
+    summary.strange = groups.strange(first, late.is_some_and(|late| late.from == first));
     summary.joined = groups.joined();
     summary.is_renamed = late.is_some_and(|late| late.is_renamed);
     Ok(summary)
