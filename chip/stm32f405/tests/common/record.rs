@@ -1,0 +1,110 @@
+//! What is on a card, and how it compares with what was sent.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+
+use embedded_sdmmc::Block;
+use hums_blackbox::record::Record;
+use hums_blackbox::{Item, LogReader};
+use hums_recorder::{Card, CardStatus, HeldBlocks, LogName};
+use hums_sdcard::Medium;
+
+/// A session on a card.
+#[derive(Debug, Default)]
+pub struct Session {
+    /// Frames: milliseconds of the record's clock and bytes.
+    pub frames: Vec<(u64, Vec<u8>)>,
+    /// Losses told: what, how many, from and to in milliseconds.
+    pub losses: Vec<(&'static str, u64, u64, u64)>,
+    /// What it says of itself: faults, notes.
+    pub texts: Vec<String>,
+    /// Parts that cannot be read.
+    pub gaps: usize,
+}
+
+/// All sessions, in their order.
+pub fn read(medium: &Medium) -> Vec<Session> {
+    let (status, held) = (CardStatus::new(), HeldBlocks::new());
+    let Ok(card) = Card::mount(medium.clone(), &status, &held) else { return Vec::new() };
+    let mut names: BTreeMap<u32, Vec<LogName>> = BTreeMap::new();
+    if card.logs(|log| names.entry(log.name.session).or_default().push(log.name)).is_err() {
+        return Vec::new();
+    }
+    let mut sessions = Vec::new();
+    for mut names in names.into_values() {
+        names.sort_unstable();
+        let mut reader = Box::new(LogReader::new());
+        let mut session = Session::default();
+        for name in names {
+            let Ok(mut segment) = card.segment(name) else { continue };
+            for index in 0..segment.blocks() {
+                let mut block = Block::new();
+                if card.read(&mut segment, index, &mut block).is_err() || block.contents == [0; 512] {
+                    break;
+                }
+                reader.feed(&block.contents);
+                take(&mut reader, &mut session);
+            }
+        }
+        reader.end();
+        take(&mut reader, &mut session);
+        sessions.push(session);
+    }
+    sessions
+}
+
+fn take(reader: &mut LogReader, session: &mut Session) {
+    while let Some(item) = reader.next() {
+        match item {
+            Item::Frame { at, bytes, .. } => session.frames.push((at.as_millis(), bytes.to_vec())),
+            Item::Record { record: Record::Loss(loss), .. } => {
+                session.losses.push((
+                    loss.what.name(),
+                    loss.count,
+                    loss.from.as_millis(),
+                    loss.to.as_millis(),
+                ));
+            }
+            Item::Record { record: Record::Fault(fault), .. } => {
+                session.texts.push(format!("fault: {} in {} at {}", fault.message, fault.task, fault.place));
+            }
+            Item::Record { record: Record::Note(note), .. } => session.texts.push(note.text.to_owned()),
+            Item::Gap(_) => session.gaps += 1,
+            Item::Record { .. } | Item::End(_) => {}
+        }
+    }
+}
+
+/// How recorded frames compare with those sent.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Compared {
+    /// Frames that are there as they were sent.
+    pub right: usize,
+    /// Frames that were sent and are not there.
+    pub missing: usize,
+    /// Frames that nobody sent, or more of them than were sent.
+    pub wrong: usize,
+    /// Frames missing before the first that is there, and after the last.
+    pub ends: (usize, usize),
+}
+
+/// Compares by content; their order is the reader's to check.
+pub fn compare<'a>(sent: &[Vec<u8>], recorded: impl Iterator<Item = &'a [u8]>) -> Compared {
+    let mut places: HashMap<&[u8], VecDeque<usize>> = HashMap::new();
+    for (place, frame) in sent.iter().enumerate() {
+        places.entry(frame).or_default().push_back(place);
+    }
+    let mut compared = Compared::default();
+    let (mut first, mut last) = (sent.len(), 0);
+    for frame in recorded {
+        match places.get_mut(frame).and_then(VecDeque::pop_front) {
+            Some(place) => {
+                compared.right += 1;
+                (first, last) = (first.min(place), last.max(place + 1));
+            }
+            None => compared.wrong += 1,
+        }
+    }
+    compared.missing = sent.len() - compared.right;
+    compared.ends = (first, sent.len() - last);
+    compared
+}

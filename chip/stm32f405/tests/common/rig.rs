@@ -1,0 +1,119 @@
+//! A board on a bench: frames come at its first port as fast as it takes them, and what becomes of them is compared.
+
+use hums_sdcard::{Medium, Plan, Slot};
+use stm32f405_model::gpio::Pin;
+use stm32f405_model::image::Image;
+use stm32f405_model::machine::{Board, Machine};
+use stm32f405_model::report::Report;
+use stm32f405_model::time::{MS, Ps};
+
+use super::record::{Compared, Session, compare, read};
+use super::{BAUD, board_with};
+
+/// The board's LED, lit when low.
+const LED: Pin = Pin(2, 12);
+
+/// The bench.
+pub struct Rig {
+    pub machine: Machine,
+    pub slot: Slot,
+    pub medium: Medium,
+    /// Frames that were sent, and when each one's last bit was.
+    pub sent: Vec<(Ps, Vec<u8>)>,
+    frames: Vec<Vec<u8>>,
+    next: usize,
+    free: Ps,
+    /// By how much the sender's clock is fast.
+    pub fast: f64,
+    /// When the LED changed, and whether it was lit then.
+    pub led: Vec<(Ps, bool)>,
+}
+
+impl Rig {
+    /// With these frames to send, over and over.
+    pub fn new(image: &Image, parts: Board, frames: Vec<Vec<u8>>) -> Self {
+        Self::with(image, parts, frames, Vec::new())
+    }
+
+    /// The same with a card that has these faults.
+    pub fn with(image: &Image, parts: Board, frames: Vec<Vec<u8>>, plans: Vec<Plan>) -> Self {
+        let (machine, slot, medium) = board_with(image.clone(), parts, plans);
+        Self { machine, slot, medium, sent: Vec::new(), frames, next: 0, free: 0, fast: 0.0, led: Vec::new() }
+    }
+
+    /// Runs until this moment; with `busy` the line is full of frames.
+    pub fn run(&mut self, until: Ps, busy: bool) -> Result<(), Box<Report>> {
+        while self.machine.now() < until {
+            let to = (self.machine.now() + 10 * MS).min(until);
+            self.free = self.free.max(self.machine.now());
+            while busy && self.free < to {
+                let frame = self.frames[self.next % self.frames.len()].clone();
+                self.next += 1;
+                self.free = self.machine.send(0, &frame, self.free, BAUD * (1.0 + self.fast));
+                self.sent.push((self.free, frame));
+            }
+            self.machine.run_until(to)?;
+            let lit = !self.machine.chip.gpio.is_high(LED) && self.machine.chip.gpio.pulls_low(LED);
+            if self.led.last().is_none_or(|(_, last)| *last != lit) {
+                self.led.push((self.machine.now(), lit));
+            }
+        }
+        Ok(())
+    }
+
+    /// The sessions on the card.
+    pub fn sessions(&self) -> Vec<Session> {
+        read(&self.medium)
+    }
+
+    /// What is recorded, against what was sent.
+    pub fn compared(&self) -> Compared {
+        let sent: Vec<Vec<u8>> = self.sent.iter().map(|(_, frame)| frame.clone()).collect();
+        let sessions = self.sessions();
+        let recorded =
+            sessions.iter().flat_map(|session| session.frames.iter().map(|(_, frame)| frame.as_slice()));
+        compare(&sent, recorded)
+    }
+}
+
+/// A `MAVLink` 2 frame of a ground station's, with the checksum's seed of its message.
+pub fn frame(id: u32, payload: &[u8], seed: u8, sequence: u8) -> Vec<u8> {
+    let mut frame = vec![0xFD, payload.len() as u8, 0, 0, sequence, 255, 190];
+    frame.extend(&id.to_le_bytes()[..3]);
+    frame.extend(payload);
+    let mut crc = 0xFFFF_u16;
+    for byte in frame[1..].iter().chain([&seed]) {
+        let mixed = byte ^ crc as u8;
+        let mixed = u16::from(mixed ^ mixed << 4);
+        crc = crc >> 8 ^ mixed << 8 ^ mixed << 3 ^ mixed >> 4;
+    }
+    frame.extend(crc.to_le_bytes());
+    frame
+}
+
+/// `PARAM_SET` of a number.
+pub fn set(name: &str, value: f32, sequence: u8) -> Vec<u8> {
+    let mut payload = value.to_le_bytes().to_vec();
+    payload.extend([1, 191]);
+    payload.extend(name.bytes().chain(std::iter::repeat(0)).take(16));
+    payload.push(9);
+    frame(23, &payload, 168, sequence)
+}
+
+/// A heartbeat of a disarmed quadrotor of ArduPilot's.
+pub fn heartbeat(sequence: u8) -> Vec<u8> {
+    let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, 0x51, 3, 3], 50, sequence);
+    // Of the autopilot's own component.
+    frame[5] = 1;
+    frame[6] = 1;
+    let body = frame[..frame.len() - 2].to_vec();
+    let mut crc = 0xFFFF_u16;
+    for byte in body[1..].iter().chain([&50]) {
+        let mixed = byte ^ crc as u8;
+        let mixed = u16::from(mixed ^ mixed << 4);
+        crc = crc >> 8 ^ mixed << 8 ^ mixed << 3 ^ mixed >> 4;
+    }
+    let end = frame.len() - 2;
+    frame[end..].copy_from_slice(&crc.to_le_bytes());
+    frame
+}
