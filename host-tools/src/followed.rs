@@ -5,10 +5,11 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use hums_blackbox::record::Before;
+use hums_blackbox::record::{Before, Found};
 use hums_core::time::Instant;
 
 use crate::ending::{Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
+use crate::logs::begun_anew::LOOKED_AT_MAX;
 use crate::logs::sessions::{Sessions, place};
 
 /// Logs held back at most; so many after a log may say something of its end.
@@ -51,14 +52,22 @@ impl<T: Logged> Followed<T> {
         let mut has_sectors = false;
         if let Some(ending) = next.ending() {
             has_sectors = ending.summary.session.is_some();
-            ending.misnamed = self.misnamed(ending);
             ending.again = self.sessions.again(&ending.name).map(str::to_owned);
             ending.begun_anew = self.sessions.begun_anew(&ending.name);
-            if let Some(before) = ending.summary.marks.before.filter(Before::has_end)
+            // That what a file held before has not its number is told there.
+            let is_told = |misnamed: &Misnamed| {
+                ending.begun_anew.is_none() || matches!(misnamed, Misnamed::Copy { .. })
+            };
+            ending.misnamed = self.misnamed(ending).filter(is_told);
+            if let Some(before) = ending.summary.marks.before
                 && ending.is_counted()
                 && ending.begun_anew.is_none()
             {
-                self.tell(&before, ending);
+                if before.has_end() {
+                    self.tell(&before, ending);
+                } else if before.found == Found::Unreadable {
+                    self.tell_empty(before.number, &ending.name);
+                }
             }
             if ending.is_counted() && ending.begun_anew.is_none() {
                 self.follow(ending);
@@ -82,18 +91,28 @@ impl<T: Logged> Followed<T> {
         if let Some(of) = self.sessions.copy_of(&ending.name, session) {
             return Some(Misnamed::Copy { of });
         }
-        let before = ending.summary.marks.before.filter(Before::has_end)?;
         let (card, number) = place(&ending.name);
-        let number = number.filter(|_| before.session != session)?;
+        let (before, number) = (ending.summary.marks.before?, number?);
+        // Of a power-on's first log all is there, or what is not was not to be kept.
+        let is_whole = ending.summary.first_number == Some(0);
+        let is_first = is_whole || ending.summary.keep.is_some_and(|keep| keep.from == 0);
+        if before.found == Found::Nothing && is_first && number > 1 && !self.sessions.has_older(card, number)
+        {
+            return Some(Misnamed::First);
+        }
+        if !before.has_end() || before.session == session {
+            return None;
+        }
         if number <= before.number {
             return Some(Misnamed::Later { before: before.number });
         }
         // The recorder gives a power-on's first log the next number. A number that no file has any more is of a log that was
         // older than this one, and then the one before is not there either.
-        let is_first = ending.summary.first_number == Some(0);
         let is_there = self.sessions.numbers(card, before.session).contains(&before.number);
-        let absent = self.sessions.absent(card, before.number, number);
-        (is_first && is_there && absent > 0).then_some(Misnamed::Ahead { before: before.number })
+        let is_absent = is_first && is_there && self.sessions.absent(card, before.number, number) > 0;
+        // Files without a sector lie between the two at most.
+        let is_far = is_whole && number - before.number > LOOKED_AT_MAX;
+        (is_absent || is_far).then_some(Misnamed::Ahead { before: before.number })
     }
 
     /// How a log follows the one before it of the same power-on.
@@ -172,6 +191,21 @@ impl<T: Logged> Followed<T> {
         PowerOn::Missing { after: None, sectors: keep.from, frames, seconds }
     }
 
+    /// The start of `next` found no sector in the newest files, of which the last one has this number: those that are empty now
+    /// were so then.
+    fn tell_empty(&mut self, newest: u32, next: &str) {
+        for log in self.held.iter_mut().filter_map(Logged::ending) {
+            let ((card, number), blocks) = (place(&log.name), &log.summary.blocks);
+            let is_looked_at = number.is_some_and(|number| {
+                number <= newest && newest - number < LOOKED_AT_MAX && log.files.len() == 1
+            });
+            let is_empty = blocks.empty + blocks.erased == blocks.blocks;
+            if card == place(next).0 && is_looked_at && is_empty && log.summary.session.is_none() {
+                log.proof = Proof::NextStart(None);
+            }
+        }
+    }
+
     /// What the start of `next` found of the log before it.
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
@@ -221,9 +255,13 @@ impl<T: Logged> Followed<T> {
 
 #[cfg(test)]
 mod tests {
-    use hums_blackbox::record::Found;
+    use std::fs;
+
+    use hums_blackbox::Sector;
+    use hums_blackbox::record::Keep;
 
     use super::*;
+    use crate::logs::find;
     use crate::logs::strangers::{Others, Strange};
 
     impl Logged for Ending {
@@ -255,5 +293,69 @@ mod tests {
         done.extend(followed.finish());
         assert_eq!(done[0].strange(), Vec::<String>::new());
         assert_eq!(done[1].before, SessionBefore::There);
+    }
+
+    #[test]
+    fn an_empty_file_is_no_finding_once_the_next_start_found_nothing_to_read() {
+        let ending = |damaged, number| {
+            let strange = Strange { file: 0, hollow: true, older: false, others: None, shift: None };
+            let mut log =
+                Ending { name: "00001".into(), files: vec!["00001_00.HUM".into()], ..Ending::default() };
+            log.summary.strange = vec![strange];
+            let blocks = &mut log.summary.blocks;
+            (blocks.blocks, blocks.empty, blocks.damaged) = (900 + damaged, 900, damaged);
+            let mut next = Ending { name: "00002".into(), ..Ending::default() };
+            next.summary.session = Some(9);
+            next.summary.marks.before =
+                Some(Before { found: Found::Unreadable, number, ..Before::default() });
+            let mut followed = Followed::new(Sessions::default());
+            let mut done = followed.push(log);
+            done.extend(followed.push(next));
+            done.extend(followed.finish());
+            done.first().is_some_and(Ending::is_proved)
+        };
+        assert!(ending(0, 1));
+        assert!(!ending(1, 1), "what is damaged may have been a sector");
+        assert!(!ending(0, 0) && !ending(0, 4), "the start did not look at it");
+    }
+
+    #[test]
+    fn a_number_that_is_not_a_power_ons_own_is_told_by_what_its_start_found() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let mut sector = Sector::from_bytes([0; 512]);
+        sector.seal(7);
+        let mut bytes = *sector.bytes();
+        bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+        let mut sector = Sector::from_bytes(bytes);
+        sector.seal(7);
+        fs::write(dir.path().join("00004_00.HUM"), sector.bytes()).expect("room");
+        let found = find(&[dir.path().to_owned()], false).expect("a folder");
+        let names: Vec<_> = found.logs.iter().map(|log| (place(&log.name).0, log)).collect();
+        let card = names.first().map_or("", |(card, _)| card);
+        let sessions = || Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log)));
+        let misnamed =
+            |name: &str, first: u32, keep: Option<u32>, found: Found, number: u32, is_alone: bool| {
+                let (card, sessions) = if is_alone { ("", Sessions::default()) } else { (card, sessions()) };
+                let name = if card.is_empty() { name.to_owned() } else { format!("{card}/{name}") };
+                let mut log = Ending { name, ..Ending::default() };
+                (log.summary.session, log.summary.first_number) = (Some(9), Some(first));
+                log.summary.keep = keep.map(|from| Keep { from, ..Keep::default() });
+                log.summary.marks.before = Some(Before { found, number, session: 7, ..Before::default() });
+                Followed::<Ending>::new(sessions).misnamed(&log)
+            };
+        let (nothing, frames) = (Found::Nothing, Found::Frames);
+        // The first session of a card, whole or as far as it was kept; a later log of the same power-on has a later number.
+        assert_eq!(misnamed("00002", 0, None, nothing, 0, true), Some(Misnamed::First));
+        assert_eq!(misnamed("00002", 70, Some(0), nothing, 0, true), Some(Misnamed::First));
+        assert_eq!(misnamed("00001", 0, None, nothing, 0, true), None);
+        assert_eq!(misnamed("00002", 70, Some(60), nothing, 0, true), None);
+        assert_eq!(misnamed("00005", 0, None, nothing, 0, false), None, "another card was in the box");
+        // The session before is not there: two files without a sector may have been.
+        assert_eq!(misnamed("00007", 0, None, frames, 4, true), None);
+        assert_eq!(misnamed("00008", 0, None, frames, 4, true), Some(Misnamed::Ahead { before: 4 }));
+        // It is there, and no file between.
+        assert_eq!(misnamed("00006", 70, Some(0), frames, 4, false), Some(Misnamed::Ahead { before: 4 }));
+        assert_eq!(misnamed("00005", 70, Some(0), frames, 4, false), None);
+        assert_eq!(misnamed("00006", 70, Some(60), frames, 4, false), None);
     }
 }

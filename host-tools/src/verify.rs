@@ -2,13 +2,15 @@
 
 use anyhow::Result;
 use hums_blackbox::Cause;
+use hums_blackbox::record::Lost;
+use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::cli;
 use crate::ending::{BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words};
 use crate::followed::Followed;
 use crate::info::json::images_json;
-use crate::logs::sessions::{BegunAnew, Sessions, place};
+use crate::logs::sessions::{Sessions, place};
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
 use crate::outcome::Outcome;
@@ -154,7 +156,8 @@ struct LogJson {
     left_over: bool,
     /// What is known of its end.
     end: EndJson,
-    /// The number of the session that its file held when the recorder had just begun to write it anew.
+    /// The number of the session that its file held when the recorder had just begun to write it anew, or of the first one of that
+    /// power-on; 0 where that is not known.
     begun_anew: Option<u32>,
     /// All blocks of its files.
     blocks: BlocksJson,
@@ -239,7 +242,7 @@ impl LogJson {
             (false, _) => Verdict::NotProved,
         };
         let (name, closed) = (ending.name.clone(), summary.closed);
-        let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew: BegunAnew| anew.of));
+        let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of.unwrap_or(0)));
         Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
     }
 }
@@ -323,5 +326,14 @@ fn newer(log: &Overview) -> String {
 
 fn losses_detail(log: &Overview) -> String {
     let losses = log.contents.losses.values();
-    losses.map(|loss| format!("{} {}", loss.count, loss.what.name())).collect::<Vec<_>>().join(", ")
+    let words = losses.map(|loss| {
+        let told = format!("{} {}", loss.count, loss.what.name());
+        // The processor stood still: nobody counted what came meanwhile.
+        if loss.what != Lost::UartOverrun {
+            return told;
+        }
+        let seconds = |at: Instant| at.as_millis() as f64 / 1e3;
+        format!("{told} of unknown frames, {:.3} to {:.3} s", seconds(loss.from), seconds(loss.to))
+    });
+    words.collect::<Vec<_>>().join(", ")
 }

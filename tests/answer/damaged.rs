@@ -1,6 +1,7 @@
 //! Damaged, cut and foreign files: exit code 3 or 1, and what could be saved is in every format.
 
 use std::fs;
+use std::path::Path;
 
 use hums_tests::child;
 use hums_tests::flights::own;
@@ -56,5 +57,40 @@ fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
         assert_eq!(read(".tlog.gaps.csv").lines().count(), 2, "{name}");
         let html = fs::read_to_string(page).unwrap();
         assert!(html.contains("\"gaps_count\":1"), "{name}");
+    }
+    beside_a_tlog(&dir.path().join("zeroed.hum"), dir.path());
+}
+
+/// A tlog's table of gaps: told of where nothing can lie beside it, and no tlog without it where something else lies there.
+fn beside_a_tlog(damaged: &Path, dir: &Path) {
+    let (tlog, gaps) = (dir.join("one.tlog"), dir.join("one.tlog.gaps.csv"));
+    let decode = |output: &Path| {
+        let mut decode = command(["decode".as_ref(), damaged.as_os_str(), "-o".as_ref(), output.as_os_str()]);
+        decode.args(["--format", "tlog"]);
+        decode
+    };
+    let made = |code: i32| child::run(&mut decode(&tlog), LIMIT).expect_code(&[code]);
+    made(3);
+    let (frames, table) = (fs::read(&tlog).unwrap(), fs::read_to_string(&gaps).unwrap());
+    let mut piped = std::process::Command::new("sh");
+    piped.args(["-c", "{ \"$@\" 3>&1 1>&2; echo code $? >&2; } | cat", "sh"]);
+    let decode_to_pipe = decode("/dev/fd/3".as_ref());
+    piped.arg(decode_to_pipe.get_program()).args(decode_to_pipe.get_args());
+    let piped = child::run(&mut piped, LIMIT).expect_code(&[0]);
+    assert!(piped.stdout == frames, "the same frames");
+    for words in ["1 gap, ", "1 gap without a table", "code 3\n"] {
+        assert!(piped.stderr.contains(words), "{}", piped.stderr);
+    }
+    for other in ["mine".to_owned(), format!("{table}mine\n")] {
+        fs::remove_file(&tlog).unwrap();
+        fs::write(&gaps, &other).unwrap();
+        let said = made(1).stderr;
+        assert!(
+            said.contains("one.tlog.gaps.csv: is there already") && said.contains("move it away"),
+            "{said}"
+        );
+        assert!(!tlog.exists() && fs::read_to_string(&gaps).unwrap() == other);
+        fs::remove_file(&gaps).unwrap();
+        made(3);
     }
 }

@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write as _;
 use std::net::TcpListener;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-use hums_tests::flights::{Manifest, own};
+use hums_tests::flights::{Manifest, own, root};
 use hums_tests::frames::of_tlog;
 use hums_tests::live::{Live, send};
+use hums_tests::{child, program};
 
 use crate::database::{Database, Kind};
 
@@ -75,6 +77,41 @@ fn influxdb_is_killed_in_flight_and_has_every_point_in_the_end() {
     assert_eq!(keys.collect::<Vec<_>>(), ["motor", "session", "vehicle"]);
     let volts = database.ask("SELECT last(\"Battery (V)\") FROM \"HUMS\"");
     assert!(volts[0]["values"][0][1].as_f64().is_some_and(|volts| (9.0..13.0).contains(&volts)), "{volts:?}");
+    write_as_documented(&database);
+}
+
+/// Runs the commands of docs/decode.md that write a log's lines into `InfluxDB`, in smaller pieces. Each point must be there.
+fn write_as_documented(database: &Database) {
+    let docs = fs::read_to_string(root().join("docs/decode.md")).unwrap();
+    let is_command = |line: &&str| {
+        line.starts_with("curl --data-urlencode 'q=CREATE DATABASE")
+            || line.starts_with("hums decode card.img -o - --format influx |")
+    };
+    let commands: Vec<&str> = docs.lines().filter(is_command).collect();
+    assert_eq!(commands.len(), 2, "{commands:?}");
+    let log = own("px4_hil_quad_low.tlog");
+    let mut script = commands.join("\n");
+    for (documented, here) in [
+        ("hums decode", format!("'{}' decode", program::path().display())),
+        ("card.img", format!("'{}'", log.display())),
+        ("localhost:8086", format!("127.0.0.1:{}", database.port)),
+        ("-C 20M", "-C 1M".to_owned()),
+    ] {
+        assert!(script.contains(documented), "{documented}: {script}");
+        script = script.replace(documented, &here);
+    }
+    let decode = ["decode", &log.display().to_string(), "-o", "-", "--format", "influx"];
+    let lines = program::hums(decode).expect_code(&[0]).text();
+    assert!(lines.len() > 2 << 20, "several pieces");
+    let measurements = ["ATTITUDE", "BATTERY_STATUS", "HUMS"];
+    let points = |name: &&str| database.points(name);
+    let before: Vec<u64> = measurements.iter().map(points).collect();
+    child::run(Command::new("sh").args(["-ec", &script]), Duration::from_mins(1)).expect_code(&[0]);
+    for (name, before) in measurements.iter().zip(before) {
+        let lines = lines.lines().filter(|line| line.starts_with(&format!("{name},"))).count() as u64;
+        assert!(lines > 0, "{name}");
+        assert_eq!(points(name) - before, lines, "{name}");
+    }
 }
 
 #[test]

@@ -61,7 +61,8 @@ use crate::logs::sessions::{Sessions, copy_words};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
 use crate::plural::count;
-use crate::source::recording::{Place, find, sessions_of};
+use crate::source::find::{find, sessions_of};
+use crate::source::recording::Place;
 use crate::summary::damaged_places;
 use crate::{output, printable, progress};
 use checked::Checked;
@@ -286,14 +287,8 @@ impl Task<'_> {
             let times = count(summary.losses, "time");
             remarks.push(format!("{}: what recorded it lost something {times}, and says so", log.name));
         }
-        if written.rows_left_out > 0 {
-            remarks.push(format!(
-                "{}: {} left out: the names of its tables take more room than any autopilot's",
-                log.name,
-                count(written.rows_left_out, "row")
-            ));
-            outcome = Outcome::Losses;
-        }
+        remarks.extend(written.left_out().map(|words| format!("{}: {words}", log.name)));
+        outcome = outcome.and(Outcome::lossy(written.rows_left_out > 0));
         let lines = if self.standard_output { Vec::new() } else { written.lines };
         Ok(Done { outcome, ending, written: true, lines, remarks, ..Done::of(log) })
     }

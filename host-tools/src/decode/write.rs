@@ -48,6 +48,11 @@ impl Single {
         settle(self.0.write_all(bytes), self.0.path())
     }
 
+    /// Where the table of gaps of a tlog goes; none where the tlog is no file.
+    fn gaps_path(&self) -> Option<PathBuf> {
+        (!self.0.is_stream()).then(|| appended(self.0.path(), "gaps.csv"))
+    }
+
     /// All of it is there; gives its name.
     fn finish(mut self) -> Result<PathBuf> {
         self.0.finish()?;
@@ -62,6 +67,23 @@ pub struct Written {
     pub lines: Vec<String>,
     /// Rows of tables for whose names there was no room.
     pub rows_left_out: u64,
+    /// Gaps of a tlog beside which no table can lie.
+    pub gaps_left_out: u64,
+}
+
+impl Written {
+    /// What was not written, as sentences.
+    pub fn left_out(&self) -> impl Iterator<Item = String> {
+        let rows = (self.rows_left_out > 0).then(|| {
+            let rows = count(self.rows_left_out, "row");
+            format!("{rows} left out: the names of its tables take more room than any autopilot's")
+        });
+        let gaps = (self.gaps_left_out > 0).then(|| {
+            let gaps = count(self.gaps_left_out, "gap");
+            format!("{gaps} without a table: beside what is no file there is no place for one; name a file")
+        });
+        rows.into_iter().chain(gaps)
+    }
 }
 
 /// The open files of one log.
@@ -76,6 +98,8 @@ pub struct Writers<'a> {
     csv: Option<Tables>,
     /// A tlog has no place for gaps: they lie beside it.
     gaps: Option<Single>,
+    /// Gaps of a tlog that is no file: nothing lies beside it.
+    gaps_left_out: u64,
     frames: u64,
     records: u64,
     /// JSON's.
@@ -121,6 +145,9 @@ impl<'a> Writers<'a> {
             wanted.then(|| Single::open(&destination, extension, context, kind)).transpose()
         };
         let tlog = open(formats.tlog, "tlog", &made::TLOG)?;
+        if let Some(path) = tlog.as_ref().and_then(Single::gaps_path) {
+            Output::check_place(&path, inputs, &GAPS)?;
+        }
         let jsonl = open(formats.jsonl, "jsonl", &made::JSONL)?;
         let influx = open(formats.influx, "lp", &made::LINES)?.map(|file| Influx {
             file,
@@ -153,6 +180,7 @@ impl<'a> Writers<'a> {
             parquet,
             csv,
             gaps: None,
+            gaps_left_out: 0,
             frames: 0,
             records: 0,
             objects: 0,
@@ -221,10 +249,13 @@ impl<'a> Writers<'a> {
 
     /// A gap beside the tlog, in a table of its own.
     fn gap_beside_tlog(&mut self, gap: &Gap) -> Result<()> {
-        let Some(path) = self.destination.path("tlog").filter(|_| self.tlog.is_some()) else { return Ok(()) };
+        let Some(tlog) = &self.tlog else { return Ok(()) };
+        let Some(path) = tlog.gaps_path() else {
+            self.gaps_left_out += 1;
+            return Ok(());
+        };
         let row = gap_row(gap);
         let first = self.gaps.is_none();
-        let path = appended(&path, "gaps.csv");
         let file = match &mut self.gaps {
             Some(file) => file,
             none => none.insert(Single::file(&path, self.context, &GAPS)?),
@@ -258,6 +289,11 @@ impl<'a> Writers<'a> {
         } else {
             format!("{frames}, {}", count(self.records, "record"))
         };
+        // None gets its name where another one of them is not what is there.
+        let influx = self.influx.as_mut().map(|influx| &mut influx.file);
+        for file in [&mut self.tlog, &mut self.jsonl, &mut self.gaps].into_iter().flatten().chain(influx) {
+            file.0.end()?;
+        }
         self.check_earlier_gaps()?;
         let objects = count(self.objects, "object");
         let mut singles = vec![(self.tlog.take(), frames), (self.jsonl.take(), objects)];
@@ -292,13 +328,12 @@ impl<'a> Writers<'a> {
             let (dir, tables) = parquet.finish()?;
             lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
         }
-        Ok(Written { lines, rows_left_out: self.rows_left_out })
+        Ok(Written { lines, rows_left_out: self.rows_left_out, gaps_left_out: self.gaps_left_out })
     }
 
     /// Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
     fn check_earlier_gaps(&self) -> Result<()> {
-        let Some(tlog) = self.destination.path("tlog").filter(|_| self.tlog.is_some()) else { return Ok(()) };
-        let path = appended(&tlog, "gaps.csv");
+        let Some(path) = self.tlog.as_ref().and_then(Single::gaps_path) else { return Ok(()) };
         if self.gaps.is_some() || !path.exists() {
             return Ok(());
         }

@@ -4,8 +4,9 @@ use super::files::Files;
 use super::place::{Misnamed, PowerOn, SessionBefore};
 use super::proof::Proof;
 use crate::logs::Log;
+use crate::logs::begun_anew::BegunAnew;
 use crate::logs::reader::Summary;
-use crate::logs::sessions::{BegunAnew, again_words};
+use crate::logs::sessions::again_words;
 use crate::logs::strangers::Strange;
 use crate::plural::{are, count, noun};
 

@@ -16,6 +16,8 @@ pub enum Misnamed {
         /// The number.
         before: u32,
     },
+    /// It was the first session on its card.
+    First,
     /// The session of this number was recorded just before it, so its own number is the next one.
     Ahead {
         /// The number.
@@ -31,6 +33,10 @@ impl Misnamed {
             Self::Later { before } => format!(
                 "it was recorded after session {before:05}, so its number is not its own: files were renamed or exchanged"
             ),
+            Self::First => {
+                "it was the first session on its card, so its number is not its own: files were renamed"
+                    .to_owned()
+            }
             Self::Ahead { before } => format!(
                 "it was recorded just after session {before:05}, so its number is not its own: files were renamed"
             ),

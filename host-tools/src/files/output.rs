@@ -100,6 +100,26 @@ impl Output {
         }
     }
 
+    /// Refuses a place where anything but such a file lies, or nothing: for what is written only later, and only perhaps.
+    pub fn check_place(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<()> {
+        inputs.refuse(path)?;
+        let about = match fs::metadata(path) {
+            Ok(about) => about,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(error).with_context(|| cannot_write(path)),
+        };
+        check(path, &about)?;
+        let is_kind = || -> io::Result<bool> { Ok(kind.found(path, None)? != Found::Other) };
+        if about.is_file() && (about.len() == 0 || is_kind().with_context(|| cannot_write(path))?) {
+            return Ok(());
+        }
+        bail!(
+            "{}: is there already, and is not {}, which goes there; move it away, or name another output",
+            path.display(),
+            kind.words
+        )
+    }
+
     /// Goes on with what an earlier run has left of a file, and says how many bytes that is. Dropped before its end it
     /// stays for the next one. In the end it replaces a file that is its beginning, and no other. Only for regular files.
     pub fn resume(path: &Path) -> Result<(Self, u64)> {
@@ -184,6 +204,22 @@ impl Output {
         self.part.as_ref().map_or(&self.path, |part| &part.path)
     }
 
+    /// Whether it goes into a pipe or a device, or into what somebody opened for us: nothing has a place beside it.
+    pub fn is_stream(&self) -> bool {
+        matches!(self.to.get_ref(), To::Standard(_))
+            || matches!(self.to.get_ref(), To::File(_)) && self.part.is_none()
+    }
+
+    /// Nothing more is written: where a file is compared, it must be at its end. [`Output::finish`] then has only to give the
+    /// name.
+    pub fn end(&mut self) -> Result<()> {
+        let ended = self.to.flush().and_then(|()| match self.to.get_mut() {
+            To::There(there) => there.end(),
+            To::File(_) | To::Standard(_) => Ok(()),
+        });
+        settle(ended, &self.path)
+    }
+
     /// Throws away what was written, or what an earlier run has left: the file begins anew.
     pub fn begin_anew(&mut self) -> Result<()> {
         let emptied = self.to.flush().and_then(|()| match self.to.get_ref() {
@@ -195,12 +231,8 @@ impl Output {
 
     /// The file is whole: from here on it has its name. Nothing can be written after that.
     pub fn finish(&mut self) -> Result<()> {
-        settle(self.to.flush(), &self.path)?;
-        let file = match self.to.get_mut() {
-            To::There(there) => return settle(there.end(), &self.path),
-            To::File(file) => file,
-            To::Standard(_) => return Ok(()),
-        };
+        self.end()?;
+        let To::File(file) = self.to.get_mut() else { return Ok(()) };
         let Some(part) = self.part.take() else { return Ok(()) };
         let placed = file.sync_all().and_then(|()| part.place(file));
         if let Err(error) = placed {

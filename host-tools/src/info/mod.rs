@@ -12,7 +12,7 @@ use crate::followed::Followed;
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::output;
-use crate::source::recording::{find, sessions_of};
+use crate::source::find::{find, sessions_of};
 use crate::summary::Overview;
 use json::{LogJson, images_json};
 use text::{image_text, text};

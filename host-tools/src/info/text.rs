@@ -13,7 +13,7 @@ use super::json::{duration_s, finite, losses, vehicle};
 use super::wear;
 use crate::ending::{among_words, behind_words};
 use crate::logs;
-use crate::logs::sessions::BegunAnew;
+use crate::logs::begun_anew::BegunAnew;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::states;

@@ -12,8 +12,9 @@ use super::native::{Entry, Native, WANT};
 use super::told::Told;
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
+use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
-use crate::source::recording::{Place, Recording, find};
+use crate::source::recording::{Place, Recording};
 
 /// Sessions that are named where one is to be chosen.
 const LISTED_MAX: usize = 12;

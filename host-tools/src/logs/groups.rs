@@ -19,9 +19,13 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
+/// The groups with which a file begins lie within so many blocks: a sector in progress may be there twice, and some of an older
+/// file between.
+const HEADING_BLOCKS: u64 = (4 * HEADING_GROUPS * GROUP_SECTORS) as u64;
+
 /// Who recorded the file that begins where `blocks` are, if one begins there.
 fn begins_here(blocks: &Blocks<'_>) -> Result<Option<Board>> {
-    let rest = blocks.from_here();
+    let rest = blocks.from_here(HEADING_BLOCKS);
     let mut groups = Groups { strangers: None, joints: None, ..Groups::new(&rest) };
     for _ in 0..HEADING_GROUPS {
         // What lies behind a gap is no part of what begins here.

@@ -12,12 +12,11 @@ use super::board::Board;
 
 /// A file's first group may be this short, before the group with the record: what lies that far in front may be left over.
 const FIRST_GROUP_MAX: u64 = 3;
-/// Places of a file that are looked at more closely, each by reading on to the end of a group: more there are only in one that was made to
-/// take our time.
-const LOOKS_MAX: u32 = 8;
+/// Places of a file that are looked at more closely; more there are only in one that was made to take our time.
+const LOOKS_MAX: u32 = 64;
 
 /// What each sector begins with: the magic byte, and the one with the format's version.
-const HEAD: [u8; 2] = [b'H', 0xb0 | hums_blackbox::VERSION];
+pub(super) const HEAD: [u8; 2] = [b'H', 0xb0 | hums_blackbox::VERSION];
 
 /// Looks for the place in each file of a log from which on another file was joined to it.
 #[derive(Debug, Default)]

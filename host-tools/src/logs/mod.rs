@@ -4,6 +4,7 @@
 //! (`00042_00.HUM`, `00042_01.HUM`, …); copied off the card the same files, in a directory; packed, one file.
 //! Whatever it was, here it is a list of places to read blocks of 512 bytes from.
 
+pub mod begun_anew;
 pub mod board;
 mod card;
 pub mod fat;

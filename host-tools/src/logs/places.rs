@@ -104,14 +104,15 @@ impl Blocks<'_> {
         (self.piece, (self.begun + self.at as u64).saturating_sub(1) / BLOCK_BYTES as u64)
     }
 
-    /// The same file from the last block on, as a log of its own.
-    pub fn from_here(&self) -> Log {
+    /// The same file from the last block on, so many blocks of it at most, as a log of its own.
+    pub fn from_here(&self, blocks: u64) -> Log {
         let (piece, at) = self.place();
-        let mut skipped = at * BLOCK_BYTES as u64;
+        let (mut skipped, mut left) = (at * BLOCK_BYTES as u64, blocks * BLOCK_BYTES as u64);
         let rest = |extent: &Extent| {
             let less = skipped.min(extent.length);
-            skipped -= less;
-            Extent { start: extent.start + less, length: extent.length - less }
+            let length = left.min(extent.length - less);
+            (skipped, left) = (skipped - less, left - length);
+            Extent { start: extent.start + less, length }
         };
         let pieces = self.log.pieces.get(piece).map(|piece| Piece {
             path: piece.path.clone(),

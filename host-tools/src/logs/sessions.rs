@@ -4,11 +4,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use hums_blackbox::Header;
-use hums_blackbox::record::{Before, Boot};
 
-use super::board::{HEADING_GROUPS, find_boot};
+use super::begun_anew::{self, BegunAnew, Known};
 use super::fingerprint::{Fingerprint, fingerprint};
-use super::groups::Groups;
 use super::places::{Log, Piece};
 
 /// Blocks that are searched for a log's first sector: what is read at once.
@@ -35,35 +33,27 @@ impl Sessions {
         let mut all: BTreeMap<_, Vec<(u32, u32)>> = BTreeMap::new();
         let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
         let mut numbers: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-        let mut oldest: BTreeMap<&str, (u32, &Log)> = BTreeMap::new();
+        let mut known: BTreeMap<&str, Vec<Known<'_>>> = BTreeMap::new();
         for &(name, log) in &logs {
             let (card, number) = place(name);
             if let Some(number) = number {
                 numbers.entry(card.to_owned()).or_default().insert(number);
-                let oldest = oldest.entry(card).or_insert((number, log));
-                *oldest = if number < oldest.0 { (number, log) } else { *oldest };
             }
-            let Some(first) = first_sector(log) else { continue };
+            let Some((at, first)) = first_sector(log) else { continue };
             alike.entry(first.session).or_default().push(Candidate { name, card, number, log });
             if let Some(number) = number {
                 all.entry((card.to_owned(), first.session)).or_default().push((number, first.number));
+                known.entry(card).or_default().push(Known { number, first, at, log });
             }
         }
         let again = alike.into_values().flat_map(copies).collect();
-        let mut sessions = Self { logs: all, again, numbers, begun_anew: BTreeMap::new() };
-        for (card, (number, log)) in oldest {
-            if let Some((there, of)) = sessions.find_begun_anew(card, number, log) {
-                let later = logs.iter().filter_map(|(name, log)| {
-                    let (other, number) = place(name);
-                    Some((number.filter(|number| other == card && *number > there)?, log))
-                });
-                // The next start looked at what was there.
-                let next = later.min_by_key(|(number, _)| *number).and_then(|(_, log)| before(log));
-                let is_confirmed = next.is_some_and(|next| next.number == there);
-                sessions.begun_anew.insert((card.to_owned(), there), BegunAnew { of, is_confirmed });
-            }
+        let mut anew = BTreeMap::new();
+        for (card, mut known) in known {
+            known.sort_by_key(|known| known.number);
+            let numbers = numbers.get(card).map_or_else(BTreeMap::new, |all| begun_anew::find(all, &known));
+            anew.extend(numbers.into_iter().map(|(number, anew)| ((card.to_owned(), number), anew)));
         }
-        sessions
+        Self { logs: all, again, numbers, begun_anew: anew }
     }
 
     /// What a log's file held when the recorder had just begun to write it anew, if it had. A full card's oldest file gets the
@@ -112,63 +102,11 @@ impl Sessions {
 
     /// The same where the log was not read.
     pub fn copy_of_log(&self, name: &str, log: &Log) -> Option<u32> {
-        self.copy_of(name, first_sector(log)?.session)
-    }
-
-    /// The number under which a card has what was its oldest log before this one, and the number that it had; `oldest` is the
-    /// lowest number that is there. What is left of it is older than the oldest log: it begins before that one in the same
-    /// power-on, or the oldest log names it as the session before. Its new name is the one after another log's.
-    fn find_begun_anew(&self, card: &str, oldest: u32, log: &Log) -> Option<(u32, u32)> {
-        let first = first_sector(log)?;
-        let of_session = self.of_session(card, first.session).iter();
-        let earlier = of_session.filter(|(_, number)| *number < first.number).map(|(there, _)| *there).next();
-        let (there, of) = if let Some(there) = earlier {
-            (there, oldest.checked_sub(1)?)
-        } else {
-            let before = before(log).filter(|before| before.number < oldest)?;
-            match self.of_session(card, before.session) {
-                [(there, _)] => (*there, before.number),
-                _ => return None,
-            }
-        };
-        (self.absent(card, there.checked_sub(2)?, there) == 0).then_some((there, of))
+        self.copy_of(name, first_session(log)?)
     }
 
     fn of_session(&self, card: &str, session: u32) -> &[(u32, u32)] {
         self.logs.get(&(card.to_owned(), session)).map_or(&[], Vec::as_slice)
-    }
-}
-
-/// The session before a log on its card and how it ended, where the beginning of the log tells that.
-fn before(log: &Log) -> Option<Before> {
-    let mut groups = Groups::new(log);
-    let end_of = |boot: &Boot<'_>| Some(boot.before).filter(Before::has_end);
-    for _ in 0..HEADING_GROUPS {
-        if let Some(before) = find_boot(&groups.next_group().ok()??, end_of) {
-            return Some(before);
-        }
-    }
-    None
-}
-
-/// A file of a full card that the recorder has given a new name, to write it anew, and whose old content is still there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BegunAnew {
-    /// The number of the session that it held: the oldest one of the card.
-    pub of: u32,
-    /// The next start found that content under the new name. Without it, files may have been renamed.
-    pub is_confirmed: bool,
-}
-
-impl BegunAnew {
-    /// What it is, as a part of a sentence.
-    pub fn words(self) -> String {
-        let Self { of, is_confirmed } = self;
-        let end = if is_confirmed { "as the next start found it" } else { "or files were renamed" };
-        format!(
-            "the recorder had just begun to write this file anew when power went: what is in it is session {of:05}, which \
-             is the oldest one, and nothing of its own is there; {end}"
-        )
     }
 }
 
@@ -235,15 +173,15 @@ pub fn place(name: &str) -> (&str, Option<u32>) {
 
 /// The session of a log's first sector.
 pub fn first_session(log: &Log) -> Option<u32> {
-    first_sector(log).map(|first| first.session)
+    first_sector(log).map(|(_, first)| first.session)
 }
 
-/// A log's first sector. That a log cannot be read is said where it is read.
-fn first_sector(log: &Log) -> Option<Header> {
+/// A log's first sector, and in which block that is. That a log cannot be read is said where it is read.
+fn first_sector(log: &Log) -> Option<(usize, Header)> {
     let mut blocks = log.blocks();
-    for _ in 0..LOOK_BLOCKS {
+    for at in 0..LOOK_BLOCKS {
         if let Ok(header) = Header::read(&blocks.next_block().ok()??) {
-            return Some(header);
+            return Some((at, header));
         }
     }
     None
@@ -253,7 +191,7 @@ fn first_sector(log: &Log) -> Option<Header> {
 mod tests {
     use std::fs;
 
-    use hums_blackbox::record::Found;
+    use hums_blackbox::record::{Before, Boot, Clock, Found};
     use hums_blackbox::{Record, Sector, SectorSink, Writer};
     use hums_core::time::Instant;
 
@@ -288,42 +226,146 @@ mod tests {
 
     /// A log of which the start found this session under this number.
     fn after(number: u32, session: u32) -> Vec<u8> {
+        log(9, number, session)
+    }
+
+    /// The same of a session of this name.
+    fn log(own: u32, number: u32, session: u32) -> Vec<u8> {
         let (mut writer, mut sink) = (Box::new(Writer::new()), Sink::default());
         let before = Before { found: Found::Frames, number, session, ..Before::default() };
         let boot = Record::Boot(Boot { before, ..Boot::default() });
         writer.record(Instant::ZERO, &boot, &mut sink).expect("room");
         writer.finish(&mut sink);
-        sink.0.into_iter().flat_map(|sector| sealed(sector, 9)).collect()
+        sink.0.into_iter().flat_map(|sector| sealed(sector, own)).collect()
+    }
+
+    /// Logs in a folder, of which some files were begun anew.
+    struct Card(tempfile::TempDir);
+
+    impl Card {
+        fn new() -> Self {
+            Self(tempfile::tempdir().expect("a folder"))
+        }
+
+        fn write(&self, name: u32, bytes: impl AsRef<[u8]>) {
+            fs::write(self.0.path().join(format!("{name:05}_00.HUM")), bytes).expect("room");
+        }
+
+        fn remove(&self, name: u32) {
+            fs::remove_file(self.0.path().join(format!("{name:05}_00.HUM"))).expect("there");
+        }
+
+        /// By number: what it held, whether or a later one of the power-on, and whether the next start found it so.
+        fn anew(&self) -> Vec<(u32, Option<u32>, bool, bool)> {
+            let found = find_in(self.0.path(), false).expect("a folder");
+            let sessions = Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log)));
+            let anew = |name: &str| {
+                let BegunAnew { of, or_later, is_confirmed, .. } = sessions.begun_anew(name)?;
+                Some((place(name).1?, of, or_later, is_confirmed))
+            };
+            found.logs.iter().filter_map(|log| anew(&log.name)).collect()
+        }
     }
 
     #[test]
     fn a_file_that_was_to_be_written_anew_is_known_and_the_next_start_confirms_it() {
-        let dir = tempfile::tempdir().expect("a folder");
-        let write = |name: u32, bytes: Vec<u8>| {
-            fs::write(dir.path().join(format!("{name:05}_00.HUM")), bytes).expect("room");
-        };
-        let anew = || {
-            let found = find_in(dir.path(), false).expect("a folder");
-            let sessions = Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log)));
-            found
-                .logs
-                .iter()
-                .filter_map(|log| Some((log.name.clone(), sessions.begun_anew(&log.name)?)))
-                .collect::<Vec<_>>()
-        };
-        // The beginning of the power-on whose second log is the oldest one that is there.
-        write(5, sector(7, 100));
-        write(6, sector(8, 0));
-        write(7, sector(7, 0));
-        assert_eq!(anew(), [("00007".to_owned(), BegunAnew { of: 4, is_confirmed: false })]);
-        write(8, after(7, 7));
-        assert_eq!(anew(), [("00007".to_owned(), BegunAnew { of: 4, is_confirmed: true })]);
+        let card = Card::new();
+        // The beginning of the power-on whose second log is the oldest one that is there; what it says of itself is lost.
+        card.write(5, sector(7, 100));
+        card.write(6, sector(8, 0));
+        card.write(7, sector(7, 0));
+        assert_eq!(card.anew(), [(7, None, false, false)]);
+        card.write(8, after(7, 7));
+        assert_eq!(card.anew(), [(7, None, false, true)]);
         // No log has the number before it: somebody gave it that name.
-        fs::remove_file(dir.path().join("00006_00.HUM")).expect("there");
-        assert_eq!(anew(), []);
+        card.remove(6);
+        assert_eq!(card.anew(), []);
         // All of the power-on before the oldest one that is there.
-        write(5, after(4, 7));
-        write(6, sector(8, 0));
-        assert_eq!(anew(), [("00007".to_owned(), BegunAnew { of: 4, is_confirmed: true })]);
+        card.write(5, after(4, 7));
+        card.write(6, sector(8, 0));
+        assert_eq!(card.anew(), [(7, None, false, true)]);
+    }
+
+    #[test]
+    fn power_that_goes_several_times_at_the_start_renames_nothing() {
+        let card = Card::new();
+        // The ring had 10 to 14. Power went just after 10 and 11 got the next names; then a start wrote over 12.
+        card.write(13, log(13, 12, 12));
+        card.write(14, log(14, 13, 13));
+        card.write(15, log(10, 9, 9));
+        assert_eq!(card.anew(), [(15, Some(10), false, false)]);
+        card.write(16, log(11, 10, 10));
+        assert_eq!(card.anew(), [(15, Some(10), false, false), (16, Some(11), false, false)]);
+        card.write(17, log(17, 16, 11));
+        let both = [(15, Some(10), false, true), (16, Some(11), false, true)];
+        assert_eq!(card.anew(), both);
+        // The names stay while later starts write over the others, to the last.
+        for number in [13, 14] {
+            card.remove(number);
+            card.write(number + 5, log(number + 5, number + 4, number + 4));
+            assert_eq!(card.anew(), both);
+        }
+        card.remove(15);
+        card.write(20, log(20, 19, 19));
+        assert_eq!(card.anew(), both[1..]);
+        // Somebody exchanged two names: what is in them is in the wrong order.
+        card.write(15, log(11, 10, 10));
+        card.write(14, log(14, 13, 13));
+        card.write(16, log(10, 9, 9));
+        card.write(17, log(17, 16, 10));
+        assert_eq!(card.anew(), [(15, Some(11), false, false), (16, Some(10), false, true)]);
+    }
+
+    #[test]
+    fn a_torn_first_sector_of_another_session_tells_that_a_file_was_begun_anew_and_a_damaged_one_does_not() {
+        let card = Card::new();
+        let (new, old) = (0x1122_3344, 0x5566_7788);
+        card.write(20, log(20, 19, 19));
+        let write = |first: &[u8]| card.write(21, [first, &sector(old, 1)].concat());
+        let mut torn = sector(new, 0);
+        torn[300..].fill(7);
+        write(&torn);
+        assert_eq!(card.anew(), [(21, None, false, false)]);
+        card.write(22, log(22, 21, old));
+        assert_eq!(card.anew(), [(21, None, false, true)]);
+        // Its clock is later than that of the log before: it is not older.
+        let timed = |own: u32, number: u32, utc_micros: u64| {
+            let (mut writer, mut sink) = (Box::new(Writer::new()), Sink::default());
+            let clock = Record::Clock(Clock { boot: Instant::ZERO, utc_micros, source: 3 });
+            writer.record(Instant::ZERO, &clock, &mut sink).expect("room");
+            writer.finish(&mut sink);
+            let numbered = |sector: Sector| {
+                let mut bytes = *sector.bytes();
+                bytes[11..15].copy_from_slice(&number.to_le_bytes());
+                sealed(Sector::from_bytes(bytes), own)
+            };
+            sink.0.into_iter().flat_map(numbered).collect::<Vec<u8>>()
+        };
+        card.write(20, timed(20, 0, 2_000));
+        for (utc, expected) in [(1_000, &[(21, None, false, true)][..]), (3_000, &[])] {
+            card.write(21, [&torn[..], &timed(old, 1, utc)].concat());
+            assert_eq!(card.anew(), expected);
+        }
+        // The next log of that power-on was begun anew too, and the start after it found it so.
+        write(&torn);
+        card.write(22, log(old, 9, 9));
+        card.write(23, log(23, 22, old));
+        let two = [(21, None, false, true), (22, Some(10), false, true)];
+        assert_eq!(card.anew(), two);
+        card.remove(23);
+        // The next log goes on with it.
+        write(&torn);
+        card.write(22, sector(old, 9));
+        assert_eq!(card.anew(), []);
+        card.write(22, log(22, 21, old));
+        // A byte of the session went wrong, or all of the head; or the head is of a log that is there.
+        let [mut byte, mut zeros, mut other] = [torn.clone(), torn.clone(), torn.clone()];
+        byte[7] = 0x88;
+        zeros[7..15].fill(0);
+        other[7..11].copy_from_slice(&[22, 0, 0, 0]);
+        for damaged in [byte, zeros, other] {
+            write(&damaged);
+            assert_eq!(card.anew(), []);
+        }
     }
 }

@@ -75,9 +75,7 @@ impl Others {
             others.board = board_of(&[Step { header: *header, sector, missing: 0, damaged: 0 }]);
         }
     }
-}
 
-impl Others {
     /// These and others of the same file.
     fn and(self, next: &Self) -> Self {
         let first = if next.first < self.first { *next } else { self };

@@ -36,7 +36,8 @@ use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path as shown, word};
-use crate::source::recording::{Place, find, sessions_of};
+use crate::source::find::{find, sessions_of};
+use crate::source::recording::Place;
 use crate::summary::Overview;
 
 /// Runs `hums report`.

@@ -26,6 +26,8 @@ mod checksums;
 pub mod clock;
 pub mod dataflash;
 pub mod doubt;
+pub mod find;
+pub mod format;
 pub mod input;
 pub mod item;
 pub mod live;

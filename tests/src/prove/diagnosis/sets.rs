@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums::source::recording::{Place, find};
+use hums::source::find::find;
+use hums::source::recording::Place;
 
 use super::labels::{self, FILE, Label};
 use super::options::{Flights, Known};

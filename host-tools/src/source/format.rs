@@ -1,0 +1,154 @@
+//! What a recording is, by its first bytes.
+
+use std::path::Path;
+
+use super::input::Input;
+use super::sniff::{Kind, sniff_bytes};
+use super::{dataflash, ulog};
+use crate::archive;
+
+/// How much of a file tells what it is.
+pub(super) const LOOK_BYTES: usize = 64 * 1024;
+/// What is read besides logs of ours, for messages: the end of a sentence.
+pub(super) const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
+                     each also as .gz";
+
+/// What a recording is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Format {
+    /// A log of HUMS, from a file, a card or a card's image.
+    Hums,
+    /// A ground station's log.
+    Tlog,
+    /// The bytes of a port.
+    Raw,
+    /// ArduPilot's onboard log, binary or as text.
+    DataFlash,
+    /// PX4's onboard log.
+    Ulog,
+}
+
+impl Format {
+    /// The name that JSON and tables use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hums => "hums",
+            Self::Tlog => "tlog",
+            Self::Raw => "raw",
+            Self::DataFlash => "dataflash",
+            Self::Ulog => "ulog",
+        }
+    }
+
+    /// What it is, for people.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Hums => "log of HUMS",
+            Self::Tlog => "ground station's log (tlog)",
+            Self::Raw => "raw MAVLink",
+            Self::DataFlash => "ArduPilot log (DataFlash)",
+            Self::Ulog => "PX4 log (ULog)",
+        }
+    }
+
+    /// What it is, for people, in a sentence: `a PX4 log (ULog)`.
+    pub fn with_article(self) -> String {
+        match self {
+            Self::Raw => self.words().to_owned(),
+            Self::DataFlash => format!("an {}", self.words()),
+            Self::Hums | Self::Tlog | Self::Ulog => format!("a {}", self.words()),
+        }
+    }
+
+    /// Whether it holds what came over a link, as a ground station or a recorder on a port heard it; otherwise the
+    /// autopilot wrote it itself.
+    pub const fn is_of_link(self) -> bool {
+        matches!(self, Self::Hums | Self::Tlog | Self::Raw)
+    }
+}
+
+/// What some first bytes are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Detected {
+    /// A ground station's log.
+    Tlog,
+    /// The bytes of a port.
+    Raw,
+    /// ArduPilot's onboard log.
+    DataFlash(dataflash::Form),
+    /// PX4's onboard log.
+    Ulog,
+}
+
+impl Detected {
+    pub(super) const fn format(self) -> Format {
+        match self {
+            Self::Tlog => Format::Tlog,
+            Self::Raw => Format::Raw,
+            Self::DataFlash(_) => Format::DataFlash,
+            Self::Ulog => Format::Ulog,
+        }
+    }
+}
+
+/// What a file that begins so is; none where that is not known.
+pub(super) fn detect(start: &[u8]) -> Option<Detected> {
+    if hint(start).is_some() {
+        // A log that lies in an archive as it is would be read from its middle.
+        return None;
+    }
+    if ulog::detect(start) {
+        return Some(Detected::Ulog);
+    }
+    if let Some(form) = dataflash::begins(start) {
+        return Some(Detected::DataFlash(form));
+    }
+    // Before DataFlash's weaker signs. In 64 KiB of anything else a frame of version 1 whose checksum holds is rare, and
+    // happens.
+    let (kind, frames) = sniff_bytes(start);
+    if dataflash::is_headless(start, frames) {
+        return Some(Detected::DataFlash(dataflash::Form::Binary));
+    }
+    match kind {
+        Kind::Tlog if frames > 0 => Some(Detected::Tlog),
+        Kind::Raw if frames > 0 => Some(Detected::Raw),
+        _ => dataflash::detect(start).map(Detected::DataFlash),
+    }
+}
+
+/// What is known of a file that is not read, by its first bytes as they are after unpacking, and what to do with it.
+pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
+    const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
+    archive::hint(start).or_else(|| start.starts_with(&archive::GZIP).then_some(TWICE))
+}
+
+/// What a file that begins with these bytes (64 KiB, or all of it) is, where it is a recording and none of our own logs.
+pub fn format_of(start: &[u8]) -> Option<Format> {
+    detect(start).map(Detected::format)
+}
+
+/// Whether a file is a recording, and none of our own logs.
+pub(super) fn is_recording(path: &Path) -> bool {
+    detect(&start_of(path)).is_some()
+}
+
+/// The first bytes of a file; none where it cannot be read.
+pub(super) fn start_of(path: &Path) -> Vec<u8> {
+    Input::open(path).ok().and_then(|mut input| input.peek(LOOK_BYTES).ok()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_that_is_one_by_chance_makes_no_mavlink_of_an_autopilots_log() {
+        use crate::mavlink::frame::tests::HEARTBEAT;
+        let binary = [&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", &HEARTBEAT].concat();
+        let text = [b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n", &HEARTBEAT[..]].concat();
+        for start in [binary, text] {
+            assert_eq!(format_of(&start), Some(Format::DataFlash));
+        }
+        assert_eq!(format_of(&HEARTBEAT.repeat(3)), Some(Format::Raw));
+    }
+}
