@@ -79,6 +79,7 @@ fn start() -> board::Idle {
     let monitor = MONITOR.take();
     let (items_in, items_out) = status::MAILBOX.split();
     let keeper = restore(parts.store, items_out, parts.boot.cause, monitor);
+    let entropy = parts.boot.entropy.unwrap_or_else(|| counted(keeper.mounts(), &identity));
     let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
     let monitoring = monitoring(monitor, identity);
     monitoring.restore_signing(keeper);
@@ -90,16 +91,23 @@ fn start() -> board::Idle {
     on.reception.spawn(tasks::reception::run(autopilot_rx, frames_in).expect(ONCE));
     let ends =
         monitor::Ends { frames: frames_out, uplink: queues.uplink_out, sectors: sectors_in, gs: gs_in };
-    on.monitor.spawn(
-        monitor::run(monitoring, ends, handover, parts.boot.cause, parts.watchdog, parts.led).expect(ONCE),
-    );
+    on.monitor
+        .spawn(monitor::run(monitoring, ends, handover, parts.boot, parts.watchdog, parts.led).expect(ONCE));
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
     on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
-    on.storage.spawn(
-        tasks::storage::run(parts.card, parts.boot.entropy, sectors_out, queues.shelf, keeper).expect(ONCE),
-    );
+    on.storage
+        .spawn(tasks::storage::run(parts.card, entropy, sectors_out, queues.shelf, keeper).expect(ONCE));
     parts.idle
+}
+
+/// Stands in for a random number: the store and the memory that survives a reset count the starts, and no two chips have one
+/// number.
+fn counted(mounts: u32, identity: &Boot<'_>) -> u32 {
+    let words = identity.uid.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word));
+    words
+        .chain([mounts, identity.boots])
+        .fold(0, |sum, word| (sum ^ word).wrapping_mul(0x9E37_79B1).rotate_left(15))
 }
 
 // Apart from `start`: what each builds on the stack is gone when the next one begins.

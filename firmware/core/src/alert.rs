@@ -24,8 +24,7 @@ const DISARMED: Span = Span::from_secs(2);
 const FLAGS_AGE: Span = Span::from_secs(5);
 
 /// What a text of the autopilot says is wrong. `severity` is a `MAV_SEVERITY`: what is only a notice, or less, says nothing is
-/// wrong. `None` where a log keeps none: then only
-/// texts count that are known and tell by themselves that they are severe.
+/// wrong. `None` where a log keeps none: then only texts count that are known and tell by themselves that they are severe.
 pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {
     const NOTICE: u8 = 5;
     const WARNING: u8 = 4;
@@ -55,21 +54,18 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
 /// Bits that both have: 0 attitude, 3 and 4 position. PX4: 10 GPS glitch, 11 accelerometer error. ArduPilot: 15 GPS glitching,
 /// which it also sets where there is no GPS.
 fn of_estimator(estimator: &Estimator, had_both: bool) -> Causes {
-    const PX4_GLITCH: u16 = 1 << 10;
-    const PX4_ACCELEROMETER: u16 = 1 << 11;
-    const ARDUPILOT_GLITCH: u16 = 1 << 15;
+    const PX4_GLITCH: u32 = 1 << 10;
+    const PX4_ACCELEROMETER: u32 = 1 << 11;
+    const ARDUPILOT_GLITCH: u32 = 1 << 15;
     let flags = estimator.flags;
     let (glitch, accelerometer) = match estimator.scale {
         EstimatorScale::TestRatio => (PX4_GLITCH, PX4_ACCELEROMETER),
         EstimatorScale::Variance => (ARDUPILOT_GLITCH, 0),
     };
-    let lost = had_both && !has_both(flags);
-    let said = [
-        (had_both && flags & glitch != 0, Cause::Gnss),
-        (flags & accelerometer != 0, Cause::Accelerometer),
-        (lost, Cause::Estimator),
-    ];
-    said.into_iter().filter(|(is, _)| *is).fold(Causes::NONE, |causes, (_, cause)| causes.with(cause))
+    let glitch = if had_both { glitch } else { 0 };
+    let said =
+        Causes::of_bits(u32::from(flags), &[(glitch, Cause::Gnss), (accelerometer, Cause::Accelerometer)]);
+    if had_both && !has_both(flags) { said.with(Cause::Estimator) } else { said }
 }
 
 /// Whether an estimator has attitude and position.

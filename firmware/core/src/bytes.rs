@@ -14,6 +14,17 @@ pub(crate) fn amount(value: f64) -> f64 {
     if value.is_finite() && value >= 0.0 { value } else { 0.0 }
 }
 
+/// FNV-1a (draft-eastlake-fnv, 32 bits): a name in four bytes.
+pub(crate) const fn fnv1a(name: &str) -> u32 {
+    let mut hash = 0x811C_9DC5_u32;
+    let mut index = 0;
+    while index < name.len() {
+        hash = (hash ^ name.as_bytes()[index] as u32).wrapping_mul(0x0100_0193);
+        index += 1;
+    }
+    hash
+}
+
 /// Writes fields; what no longer fits is left out, which the callers' const-asserted lengths rule out.
 pub(crate) struct Put<'a> {
     out: &'a mut [u8],

@@ -176,7 +176,7 @@ impl Causes {
         Self(self.0 & other.0)
     }
 
-    fn of_bits(bits: u32, table: &[(u32, Cause)]) -> Self {
+    pub(crate) fn of_bits(bits: u32, table: &[(u32, Cause)]) -> Self {
         let set = table.iter().filter(|(bit, _)| bits & bit != 0);
         set.fold(Self::NONE, |causes, (_, cause)| causes.with(*cause))
     }

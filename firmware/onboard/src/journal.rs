@@ -64,7 +64,12 @@ impl<'a> Journal<'a> {
 
     /// Counts a loss, to be recorded.
     pub(crate) fn lose(&mut self, now: Instant, what: Lost, count: u64) {
-        self.losses.count(now, what, count);
+        self.lose_since(now, now, what, count);
+    }
+
+    /// Counts a loss that may have begun at `since`, to be recorded.
+    pub(crate) fn lose_since(&mut self, since: Instant, now: Instant, what: Lost, count: u64) {
+        self.losses.count(since, now, what, count);
     }
 
     /// Records the losses whose time has come, or, at the end, all.

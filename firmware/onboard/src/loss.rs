@@ -21,10 +21,10 @@ impl Losses {
         Self { open: [None; KINDS.len()] }
     }
 
-    /// Counts a loss that was noticed at `now`.
-    pub(crate) fn count(&mut self, now: Instant, what: Lost, count: u64) {
+    /// Counts a loss that was noticed at `now`, and may have begun at `since`.
+    pub(crate) fn count(&mut self, since: Instant, now: Instant, what: Lost, count: u64) {
         let Some(slot) = KINDS.iter().position(|kind| *kind == what).filter(|_| count > 0) else { return };
-        let loss = self.open[slot].get_or_insert(Loss { what, count: 0, from: now, to: now });
+        let loss = self.open[slot].get_or_insert(Loss { what, count: 0, from: since, to: now });
         loss.count = loss.count.saturating_add(count);
         loss.to = now;
     }
@@ -50,8 +50,8 @@ mod tests {
     #[test]
     fn losses_of_a_second_are_one_record_and_wait_until_it_is_written() {
         let mut losses = Losses::new();
-        losses.count(Instant::from_millis(100), Lost::NotFrames, 3);
-        losses.count(Instant::from_millis(900), Lost::NotFrames, 4);
+        losses.count(Instant::from_millis(100), Instant::from_millis(200), Lost::NotFrames, 3);
+        losses.count(Instant::from_millis(900), Instant::from_millis(900), Lost::NotFrames, 4);
         let mut written = Vec::new();
         losses.flush(Instant::from_millis(1_000), false, |loss| {
             written.push(*loss);

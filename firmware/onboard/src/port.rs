@@ -14,6 +14,7 @@ pub struct PortStatus {
     frames: AtomicU32,
     frames_lost: AtomicU32,
     overrun: AtomicU32,
+    blind_ms: AtomicU32,
     queue_bytes_max: AtomicU32,
 }
 
@@ -58,6 +59,7 @@ impl PortStatus {
             frames: AtomicU32::new(0),
             frames_lost: AtomicU32::new(0),
             overrun: AtomicU32::new(0),
+            blind_ms: AtomicU32::new(0),
             queue_bytes_max: AtomicU32::new(0),
         }
     }
@@ -91,8 +93,14 @@ impl PortStatus {
         self.frames_lost.store(reading.frames_lost, Ordering::Relaxed);
     }
 
-    /// Counts that the port lost bytes before reception fetched them.
-    pub fn count_overrun(&self) {
+    /// Counts that the port lost bytes before reception fetched them, in a time of at most so many milliseconds.
+    pub fn count_overrun(&self, blind_ms: u32) {
+        self.blind_ms.fetch_add(blind_ms, Ordering::Relaxed);
         self.overrun.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Milliseconds in which bytes may have been lost, modulo 2^32.
+    pub(crate) fn blind_ms(&self) -> u32 {
+        self.blind_ms.load(Ordering::Relaxed)
     }
 }

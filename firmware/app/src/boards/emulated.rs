@@ -148,7 +148,7 @@ pub(crate) fn take() -> Parts<Board> {
             id: [0; 12],
             cause: reset::cause(),
             cause_register: 0,
-            entropy: arguments.seed.wrapping_add(1),
+            entropy: Some(arguments.seed.wrapping_add(1)),
         },
     }
 }
@@ -266,6 +266,11 @@ pub(crate) fn is_watched() -> bool {
 pub(crate) fn bites_soon() {
     println!("the watchdog bites");
     reset::reset(ResetCause::Watchdog)
+}
+
+/// There is none.
+pub(crate) const fn crystal_failed() -> bool {
+    false
 }
 
 /// Waits for the end of the feed.

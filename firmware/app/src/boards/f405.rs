@@ -10,13 +10,11 @@
 //! | PC12 | LED, lit when low | |
 
 use embassy_stm32::dma::{self, Request};
-use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH2, DMA2_CH7, RNG};
-use embassy_stm32::rng::{self, Rng};
+use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH2, DMA2_CH7};
 use embassy_stm32::spi::{self, Spi};
-use embassy_stm32::usart::{self, Uart};
+use embassy_stm32::usart::Uart;
 use embassy_stm32::{bind_interrupts, pac, rcc};
 use static_cell::ConstStaticCell;
 
@@ -24,10 +22,10 @@ use super::machine::{Boot, Parts};
 use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
 pub(crate) use super::stm32f4::{
     AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash,
-    TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, cycles, done, ended, is_watched, remember,
-    restart,
+    TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, crystal_failed, cycles, done, ended,
+    is_watched, remember, restart,
 };
-use super::stm32f4::{CardPort, PortRx, PortTx, clocks, reset_cause, start_counters, watch_supply};
+use super::stm32f4::{CardPort, PortRx, PortTx, line, random_number, reset_cause, start};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f405";
@@ -44,34 +42,30 @@ bind_interrupts!(struct Irqs {
     DMA2_STREAM7 => dma::InterruptHandler<DMA2_CH7>;
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
-    RNG => rng::InterruptHandler<RNG>;
 });
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
 static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
 
-/// Starts clocks, ports and card. The watchdog runs from its first feeding on.
+/// Starts clocks, watchdog, ports and card.
 pub(crate) fn take() -> Parts<Board> {
     let (cause, cause_register) = reset_cause();
-    let p = embassy_stm32::init(clocks(rcc::HseMode::Oscillator));
-    watch_supply();
-    start_counters();
+    let p = start(rcc::HseMode::Oscillator);
 
-    let mut line = usart::Config::default();
-    line.baudrate = AUTOPILOT_BAUD;
-    let (tx, rx) =
-        Uart::new_blocking(p.USART1, p.PA10, p.PA9, line).expect("the clocks allow this baud rate").split();
+    let (tx, rx) = Uart::new_blocking(p.USART1, p.PA10, p.PA9, line(AUTOPILOT_BAUD))
+        .expect("the clocks allow this baud rate")
+        .split();
     let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA2_CH2, Irqs), dma::Channel::new(p.DMA2_CH7, Irqs));
     let autopilot = (
-        PortRx::new(rx, pac::USART1, rx_dma, RING.take(), FETCH_EVERY, USART_REQUEST),
+        PortRx::new(rx, (pac::USART1, AUTOPILOT_BAUD), rx_dma, RING.take(), FETCH_EVERY, USART_REQUEST),
         PortTx::new(tx, pac::USART1, tx_dma, USART_REQUEST),
     );
-    line.baudrate = GS_BAUD;
-    let (tx, rx) =
-        Uart::new_blocking(p.USART2, p.PA3, p.PA2, line).expect("the clocks allow this baud rate").split();
+    let (tx, rx) = Uart::new_blocking(p.USART2, p.PA3, p.PA2, line(GS_BAUD))
+        .expect("the clocks allow this baud rate")
+        .split();
     let (rx_dma, tx_dma) = (dma::Channel::new(p.DMA1_CH5, Irqs), dma::Channel::new(p.DMA1_CH6, Irqs));
     let gs = (
-        PortRx::new(rx, pac::USART2, rx_dma, GS_RING.take(), GS_FETCH_EVERY, USART_REQUEST),
+        PortRx::new(rx, (pac::USART2, GS_BAUD), rx_dma, GS_RING.take(), GS_FETCH_EVERY, USART_REQUEST),
         PortTx::new(tx, pac::USART2, tx_dma, USART_REQUEST),
     );
 
@@ -79,15 +73,14 @@ pub(crate) fn take() -> Parts<Board> {
     bus.frequency = CardPort::IDENTIFICATION;
     bus.miso_pull = Pull::Up;
     let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
-    let entropy = Rng::new(p.RNG, Irqs).next_u32();
     Parts {
         autopilot,
         gs,
         card: Card::new(CardPort::new(bus, Output::new(p.PA4, Level::High, Speed::VeryHigh))),
-        store: Some(StoreFlash::new(Flash::new_blocking(p.FLASH))),
+        store: Some(StoreFlash::new()),
         led: Led::new(Output::new(p.PC12, Level::High, Speed::Low), Level::Low),
-        watchdog: Watchdog::new(p.IWDG),
+        watchdog: Watchdog::new(),
         idle: Idle(()),
-        boot: Boot { id: embassy_stm32::uid::uid(), cause, cause_register, entropy },
+        boot: Boot { id: embassy_stm32::uid::uid(), cause, cause_register, entropy: random_number() },
     }
 }

@@ -39,9 +39,12 @@ pub(crate) struct Parts<M: Machine> {
     pub(crate) boot: Boot,
 }
 
-/// Bytes were lost before the reception task could fetch them: it came too late and the receive buffer ran over.
+/// Bytes were lost before the reception task could fetch them: it came too late and the receive buffer ran over. How many is not
+/// known; at most what comes in so many milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-pub(crate) struct Overrun;
+pub(crate) struct Overrun {
+    pub(crate) blind_ms: u32,
+}
 
 /// The receiving half of a port.
 pub(crate) trait Receive {
@@ -54,6 +57,9 @@ pub(crate) trait Receive {
 pub(crate) trait Transmit {
     /// Sends all of `bytes`; returns when the port has taken the last.
     async fn transmit(&mut self, bytes: &[u8]);
+
+    /// Begins anew after a transmission that did not come to its end.
+    fn restart(&mut self) {}
 
     /// The port's baud rate, both ways, from the next frame on.
     fn set_baud(&mut self, baud: u32);
@@ -105,6 +111,6 @@ pub(crate) struct Boot {
     pub(crate) cause: ResetCause,
     /// The register that says so.
     pub(crate) cause_register: u32,
-    /// Differs from one start to the next.
-    pub(crate) entropy: u32,
+    /// Differs from one start to the next; `None` where the board cannot tell such a number.
+    pub(crate) entropy: Option<u32>,
 }

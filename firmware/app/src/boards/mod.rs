@@ -12,6 +12,7 @@
 //! | `take() -> Parts<Board>` | starts the machine; to be called once, first |
 //! | `Board` | its [`Machine`](machine::Machine): the type of each of its parts |
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |
+//! | `crystal_failed()` | whether the clock has gone over to a less exact oscillator |
 //! | `ended()` | waits for the end of the input; for ever on a board that flies |
 //! | `cycles()` | a free running counter of [`CYCLE_BITS`](machine::CYCLE_BITS) bits, for measuring |
 //! | `busy_cycles()` | what `cycles()` counted while tasks ran, in the processor's cycles; 0 where it counts something else |

@@ -1,7 +1,7 @@
 //! Downlink and requests: the frames for the ground station and for the autopilot out of their ports, one after the
 //! other.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use embassy_time::{Duration, with_timeout};
 use hums_onboard::Task;
@@ -14,10 +14,17 @@ use crate::status::SUPERVISOR;
 
 /// How often it reports in while there is nothing to send.
 const REPORT: Duration = Duration::from_millis(500);
+/// How long a frame may take: the longest has 73 ms at 38,400 baud. What takes longer does not come to an end; within the second that
+/// the supervisor allows.
+const SEND_MAX: Duration = Duration::from_millis(500);
 
 /// Baud rates of the ports as the parameters want them; 0: as the board began.
 pub(crate) static BAUD_GS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static BAUD_AUTOPILOT: AtomicU32 = AtomicU32::new(0);
+
+/// A transmission did not come to its end since the start.
+pub(crate) static GS_STOOD_STILL: AtomicBool = AtomicBool::new(false);
+pub(crate) static AUTOPILOT_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 
 #[embassy_executor::task]
 pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
@@ -26,7 +33,7 @@ pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
         SUPERVISOR.report(Task::Downlink, now());
         set_baud(&mut port, &BAUD_GS);
         if let Some(length) = queue.take(&mut frame) {
-            port.transmit(frame.get(..length).unwrap_or_default()).await;
+            send(&mut port, frame.get(..length).unwrap_or_default(), &GS_STOOD_STILL).await;
         } else {
             links::GS_EMPTY.signal(());
             // Either way it looks into the queue.
@@ -42,10 +49,18 @@ pub(crate) async fn requests(mut port: board::AutopilotTx, mut queue: AutopilotO
     loop {
         set_baud(&mut port, &BAUD_AUTOPILOT);
         if let Some(length) = queue.take(&mut frame) {
-            port.transmit(frame.get(..length).unwrap_or_default()).await;
+            send(&mut port, frame.get(..length).unwrap_or_default(), &AUTOPILOT_STOOD_STILL).await;
         } else {
             links::AUTOPILOT.wait().await;
         }
+    }
+}
+
+/// Sends a frame; gives it up where the port does not take it in time.
+async fn send(port: &mut impl Transmit, frame: &[u8], stood_still: &AtomicBool) {
+    if with_timeout(SEND_MAX, port.transmit(frame)).await.is_err() {
+        port.restart();
+        stood_still.store(true, Ordering::Relaxed);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Monitor: frames to records, findings and the summary. Also the one that feeds the watchdog, because it goes round
 //! every 50 ms whatever happens, and the one that works the LED.
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_futures::select::{Either4, select4};
 use embassy_time::Ticker;
@@ -10,9 +10,9 @@ use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
 use hums_onboard::{Handover, Task};
 use hums_recorder::CardState;
 
-use super::downlink::{BAUD_AUTOPILOT, BAUD_GS};
+use super::downlink::{AUTOPILOT_STOOD_STILL, BAUD_AUTOPILOT, BAUD_GS, GS_STOOD_STILL};
 use crate::boards::board;
-use crate::boards::machine::ResetCause;
+use crate::boards::machine::{Boot, ResetCause};
 use crate::costs::{self, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};
@@ -39,12 +39,13 @@ pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
     mut ends: Ends,
     handover: &'static mut Handover<'static>,
-    cause: ResetCause,
+    boot: Boot,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
 ) -> ! {
     body.start(now(), &mut ends.sectors);
-    tell_fault(body, &mut ends, cause);
+    tell_fault(body, &mut ends, boot.cause);
+    let mut told = [false; 4];
     wake_others();
     let mut ticker = Ticker::every(links::wait(TICK));
     let mut ticks: u32 = 0;
@@ -68,6 +69,7 @@ pub(crate) async fn run(
                     });
                 }
                 tick(body, &mut ends, handover);
+                tell_board(body, &mut ends, &mut told, boot.entropy.is_some());
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
                 fault::tick(now());
@@ -107,6 +109,23 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
     if let Some(fault) = noted.or_else(|| unnoted.then(Fault::without_note)) {
         defmt::error!("before this start: {}", defmt::Display2Format(&fault));
         body.fault(now(), &fault.record(), fault.last_messages(), &mut ends.sectors);
+    }
+}
+
+/// Tells, once, what the board does without, and keeps in `told` what was told.
+#[inline(never)]
+fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 4], has_random: bool) {
+    let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);
+    let faults = [
+        (board::crystal_failed(), 4, "HUMS: crystal failed, times may be off by 4 %"),
+        (stood_still(&AUTOPILOT_STOOD_STILL), 4, "HUMS: sending to the autopilot stands still"),
+        (stood_still(&GS_STOOD_STILL), 4, "HUMS: sending to the radio stands still"),
+        (!has_random, 5, "HUMS: no random numbers, starts are counted"),
+    ];
+    for ((is_so, severity, text), told) in faults.into_iter().zip(told) {
+        if is_so && !core::mem::replace(told, true) {
+            body.note(now(), severity, text, &mut ends.sectors);
+        }
     }
 }
 
@@ -199,9 +218,13 @@ fn wake_others() {
     links::SECTORS.signal(());
 }
 
-/// Slow blinking: recording. Fast: no card, or one that cannot be used.
+/// Slow blinking: recording. Twice in a second, briefly: recording, but the board has a fault. Fast: no card, or one that cannot be
+/// used.
 fn lit(ticks: u32) -> bool {
     let half = match CARD_STATUS.read().state {
+        CardState::Recording if board::crystal_failed() => {
+            return matches!(ticks % (2 * BLINK_RECORDING) / BLINK_TROUBLE, 0 | 2);
+        }
         CardState::Recording => BLINK_RECORDING,
         _ => BLINK_TROUBLE,
     };

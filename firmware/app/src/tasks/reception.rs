@@ -25,7 +25,7 @@ pub(crate) async fn run(mut port: board::AutopilotRx, mut frames: FramesIn<'stat
                 let bytes = bytes.get(..count).unwrap_or_default();
                 measure(Stage::Framer, || body.bytes(now(), bytes, &mut frames));
             }
-            Either::First(Ok(Err(_overrun))) => PORT_STATUS.count_overrun(),
+            Either::First(Ok(Err(overrun))) => PORT_STATUS.count_overrun(overrun.blind_ms),
             Either::First(Err(_silence)) => body.idle(now(), &mut frames),
             Either::Second(()) => break,
         }

@@ -4,6 +4,7 @@
 //! An event's number is its component, 1 for the autopilot, in the highest byte, and the FNV-1a hash of its name in the three others.
 //! So a name gives its number here, while the firmware is built, and stays the same for all versions that keep the name.
 
+use crate::bytes::fnv1a;
 use crate::cause::{Alert, Cause, Meaning};
 
 /// The autopilot's component in the number of an event.
@@ -11,14 +12,7 @@ const AUTOPILOT: u32 = 1 << 24;
 
 /// The number of an event of the autopilot, by its name.
 const fn number(name: &str) -> u32 {
-    let bytes = name.as_bytes();
-    let mut hash: u32 = 0x811C_9DC5;
-    let mut at = 0;
-    while at < bytes.len() {
-        hash = (hash ^ bytes[at] as u32).wrapping_mul(0x0100_0193);
-        at += 1;
-    }
-    AUTOPILOT | hash & 0x00FF_FFFF
+    AUTOPILOT | fnv1a(name) & 0x00FF_FFFF
 }
 
 /// What an event means.

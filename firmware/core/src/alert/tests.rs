@@ -1,4 +1,5 @@
 use super::*;
+use crate::bytes::fnv1a;
 
 const T0: Instant = Instant::from_millis(1_000);
 
@@ -62,7 +63,7 @@ fn patterns_fit_what_they_say_and_never_panic() {
 #[test]
 fn an_event_tells_its_cause_by_its_number_and_its_arguments() {
     // commander_failsafe_enter_hold: modes, action, delay, cause.
-    let hold = 1 << 24 | 0x00FF_FFFF & fnv("commander_failsafe_enter_hold");
+    let hold = 1 << 24 | 0x00FF_FFFF & fnv1a("commander_failsafe_enter_hold");
     for (cause, told) in
         [(1, Cause::RemoteControl), (2, Cause::GroundStation), (3, Cause::Power), (0, Cause::Failsafe)]
     {
@@ -72,10 +73,6 @@ fn an_event_tells_its_cause_by_its_number_and_its_arguments() {
     assert_eq!(of_event(hold, 2, &[]), Some(Alert::warning(Cause::Failsafe)), "cut short");
     assert_eq!(of_event(7, 2, &[]), Some(Alert::warning(Cause::Other)), "not known and severe");
     assert_eq!(of_event(7, 3, &[]), None, "not known");
-}
-
-fn fnv(name: &str) -> u32 {
-    name.bytes().fold(0x811C_9DC5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
 /// Alerts of a vehicle that is armed.

@@ -7,7 +7,7 @@
 use super::check::{Check, Side};
 use super::finding::{Finding, Level};
 use super::tables::checks;
-use crate::bytes::{Put, Take, Unreadable};
+use crate::bytes::{Put, Take, Unreadable, fnv1a};
 use crate::time::Instant;
 
 /// Checks and instances that are kept.
@@ -231,7 +231,7 @@ impl Exceedances {
         for exceedance in self.iter(now) {
             let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } =
                 exceedance.lifetime;
-            put.u32(hash(exceedance.check.name)).u8(exceedance.instance).u16(warnings).u16(criticals);
+            put.u32(fnv1a(exceedance.check.name)).u8(exceedance.instance).u16(warnings).u16(criticals);
             put.u32(warning_tenths).u32(critical_tenths).f32(peak);
         }
         put.len()
@@ -256,7 +256,7 @@ impl Exceedances {
                 critical_tenths: take.u32()?,
                 peak: take.f32()?,
             };
-            let check = checks().position(|check| hash(check.name) == name && instance < check.instances);
+            let check = checks().position(|check| fnv1a(check.name) == name && instance < check.instances);
             *place = check.map(|check| Entry {
                 check: check as u8,
                 instance,
@@ -282,17 +282,6 @@ const fn rank(level: Level) -> u8 {
         Level::Critical => 2,
         Level::Ok | Level::Advisory | Level::Stale => 0,
     }
-}
-
-/// FNV-1a, 32 bits: a check's name in four bytes.
-const fn hash(name: &str) -> u32 {
-    let mut hash = 0x811C_9DC5_u32;
-    let mut index = 0;
-    while index < name.len() {
-        hash = (hash ^ name.as_bytes()[index] as u32).wrapping_mul(0x0100_0193);
-        index += 1;
-    }
-    hash
 }
 
 #[cfg(test)]

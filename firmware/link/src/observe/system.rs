@@ -131,10 +131,9 @@ pub(super) fn parameter(payload: &[u8]) -> Option<Observation> {
 /// `STATUSTEXT` that says that something is wrong. Of a text in several parts the first counts: it names what it is about.
 pub(super) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
     const TEXT: usize = 1;
-    const SEVERITY_MAX: u8 = 7;
     let fields = Fields(payload);
     let (severity, part) = (fields.u8(0), fields.u8(53));
-    if severity > SEVERITY_MAX || part > 0 {
+    if part > 0 {
         return None;
     }
     let text = payload.get(TEXT..payload.len().min(TEXT + TEXT_BYTES_MAX))?;

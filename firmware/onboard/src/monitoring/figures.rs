@@ -43,6 +43,7 @@ struct Sums {
 pub(super) struct Figures<'a> {
     port: &'a PortStatus,
     port_before: PortReading,
+    blind_ms_before: u32,
     card_frames_lost_before: u32,
     sums: Sums,
     pub(super) machine: Machine,
@@ -54,6 +55,7 @@ impl<'a> Figures<'a> {
         Self {
             port,
             port_before: PortReading::default(),
+            blind_ms_before: 0,
             card_frames_lost_before: card.read().frames_lost,
             sums: Sums::default(),
             machine: Machine::default(),
@@ -153,7 +155,10 @@ impl<'a> Figures<'a> {
         self.sums.bytes_not_frames += u64::from(new.bytes_not_frames);
         self.sums.frames += u64::from(new.frames);
         self.sums.frames_lost += u64::from(new.frames_lost);
-        journal.lose(now, Lost::UartOverrun, u64::from(new.overrun));
+        let blind_ms = self.port.blind_ms();
+        let blind = blind_ms.wrapping_sub(core::mem::replace(&mut self.blind_ms_before, blind_ms));
+        let since = Instant::from_millis(now.as_millis().saturating_sub(u64::from(blind)));
+        journal.lose_since(since, now, Lost::UartOverrun, u64::from(new.overrun));
         journal.lose(now, Lost::NotFrames, u64::from(new.bytes_not_frames));
         journal.lose(now, Lost::DamagedFrames, u64::from(new.damaged));
         journal.lose(now, Lost::QueueFull, u64::from(new.frames_lost));

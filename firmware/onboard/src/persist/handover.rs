@@ -107,7 +107,7 @@ impl<'a> Handover<'a> {
             return news(5, "HUMS: store full, saving waits for the ground");
         }
         if newer(&mut told.erased, now.erased) {
-            return news(5, "HUMS: flash erased, up to 0.8 s not recorded");
+            return news(5, "HUMS: flash erased, up to 0.5 s not recorded");
         }
         if newer(&mut told.failed, now.failed) {
             return news(4, "HUMS: saving failed, have the board replaced");

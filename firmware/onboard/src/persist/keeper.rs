@@ -105,6 +105,11 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
         got.and_then(Result::ok).flatten().unwrap_or(0)
     }
 
+    /// How often the store was mounted since it was made; 0 where there is none.
+    pub fn mounts(&mut self) -> u32 {
+        self.store.as_mut().and_then(|store| store.mounts().ok()).unwrap_or(0)
+    }
+
     /// Saves one item. An erase is allowed where [`Calm`] allows it (the table in [`super`]), or if `may_erase` says so.
     pub fn service(&mut self, may_erase: bool) -> Kept {
         let calm = self.status.calm();

@@ -16,13 +16,13 @@
 //! gets no instruction out of the flash; between two words everything more urgent goes on. So a save of the session's
 //! counters, 43 words, delays nobody by more than 0.1 ms, and the ports' rings hold 44 ms.
 //!
-//! An erase takes 0.4 s, 0.8 s at the longest (datasheet, table 40, 16 KiB, writes of 8 bits). There are three times for it:
+//! An erase takes 0.25 s, 0.5 s at the longest (datasheet, table 40, 16 KiB, words of 32 bits). There are three times for it:
 //!
 //! | when | what is lost |
 //! |---|---|
 //! | at power-on, before reception begins ([`Keeper::turn_ahead`]); at least five eighths of a sector are free afterwards | nothing |
 //! | disarmed, and no frame for [`handover::QUIET`]: room is made for the next flight | nothing |
-//! | disarmed on the ground for [`handover::GROUNDED`] while the autopilot talks, and only where the sector is more than three quarters full | frames of up to 0.8 s; it is recorded and told |
+//! | disarmed on the ground for [`handover::GROUNDED`] while the autopilot talks, and only where the sector is more than three quarters full | frames of up to 0.5 s; it is recorded and told |
 //!
 //! The third is for a board that stays powered beside an autopilot that never falls silent. A save that would need an
 //! erase at any other time stays in the mailbox, and what comes after it with its owner; it is counted and told.

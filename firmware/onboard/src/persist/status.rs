@@ -21,7 +21,7 @@ pub enum StoreState {
     Failed = 4,
 }
 
-/// What an erase would cost now, as the monitor sees it. An erase stops the processor for up to 0.8 s.
+/// What an erase would cost now, as the monitor sees it. An erase stops the processor for up to 0.5 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Calm {

@@ -1,41 +1,82 @@
 //! Two sectors of the processor's own flash for the store, behind the vector table and before the program (`memory.x`).
 //!
-//! While a word is written (16 µs) or a sector erased (0.25 to 0.5 s) the flash gives no instructions: the processor
+//! While a word is written (16 µs) or a sector erased (0.25 s, 0.5 s at the longest) the flash gives no instructions: the processor
 //! stands still, interrupts and all, and only DMA goes on. What that means is in `hums_onboard::persist`.
+//!
+//! Words of 32 bits in parallel need 2.7 V (RM0090, 3.5.1, table 7): below, where the supply's watch stops everything, nothing is written.
 
-use embassy_stm32::flash::{Blocking, Error, Flash};
-use embassy_stm32::pac;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use core::ptr;
 
+use embassy_stm32::pac::FLASH;
+use embassy_stm32::pac::flash::vals::Psize;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+
+use super::{supply, watchdog};
+
+/// Where the flash is in the processor's memory.
+const FLASH_BEGIN: usize = 0x0800_0000;
 /// Sector 1 begins here (RM0090, table 5).
-const BEGIN: u32 = 16 * 1024;
+const BEGIN: usize = FLASH_BEGIN + 16 * 1024;
+/// The store's first sector.
+const SECTOR: u8 = 1;
 /// A sector from 0 to 3.
 const SECTOR_BYTES: usize = 16 * 1024;
 /// Sectors 1 and 2.
 const BYTES: usize = 2 * SECTOR_BYTES;
+/// What is written at once.
+const WORD: usize = 4;
+/// What makes the flash's control writable (RM0090, 3.5.1).
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+
+/// Why the flash did not do it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FlashError {
+    /// Not the store's, or not whole words or sectors.
+    Place,
+    /// The supply is too low.
+    Supply,
+    /// The flash itself: the bits of its status.
+    Refused(u32),
+}
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Place => NorFlashErrorKind::OutOfBounds,
+            Self::Supply | Self::Refused(_) => NorFlashErrorKind::Other,
+        }
+    }
+}
 
 /// The store's part of the flash.
-pub(crate) struct StoreFlash(Flash<'static, Blocking>);
+pub(crate) struct StoreFlash(());
 
 impl StoreFlash {
-    pub(crate) const fn new(flash: Flash<'static, Blocking>) -> Self {
-        Self(flash)
+    /// To be called once.
+    pub(crate) const fn new() -> Self {
+        Self(())
     }
 
-    fn place(offset: u32, bytes: usize) -> Result<u32, Error> {
-        if offset as usize + bytes <= BYTES { Ok(BEGIN + offset) } else { Err(Error::Size) }
+    fn place(offset: u32, bytes: usize) -> Result<usize, FlashError> {
+        let end = (offset as usize).checked_add(bytes).ok_or(FlashError::Place)?;
+        if end <= BYTES { Ok(BEGIN + offset as usize) } else { Err(FlashError::Place) }
     }
 }
 
 impl ErrorType for StoreFlash {
-    type Error = Error;
+    type Error = FlashError;
 }
 
 impl ReadNorFlash for StoreFlash {
     const READ_SIZE: usize = 1;
 
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
-        self.0.blocking_read(Self::place(offset, bytes.len())?, bytes)
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        let from = ptr::with_exposed_provenance::<u8>(Self::place(offset, bytes.len())?);
+        for (index, byte) in bytes.iter_mut().enumerate() {
+            // SAFETY: within the store's sectors, which can always be read and are no variable of the program's.
+            *byte = unsafe { from.add(index).read_volatile() };
+        }
+        Ok(())
     }
 
     fn capacity(&self) -> usize {
@@ -44,24 +85,96 @@ impl ReadNorFlash for StoreFlash {
 }
 
 impl NorFlash for StoreFlash {
-    const WRITE_SIZE: usize = 4;
+    const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
-        self.0.blocking_write(Self::place(offset, bytes.len())?, bytes)
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        let begin = Self::place(offset, bytes.len())?;
+        if !begin.is_multiple_of(WORD) || !bytes.len().is_multiple_of(WORD) {
+            return Err(FlashError::Place);
+        }
+        unlocked(|| {
+            let words = bytes.as_chunks::<WORD>().0;
+            words.iter().enumerate().try_for_each(|(index, word)| {
+                FLASH.cr().write(|w| {
+                    w.set_psize(Psize::PSIZE32);
+                    w.set_pg(true);
+                });
+                let at = ptr::with_exposed_provenance_mut::<u32>(begin + index * WORD);
+                // SAFETY: an aligned word within the store's sectors, which are no variable of the program's; the flash takes it.
+                unsafe { at.write_volatile(u32::from_le_bytes(*word)) };
+                cortex_m::asm::dsb();
+                finish()
+            })
+        })
     }
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
-        let outcome = self.0.blocking_erase(Self::place(from, 0)?, Self::place(to, 0)?);
-        forget_what_was_read();
-        outcome
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        let length = (to as usize).checked_sub(from as usize).ok_or(FlashError::Place)?;
+        Self::place(from, length)?;
+        if !(from as usize).is_multiple_of(SECTOR_BYTES) || !length.is_multiple_of(SECTOR_BYTES) {
+            return Err(FlashError::Place);
+        }
+        let sectors = from as usize / SECTOR_BYTES..to as usize / SECTOR_BYTES;
+        unlocked(|| {
+            sectors.into_iter().try_for_each(|sector| {
+                FLASH.cr().write(|w| {
+                    w.set_psize(Psize::PSIZE32);
+                    w.set_ser(true);
+                    w.set_snb(SECTOR + sector as u8);
+                });
+                // Nobody feeds it meanwhile.
+                watchdog::reload();
+                FLASH.cr().modify(|w| w.set_strt(true));
+                cortex_m::asm::dsb();
+                finish()
+            })
+        })
     }
 }
 
-/// The data cache still holds what was erased (RM0090, 3.5.2); it can be cleared only while it is off.
-fn forget_what_was_read() {
-    pac::FLASH.acr().modify(|w| w.set_dcen(false));
-    pac::FLASH.acr().modify(|w| w.set_dcrst(true));
-    pac::FLASH.acr().modify(|w| w.set_dcrst(false));
-    pac::FLASH.acr().modify(|w| w.set_dcen(true));
+/// Does `work` with the flash's control unlocked, its errors of before forgotten, and the data cache off and empty
+/// afterwards: it would still hold what was erased (RM0090, 3.5.2), and two banks damage it while one is written (`STM32F42x`, ES0206, 2.2.12).
+fn unlocked(work: impl FnOnce() -> Result<(), FlashError>) -> Result<(), FlashError> {
+    if supply::is_low() {
+        return Err(FlashError::Supply);
+    }
+    while FLASH.sr().read().bsy() {}
+    FLASH.acr().modify(|w| w.set_dcen(false));
+    if FLASH.cr().read().lock() {
+        for key in KEYS {
+            FLASH.keyr().write_value(key);
+        }
+    }
+    forget_errors();
+    let outcome = work();
+    FLASH.cr().write(|w| w.set_lock(true));
+    FLASH.acr().modify(|w| w.set_dcrst(true));
+    FLASH.acr().modify(|w| w.set_dcrst(false));
+    FLASH.acr().modify(|w| w.set_dcen(true));
+    outcome
+}
+
+/// Waits until the flash is done, and says how that went.
+fn finish() -> Result<(), FlashError> {
+    while FLASH.sr().read().bsy() {}
+    let status = FLASH.sr().read();
+    FLASH.cr().write(|_| {});
+    if status.operr() || status.wrperr() || status.pgaerr() || status.pgperr() || status.pgserr() {
+        forget_errors();
+        return Err(FlashError::Refused(status.0));
+    }
+    Ok(())
+}
+
+/// Each is cleared by a one; while one is set the flash takes no further word.
+fn forget_errors() {
+    FLASH.sr().write(|w| {
+        w.set_eop(true);
+        w.set_operr(true);
+        w.set_wrperr(true);
+        w.set_pgaerr(true);
+        w.set_pgperr(true);
+        w.set_pgserr(true);
+    });
 }

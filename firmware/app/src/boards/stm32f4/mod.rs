@@ -1,23 +1,27 @@
 //! What the boards with an STM32F4 have in common: everything but clocks, pins and channels.
 
 mod card;
+mod clock;
 mod flash;
 mod port;
+mod random;
 mod reset;
 mod supply;
+mod time;
 mod watchdog;
 
 use cortex_m::peripheral::DWT;
 use cortex_m::peripheral::syst::SystClkSource;
-use embassy_stm32::gpio::{Level, Output};
-use embassy_stm32::rcc;
+use embassy_stm32::gpio::{Level, Output, Pull};
+use embassy_stm32::{Peripherals, rcc, usart};
 use embassy_time::Duration;
 
 pub(crate) use card::{Card, CardPort};
+pub(crate) use clock::crystal_failed;
 pub(crate) use flash::StoreFlash;
 pub(crate) use port::{PortRx, PortTx};
+pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
-pub(crate) use supply::watch_supply;
 pub(crate) use watchdog::Watchdog;
 
 use crate::boards::machine::{Machine, SYSTICK_RELOAD};
@@ -70,27 +74,19 @@ impl Machine for Board {
 /// RAM survives a reset by itself.
 pub(crate) const fn remember() {}
 
-/// 168 MHz from 8 MHz at the clock's pin: 8 / 4 * 168 / 2; the peripheral buses at 42 and 84 MHz.
-pub(crate) fn clocks(mode: rcc::HseMode) -> embassy_stm32::Config {
-    let mut config = embassy_stm32::Config::default();
-    config.rcc.hse = Some(rcc::Hse { freq: embassy_stm32::time::Hertz(8_000_000), mode });
-    config.rcc.pll_src = rcc::PllSource::HSE;
-    config.rcc.pll = Some(rcc::Pll {
-        prediv: rcc::PllPreDiv::DIV4,
-        mul: rcc::PllMul::MUL168,
-        divp: Some(rcc::PllPDiv::DIV2),
-        divq: Some(rcc::PllQDiv::DIV7),
-        divr: None,
-    });
-    config.rcc.sys = rcc::Sysclk::PLL1_P;
-    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV1;
-    config.rcc.apb1_pre = rcc::APBPrescaler::DIV4;
-    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
-    config
+/// Starts clocks, counters and the watches over the machine; the chip's parts. `mode`: what is at the clock's pins.
+pub(crate) fn start(mode: rcc::HseMode) -> Peripherals {
+    watchdog::start();
+    let parts = embassy_stm32::init(clock::config(mode));
+    clock::finish();
+    time::start();
+    supply::watch();
+    start_counters();
+    parts
 }
 
 /// Starts the cycle counter, and `SysTick` for whoever watches the watchdog (`crate::watch`).
-pub(crate) fn start_counters() {
+fn start_counters() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
@@ -100,6 +96,14 @@ pub(crate) fn start_counters() {
         core.SYST.enable_interrupt();
         core.SYST.enable_counter();
     }
+}
+
+/// A port at this rate. Its receiving pin is pulled up: a line that nobody drives would float and bring noise.
+pub(crate) fn line(baudrate: u32) -> usart::Config {
+    let mut line = usart::Config::default();
+    line.baudrate = baudrate;
+    line.rx_pull = Pull::Up;
+    line
 }
 
 /// The LED.

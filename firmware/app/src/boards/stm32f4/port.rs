@@ -2,12 +2,15 @@
 //!
 //! Reception is copied by DMA and fetched every millisecond: no interrupt a byte, none on a line error (a damaged byte
 //! is for the checksum to find), so that not one good byte is thrown away with a bad one.
+//!
+//! While the processor stands still for an erase of flash, DMA goes round in the ring, and what counts its rounds is an interrupt
+//! that comes once for all of them. So a ring that nobody looked into for longer than it holds is lost as soon as anything came.
 
 use embassy_stm32::dma::{self, ReadableRingBuffer, Request, TransferOptions};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac;
 use embassy_stm32::usart::{UartRx, UartTx};
-use embassy_time::{Duration, Timer};
+use embassy_time::{Duration, Instant, Timer};
 
 use crate::boards::machine::{Overrun, Receive, Transmit};
 
@@ -16,14 +19,19 @@ pub(crate) struct PortRx {
     /// Keeps the pin and the port's clock.
     _port: UartRx<'static, Blocking>,
     ring: ReadableRingBuffer<'static, u8>,
+    registers: pac::usart::Usart,
+    /// What the port's rate is divided from, in Hz.
+    clock: u64,
     fetch_every: Duration,
+    looked: Instant,
 }
 
 impl PortRx {
-    /// `channel` must be the one that serves the reception of `registers`, which must be `port`'s own, by this `request`.
+    /// `channel` must be the one that serves the reception of `registers`, which must be `port`'s own and set to `baud`, by this
+    /// `request`.
     pub(crate) fn new(
         port: UartRx<'static, Blocking>,
-        registers: pac::usart::Usart,
+        (registers, baud): (pac::usart::Usart, u32),
         channel: dma::Channel<'static>,
         buffer: &'static mut [u8],
         fetch_every: Duration,
@@ -36,19 +44,29 @@ impl PortRx {
             unsafe { ReadableRingBuffer::new(channel, request, from, buffer, TransferOptions::default()) };
         ring.start();
         registers.cr3().modify(|w| w.set_dmar(true));
-        Self { _port: port, ring, fetch_every }
+        let clock = u64::from(baud) * u64::from(registers.brr().read().0);
+        Self { _port: port, ring, registers, clock, fetch_every, looked: Instant::now() }
+    }
+
+    /// How long it takes to fill the ring at the port's rate of now: ten bits a byte.
+    fn holds(&self) -> Duration {
+        let clocks = 10 * self.ring.capacity() as u64 * u64::from(self.registers.brr().read().0);
+        Duration::from_micros(clocks * 1_000_000 / self.clock.max(1))
     }
 }
 
 impl Receive for PortRx {
     async fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
         loop {
+            let now = Instant::now();
+            let blind = now - self.looked;
+            self.looked = now;
             match self.ring.read(buffer) {
                 Ok((0, _)) => Timer::after(self.fetch_every).await,
-                Ok((count, _)) => return Ok(count),
-                Err(_) => {
+                Ok((count, _)) if blind < self.holds() => return Ok(count),
+                Ok(_) | Err(_) => {
                     self.ring.clear();
-                    return Err(Overrun);
+                    return Err(Overrun { blind_ms: blind.as_millis() as u32 });
                 }
             }
         }
@@ -87,6 +105,11 @@ impl Transmit for PortTx {
         // SAFETY: `to` is the port's data register. The transfer borrows `bytes`, which lie in a task's memory, in RAM
         // that DMA reaches, and stops when it is dropped.
         unsafe { self.channel.write(self.request, bytes, to, TransferOptions::default()) }.await;
+    }
+
+    fn restart(&mut self) {
+        self.registers.cr1().modify(|w| w.set_te(false));
+        self.registers.cr1().modify(|w| w.set_te(true));
     }
 
     fn set_baud(&mut self, baud: u32) {

@@ -18,7 +18,7 @@ const LINE: usize = 16;
 const LEVEL_2V7: u8 = 0b101;
 
 /// Watches from now on.
-pub(crate) fn watch_supply() {
+pub(super) fn watch() {
     pac::PWR.cr1().modify(|w| {
         w.set_pls(LEVEL_2V7);
         w.set_pvde(true);
@@ -34,7 +34,8 @@ pub(crate) fn watch_supply() {
     }
 }
 
-fn is_low() -> bool {
+/// Whether it is too low now.
+pub(super) fn is_low() -> bool {
     pac::PWR.csr1().read().pvdo()
 }
 

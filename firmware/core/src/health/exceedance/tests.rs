@@ -177,7 +177,7 @@ fn full() -> Vec<u8> {
     let mut stored = vec![VERSION];
     let instances = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
     for (check, instance) in instances.take(EXCEEDANCES_MAX) {
-        stored.extend(hash(check.name).to_le_bytes());
+        stored.extend(fnv1a(check.name).to_le_bytes());
         stored.push(instance);
         stored.extend(&ROLL[6..]);
     }
@@ -246,7 +246,7 @@ fn a_check_or_an_instance_that_there_is_no_longer_is_left_out() {
 
 #[test]
 fn no_two_checks_have_the_same_hash() {
-    let mut hashes: Vec<u32> = checks().map(|check| hash(check.name)).collect();
+    let mut hashes: Vec<u32> = checks().map(|check| fnv1a(check.name)).collect();
     hashes.sort_unstable();
     assert!(hashes.windows(2).all(|pair| pair[0] != pair[1]) && hashes[0] != 0);
 }

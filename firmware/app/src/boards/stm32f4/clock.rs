@@ -1,0 +1,95 @@
+//! The clock tree: 168 MHz from a crystal or, where that does not start or dies, from the chip's own oscillator.
+//!
+//! The own oscillator is exact to 1 % at 25 °C and to 4 % from -10 to 85 °C (datasheet, table 38), and a UART stands some 3.5 % between
+//! both ends: the record goes on, its times are off by as much, and a note says so.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
+use embassy_stm32::pac::{DBGMCU, FLASH, RCC};
+use embassy_stm32::rcc;
+use embassy_stm32::time::Hertz;
+
+/// Looks for the crystal: 0.1 s at the 16 MHz of a start, where it needs 2 ms (datasheet, table 36).
+const TRIES_MAX: u32 = 200_000;
+/// The one revision whose prefetch does not work (ES0182, 2.1.1).
+const REVISION_A: u16 = 0x1000;
+
+/// The crystal does not run.
+static CRYSTAL_FAILED: AtomicBool = AtomicBool::new(false);
+
+/// Whether the crystal has failed since the start.
+pub(crate) fn crystal_failed() -> bool {
+    CRYSTAL_FAILED.load(Ordering::Relaxed)
+}
+
+/// What [`embassy_stm32::init`] is to set: 168 MHz from 8 MHz at the clock's pin: 8 / 4 * 168 / 2; from the chip's own 16 MHz,
+/// 16 / 8, where there are none. The peripheral buses at 42 and 84 MHz either way.
+pub(super) fn config(mode: rcc::HseMode) -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
+    let runs = crystal_starts(mode);
+    CRYSTAL_FAILED.store(!runs, Ordering::Relaxed);
+    config.rcc.hse = runs.then_some(rcc::Hse { freq: Hertz(8_000_000), mode });
+    config.rcc.pll_src = if runs { rcc::PllSource::HSE } else { rcc::PllSource::HSI };
+    config.rcc.pll = Some(rcc::Pll {
+        prediv: if runs { rcc::PllPreDiv::DIV4 } else { rcc::PllPreDiv::DIV8 },
+        mul: rcc::PllMul::MUL168,
+        divp: Some(rcc::PllPDiv::DIV2),
+        divq: Some(rcc::PllQDiv::DIV7),
+        divr: None,
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_P;
+    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = rcc::APBPrescaler::DIV4;
+    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
+    config
+}
+
+fn crystal_starts(mode: rcc::HseMode) -> bool {
+    RCC.cr().modify(|w| w.set_hsebyp(mode != rcc::HseMode::Oscillator));
+    RCC.cr().modify(|w| w.set_hseon(true));
+    let starts = (0..TRIES_MAX).any(|_| RCC.cr().read().hserdy());
+    if !starts {
+        RCC.cr().modify(|w| w.set_hseon(false));
+    }
+    starts
+}
+
+/// After the clocks are set: prefetch and both caches of the flash, which embassy-stm32 leaves off, and the watch over the crystal.
+pub(super) fn finish() {
+    let prefetches = DBGMCU.idcode().read().rev_id() != REVISION_A;
+    FLASH.acr().modify(|w| {
+        w.set_prften(prefetches);
+        w.set_icen(true);
+        w.set_dcen(true);
+    });
+    if !crystal_failed() {
+        RCC.cr().modify(|w| w.set_csson(true));
+    }
+}
+
+/// The crystal died: the chip has gone over to its own oscillator, without the PLL (RM0090, 7.2.7). Nothing is shared with
+/// whoever was interrupted but registers that nobody else touches after the start.
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() {
+    if !RCC.cir().read().cssf() {
+        return;
+    }
+    RCC.cir().modify(|w| w.set_cssc(true));
+    CRYSTAL_FAILED.store(true, Ordering::Relaxed);
+    RCC.cr().modify(|w| {
+        w.set_csson(false);
+        w.set_hseon(false);
+        w.set_pllon(false);
+    });
+    // None of these waits has an end of its own: the watchdog's is theirs, and the next start asks for the crystal first.
+    while RCC.cr().read().pllrdy() {}
+    RCC.pllcfgr().modify(|w| {
+        w.set_pllsrc(Pllsrc::HSI);
+        w.set_pllm(Pllm::DIV8);
+    });
+    RCC.cr().modify(|w| w.set_pllon(true));
+    while !RCC.cr().read().pllrdy() {}
+    RCC.cfgr().modify(|w| w.set_sw(Sw::PLL1_P));
+    while RCC.cfgr().read().sws() != Sw::PLL1_P {}
+}

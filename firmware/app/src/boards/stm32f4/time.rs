@@ -1,0 +1,95 @@
+//! The clock: TIM2 counts microseconds in 32 bits, and is embassy-time's driver here.
+//!
+//! The driver that embassy-stm32 has counts an overflow of 16 bits by an interrupt: while the processor stands still for an
+//! erase of flash (0.5 s) all but one of them are lost, each of them 65.536 ms of the record's time. This one has the time in its
+//! counter, and the wraps of 71.6 min are noticed by whoever asks for the time: reception does so each millisecond.
+
+use core::cell::RefCell;
+use core::task::Waker;
+
+use critical_section::Mutex;
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::InterruptExt as _;
+use embassy_stm32::pac::TIM2;
+use embassy_stm32::peripherals;
+use embassy_stm32::rcc;
+use embassy_time_driver::{Driver, TICK_HZ};
+use embassy_time_queue_utils::Queue;
+
+/// What the counter's alarm is set to at the latest: half of its range, so that no alarm is mistaken for a later one.
+const AHEAD_MAX: u64 = 1 << 31;
+
+struct State {
+    /// Wraps of the counter.
+    wraps: u32,
+    /// The counter as it was read last.
+    last: u32,
+    alarms: Queue,
+}
+
+struct Clock(Mutex<RefCell<State>>);
+
+embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock(
+    Mutex::new(RefCell::new(State { wraps: 0, last: 0, alarms: Queue::new() }))
+));
+
+impl State {
+    fn now(&mut self) -> u64 {
+        let count = TIM2.cnt().read();
+        if count < self.last {
+            self.wraps = self.wraps.wrapping_add(1);
+        }
+        self.last = count;
+        u64::from(self.wraps) << 32 | u64::from(count)
+    }
+
+    /// Wakes what is due, and sets the counter's alarm to what comes next.
+    fn arm(&mut self) {
+        loop {
+            let now = self.now();
+            let next = self.alarms.next_expiration(now).min(now + AHEAD_MAX);
+            TIM2.ccr(0).write_value(next as u32);
+            // An alarm that was passed meanwhile would not ring.
+            if self.now() < next {
+                return;
+            }
+        }
+    }
+}
+
+impl Driver for Clock {
+    fn now(&self) -> u64 {
+        critical_section::with(|cs| self.0.borrow_ref_mut(cs).now())
+    }
+
+    fn schedule_wake(&self, at: u64, waker: &Waker) {
+        critical_section::with(|cs| {
+            let mut state = self.0.borrow_ref_mut(cs);
+            if state.alarms.schedule_wake(at, waker) {
+                state.arm();
+            }
+        });
+    }
+}
+
+/// Starts the clock at 0. The clock tree is set.
+pub(super) fn start() {
+    rcc::enable_and_reset::<peripherals::TIM2>();
+    let ticks = rcc::frequency::<peripherals::TIM2>().0 / TICK_HZ as u32;
+    TIM2.psc().write_value(ticks.saturating_sub(1) as u16);
+    TIM2.arr().write_value(u32::MAX);
+    // The prescaler is taken over by an update.
+    TIM2.egr().write(|w| w.set_ug(true));
+    TIM2.sr().write(|w| w.0 = 0);
+    TIM2.dier().write(|w| w.set_ccie(0, true));
+    TIM2.cr1().write(|w| w.set_cen(true));
+    // SAFETY: the handler below is the driver's own, and nobody relies on its being masked.
+    unsafe { interrupt::TIM2.enable() };
+}
+
+#[interrupt]
+fn TIM2() {
+    // Bits are cleared by a zero.
+    embassy_stm32::pac::TIM2.sr().write(|w| w.0 = 0);
+    critical_section::with(|cs| CLOCK.0.borrow_ref_mut(cs).arm());
+}
