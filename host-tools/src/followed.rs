@@ -5,8 +5,9 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use hums_blackbox::GROUP_SECTORS;
 use hums_blackbox::record::{Before, Found};
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 
 use crate::ending::{Ending, Misnamed, PowerOn, Proof, SessionBefore, Teller};
 use crate::logs::begun_anew::LOOKED_AT_MAX;
@@ -14,6 +15,12 @@ use crate::logs::sessions::{Sessions, place};
 
 /// Logs held back at most; so many after a log may say something of its end.
 pub const HELD_MAX: usize = 4;
+
+/// Files of a log by arming that share its number; the next one has the next number, and the first of it `_00`.
+const FILES_A_NUMBER: u64 = 100;
+/// A vehicle that waits for its arming fills a file, of so many sectors at least, or leaves it after this time.
+const FILE_SECTORS_MIN: u64 = 2 * GROUP_SECTORS as u64;
+const FILE_AGE_MIN: Span = Span::from_secs(5);
 
 /// What is made of a log that was read.
 pub trait Logged {
@@ -96,8 +103,9 @@ impl<T: Logged> Followed<T> {
         // Of a power-on's first log all is there, or what is not was not to be kept.
         let is_whole = ending.summary.first_number == Some(0);
         let is_first = is_whole || ending.summary.keep.is_some_and(|keep| keep.from == 0);
-        if before.found == Found::Nothing && is_first && number > 1 && !self.sessions.has_older(card, number)
-        {
+        let waited = numbers_waited(ending, 0, Instant::ZERO);
+        let is_next = number <= waited.saturating_add(1);
+        if before.found == Found::Nothing && is_first && !is_next && !self.sessions.has_older(card, number) {
             return Some(Misnamed::First);
         }
         if !before.has_end() || before.session == session {
@@ -109,7 +117,7 @@ impl<T: Logged> Followed<T> {
         // The recorder gives a power-on's first log the next number. A number that no file has any more is of a log that was
         // older than this one, and then the one before is not there either.
         let is_there = self.sessions.numbers(card, before.session).contains(&before.number);
-        let is_absent = is_first && is_there && self.sessions.absent(card, before.number, number) > 0;
+        let is_absent = is_first && is_there && self.sessions.absent(card, before.number, number) > waited;
         // Files without a sector lie between the two at most.
         let is_far = is_whole && number - before.number > LOOKED_AT_MAX;
         (is_absent || is_far).then_some(Misnamed::Ahead { before: before.number })
@@ -147,7 +155,9 @@ impl<T: Logged> Followed<T> {
         if first < earlier.end {
             return PowerOn::Disordered { after };
         }
-        let absent = self.sessions.absent(card, after, number);
+        // Those that it used up while it waited hold nothing.
+        let waited = numbers_waited(next, earlier.end, earlier.last.unwrap_or(Instant::ZERO));
+        let absent = self.sessions.absent(card, after, number).saturating_sub(waited);
         let missing = from.saturating_sub(earlier.end);
         let frames = next.summary.frames_before.zip(earlier.frames_end);
         let frames = frames.map(|(here, there)| here.wrapping_sub(there)).filter(|frames| *frames < 1 << 31);
@@ -181,7 +191,8 @@ impl<T: Logged> Followed<T> {
             return PowerOn::First;
         };
         // Its boot record names the number before the first one of the power-on.
-        if keep.from == 0 || self.sessions.absent(card, before.number, number) == 0 {
+        let waited = numbers_waited(next, keep.from, Instant::ZERO);
+        if keep.from == 0 || self.sessions.absent(card, before.number, number) <= waited {
             return PowerOn::First;
         }
         if !self.sessions.has_older(card, number) {
@@ -251,6 +262,17 @@ impl<T: Logged> Followed<T> {
             }
         }
     }
+}
+
+/// Numbers that a log by arming may have used up, at most, while its vehicle waited, from this sector and time on: its files
+/// then take one name after the other, and only the last ones are kept.
+fn numbers_waited(log: &Ending, from: u32, since: Instant) -> u32 {
+    let summary = &log.summary;
+    let (Some(keep), Some(first)) = (summary.keep, summary.first_number) else { return 0 };
+    let sectors = u64::from(first.saturating_sub(keep.from.max(from)));
+    let waited = summary.first.map_or(Span::ZERO, |time| time.since(since));
+    let files = sectors / FILE_SECTORS_MIN + waited.as_micros() / FILE_AGE_MIN.as_micros();
+    u32::try_from(files / FILES_A_NUMBER).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]
@@ -357,5 +379,11 @@ mod tests {
         assert_eq!(misnamed("00006", 70, Some(0), frames, 4, false), Some(Misnamed::Ahead { before: 4 }));
         assert_eq!(misnamed("00005", 70, Some(0), frames, 4, false), None);
         assert_eq!(misnamed("00006", 70, Some(60), frames, 4, false), None);
+        // Who waits takes a number more for each hundred files, which have 128 sectors or last for 5 s.
+        assert_eq!(misnamed("00002", 12_800, Some(0), nothing, 0, true), None);
+        assert_eq!(misnamed("00002", 12_799, Some(0), nothing, 0, true), Some(Misnamed::First));
+        assert_eq!(misnamed("00003", 12_800, Some(0), nothing, 0, true), Some(Misnamed::First));
+        assert_eq!(misnamed("00006", 12_800, Some(0), frames, 4, false), None);
+        assert_eq!(misnamed("00006", 12_800, None, frames, 4, false), None);
     }
 }
