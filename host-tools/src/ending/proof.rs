@@ -22,7 +22,7 @@ pub enum Proof {
     None,
     /// There was more than is there now: so many sectors, and frames where they were counted.
     Short {
-        /// Sectors that are missing.
+        /// Sectors that are missing; 0 where the last one is there in an older copy, which has fewer frames.
         sectors: u32,
         /// Frames that are missing.
         frames: Option<u32>,
@@ -46,12 +46,15 @@ impl Proof {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
         if let Some(next) = next
-            && next.sectors > sectors
+            && next.sectors >= sectors
         {
             let counted = (next.found == Found::Frames).then_some(next.frames);
             let frames = counted.zip(summary.frames_end).map(|(there, here)| there.wrapping_sub(here));
             let frames = frames.filter(|missing| *missing < 1 << 31);
-            return Self::Short { sectors: next.sectors - sectors, frames, by: Teller::NextStart };
+            // The sector in progress is written again and again: an older copy of it has fewer frames.
+            if next.sectors > sectors || frames.is_some_and(|missing| missing > 0) {
+                return Self::Short { sectors: next.sectors - sectors, frames, by: Teller::NextStart };
+            }
         }
         if summary.closed {
             return Self::Closed;
@@ -124,13 +127,17 @@ impl Proof {
                 }
             },
             Self::Short { sectors, frames, by } => {
-                let frames =
-                    frames.map_or_else(String::new, |frames| format!(", {}", count(frames, "frame")));
+                let sectors = Some(sectors).filter(|sectors| *sectors > 0).map(|some| count(some, "sector"));
+                let frames = frames.map(|some| count(some, "frame"));
                 let by = match by {
                     Teller::NextStart => "the next start found them",
                     Teller::NextLog => "the next log of the same power-on begins after them",
                 };
-                format!("{} missing at its end{frames}: {by}", count(sectors, "sector"))
+                match (sectors, frames) {
+                    (Some(sectors), Some(frames)) => format!("{sectors} missing at its end, {frames}: {by}"),
+                    (Some(all), None) | (None, Some(all)) => format!("{all} missing at its end: {by}"),
+                    (None, None) => format!("its end is missing: {by}"),
+                }
             }
         }
     }
@@ -145,4 +152,26 @@ pub(super) fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
 fn moment(summary: &Summary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
     utc.map_or_else(|| format!("{:.3} s", at.as_secs_f64()), |utc| iso8601(utc / 1000 * 1000))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_older_copy_of_the_last_sector_is_a_missing_end() {
+        let summary =
+            Summary { session: Some(7), last_number: Some(25), frames_end: Some(3047), ..Summary::default() };
+        let next =
+            |frames| Before { found: Found::Frames, session: 7, sectors: 26, frames, ..Before::default() };
+        let short = Proof::Short { sectors: 0, frames: Some(17), by: Teller::NextStart };
+        assert_eq!(Proof::of(&summary, Some(&next(3064))), short);
+        assert_eq!(short.words(&summary), "17 frames missing at its end: the next start found them");
+        assert_eq!(Proof::of(&summary, Some(&next(3047))), Proof::NextStart(None));
+        assert_eq!(
+            Proof::of(&summary, Some(&next(3040))),
+            Proof::NextStart(None),
+            "it counted what it could read"
+        );
+    }
 }

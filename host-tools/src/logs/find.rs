@@ -1,16 +1,18 @@
 //! Finds the logs in files, card images, raw devices and folders, by what is in them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, Metadata};
+use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
+use hums_recorder::LogName;
 
 use super::card::{image, whole_file};
 use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
-use super::places::Log;
+use super::places::{Log, segment_name};
 use crate::files::is_seekable;
 
 /// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
@@ -26,6 +28,7 @@ pub fn find_in(folder: &Path, salvage: bool) -> Result<Found> {
 
 fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>) -> Result<Found> {
     let mut found = Found::default();
+    let mut segments = Segments::new();
     for input in inputs {
         let before = found.logs.len();
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
@@ -38,6 +41,10 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
             continue;
         } else {
             named_file(input, salvage, &mut found)?;
+            if let (Some(name), [_]) = (segment_name(input), &found.logs[before..]) {
+                let folder = input.parent().unwrap_or(Path::new("")).to_owned();
+                segments.entry((folder, name.session)).or_default().push((name, before));
+            }
         }
         if found.logs.len() == before
             && found.logs_more + found.repeats == passed_over
@@ -55,6 +62,7 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
             }
         }
     }
+    join(segments, &mut found.logs);
     make_names_unique(&mut found.logs);
     found.finish();
     Ok(found)
@@ -93,6 +101,27 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
+/// The segments that were named one by one, each with its place among the logs: by folder and session.
+type Segments = BTreeMap<(PathBuf, u32), Vec<(LogName, usize)>>;
+
+/// Segments of one session in one folder are one log, under the name of the first of them.
+fn join(segments: Segments, logs: &mut Vec<Log>) {
+    let mut joined = BTreeSet::new();
+    for mut segments in segments.into_values() {
+        segments.sort();
+        let mut places = segments.into_iter().map(|(_, place)| place);
+        let Some(first) = places.next() else { continue };
+        for place in places {
+            let (files, pieces) = (mem::take(&mut logs[place].files), mem::take(&mut logs[place].pieces));
+            logs[first].files.extend(files);
+            logs[first].pieces.extend(pieces);
+            joined.insert(place);
+        }
+    }
+    let mut place = 0..;
+    logs.retain(|_| !place.next().is_some_and(|place| joined.contains(&place)));
+}
+
 /// Two cards both have a session 1: the later ones get a number.
 fn make_names_unique(logs: &mut [Log]) {
     let mut seen: BTreeMap<String, u32> = BTreeMap::new();
@@ -102,5 +131,37 @@ fn make_names_unique(logs: &mut [Log]) {
         if *count > 1 {
             log.name = format!("{}-{count}", log.name);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_blackbox::Sector;
+
+    use super::*;
+
+    #[test]
+    fn segments_that_are_named_one_by_one_are_the_logs_of_their_sessions() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| dir.path().join(name);
+        for name in ["00003_01.HUM", "00003_00.HUM", "00004_00.HUM", "other.hum"] {
+            let mut bytes = [0; 512];
+            bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+            let mut sector = Sector::from_bytes(bytes);
+            sector.seal(7);
+            fs::write(path(name), sector.bytes()).expect("room");
+        }
+        let names = ["00003_01.HUM", "other.hum", "00004_00.HUM", "00003_00.HUM"].map(path);
+        let found = find(&names, false).expect("four files");
+        let logs: Vec<_> = found.logs.iter().map(|log| (log.name.as_str(), log.files.clone())).collect();
+        let shown = |name: &str| path(name).display().to_string();
+        assert_eq!(
+            logs,
+            [
+                ("other", vec![shown("other.hum")]),
+                ("00004_00", vec![shown("00004_00.HUM")]),
+                ("00003_00", vec![shown("00003_00.HUM"), shown("00003_01.HUM")]),
+            ]
+        );
     }
 }
