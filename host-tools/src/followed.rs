@@ -190,12 +190,16 @@ impl<T: Logged> Followed<T> {
         let (Some(keep), Some(before)) = (next.summary.keep, next.summary.marks.before) else {
             return PowerOn::First;
         };
-        // Its boot record names the number before the first one of the power-on.
-        let waited = numbers_waited(next, keep.from, Instant::ZERO);
-        if keep.from == 0 || self.sessions.absent(card, before.number, number) <= waited {
+        if keep.from == 0 {
             return PowerOn::First;
         }
-        if !self.sessions.has_older(card, number) {
+        // Its boot record names the number before the first one of the power-on. Where all numbers since are there, what was
+        // recorded before is on another card, or files were renamed.
+        let waited = numbers_waited(next, keep.from, Instant::ZERO);
+        let session = next.summary.session.unwrap_or_default();
+        let is_missing = self.sessions.absent(card, before.number, number) > waited
+            || self.sessions.has_other(card, before.number, number, session);
+        if !is_missing || !self.sessions.has_older(card, number) {
             return PowerOn::NotRead;
         }
         let (frames, seconds) = (next.summary.frames_before, next.summary.first.map(Instant::as_secs_f64));
@@ -238,11 +242,20 @@ impl<T: Logged> Followed<T> {
         };
         let is_looked_at = held.iter().any(|log| is_looked_at(&log.name));
         let numbers = self.sessions.numbers(card, before.session);
-        let elsewhere = numbers.first().copied().filter(|_| !numbers.contains(&before.number));
+        // A power-on by arming has several logs: one that ends earlier is not the one that was found.
+        let is_earlier = |log: &Ending| {
+            log.summary.session == Some(before.session)
+                && place(&log.name).1.is_some_and(|read| read < before.number)
+                && log.summary.last_number.is_some_and(|last| last.wrapping_add(1) < before.sectors)
+                && log.summary.keep.is_some()
+        };
+        let is_earlier = held.iter().any(|log| is_earlier(log));
+        let elsewhere = numbers.first().copied().filter(|_| !numbers.contains(&before.number) && !is_earlier);
         match held.iter_mut().rev().find(|log| log.summary.session == Some(before.session)) {
             Some(log) => {
                 log.proof = Proof::of(&log.summary, Some(before));
-                next.before = SessionBefore::There;
+                let is_gone = is_earlier && !numbers.contains(&before.number);
+                next.before = if is_gone { SessionBefore::Gone(before.number) } else { SessionBefore::There };
             }
             None if numbers.contains(&before.number) => next.before = SessionBefore::There,
             None if is_looked_at => next.before = SessionBefore::Gone(before.number),

@@ -7,6 +7,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use super::identity::FileId;
+use super::paths::{part_of, target_of};
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
 
@@ -77,9 +78,18 @@ impl Inputs {
         }
     }
 
-    /// Refuses an output that is an input.
+    /// Refuses an output that is an input, or that is made under the name of an input until it is whole.
     pub fn refuse(&self, output: &Path) -> Result<()> {
         let shown = output.display();
+        if let Some(part) = target_of(output).and_then(|target| part_of(&target)).ok()
+            && FileId::of(&part).is_ok_and(|part| self.files.contains_key(&part))
+        {
+            return Err(usage(format!(
+                "{shown}: is made under the name {} until it is whole, and that is an input of this command; nothing was \
+                 written; name another output",
+                part.display()
+            )));
+        }
         let Ok(id) = FileId::of(output) else { return Ok(()) };
         let Some(input) = self.files.get(&id) else { return Ok(()) };
         let which =

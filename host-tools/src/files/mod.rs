@@ -24,7 +24,7 @@ pub use identity::{FileId, check_standard_output, means_standard_output};
 pub use inputs::Inputs;
 pub use kind::{Kind, Origin};
 pub use output::Output;
-pub use part::{InPlacePart, is_part, lock_in_place, make_in_place};
+pub use part::{InPlacePart, check_nothing_left, is_part, lock_in_place, make_in_place};
 pub use paths::{
     PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
     remove_if_empty, says_directory, settle,

@@ -96,14 +96,30 @@ impl InPlacePart {
     }
 }
 
+/// Refuses an output of which a killed run has left something that came only once.
+pub fn check_nothing_left(path: &Path) -> Result<()> {
+    let part = part_of(&target_of(path)?)?;
+    if std::fs::symlink_metadata(&part).is_ok_and(|about| about.is_file() && about.len() > 0) {
+        bail!(
+            "{}: was left by a run that was killed, and what came then is nowhere else; move it away first",
+            part.display()
+        );
+    }
+    Ok(())
+}
+
 /// Removes a file that a killed run has left, unless somebody writes it.
 pub(super) fn remove_stale(part: &Path, target: &Path) -> Result<()> {
-    if !part.is_symlink() {
-        match File::open(part) {
-            Ok(file) => lock(&file, target)?,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            Err(_) => {}
+    match std::fs::symlink_metadata(part) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Ok(about) if about.is_file() => {
+            if let Ok(file) = File::open(part) {
+                lock(&file, target)?;
+            }
         }
+        Ok(about) if about.is_symlink() => {}
+        Ok(_) => bail!("{}: is no file of ours, and stands where one is made; move it away", part.display()),
+        Err(_) => {}
     }
     match std::fs::remove_file(part) {
         // The run that wrote it has finished meanwhile.

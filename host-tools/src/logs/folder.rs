@@ -22,6 +22,11 @@ const WAITING_MAX: usize = 10_000;
 /// Segments of one folder that are kept.
 const SEGMENTS_MAX: usize = 8 * LOGS_MAX;
 
+/// How the names of cards' images end.
+const IMAGES: [&str; 3] = [".img", ".dd", ".iso"];
+/// What follows where they are packed.
+const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];
+
 /// What lies in a folder and may be ours.
 #[derive(Default)]
 struct Entries {
@@ -128,6 +133,7 @@ impl Entries {
                 found.leave_out(format!("{shown}: is left out: there are too many files"));
             }
             (Ok(_), None) if is_named_as_log(&path) => found.leave_out(nothing_of_ours(&path)),
+            (Ok(_), None) if is_named_as_card(&path) => found.leave_out(no_card(&path)),
             (Ok(_), None) => {}
         }
     }
@@ -136,6 +142,20 @@ impl Entries {
 /// Whether its name ends as that of a log of ours does.
 fn is_named_as_log(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"))
+}
+
+/// Whether its name ends as that of a card's image does, compressed or not.
+fn is_named_as_card(path: &Path) -> bool {
+    let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy().to_lowercase());
+    let name = PACKED.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(&name);
+    IMAGES.iter().any(|ending| name.ends_with(ending))
+}
+
+fn no_card(path: &Path) -> String {
+    format!(
+        "{}: has the name of a card's image, and none can be read there (one that is packed: unpack it)",
+        path.display()
+    )
 }
 
 fn nothing_of_ours(path: &Path) -> String {
@@ -158,15 +178,20 @@ pub fn passed_over(path: &Path, kind: FileType) -> String {
 fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),
-        Content::Image if is_card(path)? => {
+        Content::Image => {
             let before = found.logs.len();
-            image(path, salvage, found)?;
+            match image(path, salvage, found) {
+                // A large file of anything may be a card whose first blocks are gone.
+                Err(_) if !is_named_as_card(path) && !is_card(path)? => return Ok(()),
+                looked_at => looked_at?,
+            }
             let stem = path.file_stem().map_or("card".into(), |stem| stem.to_string_lossy());
             for log in found.logs.iter_mut().skip(before) {
                 log.name = format!("{stem}/{}", log.name);
             }
         }
         _ if is_named_as_log(path) => bail!(nothing_of_ours(path)),
+        _ if is_named_as_card(path) => bail!(no_card(path)),
         _ => {}
     }
     Ok(())

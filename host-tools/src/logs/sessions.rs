@@ -86,6 +86,15 @@ impl Sessions {
         (end - first).saturating_sub(there as u32)
     }
 
+    /// Whether a number between these two is that of a log of another session. One that the recorder had begun to write anew is
+    /// of none.
+    pub fn has_other(&self, card: &str, after: u32, before: u32, session: u32) -> bool {
+        let others = self.logs.iter().filter(|((other, of), _)| other == card && *of != session);
+        others.flat_map(|(_, logs)| logs).any(|(number, _)| {
+            after < *number && *number < before && self.begun_anew_number(card, *number).is_none()
+        })
+    }
+
     /// Whether a card has a log of a lower number.
     pub fn has_older(&self, card: &str, number: u32) -> bool {
         self.numbers.get(card).is_some_and(|numbers| numbers.range(..number).next().is_some())

@@ -111,9 +111,12 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         let before = found.places.len();
         check_seekable(input, &about)?;
         if about.is_dir() {
-            let mut walk = Walk::default();
+            let own = logs::find::find_in(input, salvage)?;
+            let pieces = own.logs.iter().flat_map(|log| &log.pieces).map(|piece| &piece.path);
+            let ours = pieces.chain(own.images.iter().map(|image| &image.path)).cloned().collect();
+            let mut walk = Walk { ours, ..Walk::default() };
             walk.folder(input, 0)?;
-            found.add_own(input, logs::find::find_in(input, salvage)?);
+            found.add_own(input, own);
             found.places.extend(walk.paths.iter().map(|path| Place::file(path)));
             if walk.left_out > 0 {
                 found.is_cut = true;
@@ -131,8 +134,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
                     found.remarks.iter().chain(passed_over).map(|remark| format!("\n  {remark}")).collect();
                 bail!("{}: no log and no recording is in there{}", input.display(), remarks.concat());
             }
-            // A card has other files beside its logs.
-            if walk.others > 0 && found.places.iter().skip(before).all(|place| place.own().is_none()) {
+            if walk.others > 0 {
                 let files = count(walk.others, "file");
                 let names: Vec<String> = walk.passed_over.iter().map(|name| format!("\n  {name}")).collect();
                 let more = walk.others.saturating_sub(names.len() as u64);
@@ -210,7 +212,9 @@ struct Walk {
     paths: Vec<PathBuf>,
     /// Recordings and folders for which there was no room.
     left_out: u64,
-    /// Files that are no recording: the logs of ours among them.
+    /// Files of our own logs and of cards.
+    ours: BTreeSet<PathBuf>,
+    /// Files that are neither these nor a recording.
     others: u64,
     /// The first of them, by their names in the folder.
     passed_over: Vec<String>,
@@ -229,7 +233,7 @@ impl Walk {
         for entry in fs::read_dir(dir).with_context(context)? {
             let entry = entry.with_context(context)?;
             let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
-            if is_part(&path) {
+            if is_part(&path) || self.ours.contains(&path) {
                 // What a run of this program has not made whole is nobody's recording.
                 continue;
             }

@@ -352,6 +352,26 @@ fn an_image_that_was_cut_short_is_told_as_that() {
 }
 
 #[test]
+fn a_damaged_image_in_a_folder_is_read_as_where_it_is_named() {
+    let dir = copied(1, "");
+    let cards = dir.path().join("cards");
+    fs::create_dir(&cards).expect("a folder");
+    let mut image = fs::read(dir.path().join("card.img")).expect("an image");
+    image[..512].fill(0);
+    fs::write(cards.join("card.img"), &image).expect("written");
+    for (command, code, said) in readers(dir.path(), "cards") {
+        assert!(code == 3 && !said.contains("no log"), "{command}: {said}");
+    }
+    // What is left of an image is told, and what is none is passed over and named.
+    fs::write(cards.join("card.img"), &image[..300]).expect("written");
+    fs::write(cards.join("notes.xyz"), "notes").expect("written");
+    fs::copy(px4(), cards.join("flight.tlog")).expect("copied");
+    let said = run(dir.path(), "check cards", 3);
+    let said = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(said.contains("has the name of a card's image") && said.contains("notes.xyz"), "{said}");
+}
+
+#[test]
 fn a_pipe_or_a_device_as_a_recording_is_refused_at_once_and_nothing_is_left() {
     let dir = tempfile::tempdir().expect("directory");
     let made = std::process::Command::new("mkfifo").arg(dir.path().join("pipe")).status();

@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{Arg, ArgAction, CommandFactory as _};
 use hums::cli::Cli;
 
-use crate::support::{Stamp, attempt, contents, furnished, recorded, run, stamps};
+use crate::support::{Stamp, attempt, contents, furnished, px4, recorded, run, stamps};
 
 /// What an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -169,6 +169,26 @@ fn a_cards_image_is_written_over_by_no_format() {
         refused(at, &words_of(&format!("report card.img -o ./new-folder/../card.img {flag}")), &before);
     }
     assert!(contents(at) == whole, "something was changed");
+}
+
+#[test]
+fn what_stands_where_an_output_is_made_is_no_victim() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = dir.path();
+    for part in [".out.hum.hums-part", ".gs.raw.hums-part"] {
+        fs::copy(px4(), at.join(part)).expect("copied");
+    }
+    let before = contents(at);
+    let said = run(at, "pack .out.hum.hums-part -o out.hum", 2);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("an input of this command"));
+    run(at, "sim --input .gs.raw.hums-part --sd new.img --gs gs.raw", 2);
+    // What a killed run got from a live source came only once.
+    let said = run(at, "sim --input tcp:127.0.0.1:9 --sd new.img --gs gs.raw", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("was left by a run that was killed"));
+    assert!(contents(at) == before);
+    let made = std::process::Command::new("mkfifo").arg(at.join(".pipe.hum.hums-part")).status();
+    assert!(made.expect("it runs").success());
+    run(at, "pack .gs.raw.hums-part -o pipe.hum", 1);
 }
 
 fn words_of(line: &str) -> Vec<String> {

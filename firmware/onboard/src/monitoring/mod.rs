@@ -11,7 +11,7 @@ mod slot;
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::Writer;
-use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Found, Moment, Note, Record, Stats};
+use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Moment, Note, Record, Stats};
 use hums_core::health::{Finding, Level};
 use hums_core::time::{Instant, Span};
 use hums_core::{Monitor, monitor};
@@ -131,9 +131,7 @@ impl<'a> Monitoring<'a> {
     fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Some(before) = self.book.card.take_before() else { return };
         self.identity.before = before;
-        if before.found != Found::Nothing {
-            self.book.journal.record(now, &Record::Boot(self.identity), sectors);
-        }
+        self.book.journal.record(now, &Record::Boot(self.identity), sectors);
     }
 
     /// Records how the boot before this one ended, with a word on what came before, and tells the ground station as soon
