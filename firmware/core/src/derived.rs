@@ -2,10 +2,12 @@
 //! imbalance of motors in steady flight, clips of late, load factor.
 
 use crate::cells::Cells;
+use crate::crosscheck::Crosschecks;
 use crate::currents::Currents;
 use crate::flight::{Flight, FlightEvent};
 use crate::latest::{Latest, Reading};
-use crate::observation::{Battery, EscGroup, MOTORS_MAX, Observation};
+use crate::observation::{Battery, EscGroup, Imu, MOTORS_MAX, Observation};
+use crate::outputs::MotorOutputs;
 use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
@@ -65,6 +67,8 @@ pub struct Derived {
     resistance: [Resistance; BATTERIES_MAX],
     motors: [MotorTrack; MOTORS_MAX],
     currents: Currents,
+    crosschecks: Crosschecks,
+    outputs: MotorOutputs,
     load_factor: Latest<f32>,
     /// When anything at all was heard of the vehicle.
     heard: Option<Instant>,
@@ -123,6 +127,8 @@ impl Derived {
             resistance: [Resistance::new(); BATTERIES_MAX],
             motors: [MOTOR; MOTORS_MAX],
             currents: Currents::new(),
+            crosschecks: Crosschecks::new(),
+            outputs: MotorOutputs::new(),
             load_factor: Latest::nothing(),
             heard: None,
             resumed: Instant::ZERO,
@@ -151,11 +157,16 @@ impl Derived {
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
         self.hear(at);
         match observation {
-            Observation::Imu(imu) | Observation::ImuAndAir(imu, _) if imu.instance == 0 => {
-                if let Some(load_g) = imu.acceleration.and_then(load_factor_g) {
-                    self.load_factor.set(at, load_g);
-                }
+            Observation::Imu(imu) => self.take_imu(at, imu),
+            Observation::Air(air) => self.crosschecks.take_air(at, air),
+            Observation::ImuAndAir(imu, air) => {
+                self.take_imu(at, imu);
+                self.crosschecks.take_air(at, air);
             }
+            Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator, flight),
+            // On the scale that the vehicle knows.
+            Observation::Vibration(_) => self.crosschecks.take_vibration(at, vehicle, flight),
+            Observation::Outputs(outputs) => self.outputs.take(at, outputs, vehicle, flight),
             Observation::Gnss(gnss) => {
                 if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
                     *had_fix |= gnss.fix >= 3;
@@ -184,6 +195,15 @@ impl Derived {
                 self.currents.take(at, vehicle, flight.airborne(), motors);
             }
             _ => {}
+        }
+    }
+
+    fn take_imu(&mut self, at: Instant, imu: &Imu) {
+        self.crosschecks.take_imu(at, imu);
+        if imu.instance == 0
+            && let Some(load_g) = imu.acceleration.and_then(load_factor_g)
+        {
+            self.load_factor.set(at, load_g);
         }
     }
 
@@ -243,9 +263,15 @@ impl Derived {
         &mut self,
         now: Instant,
         vehicle: &Vehicle,
+        flight: &Flight,
         event: Option<FlightEvent>,
         recorder: &RecorderStatus,
     ) {
+        if matches!(event, Some(FlightEvent::TakeOff | FlightEvent::Resumed)) {
+            self.crosschecks.begin();
+            self.outputs.begin();
+        }
+        self.crosschecks.step(now, vehicle, flight);
         let clips = clips(vehicle).map_or(0, u64::from);
         // What was clipped before this flight, or before the autopilot's restart, is not of this flight.
         if event.is_some() || clips < self.clips.count || !self.clips_known {
@@ -256,6 +282,16 @@ impl Derived {
         self.find_furthest();
         self.frames_lost.take(now, recorder.frames_lost);
         self.write_errors.take(now, recorder.write_errors);
+    }
+
+    /// Sensors against each other.
+    pub(crate) const fn crosschecks(&self) -> &Crosschecks {
+        &self.crosschecks
+    }
+
+    /// What the motors are given.
+    pub(crate) const fn outputs(&self) -> &MotorOutputs {
+        &self.outputs
     }
 
     /// What the motors take.

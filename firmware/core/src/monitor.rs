@@ -88,7 +88,7 @@ const PHASE_LASTS: Span = Span::from_secs(1);
 /// By then cells are told as not known, where nobody says that the autopilot's parameters were asked for.
 const CELLS_COME: Span = Span::from_secs(45);
 
-const _: () = assert!(size_of::<Monitor>() <= 14 * 1024);
+const _: () = assert!(size_of::<Monitor>() <= 15 * 1024);
 
 impl Monitor {
     /// Before the first observation.
@@ -172,7 +172,7 @@ impl Monitor {
         findings: &mut impl FnMut(&Finding),
     ) {
         let event = self.step_flight(now);
-        self.derived.step(now, &self.vehicle, event, recorder);
+        self.derived.step(now, &self.vehicle, &self.flight, event, recorder);
         self.step_trends(now, event);
         self.usage.step(now, &self.vehicle, &self.flight, event, &self.derived, &self.params);
         self.step_wear();

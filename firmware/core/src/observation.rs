@@ -6,7 +6,7 @@
 
 use crate::cause::{Alert, Causes};
 use crate::units::{
-    AmpereHours, Amperes, Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
+    AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
     Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
 };
 
@@ -142,6 +142,8 @@ pub struct Imu {
     pub acceleration: Option<[MetresPerSecond2; 3]>,
     /// Angular rate.
     pub rate: Option<[RadiansPerSecond; 3]>,
+    /// Magnetic field, of the compass of the same number.
+    pub field: Option<[Gauss; 3]>,
     /// The sensor's temperature.
     pub temperature: Option<Celsius>,
 }
@@ -149,6 +151,8 @@ pub struct Imu {
 /// The air outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Air {
+    /// Barometer, from 0.
+    pub instance: u8,
     /// Static pressure.
     pub pressure: Option<Hectopascals>,
     /// The barometer's temperature.
@@ -200,6 +204,15 @@ pub struct LocalPosition {
     pub position: [Metres; 3],
     /// Over ground.
     pub velocity: [MetresPerSecond; 3],
+}
+
+/// What the autopilot gives motors and servos: pulses of `SERVO_OUTPUT_RAW`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outputs {
+    /// Which group: 0 the main outputs, 1 the auxiliary ones.
+    pub port: u8,
+    /// Microseconds, from the first output on; 0 where there is none.
+    pub pulses: [u16; MOTORS_MAX],
 }
 
 /// The fused global position.
@@ -515,8 +528,10 @@ pub enum Observation {
     GnssIntegrity(GnssIntegrity),
     /// `SCALED_IMU*`, `RAW_IMU`, `HIGHRES_IMU`
     Imu(Imu),
-    /// `SCALED_PRESSURE`, `HIGHRES_IMU`
+    /// `SCALED_PRESSURE*`, `HIGHRES_IMU`
     Air(Air),
+    /// `SERVO_OUTPUT_RAW`
+    Outputs(Outputs),
     /// `HIGHRES_IMU`: both at once.
     ImuAndAir(Imu, Air),
     /// `ATTITUDE`

@@ -225,6 +225,13 @@ params! {
     BatStateCrit "BAT_STATE_CRIT" "" 1.5 0.0 3.0 "2: the autopilot calls it critical, an emergency or failed";
     MisSink "MIS_SINK" "m/s" 6.0 1.0 50.0 "above the fastest descent that PX4 (4) and ArduPilot (5) can be set to";
     MisOverturn "MIS_OVERTURN" "deg" 60.0 30.0 180.0 "tilt of what carries the vehicle; of the estimator's attitude 100 degrees at least";
+    AccMismWarn "ACC_MISM_WARN" "m/s2" 1.0 0.05 100.0 "accelerometers apart beyond usual; PX4 arms up to 0.7 (COM_ARM_IMU_ACC), ArduPilot up to 0.75";
+    GyroMismWarn "GYRO_MISM_WARN" "rad/s" 0.15 0.01 10.0 "gyros apart beyond usual; PX4 arms up to 0.25 (COM_ARM_IMU_GYR), ArduPilot up to 0.09";
+    MagMismWarn "MAG_MISM_WARN" "%" 40.0 1.0 1000.0 "compasses apart beyond usual, of the field; ArduPilot arms up to 200 mG, which is 40 % of it";
+    BaroMismWarn "BARO_MISM_WARN" "m" 8.0 0.5 10_000.0 "barometers apart beyond usual; above what wind and motors do to one of them";
+    VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, in hover";
+    MotOutWarn "MOT_OUT_WARN" "%" 20.0 1.0 1000.0 "a motor's output alone above its usual share; healthy flights reach 9";
+    MotOutCrit "MOT_OUT_CRIT" "%" 40.0 1.0 1000.0 "a motor's output alone above its usual share: it gives two thirds of its thrust";
 }
 
 impl Param {

@@ -47,6 +47,8 @@ units! {
     Rpm, "rpm";
     /// Pressure.
     Hectopascals, "hPa";
+    /// Magnetic flux density: the earth's is 0.25 to 0.65.
+    Gauss, "G";
     /// A part of the whole: 1 is all of it.
     Fraction, "1";
 }

@@ -304,10 +304,10 @@ impl Vehicle {
                 set_instance(&mut self.gnss_integrity, integrity.instance, at, integrity);
             }
             Observation::Imu(imu) => self.take_imu(at, imu),
-            Observation::Air(air) => self.air.set(at, air),
+            Observation::Air(air) => self.take_air(at, air),
             Observation::ImuAndAir(imu, air) => {
                 self.take_imu(at, imu);
-                self.air.set(at, air);
+                self.take_air(at, air);
             }
             Observation::Attitude(attitude) => {
                 if let Some(boot_ms) = attitude.boot_ms {
@@ -344,6 +344,7 @@ impl Vehicle {
             Observation::Failing(causes) => self.alerts.take_failures(at, causes),
             Observation::MissionReached(item) => self.mission_reached.set(at, item),
             Observation::SpeedSensors(_)
+            | Observation::Outputs(_)
             | Observation::MissionCurrent(_)
             | Observation::Parameter(..)
             | Observation::FlightInformation { .. } => {}
@@ -408,6 +409,13 @@ impl Vehicle {
         if imu.instance == 0 {
             self.imu.set(at, imu);
             self.inertial.take(at, &imu);
+        }
+    }
+
+    /// The first barometer's likewise.
+    fn take_air(&mut self, at: Instant, air: Air) {
+        if air.instance == 0 {
+            self.air.set(at, air);
         }
     }
 

@@ -56,7 +56,7 @@ fn fly(settings: &[(&str, f32)], fault: Fault) -> Vec<Finding> {
     findings
 }
 
-const FAULTS: [(&str, u8, Level, Fault); 95] = [
+const FAULTS: [(&str, u8, Level, Fault); 97] = [
     ("batt_remaining", 0, Level::Critical, |quad, _| quad.battery.remaining = Some(Fraction(0.05))),
     ("batt_remaining", 1, Level::Critical, |_, more| {
         let remaining = Some(Fraction(0.05));
@@ -107,13 +107,18 @@ const FAULTS: [(&str, u8, Level, Fault); 95] = [
     }),
     ("clipping", 0, Level::Critical, |quad, _| quad.vibration.clips = [200; 3]),
     ("load_factor", 0, Level::Critical, |quad, _| quad.acceleration_down = -45.0),
-    ("ekf_variance", 0, Level::Warning, |quad, _| quad.estimator.compass = Some(0.9)),
+    ("ekf_variance", 0, Level::Warning, |quad, _| quad.estimator.velocity = Some(0.9)),
+    ("ekf_compass", 0, Level::Warning, |quad, _| quad.estimator.compass = Some(0.9)),
     ("ekf_failsafe", 0, Level::Critical, |quad, _| {
         (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(0.9));
     }),
     ("ekf_test_ratio", 0, Level::Critical, |quad, _| {
         quad.estimator.scale = EstimatorScale::TestRatio;
         quad.estimator.velocity = Some(1.5);
+    }),
+    ("ekf_mag_ratio", 0, Level::Critical, |quad, _| {
+        quad.estimator.scale = EstimatorScale::TestRatio;
+        quad.estimator.compass = Some(1.5);
     }),
     ("gps_satellites", 0, Level::Warning, |quad, _| quad.gnss.satellites = Some(5)),
     ("gps_satellites", 1, Level::Warning, |_, more| {
@@ -195,8 +200,15 @@ const FAULTS: [(&str, u8, Level, Fault); 95] = [
 ];
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
-/// `trends.rs`, mishaps in `mishap.rs`.
-const ELSEWHERE: [&str; 14] = [
+/// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
+const ELSEWHERE: [&str; 21] = [
+    "accel_mismatch",
+    "gyro_mismatch",
+    "compass_mismatch",
+    "baro_mismatch",
+    "compass_unused",
+    "vibration_rise",
+    "motor_output",
     "esc_silent",
     "esc_errors",
     "heartbeat",

@@ -7,14 +7,14 @@ use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
 use hums_core::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CommandAck, Engine, Esc, EscGroup,
     Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState,
-    LocalPosition, Observation, Processor, RadioControl, Rails, Source, SpeedSensor, SystemStatus,
-    SystemTime, TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState,
+    LocalPosition, MOTORS_MAX, Observation, Outputs, Processor, RadioControl, Rails, Source, SpeedSensor,
+    SystemStatus, SystemTime, TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState,
 };
 use hums_core::params::{Params, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
 use hums_core::units::{
-    AmpereHours, Amperes, Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
+    AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
     Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
 };
 use hums_core::usage::BASELINE_FIRST;
@@ -166,16 +166,23 @@ impl Random {
             instance: self.pick(&[0, 0, 1, 2, 255]),
             acceleration: self.maybe(|random| random.vector(MetresPerSecond2)),
             rate: self.maybe(|random| random.vector(RadiansPerSecond)),
+            field: self.maybe(|random| random.vector(Gauss)),
             temperature: self.float(Celsius),
         }
     }
 
     fn air(&mut self) -> Air {
-        Air { pressure: self.float(Hectopascals), temperature: self.float(Celsius) }
+        let instance = self.pick(&[0, 0, 1, 2, 255]);
+        Air { instance, pressure: self.float(Hectopascals), temperature: self.float(Celsius) }
+    }
+
+    fn outputs(&mut self) -> Observation {
+        let pulses = [(); MOTORS_MAX].map(|()| self.pick(&[0, 900, 1_000, 1_100, 1_500, 1_900, 65_535]));
+        Observation::Outputs(Outputs { port: self.pick(&[0, 0, 1, 255]), pulses })
     }
 
     fn observation(&mut self) -> Observation {
-        let number = self.below(28);
+        let number = self.below(29);
         match number {
             0..=2 => Observation::Heartbeat(self.heartbeat()),
             3 => Observation::SystemStatus(SystemStatus {
@@ -232,6 +239,7 @@ impl Random {
             17 => Observation::Rails(Rails { vcc: self.float(Volts), servo: self.float(Volts) }),
             18 => Observation::Battery(self.battery()),
             19..=26 => self.machine(number),
+            27 => self.outputs(),
             _ => self.rare(),
         }
     }

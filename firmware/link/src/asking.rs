@@ -60,7 +60,7 @@ enum By {
 type Wanted = (u32, By, u8, u8);
 
 /// What the checks need, the most needed first.
-const WANTED: [Wanted; 26] = [
+const WANTED: [Wanted; 29] = [
     (1, By::Both, 2, 43),           // SYS_STATUS
     (30, By::Both, 10, 40),         // ATTITUDE
     (33, By::Both, 5, 40),          // GLOBAL_POSITION_INT
@@ -71,6 +71,7 @@ const WANTED: [Wanted; 26] = [
     (2, By::Both, 1, 24),           // SYSTEM_TIME
     (65, By::Both, 2, 54),          // RC_CHANNELS
     (245, By::Both, 2, 14),         // EXTENDED_SYS_STATE
+    (36, By::Both, 5, 49),          // SERVO_OUTPUT_RAW
     (230, By::Px4, 2, 54),          // ESTIMATOR_STATUS
     (291, By::Px4, 5, 69),          // ESC_STATUS
     (290, By::Px4, 1, 58),          // ESC_INFO
@@ -87,6 +88,8 @@ const WANTED: [Wanted; 26] = [
     (225, By::ArduPilot, 2, 82),    // EFI_STATUS
     (11_039, By::ArduPilot, 1, 22), // MCU_STATUS
     (29, By::ArduPilot, 1, 28),     // SCALED_PRESSURE
+    (116, By::Both, 4, 36),         // SCALED_IMU2
+    (129, By::Both, 4, 36),         // SCALED_IMU3
 ];
 
 /// Groups of `REQUEST_DATA_STREAM` and their rates: raw sensors, extended status, RC, position, extra 1 to 3.

@@ -278,7 +278,7 @@ impl Reference {
             Observation::SystemStatus(_) if self.vehicle.batteries[0].get().is_none() => {
                 one(&[Quantity::BatteryPercent, Quantity::BatteryVolts])
             }
-            Observation::Air(_) => one(&air),
+            Observation::Air(sensor) if sensor.instance == 0 => one(&air),
             Observation::Imu(sensor) if sensor.instance == 0 => one(&imu),
             Observation::ImuAndAir(..) => one(&[&imu[..], &air].concat()),
             Observation::LocalPosition(_) => one(&velocity),

@@ -133,7 +133,9 @@ impl Samples {
                 push(Plot::Estimator, 2, estimator.position_vertical);
                 push(Plot::Estimator, 3, estimator.compass);
             }
-            Observation::Air(air) => push(Plot::Temperature, 0, air.temperature.map(|celsius| celsius.0)),
+            Observation::Air(air) if air.instance == 0 => {
+                push(Plot::Temperature, 0, air.temperature.map(|celsius| celsius.0));
+            }
             Observation::Imu(imu) if imu.instance == 0 => {
                 push(Plot::Temperature, 1, imu.temperature.map(|celsius| celsius.0));
             }

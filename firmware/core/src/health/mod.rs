@@ -43,7 +43,7 @@ pub struct Health {
     states: [State; STATES],
 }
 
-const _: () = assert!(size_of::<Health>() <= 4 * 1024);
+const _: () = assert!(size_of::<Health>() <= 4 * 1024 + 512);
 
 impl Default for Health {
     fn default() -> Self {

@@ -5,6 +5,7 @@ use super::common::{STALE, alert};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::cause::Cause;
+use crate::crosscheck::{Kind, SENSORS_MAX};
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale, Gnss, VehicleKind};
 use crate::params::Param;
@@ -42,6 +43,21 @@ const GNSS: Check = Check {
     ..ESTIMATOR
 };
 
+/// Two sensors of a kind against each other ([`crate::crosscheck`]).
+const MISMATCH: Check = Check {
+    name: "accel_mismatch",
+    words: "accel mismatch",
+    unit: "m/s2",
+    warn: Some(Param::AccMismWarn),
+    hysteresis: 0.2,
+    debounce_warn: Span::from_millis(500),
+    // Never stale: they are compared where that says something.
+    stale_after: None,
+    instances: SENSORS_MAX as u8,
+    read: |inputs, sensor| mismatch(inputs, Kind::Accelerometer, sensor),
+    ..ESTIMATOR
+};
+
 pub(super) const CHECKS: &[Check] = &[
     ESTIMATOR,
     Check {
@@ -58,12 +74,64 @@ pub(super) const CHECKS: &[Check] = &[
         ..ESTIMATOR
     },
     Check {
+        name: "ekf_compass",
+        words: "compass variance",
+        read: |inputs, _| estimator(inputs, EstimatorScale::Variance, |estimator| estimator.compass),
+        ..ESTIMATOR
+    },
+    Check {
         name: "ekf_test_ratio",
         words: "EKF test ratio",
         warn: Some(Param::EkfRatioWarn),
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest),
         ..ESTIMATOR
+    },
+    Check {
+        name: "ekf_mag_ratio",
+        words: "compass test ratio",
+        warn: Some(Param::EkfRatioWarn),
+        critical: Some(Param::EkfRatioCrit),
+        read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
+        ..ESTIMATOR
+    },
+    Check {
+        name: "compass_unused",
+        is_flag: true,
+        words: "compass not used",
+        warn: Some(Param::AlertWarn),
+        // That it is used says nothing about how well it is.
+        alarm_only: true,
+        read: |inputs, _| inputs.derived.crosschecks().compass_unused(),
+        ..ESTIMATOR
+    },
+    MISMATCH,
+    Check {
+        name: "gyro_mismatch",
+        words: "gyro mismatch",
+        unit: "rad/s",
+        warn: Some(Param::GyroMismWarn),
+        hysteresis: 0.02,
+        read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor),
+        ..MISMATCH
+    },
+    Check {
+        name: "compass_mismatch",
+        words: "compass mismatch",
+        unit: "%",
+        warn: Some(Param::MagMismWarn),
+        hysteresis: 5.0,
+        read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor),
+        ..MISMATCH
+    },
+    Check {
+        name: "baro_mismatch",
+        words: "baro mismatch",
+        unit: "m",
+        warn: Some(Param::BaroMismWarn),
+        hysteresis: 1.0,
+        read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor),
+        ..MISMATCH
     },
     GNSS,
     Check {
@@ -127,6 +195,10 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Estimator as usize }>("EKF alert", Subsystem::Navigation),
 ];
 
+fn mismatch(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {
+    inputs.derived.crosschecks().mismatch(inputs.now, kind, sensor)
+}
+
 fn estimator(
     inputs: &Inputs<'_>,
     scale: EstimatorScale,
@@ -137,8 +209,9 @@ fn estimator(
     Reading::new(slot.at(), pick(estimator))
 }
 
+/// The compass has a check of its own, which names it.
 fn largest(estimator: &Estimator) -> Option<f32> {
-    [estimator.velocity, estimator.position_horizontal, estimator.position_vertical, estimator.compass]
+    [estimator.velocity, estimator.position_horizontal, estimator.position_vertical]
         .into_iter()
         .flatten()
         .reduce(f32::max)

@@ -8,6 +8,7 @@ use crate::baseline::Quantity;
 use crate::cause::Cause;
 use crate::latest::Reading;
 use crate::observation::MOTORS_MAX;
+use crate::outputs::JUDGED_MAX;
 use crate::params::Param;
 use crate::time::Span;
 use crate::vehicle::Motor;
@@ -100,6 +101,20 @@ pub(super) const CHECKS: &[Check] = &[
             let Inputs { now, vehicle, flight, derived, .. } = *inputs;
             derived.motor_imbalance(now, vehicle, flight, motor)
         },
+        ..ESC
+    },
+    Check {
+        name: "motor_output",
+        words: "motor weak",
+        unit: "%",
+        warn: Some(Param::MotOutWarn),
+        critical: Some(Param::MotOutCrit),
+        hysteresis: 5.0,
+        debounce_warn: Span::from_secs(1),
+        debounce_critical: Span::from_secs(1),
+        when: When::InFlight,
+        instances: JUDGED_MAX as u8,
+        read: |inputs, motor| inputs.derived.outputs().alone(inputs.now, inputs.vehicle, motor),
         ..ESC
     },
     Check {

@@ -42,6 +42,20 @@ pub(super) const CHECKS: &[Check] = &[
         ..VIBRATION
     },
     Check {
+        name: "vibration_rise",
+        words: "vibration jump",
+        unit: "",
+        warn: Some(Param::VibeRiseWarn),
+        critical: None,
+        hysteresis: 0.5,
+        debounce_warn: Span::from_millis(500),
+        when: When::InFlight,
+        // Never stale: only hover says something.
+        stale_after: None,
+        read: |inputs, _| inputs.derived.crosschecks().vibration_rise(),
+        ..VIBRATION
+    },
+    Check {
         name: "clipping",
         words: "accel clipping",
         unit: "",

@@ -56,12 +56,14 @@ impl Mishap {
         match observation {
             Observation::Imu(imu) if imu.instance == 0 => self.take_imu(at, imu, vehicle, params),
             Observation::ImuAndAir(imu, air) => {
-                self.take_pressure(at, air);
+                if air.instance == 0 {
+                    self.take_pressure(at, air);
+                }
                 if imu.instance == 0 {
                     self.take_imu(at, imu, vehicle, params);
                 }
             }
-            Observation::Air(air) => self.take_pressure(at, air),
+            Observation::Air(air) if air.instance == 0 => self.take_pressure(at, air),
             Observation::Attitude(attitude) => {
                 self.take_attitude(at, attitude, vehicle, params);
                 if let Some(rates) = attitude.rates {

@@ -2,10 +2,10 @@
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud, Imu, LocalPosition,
-    Vibration, VibrationScale, Wanted,
+    MOTORS_MAX, Outputs, Vibration, VibrationScale, Wanted,
 };
 use hums_core::units::{
-    Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
     RadiansPerSecond,
 };
 use mavlink::dialects::ardupilotmega as ap;
@@ -93,12 +93,24 @@ pub(super) fn gnss_integrity(payload: &[u8]) -> GnssIntegrity {
     }
 }
 
-/// Milli-g and mrad/s, also in ArduPilot's `RAW_IMU`, in spite of its name.
-fn scaled(instance: u8, acceleration: [i16; 3], rotation: [i16; 3], temperature: i16) -> Imu {
+/// A compass that is not there measures nothing.
+fn field(gauss: [f32; 3]) -> Option<[Gauss; 3]> {
+    vector(gauss).filter(|gauss| *gauss != [0.0; 3]).map(|gauss| gauss.map(Gauss))
+}
+
+/// Milli-g, mrad/s and mG, also in ArduPilot's `RAW_IMU`, in spite of its name.
+fn scaled(
+    instance: u8,
+    acceleration: [i16; 3],
+    rotation: [i16; 3],
+    magnetic: [i16; 3],
+    temperature: i16,
+) -> Imu {
     Imu {
         instance,
         acceleration: Some(acceleration.map(|milli_g| MetresPerSecond2(f32::from(milli_g) * GRAVITY / 1e3))),
         rate: Some(rotation.map(|milli| RadiansPerSecond(f32::from(milli) / 1e3))),
+        field: field(magnetic.map(|milli| f32::from(milli) / 1e3)),
         temperature: unless(temperature, 0).map(|hundredths| Celsius(f32::from(hundredths) / 100.0)),
     }
 }
@@ -107,7 +119,8 @@ pub(super) fn imu(id: u32, payload: &[u8]) -> Option<Imu> {
     if id == 27 {
         let imu = read::<ap::RAW_IMU_DATA>(payload, &[])?;
         let rotation = [imu.xgyro, imu.ygyro, imu.zgyro];
-        return Some(scaled(imu.id, [imu.xacc, imu.yacc, imu.zacc], rotation, imu.temperature));
+        let magnetic = [imu.xmag, imu.ymag, imu.zmag];
+        return Some(scaled(imu.id, [imu.xacc, imu.yacc, imu.zacc], rotation, magnetic, imu.temperature));
     }
     // The second and the third have the fields of the first.
     let imu = read::<ap::SCALED_IMU_DATA>(payload, &[])?;
@@ -117,7 +130,8 @@ pub(super) fn imu(id: u32, payload: &[u8]) -> Option<Imu> {
         _ => 2,
     };
     let rotation = [imu.xgyro, imu.ygyro, imu.zgyro];
-    Some(scaled(instance, [imu.xacc, imu.yacc, imu.zacc], rotation, imu.temperature))
+    let magnetic = [imu.xmag, imu.ymag, imu.zmag];
+    Some(scaled(instance, [imu.xacc, imu.yacc, imu.zacc], rotation, magnetic, imu.temperature))
 }
 
 /// Only what `fields_updated` names is new; the rest repeats an older sample.
@@ -127,23 +141,43 @@ pub(super) fn highres_imu(payload: &[u8]) -> Option<(Imu, Air)> {
     let all = |bits: u16| updated & bits == bits;
     let acceleration = vector([imu.xacc, imu.yacc, imu.zacc]).filter(|_| all(0b111));
     let rate = vector([imu.xgyro, imu.ygyro, imu.zgyro]).filter(|_| all(0b11_1000));
+    let field = field([imu.xmag, imu.ymag, imu.zmag]).filter(|_| all(0b1_1100_0000));
     let temperature = Celsius(imu.temperature).finite().filter(|_| all(1 << 12));
     let pressure = Hectopascals(imu.abs_pressure).finite().filter(|_| all(1 << 9));
     let sensor = Imu {
         instance: imu.id,
         acceleration: acceleration.map(|values| values.map(MetresPerSecond2)),
         rate: rate.map(|values| values.map(RadiansPerSecond)),
+        field,
         temperature,
     };
-    Some((sensor, Air { pressure, temperature }))
+    Some((sensor, Air { instance: imu.id, pressure, temperature }))
 }
 
-pub(super) fn air(payload: &[u8]) -> Option<Air> {
+/// The second and the third have the fields of the first.
+pub(super) fn air(id: u32, payload: &[u8]) -> Option<Air> {
     let pressure = read::<ap::SCALED_PRESSURE_DATA>(payload, &[])?;
+    let instance = match id {
+        29 => 0,
+        137 => 1,
+        _ => 2,
+    };
     Some(Air {
+        instance,
         pressure: Hectopascals(pressure.press_abs).finite().filter(|pressure| pressure.0 > 0.0),
         temperature: Some(Celsius(f32::from(pressure.temperature) / 100.0)),
     })
+}
+
+/// Eight outputs in the message of old, the others in its extension; 65535 is none.
+pub(super) fn outputs(payload: &[u8]) -> Outputs {
+    /// Where the ninth stands.
+    const EXTENSION: usize = 21;
+    let pulse = |output: usize| {
+        let at = if output < 8 { 4 + 2 * output } else { EXTENSION + 2 * (output - 8) };
+        unless(Fields(payload).u16(at), u16::MAX).unwrap_or(0)
+    };
+    Outputs { port: Fields(payload).u8(20), pulses: core::array::from_fn::<u16, MOTORS_MAX, _>(pulse) }
 }
 
 /// An attitude that is no number is none.

@@ -3,7 +3,7 @@ use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::observation::{
     Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
 };
-use hums_core::units::{Amperes, Celsius, Fraction, MetresPerSecond2, Volts};
+use hums_core::units::{Amperes, Celsius, Fraction, Gauss, Hectopascals, MetresPerSecond2, Volts};
 use mavlink::dialects::ardupilotmega as ap;
 use mavlink::{MavlinkVersion, MessageData};
 use proptest::prelude::*;
@@ -184,6 +184,35 @@ fn highres_imu_gives_only_what_was_updated() {
     let Some(Observation::ImuAndAir(imu, air)) = said(&message) else { panic!() };
     assert_eq!(imu.acceleration, Some([0.0, 0.0, -9.8].map(MetresPerSecond2)));
     assert_eq!((imu.rate, imu.temperature, air.pressure), (None, None, None));
+}
+
+#[test]
+fn the_second_and_third_sensors_are_of_their_own_and_fields_are_in_gauss() {
+    let message =
+        ap::SCALED_IMU2_DATA { zacc: -1_000, xmag: 210, ymag: -50, zmag: 400, ..Default::default() };
+    let Some(Observation::Imu(imu)) = said(&message) else { panic!() };
+    assert_eq!((imu.instance, imu.field), (1, Some([0.21, -0.05, 0.4].map(Gauss))));
+    let message = ap::SCALED_IMU3_DATA { zacc: -1_000, ..Default::default() };
+    let Some(Observation::Imu(imu)) = said(&message) else { panic!() };
+    assert_eq!((imu.instance, imu.field), (2, None), "a compass that is not there");
+    let message = ap::SCALED_PRESSURE2_DATA { press_abs: 1_000.0, ..Default::default() };
+    let Some(Observation::Air(air)) = said(&message) else { panic!() };
+    assert_eq!((air.instance, air.pressure), (1, Some(Hectopascals(1_000.0))));
+}
+
+#[test]
+fn outputs_go_on_in_the_extension_and_none_is_nothing() {
+    let message = ap::SERVO_OUTPUT_RAW_DATA {
+        servo1_raw: 1_100,
+        servo8_raw: u16::MAX,
+        port: 1,
+        servo9_raw: 1_900,
+        servo12_raw: 1_200,
+        ..Default::default()
+    };
+    let Some(Observation::Outputs(outputs)) = said(&message) else { panic!() };
+    assert_eq!(outputs.port, 1);
+    assert_eq!(outputs.pulses, [1_100, 0, 0, 0, 0, 0, 0, 0, 1_900, 0, 0, 1_200]);
 }
 
 #[test]

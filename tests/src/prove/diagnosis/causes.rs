@@ -27,10 +27,12 @@ pub(super) const CLASSES: &[Class] = &[
             "esc_errors",
             "motor_loss",
             "motor_imbalance",
+            "motor_output",
             "drive_alert",
             // They tell people to look at propellers and motors first.
             "vibration",
             "vibration_px4",
+            "vibration_rise",
             "free_fall",
         ],
     },
@@ -63,17 +65,21 @@ pub(super) const CLASSES: &[Class] = &[
             "gnss_alert",
         ],
     },
-    Class { name: "compass", about: "compasses", checks: &["compass_alert"] },
-    Class { name: "barometer", about: "barometers", checks: &["baro_alert"] },
+    Class {
+        name: "compass",
+        about: "compasses",
+        checks: &["compass_alert", "ekf_compass", "ekf_mag_ratio", "compass_unused", "compass_mismatch"],
+    },
+    Class { name: "barometer", about: "barometers", checks: &["baro_alert", "baro_mismatch"] },
     Class {
         name: "inertial",
         about: "accelerometers, gyros, airspeed",
-        checks: &["accel_alert", "gyro_alert", "airspeed_alert"],
+        checks: &["accel_alert", "gyro_alert", "airspeed_alert", "accel_mismatch", "gyro_mismatch"],
     },
     Class {
         name: "vibration",
         about: "vibration",
-        checks: &["vibration", "vibration_px4", "clipping", "vibration_alert"],
+        checks: &["vibration", "vibration_px4", "vibration_rise", "clipping", "vibration_alert"],
     },
     Class {
         name: "attitude",

@@ -1,12 +1,12 @@
 //! Where the vehicle is, how it moves and how well it knows.
 
 use hums_core::observation::{
-    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, Observation,
-    SystemTime, Vibration, VibrationScale, Wanted,
+    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, MOTORS_MAX,
+    Observation, Outputs, SystemTime, Vibration, VibrationScale, Wanted,
 };
 use hums_core::time::Span;
 use hums_core::units::{
-    Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
     RadiansPerSecond,
 };
 
@@ -89,8 +89,27 @@ pub(super) const HANDLERS: &[Handler] = &[
     },
     Handler {
         names: &[("MAG", 0), ("MAG2", 1), ("MAG3", 2)],
-        columns: &[&["I"], &["Health"]],
+        columns: &[&["I"], &["Health"], &["MagX"], &["MagY"], &["MagZ"]],
         take: compass,
+        ..MOTION
+    },
+    Handler {
+        names: &[("RCOU", 0)],
+        columns: &[
+            &["C1", "Ch1", "Chan1"],
+            &["C2", "Ch2", "Chan2"],
+            &["C3", "Ch3", "Chan3"],
+            &["C4", "Ch4", "Chan4"],
+            &["C5", "Ch5", "Chan5"],
+            &["C6", "Ch6", "Chan6"],
+            &["C7", "Ch7", "Chan7"],
+            &["C8", "Ch8", "Chan8"],
+            &["C9", "Ch9"],
+            &["C10", "Ch10"],
+            &["C11", "Ch11"],
+            &["C12", "Ch12"],
+        ],
+        take: outputs,
         ..MOTION
     },
     Handler {
@@ -180,7 +199,8 @@ fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
     // A sensor without a thermometer says 0.
     let temperature = given.single(7).filter(|celsius| *celsius != 0.0).map(Celsius);
-    out.observe(&Observation::Imu(Imu { instance, acceleration, rate, temperature }));
+    let field = state.fields.get_mut(usize::from(instance)).and_then(Option::take);
+    out.observe(&Observation::Imu(Imu { instance, acceleration, rate, field, temperature }));
 }
 
 fn place(latitude_deg: f64, longitude_deg: f64) -> Option<Position> {
@@ -292,26 +312,36 @@ fn accuracy(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
 fn air(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let instance = given.instance(0);
     state.health(instance, PRESSURE, given.single(3));
-    if instance > 0 {
-        return;
-    }
-    if let Some(climb) = given.single(4) {
-        state.climb.set(given.at, climb);
-    }
-    if let Some(height) = given.single(5) {
-        state.baro_height.set(given.at, height);
+    if instance == 0 {
+        if let Some(climb) = given.single(4) {
+            state.climb.set(given.at, climb);
+        }
+        if let Some(height) = given.single(5) {
+            state.baro_height.set(given.at, height);
+        }
     }
     let pressure =
         given.single(1).filter(|pascals| *pascals > 0.0).map(|pascals| Hectopascals(pascals / 100.0));
     let temperature = given.single(2).map(Celsius);
-    out.observe(&Observation::Air(Air { pressure, temperature }));
+    out.observe(&Observation::Air(Air { instance, pressure, temperature }));
 }
 
+/// In mG; MAVLink tells it with the inertial sensor of the same number.
 fn compass(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    let instance = given.instance(0);
     // SYS_STATUS tells of the first one.
-    if given.instance(0) == 0 {
+    if instance == 0 {
         state.health(0, MAGNETOMETER, given.single(1));
     }
+    if let (Some(field), Some(slot)) = (given.singles(2), state.fields.get_mut(usize::from(instance))) {
+        *slot = Some(field.map(|milli: f32| Gauss(milli / 1e3)));
+    }
+}
+
+fn outputs(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let pulse = |output: usize| given.unsigned(output).and_then(|pulse| pulse.try_into().ok()).unwrap_or(0);
+    let pulses = std::array::from_fn::<u16, MOTORS_MAX, _>(pulse);
+    out.observe(&Observation::Outputs(Outputs { port: 0, pulses }));
 }
 
 fn position(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {

@@ -5,7 +5,7 @@ use hums_core::observation::{
     Autopilot, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus, VehicleKind, VtolState,
 };
 use hums_core::time::{Instant, Span};
-use hums_core::units::{Amperes, Fraction, Metres, Volts};
+use hums_core::units::{Amperes, Fraction, Gauss, Metres, Volts};
 
 use super::arming::{Arming, Word};
 use super::say::{Out, Say};
@@ -100,6 +100,8 @@ pub(in crate::source::dataflash) struct State {
     pub(super) unhealthy: [u32; INSTANCES],
     /// Accuracy by receiver.
     pub(super) accuracy: [Dated<Metres>; INSTANCES],
+    /// What each compass measured last, until an inertial sensor's observation takes it along.
+    pub(super) fields: [Option<[Gauss; 3]>; INSTANCES],
     /// Velocity of the estimator, north, east, down.
     pub(super) velocity: Dated<[f32; 3]>,
     pub(super) primary_core: u8,

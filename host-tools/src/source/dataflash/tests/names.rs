@@ -23,6 +23,39 @@ fn each_message_that_is_asked_for_serves_or_is_told_to_be_rows_only() {
 }
 
 #[test]
+fn each_sensor_is_told_with_its_number_a_compass_with_its_inertial_sensor_and_what_motors_are_given() {
+    let mut log = Writer::new();
+    log.format(150, "MAG", "QBhhh", "TimeUS,I,MagX,MagY,MagZ");
+    log.format(151, "IMU", "QBffffff", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ");
+    log.format(152, "BARO", "QBf", "TimeUS,I,Press");
+    log.format(153, "RCOU", "QHH", "TimeUS,C1,C2");
+    let time = 1_000_000_u64.to_le_bytes();
+    let field = [200_i16, -50, 400].map(i16::to_le_bytes).concat();
+    let inertial = [0.0_f32, 0.0, 0.1, 0.0, 0.0, -9.8].map(f32::to_le_bytes).concat();
+    log.raw(150, &[&time, &[1], &field]);
+    log.raw(151, &[&time, &[0], &inertial]);
+    log.raw(151, &[&time, &[1], &inertial]);
+    log.raw(152, &[&time, &[1], &100_000.0_f32.to_le_bytes()]);
+    log.raw(153, &[&time, &[1_100_u16, 1_900].map(u16::to_le_bytes).concat()]);
+    let of = |observation: &Observation| match observation {
+        Observation::Imu(imu) => Some(format!("{} {:?}", imu.instance, imu.field)),
+        Observation::Air(air) => Some(format!("{} {:?}", air.instance, air.pressure)),
+        Observation::Outputs(outputs) => Some(format!("{:?}", &outputs.pulses[..3])),
+        _ => None,
+    };
+    let told: Vec<String> = seen(&log.bytes).find(of);
+    assert_eq!(
+        told,
+        [
+            "0 None",
+            "1 Some([Gauss(0.2), Gauss(-0.05), Gauss(0.4)])",
+            "1 Some(Hectopascals(1000.0))",
+            "[1100, 1900, 0]"
+        ]
+    );
+}
+
+#[test]
 fn a_height_is_above_the_home_that_the_log_tells_where_nothing_else_does() {
     let heights = |kind: u8| {
         let mut log = Writer::new();

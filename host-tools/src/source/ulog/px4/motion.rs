@@ -1,11 +1,11 @@
 //! How the vehicle moves, and how well its estimator knows that.
 
 use hums_core::observation::{
-    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition, Observation,
-    Vibration, VibrationScale, Wanted,
+    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition, MOTORS_MAX,
+    Observation, Outputs, Vibration, VibrationScale, Wanted,
 };
 use hums_core::units::{
-    Celsius, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
+    Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
     RadiansPerSecond,
 };
 
@@ -33,6 +33,27 @@ pub(super) const TOPICS: &[Topic] = &[
         fields: &["xyz"],
         take: |px4, said| px4.motion.rate = said.fields.vector(0),
     },
+    // Each of several sensors; the one that flies is in the topics above.
+    Topic {
+        name: "vehicle_imu",
+        instances: 3,
+        every_us: MEDIUM_US,
+        fields: &["delta_velocity", "delta_velocity_dt", "delta_angle", "delta_angle_dt"],
+        take: other_imu,
+    },
+    Topic {
+        name: "vehicle_magnetometer",
+        instances: 3,
+        every_us: MEDIUM_US,
+        fields: &["magnetometer_ga"],
+        take: |px4, said| {
+            if let Some(slot) = px4.motion.fields.get_mut(usize::from(said.instance)) {
+                *slot = said.fields.vector(0).map(|field| field.map(Gauss));
+            }
+        },
+    },
+    Topic { name: "sensor_baro", instances: 3, every_us: MEDIUM_US, fields: &["pressure"], take: other_air },
+    Topic { name: "actuator_outputs", instances: 2, every_us: MEDIUM_US, fields: &["output"], take: outputs },
     Topic {
         name: "vehicle_air_data",
         instances: 1,
@@ -203,24 +224,55 @@ pub(super) const TOPICS: &[Topic] = &[
     },
 ];
 
-fn inertial(acceleration: Option<[f32; 3]>, rate: Option<[f32; 3]>) -> Observation {
-    Observation::Imu(Imu {
-        instance: 0,
+/// With the field of the compass of the same number, as in MAVLink's messages.
+fn inertial(px4: &mut Px4, instance: u8, acceleration: Option<[f32; 3]>, rate: Option<[f32; 3]>) {
+    let field = px4.motion.fields.get_mut(usize::from(instance)).and_then(Option::take);
+    px4.observe(Observation::Imu(Imu {
+        instance,
         acceleration: acceleration.map(|values| values.map(MetresPerSecond2)),
         rate: rate.map(|values| values.map(RadiansPerSecond)),
+        field,
         temperature: None,
-    })
+    }));
 }
 
 fn imu(px4: &mut Px4, said: &Said<'_>) {
     px4.motion.combined = true;
-    px4.observe(inertial(said.fields.vector(0), said.fields.vector(1)));
+    inertial(px4, 0, said.fields.vector(0), said.fields.vector(1));
+}
+
+/// Velocity and angle over a time, which is in microseconds.
+fn other_imu(px4: &mut Px4, said: &Said<'_>) {
+    let over = |delta: usize, dt: usize| {
+        let dt_s = said.fields.finite(dt).map(|us| us / 1e6).filter(|dt_s| *dt_s > 0.0)?;
+        Some(said.fields.vector::<3>(delta)?.map(|axis| axis / dt_s))
+    };
+    if said.instance > 0 {
+        inertial(px4, said.instance, over(0, 1), over(2, 3));
+    }
+}
+
+/// In hPa until v1.13, in Pa since.
+fn other_air(px4: &mut Px4, said: &Said<'_>) {
+    const HPA_MAX: f32 = 2_000.0;
+    let pressure = said.fields.finite(0).filter(|pressure| *pressure > 0.0);
+    let pressure = pressure.map(|it| Hectopascals(if it > HPA_MAX { it / 100.0 } else { it }));
+    if said.instance > 0 {
+        px4.observe(Observation::Air(Air { instance: said.instance, pressure, temperature: None }));
+    }
+}
+
+/// What `SERVO_OUTPUT_RAW` is made of.
+fn outputs(px4: &mut Px4, said: &Said<'_>) {
+    let pulse = |output: usize| said.fields.element(0, output).map_or(0, |pulse| pulse.round() as u16);
+    let pulses = std::array::from_fn::<u16, MOTORS_MAX, _>(pulse);
+    px4.observe(Observation::Outputs(Outputs { port: said.instance, pulses }));
 }
 
 /// Where a log has no `sensor_combined`.
 fn acceleration(px4: &mut Px4, said: &Said<'_>) {
     if !px4.motion.combined {
-        px4.observe(inertial(said.fields.vector(0), px4.motion.rate));
+        inertial(px4, 0, said.fields.vector(0), px4.motion.rate);
     }
 }
 
@@ -228,6 +280,7 @@ fn air(px4: &mut Px4, said: &Said<'_>) {
     let fields = &said.fields;
     px4.motion.pressure_altitude = fields.finite(3);
     px4.observe(Observation::Air(Air {
+        instance: 0,
         pressure: fields
             .finite(0)
             .filter(|pascals| *pascals > 0.0)

@@ -2,7 +2,7 @@
 
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
-use hums_core::units::{Amperes, Fraction, Volts};
+use hums_core::units::{Amperes, Fraction, Gauss, Volts};
 
 use super::super::fields::Fields;
 
@@ -137,6 +137,8 @@ pub(super) struct Status {
 pub(super) struct Motion {
     pub(super) combined: bool,
     pub(super) rate: Option<[f32; 3]>,
+    /// What each compass measured last, until an inertial sensor's observation takes it along.
+    pub(super) fields: [Option<[Gauss; 3]>; 3],
     pub(super) local: Option<Local>,
     pub(super) home: Option<Home>,
     pub(super) pressure_altitude: Option<f32>,

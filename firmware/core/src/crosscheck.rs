@@ -1,0 +1,269 @@
+//! Sensors of one kind against each other, the estimator's word on its compass, and vibration against its own usual level.
+//!
+//! How far two sensors are apart is a figure with a usual level in each flight ([`crate::departure`]): calibration, mounting and
+//! currents make one, and it is no fault. What comes to it in flight is. Of three sensors the one is told that is apart from both
+//! others; of two nobody knows which of them is wrong, and the second one is told.
+//!
+//! Accelerometers and gyros are compared, and vibration judged, where multicopters hover: they are not mounted at the same place, they
+//! are not sampled at the same moment, and a VTOL's transition or a fast leg sets them apart. An inertial sensor that says nothing but
+//! zeros is not fitted.
+
+use crate::departure::Departure;
+use crate::derived::{Derived, norm};
+use crate::flight::Flight;
+use crate::latest::Reading;
+use crate::observation::{Air, Estimator, EstimatorScale, Imu, VehicleKind, VibrationScale};
+use crate::time::{Instant, Span};
+use crate::vehicle::Vehicle;
+
+/// Sensors of one kind that are compared.
+pub(crate) const SENSORS_MAX: usize = 3;
+/// Pairs of them.
+const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
+/// Between comparisons.
+const EVERY: Span = Span::from_millis(100);
+/// Older samples are not compared, and older comparisons say nothing.
+const FRESH: Span = Span::from_secs(1);
+/// Time constant of the samples: sensors are not sampled at the same moment.
+const SMOOTHING_S: f32 = 0.5;
+/// What turns slower than [`crate::inertial`]'s fast for so long can be compared.
+const TURNED: Span = Span::from_secs(1);
+/// No sensor measures so much, in any of the units.
+const GARBAGE: f32 = 1e6;
+/// In the air for so long it has left the ground.
+const SETTLED: Span = Span::from_secs(3);
+/// A hover, m/s: over ground, and up or down.
+const SLOW_MPS: f32 = 6.0;
+const LEVEL_MPS: f32 = 2.0;
+/// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
+const SCALE_HEIGHT_M: f32 = 8_430.0;
+/// Ratios that the estimator told of its compass in flight, before their end says that it does not use it any more: at 1 Hz or more.
+const RATIOS_KNOWN: u8 = 20;
+/// Vibration that rises by less did not rise: per axis, and PX4's metric, m/s2.
+const GRAIN_PER_AXIS: f32 = 3.0;
+const GRAIN_PX4: f32 = 1.0;
+
+/// A kind of sensors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Accelerometers: apart in m/s2.
+    Accelerometer,
+    /// Gyros: apart in rad/s.
+    Gyro,
+    /// Compasses: apart in percent of the field, by direction and length.
+    Compass,
+    /// Barometers: apart in metres of height.
+    Barometer,
+}
+
+impl Kind {
+    const ALL: [Self; 4] = [Self::Accelerometer, Self::Gyro, Self::Compass, Self::Barometer];
+
+    /// Further beyond their usual range they teach nothing: half of the default limits.
+    const fn hold(self) -> f32 {
+        match self {
+            Self::Accelerometer => 0.5,
+            Self::Gyro => 0.07,
+            Self::Compass => 20.0,
+            Self::Barometer => 4.0,
+        }
+    }
+
+    fn apart(self, one: [f32; 3], other: [f32; 3]) -> f32 {
+        let [x, y, z] = [0, 1, 2].map(|axis| one[axis] - other[axis]);
+        match self {
+            Self::Accelerometer | Self::Gyro => norm([x, y, z]),
+            Self::Compass => norm([x, y, z]) / (norm(one) + norm(other)) * 200.0,
+            Self::Barometer => libm::fabsf(x) / one[0].max(other[0]) * SCALE_HEIGHT_M,
+        }
+    }
+}
+
+/// The smoothed samples of one sensor.
+#[derive(Clone, Copy, Debug)]
+struct Sensor {
+    at: Option<Instant>,
+    smooth: [f32; 3],
+}
+
+impl Sensor {
+    fn take(&mut self, at: Instant, sample: [f32; 3]) {
+        if !sample.iter().all(|axis| axis.abs() <= GARBAGE) {
+            return;
+        }
+        let step_s = self.at.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
+        let weight = if step_s < 1.0 { step_s / (SMOOTHING_S + step_s) } else { 1.0 };
+        for (smooth, axis) in self.smooth.iter_mut().zip(sample) {
+            *smooth += weight * (axis - *smooth);
+        }
+        self.at = Some(at);
+    }
+
+    /// Its samples, smoothed, while they are fresh.
+    fn fresh(&self, now: Instant) -> Option<[f32; 3]> {
+        self.at.filter(|at| now.since(*at) <= FRESH).map(|_| self.smooth)
+    }
+}
+
+/// The memory of all comparisons.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crosschecks {
+    sensors: [[Sensor; SENSORS_MAX]; Kind::ALL.len()],
+    pairs: [[Departure; SENSORS_MAX]; Kind::ALL.len()],
+    /// When sensors of a kind were compared last, and when that was tried.
+    compared_at: [Option<Instant>; Kind::ALL.len()],
+    stepped_at: Option<Instant>,
+    vibration: Departure,
+    vibration_at: Option<Instant>,
+    vibration_grain: f32,
+    /// Ratios of the compass that the estimator told in this flight, and whether the last one was none.
+    ratios: u8,
+    unused: Option<Reading>,
+}
+
+impl Crosschecks {
+    /// Nothing seen yet.
+    pub(crate) const fn new() -> Self {
+        const SENSOR: Sensor = Sensor { at: None, smooth: [0.0; 3] };
+        Self {
+            sensors: [[SENSOR; SENSORS_MAX]; Kind::ALL.len()],
+            pairs: [[Departure::NEW; SENSORS_MAX]; Kind::ALL.len()],
+            compared_at: [None; Kind::ALL.len()],
+            stepped_at: None,
+            vibration: Departure::NEW,
+            vibration_at: None,
+            vibration_grain: 0.0,
+            ratios: 0,
+            unused: None,
+        }
+    }
+
+    fn sensor(&mut self, kind: Kind, instance: u8) -> Option<&mut Sensor> {
+        self.sensors[kind as usize].get_mut(usize::from(instance))
+    }
+
+    pub(crate) fn take_imu(&mut self, at: Instant, imu: &Imu) {
+        let force = imu.acceleration.map(|force| force.map(|axis| axis.0));
+        let rate = imu.rate.map(|rate| rate.map(|axis| axis.0));
+        let field = imu.field.map(|field| field.map(|axis| axis.0));
+        // A gyro that stands still may measure zeros, but not beside an accelerometer that does.
+        let is_fitted = force != Some([0.0; 3]);
+        for (kind, sample) in [
+            (Kind::Accelerometer, force.filter(|_| is_fitted)),
+            (Kind::Gyro, rate.filter(|_| is_fitted)),
+            (Kind::Compass, field.filter(|field| *field != [0.0; 3])),
+        ] {
+            if let (Some(sample), Some(sensor)) = (sample, self.sensor(kind, imu.instance)) {
+                sensor.take(at, sample);
+            }
+        }
+    }
+
+    pub(crate) fn take_air(&mut self, at: Instant, air: &Air) {
+        let pressure = air.pressure.filter(|pressure| pressure.0 > 0.0);
+        if let (Some(pressure), Some(sensor)) = (pressure, self.sensor(Kind::Barometer, air.instance)) {
+            sensor.take(at, [pressure.0, 0.0, 0.0]);
+        }
+    }
+
+    /// PX4 tells no ratio of what it does not fuse.
+    pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator, flight: &Flight) {
+        if estimator.scale != EstimatorScale::TestRatio || !flight.airborne() {
+            return;
+        }
+        self.ratios = self.ratios.saturating_add(u8::from(estimator.compass.is_some()));
+        // An estimator that tells nothing at all says nothing about its compass.
+        let tells = estimator.velocity.is_some() || estimator.position_horizontal.is_some();
+        if tells && self.ratios >= RATIOS_KNOWN {
+            let unused = estimator.compass.is_none();
+            self.unused = Some(Reading { at, value: f32::from(u8::from(unused)) });
+        }
+    }
+
+    pub(crate) fn take_vibration(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight) {
+        let Some(vibration) = vehicle.vibration.get() else { return };
+        let level = match vibration.scale {
+            VibrationScale::PerAxis => vibration.levels.into_iter().flatten().reduce(f32::max),
+            VibrationScale::Px4Metrics => vibration.levels[2],
+        };
+        let (Some(level), true) = (level, hovers(at, vehicle, flight)) else { return };
+        self.vibration_grain = match vibration.scale {
+            VibrationScale::PerAxis => GRAIN_PER_AXIS,
+            VibrationScale::Px4Metrics => GRAIN_PX4,
+        };
+        let step_s = self.vibration_at.map_or(0.0, |before| at.since(before).as_secs_f32());
+        self.vibration_at = Some(at);
+        if step_s > 0.0 && step_s < FRESH.as_secs_f32() {
+            self.vibration.take(level, step_s, self.vibration_grain);
+        }
+    }
+
+    /// A flight begins: nothing is usual yet.
+    pub(crate) const fn begin(&mut self) {
+        *self = Self { sensors: self.sensors, ..Self::new() };
+    }
+
+    /// One step, at least every 50 ms.
+    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
+        if self.stepped_at.is_some_and(|at| now.since(at) < EVERY) || !flight.airborne() {
+            return;
+        }
+        self.stepped_at = Some(now);
+        let turns_little = vehicle.inertial.turns_little(now, TURNED);
+        let hovers = hovers(now, vehicle, flight);
+        let calm = turns_little
+            && matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Plane)
+            && flight.airborne_since().is_some_and(|since| now.since(since) > SETTLED);
+        for kind in Kind::ALL {
+            let compares = match kind {
+                Kind::Accelerometer | Kind::Gyro => hovers,
+                Kind::Compass | Kind::Barometer => calm,
+            };
+            if compares {
+                self.compare(now, kind);
+            }
+        }
+    }
+
+    fn compare(&mut self, now: Instant, kind: Kind) {
+        let fresh = self.sensors[kind as usize].map(|sensor| sensor.fresh(now));
+        for ((one, other), pair) in PAIRS.into_iter().zip(&mut self.pairs[kind as usize]) {
+            if let (Some(one), Some(other)) = (fresh[one], fresh[other]) {
+                pair.take(kind.apart(one, other), EVERY.as_secs_f32(), kind.hold());
+                self.compared_at[kind as usize] = Some(now);
+            }
+        }
+    }
+
+    /// How far a sensor is apart from all others of its kind, beyond what is usual; of two, for the second one.
+    pub(crate) fn mismatch(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
+        let at = self.compared_at[kind as usize].filter(|at| now.since(*at) <= EVERY + EVERY)?;
+        let pairs = || PAIRS.iter().zip(&self.pairs[kind as usize]);
+        let three = pairs().all(|(_, pair)| pair.beyond().is_some());
+        let sensor = usize::from(sensor);
+        let mine = pairs().filter(|((one, other), _)| *other == sensor || (three && *one == sensor));
+        let beyond = mine.filter_map(|(_, pair)| pair.beyond()).reduce(f32::min);
+        Reading::new(Some(at), beyond)
+    }
+
+    /// Whether the estimator stopped using a compass that it used in this flight.
+    pub(crate) const fn compass_unused(&self) -> Option<Reading> {
+        self.unused
+    }
+
+    /// Vibration as a multiple of what is usual in this flight.
+    pub(crate) fn vibration_rise(&self) -> Option<Reading> {
+        Reading::new(self.vibration_at, self.vibration.multiple(self.vibration_grain))
+    }
+}
+
+/// A multicopter that is level and slow, and does not turn.
+pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+    let slow = vehicle.global.within(now, FRESH).is_none_or(|global| {
+        let [north, east, down] = global.velocity.map(|speed| speed.0);
+        north * north + east * east < SLOW_MPS * SLOW_MPS && libm::fabsf(down) < LEVEL_MPS
+    });
+    slow && vehicle.is_multicopter()
+        && Derived::is_steady(now, vehicle, flight)
+        && vehicle.inertial.turns_little(now, TURNED)
+}

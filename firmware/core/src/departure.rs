@@ -1,0 +1,106 @@
+//! A figure against its own usual level in this flight.
+//!
+//! The figure is smoothed. Its usual level is the mean of the smoothed figure over the last minute, and its usual range that mean and
+//! [`SPREADS`] times the mean distance from it. What is beyond the range by as much as the caller names teaches nothing, so that a
+//! fault does not become usual; what is so from the beginning of a flight is usual.
+
+/// Time constant of the figure that is judged, s.
+const SMOOTHING_S: f32 = 0.5;
+/// The usual level is known after so long, s, and looks back over so long.
+const KNOWN_S: f32 = 8.0;
+const MEMORY_S: f32 = 60.0;
+/// What is more is garbage.
+const FIGURE_MAX: f32 = 1e6;
+/// Of noise with a normal distribution four mean distances are 3.2 standard deviations.
+const SPREADS: f32 = 4.0;
+
+/// A figure, and what is usual of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Departure {
+    smooth: f32,
+    mean: f32,
+    spread: f32,
+    learnt_s: f32,
+}
+
+impl Departure {
+    /// Nothing learnt.
+    pub(crate) const NEW: Self = Self { smooth: 0.0, mean: 0.0, spread: 0.0, learnt_s: 0.0 };
+
+    /// Takes the figure, which is 0 or more, `step_s` after the one before. Further beyond its usual range than `hold` it teaches nothing.
+    pub(crate) fn take(&mut self, figure: f32, step_s: f32, hold: f32) {
+        if !(0.0..=FIGURE_MAX).contains(&figure) {
+            return;
+        }
+        if self.learnt_s == 0.0 {
+            (self.smooth, self.mean) = (figure, figure);
+        }
+        self.smooth += step_s / (SMOOTHING_S + step_s) * (figure - self.smooth);
+        if self.beyond().is_some_and(|beyond| beyond > hold) {
+            return;
+        }
+        self.learnt_s = (self.learnt_s + step_s).min(MEMORY_S);
+        let weight = step_s / self.learnt_s.max(step_s);
+        let off = self.smooth - self.mean;
+        self.mean += weight * off;
+        self.spread += weight * (libm::fabsf(off) - self.spread);
+    }
+
+    /// How far the figure is above its usual range, 0 at least; `None` until that is known.
+    pub(crate) fn beyond(&self) -> Option<f32> {
+        let beyond = self.smooth - self.mean - SPREADS * self.spread;
+        (self.learnt_s >= KNOWN_S).then_some(beyond.max(0.0))
+    }
+
+    /// The figure as a multiple of what is usual, where it is beyond its usual range by more than `grain`; 1 where it is not.
+    pub(crate) fn multiple(&self, grain: f32) -> Option<f32> {
+        let beyond = self.beyond()?;
+        Some(if beyond > grain { self.smooth / self.mean.max(f32::MIN_POSITIVE) } else { 1.0 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Takes figures ten times a second.
+    fn taken(figures: impl Iterator<Item = f32>) -> Departure {
+        let mut departure = Departure::NEW;
+        figures.for_each(|figure| departure.take(figure, 0.1, 1.0));
+        departure
+    }
+
+    /// Up and down by one around a level.
+    fn noise(level: f32, count: usize) -> impl Iterator<Item = f32> {
+        (0..count).map(move |step| level + if step % 2 == 0 { 1.0 } else { -1.0 })
+    }
+
+    #[test]
+    fn nothing_is_said_before_the_usual_level_is_known() {
+        assert_eq!(taken(noise(5.0, 70)).beyond(), None);
+        assert_eq!(taken(noise(5.0, 90)).beyond(), Some(0.0));
+    }
+
+    #[test]
+    fn a_step_is_beyond_and_stays_so_and_does_not_become_usual() {
+        let departed = taken(noise(5.0, 200).chain(noise(15.0, 3_000)));
+        let beyond = departed.beyond().unwrap();
+        assert!((8.0..10.0).contains(&beyond), "{beyond}");
+        assert!(departed.multiple(1.0).is_some_and(|multiple| (2.5..3.5).contains(&multiple)));
+        assert_eq!(taken(noise(5.0, 200)).multiple(1.0), Some(1.0));
+    }
+
+    #[test]
+    fn what_is_so_from_the_beginning_and_what_changes_slowly_is_usual() {
+        assert_eq!(taken(noise(50.0, 300)).beyond(), Some(0.0));
+        let slowly = taken(noise(5.0, 200).chain((0..6_000).map(|step| 5.0 + step as f32 / 600.0)));
+        assert_eq!(slowly.beyond(), Some(0.0));
+    }
+
+    #[test]
+    fn garbage_changes_nothing() {
+        let departed =
+            taken(noise(5.0, 200).chain([f32::NAN, f32::INFINITY, f32::MAX, -1.0]).chain(noise(5.0, 10)));
+        assert_eq!(departed.beyond(), Some(0.0));
+    }
+}

@@ -1,0 +1,177 @@
+//! What the autopilot gives each motor of a multicopter against what it gives the others: a motor that gives less thrust than it
+//! should shows there, without any telemetry of its ESC.
+//!
+//! Control keeps the sum of thrust, roll, pitch and yaw. So where one motor is weak, its command rises until the sums are what they
+//! were: the commands change by the projection of that motor on the four. Of four motors that is the weak one's command alone. Of six
+//! it is 2/3 of the loss at the weak motor, 1/6 at four others and -1/3 at the opposite one. What moves the vehicle's load, tilts it
+//! or turns it changes commands in pairs: as much down on one side as up on the other. What is judged is therefore how far the highest
+//! change is above the second, less how far the others are apart from each other: of four motors all others, of six without the
+//! lowest. It is in percent of what the motors are given on the average, smoothed, and against what was usual in this flight.
+//! (Derived from the geometry of regular frames, for this project.)
+//!
+//! A motor that is given next to nothing while the others carry the vehicle was taken out.
+//!
+//! Other frames are not judged: three motors have no such pattern, eight and coaxial ones hardly any.
+
+use crate::flight::Flight;
+use crate::latest::Reading;
+use crate::observation::{MOTORS_MAX, Outputs};
+use crate::time::{Instant, Span};
+use crate::vehicle::Vehicle;
+
+/// Motors of the largest frame that is judged.
+pub(crate) const JUDGED_MAX: usize = 6;
+/// Time constant of the commands, s.
+const SMOOTHING_S: f32 = 1.0;
+/// The usual shares are known after so long, s, and look back over so long.
+const KNOWN_S: f32 = 8.0;
+const MEMORY_S: f32 = 60.0;
+/// Pulses of a motor that does not turn are not longer than this, us.
+const IDLE_US: u16 = 1_150;
+/// Pulses begin here, us. What is shorter on the ground is on another scale, which begins at nothing.
+const ZERO_US: f32 = 1_000.0;
+/// Motors that carry a vehicle are given so much more on the average.
+const CARRIES_US: f32 = 100.0;
+/// Further above the others a change teaches nothing, percent.
+const HOLD_PERCENT: f32 = 10.0;
+/// Below this part of the average, percent, a motor was taken out.
+const OUT_PERCENT: f32 = -70.0;
+/// Messages that are further apart are not of the same hover.
+const PAUSE: Span = Span::from_secs(2);
+/// Tilted further, turning fast so short a time ago, or climbing faster, it does not hover.
+const TILT_RAD: f32 = 0.35;
+const TURNED: Span = Span::from_secs(1);
+const CLIMB_MPS: f32 = 2.0;
+const SETTLED: Span = Span::from_secs(3);
+
+/// The memory of the motors' commands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MotorOutputs {
+    /// The group that has the motors: the first one that has any output.
+    port: Option<u8>,
+    /// The shortest pulse on the ground.
+    lowest: [u16; JUDGED_MAX],
+    /// Command against the average of all, percent, smoothed; and what is usual.
+    share: [f32; JUDGED_MAX],
+    usual: [f32; JUDGED_MAX],
+    learnt_s: f32,
+    at: Option<Instant>,
+    /// The motor that stands out, and how far, percent.
+    alone: (u8, f32),
+}
+
+impl MotorOutputs {
+    /// Nothing seen yet.
+    pub(crate) const fn new() -> Self {
+        Self {
+            port: None,
+            lowest: [u16::MAX; JUDGED_MAX],
+            share: [0.0; JUDGED_MAX],
+            usual: [0.0; JUDGED_MAX],
+            learnt_s: 0.0,
+            at: None,
+            alone: (0, 0.0),
+        }
+    }
+
+    /// A flight begins: nothing is usual yet.
+    pub(crate) const fn begin(&mut self) {
+        *self = Self { port: self.port, lowest: self.lowest, ..Self::new() };
+    }
+
+    pub(crate) fn take(&mut self, at: Instant, outputs: &Outputs, vehicle: &Vehicle, flight: &Flight) {
+        let count = motors(vehicle);
+        let Some(pulses) = outputs.pulses.get(..count).filter(|pulses| pulses.iter().any(|pulse| *pulse > 0))
+        else {
+            return;
+        };
+        if *self.port.get_or_insert(outputs.port) != outputs.port {
+            return;
+        }
+        if !flight.airborne() {
+            for (lowest, pulse) in self.lowest.iter_mut().zip(pulses) {
+                *lowest = if *pulse > 0 { (*lowest).min(*pulse) } else { *lowest };
+            }
+            return;
+        }
+        let lowest = &self.lowest[..count];
+        // What has no idle pulse on the ground is a servo.
+        if lowest.iter().any(|lowest| *lowest > IDLE_US) || !hovers(at, vehicle, flight) {
+            return;
+        }
+        let zero_us =
+            if lowest.iter().all(|lowest| f32::from(*lowest) < ZERO_US / 2.0) { 0.0 } else { ZERO_US };
+        let given = |pulse: &u16| (f32::from(*pulse) - zero_us).max(0.0);
+        let mean = pulses.iter().map(given).sum::<f32>() / count as f32;
+        if mean < CARRIES_US {
+            return;
+        }
+        let begins = self.at.is_none_or(|before| at.since(before) > PAUSE);
+        let step_s = if begins { 0.0 } else { self.at.map_or(0.0, |before| at.since(before).as_secs_f32()) };
+        self.at = Some(at);
+        let weight = if self.learnt_s == 0.0 { 1.0 } else { step_s / (SMOOTHING_S + step_s) };
+        for (share, pulse) in self.share.iter_mut().zip(pulses) {
+            *share += weight * (given(pulse) / mean * 100.0 - 100.0 - *share);
+        }
+        self.judge(count, step_s);
+    }
+
+    fn judge(&mut self, count: usize, step_s: f32) {
+        let mut changes = [(0.0, 0); JUDGED_MAX];
+        for ((place, change), (share, usual)) in
+            (0_u8..).zip(&mut changes).zip(self.share.iter().zip(&self.usual)).take(count)
+        {
+            *change = (share - usual, place);
+        }
+        let changes = &mut changes[..count];
+        changes.sort_unstable_by(|one, other| other.0.total_cmp(&one.0));
+        // Of six the opposite one is lowered.
+        let [first, second, .., lowest] = *changes else { return };
+        let lowest = if count == JUDGED_MAX { changes[count - 2] } else { lowest };
+        let stands_out = (first.0 - second.0) - (second.0 - lowest.0);
+        if self.learnt_s < KNOWN_S || stands_out < HOLD_PERCENT {
+            self.learnt_s = (self.learnt_s + step_s).min(MEMORY_S);
+            let weight = if self.learnt_s > 0.0 { step_s / self.learnt_s } else { 1.0 };
+            for (usual, share) in self.usual.iter_mut().zip(&self.share) {
+                *usual += weight * (share - *usual);
+            }
+        }
+        let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| **share < OUT_PERCENT);
+        self.alone = out.map_or((first.1, stands_out), |(place, _)| (place, 100.0));
+    }
+
+    /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
+    pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+        let at = self.at.filter(|at| now.since(*at) <= PAUSE && self.learnt_s >= KNOWN_S)?;
+        if usize::from(motor) >= motors(vehicle) {
+            return None;
+        }
+        let (place, percent) = self.alone;
+        Some(Reading { at, value: if place == motor { percent.max(0.0) } else { 0.0 } })
+    }
+}
+
+/// Motors of a frame that is judged; 0 of any other. `MAV_TYPE`: 2 quadrotor, 13 hexarotor (a coaxial one calls itself so too, and is
+/// quiet).
+fn motors(vehicle: &Vehicle) -> usize {
+    match vehicle.heartbeat.get().map(|heartbeat| heartbeat.type_number) {
+        Some(2) => 4,
+        Some(13) => JUDGED_MAX,
+        _ => 0,
+    }
+}
+
+/// It need not be slow: a fast leg changes commands in pairs.
+fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+    let level = vehicle
+        .attitude
+        .get()
+        .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
+    let climbs = crate::flight::climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > CLIMB_MPS);
+    level
+        && !climbs
+        && flight.airborne_since().is_some_and(|since| now.since(since) > SETTLED)
+        && vehicle.inertial.turns_little(now, TURNED)
+}
+
+const _: () = assert!(JUDGED_MAX <= MOTORS_MAX);

@@ -1,0 +1,300 @@
+//! What departs from its usual level in a flight is named in time: sensors against each other, vibration, a motor's output, the
+//! estimator's compass. What is so from the beginning, what wind, load and turns do, and what is not fitted says nothing.
+#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
+
+mod common;
+
+use common::{AUTOPILOT, Quad};
+use hums_core::Monitor;
+use hums_core::health::{Finding, Level};
+use hums_core::observation::{
+    Air, Attitude, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation, Outputs, VehicleKind,
+};
+use hums_core::params::Params;
+use hums_core::status::LinkReading;
+use hums_core::time::Instant;
+use hums_core::units::{Gauss, Hectopascals, MetresPerSecond2, Radians, RadiansPerSecond};
+
+/// It takes off at 4 s; what is to be found begins at 30 s.
+const OFF_MS: u64 = 4_000;
+const FAULT_MS: u64 = 30_000;
+const END_MS: u64 = 60_000;
+
+/// A vehicle with three sensors of each kind, and the outputs of its motors.
+#[derive(Clone)]
+struct Fitted {
+    quad: Quad,
+    force: [[f32; 3]; 3],
+    rate: [[f32; 3]; 3],
+    field: [[f32; 3]; 3],
+    pressure: [f32; 3],
+    pulses: [f32; MOTORS_MAX],
+    /// How fast it turns, rad/s.
+    yaw_rate: f32,
+}
+
+/// A number between -1 and 1 for a moment and a sensor: the same one each time.
+fn noise(now_ms: u64, seed: u64) -> f32 {
+    let mut state = (now_ms << 8 | seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    state = (state ^ state >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    ((state >> 40) as f32 / (1_u64 << 23) as f32) - 1.0
+}
+
+impl Fitted {
+    fn healthy(now_ms: u64) -> Self {
+        let mut quad = Quad::healthy();
+        quad.height = if now_ms < OFF_MS { 0.0 } else { 20.0 };
+        quad.throttle = if now_ms < OFF_MS { 0.0 } else { 0.5 };
+        let mut pulses = [0.0; MOTORS_MAX];
+        for (motor, pulse) in (0..4).zip(&mut pulses) {
+            *pulse = if now_ms < OFF_MS { 1_000.0 } else { 1_500.0 + 20.0 * noise(now_ms, motor) };
+        }
+        // Each has its own offset, and shakes in its own way.
+        let shaken = |seed| noise(now_ms, seed) * 2.0;
+        let force =
+            [0, 1, 2].map(|sensor| [0.2 * sensor as f32, shaken(sensor + 10), -9.8 + shaken(sensor + 20)]);
+        let rate = [0, 1, 2].map(|sensor| [0.01 * sensor as f32, 0.05 * noise(now_ms, sensor + 30), 0.0]);
+        let field =
+            [0, 1, 2].map(|sensor| [0.2, 0.05 * sensor as f32, 0.4 + 0.01 * noise(now_ms, sensor + 40)]);
+        let pressure =
+            [0, 1, 2].map(|sensor| 1_000.0 + 0.3 * sensor as f32 + 0.05 * noise(now_ms, sensor + 50));
+        Self { quad, force, rate, field, pressure, pulses, yaw_rate: 0.0 }
+    }
+
+    fn says(&self, now_ms: u64) -> Vec<Observation> {
+        let mut said = self.quad.says(now_ms);
+        said.retain(|said| !matches!(said, Observation::Imu(_) | Observation::Attitude(_)));
+        let rates = Some([0.0, 0.0, self.yaw_rate].map(RadiansPerSecond));
+        said.push(Observation::Attitude(Attitude {
+            roll: Radians(self.quad.roll),
+            rates,
+            boot_ms: Some((now_ms + 100_000) as u32),
+            ..Attitude::default()
+        }));
+        for instance in 0..3_u8 {
+            let sensor = usize::from(instance);
+            said.push(Observation::Imu(Imu {
+                instance,
+                acceleration: Some(self.force[sensor].map(MetresPerSecond2)),
+                rate: Some(self.rate[sensor].map(RadiansPerSecond)),
+                field: Some(self.field[sensor].map(Gauss)),
+                temperature: None,
+            }));
+            let pressure = Some(Hectopascals(self.pressure[sensor]));
+            said.push(Observation::Air(Air { instance, pressure, temperature: None }));
+        }
+        let pulses = self.pulses.map(|pulse| pulse as u16);
+        said.push(Observation::Outputs(Outputs { port: 0, pulses }));
+        said
+    }
+}
+
+/// Flies; the script changes what it says, from the beginning on.
+fn fly(script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
+    let mut monitor = Monitor::new(Params::defaults());
+    let mut findings = Vec::new();
+    for now_ms in (0..END_MS).step_by(50) {
+        let now = Instant::from_millis(now_ms);
+        let mut fitted = Fitted::healthy(now_ms);
+        script(now_ms, &mut fitted);
+        if now_ms.is_multiple_of(100) {
+            for observation in fitted.says(now_ms) {
+                monitor.observe(now, AUTOPILOT, &observation);
+            }
+        }
+        let link = LinkReading { frames_lost: Some(0.0), at: now };
+        monitor.tick(now, &link, &fitted.quad.recorder, &mut |finding| findings.push(*finding));
+    }
+    findings
+}
+
+/// The fault of a script is found as this check of this instance, in time, and as nothing else.
+#[track_caller]
+fn finds(check: &str, instance: u8, level: Level, within_ms: u64, fault: impl Fn(u64, &mut Fitted)) {
+    let findings = fly(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            fault(now_ms, fitted);
+        }
+    });
+    let found = findings.iter().find(|finding| finding.level == level);
+    let found = found.unwrap_or_else(|| panic!("{check} never {level:?}: {findings:?}"));
+    assert!(findings.iter().all(|one| (one.check, one.instance) == (check, instance)), "{findings:?}");
+    let after_ms = found.at.as_millis().saturating_sub(FAULT_MS);
+    assert!((1..=within_ms).contains(&after_ms), "{check} after {after_ms} ms: {findings:?}");
+}
+
+#[track_caller]
+fn is_quiet(script: impl Fn(u64, &mut Fitted)) {
+    assert_eq!(fly(script), []);
+}
+
+#[test]
+fn of_three_sensors_the_one_that_comes_apart_is_named() {
+    for sensor in 0..3_u8 {
+        let place = usize::from(sensor);
+        finds("accel_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.force[place][2] += 3.0);
+        finds("gyro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.rate[place][0] += 0.4);
+        finds("compass_mismatch", sensor, Level::Warning, 3_000, |_, fitted| {
+            fitted.field[place] = [0.5, 0.0, -0.1]
+        });
+        finds("baro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.pressure[place] += 2.5);
+    }
+}
+
+#[test]
+fn of_two_sensors_the_second_stands_for_both() {
+    // The third is not fitted.
+    let two = |fitted: &mut Fitted| {
+        (fitted.force[2], fitted.rate[2], fitted.field[2], fitted.pressure[2]) =
+            ([0.0; 3], [0.0; 3], [0.0; 3], 0.0);
+    };
+    is_quiet(|_, fitted| two(fitted));
+    for wrong in [0, 1] {
+        let findings = fly(|now_ms, fitted| {
+            two(fitted);
+            if now_ms >= FAULT_MS {
+                fitted.force[wrong][0] += 3.0;
+            }
+        });
+        let [found] = findings[..] else { panic!("{findings:?}") };
+        assert_eq!((found.check, found.instance, found.level), ("accel_mismatch", 1, Level::Warning));
+    }
+}
+
+#[test]
+fn what_is_so_from_the_beginning_is_usual() {
+    is_quiet(|_, fitted| {
+        fitted.force[1][0] += 3.0;
+        fitted.rate[1][0] += 0.4;
+        fitted.field[1] = [0.5, 0.0, -0.1];
+        fitted.pressure[1] += 5.0;
+        fitted.pulses[2] += 150.0;
+        fitted.quad.vibration.levels = [Some(20.0); 3];
+    });
+}
+
+#[test]
+fn a_fast_turn_and_a_vtol_say_nothing_about_sensors() {
+    let apart = |now_ms: u64, fitted: &mut Fitted| {
+        if now_ms >= FAULT_MS {
+            fitted.force[1][0] += 3.0;
+            fitted.rate[1][0] += 0.4;
+            fitted.field[1] = [0.5, 0.0, -0.1];
+        }
+    };
+    is_quiet(|now_ms, fitted| {
+        apart(now_ms, fitted);
+        fitted.yaw_rate = if now_ms >= FAULT_MS { 1.0 } else { 0.0 };
+    });
+    is_quiet(|now_ms, fitted| {
+        apart(now_ms, fitted);
+        (fitted.quad.kind, fitted.quad.type_number) = (VehicleKind::Vtol, 20);
+    });
+}
+
+#[test]
+fn vibration_that_jumps_is_named_and_gusts_are_not() {
+    finds("vibration_rise", 0, Level::Warning, 2_500, |_, fitted| {
+        fitted.quad.vibration.levels = [Some(5.0), Some(18.0), Some(5.0)];
+    });
+    is_quiet(|now_ms, fitted| {
+        let gust = 5.0 + 3.0 * noise(now_ms / 2_000, 1) + noise(now_ms, 2);
+        fitted.quad.vibration.levels = [Some(gust); 3];
+    });
+}
+
+#[test]
+fn a_weak_motor_of_a_quadrotor_is_named() {
+    for motor in 0..4_u8 {
+        finds("motor_output", motor, Level::Warning, 4_000, |_, fitted| {
+            fitted.pulses[usize::from(motor)] += 150.0;
+        });
+        finds("motor_output", motor, Level::Critical, 3_000, |_, fitted| {
+            fitted.pulses[usize::from(motor)] += 400.0;
+        });
+    }
+    finds("motor_output", 1, Level::Critical, 4_000, |_, fitted| fitted.pulses[1] = 1_000.0);
+}
+
+/// A hexarotor's commands, where one motor has lost thrust worth `loss` us: the projection on thrust, roll, pitch and yaw.
+fn hexa(fitted: &mut Fitted, now_ms: u64, shift: [f32; 6]) {
+    fitted.quad.type_number = 13;
+    for (motor, pulse) in (0..6).zip(&mut fitted.pulses) {
+        let flies = 1_500.0 + 15.0 * noise(now_ms, motor + 60) + shift[motor as usize];
+        *pulse = if now_ms < OFF_MS { 1_000.0 } else { flies };
+    }
+}
+
+#[test]
+fn a_weak_motor_of_a_hexarotor_is_named() {
+    // Round the frame from the weak one on: 2/3, 1/6, 1/6, -1/3, 1/6, 1/6 of what it lost.
+    let weak = [267.0, 67.0, 67.0, -133.0, 67.0, 67.0];
+    let findings =
+        fly(|now_ms, fitted| hexa(fitted, now_ms, if now_ms < FAULT_MS { [0.0; 6] } else { weak }));
+    let found = findings.iter().find(|one| one.level == Level::Warning).unwrap();
+    assert_eq!((found.check, found.instance), ("motor_output", 0));
+    assert!((FAULT_MS..FAULT_MS + 4_000).contains(&found.at.as_millis()), "{found:?}");
+}
+
+#[test]
+fn load_wind_and_yaw_change_outputs_in_pairs_and_say_nothing() {
+    let quad =
+        [[150.0, -150.0, 0.0, 0.0], [100.0, -100.0, 100.0, -100.0], [90.0, 90.0, -90.0, -90.0], [150.0; 4]];
+    for shift in quad {
+        is_quiet(|now_ms, fitted| {
+            if now_ms >= FAULT_MS {
+                fitted.pulses.iter_mut().zip(shift).for_each(|(pulse, shift)| *pulse += shift);
+            }
+        });
+    }
+    let hexas = [
+        [150.0, 75.0, -75.0, -150.0, -75.0, 75.0],
+        [130.0, 0.0, -130.0, -130.0, 0.0, 130.0],
+        [80.0, -80.0, 80.0, -80.0, 80.0, -80.0],
+    ];
+    for shift in hexas {
+        is_quiet(|now_ms, fitted| hexa(fitted, now_ms, if now_ms < FAULT_MS { [0.0; 6] } else { shift }));
+    }
+}
+
+#[test]
+fn a_servo_among_the_first_outputs_and_a_flight_that_was_not_seen_to_begin_are_not_judged() {
+    let weak = |now_ms: u64, fitted: &mut Fitted| {
+        if now_ms >= FAULT_MS {
+            fitted.pulses[0] += 400.0;
+        }
+    };
+    is_quiet(|now_ms, fitted| {
+        weak(now_ms, fitted);
+        fitted.pulses[3] = 1_500.0;
+    });
+    is_quiet(|now_ms, fitted| {
+        weak(now_ms, fitted);
+        if now_ms < OFF_MS {
+            fitted.pulses = [0.0; MOTORS_MAX];
+        }
+    });
+}
+
+#[test]
+fn px4_that_stops_using_its_compass_is_named() {
+    let px4 = |compass| Estimator {
+        scale: EstimatorScale::TestRatio,
+        velocity: Some(0.1),
+        position_horizontal: Some(0.1),
+        position_vertical: Some(0.1),
+        compass,
+        ..Estimator::default()
+    };
+    let findings = fly(|now_ms, fitted| {
+        fitted.quad.estimator = px4(if now_ms < FAULT_MS { Some(0.1) } else { None });
+    });
+    let [found] = findings[..] else { panic!("{findings:?}") };
+    assert_eq!((found.check, found.level), ("compass_unused", Level::Warning));
+    assert!((FAULT_MS + 1_000..FAULT_MS + 1_200).contains(&found.at.as_millis()), "{found:?}");
+    // One that was never used is none that was lost.
+    is_quiet(|_, fitted| {
+        (fitted.quad.autopilot, fitted.quad.estimator) = (Autopilot::Px4, px4(None));
+        fitted.quad.vibration.levels = [Some(0.0), Some(0.0), Some(1.0)];
+    });
+}
