@@ -1,5 +1,6 @@
 //! What a vehicle's components say in words: `STATUSTEXT`, long ones put together from their parts.
 
+use hums_core::cause::Alert;
 use hums_core::observation::Source;
 use hums_core::time::{Instant, Span};
 
@@ -24,6 +25,8 @@ pub struct Text {
     pub severity: u8,
     /// Text of the world, never markup.
     pub words: String,
+    /// What its first part says is wrong.
+    pub alert: Option<Alert>,
     /// The number that its parts share; 0 where there is but one.
     id: u16,
     /// Nothing follows.
@@ -33,7 +36,7 @@ pub struct Text {
 impl Text {
     /// A text that is whole.
     pub fn whole(at: Instant, source: Source, severity: u8, words: &str) -> Self {
-        Self { at, source, severity, words: words.to_owned(), id: 0, ends: true }
+        Self { at, source, severity, words: words.to_owned(), alert: None, id: 0, ends: true }
     }
 
     /// The level of a finding as grave as this.
@@ -51,7 +54,8 @@ impl Text {
         let id = payload.number("id").unwrap_or(0.0) as u16;
         let severity = payload.number("severity").unwrap_or(0.0) as u8;
         let words = String::from_utf8_lossy(bytes).into_owned();
-        Some(Self { at, source, severity, words, id, ends: id == 0 || bytes.len() < PART_BYTES })
+        let ends = id == 0 || bytes.len() < PART_BYTES;
+        Some(Self { at, source, severity, words, alert: None, id, ends })
     }
 }
 

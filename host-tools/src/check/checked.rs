@@ -21,12 +21,8 @@ impl Checked {
     /// How the run ended for this one.
     pub(super) fn outcome(&self) -> Outcome {
         let wrong = !self.judged.problems.is_empty();
-        // A file of a card into which nothing was written is no recording.
-        let is_empty = self.ending.as_ref().is_some_and(|ending| ending.summary.session.is_none());
-        // Too little to judge is no damage: it is said, and what was judged counts.
-        let nobody = self.judged.worst().is_none() && !is_empty;
-        let lossy =
-            self.aside().is_none() && (self.judged.damages > 0 || nobody || !self.unproved().is_empty());
+        // Too little to judge, or nothing, is no damage: the verdict says so.
+        let lossy = self.aside().is_none() && (self.judged.damages > 0 || !self.unproved().is_empty());
         Outcome::lossy(lossy).and(if wrong { Outcome::Findings } else { Outcome::Done })
     }
 

@@ -1,9 +1,8 @@
 //! What a check of several things was of: which failsafe, which sensor. The monitor counts and compares; names are for
 //! people.
 
-use hums_core::Monitor;
 use hums_core::alert::HOLDS;
-use hums_core::cause::{Alert, Cause, Causes};
+use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::health::{Level, checks};
 use hums_core::observation::{AutopilotIdentity, Heartbeat, Source, SystemStatus};
 use hums_core::params::{Param, Params};
@@ -82,35 +81,24 @@ impl Details {
     }
 
     /// These failsafes are in force from here on.
-    pub(super) fn failsafes(&mut self, words: &str, problems: &mut Problems) {
+    pub(super) fn failsafes(&mut self, words: &str) {
         words.clone_into(&mut self.failsafes);
-        self.tell(FAILSAFE, problems);
     }
 
     /// The vehicle says which of its sensors are not healthy.
-    pub(super) fn sensors(
-        &mut self,
-        source: Source,
-        status: &SystemStatus,
-        monitor: &Monitor,
-        problems: &mut Problems,
-    ) {
-        if monitor.vehicle().source == Some(source)
-            && let Some(unhealthy) = status.unhealthy.filter(|unhealthy| *unhealthy != self.sensors)
-        {
-            self.sensors = unhealthy;
-            for cause in Cause::ALL {
-                self.tell(cause.check(), problems);
-            }
-        }
+    pub(super) fn sensors(&mut self, status: &SystemStatus) -> bool {
+        let is_new = status.unhealthy.filter(|unhealthy| *unhealthy != self.sensors);
+        self.sensors = is_new.unwrap_or(self.sensors);
+        is_new.is_some()
     }
 
-    /// The autopilot says in words that something is wrong.
-    pub(super) fn said(&mut self, at: Instant, alert: Alert, words: &str, problems: &mut Problems) {
-        if let Some(said) = self.said.get_mut(alert.cause as usize) {
-            *said = Some((at, words.to_owned()));
+    /// It says in words that something is wrong, or (`false`) no longer is.
+    pub(super) fn said(&mut self, at: Instant, alert: Alert, words: String) -> bool {
+        let is_wrong = alert.urgency > Urgency::Over;
+        if let Some(said) = self.said.get_mut(alert.cause as usize).filter(|_| is_wrong) {
+            *said = Some((at, words));
         }
-        self.tell(alert.cause.check(), problems);
+        is_wrong
     }
 
     /// An autopilot tells what it is.

@@ -8,12 +8,11 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
-use hums_core::alert;
-use hums_core::cause::{Alert, Urgency};
+use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
-use hums_core::observation::Observation;
+use hums_core::observation::{Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
@@ -141,8 +140,10 @@ impl Judge {
             Item::Observation(source, observation) => {
                 self.advance(at);
                 match observation {
-                    Observation::SystemStatus(status) => {
-                        self.details.sensors(source, status, &self.monitor, &mut self.here);
+                    Observation::SystemStatus(status) if self.is_vehicle(source) => {
+                        if self.details.sensors(status) {
+                            Cause::ALL.into_iter().for_each(|cause| self.tell(cause.check()));
+                        }
                     }
                     Observation::Battery(battery) => self.details.battery(source, battery.id),
                     Observation::Heartbeat(heartbeat) => self.details.heartbeat(source, heartbeat),
@@ -152,7 +153,8 @@ impl Judge {
                 self.monitor.observe(self.clock.monitor(at), source, observation);
             }
             Item::Fact(Fact { about: About::Failsafes, words }) => {
-                self.details.failsafes(words, &mut self.here);
+                self.details.failsafes(words);
+                self.tell(details::FAILSAFE);
             }
             Item::Fact(Fact { about: About::Emergency, words }) => self.emergency(at, words),
             Item::Epoch(epoch_us) => self.epochs.epoch(epoch_us),
@@ -173,22 +175,32 @@ impl Judge {
             Item::Parameter(parameter) => {
                 self.monitor.learn_parameter(parameter.name, parameter.value as f32);
             }
-            Item::Text(Text { severity, words, .. }) => {
-                let severity = Some(severity).filter(|_| self.format != Format::DataFlash);
-                self.said(at, alert::of_text(severity, words.as_bytes()), words);
+            Item::Text(Text { source, words, alert: Some(alert), .. }) => {
+                self.said(at, source, alert, words.to_owned());
             }
-            Item::Event(Event { number, severity, words }) => {
-                self.said(at, alert::of_event(number, severity, &[]), words);
+            Item::Event(Event { source, number, words, alert: Some(alert), .. }) => {
+                let words = if words.is_empty() { format!("event {number}") } else { words.to_owned() };
+                self.said(at, source, alert, words);
             }
-            Item::Frame(_) | Item::Mode(_) | Item::Row(_) => {}
+            Item::Text(_) | Item::Event(_) | Item::Frame(_) | Item::Mode(_) | Item::Row(_) => {}
         }
     }
 
-    /// The autopilot says something in words.
-    fn said(&mut self, at: Instant, alert: Option<Alert>, words: &str) {
-        if let Some(alert) = alert.filter(|alert| alert.urgency > Urgency::Over && !words.is_empty()) {
-            self.details.said(at, alert, words, &mut self.here);
+    fn is_vehicle(&self, source: Source) -> bool {
+        self.monitor.vehicle().source == Some(source)
+    }
+
+    /// Somebody says in words that something is wrong.
+    fn said(&mut self, at: Instant, source: Source, alert: Alert, words: String) {
+        if self.is_vehicle(source) && self.details.said(at, alert, words) {
+            self.tell(alert.cause.check());
         }
+    }
+
+    /// What a check is of, while it is wrong: here, and as the board found it.
+    fn tell(&mut self, check: &str) {
+        self.details.tell(check, &mut self.here);
+        self.details.tell(check, &mut self.board);
     }
 
     fn told(&mut self, told: &Told) {
@@ -200,6 +212,7 @@ impl Judge {
             Told::Finding(finding) => {
                 self.checked_on_board = true;
                 self.board.take(finding, Span::ZERO);
+                self.details.tell(&finding.check, &mut self.board);
             }
             Told::Checked => self.checked_on_board = true,
             Told::Parameter { .. } | Told::Part { .. } => {}

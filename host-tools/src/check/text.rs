@@ -290,9 +290,9 @@ fn verdict(judged: &Judged) -> String {
     let all = judged.judged.len() + judged.not_judged.len();
     match judged.worst() {
         None if judged.gaps.iter().any(|gap| gap.cause == Cause::NoTimes) => {
-            "nothing can be said: the log has no times".to_owned()
+            "unknown: the log has no times, and nothing was judged".to_owned()
         }
-        None => "nothing can be said: no autopilot was heard".to_owned(),
+        None => "unknown: no autopilot was heard, and nothing was judged".to_owned(),
         Some(Level::Critical) if warnings > 0 => format!(
             "not fit to fly before this is cleared up: {}, {}",
             plural(critical, "critical finding"),

@@ -13,6 +13,7 @@
 use std::sync::Arc;
 
 use anyhow::Result;
+use hums_core::cause::Alert;
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use hums_link::Frame;
@@ -70,6 +71,8 @@ pub struct Text<'a> {
     pub severity: u8,
     /// Words of the world, never markup.
     pub words: &'a str,
+    /// What they say is wrong: an [`Observation::Alert`] of its own, which the monitor takes.
+    pub alert: Option<Alert>,
 }
 
 /// A flight mode.
@@ -84,12 +87,16 @@ pub struct Mode<'a> {
 /// An event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event<'a> {
+    /// Who.
+    pub source: Source,
     /// Its number: `PX4`'s event id; of `ArduPilot`'s `EV` the number, of its `ERR` subsystem times 256 plus code.
     pub number: u32,
     /// `MAV_SEVERITY`.
     pub severity: u8,
     /// Its name or meaning; empty where nothing is known of it.
     pub words: &'a str,
+    /// What it says is wrong: as of a [`Text`].
+    pub alert: Option<Alert>,
 }
 
 /// A fact.
@@ -300,6 +307,17 @@ impl Rows<'_> {
 
 /// What gets each item with its time. An error of it ends the reading and is handed on; [`Stop`] is no failure.
 pub type Take<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
+
+/// Hands on a text or an event, and before it the alert that it is, where observations are wanted.
+pub fn hand_said(at: Instant, item: Item<'_>, want_observations: bool, take: &mut Take<'_>) -> Result<()> {
+    if let Item::Text(Text { source, alert: Some(alert), .. })
+    | Item::Event(Event { source, alert: Some(alert), .. }) = item
+        && want_observations
+    {
+        take(at, Item::Observation(source, &Observation::Alert(alert)))?;
+    }
+    take(at, item)
+}
 
 /// The error of a [`Take`] that has had enough.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

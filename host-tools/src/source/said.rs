@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use hums_core::alert::event_name;
+use hums_core::cause::Alert;
 use hums_core::observation::{Autopilot, Observation};
 use hums_core::time::Instant;
 use hums_link::encode::COMPONENT;
@@ -39,13 +40,18 @@ impl Said {
         if frame.check() != Check::Verified {
             return Ok(());
         }
+        let observed = observe(frame);
+        let alert = match &observed {
+            Some((_, Observation::Alert(alert))) => Some(*alert),
+            _ => None,
+        };
         match frame.id() {
-            STATUSTEXT => self.text(at, frame, take)?,
-            EVENT => event(at, frame, take)?,
+            STATUSTEXT => self.text(at, frame, alert, take)?,
+            EVENT => event(at, frame, alert, take)?,
             PARAM_VALUE if frame.component() != COMPONENT => parameter(at, frame, self.autopilot, take)?,
             _ => {}
         }
-        let Some((source, observation)) = observe(frame) else { return Ok(()) };
+        let Some((source, observation)) = observed else { return Ok(()) };
         if let Observation::Heartbeat(heartbeat) = &observation {
             self.autopilot = heartbeat.autopilot;
             take(at, Item::Mode(Mode { number: heartbeat.mode, name: None }))?;
@@ -58,8 +64,15 @@ impl Said {
         hand_texts(take, |hand| self.texts.end(&mut |text| hand(text)))
     }
 
-    fn text(&mut self, at: Instant, frame: &Frame<'_>, take: &mut Take<'_>) -> Result<()> {
-        let Some(text) = statustext::Text::of(at, frame.source(), frame.payload()) else { return Ok(()) };
+    fn text(
+        &mut self,
+        at: Instant,
+        frame: &Frame<'_>,
+        alert: Option<Alert>,
+        take: &mut Take<'_>,
+    ) -> Result<()> {
+        let Some(mut text) = statustext::Text::of(at, frame.source(), frame.payload()) else { return Ok(()) };
+        text.alert = alert;
         hand_texts(take, |hand| self.texts.take(text, &mut |text| hand(text)))
     }
 }
@@ -81,15 +94,17 @@ fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
     if text.source.component == AUTOPILOT && is_firmware(words) {
         take(text.at, Item::Fact(Fact { about: About::Firmware, words }))?;
     }
-    take(text.at, Item::Text(Text { source: text.source, severity: text.severity, words }))
+    let statustext::Text { source, severity, alert, .. } = *text;
+    take(text.at, Item::Text(Text { source, severity, words, alert }))
 }
 
 /// `EVENT`: its number, its name where that is known, and its level outside. From 8 on it is not for people.
-fn event(at: Instant, frame: &Frame<'_>, take: &mut Take<'_>) -> Result<()> {
+fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut Take<'_>) -> Result<()> {
     let fields = Fields(frame.payload());
     let (number, severity) = (fields.u32(0), fields.u8(12) & 0xF);
     let words = event_name(number).unwrap_or_default();
-    if severity < 8 { take(at, Item::Event(Event { number, severity, words })) } else { Ok(()) }
+    let event = Event { source: frame.source(), number, severity, words, alert };
+    if severity < 8 { take(at, Item::Event(event)) } else { Ok(()) }
 }
 
 /// `PARAM_VALUE`. An integer is the bits of the float at PX4, and a number like any other at ArduPilot

@@ -283,7 +283,7 @@ fn a_log_without_times_is_not_called_good_and_its_page_neither() {
         FMT, 1, 17, ATT, ccc, Roll,Pitch,Yaw\nEV, 10\nATT, 0.00, 0.47, 0.00\n";
     fs::write(dir.path().join("old.log"), log).expect("written");
     let screen = text(&run(dir.path(), "check old.log", 3));
-    assert!(screen.contains("nothing can be said: the log has no times"), "{screen}");
+    assert!(screen.contains("unknown: the log has no times, and nothing was judged"), "{screen}");
     assert!(screen.contains("ArduCopter V3.0.1") && !screen.contains("never armed"), "{screen}");
     run(dir.path(), "report old.log -o old.html", 3);
     let info = text(&run(dir.path(), "info old.log", 3));
@@ -430,19 +430,41 @@ fn a_log_in_which_there_was_nothing_to_judge_does_not_look_good_to_a_script() {
     fs::write(dir.path().join("little.bin"), dataflash(&little)).expect("written");
     let tracker = [definition, message(1, "AntennaTracker V4.5.0"), message(5, "x")];
     fs::write(dir.path().join("nobody.bin"), dataflash(&tracker)).expect("written");
-    for (name, code, verdict, words) in [
-        ("little.bin", 0, "too_little", "not enough to judge: "),
-        ("nobody.bin", 3, "unknown", "nothing can be said: no autopilot was heard"),
+    fs::write(dir.path().join("nobody.ulg"), ulog_of_nothing_known()).expect("written");
+    let nobody = "unknown: no autopilot was heard, and nothing was judged";
+    for (name, verdict, words) in [
+        ("little.bin", "too_little", "not enough to judge: "),
+        ("nobody.bin", "unknown", nobody),
+        ("nobody.ulg", "unknown", nobody),
     ] {
-        let checked = json(&run(dir.path(), &format!("check --json {name}"), code));
+        let checked = json(&run(dir.path(), &format!("check --json {name}"), 0));
         assert_eq!((checked["verdict"].as_str(), checked["damaged"].as_bool()), (Some(verdict), Some(false)));
-        assert!(text(&run(dir.path(), &format!("check {name}"), code)).contains(words));
+        assert!(checked["vehicle"].is_null() == (verdict == "unknown"), "{checked}");
+        assert!(text(&run(dir.path(), &format!("check {name}"), 0)).contains(words));
     }
     // It neither hides what is wrong with another log nor counts as good.
     faults(dir.path());
     let table = text(&run(dir.path(), "check little.bin faults.tlog", 4));
     assert!(table.contains("1  not enough in it to judge") && !table.contains("nothing wrong"), "{table}");
-    run(dir.path(), "check nobody.bin faults.tlog little.bin", 3);
+    let table = text(&run(dir.path(), "check nobody.bin faults.tlog little.bin", 4));
+    assert!(table.contains("1  no vehicle in it"), "{table}");
+}
+
+/// A ULog of a topic that no check reads.
+fn ulog_of_nothing_known() -> Vec<u8> {
+    let mut log = b"ULog\x01\x12\x35\x01".to_vec();
+    log.extend(1_000_000_u64.to_le_bytes());
+    let mut message = |kind: u8, body: &[u8]| {
+        log.extend((body.len() as u16).to_le_bytes());
+        log.push(kind);
+        log.extend(body);
+    };
+    message(b'F', b"camera_stuff:uint64_t timestamp;uint8_t shots;");
+    message(b'A', &[&[0, 0, 0][..], b"camera_stuff"].concat());
+    for second in 1..20_u64 {
+        message(b'D', &[&[0, 0][..], &(second * 1_000_000).to_le_bytes(), &[7]].concat());
+    }
+    log
 }
 
 /// A ULog in which a vehicle is heard for 20 s, and whose logger lost something.

@@ -9,7 +9,7 @@ use hums_core::units::{Fraction, Rpm, Volts};
 
 use super::*;
 use crate::check::flights::Flight;
-use crate::source::item::Cause;
+use crate::source::item::{Cause as Why, hand_said};
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -173,7 +173,7 @@ fn a_gap_is_no_time_in_the_air_and_a_landing_right_before_it_ends_the_flight() {
         }
         let (from, to) = (Some(at), Some(Instant::from_millis(930_000)));
         let words = String::new();
-        let gap = Gap { from, to, cause: Cause::NotKept, place: None, bytes: 0, words };
+        let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words };
         judge.item(Instant::from_millis(930_000), Item::Gap(&gap));
         half_seconds(&mut judge, 930_000, 950_000, true, LandedState::InAir);
         let flights = judge.end().flights;
@@ -301,7 +301,7 @@ fn a_recording_that_does_not_tell_arming_says_so_and_not_never() {
 fn nothing_of_a_vehicle_is_no_good_news() {
     let mut judge = Judge::new(&Limits::default(), Format::Tlog);
     let gap =
-        Gap { from: None, to: None, cause: Cause::Cut, place: Some(7), bytes: 3, words: "cut".to_owned() };
+        Gap { from: None, to: None, cause: Why::Cut, place: Some(7), bytes: 3, words: "cut".to_owned() };
     judge.item(Instant::ZERO, Item::Gap(&gap));
     let judged = judge.end();
     assert_eq!((judged.worst(), judged.damages), (None, 1));
@@ -375,11 +375,11 @@ fn escs(judge: &mut Judge, from_ms: u64, to_ms: u64) {
 #[test]
 fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is_found() {
     for (told, others, cause, silent) in [
-        (true, false, Cause::NotKept, 0),
-        (true, false, Cause::Lost, 0),
-        (true, false, Cause::Damaged, 0),
-        (false, false, Cause::Lost, 0),
-        (false, true, Cause::Lost, 1),
+        (true, false, Why::NotKept, 0),
+        (true, false, Why::Lost, 0),
+        (true, false, Why::Damaged, 0),
+        (false, false, Why::Lost, 0),
+        (false, true, Why::Lost, 1),
     ] {
         let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
         escs(&mut judge, 0, 10_000);
@@ -409,7 +409,7 @@ fn findings_after_a_pause_have_the_recordings_time() {
     fly(&mut judge, 0, 10, 10, 0.9);
     let (from, to) = (Some(Instant::from_millis(9_900)), Some(Instant::from_millis(30_000)));
     let words = String::new();
-    let gap = Gap { from, to, cause: Cause::NotKept, place: None, bytes: 0, words };
+    let gap = Gap { from, to, cause: Why::NotKept, place: None, bytes: 0, words };
     judge.item(Instant::from_millis(30_000), Item::Gap(&gap));
     fly(&mut judge, 30, 40, 10, 0.1);
     let found = found(&judge.end());
@@ -445,4 +445,71 @@ fn what_the_board_found_counts_unless_other_limits_are_asked_for() {
         assert_eq!(judged.by, by);
         assert_eq!(judged.problems.iter().map(|problem| problem.check.as_str()).collect::<Vec<_>>(), [check]);
     }
+}
+
+/// Twenty seconds of an armed vehicle, and this at the tenth.
+fn armed_and_told(format: Format, item: Item<'_>) -> Judged {
+    let mut judge = Judge::new(&Limits::default(), format);
+    for tick in 0..200_u64 {
+        let at = Instant::from_millis(tick * 100);
+        judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
+        if tick == 100 {
+            let mut take = |at: Instant, item: Item<'_>| {
+                judge.item(at, item);
+                Ok(())
+            };
+            hand_said(at, item, true, &mut take).expect("no error");
+        }
+    }
+    judge.end()
+}
+
+#[test]
+fn a_finding_names_the_text_or_the_event_that_raised_it_whatever_the_words_of_it_mean_by_themselves() {
+    use hums_core::cause::Urgency;
+    let alert = Some(Alert { cause: Cause::Power, urgency: Urgency::Warning });
+    let stranger = Source { system: 255, component: 190 };
+    let text = |source| Item::Text(Text { source, severity: 6, words: "it hums no more", alert });
+    let event = |words| Item::Event(Event { source: AUTOPILOT, number: 4711, severity: 7, words, alert });
+    for (item, named) in [
+        (text(AUTOPILOT), Some("it hums no more")),
+        (event("a name"), Some("a name")),
+        (event(""), Some("event 4711")),
+        (text(stranger), None),
+    ] {
+        let judged = armed_and_told(Format::Ulog, item);
+        let names: Vec<_> = judged.problems.iter().flat_map(|problem| &problem.details).collect();
+        assert_eq!(names, Vec::from_iter(named), "{:?}", judged.problems);
+        assert_eq!(judged.problems.len(), usize::from(named.is_some()), "{:?}", judged.problems);
+    }
+    // What nobody calls an alert is none, however severe.
+    let silent = Text { source: AUTOPILOT, severity: 0, words: "Battery failsafe", alert: None };
+    assert!(armed_and_told(Format::Tlog, Item::Text(silent)).problems.is_empty());
+}
+
+#[test]
+fn what_the_board_found_is_named_too() {
+    use hums_core::cause::Urgency;
+    let mut judge = Judge::new(&Limits::default(), Format::Hums);
+    let finding = Finding {
+        at: Instant::from_millis(5_100),
+        subsystem: hums_core::health::Subsystem::Power,
+        check: "battery_alert".to_owned(),
+        instance: 0,
+        level: Level::Warning,
+        previous: Level::Ok,
+        value: 1.0,
+        limit: 0.5,
+        unit: String::new(),
+    };
+    fly(&mut judge, 0, 5, 10, 0.9);
+    let alert = Some(Alert { cause: Cause::Power, urgency: Urgency::Warning });
+    let text = Text { source: AUTOPILOT, severity: 4, words: "Battery 1 is low", alert };
+    judge.item(Instant::from_millis(5_050), Item::Text(text));
+    judge.item(finding.at, Item::Record(&Told::Finding(Box::new(finding))));
+    let judged = judge.end();
+    assert_eq!(
+        (judged.by, judged.problems[0].details.clone()),
+        (JudgedBy::Board, vec!["Battery 1 is low".to_owned()])
+    );
 }

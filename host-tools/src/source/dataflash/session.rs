@@ -19,7 +19,7 @@ use crate::plural::count;
 use crate::source::clock::Wrong;
 use crate::source::item::{
     About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
-    Text, Want,
+    Text, Want, hand_said,
 };
 
 /// The autopilot: every log is of one.
@@ -521,9 +521,11 @@ impl Said<'_, '_> {
             Say::Observation(observation) if self.observations => Item::Observation(SOURCE, observation),
             Say::Observation(_) => return Ok(()),
             Say::Parameter(name, value) => Item::Parameter(Parameter { name, value }),
-            Say::Text(severity, words) => Item::Text(Text { source: SOURCE, severity, words }),
+            Say::Text(severity, words, alert) => Item::Text(Text { source: SOURCE, severity, words, alert }),
             Say::Mode(number) => Item::Mode(Mode { number, name: self.craft.mode_name(number) }),
-            Say::Event(number, severity, words) => Item::Event(Event { number, severity, words }),
+            Say::Event(number, severity, words, alert) => {
+                Item::Event(Event { source: SOURCE, number, severity, words, alert })
+            }
             Say::Arming(words) => Item::Fact(Fact { about: About::Arming, words }),
             Say::Failsafes(words) => Item::Fact(Fact { about: About::Failsafes, words }),
             Say::Emergency(words) => Item::Fact(Fact { about: About::Emergency, words }),
@@ -545,6 +547,6 @@ impl Said<'_, '_> {
                 return (self.take)(self.at, Item::Gap(&gap));
             }
         };
-        (self.take)(self.at, item)
+        hand_said(self.at, item, self.observations, self.take)
     }
 }

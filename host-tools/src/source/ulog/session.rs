@@ -6,8 +6,6 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use hums_core::alert::{self, event_name};
-use hums_core::cause::{self, Alert};
-use hums_core::observation::Observation;
 use hums_core::time::Span;
 
 use super::fields::Fields;
@@ -23,7 +21,7 @@ use super::window::Window;
 use crate::source::clock::{self, Clock, Reading, Stamp, Wrong};
 use crate::source::item::{
     About, Cause, Column, Event, Fact, Gap, Item, Kind, Mode, Parameter, Row, Rows, Summary, Table, Take,
-    Text, Value, Want,
+    Text, Value, Want, hand_said,
 };
 
 /// An event that is older than this when it comes tells of what was before the log.
@@ -205,6 +203,11 @@ impl<'a, 'b> Session<'a, 'b> {
 
     fn tell(&mut self, item: Item<'_>) -> Result<()> {
         (self.take)(self.clock.now(), item)
+    }
+
+    /// A text or an event.
+    fn tell_said(&mut self, item: Item<'_>) -> Result<()> {
+        hand_said(self.clock.now(), item, self.want.observations, self.take)
     }
 
     fn gap(&mut self, cause: Cause, place: Option<u64>, bytes: u64, words: String) -> Result<()> {
@@ -413,8 +416,8 @@ impl<'a, 'b> Session<'a, 'b> {
             Told::Text { severity, words } => self.say(severity, &words),
             Told::Event { number, severity, arguments, is_old } => {
                 let words = event_name(number).unwrap_or_default();
-                self.tell(Item::Event(Event { number, severity, words }))?;
-                self.alert(alert::of_event(number, severity, &arguments).filter(|_| !is_old))
+                let alert = alert::of_event(number, severity, &arguments).filter(|_| !is_old);
+                self.tell_said(Item::Event(Event { source, number, severity, words, alert }))
             }
             Told::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
             Told::Failsafes(words) => self.tell(Item::Fact(Fact { about: About::Failsafes, words: &words })),
@@ -446,23 +449,14 @@ impl<'a, 'b> Session<'a, 'b> {
         self.say(level, text_of(words).trim_end())
     }
 
-    /// What the autopilot says is wrong.
-    fn alert(&mut self, alert: Option<Alert>) -> Result<()> {
-        let Some(alert) = alert.filter(|_| self.want.observations) else { return Ok(()) };
-        let source = self.px4.source();
-        self.tell(Item::Observation(source, &Observation::Alert(alert)))
-    }
-
     fn say(&mut self, severity: u8, words: &str) -> Result<()> {
         if words.is_empty() || words == self.last_words {
             return Ok(());
         }
         words.clone_into(&mut self.last_words);
         let source = self.px4.source();
-        self.tell(Item::Text(Text { source, severity, words }))?;
-        // A console's line that no table knows is not for a pilot, however severe.
         let alert = alert::of_text(Some(severity), without_module(words).as_bytes());
-        self.alert(alert.filter(|alert| alert.cause != cause::Cause::Other))
+        self.tell_said(Item::Text(Text { source, severity, words, alert }))
     }
 
     fn dropout(&mut self, place: u64, milliseconds: u16) -> Result<()> {

@@ -243,6 +243,15 @@ fn an_empty_line_of_a_console_is_no_damage() {
 }
 
 #[test]
+fn a_severe_line_of_a_console_is_an_alert_though_nobody_knows_what_it_means() {
+    let read =
+        read(&small().text(b'3', 4 * SECOND, "[flux] capacitor drained").text(b'4', 4 * SECOND, "x").bytes);
+    assert_eq!(read.of("text"), ["3 [flux] capacitor drained", "4 x"]);
+    let alerts: Vec<_> = read.of("observation").into_iter().filter(|told| told.contains("Alert")).collect();
+    assert!(matches!(alerts[..], [alert] if alert.contains("Other")), "{alerts:?}");
+}
+
+#[test]
 fn kinds_of_messages_that_are_newer_than_this_reader_are_skipped() {
     let read = read(&small().message(b'Z', &[b"something new"]).data(0, 4 * SECOND, &position(0.0, 0)).bytes);
     assert_eq!((read.of("row position").len(), read.gaps.len()), (21, 0));

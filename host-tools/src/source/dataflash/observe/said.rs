@@ -91,10 +91,7 @@ fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         }
     }
     // A log keeps no severity of its texts.
-    if let Some(alert) = alert::of_text(None, words.as_bytes()) {
-        out.observe(&Observation::Alert(alert));
-    }
-    out.say(&Say::Text(INFO, &words));
+    out.say(&Say::Text(INFO, &words, alert::of_text(None, words.as_bytes())));
 }
 
 fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
@@ -154,7 +151,7 @@ fn event(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         28 => state.leave_ground(),
         _ => {}
     }
-    out.say(&Say::Event(number.into(), NOTICE, words::event(number)));
+    out.say(&Say::Event(number.into(), NOTICE, words::event(number), None));
 }
 
 fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
@@ -166,12 +163,10 @@ fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if subsystem == CRASH_CHECK && code != 0 {
         out.say(&Say::Emergency(words::subsystem(CRASH_CHECK)));
     }
-    if let Some(alert) = words::alert(subsystem, code) {
-        out.observe(&Observation::Alert(alert));
-    }
     let severity = if code == 0 { NOTICE } else { ERROR };
     let number = u32::from(subsystem) << 8 | u32::from(code);
-    out.say(&Say::Event(number, severity, &words::error(subsystem, code)));
+    let alert = words::alert(subsystem, code);
+    out.say(&Say::Event(number, severity, &words::error(subsystem, code), alert));
 }
 
 /// The autopilot counts the messages that its logger had no room for.

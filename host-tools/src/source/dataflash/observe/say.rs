@@ -1,5 +1,6 @@
 //! What handlers say, and where to.
 
+use hums_core::cause::Alert;
 use hums_core::observation::Observation;
 
 /// What handlers say.
@@ -8,12 +9,12 @@ pub(in crate::source::dataflash) enum Say<'a> {
     Observation(&'a Observation),
     /// A parameter and its value.
     Parameter(&'a str, f64),
-    /// Words with their severity.
-    Text(u8, &'a str),
+    /// Words with their severity, and what they say is wrong.
+    Text(u8, &'a str, Option<Alert>),
     /// The mode's number.
     Mode(u32),
-    /// An event's number, severity and words.
-    Event(u32, u8, &'a str),
+    /// An event's number, severity and words, and what it says is wrong.
+    Event(u32, u8, &'a str, Option<Alert>),
     /// The firmware's name and version.
     Firmware(&'a str),
     /// The airframe.
