@@ -194,6 +194,11 @@ impl Mishap {
         self.fate() != Fate::Own
     }
 
+    /// Whether it is over: the vehicle lies where it came down.
+    pub(crate) const fn is_down(&self) -> bool {
+        matches!(self.state, State::Down)
+    }
+
     /// What a check reads: the worst of this mishap, 0 while there is none; `None` where the vehicle does not tell enough to see
     /// it.
     pub(crate) fn reading(&self, kind: Kind, now: Instant, vehicle: &Vehicle) -> Option<Reading> {

@@ -143,6 +143,7 @@ impl Monitor {
         self.derived = Derived::new();
         self.health = Health::new();
         self.protect = Protect::new();
+        self.usage.break_off();
         self.parameters_asked = false;
         self.happenings.push(Happening::OtherVehicle);
     }
@@ -157,7 +158,6 @@ impl Monitor {
 
     /// What comes next is of another recording, of another day or another vehicle: nothing holds but what was counted.
     pub fn begin_another_recording(&mut self) {
-        self.usage.break_off();
         self.vehicle = Vehicle::unknown();
         self.begin_with_another();
         self.cells_told = false;

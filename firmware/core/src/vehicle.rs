@@ -29,6 +29,8 @@ const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
 /// Boot times follow each other within this of the time that went by, microseconds: messages overtake each other and wait in line.
 /// One that falls by more is a reboot.
 const REBOOT_US: i64 = 3_000_000;
+/// An autopilot that restarts in flight is off no longer.
+const OFF: Span = Span::from_secs(10);
 
 /// One motor, put together from whichever ESC messages the vehicle sends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -378,12 +380,16 @@ impl Vehicle {
             self.odd_boot = Some((boot_ms, at));
             return;
         }
-        if self.boot.map(ahead_us).is_some_and(|(ahead, _)| ahead < 0) {
+        if let Some((_, told_at)) = self.boot
+            && self.boot.map(ahead_us).is_some_and(|(ahead, _)| ahead < 0)
+        {
+            // How long nothing was heard before this power-on: what happened in a long silence, a landing too, nobody knows.
+            let silent_ms = at.since(told_at).as_millis().saturating_sub(boot_ms.into());
             self.reboots = self.reboots.saturating_add(1);
             self.rebooted_at = Some(at);
             // As it was before: the first heartbeat after a restart may come before the time that shows it, and an autopilot's own
             // log of the next power-on may begin with its arming.
-            self.rebooted_armed = self.boot_armed;
+            self.rebooted_armed = self.boot_armed && silent_ms <= OFF.as_millis();
         }
         (self.boot, self.odd_boot, self.boot_armed) = (Some((boot_ms, at)), None, self.armed());
     }

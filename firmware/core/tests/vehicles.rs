@@ -137,8 +137,8 @@ fn what_is_a_fault_of_a_multicopter_is_none_of_a_plane_a_vtol_or_a_helicopter() 
     }
 }
 
-/// Says it restarted at 30 s, armed or not; the findings.
-fn restarted(armed: bool) -> Vec<&'static str> {
+/// Says it restarted at 29 s, armed or not, after so long a silence; the findings.
+fn restarted(armed: bool, silent_ms: u64) -> Vec<&'static str> {
     let mut monitor = Monitor::new(Params::defaults());
     let (findings, _) = run(&mut monitor, 0, 60_000, |now_ms| {
         let height = if armed { 20.0 } else { 0.0 };
@@ -146,6 +146,7 @@ fn restarted(armed: bool) -> Vec<&'static str> {
         if now_ms >= 30_000 {
             quad.boot_offset_ms = -29_000;
         }
+        quad.silent = (30_000 - silent_ms..30_000).contains(&now_ms);
         vec![(AUTOPILOT, quad.says(now_ms))]
     });
     assert_eq!(monitor.vehicle().reboots, 1);
@@ -158,8 +159,13 @@ fn restarted(armed: bool) -> Vec<&'static str> {
 
 #[test]
 fn an_autopilot_that_restarts_on_the_ground_is_counted_and_one_that_restarts_armed_is_an_alarm() {
-    assert!(restarted(false).is_empty());
-    assert!(!restarted(true).is_empty());
+    assert!(restarted(false, 0).is_empty());
+    assert!(!restarted(true, 0).is_empty());
+    assert!(!restarted(true, 5_000).is_empty());
+    assert!(
+        restarted(true, 15_000).is_empty(),
+        "nobody knows what it did in a long silence: it may have landed"
+    );
 }
 
 /// Flies a VTOL that is this way by its own word, with something wrong from 20 to 25 s; the checks that found something.

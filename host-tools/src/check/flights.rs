@@ -30,7 +30,23 @@ pub(super) struct Flights {
     open: bool,
     /// The flight that ends next ends by a mishap.
     crashed: bool,
+    silence: Option<Silence>,
 }
+
+/// The vehicle was silent, and is not known to be still on its flight.
+#[derive(Clone, Copy, Debug)]
+struct Silence {
+    /// The flight as it was when the vehicle was heard last.
+    to: Instant,
+    air: Span,
+    /// Since when it is heard again.
+    heard_since: Option<Instant>,
+}
+
+/// Without a heartbeat for so long it is silent.
+const SILENT: Span = Span::from_secs(5);
+/// What is heard for so long and flies is on its flight still: longer than a landing needs to be seen.
+const STILL_FLIES: Span = Span::from_secs(3);
 
 impl Flights {
     /// The vehicle took off.
@@ -42,14 +58,39 @@ impl Flights {
         }
     }
 
-    /// A step of the monitor was made.
-    pub(super) fn step(&mut self, now: Instant, monitor: &Monitor) {
-        if monitor.flight().airborne()
-            && let Some(flight) = self.list.last_mut().filter(|_| self.open)
-        {
+    /// A step of the monitor was made, so long after the vehicle's last heartbeat. Silence counts as flight once the vehicle is heard
+    /// again and still flies.
+    pub(super) fn step(&mut self, now: Instant, since_heard: Span, monitor: &Monitor) {
+        let Some(flight) = self.list.last_mut().filter(|_| self.open) else { return };
+        if since_heard > SILENT {
+            let heard_at = Instant::from_micros(now.as_micros().saturating_sub(since_heard.as_micros()));
+            let over = flight.to.since(heard_at.max(flight.from)).min(flight.air);
+            let [to, air] =
+                [flight.to.as_micros(), flight.air.as_micros()].map(|us| us.saturating_sub(over.as_micros()));
+            let new =
+                Silence { to: Instant::from_micros(to), air: Span::from_micros(air), heard_since: None };
+            self.silence.get_or_insert(new).heard_since = None;
+        } else if let Some(silence) = &mut self.silence {
+            let heard_since = *silence.heard_since.get_or_insert(now);
+            let flies = monitor.flight().airborne() && monitor.vehicle().armed();
+            if flies && now.since(heard_since) >= STILL_FLIES {
+                self.silence = None;
+            }
+        }
+        if monitor.flight().airborne() {
             flight.air = flight.air + TICK.min(now.since(flight.to));
             flight.to = now;
         }
+    }
+
+    /// The flight goes on no more: a silence after which it was not seen to fly is none of it.
+    fn close(&mut self) {
+        if let (Some(flight), Some(silence)) =
+            (self.list.last_mut().filter(|_| self.open), self.silence.take())
+        {
+            (flight.to, flight.air) = (silence.to, silence.air);
+        }
+        (self.open, self.silence) = (false, None);
     }
 
     /// Which of the flights goes on.
@@ -63,12 +104,7 @@ impl Flights {
         if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
             flight.landed = !crashed;
         }
-        self.open = false;
-    }
-
-    /// It goes on no more, and nobody saw how it ended.
-    pub(super) fn break_off(&mut self) {
-        (self.open, self.crashed) = (false, false);
+        self.close();
     }
 
     /// Nobody knows whether it was disarmed in the air.
@@ -97,7 +133,9 @@ impl Flights {
             // On the ground, still armed: what is over is the recording, and the flight too.
             self.landing();
         }
-        self.break_off();
+        // Otherwise nobody saw how it ended.
+        self.close();
+        self.crashed = false;
     }
 
     /// All has ended.

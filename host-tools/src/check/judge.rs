@@ -12,7 +12,7 @@ use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
-use hums_core::observation::{Observation, Source};
+use hums_core::observation::{Observation, Source, SystemStatus};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
@@ -140,11 +140,7 @@ impl Judge {
             Item::Observation(source, observation) => {
                 self.advance(at);
                 match observation {
-                    Observation::SystemStatus(status) if self.is_vehicle(source) => {
-                        if self.details.sensors(status) {
-                            Cause::ALL.into_iter().for_each(|cause| self.tell(cause.check()));
-                        }
-                    }
+                    Observation::SystemStatus(status) => self.sensors(source, status),
                     Observation::Battery(battery) => self.details.battery(source, battery.id),
                     Observation::Heartbeat(heartbeat) => self.details.heartbeat(source, heartbeat),
                     Observation::Identity(identity) => self.details.identity(source, identity),
@@ -190,6 +186,15 @@ impl Judge {
         self.monitor.vehicle().source == Some(source)
     }
 
+    /// The vehicle says which of its sensors are not healthy.
+    fn sensors(&mut self, source: Source, status: &SystemStatus) {
+        if self.is_vehicle(source) && self.details.sensors(status) {
+            for cause in Cause::ALL {
+                self.tell(cause.check());
+            }
+        }
+    }
+
     /// Somebody says in words that something is wrong.
     fn said(&mut self, at: Instant, source: Source, alert: Alert, words: String) {
         if self.is_vehicle(source) && self.details.said(at, alert, words) {
@@ -225,18 +230,26 @@ impl Judge {
         self.restarts += 1;
         self.epochs.restart(at);
         if matches!(self.format, Format::DataFlash | Format::Ulog) {
+            self.leave_off(at);
             self.monitor.begin_anew();
-            self.flights.break_off();
         }
+    }
+
+    /// A recording, or a power-on, ended where the vehicle was heard last, and its flight too. Another one begins here: what passed
+    /// between them is of neither, and the first values come in before it is judged.
+    fn leave_off(&mut self, at: Instant) {
+        if self.first.is_some() {
+            self.advance(self.last);
+        }
+        self.flights.end_of_recording(&self.monitor);
+        self.clock.skip_to(at + SETTLE);
     }
 
     /// Another recording was joined on, of another day or another vehicle: it is judged by itself, from the time on at which all
     /// was told anew. What was found and counted stays.
     fn joint(&mut self, at: Instant) {
-        if self.first.is_some() {
-            self.advance(at);
-        }
-        self.here.break_off(at, self.clock.behind());
+        self.leave_off(at);
+        self.here.break_off(self.last, self.clock.behind());
         if self.monitor.vehicle().source.is_some() {
             self.earlier = Some(self.monitor.clone());
         }
@@ -248,9 +261,7 @@ impl Judge {
             self.joints.push(at);
         }
         self.epochs.restart(at);
-        self.flights.end_of_recording(&self.monitor);
         self.monitor.begin_another_recording();
-        self.clock.skip_to(at + SETTLE);
     }
 
     /// The autopilot stops its motors in the moment in which it says why: that is no state which lasts for as long as the
@@ -323,7 +334,8 @@ impl Judge {
                 _ => {}
             }
         }
-        self.flights.step(now, &self.monitor);
+        let heard_at = self.monitor.vehicle().heartbeat.at();
+        self.flights.step(now, steps.since(heard_at.unwrap_or(steps)), &self.monitor);
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
     }
 

@@ -65,13 +65,17 @@ impl Health {
         findings: &mut impl FnMut(&Finding),
     ) {
         let latched = inputs.params.get(Param::Latch) >= 0.5 && inputs.vehicle.armed();
-        let quiet = inputs.mishap.is_going();
         let heard = inputs.vehicle.heartbeat.within(inputs.now, SILENT).is_some();
+        // What lies disarmed, or is silent, has nothing more to judge but itself.
+        let over =
+            inputs.mishap.is_going() && (!heard || (inputs.mishap.is_down() && !inputs.vehicle.armed()));
+        let quiet = inputs.mishap.is_going() && !over;
         let mut states = self.states.iter_mut();
         for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
             let quiet = quiet && check.when != When::Always;
             let applies = match check.when {
                 When::Always => true,
+                _ if over => false,
                 _ if quiet => true,
                 When::Armed => inputs.vehicle.armed(),
                 When::InFlight => inputs.flight.airborne(),
@@ -88,8 +92,8 @@ impl Health {
                 }
                 let before = *state;
                 let change = state.step(check, inputs.now, reading, applies, inputs.params);
-                if quiet && (heard || change.is_none_or(|change| change.level != Level::Stale)) {
-                    // It would only echo the mishap: it stays as it was, unless the vehicle falls silent.
+                if quiet {
+                    // It would only echo the mishap: it stays as it was.
                     *state = before.seen_as(state);
                     continue;
                 }

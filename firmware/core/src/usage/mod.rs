@@ -57,6 +57,8 @@ pub struct Usage {
     /// Full discharges of each battery, where the capacity is known: each has an equal share of it.
     battery_cycles: [f64; BATTERIES_MAX],
     load_cycles: Rainflow<7>,
+    /// How long it has been armed and in the air, seconds, as far as is known of a vehicle that is silent.
+    unheard_s: [f64; 2],
 }
 
 /// Lowest ranges of the load factor's cycles, g.
@@ -86,6 +88,7 @@ impl Usage {
             capacity_ah: 0.0,
             battery_cycles: [0.0; BATTERIES_MAX],
             load_cycles: Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
+            unheard_s: [0.0; 2],
         }
     }
 
@@ -167,21 +170,34 @@ impl Usage {
             return;
         }
         let step_s = f64::from(step.as_secs_f32());
-        if vehicle.armed() {
-            self.totals.add(UsageCounter::Armed, step_s);
-        }
-        if vehicle.heartbeat.within(now, HEARD).is_some() {
-            self.totals.add(regime(flight.phase(now, vehicle)), step_s);
-        }
-        if flight.airborne() {
-            self.totals.add(UsageCounter::Flight, step_s);
-            if let Some(speed_mps) = ground_speed_mps(now, vehicle) {
-                self.totals.add(UsageCounter::Distance, f64::from(speed_mps) * step_s);
-                self.totals.extend(UsageCounter::SpeedMax, f64::from(speed_mps));
-            }
+        self.step_times(now, vehicle, flight, step_s);
+        if let Some(speed_mps) = ground_speed_mps(now, vehicle).filter(|_| flight.airborne()) {
+            self.totals.add(UsageCounter::Distance, f64::from(speed_mps) * step_s);
+            self.totals.extend(UsageCounter::SpeedMax, f64::from(speed_mps));
         }
         self.step_battery(now, vehicle, step_s);
         self.step_motors(now, vehicle, step_s);
+    }
+
+    /// Silence counts once the vehicle is heard again as it was: still armed, still in the air.
+    fn step_times(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, step_s: f64) {
+        let states = [(UsageCounter::Armed, vehicle.armed()), (UsageCounter::Flight, flight.airborne())];
+        let heard = vehicle.heartbeat.within(now, HEARD).is_some();
+        if !vehicle.armed() {
+            self.unheard_s = [0.0; 2];
+        }
+        for ((counter, is_so), unheard_s) in states.into_iter().zip(&mut self.unheard_s) {
+            if !is_so {
+                *unheard_s = 0.0;
+            } else if heard {
+                self.totals.add(counter, step_s + core::mem::take(unheard_s));
+            } else {
+                *unheard_s += step_s;
+            }
+        }
+        if heard {
+            self.totals.add(regime(flight.phase(now, vehicle)), step_s);
+        }
     }
 
     fn step_battery(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
@@ -216,6 +232,7 @@ impl Usage {
     pub(crate) fn break_off(&mut self) {
         (self.touchdown, self.airborne, self.crashed, self.touched_mps) =
             (Touchdown::new(), false, false, 0.0);
+        self.unheard_s = [0.0; 2];
     }
 
     /// The flight ends now by a mishap, in which it touched with so many m/s: that is no landing.

@@ -115,6 +115,38 @@ fn after_a_mishap_the_next_arming_begins_anew() {
     assert_eq!(outcome.monitor.health().subsystem(Subsystem::Mishap), Level::Ok);
 }
 
+/// When the check of the vibration went bad and good again; it shakes for 3 s, and then it falls.
+fn shakes_and_falls(script: Script) -> Vec<(Level, u64)> {
+    let outcome = fly(&hovering(ROTORS[0]), script);
+    assert!(outcome.changes.iter().any(|(_, change)| *change == Change::Down), "{:?}", outcome.changes);
+    let of_vibration = outcome.findings.iter().filter(|finding| finding.check == "vibration");
+    of_vibration.map(|finding| (finding.level, finding.at.as_millis())).collect()
+}
+
+#[test]
+fn what_was_wrong_before_a_mishap_ends_when_it_lies_disarmed_and_when_it_is_silent() {
+    fn shaken(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+        quad.vibration.levels = [Some(45.0); 3];
+        if ms >= 3_000 {
+            fall(ms - 3_000, quad, motion);
+        }
+    }
+    let disarmed = shakes_and_falls(|ms, quad, motion| {
+        shaken(ms, quad, motion);
+        quad.armed = ms < 12_000;
+    });
+    let [(Level::Warning, bad), (Level::Ok, good)] = disarmed[..] else { panic!("{disarmed:?}") };
+    assert!(bad < AT_MS + 3_000 && (12_000..12_600).contains(&(good - AT_MS)), "{bad} {good}");
+    let silent = shakes_and_falls(|ms, quad, motion| {
+        shaken(ms, quad, motion);
+        quad.silent = ms >= 8_000;
+    });
+    let [(Level::Warning, _), (Level::Ok, good)] = silent[..] else { panic!("{silent:?}") };
+    assert!((12_400..13_200).contains(&(good - AT_MS)), "{good}");
+    let armed = shakes_and_falls(shaken);
+    assert!(matches!(armed[..], [(Level::Warning, _)]), "while it is armed it stays as it was: {armed:?}");
+}
+
 #[test]
 fn every_text_of_a_mishap_fits() {
     let place = |height_m| Place { position: Some((-899_999_999, -1_799_999_999)), height_m };

@@ -232,6 +232,54 @@ fn another_power_on_in_an_autopilots_own_log_ends_the_flight_of_before_and_a_gro
 }
 
 #[test]
+fn a_flight_ends_where_the_vehicle_was_heard_last_before_another_power_on_or_recording() {
+    for (format, item) in [
+        (Format::DataFlash, Item::Restart),
+        (Format::Ulog, Item::Restart),
+        (Format::DataFlash, Item::Joint),
+        (Format::Tlog, Item::Joint),
+    ] {
+        let mut judge = Judge::new(&Limits::default(), format);
+        half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+        half_seconds(&mut judge, 5_000, 40_000, true, LandedState::InAir);
+        judge.item(Instant::from_millis(7_240_000), item);
+        half_seconds(&mut judge, 7_240_500, 7_260_000, false, LandedState::OnGround);
+        let judged = judge.end();
+        let flights: Vec<_> = judged.flights.iter().map(|flight| flight.to.as_millis()).collect();
+        assert!(matches!(flights[..], [to] if (39_400..=39_600).contains(&to)), "{format:?}: {flights:?}");
+        assert!((34_000..=34_600).contains(&air_ms(&judged.flights)[0].0), "{:?}", judged.flights);
+        assert!(judged.armed < Span::from_secs(40), "{:?}", judged.armed);
+    }
+}
+
+#[test]
+fn silence_is_flight_where_the_vehicle_flies_when_it_is_heard_again() {
+    for (armed, landed, length_s, air_s) in [
+        (true, LandedState::InAir, 30, 75),
+        (true, LandedState::OnGround, 30, 35),
+        (false, LandedState::OnGround, 30, 35),
+        (false, LandedState::OnGround, 600, 35),
+        // Longer than is stepped through.
+        (true, LandedState::InAir, 600, 120),
+    ] {
+        let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+        half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+        half_seconds(&mut judge, 5_000, 40_000, true, LandedState::InAir);
+        let again = 40_000 + length_s * 1_000;
+        half_seconds(&mut judge, again, again + 10_000, armed, landed);
+        let judged = judge.end();
+        let [(air_ms, _)] = air_ms(&judged.flights)[..] else { panic!("{:?}", judged.flights) };
+        assert!(
+            air_ms.abs_diff(air_s * 1_000) < 1_100,
+            "{armed} {landed:?} {length_s}: {air_ms} {:?}",
+            judged.flights
+        );
+        let armed_s = judged.armed.as_micros() / 1_000_000;
+        assert!(armed || (40..46).contains(&armed_s), "{length_s}: {armed_s}");
+    }
+}
+
+#[test]
 fn a_recording_that_was_joined_on_is_judged_by_itself() {
     for (joint, findings) in [(Item::Joint, 0), (Item::Restart, 1)] {
         let mut judge = Judge::new(&Limits::default(), Format::Tlog);
