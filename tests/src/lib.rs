@@ -1,6 +1,7 @@
 //! Helpers of the end-to-end tests: the `hums` program as a user runs it, the recorded flights, and readers of MAVLink
 //! that share no code with what they check.
 //!
+//! * [`chip`] is a board on the model of the chip, with the image that is flashed.
 //! * [`child`] runs a program with a limit on its time, and tells what it said and the memory it took.
 //! * [`program`] runs `hums` and reads what it left behind.
 //! * [`frames`] reads MAVLink frames with a few lines of its own and the checksum seeds of pymavlink.
@@ -18,6 +19,7 @@
 )]
 
 pub mod child;
+pub mod chip;
 pub mod damage;
 pub mod fat;
 pub mod flights;

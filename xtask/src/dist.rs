@@ -1,9 +1,10 @@
 //! `cargo xtask dist`: what a release is made of, and proof that whoever builds it gets the same.
 //!
 //! A release is built from a commit, in a clone of its own, so that nothing that lies about in the working copy gets
-//! into it. Paths of the machine are replaced by `/hums` and `/cargo`: two builds in two places are equal byte by byte,
-//! which `--check` shows by doing so.
+//! into it. The firmware's flags and files are those of every build of it ([`firmware::flags`], [`firmware::files`]). Two builds in two
+//! places are equal byte by byte, which `--check` shows by doing so.
 
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -12,9 +13,7 @@ use anyhow::{Context as _, Result, bail};
 use sha2::{Digest as _, Sha256};
 
 use crate::budgets;
-use crate::dfu;
 use crate::firmware::{self, Board};
-use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, Need, STATIC_TARGET};
 use crate::shell::Shell;
@@ -60,13 +59,13 @@ pub(crate) fn run(check: bool) -> Result<()> {
 }
 
 /// A file of the release: its name and what is in it.
-type File = (String, Vec<u8>);
+pub(crate) type File = (String, Vec<u8>);
 
 /// A clone in which one release is built.
 struct Release {
     tree: PathBuf,
     commit: String,
-    flags: String,
+    flags: OsString,
 }
 
 impl Release {
@@ -76,15 +75,8 @@ impl Release {
         }
         Shell::new("git").args(["clone", "--quiet", "--no-checkout", "."]).arg(tree).run()?;
         Shell::new("git").within(tree).args(["checkout", "--quiet", "--detach", commit]).run()?;
-        let cargo_home = env::var_os("CARGO_HOME").map(PathBuf::from);
-        let cargo_home = cargo_home.or_else(|| Some(env::home_dir()?.join(".cargo")));
-        let cargo_home = cargo_home.context("neither CARGO_HOME nor a home folder is known")?;
         let tree = tree.canonicalize()?;
-        let flags = [(&tree, "/hums"), (&cargo_home, "/cargo")]
-            .map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()))
-            // Not separated by spaces: a folder may have one in its name. They take the place of those of .cargo/config.toml.
-            .join("\u{1f}")
-            + "\u{1f}--cfg\u{1f}sha2_backend_soft=\"compact\"";
+        let flags = firmware::flags(&tree)?;
         Ok(Self { tree, commit: commit.to_owned(), flags })
     }
 
@@ -92,12 +84,8 @@ impl Release {
         let mut files = Vec::new();
         for board in boards() {
             self.build(&board.cargo_arguments())?;
-            let elf = self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware");
-            let elf = read(&format!("hums-{}.elf", board.name()), &elf)?;
-            let pieces = image::pieces(&elf.1)?;
-            files.push((format!("hums-{}.dfu", board.name()), dfu::file(board.name(), &pieces)));
-            files.push((format!("hums-{}.bin", board.name()), image::flat(&pieces)));
-            files.push(elf);
+            let (_, elf) = read("", &self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))?;
+            files.extend(firmware::files(board, elf)?);
             files.push(self.sbom(&format!("hums-{}", board.name()), "firmware/app", &board.choice())?);
         }
         self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
@@ -210,7 +198,7 @@ fn write_all(folder: &Path, files: &[File]) -> Result<()> {
 }
 
 /// As `sha256sum` writes it and `sha256sum --check` reads it.
-fn sums(files: &[File]) -> String {
+pub(crate) fn sums(files: &[File]) -> String {
     files.iter().fold(String::new(), |mut text, (name, data)| {
         for byte in Sha256::digest(data) {
             let _ = write!(text, "{byte:02x}");

@@ -1,10 +1,13 @@
 //! Building the firmware: always with its own profile and for one board, so never by a plain `cargo build`.
 
-use std::path::PathBuf;
-use std::{fs, io};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::{env, fs, io};
 
 use anyhow::{Context as _, Result, bail};
 
+use crate::dfu;
+use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::shell::Shell;
 
@@ -70,24 +73,60 @@ impl Board {
     }
 }
 
-/// Builds the firmware for `board` and returns where its ELF file lies.
+/// The compiler's flags of everything that is released from `tree`, as cargo takes them. Paths of the machine are replaced by
+/// `/hums` and `/cargo`: who builds the same commit elsewhere gets the same bytes.
+pub(crate) fn flags(tree: &Path) -> Result<OsString> {
+    let cargo_home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let cargo_home = cargo_home.or_else(|| Some(env::home_dir()?.join(".cargo")));
+    let cargo_home = cargo_home.context("neither CARGO_HOME nor a home folder is known")?;
+    let mut flags = OsString::new();
+    for (from, to) in [(tree.canonicalize()?, "/hums"), (cargo_home, "/cargo")] {
+        flags.push("--remap-path-prefix=");
+        flags.push(from);
+        // Not separated by spaces: a folder may have one in its name.
+        flags.push(format!("={to}\u{1f}"));
+    }
+    // SHA-256 (the signatures of a few frames a second) as loops: 6 KB of flash less than unrolled.
+    flags.push("--cfg\u{1f}sha2_backend_soft=\"compact\"");
+    Ok(flags)
+}
+
+/// cargo with the flags of a release, for what is of the firmware.
+pub(crate) fn cargo() -> Result<Shell> {
+    Ok(Shell::cargo().env("CARGO_ENCODED_RUSTFLAGS", flags(repo::root())?))
+}
+
+/// Builds the firmware for `board` as a release does and returns where its ELF file lies; beside it are the other files of a release.
 pub(crate) fn build(board: Board) -> Result<PathBuf> {
-    Shell::cargo().arg("build").args(board.cargo_arguments()).run()?;
+    cargo()?.arg("build").args(board.cargo_arguments()).run()?;
     let built = repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware");
+    let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
     let image = board.image();
-    copy_if_different(&built, &image)
-        .with_context(|| format!("cannot copy {} to {}", built.display(), image.display()))?;
+    for (name, data) in files(board, elf)? {
+        let path = image.with_file_name(name);
+        write_if_different(&path, &data).with_context(|| format!("cannot write {}", path.display()))?;
+    }
     Ok(image)
+}
+
+/// What a user flashes of the firmware of `board`: the name and the content of each file, the ELF file last.
+pub(crate) fn files(board: Board, elf: Vec<u8>) -> Result<[(String, Vec<u8>); 3]> {
+    let name = format!("hums-{}", board.name());
+    let pieces = image::pieces(&elf).with_context(|| name.clone())?;
+    Ok([
+        (format!("{name}.dfu"), dfu::file(&name, &pieces)),
+        (format!("{name}.bin"), image::flat(&pieces)),
+        (format!("{name}.elf"), elf),
+    ])
 }
 
 /// Lints the firmware for `board`; a warning is an error.
 pub(crate) fn lint(board: Board) -> Result<()> {
-    Shell::cargo().arg("clippy").args(board.cargo_arguments()).args(["--", "-D", "warnings"]).run()
+    cargo()?.arg("clippy").args(board.cargo_arguments()).args(["--", "-D", "warnings"]).run()
 }
 
 /// An unchanged image keeps its time, so that nothing that depends on it is made anew.
-fn copy_if_different(from: &PathBuf, to: &PathBuf) -> io::Result<()> {
-    let new = fs::read(from)?;
+fn write_if_different(to: &Path, new: &[u8]) -> io::Result<()> {
     if fs::read(to).is_ok_and(|old| old == new) {
         return Ok(());
     }

@@ -1,6 +1,5 @@
 //! `cargo xtask flash` and `cargo xtask attach`: a firmware onto a board, and what the board says of itself.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -8,7 +7,6 @@ use anyhow::{Context as _, Result, bail};
 use crate::firmware::{self, Board};
 use crate::setup::{self, Need};
 use crate::shell::Shell;
-use crate::{dfu, image};
 
 const PROBE_RS: (&str, &str) =
     ("probe-rs", "cargo install probe-rs-tools --locked (or see https://probe.rs)");
@@ -56,7 +54,6 @@ impl Options {
 pub(crate) fn flash(options: Options) -> Result<()> {
     setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
     let elf = firmware::build(options.board)?;
-    let pieces = image::pieces(&fs::read(&elf)?).with_context(|| elf.display().to_string())?;
     match options.way {
         Way::Probe => {
             require(PROBE_RS)?;
@@ -66,7 +63,6 @@ pub(crate) fn flash(options: Options) -> Result<()> {
         }
         Way::Dfu => {
             let path = elf.with_extension("dfu");
-            fs::write(&path, dfu::file(&format!("hums {}", options.board.name()), &pieces))?;
             println!("{}", path.display());
             require(DFU_UTIL)?;
             load(&path).run()

@@ -197,6 +197,10 @@ impl Usart {
             }
             self.idle_at = NEVER;
         }
+        // Its clock became faster within a character: what it would have seen by now is over.
+        if self.deadline() <= now {
+            (self.incoming, self.idle_at, self.free) = (None, NEVER, now);
+        }
     }
 
     fn receive(&mut self, edge: Ps, bit: Ps) {
@@ -323,6 +327,22 @@ mod tests {
         port.write(0x08, 91, 0);
         port.write(0x0C, UE | TE | RE, 0);
         port
+    }
+
+    #[test]
+    fn a_clock_that_becomes_faster_within_a_character_does_not_stop_it() {
+        let mut port = port();
+        port.set_clock(8_000_000);
+        port.line.extend(chars(b"UUUUUUUUUUUUUUUU", 0, 921_600.0).0);
+        let (end, mut last) = (port.deadline(), 0);
+        port.happen(end - 1);
+        port.set_clock(84_000_000);
+        while port.deadline() != NEVER {
+            let now = port.deadline().max(end);
+            port.happen(now);
+            assert!(port.deadline() > now && now > last, "{now} after {last}");
+            last = now;
+        }
     }
 
     fn run(port: &mut Usart, mut each: impl FnMut(&mut Usart, Ps)) {

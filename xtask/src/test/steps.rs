@@ -1,11 +1,14 @@
 //! The steps of `cargo xtask test`.
 
+use std::fs;
+
 use anyhow::{Context as _, Result};
 
 use super::table::NOT_TESTED;
 use crate::budgets;
 use crate::costs;
 use crate::demo;
+use crate::dist;
 use crate::firmware::{self, Board};
 use crate::hums;
 use crate::oracle;
@@ -39,7 +42,7 @@ pub(super) enum Builds {
 
 /// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
 /// wait for, then what takes longest.
-pub(super) const STEPS: [Step; 19] = [
+pub(super) const STEPS: [Step; 20] = [
     Step {
         name: "fmt",
         about: "the formatting",
@@ -87,6 +90,14 @@ pub(super) const STEPS: [Step; 19] = [
         after: &["oracle", "build", "budgets"],
         builds: None,
         run: || pc::end_to_end("emulator", &[]),
+    },
+    Step {
+        name: "chip",
+        about: "the image that is flashed, on the model of its chip",
+        needs: &[Need::FirmwareTarget],
+        after: &["build", "budgets"],
+        builds: None,
+        run: chip,
     },
     Step {
         name: "clippy-firmware",
@@ -203,6 +214,14 @@ fn check_budgets() -> Result<()> {
     budgets::check(&FLOWN)
 }
 
+/// What is flashed is what is tested: the sums are those of `cargo xtask dist` of the same sources.
+fn chip() -> Result<()> {
+    let elf = Board::F405.image();
+    let files = firmware::files(Board::F405, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
+    print!("{}", dist::sums(&files));
+    pc::end_to_end("chip", &[])
+}
+
 fn clippy() -> Result<()> {
     Shell::cargo().arg("clippy").args(pc::CHOICE).args(["--all-targets", "--", "-D", "warnings"]).run()
 }
@@ -219,7 +238,7 @@ fn doc() -> Result<()> {
 /// `hums-onboard` depends on all other crates that fly. The target has no std, so whatever of them or of what they
 /// depend on asks for std does not compile; and `hums-app`, which turns further features on, takes no part.
 fn no_std() -> Result<()> {
-    Shell::cargo()
+    firmware::cargo()?
         .args(["check", "--profile=firmware", "--target", FIRMWARE_TARGET, "--package=hums-onboard"])
         .run()
 }

@@ -1,4 +1,8 @@
 //! The microSD card on an SPI bus: its port; the driver is `hums_recorder::spi`.
+//!
+//! A card is busy for some milliseconds after a block, and says so by a low line: bytes that are zero (SD specification, 7.2.4). The
+//! driver looks again and again; after some looks in a row the processor sleeps before the next one. An interrupt wakes it,
+//! at the latest reception's, each millisecond.
 
 use embassy_stm32::gpio::{Level, Output};
 use embassy_stm32::mode::Blocking;
@@ -8,13 +12,20 @@ use hums_core::time::Instant;
 use hums_recorder::SpiCard;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
-/// The microSD card. Its driver waits for the card with the processor: only the least urgent task may use it.
+/// Bytes that the driver exchanges at most to look whether the card is busy.
+const LOOK_BYTES: usize = 4;
+/// Looks in a row that find the card busy before the processor sleeps: some 50 µs.
+const LOOKS: u32 = 16;
+
+/// The microSD card. Nothing less urgent runs while its driver waits for the card: only the least urgent task may use it.
 pub(crate) type Card = SpiCard<CardPort>;
 
 /// The card's port.
 pub(crate) struct CardPort {
     bus: Spi<'static, Blocking, Master>,
     select: Output<'static>,
+    /// Looks in a row that found the card busy.
+    busy: u32,
 }
 
 impl CardPort {
@@ -25,7 +36,7 @@ impl CardPort {
 
     /// The port on this bus, mode 0, with its select pin high.
     pub(crate) const fn new(bus: Spi<'static, Blocking, Master>, select: Output<'static>) -> Self {
-        Self { bus, select }
+        Self { bus, select, busy: 0 }
     }
 }
 
@@ -35,7 +46,13 @@ impl Port for CardPort {
     }
 
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
-        self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)
+        if self.busy > LOOKS {
+            cortex_m::asm::wfi();
+        }
+        self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)?;
+        let is_busy = bytes.len() <= LOOK_BYTES && bytes.iter().all(|byte| *byte == 0);
+        self.busy = if is_busy { self.busy.saturating_add(1) } else { 0 };
+        Ok(())
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {

@@ -4,8 +4,9 @@ use hums_sdcard::{Medium, Plan, Slot};
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board, Machine};
+use stm32f405_model::memory::FLASH;
 use stm32f405_model::report::Report;
-use stm32f405_model::time::{MS, Ps};
+use stm32f405_model::time::{MS, Ps, SECOND};
 
 use super::record::{Compared, Session, compare, read};
 use super::{BAUD, board_with};
@@ -13,10 +14,40 @@ use super::{BAUD, board_with};
 /// The board's LED, lit when low.
 const LED: Pin = Pin(2, 12);
 
-/// The bench.
+/// Frames and the image that is to record them.
+#[derive(Debug)]
+pub struct Bench {
+    /// What the board runs.
+    pub image: Image,
+    /// What comes at its first port, over and over.
+    pub frames: Vec<Vec<u8>>,
+}
+
+impl Bench {
+    /// A board that gets power for the first time.
+    pub fn rig(&self, parts: Board) -> Rig {
+        Rig::new(&self.image, parts, self.frames.clone())
+    }
+
+    /// A board that has made its store before, and just got power again: its second reset.
+    pub fn settled(&self, parts: Board) -> Result<Rig, Box<Report>> {
+        let mut rig = self.rig(parts);
+        rig.machine.run_until(2 * SECOND)?;
+        rig.machine.power_off();
+        rig.machine.run_until(2 * SECOND + 100 * MS)?;
+        rig.machine.power_on();
+        rig.machine.chip.flash.erases.clear();
+        Ok(rig)
+    }
+}
+
+/// A board on a bench.
 pub struct Rig {
+    /// The board.
     pub machine: Machine,
+    /// Its card's slot.
     pub slot: Slot,
+    /// What is on the card.
     pub medium: Medium,
     /// Frames that were sent, and when each one's last bit was.
     pub sent: Vec<(Ps, Vec<u8>)>,
@@ -59,6 +90,55 @@ impl Rig {
             }
         }
         Ok(())
+    }
+
+    /// Fills the store by settings from a ground station, on the ground and disarmed, for 36 s: the next calm needs an erase.
+    pub fn fill(&mut self) -> Result<(), Box<Report>> {
+        const NAMES: [&str; 6] = [
+            "BAT_TEMP_WARN",
+            "ESC_TEMP_WARN",
+            "MCU_TEMP_WARN",
+            "VIBE_WARN",
+            "CPU_LOAD_WARN",
+            "LINK_LOSS_WARN",
+        ];
+        for number in 0..360_u32 {
+            let now = self.machine.now();
+            if number % 10 == 0 {
+                let beat = heartbeat(number as u8);
+                let end = self.machine.send(0, &beat, now, BAUD);
+                self.sent.push((end, beat));
+            }
+            let name = NAMES[number as usize % NAMES.len()];
+            self.machine.send(1, &set(name, 20.0 + (number / 6) as f32 / 10.0, number as u8), now, 57_600.0);
+            self.run(now + 100 * MS, false)?;
+        }
+        Ok(())
+    }
+
+    /// The task whose interrupt's handler this is hangs, at full rate, until the next reset (4 s at the most): the handler begins with
+    /// a branch to itself. Gives the handler's address.
+    ///
+    /// # Panics
+    /// If the image has no such handler.
+    pub fn hang(&mut self, handler: &str) -> Result<u32, Box<Report>> {
+        let symbol = self.machine.image().symbols.iter().find(|symbol| symbol.name == handler);
+        let address = symbol.expect("a handler of the image's").address;
+        let at = (address - FLASH.0) as usize;
+        let swap = |rig: &mut Self, with: [u8; 2]| {
+            let place = &mut rig.machine.chip.flash.content.all_mut()[at..at + 2];
+            let was = [place[0], place[1]];
+            place.copy_from_slice(&with);
+            rig.machine.core.forget_code(address, 2);
+            was
+        };
+        let was = swap(self, [0xFE, 0xE7]);
+        let (resets, end) = (self.machine.resets.len(), self.machine.now() + 4 * SECOND);
+        while self.machine.resets.len() == resets && self.machine.now() < end {
+            self.run(self.machine.now() + MS, true)?;
+        }
+        swap(self, was);
+        Ok(address)
     }
 
     /// The sessions on the card.

@@ -2,16 +2,14 @@
 //!
 //! `boot IMAGE SECONDS [FLIGHT.tlog|BYTES [CARD.img]]`: a tlog's frames come at their own times, other bytes back to
 //! back at 921,600 baud, both from
-//! 1.5 s on. Run it with `cargo run --release -p stm32f405-model --example boot -- ...`.
+//! 1.5 s on. Run it with `cargo run --release -p hums-tests --example boot -- ...`.
 
 use std::time::Instant;
 
+use hums_tests::chip;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::time::{MS, Ps, SECOND, US};
-
-#[path = "../tests/common/mod.rs"]
-mod common;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -20,10 +18,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let image = Image::parse(&std::fs::read(image)?)?;
     let until = (seconds.parse::<f64>()? * SECOND as f64) as Ps;
-    let (mut machine, slot, medium) = common::board(image, Board::default());
+    let (mut machine, slot, medium) = chip::board(image, Board::default());
     let feed = match rest.first() {
-        Some(path) => common::Feed::read(path.as_ref(), 1_500 * MS)?,
-        None => common::Feed::default(),
+        Some(path) => chip::Feed::read(path.as_ref(), 1_500 * MS)?,
+        None => chip::Feed::default(),
     };
     let begun = Instant::now();
     let worst = fly(&mut machine, feed, until);
@@ -35,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     tell(&mut machine, took);
     println!("card: {:?}, violations {:?}, {} writes", slot.counts(), slot.violations(), medium.writes());
     if let Some(path) = rest.get(1) {
-        common::save(&medium, path.as_ref())?;
+        chip::save(&medium, path.as_ref())?;
     }
     Ok(())
 }
@@ -43,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Flies it second by second; gives the part of the worst second that the processor was busy, after the first two.
 fn fly(
     machine: &mut Machine,
-    mut feed: common::Feed,
+    mut feed: chip::Feed,
     until: Ps,
 ) -> Result<f64, Box<stm32f405_model::report::Report>> {
     let mut worst = 0.0_f64;

@@ -1,11 +1,9 @@
 //! Prints each instruction between two moments: `trace IMAGE FROM-US TO-US [FLIGHT]`.
 
+use hums_tests::chip;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::Board;
 use stm32f405_model::time::{MS, NEVER, US};
-
-#[path = "../tests/common/mod.rs"]
-mod common;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -14,9 +12,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let image = Image::parse(&std::fs::read(image)?)?;
     let (from, to) = (from.parse::<u64>()? * US, to.parse::<u64>()? * US);
-    let (mut machine, _, _) = common::board(image, Board::default());
+    let (mut machine, _, _) = chip::board(image, Board::default());
     if let Some(path) = rest.first() {
-        common::Feed::read(path.as_ref(), 1_500 * MS)?.give(&mut machine, NEVER / 2);
+        chip::Feed::read(path.as_ref(), 1_500 * MS)?.give(&mut machine, NEVER / 2);
     }
     machine.run_until(from).map_err(|report| report.to_string())?;
     let mut last = 0;

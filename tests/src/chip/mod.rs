@@ -1,12 +1,11 @@
-//! What the tests' boards have: the simulated SD card of `hums-sdcard` at the chip's bus.
-
-#![allow(dead_code, missing_docs, unreachable_pub, reason = "each test takes what it needs")]
+//! A board on the model of the chip, with the simulated SD card of `hums-sdcard` at its bus: the image that is flashed, run where
+//! everything round it can be made to fail (`docs/chip.md`).
 
 pub mod record;
 pub mod rig;
 
 use std::collections::VecDeque;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hums_recorder::spi::{Clock, Port};
 use hums_sdcard::{Kind, Medium, Model, Plan, SimPort, Slot};
@@ -16,11 +15,24 @@ use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::spi::Wire;
 use stm32f405_model::time::{Ps, SECOND, US};
 
+use crate::flights::root;
+
+/// The F405's image, made as a release is: `HUMS_IMAGE` names the ELF file, otherwise it is where xtask leaves it.
+///
+/// # Panics
+/// If it is not there.
+pub fn image_path() -> PathBuf {
+    let built = || root().join("target/firmware/hums-f405.elf");
+    let path = std::env::var_os("HUMS_IMAGE").map_or_else(built, PathBuf::from);
+    assert!(path.is_file(), "{} is missing: `cargo xtask firmware`", path.display());
+    path
+}
+
 /// The autopilot's rate.
 pub const BAUD: f64 = 921_600.0;
 
 /// What comes to the first port: pieces of bytes, each at its time or as soon as the line is free.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Feed {
     pieces: VecDeque<(Ps, Vec<u8>)>,
     free: Ps,
@@ -75,7 +87,7 @@ pub fn frames(mut tlog: &[u8]) -> Vec<(u64, &[u8])> {
     frames
 }
 
-/// Nanoseconds that the slot had passed when the machine began: it powers up by itself.
+/// A card in its slot, byte by byte at a bus.
 pub struct Card {
     slot: Slot,
     port: SimPort,
@@ -83,6 +95,7 @@ pub struct Card {
 }
 
 impl Card {
+    /// At the bus's beginning.
     pub fn new(slot: &Slot) -> Self {
         Self { slot: slot.clone(), port: slot.port(), hz: 0 }
     }

@@ -1,0 +1,181 @@
+//! What fails round the processor, as a review saw it on another model of the chip (issue 22), each as it is to be.
+
+use hums_tests::chip::record::{Compared, Session};
+use hums_tests::chip::rig::Rig;
+use stm32f405_model::flash::Speed;
+use stm32f405_model::machine::Board;
+use stm32f405_model::rcc::Cause;
+use stm32f405_model::small::Randomness;
+use stm32f405_model::time::{MS, SECOND};
+
+use crate::bench;
+
+/// The low-speed oscillator at its fastest (DS8626, table 36).
+const LSI_FASTEST: u32 = 47_000;
+
+/// All that was sent is recorded, in order, and nothing else.
+#[track_caller]
+fn assert_whole(rig: &Rig) {
+    let compared = rig.compared();
+    let wanted = Compared { right: rig.sent.len(), ends: (0, 0), ..Compared::default() };
+    assert_eq!(compared, wanted);
+    assert!(rig.sent.len() > 500, "{} frames", rig.sent.len());
+}
+
+/// No reset but those of power.
+#[track_caller]
+fn assert_no_reset(rig: &Rig) {
+    assert!(rig.machine.resets.iter().all(|(_, cause)| *cause == Cause::Power), "{:?}", rig.machine.resets);
+}
+
+fn last(rig: &Rig) -> Session {
+    rig.sessions().pop().expect("a session")
+}
+
+#[track_caller]
+fn assert_told(rig: &Rig, text: &str) {
+    let texts = last(rig).texts;
+    assert!(texts.iter().any(|told| told == text), "not «{text}» but {texts:#?}");
+}
+
+/// 1 and 2: a first start erases twice.
+#[test]
+fn the_slowest_erases_leave_the_clock_right_and_the_fastest_watchdog_quiet() {
+    for (speed, lsi_hz) in [(Speed::Typical, 32_000), (Speed::Longest, LSI_FASTEST)] {
+        let mut rig = bench().rig(Board { lsi_hz, ..Board::default() });
+        rig.machine.chip.flash.speed = speed;
+        rig.run(3 * SECOND, false).unwrap();
+        rig.run(3_200 * MS, true).unwrap();
+        rig.run(4_500 * MS, false).unwrap();
+        let erased: u64 = rig.machine.chip.flash.erases.iter().map(|(_, _, long)| long / MS).sum();
+        assert!(rig.machine.chip.flash.erases.len() == 2 && erased >= 500, "{erased} ms");
+        let sent_ms = rig.sent[0].0 / MS;
+        let recorded_ms = last(&rig).frames[0].0;
+        // The clock begins when memory is cleared and the clock tree is set.
+        assert!(
+            (15..25).contains(&(sent_ms - recorded_ms)),
+            "{speed:?}: sent {sent_ms}, recorded {recorded_ms}"
+        );
+        assert_no_reset(&rig);
+    }
+}
+
+/// 2 and 3: the store is full, and is erased in a calm, as slowly as can be; in the middle of it the autopilot resumes.
+#[test]
+fn what_comes_in_an_erase_is_told_and_the_watchdog_does_not_bite() {
+    let mut rig = bench().settled(Board { lsi_hz: LSI_FASTEST, ..Board::default() }).unwrap();
+    rig.machine.chip.flash.speed = Speed::Longest;
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    rig.fill().unwrap();
+    let end = rig.machine.now() + 20 * SECOND;
+    while rig.machine.chip.flash.erases.is_empty() {
+        assert!(rig.machine.now() < end, "nothing was erased");
+        let next = rig.machine.now() + MS;
+        rig.run(next, false).unwrap();
+    }
+    let now = rig.machine.now() + 60 * MS;
+    rig.run(now, false).unwrap();
+    rig.run(now + 1_500 * MS, true).unwrap();
+    rig.run(now + 2_500 * MS, false).unwrap();
+    assert_no_reset(&rig);
+    let compared = rig.compared();
+    let session = last(&rig);
+    assert!(compared.wrong == 0 && (100..2_000).contains(&compared.missing), "{compared:?}");
+    let overruns: Vec<_> = session.losses.iter().filter(|(what, ..)| *what == "uart_overrun").collect();
+    let [(_, _, from, to)] = overruns[..] else { panic!("{:?}", session.losses) };
+    let (_, _, erase) = rig.machine.chip.flash.erases[0];
+    assert!(
+        (erase / MS..erase / MS + 50).contains(&(to - from)),
+        "{from} to {to}, erase of {} ms",
+        erase / MS
+    );
+}
+
+/// 4
+#[test]
+fn a_crystal_that_never_starts_does_not_keep_it_from_recording() {
+    let mut rig = bench().rig(Board::default());
+    rig.machine.set_crystal(false);
+    rig.run(2 * SECOND, false).unwrap();
+    rig.run(3 * SECOND, true).unwrap();
+    rig.run(4 * SECOND, false).unwrap();
+    assert_whole(&rig);
+    assert_told(&rig, "HUMS: crystal failed, times may be off by 4 %");
+    assert!(rig.machine.chip.iwdg.is_running());
+    assert_no_reset(&rig);
+}
+
+/// 4
+#[test]
+fn a_crystal_that_dies_in_flight_costs_the_frames_of_that_moment() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    rig.run(begin + SECOND, true).unwrap();
+    rig.machine.set_crystal(false);
+    rig.run(begin + 2 * SECOND, true).unwrap();
+    rig.run(begin + 3 * SECOND, false).unwrap();
+    let compared = rig.compared();
+    assert!(compared.wrong == 0 && compared.missing <= 3 && compared.ends == (0, 0), "{compared:?}");
+    assert_told(&rig, "HUMS: crystal failed, times may be off by 4 %");
+    assert_no_reset(&rig);
+}
+
+/// 4
+#[test]
+fn random_numbers_that_never_come_do_not_keep_it_from_recording() {
+    let mut rig = bench().rig(Board::default());
+    rig.machine.chip.rng.behaves = Randomness::Never;
+    rig.run(2 * SECOND, false).unwrap();
+    rig.run(3 * SECOND, true).unwrap();
+    rig.run(4 * SECOND, false).unwrap();
+    assert_whole(&rig);
+    assert_told(&rig, "HUMS: no random numbers, starts are counted");
+    assert_no_reset(&rig);
+}
+
+/// 6: eight bytes are left in the ring of the log, and who read it is gone; it had asked for nothing to be dropped.
+#[test]
+fn a_debugger_that_went_does_not_stop_it() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    let block = rig.machine.image().find("_SEGGER_RTT").unwrap().address;
+    // The first up-channel, behind 24 bytes of head: name, buffer, size, place of writing, place of reading, flags.
+    let word =
+        |rig: &Rig, at: u32| u32::from_le_bytes(rig.machine.memory(block + 24 + at, 4).try_into().unwrap());
+    let (size, written) = (word(&rig, 8), word(&rig, 12));
+    let read = (written + 9) % size;
+    for (at, value) in [(16, read), (20, 2)] {
+        for (byte, value) in (0..).zip(u32::to_le_bytes(value)) {
+            rig.machine.poke(block + 24 + at + byte, |_| value);
+        }
+    }
+    // A finding: nothing comes for too long.
+    rig.run(begin + SECOND, true).unwrap();
+    rig.run(begin + 6 * SECOND, false).unwrap();
+    rig.run(begin + 7 * SECOND, true).unwrap();
+    rig.run(begin + 8 * SECOND, false).unwrap();
+    assert_ne!(word(&rig, 12), written, "nothing was logged: this has tried nothing");
+    assert_whole(&rig);
+    assert_no_reset(&rig);
+}
+
+/// 7
+#[test]
+fn transmitters_that_stand_still_are_told_and_cost_nothing() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    rig.run(begin + SECOND, true).unwrap();
+    for port in [0, 1] {
+        rig.machine.chip.usarts[port].is_stuck = true;
+    }
+    rig.run(begin + 5 * SECOND, true).unwrap();
+    rig.run(begin + 6 * SECOND, false).unwrap();
+    assert_whole(&rig);
+    assert_told(&rig, "HUMS: sending to the autopilot stands still");
+    assert_told(&rig, "HUMS: sending to the radio stands still");
+    assert_no_reset(&rig);
+}

@@ -1,0 +1,32 @@
+//! The image that is flashed, byte for byte, on the model of its chip (`docs/chip.md`): it records, and goes on where the parts
+//! round it fail. Times and loads are modelled, not measured.
+//!
+//! Without the feature `chip` nothing of this is built: `cargo xtask test` turns it on, and builds the image.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
+#[cfg(feature = "chip")]
+mod faults;
+#[cfg(feature = "chip")]
+mod flights;
+#[cfg(feature = "chip")]
+mod hangs;
+#[cfg(feature = "chip")]
+mod images;
+
+/// In the list of what was ignored: what was not tested is no success.
+#[cfg(not(feature = "chip"))]
+#[test]
+#[ignore = "the image on the model of its chip: `cargo xtask test` runs it"]
+fn the_image_on_the_model_of_its_chip() {}
+
+/// The F405's image, and a PX4 flight's frames to send.
+#[cfg(feature = "chip")]
+fn bench() -> hums_tests::chip::rig::Bench {
+    use hums_tests::{chip, flights};
+
+    let file = std::fs::read(chip::image_path()).unwrap();
+    let image = stm32f405_model::image::Image::parse(&file).unwrap();
+    let tlog = std::fs::read(flights::own("px4_hil_quad_low.tlog")).unwrap();
+    let frames = chip::frames(&tlog).into_iter().map(|(_, frame)| frame.to_vec()).collect();
+    chip::rig::Bench { image, frames }
+}
