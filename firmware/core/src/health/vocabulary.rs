@@ -108,7 +108,7 @@ vocabulary! {
     "The motor's speed differed from the others' in steady flight.";
     "Check this arm: propeller, motor, its tilt, and the centre of gravity.";
     "motor_output" Vehicle "motor output", "motor", needs "motor outputs of a quadrotor or hexarotor, on the ground and in flight";
-    "The motor was given far more than the others: it gave less thrust than it should, or it was taken out.";
+    "The motor was driven far harder than the others: it or its propeller gives less thrust.";
     "Do not fly until its propeller, motor and ESC are checked.";
     "motor_trend" Stored "motor balance against earlier flights", "motor", needs "speeds of earlier flights to compare with";
     "The motor's speed has changed against earlier flights."; "Check its propeller and bearings.";
