@@ -9,11 +9,11 @@
 //! zeros is not fitted.
 
 use crate::departure::Departure;
-use crate::derived::{Derived, norm};
 use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::observation::{Air, Estimator, EstimatorScale, Imu, VehicleKind, VibrationScale};
 use crate::time::{Instant, Span};
+use crate::units::norm;
 use crate::vehicle::Vehicle;
 
 /// Sensors of one kind that are compared.
@@ -151,7 +151,7 @@ impl Crosschecks {
         for (kind, sample) in [
             (Kind::Accelerometer, force.filter(|_| is_fitted)),
             (Kind::Gyro, rate.filter(|_| is_fitted)),
-            (Kind::Compass, field.filter(|field| *field != [0.0; 3])),
+            (Kind::Compass, field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0))),
         ] {
             if let (Some(sample), Some(sensor)) = (sample, self.sensor(kind, imu.instance)) {
                 sensor.take(at, sample);
@@ -264,6 +264,6 @@ pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
         north * north + east * east < SLOW_MPS * SLOW_MPS && libm::fabsf(down) < LEVEL_MPS
     });
     slow && vehicle.is_multicopter()
-        && Derived::is_steady(now, vehicle, flight)
+        && flight.is_steady(now, vehicle)
         && vehicle.inertial.turns_little(now, TURNED)
 }

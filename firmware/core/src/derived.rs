@@ -12,7 +12,7 @@ use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
 use crate::trend::{Rate, Resistance};
-use crate::units::{GRAVITY, MetresPerSecond2};
+use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// No sensor that autopilots have measures more than 32 g an axis: beyond this it is garbage.
@@ -23,9 +23,6 @@ const SAG_MAX_V: f32 = 0.3;
 const TURNING_RPM: f32 = 100.0;
 /// An ESC is silent when it misses this many of its own intervals.
 const INTERVALS_MISSED: f32 = 3.0;
-/// Steady flight: in the air for this long, and not tilted further.
-const STEADY_AFTER: Span = Span::from_secs(3);
-const STEADY_TILT_RAD: f32 = 0.26;
 /// Motors that are compared have all been told of within this.
 const MOTORS_TOLD: Span = Span::from_secs(1);
 /// Below this part of their highest speed motors do not carry a vehicle (thrust goes by the square).
@@ -406,7 +403,7 @@ impl Derived {
         if !compares
             || idles
             || !(lost || vehicle.inertial.turns_little(now, TURNED))
-            || !Self::is_steady(now, vehicle, flight)
+            || !flight.is_steady(now, vehicle)
         {
             return None;
         }
@@ -472,14 +469,6 @@ impl Derived {
         Some((track.smooth_rpm - mean) / mean * 100.0)
     }
 
-    /// In the air for a moment, and not tilted far.
-    pub(crate) fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
-        flight.airborne_since().is_some_and(|since| now.since(since) > STEADY_AFTER)
-            && vehicle.attitude.get().is_none_or(|attitude| {
-                attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
-            })
-    }
-
     /// The mean speed of the motors that are fitted, but for one; `None` while they do not turn.
     fn mean_of_others(&self, motor: u8) -> Option<f32> {
         let others = self.motors.iter().enumerate();
@@ -531,11 +520,6 @@ impl Derived {
 /// The specific force in units of gravity; `None` where it was not measured.
 pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
     Some(norm(force.map(|axis| axis.0)) / GRAVITY).filter(|load_g| *load_g <= LOAD_MAX_G)
-}
-
-/// How long a vector is.
-pub(crate) fn norm([x, y, z]: [f32; 3]) -> f32 {
-    libm::sqrtf(x * x + y * y + z * z)
 }
 
 /// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.

@@ -24,6 +24,10 @@ use crate::observation::{LandedState, VehicleKind};
 use crate::time::{Instant, Span};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
+/// Steady flight: in the air for this long, and not tilted further.
+const STEADY_AFTER: Span = Span::from_secs(3);
+const STEADY_TILT_RAD: f32 = 0.26;
+
 const TAKEOFF_HEIGHT_M: f32 = 1.0;
 const LANDED_HEIGHT_M: f32 = 0.5;
 const PLANE_FLYING_MPS: f32 = 8.0;
@@ -141,6 +145,14 @@ impl Flight {
     /// Whether it is in the air.
     pub const fn airborne(&self) -> bool {
         self.airborne_since.is_some()
+    }
+
+    /// In the air for a moment, and not tilted far.
+    pub(crate) fn is_steady(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        self.airborne_since().is_some_and(|since| now.since(since) > STEADY_AFTER)
+            && vehicle.attitude.get().is_none_or(|attitude| {
+                attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
+            })
     }
 
     /// When it left the ground last, while it is in the air.

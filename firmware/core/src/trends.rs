@@ -160,7 +160,7 @@ fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
         .get()
         .is_some_and(|heartbeat| matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol));
     let phase = flight.phase(now, vehicle);
-    let level = Derived::is_steady(now, vehicle, flight);
+    let level = flight.is_steady(now, vehicle);
     level && (phase == Phase::Hover || (wings && phase == Phase::Cruise))
 }
 

@@ -61,3 +61,8 @@ pub struct Position {
     /// East positive.
     pub longitude_deg: f64,
 }
+
+/// How long a vector is.
+pub(crate) fn norm([x, y, z]: [f32; 3]) -> f32 {
+    libm::sqrtf(x * x + y * y + z * z)
+}

@@ -1,6 +1,6 @@
 //! What departs from its usual level in a flight is named in time: sensors against each other, vibration, a motor's output, the
 //! estimator's compass. What is so from the beginning, what wind, load and turns do, and what is not fitted says nothing.
-#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
+#![expect(clippy::panic, reason = "that is how a test fails")]
 
 mod common;
 

@@ -4,13 +4,13 @@ use super::evidence::{
     BREAKS_OFF, BROKEN_OFF, FULL_THROTTLE, IDLE_THROTTLE, Shock, is_believed, on_rotors, throttle,
 };
 use super::{Kind, Mishap, State, WATCHED};
-use crate::derived::{load_factor_g, norm};
+use crate::derived::load_factor_g;
 use crate::flight::{climb_mps, ground_speed_mps, height_m};
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
 use crate::observation::{Air, Attitude, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
-use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond};
+use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};
 use crate::vehicle::Vehicle;
 
 /// Below this load factor nothing carries the vehicle. A fall with the drag of a quad at its end speed is above it.

@@ -95,7 +95,7 @@ pub(super) fn gnss_integrity(payload: &[u8]) -> GnssIntegrity {
 
 /// A compass that is not there measures nothing.
 fn field(gauss: [f32; 3]) -> Option<[Gauss; 3]> {
-    vector(gauss).filter(|gauss| *gauss != [0.0; 3]).map(|gauss| gauss.map(Gauss))
+    vector(gauss).filter(|gauss| gauss.iter().any(|axis| axis.abs() > 0.0)).map(|gauss| gauss.map(Gauss))
 }
 
 /// Milli-g, mrad/s and mG, also in ArduPilot's `RAW_IMU`, in spite of its name.
