@@ -90,7 +90,7 @@ fn the_full_line_rate_is_recorded_without_loss() {
         let slept = (rig.machine.core.slept() - before.1) as f64;
         worst = worst.max(100.0 - 100.0 * slept / (rig.machine.core.cycles() - before.0) as f64);
     }
-    rig.run(begin + 5 * SECOND, false).unwrap();
+    rig.run(begin + 8 * SECOND, false).unwrap();
     println!("{worst:.1} % busy in the worst second, modelled");
     assert!(worst < BUSY_PERCENT_MAX, "{worst:.1} % busy");
     assert_eq!(rig.machine.chip.flash.acr(), ACR);

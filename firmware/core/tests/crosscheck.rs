@@ -135,7 +135,7 @@ fn of_three_sensors_the_one_that_comes_apart_is_named() {
         finds("accel_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.force[place][2] += 3.0);
         finds("gyro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.rate[place][0] += 0.4);
         finds("compass_mismatch", sensor, Level::Warning, 3_000, |_, fitted| {
-            fitted.field[place] = [0.5, 0.0, -0.1]
+            fitted.field[place] = [0.5, 0.0, -0.1];
         });
         finds("baro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.pressure[place] += 2.5);
     }
