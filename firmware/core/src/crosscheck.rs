@@ -11,10 +11,10 @@
 use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::latest::Reading;
-use crate::observation::{Air, Estimator, EstimatorScale, Imu, VehicleKind, VibrationScale};
+use crate::observation::{Air, Estimator, EstimatorScale, Imu, LandedState, VehicleKind, VibrationScale};
 use crate::time::{Instant, Span};
 use crate::units::norm;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
 /// Sensors of one kind that are compared.
 pub(crate) const SENSORS_MAX: usize = 3;
@@ -32,7 +32,8 @@ const TURNED: Span = Span::from_secs(1);
 const GARBAGE: f32 = 1e6;
 /// In the air for so long it has left the ground.
 const SETTLED: Span = Span::from_secs(3);
-/// A hover, m/s: over ground, and up or down.
+/// A hover, m: above this height over home; m/s: over ground, and up or down.
+const LOW_M: f32 = 1.5;
 const SLOW_MPS: f32 = 6.0;
 const LEVEL_MPS: f32 = 2.0;
 /// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
@@ -257,13 +258,17 @@ impl Crosschecks {
     }
 }
 
-/// A multicopter that is level and slow, and does not turn.
+/// A multicopter that is level and slow, does not turn, and does not touch the ground: contact and the propellers' wash there set
+/// sensors apart.
 pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     let slow = vehicle.global.within(now, FRESH).is_none_or(|global| {
         let [north, east, down] = global.velocity.map(|speed| speed.0);
-        north * north + east * east < SLOW_MPS * SLOW_MPS && libm::fabsf(down) < LEVEL_MPS
+        let level = north * north + east * east < SLOW_MPS * SLOW_MPS && libm::fabsf(down) < LEVEL_MPS;
+        level && libm::fabsf(global.relative_altitude.0) > LOW_M
     });
-    slow && vehicle.is_multicopter()
+    let landed = vehicle.landed.within(now, LANDED_STATE_AGE);
+    slow && !matches!(landed, Some(LandedState::TakingOff | LandedState::Landing | LandedState::OnGround))
+        && vehicle.is_multicopter()
         && flight.is_steady(now, vehicle)
         && vehicle.inertial.turns_little(now, TURNED)
 }
