@@ -10,6 +10,7 @@ use super::format::{KNOWN, detect, hint, is_recording, start_of};
 use super::recording::Place;
 use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
+use crate::logs::places::segment_name;
 use crate::logs::sessions::Sessions;
 use crate::logs::{self, Content};
 use crate::outcome::usage;
@@ -146,8 +147,12 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
                 ));
             }
         } else if is_own(input)? {
-            let own =
-                logs::find(std::slice::from_ref(input), salvage).map_err(|error| not_known(input, error))?;
+            let together = segments_with(input, inputs);
+            if together.first().map(PathBuf::as_path) != Some(input.as_path()) {
+                // Read with the first one of its session.
+                continue;
+            }
+            let own = logs::find(&together, salvage).map_err(|error| not_known(input, error))?;
             found.add_own(input, own);
         } else {
             found.places.push(Place::file(input));
@@ -184,6 +189,14 @@ fn make_names_unique(places: &mut [Place]) {
 /// Which session each number of the cards holds.
 pub fn sessions_of(places: &[Place]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
+}
+
+/// The inputs that are segments of one session in one folder, this one among them; it alone where it is no segment.
+fn segments_with(input: &Path, inputs: &[PathBuf]) -> Vec<PathBuf> {
+    let of = |path: &Path| Some((path.parent()?.to_owned(), segment_name(path)?.session));
+    let Some(session) = of(input) else { return vec![input.to_owned()] };
+    let is_one = |other: &&PathBuf| of(other).as_ref() == Some(&session) && is_own(other).unwrap_or(false);
+    inputs.iter().filter(is_one).cloned().collect()
 }
 
 /// Whether a file is a log of ours or a card's image.
