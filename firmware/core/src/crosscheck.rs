@@ -260,7 +260,7 @@ impl Crosschecks {
 
 /// A multicopter that is level and slow, does not turn, and does not touch the ground: contact and the propellers' wash there set
 /// sensors apart.
-pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     let slow = vehicle.global.within(now, FRESH).is_none_or(|global| {
         let [north, east, down] = global.velocity.map(|speed| speed.0);
         let level = north * north + east * east < SLOW_MPS * SLOW_MPS && libm::fabsf(down) < LEVEL_MPS;

@@ -12,7 +12,7 @@ use super::card::{image, whole_file};
 use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
-use super::places::{Log, segment_name};
+use super::places::{Log, segment_name, session_of};
 use crate::files::is_seekable;
 
 /// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
@@ -41,9 +41,10 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
             continue;
         } else {
             named_file(input, salvage, &mut found)?;
-            if let (Some(name), [_]) = (segment_name(input), &found.logs[before..]) {
-                let folder = input.parent().unwrap_or(Path::new("")).to_owned();
-                segments.entry((folder, name.session)).or_default().push((name, before));
+            if let (Some(name), Some(session), [_]) =
+                (segment_name(input), session_of(input), &found.logs[before..])
+            {
+                segments.entry(session).or_default().push((name, before));
             }
         }
         if found.logs.len() == before

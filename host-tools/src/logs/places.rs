@@ -71,6 +71,11 @@ pub fn segment_name(path: &Path) -> Option<LogName> {
     LogName::from_short(base.as_bytes(), extension.as_bytes())
 }
 
+/// Of which session a file's name says it is a segment: the folder, as it was named, and the session's number.
+pub fn session_of(path: &Path) -> Option<(PathBuf, u32)> {
+    Some((path.parent()?.to_owned(), segment_name(path)?.session))
+}
+
 /// Streams a log's blocks. A last part of less than a block is padded with zeros: it is damaged either way.
 pub struct Blocks<'a> {
     log: &'a Log,

@@ -10,7 +10,7 @@ use super::format::{KNOWN, detect, hint, is_recording, start_of};
 use super::recording::Place;
 use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
-use crate::logs::places::segment_name;
+use crate::logs::places::session_of;
 use crate::logs::sessions::Sessions;
 use crate::logs::{self, Content};
 use crate::outcome::usage;
@@ -100,6 +100,7 @@ impl Found {
 /// lies in a folder and is none is passed over.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     let mut found = Found::default();
+    let mut segments = by_session(inputs);
     for input in inputs {
         if input == Path::new("-") {
             if found.places.iter().any(Place::is_standard) {
@@ -147,11 +148,14 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
                 ));
             }
         } else if is_own(input)? {
-            let together = segments_with(input, inputs);
-            if together.first().map(PathBuf::as_path) != Some(input.as_path()) {
-                // Read with the first one of its session.
-                continue;
-            }
+            let together = match session_of(input) {
+                None => vec![input.clone()],
+                Some(session) => match segments.remove(&session) {
+                    Some(named) => named.into_iter().filter(|one| is_own(one).unwrap_or(false)).collect(),
+                    // Read with the first one of its session.
+                    None => continue,
+                },
+            };
             let own = logs::find(&together, salvage).map_err(|error| not_known(input, error))?;
             found.add_own(input, own);
         } else {
@@ -191,12 +195,13 @@ pub fn sessions_of(places: &[Place]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
 }
 
-/// The inputs that are segments of one session in one folder, this one among them; it alone where it is no segment.
-fn segments_with(input: &Path, inputs: &[PathBuf]) -> Vec<PathBuf> {
-    let of = |path: &Path| Some((path.parent()?.to_owned(), segment_name(path)?.session));
-    let Some(session) = of(input) else { return vec![input.to_owned()] };
-    let is_one = |other: &&PathBuf| of(other).as_ref() == Some(&session) && is_own(other).unwrap_or(false);
-    inputs.iter().filter(is_one).cloned().collect()
+/// The inputs that are named as segments: one by one, they are read with the others of their session.
+fn by_session(inputs: &[PathBuf]) -> BTreeMap<(PathBuf, u32), Vec<PathBuf>> {
+    let mut segments: BTreeMap<_, Vec<PathBuf>> = BTreeMap::new();
+    for (session, input) in inputs.iter().filter_map(|input| Some((session_of(input)?, input))) {
+        segments.entry(session).or_default().push(input.clone());
+    }
+    segments
 }
 
 /// Whether a file is a log of ours or a card's image.
