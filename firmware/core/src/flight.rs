@@ -13,6 +13,10 @@
 //! | the airspeed of a plane or VTOL, and its throttle | faster than 8 m/s with more than a fifth: wind alone is no flight | slower |
 //! | only the throttle (no position at all) | more than a fifth, and the displayed altitude rose by a metre | less than a tenth |
 //!
+//! One lost message, or a land detector that fails, hides no flight: the word that it stands counts no more once it was contradicted
+//! for five seconds, by 2 m and more above the place of arming together with throttle that flies (on rotors) or more than
+//! 8 m/s (on wings). It counts again with the end of the flight, or once the autopilot has said that it flies.
+//!
 //! The place of arming counts only where arming was seen. Whoever hears an armed vehicle first (a restart in the air) takes
 //! the height above home as it is, and goes on in the air at once: [`FlightEvent::Resumed`].
 //!
@@ -20,6 +24,7 @@
 //! A flight begins with leaving the ground. It ends when the vehicle is disarmed, or when it has been on the ground for
 //! eight seconds; so a bounce and a touch-and-go are parts of one flight.
 
+use crate::motion::{airspeed_mps, altitude_m, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::{LandedState, VehicleKind};
 use crate::time::{Instant, Span};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
@@ -35,8 +40,6 @@ const PLANE_FLYING_MPS: f32 = 8.0;
 const FLYING_THROTTLE: f32 = 0.2;
 const IDLE_THROTTLE: f32 = 0.1;
 const FULL_THROTTLE: f32 = 0.95;
-/// Nothing that is watched here is faster: garbage, which must not get into sums and maxima.
-const SPEED_MAX_MPS: f32 = 1_000.0;
 const STILL_MPS: f32 = 0.5;
 /// What climbs, sinks or goes faster than this moves, whatever wind and noise make of what stands.
 const MOVES_MPS: f32 = 1.5;
@@ -48,10 +51,10 @@ const TAKEOFF_DEBOUNCE: Span = Span::from_millis(500);
 const LANDING_DEBOUNCE: Span = Span::from_secs(2);
 /// The autopilot's word has its own debounce; one message of nonsense at 2 Hz has none.
 const WORD_DEBOUNCE: Span = Span::from_millis(600);
+/// What is seen of the vehicle contradicts the autopilot's word for so long: the word is as one that is not told any more.
+const CONTRADICTED: Span = LANDED_STATE_AGE;
 /// On the ground, still armed, for so long: the flight is over. A plane rolls on from a touch-and-go within this.
 const GROUND_LASTS: Span = Span::from_secs(8);
-/// Positions and speeds older than this decide nothing.
-const MOTION_AGE: Span = Span::from_secs(3);
 
 /// What the vehicle is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,6 +127,10 @@ pub struct Flight {
     /// It had throttle to fly with since its arming: what is told of the throttle means something.
     driven: bool,
     changing_since: Option<Instant>,
+    /// Since when what is seen contradicts the autopilot's word that it stands.
+    contradicted_since: Option<Instant>,
+    /// That word counts for nothing in this flight.
+    overruled: bool,
 }
 
 impl Flight {
@@ -139,6 +146,8 @@ impl Flight {
             idle_altitude_m: None,
             driven: false,
             changing_since: None,
+            contradicted_since: None,
+            overruled: false,
         }
     }
 
@@ -191,7 +200,9 @@ impl Flight {
     pub fn step(&mut self, now: Instant, vehicle: &Vehicle) -> Option<FlightEvent> {
         self.note_arming(now, vehicle);
         let idles = self.idles(now, vehicle);
-        let says = Self::autopilot_says(now, vehicle).filter(|flies| !flies || !idles);
+        let word = Self::autopilot_says(now, vehicle);
+        self.weigh(now, vehicle, word, idles);
+        let says = word.filter(|flies| if *flies { !idles } else { !self.overruled });
         let flies = self.armed
             && can_fly(vehicle)
             && says.unwrap_or_else(|| !idles && self.seems_to_fly(now, vehicle));
@@ -216,6 +227,35 @@ impl Flight {
             }
         }
         self.begin_or_end(now)
+    }
+
+    /// Whether the autopilot's word that it stands counts.
+    fn weigh(&mut self, now: Instant, vehicle: &Vehicle, word: Option<bool>, idles: bool) {
+        if word == Some(true) || !self.armed {
+            (self.contradicted_since, self.overruled) = (None, false);
+            return;
+        }
+        self.overruled &= self.is_open();
+        if word.is_none() || self.overruled || idles || !self.surely_flies(now, vehicle) {
+            self.contradicted_since = None;
+            return;
+        }
+        let since = *self.contradicted_since.get_or_insert(now);
+        if now.since(since) >= CONTRADICTED {
+            self.overruled = true;
+            self.changing_since = Some(since);
+        }
+    }
+
+    /// Whether it flies by all that is seen: high, and with the thrust or the speed of flight.
+    fn surely_flies(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        let height_m = self.height_above_start_m(now, vehicle).or_else(|| self.rise_m(now, vehicle));
+        let is_driven = if vehicle.hovers(now) == Some(true) {
+            throttle(now, vehicle).is_some_and(|throttle| throttle >= FLYING_THROTTLE)
+        } else {
+            is_fast(ground_speed_mps(now, vehicle)) || is_fast(airspeed_mps(now, vehicle))
+        };
+        can_fly(vehicle) && is_driven && height_m.is_some_and(|height_m| height_m > STANDS_M)
     }
 
     fn note_arming(&mut self, now: Instant, vehicle: &Vehicle) {
@@ -354,8 +394,6 @@ impl Flight {
         let speed_mps = ground_speed_mps(now, vehicle);
         let throttle = throttle(now, vehicle);
         let has_thrust = |least: f32| throttle.is_some_and(|throttle| throttle > least);
-        let is_fast =
-            |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps > PLANE_FLYING_MPS);
         // Wind alone shows an airspeed on the ground.
         let by_air = is_fast(airspeed_mps(now, vehicle)) && (self.airborne() || has_thrust(FLYING_THROTTLE));
         let fast = has_wings(vehicle) && (is_fast(speed_mps) || by_air);
@@ -378,6 +416,11 @@ impl Flight {
     }
 }
 
+/// A speed at which wings carry.
+fn is_fast(speed_mps: Option<f32>) -> bool {
+    speed_mps.is_some_and(|speed_mps| speed_mps > PLANE_FLYING_MPS)
+}
+
 fn can_fly(vehicle: &Vehicle) -> bool {
     vehicle.kind() != VehicleKind::Surface
 }
@@ -386,231 +429,5 @@ fn has_wings(vehicle: &Vehicle) -> bool {
     matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Vtol)
 }
 
-/// Height above home; above the local origin where there is no global position.
-pub(crate) fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let global = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
-    let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.position[2].0);
-    global.or_else(local).filter(|height_m| height_m.is_finite())
-}
-
-/// The part of the throttle that the autopilot gives.
-fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let hud = vehicle.hud.within(now, MOTION_AGE);
-    hud.and_then(|hud| hud.throttle).map(|throttle| throttle.0).filter(|part| part.is_finite())
-}
-
-/// The speed through the air, in m/s.
-fn airspeed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let hud = vehicle.hud.within(now, MOTION_AGE);
-    hud.and_then(|hud| hud.airspeed)
-        .map(|speed| speed.0)
-        .filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
-}
-
-/// The altitude of the pilot's display, of the barometer where there is no position.
-fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let hud = vehicle.hud.within(now, MOTION_AGE);
-    hud.and_then(|hud| hud.altitude).map(|altitude| altitude.0).filter(|height_m| height_m.is_finite())
-}
-
-/// Speed upwards from the best source that is fresh, in m/s.
-pub(crate) fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let global = vehicle.global.within(now, MOTION_AGE).map(|global| -global.velocity[2].0);
-    let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.velocity[2].0);
-    let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.climb).map(|climb| climb.0);
-    global.or_else(local).or_else(hud).filter(|climb| climb.abs() <= SPEED_MAX_MPS)
-}
-
-/// Speed over ground from the best source that is fresh, in m/s.
-pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let norm = |north: f32, east: f32| libm::sqrtf(north * north + east * east);
-    let global =
-        vehicle.global.within(now, MOTION_AGE).map(|global| norm(global.velocity[0].0, global.velocity[1].0));
-    let local =
-        || vehicle.local.within(now, MOTION_AGE).map(|local| norm(local.velocity[0].0, local.velocity[1].0));
-    let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.groundspeed).map(|speed| speed.0);
-    global.or_else(local).or_else(hud).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::observation::{GlobalPosition, Heartbeat, Hud, Observation, Source, VtolState};
-    use crate::units::{Fraction, Metres, MetresPerSecond};
-
-    const AUTOPILOT: Source = Source { system: 1, component: 1 };
-
-    fn fly(kind: VehicleKind, heights_m: &[(u64, f32)]) -> Vec<(u64, FlightEvent)> {
-        let mut vehicle = Vehicle::unknown();
-        let mut flight = Flight::grounded();
-        let mut events = Vec::new();
-        let mut now_ms = 0;
-        for (until_ms, height_m) in heights_m {
-            while now_ms < *until_ms {
-                let now = Instant::from_millis(now_ms);
-                let heartbeat = Heartbeat { armed: now_ms >= 1_000, kind, ..Heartbeat::default() };
-                vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-                let global =
-                    GlobalPosition { relative_altitude: Metres(*height_m), ..GlobalPosition::default() };
-                vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-                events.extend(flight.step(now, &vehicle).map(|event| (now_ms, event)));
-                now_ms += 50;
-            }
-        }
-        events
-    }
-
-    #[test]
-    fn height_above_the_place_of_arming_is_a_take_off() {
-        let heights = [(5_000, 20.0), (10_000, 25.0), (30_000, 20.1)];
-        // Two seconds of standing, and then the flight is over.
-        let expected = [(5_500, FlightEvent::TakeOff), (19_950, FlightEvent::Landing)];
-        assert_eq!(fly(VehicleKind::Rotorcraft, &heights), expected);
-    }
-
-    #[test]
-    fn a_submarine_never_flies() {
-        assert_eq!(fly(VehicleKind::Surface, &[(5_000, 0.0), (10_000, 25.0)]), []);
-    }
-
-    #[test]
-    fn a_bounce_and_a_touch_and_go_are_one_flight() {
-        let heights = [
-            (5_000, 0.0),
-            (20_000, 25.0),
-            (25_000, 0.0),
-            (26_000, 3.0),
-            (32_000, 0.0),
-            (50_000, 25.0),
-            (70_000, 0.0),
-        ];
-        let events: Vec<_> =
-            fly(VehicleKind::Rotorcraft, &heights).into_iter().map(|(_, event)| event).collect();
-        assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
-    }
-
-    /// Armed all along; what the autopilot says of it, each for so many messages, two a second.
-    fn told(kind: VehicleKind, words: &[(u64, LandedState)]) -> Vec<(u64, FlightEvent)> {
-        let (mut vehicle, mut flight, mut events, mut now_ms) =
-            (Vehicle::unknown(), Flight::grounded(), Vec::new(), 0);
-        let heartbeat = Heartbeat { armed: true, kind, ..Heartbeat::default() };
-        for (messages, landed) in words {
-            for _ in 0..messages * 10 {
-                let now = Instant::from_millis(now_ms);
-                vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-                if now_ms % 500 == 0 {
-                    vehicle.observe(now, AUTOPILOT, &Observation::Landed(*landed, VtolState::Unknown));
-                }
-                events.extend(flight.step(now, &vehicle).map(|event| (now_ms, event)));
-                now_ms += 50;
-            }
-        }
-        events
-    }
-
-    #[test]
-    fn the_autopilots_own_word_counts() {
-        let words = [
-            (10, LandedState::OnGround),
-            (4, LandedState::TakingOff),
-            (20, LandedState::InAir),
-            (10, LandedState::Landing),
-            (40, LandedState::OnGround),
-        ];
-        let expected = [(7_600, FlightEvent::TakeOff), (29_950, FlightEvent::Landing)];
-        assert_eq!(told(VehicleKind::Rotorcraft, &words), expected);
-    }
-
-    #[test]
-    fn a_rover_never_flies_whatever_its_landed_state_says() {
-        assert_eq!(told(VehicleKind::Surface, &[(10, LandedState::OnGround), (40, LandedState::InAir)]), []);
-    }
-
-    #[test]
-    fn one_wrong_word_is_no_landing() {
-        let mut words = vec![(10, LandedState::OnGround), (20, LandedState::InAir)];
-        words.extend([(1, LandedState::OnGround), (40, LandedState::InAir)]);
-        assert_eq!(told(VehicleKind::Rotorcraft, &words).len(), 1);
-    }
-
-    #[test]
-    fn a_landed_state_that_is_lost_leaves_the_decision_to_what_else_is_known() {
-        let (mut vehicle, mut flight, mut events) = (Vehicle::unknown(), Flight::grounded(), Vec::new());
-        for now_ms in (0..60_000).step_by(50) {
-            let now = Instant::from_millis(now_ms);
-            let heartbeat =
-                Heartbeat { armed: now_ms >= 1_000, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-            let height_m = if (5_000..50_000).contains(&now_ms) { 30.0 } else { 0.0 };
-            let global = GlobalPosition { relative_altitude: Metres(height_m), ..GlobalPosition::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-            if (5_000..20_000).contains(&now_ms) {
-                vehicle.observe(now, AUTOPILOT, &Observation::Landed(LandedState::InAir, VtolState::Unknown));
-            }
-            events.extend(flight.step(now, &vehicle));
-        }
-        assert_eq!(events, [FlightEvent::TakeOff, FlightEvent::Landing]);
-    }
-
-    #[test]
-    fn who_is_heard_first_in_the_air_goes_on_in_the_air_at_once() {
-        let (mut vehicle, mut flight) = (Vehicle::unknown(), Flight::grounded());
-        let mut events = Vec::new();
-        for now_ms in (0..2_000).step_by(50) {
-            let now = Instant::from_millis(now_ms);
-            let heartbeat = Heartbeat { armed: true, kind: VehicleKind::Rotorcraft, ..Heartbeat::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-            let global = GlobalPosition { relative_altitude: Metres(50.0), ..GlobalPosition::default() };
-            vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-            events.extend(flight.step(now, &vehicle).map(|event| (now_ms, event)));
-        }
-        assert_eq!(events, [(500, FlightEvent::Resumed)]);
-    }
-
-    /// Armed from 1 s on, without any position: its throttle and its airspeed, each until a time.
-    fn fly_by_hud(kind: VehicleKind, said: &[(u64, f32, f32)], height_m: Option<f32>) -> Vec<FlightEvent> {
-        let (mut vehicle, mut flight, mut events, mut now_ms) =
-            (Vehicle::unknown(), Flight::grounded(), Vec::new(), 0);
-        for (until_ms, throttle, airspeed_mps) in said {
-            while now_ms < *until_ms {
-                let now = Instant::from_millis(now_ms);
-                let heartbeat = Heartbeat { armed: now_ms >= 1_000, kind, ..Heartbeat::default() };
-                vehicle.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
-                let hud = Hud {
-                    throttle: Some(Fraction(*throttle)),
-                    airspeed: Some(MetresPerSecond(*airspeed_mps)),
-                    ..Hud::default()
-                };
-                vehicle.observe(now, AUTOPILOT, &Observation::Hud(hud));
-                if let Some(height_m) = height_m {
-                    // Down into a valley, where it stays.
-                    let height_m =
-                        if now_ms < 5_000 { 0.0 } else { (20.0 - now_ms as f32 / 500.0).max(height_m) };
-                    let relative_altitude = Metres(height_m);
-                    let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
-                    vehicle.observe(now, AUTOPILOT, &Observation::GlobalPosition(global));
-                }
-                events.extend(flight.step(now, &vehicle));
-                now_ms += 50;
-            }
-        }
-        events
-    }
-
-    #[test]
-    fn a_plane_without_a_position_flies_by_its_airspeed_and_a_wind_over_the_runway_is_no_flight() {
-        let flown = [(5_000, 0.0, 3.0), (40_000, 0.6, 18.0), (50_000, 0.0, 12.0), (60_000, 0.0, 2.0)];
-        let expected = [FlightEvent::TakeOff, FlightEvent::Landing];
-        assert_eq!(fly_by_hud(VehicleKind::Plane, &flown, None), expected);
-        assert_eq!(fly_by_hud(VehicleKind::Plane, &[(60_000, 0.0, 12.0)], None), []);
-    }
-
-    #[test]
-    fn a_multicopter_that_hovers_below_its_place_of_arming_flies_until_it_stands_there() {
-        let hovers = [(5_000, 0.0, 0.0), (60_000, 0.5, 0.0)];
-        assert_eq!(fly_by_hud(VehicleKind::Rotorcraft, &hovers, Some(-15.0)), [FlightEvent::TakeOff]);
-        let lands = [(5_000, 0.0, 0.0), (60_000, 0.5, 0.0), (80_000, 0.02, 0.0)];
-        let expected = [FlightEvent::TakeOff, FlightEvent::Landing];
-        assert_eq!(fly_by_hud(VehicleKind::Rotorcraft, &lands, Some(-15.0)), expected);
-    }
-}
+mod tests;

@@ -24,6 +24,7 @@ pub mod lifetime;
 pub mod mishap;
 mod modes;
 pub mod monitor;
+pub mod motion;
 pub mod observation;
 mod outputs;
 pub mod params;

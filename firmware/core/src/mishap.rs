@@ -35,8 +35,9 @@ mod told;
 
 pub use told::{Change, Kind, Place, Report};
 
-use crate::flight::{Flight, climb_mps, ground_speed_mps, height_m};
+use crate::flight::Flight;
 use crate::latest::Reading;
+use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::{LandedState, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};

@@ -167,7 +167,7 @@ fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
         .attitude
         .get()
         .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
-    let climbs = crate::flight::climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > CLIMB_MPS);
+    let climbs = crate::motion::climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > CLIMB_MPS);
     level
         && !climbs
         && flight.airborne_since().is_some_and(|since| now.since(since) > SETTLED)

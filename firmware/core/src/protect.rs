@@ -19,9 +19,10 @@ use core::fmt::Write as _;
 
 use heapless::String;
 
-use crate::flight::{self, Flight, FlightEvent, Phase};
+use crate::flight::{Flight, FlightEvent, Phase};
 use crate::health::{Health, Level, Subsystem};
 use crate::latest::Latest;
+use crate::motion;
 use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
@@ -421,8 +422,8 @@ fn in_mission(vehicle: &Vehicle) -> bool {
 fn approaches(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, .. } = *situation;
     in_mission(vehicle)
-        && flight::climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps < -APPROACH_MPS)
-        && flight::height_m(now, vehicle).is_some_and(|height_m| height_m < APPROACH_M)
+        && motion::climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps < -APPROACH_MPS)
+        && motion::height_m(now, vehicle).is_some_and(|height_m| height_m < APPROACH_M)
 }
 
 /// An answer to our command, and not to what somebody else asked.

@@ -90,7 +90,7 @@ const KEPT: [Quantity; 24] = [
     Quantity("pitch_deg", |inputs| {
         Some(inputs.vehicle.attitude.within(inputs.now, FRESH)?.pitch.0.to_degrees())
     }),
-    Quantity("climb_m_s", |inputs| crate::flight::climb_mps(inputs.now, inputs.vehicle)),
+    Quantity("climb_m_s", |inputs| crate::motion::climb_mps(inputs.now, inputs.vehicle)),
     Quantity("height_m", |inputs| Some(inputs.vehicle.global.within(inputs.now, FRESH)?.relative_altitude.0)),
 ];
 

@@ -29,7 +29,8 @@ const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
 /// Boot times follow each other within this of the time that went by, microseconds: messages overtake each other and wait in line.
 /// One that falls by more is a reboot.
 const REBOOT_US: i64 = 3_000_000;
-/// An autopilot that restarts in flight is off no longer.
+/// An autopilot that restarts in flight is off no longer; a link that was silent for longer is lost (PX4, `COM_DL_LOSS_T`: 10 s), and
+/// nobody knows what passed meanwhile: a landing, a disarming, another battery.
 const OFF: Span = Span::from_secs(10);
 
 /// One motor, put together from whichever ESC messages the vehicle sends.

@@ -5,6 +5,7 @@ use hums_core::mishap::{Change, Kind};
 use hums_core::monitor::TICK;
 use hums_core::time::{Instant, Span};
 
+use super::clock::SETTLE;
 use super::problem::LISTED_MAX;
 
 /// A flight.
@@ -31,6 +32,8 @@ pub(super) struct Flights {
     /// The flight that ends next ends by a mishap.
     crashed: bool,
     silence: Option<Silence>,
+    /// The monitor's time of the last step.
+    stepped_at: Option<Instant>,
 }
 
 /// The vehicle was silent, and is not known to be still on its flight.
@@ -43,6 +46,8 @@ struct Silence {
     heard_since: Option<Instant>,
 }
 
+/// Steps are no further apart than this, behind a gap of the recording too ([`SETTLE`]); the rest of a longer silence was left out.
+const STEP_MAX: Span = Span::from_millis(SETTLE.as_millis() + 2 * TICK.as_millis());
 /// Without a heartbeat for so long it is silent.
 const SILENT: Span = Span::from_secs(5);
 /// What is heard for so long and flies is on its flight still: longer than a landing needs to be seen.
@@ -58,9 +63,10 @@ impl Flights {
         }
     }
 
-    /// A step of the monitor was made, so long after the vehicle's last heartbeat. Silence counts as flight once the vehicle is heard
-    /// again and still flies.
-    pub(super) fn step(&mut self, now: Instant, since_heard: Span, monitor: &Monitor) {
+    /// A step of the monitor was made, at `steps` of its own time, so long after the vehicle's last heartbeat. Silence counts as
+    /// flight once the vehicle is heard again and still flies.
+    pub(super) fn step(&mut self, now: Instant, steps: Instant, since_heard: Span, monitor: &Monitor) {
+        let passed = self.stepped_at.replace(steps).map_or(Span::ZERO, |before| steps.since(before));
         let Some(flight) = self.list.last_mut().filter(|_| self.open) else { return };
         if since_heard > SILENT {
             let heard_at = Instant::from_micros(now.as_micros().saturating_sub(since_heard.as_micros()));
@@ -78,7 +84,8 @@ impl Flights {
             }
         }
         if monitor.flight().airborne() {
-            flight.air = flight.air + TICK.min(now.since(flight.to));
+            let passed = if passed > STEP_MAX { TICK } else { passed };
+            flight.air = flight.air + passed.min(now.since(flight.to));
             flight.to = now;
         }
     }

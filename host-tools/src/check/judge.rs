@@ -335,7 +335,7 @@ impl Judge {
             }
         }
         let heard_at = self.monitor.vehicle().heartbeat.at();
-        self.flights.step(now, steps.since(heard_at.unwrap_or(steps)), &self.monitor);
+        self.flights.step(now, steps, steps.since(heard_at.unwrap_or(steps)), &self.monitor);
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
     }
 

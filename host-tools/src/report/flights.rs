@@ -1,6 +1,6 @@
 //! Flights, as [`crate::check`] finds them, with how high and fast they were; and phases, by the rules of the firmware.
 
-use hums_core::flight::ground_speed_mps;
+use hums_core::motion::ground_speed_mps;
 use hums_core::time::{Instant, Span};
 use serde::Serialize;
 

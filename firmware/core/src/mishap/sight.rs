@@ -5,8 +5,8 @@ use super::evidence::{
 };
 use super::{Kind, Mishap, State, WATCHED};
 use crate::derived::load_factor_g;
-use crate::flight::{climb_mps, ground_speed_mps, height_m};
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
+use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::{Air, Attitude, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};

@@ -4,7 +4,7 @@ use core::fmt::Write as _;
 
 use heapless::String;
 
-use crate::flight::height_m;
+use crate::motion::height_m;
 use crate::time::Instant;
 use crate::vehicle::Vehicle;
 

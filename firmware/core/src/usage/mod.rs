@@ -13,7 +13,8 @@ pub use counters::{
 pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
-use crate::flight::{Flight, FlightEvent, Phase, climb_mps, ground_speed_mps, height_m};
+use crate::flight::{Flight, FlightEvent, Phase};
+use crate::motion::{climb_mps, ground_speed_mps, height_m};
 use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::rainflow::Rainflow;

@@ -184,6 +184,24 @@ fn a_gap_is_no_time_in_the_air_and_a_landing_right_before_it_ends_the_flight() {
 }
 
 #[test]
+fn what_follows_a_gap_and_is_not_judged_is_time_in_the_air() {
+    let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+    half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+    for from_ms in (5_000..65_000).step_by(6_000) {
+        half_seconds(&mut judge, from_ms, from_ms + 4_000, true, LandedState::InAir);
+        let [from, to] = [from_ms + 4_000, from_ms + 6_000].map(Instant::from_millis);
+        let (words, cause) = (String::new(), Why::Lost);
+        let gap = Gap { from: Some(from), to: Some(to), cause, place: None, bytes: 0, words };
+        judge.item(to, Item::Gap(&gap));
+    }
+    half_seconds(&mut judge, 65_000, 70_000, true, LandedState::InAir);
+    let judged = judge.end();
+    let [(air, false)] = air_ms(&judged.flights)[..] else { panic!("{:?}", judged.flights) };
+    assert!((44_000..=45_500).contains(&air), "ten times 4 s and 5 s: {air}");
+    assert!(judged.armed.as_millis().abs_diff(air) <= 6_500, "{:?}", judged.armed);
+}
+
+#[test]
 fn arming_that_is_guessed_from_the_throttle_is_no_disarming_in_the_air() {
     let judged = disarmed_high_with(true, Some("taken from the throttle"));
     assert!(judged.problems.iter().all(|problem| problem.check != DISARMED), "{:?}", judged.problems);
