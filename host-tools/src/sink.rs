@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
-use crate::files::{Inputs, Output};
+use crate::files::{Inputs, Output, check_standard_output_is_open};
 use crate::made;
 use crate::output::Stdout;
 
@@ -89,6 +89,7 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
         }
         Endpoint::Standard => {
             inputs.refuse_standard_output()?;
+            check_standard_output_is_open()?;
             Ok(Ground { writer: Box::new(BufWriter::new(Stdout::new())), heard, file: None })
         }
         _ => {

@@ -17,6 +17,7 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::plural::count;
 use crate::printable::{path, word};
+use crate::source::find::besides;
 use crate::summary::Overview;
 
 /// Runs `hums verify`.
@@ -26,6 +27,13 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
         note!("{remark}");
     }
     let (mut ok, mut logs, mut without_earlier) = (!found.is_cut(), 0_u64, WithoutEarlier::default());
+    for folder in args.inputs.iter().filter(|input| input.is_dir()) {
+        let (words, is_broken) = besides(folder, &found)?;
+        for words in words {
+            note!("{words}");
+        }
+        ok &= !is_broken;
+    }
     // The list is printed as it is made: a folder may have ten thousand logs.
     let begin = || output::JsonList::begin("images", &images_json(&found.images), "logs");
     let mut list = args.json.then(begin).transpose()?;

@@ -89,6 +89,15 @@ impl Layout {
             .map_err(LayoutError::BadVolume)
     }
 
+    /// The same of a volume without a partition table before it, as an image of a partition alone has it. The recorder
+    /// writes to no such card.
+    pub fn volume<D: BlockDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
+        let blocks = device.num_blocks().map_err(LayoutError::Device)?.0;
+        let mut block = [Block::new()];
+        device.read(&mut block, BlockIdx(0)).map_err(LayoutError::Device)?;
+        Self::from_boot_sector(&block[0], 0, blocks).map_err(LayoutError::BadVolume)
+    }
+
     fn from_boot_sector(boot: &Block, start: u32, blocks: u32) -> Result<Self, &'static str> {
         let u8_at = |at: usize| u32::from(boot[at]);
         let u16_at = |at: usize| u32::from(u16::from_le_bytes([boot[at], boot[at + 1]]));

@@ -37,7 +37,6 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     // Each demo begins with an empty card.
     let mut place = earlier::Place::clear(&args.dir, &inputs)?;
     line(&format!("1. {flight} goes in at the autopilot UART"))?;
-    // A demo that is killed while it records leaves a part, which the next one removes.
     let parts = [InPlacePart::begin(&card)?, InPlacePart::begin(&gs)?];
     let [card_part, gs_part] = parts.each_ref().map(InPlacePart::path);
     let recorded = record(&flight, card_part, gs_part)?;

@@ -13,6 +13,8 @@ use crate::plural::{are, count};
 
 /// Clocks of two power-ons differ by more than this, or say nothing about which one was first: microseconds.
 const EPOCH_SLACK_US: u64 = 60_000_000;
+/// No box recorded before 2025, and a clock that says so is wrong: microseconds since 1970.
+const EARLIEST_US: u64 = 1_735_689_600_000_000;
 /// Files of a log that are named one by one.
 const NAMED_MAX: usize = 3;
 
@@ -170,7 +172,8 @@ impl Files<'_> {
     /// Whether sectors of a session that began later lie in the log's files. What is left over there is older: a file is
     /// only ever overwritten by a newer session.
     pub(super) fn has_newer(&self) -> bool {
-        let both = self.summary.other_epoch_us.zip(self.summary.epoch_us);
+        let both =
+            self.summary.other_epoch_us.zip(self.summary.epoch_us.filter(|epoch| *epoch >= EARLIEST_US));
         both.is_some_and(|(other, own)| other > own.saturating_add(EPOCH_SLACK_US))
     }
 }
@@ -245,6 +248,17 @@ mod tests {
         let whom = "of another session (box 3f3f3f3f3f3f3f3f3f3f3f3f, session 1a2b3c4d)";
         assert!(joined.starts_with(&format!("sectors 400 to 699 of 00001_00.HUM are {whom}: ")), "{joined}");
         assert!(hollow.ends_with(&format!("holds 300 sectors {whom}")), "{hollow}");
+    }
+
+    #[test]
+    fn a_clock_of_before_any_box_says_nothing_about_which_session_began_later() {
+        let has_newer = |own, other| {
+            let summary = Summary { epoch_us: Some(own), other_epoch_us: Some(other), ..Summary::default() };
+            Files { names: &[], summary: &summary, proof: Proof::None }.has_newer()
+        };
+        let (then, now) = (1_554_595_200_000_000, 1_790_000_000_000_000);
+        assert!(has_newer(now, now + 2 * EPOCH_SLACK_US) && !has_newer(now, now));
+        assert!(!has_newer(then, now), "2019");
     }
 
     #[test]

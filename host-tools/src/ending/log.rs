@@ -111,6 +111,12 @@ impl Ending {
         if blocks.misplaced > 0 {
             all.push(format!("{} there twice, or where others belong", are(blocks.misplaced, "sector")));
         }
+        if summary.times_fell > 0 {
+            all.push(format!(
+                "its times fall back at the beginning of {}",
+                count(summary.times_fell, "group")
+            ));
+        }
         if summary.marks.wrong > 0 {
             all.push(format!(
                 "{} of another number of frames than were read",
@@ -161,5 +167,22 @@ impl Ending {
     /// Whether sectors of a session that began later lie in the log's files.
     pub fn has_newer(&self) -> bool {
         self.file().has_newer()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_whose_times_fall_back_is_not_proved() {
+        let summary =
+            |times_fell| Summary { session: Some(7), closed: true, times_fell, ..Summary::default() };
+        let unproved = |times_fell| {
+            let summary = summary(times_fell);
+            Ending { proof: Proof::of(&summary, None), summary, ..Ending::default() }.unproved()
+        };
+        assert_eq!(unproved(0), Vec::<String>::new());
+        assert_eq!(unproved(2), ["its times fall back at the beginning of 2 groups"]);
     }
 }

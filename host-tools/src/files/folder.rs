@@ -15,13 +15,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use anyhow::{Context as _, Result, bail};
 
 use super::inputs::Inputs;
-use super::part::{is_written, lock, lock_folder_of, sync_folder_of};
-use super::paths::{cannot_write, make_parent, part_of, settle, target_of};
+use super::part::{free_part, lock, lock_folder_of, sync_folder_of};
+use super::paths::{cannot_write, make_parent, settle, target_of};
 use super::stamp::{STAMP, Stamp, foreign};
 use super::there::There;
 use crate::outcome::Differs;
 
-/// What a folder may hold that a killed run has left.
+/// What a folder may hold that is not ended.
 const EXTENSIONS: [&str; 2] = ["csv", "parquet"];
 /// Files that are synced at once: each waits for the disk, and nearly all of it together.
 const SYNCS_AT_ONCE: usize = 8;
@@ -170,11 +170,7 @@ fn is_all_there(path: &Path, files: &BTreeMap<String, Arc<AtomicU64>>) -> Result
 
 impl Part {
     fn begin(path: &Path, target: PathBuf, replaces: bool) -> Result<Self> {
-        let part = part_of(&target)?;
-        if part.exists() || part.is_symlink() {
-            is_written(&part.join(STAMP), path)?;
-            remove_part(&part).with_context(|| cannot_write(&part))?;
-        }
+        let part = free_part(&target, path)?;
         fs::create_dir(&part).with_context(|| cannot_write(path))?;
         let mut part = Self { path: part, target, replaces, stamp: None };
         let stamp = File::options().write(true).create_new(true).open(part.path.join(STAMP));
@@ -218,7 +214,7 @@ impl Drop for Part {
     fn drop(&mut self) {
         if !self.path.as_os_str().is_empty() {
             let _ending = lock_folder_of(&self.target);
-            // Where it cannot be removed, the next run does.
+            // Where it cannot be removed, it is in nobody's way.
             let _ = remove_part(&self.path);
         }
     }
@@ -277,11 +273,8 @@ fn remove_ours(folder: &Path) -> io::Result<()> {
     remove(folder, |name| stamp.has(name))
 }
 
-/// Removes what a run has left that was killed or has failed: its stamp may name no file yet.
+/// Removes what this run has made and not ended: its stamp may name no file yet.
 fn remove_part(folder: &Path) -> io::Result<()> {
-    if folder.is_symlink() {
-        return fs::remove_file(folder);
-    }
     let stamp = Stamp::of(folder).filter(|stamp| !stamp.files.is_empty());
     let is_table = |name: &str| EXTENSIONS.iter().any(|extension| name.ends_with(&format!(".{extension}")));
     remove(folder, |name| stamp.as_ref().map_or(name == STAMP || is_table(name), |stamp| stamp.has(name)))

@@ -196,6 +196,22 @@ pub(super) fn refuse_overwriting(number: u32) -> Result<()> {
     )))
 }
 
+/// Refuses a standard output that is closed: what is made would be gone, without an error. Rust opens `/dev/null` in its place
+/// for reading and writing, which `>/dev/null` does not.
+pub fn check_standard_output_is_open() -> Result<()> {
+    let same = |one: &Path, other: &Path| {
+        FileId::of(one).ok().zip(FileId::of(other).ok()).is_some_and(|(a, b)| a == b)
+    };
+    let open = fs::read_to_string(format!("/proc/self/fdinfo/{STANDARD_OUTPUT}")).unwrap_or_default();
+    let flags = open.lines().find_map(|line| line.strip_prefix("flags:")).map(str::trim);
+    let is_both = flags.is_some_and(|flags| flags.ends_with('2'));
+    if is_both && same(Path::new("/dev/null"), &Path::new("/proc/self/fd").join(STANDARD_OUTPUT.to_string()))
+    {
+        return Err(usage("standard output: is closed; nothing was written; name a file"));
+    }
+    Ok(())
+}
+
 /// Refuses a standard output that would be written over what is there.
 pub fn check_standard_output() -> Result<()> {
     refuse_overwriting(STANDARD_OUTPUT)

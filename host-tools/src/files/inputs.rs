@@ -7,7 +7,6 @@ use std::path::Path;
 use anyhow::Result;
 
 use super::identity::FileId;
-use super::paths::{part_of, target_of};
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
 
@@ -19,6 +18,8 @@ pub struct Inputs {
     compared: BTreeSet<FileId>,
     /// `--replace`
     replace: bool,
+    /// One of them comes live: what is made of it cannot be made again.
+    live: bool,
 }
 
 impl Inputs {
@@ -65,8 +66,14 @@ impl Inputs {
         self.files.insert(id, path.display().to_string());
     }
 
-    /// Adds what an endpoint reads, where that is a file.
+    /// Whether one of them comes live.
+    pub(super) const fn is_live(&self) -> bool {
+        self.live
+    }
+
+    /// Adds what an endpoint reads.
     pub fn add_endpoint(&mut self, endpoint: &Endpoint) {
+        self.live |= endpoint.is_live();
         match endpoint {
             Endpoint::File(path) => self.add(path),
             Endpoint::Standard => {
@@ -78,18 +85,9 @@ impl Inputs {
         }
     }
 
-    /// Refuses an output that is an input, or that is made under the name of an input until it is whole.
+    /// Refuses an output that is an input.
     pub fn refuse(&self, output: &Path) -> Result<()> {
         let shown = output.display();
-        if let Some(part) = target_of(output).and_then(|target| part_of(&target)).ok()
-            && FileId::of(&part).is_ok_and(|part| self.files.contains_key(&part))
-        {
-            return Err(usage(format!(
-                "{shown}: is made under the name {} until it is whole, and that is an input of this command; nothing was \
-                 written; name another output",
-                part.display()
-            )));
-        }
         let Ok(id) = FileId::of(output) else { return Ok(()) };
         let Some(input) = self.files.get(&id) else { return Ok(()) };
         let which =

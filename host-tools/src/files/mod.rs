@@ -20,11 +20,11 @@ mod there;
 
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
-pub use identity::{FileId, check_standard_output, means_standard_output};
+pub use identity::{FileId, check_standard_output, check_standard_output_is_open, means_standard_output};
 pub use inputs::Inputs;
 pub use kind::{Kind, Origin};
 pub use output::Output;
-pub use part::{InPlacePart, check_nothing_left, is_part, lock_in_place, make_in_place};
+pub use part::{InPlacePart, is_part, lock_in_place, make_in_place};
 pub use paths::{
     PART, appended, cannot_write, check_parent, inside, is_seekable, make_directory, make_parent,
     remove_if_empty, says_directory, settle,

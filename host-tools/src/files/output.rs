@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 
 use super::identity::{
-    check_standard_output, descriptor, is_standard_output, means_standard_output, refuse_overwriting,
+    check_standard_output, check_standard_output_is_open, descriptor, is_standard_output,
+    means_standard_output, refuse_overwriting,
 };
 use super::inputs::Inputs;
 use super::kind::{Found, Kind, Origin};
-use super::part::{lock, lock_folder_of, remove_stale, rename_new, sync_folder_of};
-use super::paths::{aside_of, begun_of, cannot_write, part_of, settle, target_of};
+use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
+use super::paths::{aside_of, begun_of, cannot_write, settle, target_of};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
 use crate::output::Stdout;
@@ -26,6 +27,9 @@ const BUFFER_BYTES: usize = 16 * 1024;
 /// A file that is there and has a byte in it is never replaced by other content, unless the user says so: what is
 /// written is compared with it, and the first byte that differs is an error ([`Differs`]). What is no regular file (a
 /// FIFO, `/dev/null`) and what somebody opened for us (`-`, `/dev/stdout`, `/dev/fd/3`) is written as it is.
+///
+/// What is made of a live source cannot be made again: it has its name from the beginning, and each write is in the file at
+/// once. So what came before a kill is there, and every command sees it.
 #[derive(Debug)]
 pub struct Output {
     to: BufWriter<To>,
@@ -45,6 +49,7 @@ enum To {
 /// What becomes the file when it is whole.
 #[derive(Debug)]
 struct Part {
+    /// Empty until it is begun.
     path: PathBuf,
     /// Without links: a link to the file stays a link.
     target: PathBuf,
@@ -76,7 +81,9 @@ impl Output {
             return Self::standard(path, inputs);
         }
         match Part::of(path, inputs, kind, of)? {
+            Place::Free(_) if inputs.is_live() => Self::record(path),
             Place::Free(part) => Self::begin(path, part),
+            Place::Taken if inputs.is_live() => Err(Differs::new(path).into()),
             Place::Taken => {
                 let there =
                     There::open(path, 0).with_context(|| format!("{}: cannot be read", path.display()));
@@ -138,22 +145,28 @@ impl Output {
             keeps_longer: false,
             resumed: true,
         };
-        if part.path.is_symlink() {
-            fs::remove_file(&part.path).with_context(|| cannot_write(path))?;
+        if fs::symlink_metadata(&part.path).is_ok_and(|about| !about.is_file()) {
+            bail!("{}: is no file of ours, and stands where one is begun; move it away", part.path.display());
         }
         let file = open_to_go_on(&part.path, path)?;
         let bytes = file.metadata().with_context(|| cannot_write(path))?.len();
-        Ok((Self::new(To::File(file), path, Some(part)), bytes))
+        Ok((Self::at_once(file, path, Some(part)), bytes))
     }
 
-    /// Begins anew what [`Output::resume`] gave, and keeps what an earlier run has left until the file is whole.
-    pub fn set_aside(&mut self) -> Result<()> {
-        let Some(part) = &self.part else { return Ok(()) };
-        let renamed = fs::rename(&part.path, aside_of(&part.target)?);
-        settle(renamed, &self.path)?;
+    /// Begins anew what [`Output::resume`] gave. What an earlier run has left stays under the name that is given back.
+    pub fn set_aside(&mut self) -> Result<PathBuf> {
+        let Some(part) = self.part.take() else { bail!("{}", cannot_write(&self.path)) };
+        let mut number = 1;
+        let aside = loop {
+            let aside = aside_of(&part.target, number)?;
+            match rename_new(&part.path, &aside) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+                renamed => break settle(renamed, &self.path).map(|()| aside)?,
+            }
+        };
         let file = open_to_go_on(&part.path, &self.path)?;
-        self.to = BufWriter::with_capacity(BUFFER_BYTES, To::File(file));
-        Ok(())
+        *self = Self::at_once(file, &self.path, Some(part));
+        Ok(aside)
     }
 
     /// Removes a file that an earlier run made, and that is no input.
@@ -166,9 +179,23 @@ impl Output {
         Self { to: BufWriter::with_capacity(BUFFER_BYTES, to), path: path.to_owned(), part }
     }
 
-    fn begin(path: &Path, part: Part) -> Result<Self> {
+    /// A file into which each write goes at once.
+    fn at_once(file: File, path: &Path, part: Option<Part>) -> Self {
+        Self { to: BufWriter::with_capacity(0, To::File(file)), path: path.to_owned(), part }
+    }
+
+    /// What has its name from the beginning. Nothing is there, or an empty file.
+    fn record(path: &Path) -> Result<Self> {
+        let file = open_to_go_on(path, path)?;
+        if file.metadata().with_context(|| cannot_write(path))?.len() > 0 {
+            return Err(Differs::new(path).into());
+        }
+        Ok(Self::at_once(file, path, None))
+    }
+
+    fn begin(path: &Path, mut part: Part) -> Result<Self> {
         let _beginning = lock_folder_of(&part.target);
-        remove_stale(&part.path, path)?;
+        part.path = free_part(&part.target, path)?;
         let file = File::options().write(true).create_new(true).open(&part.path);
         let file = file.with_context(|| cannot_write(path))?;
         lock(&file, path)?;
@@ -178,6 +205,7 @@ impl Output {
     fn standard(path: &Path, inputs: &Inputs) -> Result<Self> {
         inputs.refuse_standard_output()?;
         check_standard_output()?;
+        check_standard_output_is_open()?;
         // The results that the command prints are not to stand in what it makes.
         crate::output::leave_standard_output();
         Ok(Self::new(To::Standard(Stdout::new()), path, None))
@@ -233,17 +261,16 @@ impl Output {
     pub fn finish(&mut self) -> Result<()> {
         self.end()?;
         let To::File(file) = self.to.get_mut() else { return Ok(()) };
-        let Some(part) = self.part.take() else { return Ok(()) };
+        let Some(part) = self.part.take() else {
+            let is_file = file.metadata().is_ok_and(|about| about.is_file());
+            return settle(if is_file { file.sync_all() } else { Ok(()) }, &self.path);
+        };
         let placed = file.sync_all().and_then(|()| part.place(file));
         if let Err(error) = placed {
             part.abandon();
             return settle(Err(error), &self.path);
         }
         sync_folder_of(&part.target);
-        if part.resumed {
-            // There is none, mostly.
-            let _ = fs::remove_file(aside_of(&part.target)?);
-        }
         Ok(())
     }
 }
@@ -300,8 +327,7 @@ impl Part {
         // A table beside a file is shorter where that has become whole.
         let keeps_longer = !matches!(kind.origin, Origin::Ours);
         let part = |target: PathBuf, permissions, replaces_beginning| -> Result<Place> {
-            let path = part_of(&target)?;
-            let resumed = false;
+            let (path, resumed) = (PathBuf::new(), false);
             Ok(Place::Free(Self { path, target, permissions, replaces_beginning, keeps_longer, resumed }))
         };
         let about = match fs::metadata(path) {
@@ -359,7 +385,7 @@ impl Part {
 
     fn abandon(&self) {
         if !self.resumed {
-            // Where it cannot be removed either, the next run does.
+            // Where it cannot be removed either, it is in nobody's way.
             let _ = fs::remove_file(&self.path);
         }
     }

@@ -1,6 +1,7 @@
 //! What is not whole yet: a file or a folder beside its target, `.NAME.hums-part`, renamed when it is whole.
 //!
-//! Whoever writes one holds a lock on it, so that a second run does not take it for what a killed one has left.
+//! Whoever writes one holds a lock on it, which a second run sees. What is not locked has the name by chance, or was left by
+//! a run that was killed. Nothing tells these apart, so it stays, and the run takes `.NAME.2.hums-part`.
 
 use std::fs::{File, TryLockError};
 use std::io;
@@ -8,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::paths::{PART, cannot_write, part_of, target_of};
+use super::paths::{PART, PARTS_MAX, cannot_write, part_of, target_of};
+use super::stamp::STAMP;
 
 /// Whether a name is that of a file or a folder that is not whole: readers pass it over.
 pub fn is_part(path: &Path) -> bool {
@@ -29,8 +31,8 @@ pub(super) fn lock(file: &File, target: &Path) -> Result<()> {
     }
 }
 
-/// Keeps other runs from beginning or ending anything in the folder of a target, for as long as it is held: what a killed
-/// run has left is removed, and the new part made and locked, in one go. None where the system does not lock folders.
+/// Keeps other runs from beginning or ending anything in the folder of a target, for as long as it is held: a free name is
+/// found, and the new part made and locked, in one go. None where the system does not lock folders.
 pub(super) fn lock_folder_of(target: &Path) -> Option<File> {
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = File::open(folder).ok()?;
@@ -50,9 +52,8 @@ pub fn lock_in_place(file: &File, path: &Path) -> Result<()> {
 /// that is killed before leaves nothing of this name.
 pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Result<File> {
     let target = target_of(path)?;
-    let part = part_of(&target)?;
     let beginning = lock_folder_of(&target);
-    remove_stale(&part, path)?;
+    let part = free_part(&target, path)?;
     let file = File::options().read(true).write(true).create_new(true).open(&part);
     let file = file.with_context(|| cannot_write(path))?;
     lock(&file, path)?;
@@ -63,7 +64,7 @@ pub fn make_in_place(path: &Path, fill: impl FnOnce(&File) -> Result<()>) -> Res
         let _ = file.unlock();
     }
     if made.is_err() {
-        // Where it cannot be removed, the next run does.
+        // Where it cannot be removed, it is in nobody's way.
         let _ = std::fs::remove_file(&part);
     }
     made.map(|()| file)
@@ -78,11 +79,9 @@ pub struct InPlacePart {
 }
 
 impl InPlacePart {
-    /// Removes what a killed run has left.
+    /// Finds a name that nothing has.
     pub fn begin(target: &Path) -> Result<Self> {
-        let part = part_of(target)?;
-        remove_stale(&part, target)?;
-        Ok(Self { part, target: target.to_owned() })
+        Ok(Self { part: free_part(target, target)?, target: target.to_owned() })
     }
 
     /// Where it is made.
@@ -96,36 +95,23 @@ impl InPlacePart {
     }
 }
 
-/// Refuses an output of which a killed run has left something that came only once.
-pub fn check_nothing_left(path: &Path) -> Result<()> {
-    let part = part_of(&target_of(path)?)?;
-    if std::fs::symlink_metadata(&part).is_ok_and(|about| about.is_file() && about.len() > 0) {
-        bail!(
-            "{}: was left by a run that was killed, and what came then is nowhere else; move it away first",
+/// The first name of a part that nothing has. An error where another run is writing one.
+pub(super) fn free_part(target: &Path, path: &Path) -> Result<PathBuf> {
+    for number in 1..=PARTS_MAX {
+        let part = part_of(target, number)?;
+        // What cannot be looked at cannot be made either, which says why.
+        let Ok(about) = std::fs::symlink_metadata(&part) else { return Ok(part) };
+        let locked =
+            if about.is_dir() { Some(part.join(STAMP)) } else { about.is_file().then(|| part.clone()) };
+        if let Some(Ok(file)) = locked.map(File::open) {
+            lock(&file, path)?;
+        }
+        note!(
+            "{}: was left by a run that was killed, or has the name of such a file; it stays: remove it if nobody needs it",
             part.display()
         );
     }
-    Ok(())
-}
-
-/// Removes a file that a killed run has left, unless somebody writes it.
-pub(super) fn remove_stale(part: &Path, target: &Path) -> Result<()> {
-    match std::fs::symlink_metadata(part) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Ok(about) if about.is_file() => {
-            if let Ok(file) = File::open(part) {
-                lock(&file, target)?;
-            }
-        }
-        Ok(about) if about.is_symlink() => {}
-        Ok(_) => bail!("{}: is no file of ours, and stands where one is made; move it away", part.display()),
-        Err(_) => {}
-    }
-    match std::fs::remove_file(part) {
-        // The run that wrote it has finished meanwhile.
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        removed => removed.with_context(|| cannot_write(part)),
-    }
+    bail!("{}: {PARTS_MAX} killed runs have left parts of it (.NAME.hums-part); remove them", path.display())
 }
 
 /// Renames a file to a name that nothing has; [`io::ErrorKind::AlreadyExists`] where something has it.
@@ -151,14 +137,6 @@ fn rename_if_free(from: &Path, to: &Path) -> io::Result<()> {
         return Err(io::ErrorKind::AlreadyExists.into());
     }
     std::fs::rename(from, to)
-}
-
-/// Refuses a folder that another run is writing: its lock is on its stamp.
-pub(super) fn is_written(stamp: &Path, target: &Path) -> Result<()> {
-    match File::open(stamp) {
-        Ok(file) => lock(&file, target),
-        Err(_) => Ok(()),
-    }
 }
 
 /// Makes a rename outlive a power loss of this PC, where the file system can do that.

@@ -6,25 +6,33 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
+use sha2::{Digest as _, Sha256};
+
+use super::ends::short;
 use super::identity::{folded, leads_to, without_links};
 use crate::outcome::usage;
 
 /// How the name of a file or a folder ends that is not whole yet.
 pub const PART: &str = ".hums-part";
 
-/// The part of a target, beside it.
-pub(super) fn part_of(target: &Path) -> Result<PathBuf> {
-    beside(target, PART)
+/// Names of a part that are tried.
+pub(super) const PARTS_MAX: u32 = 100;
+/// A longer name is a hash in the name of its part: file systems take 255 bytes.
+const NAME_BYTES_MAX: usize = 200;
+
+/// The part of a target, beside it: the `number`-th name, from 1 on.
+pub(super) fn part_of(target: &Path, number: u32) -> Result<PathBuf> {
+    beside(target, "", number)
 }
 
 /// What `hums pull` has begun of a target, beside it: to be gone on with, so no other command takes it for its own.
 pub(super) fn begun_of(target: &Path) -> Result<PathBuf> {
-    beside(target, &format!(".pull{PART}"))
+    beside(target, ".pull", 1)
 }
 
-/// What was begun of another log of the same name, beside it, until the log is whole.
-pub(super) fn aside_of(target: &Path) -> Result<PathBuf> {
-    beside(target, &format!(".pull-other{PART}"))
+/// What was begun of another log of the same name, beside it: the `number`-th name, from 1 on.
+pub(super) fn aside_of(target: &Path, number: u32) -> Result<PathBuf> {
+    beside(target, ".pull-other", number)
 }
 
 /// The path that is written where this one is named: without links, so that a link stays one. What a link in `/proc` says
@@ -42,13 +50,21 @@ pub(super) fn target_of(path: &Path) -> Result<PathBuf> {
     )))
 }
 
-fn beside(target: &Path, ending: &str) -> Result<PathBuf> {
+fn beside(target: &Path, what: &str, number: u32) -> Result<PathBuf> {
     let Some(name) = target.file_name() else {
         bail!("{}: is no name of a file", target.display());
     };
     let mut part = std::ffi::OsString::from(".");
-    part.push(name);
-    part.push(ending);
+    if name.len() <= NAME_BYTES_MAX {
+        part.push(name);
+    } else {
+        part.push(format!("{:08x}", short(Sha256::new().chain_update(name.as_encoded_bytes()))));
+    }
+    part.push(what);
+    if number > 1 {
+        part.push(format!(".{number}"));
+    }
+    part.push(PART);
     Ok(target.with_file_name(part))
 }
 
@@ -96,7 +112,10 @@ pub fn make_parent(path: &Path) -> Result<()> {
 /// Says that a file cannot be written, and names its folder where that is missing.
 pub fn cannot_write(path: &Path) -> String {
     // A folder that is being made is there under the name of its part.
-    let is_there = |folder: &Path| folder.exists() || part_of(folder).is_ok_and(|part| part.exists());
+    let is_there = |folder: &Path| {
+        folder.exists()
+            || (1..=PARTS_MAX).any(|number| part_of(folder, number).is_ok_and(|part| part.exists()))
+    };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !is_there(folder));
     let why = folder.map_or_else(String::new, |folder| format!("; there is no folder {}", folder.display()));
     format!("{}: cannot be written{why}", path.display())

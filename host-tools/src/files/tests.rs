@@ -101,17 +101,56 @@ fn what_somebody_else_puts_there_while_a_file_is_written_stays() {
 }
 
 #[test]
-fn what_a_killed_run_has_left_is_in_nobodys_way_and_two_runs_do_not_mix() {
+fn what_has_the_name_of_a_part_stays_and_is_in_nobodys_way_and_two_runs_do_not_mix() {
     let dir = furnished();
     let path = dir.path().join("new");
-    fs::write(dir.path().join(".new.hums-part"), [b'x'; 1000]).expect("written");
+    let left = dir.path().join(".new.hums-part");
+    fs::write(&left, "left").expect("written");
+    std::os::unix::fs::symlink("old", dir.path().join(".new.2.hums-part")).expect("a link");
     let mut first = create(&path).expect("created");
+    assert_eq!(first.part(), dir.path().join(".new.3.hums-part"));
     let second = create(&path).expect_err("somebody writes it").to_string();
     assert!(second.contains("another run of hums is writing it"), "{second}");
     first.write_all(b"first").expect("written");
     first.finish().expect("whole");
     assert_eq!(fs::read(&path).expect("there"), b"first");
-    assert_eq!(names(dir.path()), ["new", "old"]);
+    assert_eq!(fs::read(&left).expect("there"), b"left");
+    assert_eq!(fs::read(dir.path().join("old")).expect("there"), b"what was there");
+    assert_eq!(names(dir.path()), [".new.2.hums-part", ".new.hums-part", "new", "old"]);
+    // Nor is a folder of this name, whatever is in it.
+    let (tables, left) = (dir.path().join("tables"), dir.path().join(".tables.hums-part"));
+    made(&left, "left");
+    made(&tables, "new");
+    assert_eq!((table(&tables), table(&left)), ("new".to_owned(), "left".to_owned()));
+}
+
+#[test]
+fn a_name_may_have_as_many_bytes_as_the_file_system_takes() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let long = "n".repeat(255);
+    let path = dir.path().join(&long);
+    write(&path, &Inputs::none(), "whole").expect("a name of 255 bytes");
+    fs::remove_file(&path).expect("there");
+    made(&path, "tables");
+    assert_eq!((names(dir.path()), table(&path)), (vec![long], "tables".to_owned()));
+}
+
+#[test]
+fn what_comes_live_has_its_name_and_is_in_the_file_at_once() {
+    let dir = furnished();
+    let path = dir.path().join("tap");
+    let mut inputs = Inputs::none();
+    inputs.add_endpoint(&"tcp:127.0.0.1:9".parse().expect("an endpoint"));
+    let mut tap = Output::create(&path, &inputs, &ANY, None).expect("created");
+    tap.write_all(b"came").expect("written");
+    assert_eq!(fs::read(&path).expect("there"), b"came");
+    let second = Output::create(&path, &inputs, &ANY, None).map(|_| ()).expect_err("it is there");
+    assert!(format!("{second:#}").contains("is there already"), "{second:#}");
+    drop(tap);
+    assert_eq!(
+        (names(dir.path()), fs::read(&path).expect("there")),
+        (vec!["old".into(), "tap".into()], b"came".to_vec())
+    );
 }
 
 #[test]
@@ -134,7 +173,7 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
     output.write_all(b"onetwothree").expect("written");
     output.finish().expect("whole");
     assert_eq!(fs::read(&path).expect("there"), b"onetwothree", "what was there was its beginning");
-    // What is of another log stays until the new one is whole.
+    // What is of another log stays.
     let (mut output, _) = Output::resume(&path).expect("created");
     output.write_all(b"of another log").expect("written");
     drop(output);
@@ -144,7 +183,8 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
     let aside = dir.path().join(".log.pull-other.hums-part");
     assert_eq!(fs::read(&aside).expect("there"), b"of another log");
     output.finish().expect("whole");
-    assert!(!aside.exists());
+    assert_eq!(fs::read(&aside).expect("there"), b"of another log");
+    fs::remove_file(&aside).expect("there");
     let (mut output, _) = Output::resume(&path).expect("created");
     output.write_all(b"another, and longer").expect("written");
     output.finish().expect_err("what is there is no beginning of it");

@@ -7,14 +7,17 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::Header;
+use hums_recorder::LogName;
 use hums_recorder::layout::{Layout, LayoutError};
 
 use super::fat::{CardFile, Extent, ReadAt as _, Volume, Walk};
 use super::found::{Found, Image, belong};
 use super::places::{BLOCK_BYTES, Log, Piece};
 use super::scan::{Files, Scan, scan};
-use super::sessions::Sessions;
 use crate::card::{ReadOnlyImage, length};
+
+/// What a deleted name's digits count up to.
+const DIGITS: u32 = 10_000;
 
 /// A file that is a log, or a segment of one.
 pub(super) fn whole_file(path: &Path) -> Result<Log> {
@@ -31,17 +34,21 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     })
 }
 
+/// Where things are on a card, or on its partition alone (`/dev/sdX1`).
+fn layout(device: &ReadOnlyImage) -> Result<Layout, LayoutError<io::Error>> {
+    Layout::read(device).or_else(|error| Layout::volume(device).map_err(|_| error))
+}
+
 /// Whether the file system of a card can be read there.
 pub fn is_card(path: &Path) -> Result<bool> {
-    let device = ReadOnlyImage::new(File::open(path)?)?;
-    Ok(Layout::read(&device).is_ok())
+    Ok(layout(&ReadOnlyImage::new(File::open(path)?)?).is_ok())
 }
 
 /// The logs that a card's file system knows; none where it has none. No block is searched for more.
 pub fn on_card(path: &Path) -> Vec<Log> {
     let read = || -> Result<Vec<Log>> {
         let file = File::open(path)?;
-        let layout = Layout::read(&ReadOnlyImage::new(file.try_clone()?)?).ok().context("no file system")?;
+        let layout = layout(&ReadOnlyImage::new(file.try_clone()?)?).ok().context("no file system")?;
         Ok(sessions_of(path, &Volume::new(&file, layout)?.walk()?.files))
     };
     read().unwrap_or_default()
@@ -59,7 +66,7 @@ pub struct Room {
 /// The room on a card; none where its file system cannot be read.
 pub fn room(path: &Path) -> Option<Room> {
     let file = File::open(path).ok()?;
-    let layout = Layout::read(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
+    let layout = layout(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
     let (all, clusters) = (layout.data_bytes(), u64::from(layout.clusters));
     let walk = Volume::new(&file, layout).and_then(Volume::walk).ok()?;
     Some(Room { free: all / clusters.max(1) * walk.free_clusters, all })
@@ -72,7 +79,7 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
     let device = ReadOnlyImage::new(file.try_clone().with_context(context)?).with_context(context)?;
     let mut about = Image { path: path.to_owned(), ..Image::default() };
     let mut files = Vec::new();
-    match Layout::read(&device) {
+    match layout(&device) {
         Ok(layout) => {
             let walk = Volume::new(&file, layout).and_then(Volume::walk).with_context(context)?;
             files = by_file_system(path, walk, &mut about)?;
@@ -82,23 +89,21 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
             about.damage.push(cut.unwrap_or_else(|| error.to_string()));
         }
     }
-    // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead.
-    if salvage || files.is_empty() || !about.damage.is_empty() {
-        let length = length(&file).with_context(context)?;
-        let known = sessions_of(path, &files);
-        let is_sound = about.damage.is_empty();
-        found.add(by_blocks(path, length, &known, &mut about)?);
-        if is_sound {
-            about.damage.extend(begun_anew(&known));
-        }
-    } else {
+    // A file system that is damaged tells of some files only, and of none surely: every block is looked at instead. That of a
+    // sound one is read by its files, also where every block is looked at for what no file holds any more.
+    let known = if about.damage.is_empty() { sessions_of(path, &files) } else { Vec::new() };
+    if !known.is_empty() {
         for name in files.iter().filter(|file| file.name.is_none()).map(|file| &file.path) {
             found.remark(format!(
                 "{}: {name} begins as a log and has not the name of a segment: it is read as a log of its own",
                 path.display()
             ));
         }
-        found.add(sessions_of(path, &files));
+        found.add(known.iter().cloned());
+    }
+    if salvage || known.is_empty() {
+        let length = length(&file).with_context(context)?;
+        found.add(by_blocks(path, length, &known, &mut about)?);
     }
     found.images.push(about);
     Ok(())
@@ -114,27 +119,28 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
             .damage
             .push(format!("{clusters}, with sectors of logs in them: an entry of a directory is lost"));
     }
-    // Older logs are deleted to make room; the newest one is what a card is read for.
+    // Older logs are deleted to make room; the newest one is what a card is read for. The first digit of a deleted one is
+    // lost: of the numbers that it may have had, the next one to those that are there counts.
     let newest = walk.files.iter().filter_map(|file| Some(file.name?.session)).max();
-    if let (Some(newest), Some((deleted, place))) = (newest, walk.deleted)
-        && deleted.session > newest % 10_000
+    let after = |(deleted, place): &(LogName, Extent)| {
+        let ahead = (deleted.session + DIGITS - newest? % DIGITS) % DIGITS;
+        (1..DIGITS / 2).contains(&ahead).then_some((newest? + ahead, *place))
+    };
+    if let Some((number, place)) = walk.deleted.iter().filter_map(after).max_by_key(|(number, _)| *number)
         && has_sector(path, vec![place])?
     {
-        about.damage.push(format!(
-            "session {:05}, which is newer than all that are there, was deleted",
-            newest / 10_000 * 10_000 + deleted.session
-        ));
+        about
+            .damage
+            .push(format!("session {number:05}, which is newer than all that are there, was deleted"));
     }
     about.deleted_logs = walk.deleted_logs;
     Ok(walk.files)
 }
 
-/// The sessions of which there are sectors anywhere; `known` are the logs that the file system knows of.
+/// The sessions of which there are sectors outside of the logs that the file system knows of.
 fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Result<Vec<Log>> {
-    let is_sound = about.damage.is_empty();
-    let knows_none = known.is_empty() && is_sound;
-    let files = if is_sound { Files::of(known)? } else { Files::default() };
-    let Scan { logs, left_out } = scan(path, length, &files)?;
+    let knows_none = known.is_empty() && about.damage.is_empty();
+    let Scan { logs, left_out } = scan(path, length, &Files::of(known))?;
     if left_out > 0 {
         about.damage.push(format!(
             "{left_out} sectors of small or scattered sessions are left out: there are too many of them"
@@ -148,22 +154,11 @@ fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Resu
         );
     }
     about.searched = true;
-    about.scanned = !logs.is_empty();
+    about.scanned = known.is_empty() && !logs.is_empty();
     if about.scanned && knows_none {
         about.damage.push("its file system knows of no log, and sectors of logs are there".to_owned());
     }
     Ok(logs)
-}
-
-/// Files that the recorder had just begun to write anew, as sentences: what is in them is found by its sectors too, and not
-/// that nothing of their own is there.
-fn begun_anew(known: &[Log]) -> Vec<String> {
-    let sessions = Sessions::of(known.iter().map(|log| (log.name.as_str(), log)));
-    let words = |log: &Log| {
-        let anew = sessions.begun_anew(&log.name).filter(|anew| !anew.is_confirmed)?;
-        Some(format!("{}: {}", log.files.join(", "), anew.words()))
-    };
-    known.iter().filter_map(words).collect()
 }
 
 /// Says of an image that ends before its first partition does that it is cut short. Its volume is then not what is wrong.

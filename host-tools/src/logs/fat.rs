@@ -36,6 +36,8 @@ const ENTRIES_PER_BLOCK: u32 = 128;
 const END_OF_CHAIN: u32 = 0x0fff_fff8;
 const ENTRY_MASK: u32 = 0x0fff_ffff;
 
+/// Deleted segments that are kept.
+const DELETED_MAX: usize = 10_000;
 /// The first byte of an entry whose file was deleted.
 const DELETED: u8 = 0xe5;
 const ATTRIBUTE_VOLUME: u8 = 0x08;
@@ -79,9 +81,9 @@ pub struct Walk {
     pub lost_clusters: u64,
     /// Where they lie, as far as there is room to keep it.
     pub lost: Vec<Extent>,
-    /// The deleted segment with the highest name whose first cluster is free, and where that cluster lies. A deleted entry
-    /// has lost its name's first digit, which is taken for 0.
-    pub deleted: Option<(LogName, Extent)>,
+    /// The deleted segments whose first clusters are free, and where these lie. A deleted entry has lost its name's first
+    /// digit, which is taken for 0.
+    pub deleted: Vec<(LogName, Extent)>,
     /// Deleted segments whose first cluster is free and begins with a sector of a log.
     pub deleted_logs: u64,
 }
@@ -285,9 +287,9 @@ impl<'a, I: ReadAt> Volume<'a, I> {
             return Ok(());
         }
         self.walk.deleted_logs += u64::from(self.begins_as_log(child)?);
-        if self.walk.deleted.is_none_or(|(newest, _)| newest < name) {
+        if self.walk.deleted.len() < DELETED_MAX {
             let place = Extent { start: self.place(child.first), length: self.cluster_bytes() };
-            self.walk.deleted = Some((name, place));
+            self.walk.deleted.push((name, place));
         }
         Ok(())
     }

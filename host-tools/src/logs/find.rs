@@ -1,8 +1,7 @@
 //! Finds the logs in files, card images, raw devices and folders, by what is in them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{self, Metadata};
-use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -12,7 +11,7 @@ use super::card::{image, whole_file};
 use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
-use super::places::{Log, segment_name, session_of};
+use super::places::{Log, segment_name};
 use crate::files::is_seekable;
 
 /// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
@@ -40,11 +39,14 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
             found.remark(format!("{}: was named or found already; it is read once", input.display()));
             continue;
         } else {
+            let images = found.images.len();
             named_file(input, salvage, &mut found)?;
-            if let (Some(name), Some(session), [_]) =
-                (segment_name(input), session_of(input), &found.logs[before..])
+            if let (Some(name), true) =
+                (segment_name(input), images == found.images.len() && before < found.logs.len())
+                && let Some(log) = found.logs.pop()
             {
-                segments.entry(session).or_default().push((name, before));
+                segments.entry(folder_of(input)).or_default().push((name, log));
+                continue;
             }
         }
         if found.logs.len() == before
@@ -63,7 +65,7 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
             }
         }
     }
-    join(segments, &mut found.logs);
+    found.add(as_in_folders(segments));
     make_names_unique(&mut found.logs);
     found.finish();
     Ok(found)
@@ -102,25 +104,42 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
-/// The segments that were named one by one, each with its place among the logs: by folder and session.
-type Segments = BTreeMap<(PathBuf, u32), Vec<(LogName, usize)>>;
+/// The segments that were named one by one, by folder.
+type Segments = BTreeMap<PathBuf, Vec<(LogName, Log)>>;
 
-/// Segments of one session in one folder are one log, under the name of the first of them.
-fn join(segments: Segments, logs: &mut Vec<Log>) {
-    let mut joined = BTreeSet::new();
-    for mut segments in segments.into_values() {
-        segments.sort();
-        let mut places = segments.into_iter().map(|(_, place)| place);
-        let Some(first) = places.next() else { continue };
-        for place in places {
-            let (files, pieces) = (mem::take(&mut logs[place].files), mem::take(&mut logs[place].pieces));
-            logs[first].files.extend(files);
-            logs[first].pieces.extend(pieces);
-            joined.insert(place);
+/// The folder in which a file is, however that is spelled.
+fn folder_of(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
+}
+
+/// The logs of segments, as if a folder with no others had been named, whatever their order: those of one session are one
+/// log, and those of one folder are of one card.
+fn as_in_folders(segments: Segments) -> Vec<Log> {
+    let (mut logs, mut prefixes) = (Vec::<Log>::new(), BTreeMap::<String, u32>::new());
+    let is_one = segments.len() == 1;
+    for (folder, mut segments) in segments {
+        let name = folder.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
+        let count = prefixes.entry(name.to_string()).or_default();
+        *count += 1;
+        let prefix = match count {
+            _ if is_one => String::new(),
+            1 => format!("{name}/"),
+            count => format!("{name}-{count}/"),
+        };
+        segments.sort_by_key(|(name, _)| *name);
+        for (segment, mut log) in segments {
+            log.name = format!("{prefix}{:05}", segment.session);
+            match logs.last_mut().filter(|last| last.name == log.name) {
+                Some(last) => {
+                    last.files.append(&mut log.files);
+                    last.pieces.append(&mut log.pieces);
+                }
+                None => logs.push(log),
+            }
         }
     }
-    let mut place = 0..;
-    logs.retain(|_| !place.next().is_some_and(|place| joined.contains(&place)));
+    logs
 }
 
 /// Two cards both have a session 1: the later ones get a number.
@@ -160,8 +179,8 @@ mod tests {
             logs,
             [
                 ("other", vec![shown("other.hum")]),
-                ("00004_00", vec![shown("00004_00.HUM")]),
-                ("00003_00", vec![shown("00003_00.HUM"), shown("00003_01.HUM")]),
+                ("00003", vec![shown("00003_00.HUM"), shown("00003_01.HUM")]),
+                ("00004", vec![shown("00004_00.HUM")]),
             ]
         );
     }

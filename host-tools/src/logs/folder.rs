@@ -97,10 +97,11 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
         let entry = entry.with_context(context)?;
         let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
         if is_part(&path) {
-            // What a run of this program has not made whole is nobody's log.
-            continue;
-        }
-        if kind.is_dir() && entries.folders.len() < WAITING_MAX {
+            found.remark(format!(
+                "{}: has the name of what a run of hums has not ended, and is passed over; to read it, rename it",
+                path.display()
+            ));
+        } else if kind.is_dir() && entries.folders.len() < WAITING_MAX {
             entries.folders.push(path);
         } else if kind.is_file() {
             entries.file(path, found);
@@ -121,6 +122,7 @@ impl Entries {
                 found.leave_out(format!("{shown}: format version {version} is newer than this program"));
             }
             // Whatever is in it: that it holds nothing of ours is told with its log.
+            (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
                 self.segments += 1;
                 self.sessions.entry(name.session).or_default().push((name, path));
@@ -139,16 +141,20 @@ impl Entries {
     }
 }
 
-/// Whether its name ends as that of a log of ours does.
+/// Whether its name ends as that of a log of ours does, compressed or not.
 fn is_named_as_log(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"))
+    is_named(path, &[".hum"])
 }
 
 /// Whether its name ends as that of a card's image does, compressed or not.
 fn is_named_as_card(path: &Path) -> bool {
+    is_named(path, &IMAGES)
+}
+
+fn is_named(path: &Path, endings: &[&str]) -> bool {
     let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy().to_lowercase());
-    let name = PACKED.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(&name);
-    IMAGES.iter().any(|ending| name.ends_with(ending))
+    let name = PACKED.iter().find_map(|packed| name.strip_suffix(packed)).unwrap_or(&name);
+    endings.iter().any(|ending| name.ends_with(ending))
 }
 
 fn no_card(path: &Path) -> String {
@@ -159,7 +165,10 @@ fn no_card(path: &Path) -> String {
 }
 
 fn nothing_of_ours(path: &Path) -> String {
-    format!("{}: has the name of a log and holds nothing of ours", path.display())
+    format!(
+        "{}: has the name of a log and holds nothing of ours (one that is packed: unpack it)",
+        path.display()
+    )
 }
 
 /// Says of something in a folder that it is no file.

@@ -64,16 +64,11 @@ impl Log {
     }
 }
 
-/// The segment that a file's name says it is: `00042_07.HUM` in any case of letters.
+/// The segment that a file's name says it is: `00042_07.HUM` in any case of letters, also where the ending was lost.
 pub fn segment_name(path: &Path) -> Option<LogName> {
     let name = path.file_name()?.to_str()?.to_ascii_uppercase();
-    let (base, extension) = name.split_once('.')?;
+    let (base, extension) = name.split_once('.').unwrap_or((&name, "HUM"));
     LogName::from_short(base.as_bytes(), extension.as_bytes())
-}
-
-/// Of which session a file's name says it is a segment: the folder, as it was named, and the session's number.
-pub fn session_of(path: &Path) -> Option<(PathBuf, u32)> {
-    Some((path.parent()?.to_owned(), segment_name(path)?.session))
 }
 
 /// Streams a log's blocks. A last part of less than a block is padded with zeros: it is damaged either way.

@@ -3,7 +3,7 @@
 //! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card that has more is not ours or was
 //! made to take our memory: of too many sessions those with the most sectors stay, and what is left out is counted.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Result;
@@ -11,6 +11,7 @@ use hums_blackbox::Header;
 
 use super::fat::Extent;
 use super::places::{BLOCK_BYTES, Blocks, Log, Piece};
+use super::sessions::first_session;
 use crate::progress;
 
 /// Runs of all sessions together: 16 MiB. The recorder makes a segment in a few runs.
@@ -91,60 +92,34 @@ impl Sessions {
     }
 }
 
-/// The files of a sound file system: what a file of one log holds of others is left over.
+/// The files of a sound file system: what a log's files hold of its own session is read there.
 #[derive(Debug, Default)]
 pub(super) struct Files {
-    sessions: BTreeSet<u32>,
-    /// By the block where each extent begins.
-    extents: BTreeMap<u64, FileExtent>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct FileExtent {
-    blocks: u64,
-    session: u32,
-    /// The number of the sector that belongs into its first block.
-    number: u32,
+    /// The blocks of each extent and the session of its log, by the block where it begins.
+    extents: BTreeMap<u64, (u64, u32)>,
 }
 
 impl Files {
-    /// Of these logs' files, each with the session of the log and where its first block is sound the number in there.
-    pub(super) fn of(logs: &[Log]) -> Result<Self> {
+    /// Of these logs' files.
+    pub(super) fn of(logs: &[Log]) -> Self {
         let mut files = Self::default();
-        for piece in logs.iter().flat_map(|log| &log.pieces) {
-            let one = Log {
-                name: String::new(),
-                files: Vec::new(),
-                pieces: vec![piece.clone()],
-                session: None,
-                left_over: false,
-            };
-            let Some(Ok(first)) = one.blocks().next_block()?.map(|block| Header::read(&block)) else {
-                continue;
-            };
-            files.sessions.insert(first.session);
-            let mut number = first.number;
-            for extent in &piece.extents {
-                let blocks = extent.length / BLOCK_BYTES as u64;
-                let place = FileExtent { blocks, session: first.session, number };
-                files.extents.insert(extent.start / BLOCK_BYTES as u64, place);
-                number = number.wrapping_add(blocks as u32);
+        for (log, session) in logs.iter().filter_map(|log| Some((log, first_session(log)?))) {
+            for extent in log.pieces.iter().flat_map(|piece| &piece.extents) {
+                let [start, blocks] = [extent.start, extent.length].map(|bytes| bytes / BLOCK_BYTES as u64);
+                files.extents.insert(start, (blocks, session));
             }
         }
-        Ok(files)
+        files
     }
 
-    /// Whether a run is no more than what is left over in a file that was written anew.
-    fn is_left_over(&self, session: u32, run: &Run) -> bool {
-        let Some((start, file)) = self.extents.range(..=run.start).next_back() else { return false };
-        let at = run.start - start;
-        // A copy of a sector in progress may lie one block further than its own place.
-        let own = u64::from(run.number.wrapping_sub(file.number));
-        at < file.blocks && (session != file.session || at.wrapping_sub(own) > 1)
+    /// Whether a sector of this session in this block is read with its log.
+    fn has(&self, session: u32, at: u64) -> bool {
+        let extent = self.extents.range(..=at).next_back();
+        extent.is_some_and(|(start, (blocks, of))| at - start < *blocks && *of == session)
     }
 }
 
-/// Looks at every block of `length` bytes. Of the sessions of `files` what is left over in newer files is left out.
+/// Looks at every block of `length` bytes for sectors that are not read with the logs of `files`.
 pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     let everything = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
     let all = Log {
@@ -160,7 +135,9 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     let bar = progress::bytes(Some(length), &format!("{}: looking at every block", path.display()));
     let mut at: u64 = 0;
     while let Some(block) = blocks.next_block()? {
-        if let Ok(header) = Header::read(&block) {
+        if let Ok(header) = Header::read(&block)
+            && !files.has(header.session, at)
+        {
             sessions.sector(&header, at);
         }
         at += 1;
@@ -172,12 +149,8 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     sessions.make_room();
     let Sessions { runs, left_out, .. } = sessions;
     let block_bytes = BLOCK_BYTES as u64;
-    let has_files = !files.sessions.is_empty();
+    let left_over = !files.extents.is_empty();
     let log = |(session, mut runs): (u32, Vec<Run>)| {
-        let is_known = files.sessions.contains(&session);
-        if is_known {
-            runs.retain(|run| !files.is_left_over(session, run));
-        }
         runs.sort_unstable_by_key(|run| (run.number, run.start));
         let extent = |run: &Run| Extent {
             start: run.start * block_bytes,
@@ -190,7 +163,7 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
             files,
             pieces: vec![piece],
             session: Some(session),
-            left_over: !is_known && has_files,
+            left_over,
         }
     };
     let mut logs: Vec<Log> = runs.into_iter().map(log).collect();

@@ -144,9 +144,8 @@ impl Candidate<'_> {
 /// Names of copies among the logs of one session, each with that of its original: a card's log before one of another name,
 /// one of more files before one of less.
 fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
-    let eligible =
-        |log: &Candidate<'_>| logs.iter().any(|other| log.name != other.name && log.may_be_copy(other));
-    if !logs.iter().any(eligible) {
+    let may_be = |one: &Candidate<'_>| logs.iter().skip(1).any(|other| one.may_be_copy(other));
+    if !logs.first().is_some_and(may_be) && logs.iter().all(|log| log.number.is_some()) {
         return Vec::new();
     }
     logs.sort_by_key(|log| (log.number.is_none(), std::cmp::Reverse(log.log.pieces.len())));

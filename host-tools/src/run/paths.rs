@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::cli::Run;
 use crate::endpoint::Endpoint;
-use crate::files::{FileId, Inputs, Output, check_nothing_left, means_standard_output};
+use crate::files::{FileId, Inputs, Output, means_standard_output};
 use crate::made;
 use crate::outcome::usage;
 
@@ -30,9 +30,6 @@ pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> 
     for output in gs.into_iter().chain(tap) {
         // A run also changes the card, so that it is too late to compare while it goes on.
         Output::check_new(output, &inputs, &made::RAW)?;
-        if run.input.is_live() && !means_standard_output(output) && !is_device(output) {
-            check_nothing_left(output)?;
-        }
     }
     if let (Some(gs), Some(tap)) = (gs, tap)
         && FileId::of(gs).ok() == FileId::of(tap).ok()

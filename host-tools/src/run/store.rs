@@ -46,6 +46,18 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
     }
 }
 
+/// Refuses what cannot be opened, before anything else is made.
+pub(super) fn check(path: &Path) -> Result<()> {
+    if path.exists() {
+        return read(path).map(drop);
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        bail!("--store {}: cannot be made; there is no folder {}", path.display(), folder.display());
+    }
+    Ok(())
+}
+
 /// What the file holds, and the file for writing.
 fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if path.metadata().is_ok_and(|about| !about.is_file()) {

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::mem;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -10,9 +11,8 @@ use super::format::{KNOWN, detect, hint, is_recording, start_of};
 use super::recording::Place;
 use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
-use crate::logs::places::session_of;
 use crate::logs::sessions::Sessions;
-use crate::logs::{self, Content};
+use crate::logs::{self, Content, segment_name};
 use crate::outcome::usage;
 use crate::plural::count;
 use crate::printable;
@@ -53,8 +53,12 @@ impl Found {
         self.remarks.extend(own.remarks);
         let single = own.logs.len() == 1 && path.is_file();
         for log in own.logs {
-            let name =
-                if single { path.display().to_string() } else { format!("{}:{}", path.display(), log.name) };
+            let name = match log.files.first() {
+                // A log of segments that were named one by one.
+                Some(file) if path.is_file() && segment_name(path).is_some() => file.clone(),
+                _ if single => path.display().to_string(),
+                _ => format!("{}:{}", path.display(), log.name),
+            };
             self.places.push(Place::log(name, log));
         }
     }
@@ -100,7 +104,8 @@ impl Found {
 /// lies in a folder and is none is passed over.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     let mut found = Found::default();
-    let mut segments = by_session(inputs);
+    let is_segment = |input: &&PathBuf| segment_name(input).is_some() && is_own(input).unwrap_or(false);
+    let mut segments: Vec<PathBuf> = inputs.iter().filter(is_segment).cloned().collect();
     for input in inputs {
         if input == Path::new("-") {
             if found.places.iter().any(Place::is_standard) {
@@ -114,20 +119,11 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         check_seekable(input, &about)?;
         if about.is_dir() {
             let own = logs::find::find_in(input, salvage)?;
-            let pieces = own.logs.iter().flat_map(|log| &log.pieces).map(|piece| &piece.path);
-            let ours = pieces.chain(own.images.iter().map(|image| &image.path)).cloned().collect();
-            let mut walk = Walk { ours, ..Walk::default() };
-            walk.folder(input, 0)?;
+            let mut walk = Walk::of(input, &own)?;
             found.add_own(input, own);
             found.places.extend(walk.paths.iter().map(|path| Place::file(path)));
-            if walk.left_out > 0 {
-                found.is_cut = true;
-                found.remarks.push(format!(
-                    "{}: recordings and folders beyond {WALKED_MAX} are left out ({} of them): name fewer folders at once",
-                    input.display(),
-                    walk.left_out
-                ));
-            }
+            found.is_cut |= walk.left_out > 0;
+            found.remarks.extend(walk.left_out_words(input));
             found.is_cut |= walk.unknown > 0;
             found.remarks.append(&mut walk.remarks);
             if found.places.len() == before {
@@ -136,33 +132,21 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
                     found.remarks.iter().chain(passed_over).map(|remark| format!("\n  {remark}")).collect();
                 bail!("{}: no log and no recording is in there{}", input.display(), remarks.concat());
             }
-            if walk.others > 0 {
-                let files = count(walk.others, "file");
-                let names: Vec<String> = walk.passed_over.iter().map(|name| format!("\n  {name}")).collect();
-                let more = walk.others.saturating_sub(names.len() as u64);
-                let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
-                found.remarks.push(format!(
-                    "{}: {files} passed over: no log of a known kind{}{more}",
-                    input.display(),
-                    names.concat()
-                ));
-            }
+            found.remarks.extend(walk.passed_over_words(input));
         } else if is_own(input)? {
-            let together = match session_of(input) {
-                None => vec![input.clone()],
-                Some(session) => match segments.remove(&session) {
-                    Some(named) => named.into_iter().filter(|one| is_own(one).unwrap_or(false)).collect(),
-                    // Read with the first one of its session.
-                    None => continue,
-                },
-            };
+            // Those that are named one by one are judged together, as in a folder.
+            let together =
+                if segment_name(input).is_none() { vec![input.clone()] } else { mem::take(&mut segments) };
+            if together.is_empty() {
+                continue;
+            }
             let own = logs::find(&together, salvage).map_err(|error| not_known(input, error))?;
             found.add_own(input, own);
         } else {
             found.places.push(Place::file(input));
         }
         found.drop_repeats(before);
-        if inputs.len() > 1 {
+        if inputs.len() > 1 && segment_name(input).is_none() {
             name_after(input, found.places.iter_mut().skip(before).filter(|place| place.own().is_some()));
         }
     }
@@ -190,18 +174,28 @@ fn make_names_unique(places: &mut [Place]) {
     }
 }
 
+/// What lies in a folder besides the logs of ours that were found there, as sentences, and whether something is among it that
+/// has the name of a recording and holds none: for a command that reads logs of ours only.
+pub fn besides(folder: &Path, own: &logs::Found) -> Result<(Vec<String>, bool)> {
+    let walk = Walk::of(folder, own)?;
+    let recordings = walk.paths.len();
+    let not_judged = (recordings > 0).then(|| {
+        format!(
+            "{}: {} of other kinds passed over: `hums check` judges them",
+            folder.display(),
+            count(recordings as u64, "recording")
+        )
+    });
+    let mut words = walk.remarks.clone();
+    words.extend(not_judged);
+    words.extend(walk.left_out_words(folder));
+    words.extend(walk.passed_over_words(folder));
+    Ok((words, walk.unknown > 0))
+}
+
 /// Which session each number of the cards holds.
 pub fn sessions_of(places: &[Place]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
-}
-
-/// The inputs that are named as segments: one by one, they are read with the others of their session.
-fn by_session(inputs: &[PathBuf]) -> BTreeMap<(PathBuf, u32), Vec<PathBuf>> {
-    let mut segments: BTreeMap<_, Vec<PathBuf>> = BTreeMap::new();
-    for (session, input) in inputs.iter().filter_map(|input| Some((session_of(input)?, input))) {
-        segments.entry(session).or_default().push(input.clone());
-    }
-    segments
 }
 
 /// Whether a file is a log of ours or a card's image.
@@ -244,6 +238,37 @@ struct Walk {
 }
 
 impl Walk {
+    /// What is in a folder besides what was found of our own.
+    fn of(folder: &Path, own: &logs::Found) -> Result<Self> {
+        let mut walk = Self { ours: own.paths().map(Path::to_owned).collect(), ..Self::default() };
+        walk.folder(folder, 0)?;
+        Ok(walk)
+    }
+
+    fn left_out_words(&self, folder: &Path) -> Option<String> {
+        (self.left_out > 0).then(|| {
+            format!(
+                "{}: recordings and folders beyond {WALKED_MAX} are left out ({} of them): name fewer folders at once",
+                folder.display(),
+                self.left_out
+            )
+        })
+    }
+
+    fn passed_over_words(&self, folder: &Path) -> Option<String> {
+        let names: Vec<String> = self.passed_over.iter().map(|name| format!("\n  {name}")).collect();
+        let more = self.others.saturating_sub(names.len() as u64);
+        let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
+        (self.others > 0).then(|| {
+            let files = count(self.others, "file");
+            format!(
+                "{}: {files} passed over: no log of a known kind{}{more}",
+                folder.display(),
+                names.concat()
+            )
+        })
+    }
+
     /// What is neither a recording nor a folder is forgotten at once: there may be millions of files.
     fn folder(&mut self, dir: &Path, depth: usize) -> Result<()> {
         let context = || format!("{}: cannot be read", dir.display());

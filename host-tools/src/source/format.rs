@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use hums_blackbox::Header;
+
 use super::input::Input;
 use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
@@ -119,7 +121,11 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
 /// What is known of a file that is not read, by its first bytes as they are after unpacking, and what to do with it.
 pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
     const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
-    archive::hint(start).or_else(|| start.starts_with(&archive::GZIP).then_some(TWICE))
+    const OWN: &str = "is a log of HUMS in another file, compressed or joined; unpack it (gzip -dk)";
+    let is_own = || start.first_chunk().is_some_and(|block| Header::read(block).is_ok());
+    archive::hint(start)
+        .or_else(|| start.starts_with(&archive::GZIP).then_some(TWICE))
+        .or_else(|| is_own().then_some(OWN))
 }
 
 /// What a file that begins with these bytes (64 KiB, or all of it) is, where it is a recording and none of our own logs.

@@ -2,6 +2,7 @@
 //! command that reads says the same of them, with the same exit code.
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
 use tempfile::TempDir;
@@ -101,14 +102,43 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
     {
         let path = dir.path().join("copied").join(name);
         fs::write(&path, content).expect("written");
-        for command in ["decode -o out --format csv", "report -o pages/", "info", "check"] {
-            let ended = attempt(dir.path(), &format!("{command} copied"));
-            let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-            assert_eq!(ended.status.code(), Some(3), "{command} {name}: {said}");
-            assert!(said.contains(&format!("{name}: has the name of a recording and holds none")), "{said}");
-        }
+        all_say(dir.path(), "copied", 3, &[&format!("{name}: has the name of a recording and holds none")]);
         fs::remove_file(path).expect("removed");
     }
+    // A log in an archive is not read; nor does `verify` judge recordings of others.
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    gzip.write_all(&fs::read(dir.path().join("copied/00001_00.HUM")).expect("there")).expect("packed");
+    let path = dir.path().join("copied/00003_00.HUM.gz");
+    fs::write(&path, gzip.finish().expect("packed")).expect("written");
+    all_say(dir.path(), "copied", 3, &["00003_00.HUM.gz: has the name of a log and holds nothing of ours"]);
+    fs::remove_file(path).expect("removed");
+    fs::copy(px4(), dir.path().join("copied/flight.tlog")).expect("copied");
+    fs::write(dir.path().join("copied/notes.txt"), "mine").expect("written");
+    let said = run(dir.path(), "verify copied", 0).stderr;
+    let said = String::from_utf8_lossy(&said);
+    for words in ["1 recording of other kinds passed over", "1 file passed over: no log of a known kind"] {
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+#[test]
+fn files_that_are_named_one_by_one_are_judged_as_their_folder_is() {
+    let dir = copied(3, "");
+    let at = |name: &str| dir.path().join("copied").join(name);
+    let named = "copied/00003_00.HUM copied/00001_00.HUM";
+    let all = format!("{named} ./copied/00002_00.HUM");
+    let said = |line: &str, code| text(&run(dir.path(), line, code)).replace("./", "");
+    assert_eq!(said(&format!("verify {all}"), 0), said("verify copied", 0));
+    fs::rename(at("00002_00.HUM"), dir.path().join("elsewhere")).expect("renamed");
+    all_say(dir.path(), named, 3, &["session 00002, which was recorded just before it, is not there"]);
+    assert_eq!(said(&format!("verify {named}"), 3), said("verify copied", 3));
+    // Without their endings, and two cards.
+    fs::rename(dir.path().join("elsewhere"), at("00002_00")).expect("renamed");
+    run(dir.path(), "verify copied", 0);
+    run(dir.path(), &format!("verify {named} copied/00002_00"), 0);
+    fs::create_dir_all(dir.path().join("other/copied")).expect("made");
+    fs::rename(at("00002_00"), dir.path().join("other/copied/00002_00.HUM")).expect("renamed");
+    run(dir.path(), &format!("verify {named} other/copied/00002_00.HUM"), 3);
 }
 
 /// Power went before the second session had a sector; the third one found none there.
@@ -244,6 +274,17 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
         &["session 00002, which is newer than all that are there, was deleted"],
     );
     assert_eq!(codes(), [3; 4]);
+    // The first digit of a deleted name is lost: an older one is not taken for a newer one, nor a newer one for an older one.
+    let two = [b"00001_00HUM", b"00002_00HUM"].map(|name| entry(name));
+    for (there, gone, is_newer) in [(b"10001", b"09998", false), (b"09999", b"10002", true)] {
+        let mut cards = deleted.clone();
+        cards[two[0]..][..5].copy_from_slice(there);
+        cards[two[1] + 1..][..4].copy_from_slice(&gone[1..]);
+        fs::write(&path, &cards).expect("written");
+        let said = text(&attempt(dir.path(), "verify card.img"));
+        let words = "session 10002, which is newer than all that are there, was deleted";
+        assert_eq!((said.contains(words), said.contains("was deleted")), (is_newer, is_newer), "{said}");
+    }
     // All of them: a card that was formatted in haste.
     let mut wiped = image.clone();
     for name in [b"00001_00HUM", b"00002_00HUM"] {
@@ -289,7 +330,8 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
         let said = text(&run(dir.path(), &format!("{command} card.img"), 0));
         assert!(said.contains(words) && said.matches(sessions).count() == 2, "{command}: {said}");
         let said = text(&run(dir.path(), &format!("{command} card.img --salvage"), 0));
-        assert!(!said.contains(words) && said.matches("Session session-").count() == 3, "{command}: {said}");
+        let counts = ["Session 0000", "Session session-"].map(|sessions| said.matches(sessions).count());
+        assert!(!said.contains(words) && counts == [2, 1], "{command}: {said}");
     }
     let told = json(&run(dir.path(), "info --json card.img", 0));
     assert_eq!(told["images"][0]["not_looked_at"], words);
@@ -335,6 +377,20 @@ fn a_report_compares_sessions_of_one_card_only() {
         run(dir.path(), &format!("pack PX4 -o {name}.hum"), 0);
     }
     assert_eq!(sessions("report one.hum two.hum"), 1);
+}
+
+#[test]
+fn an_image_of_a_partition_alone_is_read_like_its_cards() {
+    let dir = copied(2, "");
+    let image = fs::read(dir.path().join("card.img")).expect("an image");
+    let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four")) as usize;
+    let partition = &image[word(446 + 8) * BLOCK..][..word(446 + 12) * BLOCK];
+    fs::create_dir(dir.path().join("part")).expect("made");
+    fs::write(dir.path().join("part/card.img"), partition).expect("written");
+    for command in ["verify", "info", "verify --salvage"] {
+        let said = |card: &str| text(&run(dir.path(), &format!("{command} {card}"), 0)).replace("part/", "");
+        assert_eq!(said("part/card.img"), said("card.img"));
+    }
 }
 
 #[test]

@@ -44,10 +44,10 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     assert_eq!(ended.status.code(), Some(1), "{said}");
     assert!(said.contains("card.img: cannot have"), "{said}");
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 0, "nothing is left");
-    // What a killed run has left is in nobody's way.
+    // What a killed run has left is in nobody's way, and stays.
     fs::write(dir.path().join(".card.img.hums-part"), [0; 512]).expect("written");
     run(dir.path(), "sim --input PX4 --sd card.img", 0);
-    assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 1);
+    assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 2);
     // One that a run of an earlier version left, which was killed while it made it.
     fs::File::create(&image).and_then(|file| file.set_len(64 << 20)).expect("made");
     let said = run(dir.path(), "sim --input PX4 --sd card.img", 3);
@@ -57,6 +57,37 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
         "{said}"
     );
     assert!(said.contains("name an image of a card, or a new file"), "{said}");
+}
+
+#[test]
+fn a_store_that_is_refused_leaves_no_card_and_a_card_that_is_refused_no_store() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("text"), "no store").expect("written");
+    for store in ["text", ".", "missing/store"] {
+        run(dir.path(), &format!("sim --input PX4 --sd card.img --store {store}"), 1);
+    }
+    fs::create_dir(dir.path().join("folder")).expect("made");
+    run(dir.path(), "sim --input PX4 --sd folder --store store", 1);
+    for name in ["card.img", "store", "missing"] {
+        assert!(!dir.path().join(name).exists(), "{name}");
+    }
+}
+
+#[test]
+fn what_goes_to_a_standard_output_that_is_closed_is_an_error() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let program = env!("CARGO_BIN_EXE_hums");
+    let end = |line: &str| {
+        let ended = Command::new("bash")
+            .args(["-c", &format!("exec {program} {line}")])
+            .current_dir(dir.path())
+            .output();
+        ended.expect("it runs").status.code()
+    };
+    assert_eq!(end("decode log.hum -o - --format tlog >&-"), Some(2));
+    assert_eq!(end(&format!("sim --input {} --sd card.img --gs - >&-", px4().display())), Some(2));
+    assert_eq!(end("decode log.hum -o - --format tlog >/dev/null"), Some(0));
 }
 
 /// A text log of ArduPilot that begins five minutes after the autopilot's power-on: eleven messages, one a second.

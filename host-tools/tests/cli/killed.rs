@@ -2,11 +2,12 @@
 
 use std::fs;
 use std::io::Write as _;
+use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::support::{attempt, contents, flight, hums, named, px4, run, until};
+use crate::support::{attempt, contents, flight, frames_of, hums, named, px4, run, until};
 
 /// Files and folders that are not whole.
 fn parts(dir: &Path) -> Vec<String> {
@@ -81,8 +82,11 @@ fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     program.wait().expect("it is ours");
     assert_eq!(fs::read(&old).expect("there"), before);
     assert!(part.exists());
-    run(dir.path(), "pack PX4 -o old.hum --replace", 0);
-    assert!(!part.exists());
+    // What it has left may be somebody's: it stays, which is said.
+    let left = fs::read(&part).expect("there");
+    let said = run(dir.path(), "pack PX4 -o old.hum --replace", 0);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("was left by a run that was killed"));
+    assert!(fs::read(&part).expect("there") == left);
     run(dir.path(), "verify old.hum", 0);
 }
 
@@ -122,13 +126,17 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
     }
     assert!(killed > 0);
     run(dir.path(), "decode log.hum -o out --format csv,parquet --replace", 0);
-    assert_eq!(contents(&out), whole, "and nothing of the killed runs is left");
+    let made =
+        contents(&out).into_iter().filter(|(name, _)| !name.contains(".hums-part")).collect::<Vec<_>>();
+    assert_eq!(made, whole);
 }
 
 #[test]
 fn a_demo_that_was_killed_is_in_the_next_ones_way_nowhere() {
     let dir = tempfile::tempdir().expect("directory");
     let input = px4().display().to_string();
+    let mine = dir.path().join(".card.img.hums-part");
+    fs::write(&mine, "mine").expect("written");
     let demo = || {
         let mut demo = Command::new(env!("CARGO_BIN_EXE_hums"));
         // Without a path there is no emulator.
@@ -139,13 +147,63 @@ fn a_demo_that_was_killed_is_in_the_next_ones_way_nowhere() {
     // Killed while it records.
     for after_ms in [0, 20, 40] {
         let mut killed = demo().spawn().expect("it runs");
-        until("it begins", || dir.path().join(".card.img.hums-part").exists());
+        let before = fs::read_dir(dir.path()).expect("a folder").count();
+        until("it begins", || fs::read_dir(dir.path()).expect("a folder").count() > before);
         std::thread::sleep(Duration::from_millis(after_ms));
         killed.kill().expect("it is ours");
         killed.wait().expect("it is ours");
     }
     assert!(demo().status().expect("it runs").success());
+    assert_eq!(fs::read(&mine).expect("there"), b"mine");
+}
+
+#[test]
+fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let server = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"))
+        .args(["sim", "--sd", "card.img", "--tap", "tap.bin", "--input"])
+        .arg(format!("tcp:{}", server.local_addr().expect("an address")))
+        .current_dir(dir.path())
+        .spawn()
+        .expect("it runs");
+    let sent = frames_of(&px4())[..100].concat();
+    let (mut stream, _) = server.accept().expect("a connection");
+    stream.write_all(&sent).expect("sent");
+    let tap = dir.path().join("tap.bin");
+    until("it records", || tap.metadata().is_ok_and(|about| about.len() == sent.len() as u64));
+    sim.kill().expect("it is ours");
+    sim.wait().expect("it is ours");
+    run(dir.path(), "check tap.bin", 0);
+    for line in [
+        "sim --input PX4 --sd other.img --tap tap.bin",
+        "sim --input PX4 --sd other.img --gs tap.bin",
+        "pack PX4 -o tap.bin",
+        "pack PX4 -o tap.bin --replace",
+        "report log.hum -o tap.bin --replace",
+        "decode log.hum -o tap.bin --format tlog --replace",
+    ] {
+        run(dir.path(), line, 1);
+        assert!(fs::read(&tap).expect("there") == sent, "{line}");
+    }
     assert_eq!(parts(dir.path()), Vec::<String>::new());
+}
+
+#[test]
+fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let folder = dir.path().join("folder");
+    fs::create_dir_all(folder.join(".x.hums-part")).expect("made");
+    for name in ["00001_00.HUM", ".00002_00.HUM.hums-part", ".00003_00.HUM.pull.hums-part"] {
+        fs::copy(dir.path().join("log.hum"), folder.join(name)).expect("copied");
+    }
+    for line in ["verify folder", "info folder", "check folder", "decode folder -o out --format tlog"] {
+        let said = run(dir.path(), line, 0);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert_eq!(said.matches("has not ended, and is passed over").count(), 3, "{line}: {said}");
+    }
 }
 
 #[test]

@@ -347,9 +347,10 @@ fn segments_copied_off_a_card_are_a_log() {
     assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&px4()));
     // In two files that are named one by one, in any order.
     let (first, second) = image[start..start + (8 << 20)].split_at(100 * 512);
-    fs::write(folder.join("00002_00.hum"), first).expect("written");
-    fs::write(folder.join("00002_01.hum"), second).expect("written");
-    let two = "copied/box7/00002_01.hum copied/box7/00002_00.hum";
+    fs::create_dir(folder.join("two")).expect("made");
+    fs::write(folder.join("two/00001_00.hum"), first).expect("written");
+    fs::write(folder.join("two/00001_01.hum"), second).expect("written");
+    let two = "copied/box7/two/00001_01.hum copied/box7/two/00001_00.hum";
     run(dir.path(), &format!("decode {two} -o again.tlog --format tlog"), 0);
     assert_eq!(frames_of(&dir.path().join("again.tlog")), frames_of(&px4()));
 }

@@ -45,6 +45,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     let store = run.store.clone().unwrap_or_else(|| dir.path().join("store"));
     // Open, so that no other run uses them.
     let (mut arrivals, _in_use) = Arrivals::open(run, None, || {
+        run.store.as_deref().map_or(Ok(()), store::check)?;
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(Some(&store), &params)?))
     })?;

@@ -44,6 +44,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     let params = params::read(run.params.as_deref())?;
     let tap = args.tap.as_deref().map(|path| (path, &inputs));
     let (mut arrivals, (image, flash)) = Arrivals::open(run, tap, || {
+        run.store.as_deref().map_or(Ok(()), store::check)?;
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(run.store.as_deref(), &params)?))
     })?;

@@ -138,8 +138,8 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<There> {
     }
 }
 
-/// How much of the log an earlier run has left that can be gone on with, and what says so; what is of another log is thrown
-/// away once this one is whole.
+/// How much of the log an earlier run has left that can be gone on with, and what says so; what is of another log is set
+/// aside.
 fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u32, Likeness)> {
     let part = file.part().to_owned();
     let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
@@ -147,8 +147,11 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
     if likeness != Likeness::Other {
         return Ok((bytes, likeness));
     }
-    note!("{name}: what was begun is of another log of this name, or was changed; it begins anew");
-    file.set_aside()?;
+    let aside = file.set_aside()?;
+    note!(
+        "{name}: what was begun is of another log of this name, or was changed; it begins anew, and that stays as {}",
+        aside.display()
+    );
     Ok((0, likeness))
 }
 
@@ -176,9 +179,6 @@ fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, from: u32, length: u32) -
             settle(written, file.path())?;
             have += data.len() as u32;
         }
-        // A kill loses no more than a burst.
-        let flushed = file.flush();
-        settle(flushed, file.path())?;
         note!("{name}: {have} of {length} bytes");
         if have == before && silent == 0 {
             bail!("the board sends nothing new after {have} of {length} bytes");
