@@ -101,6 +101,7 @@ fn what_somebody_else_puts_there_while_a_file_is_written_stays() {
 }
 
 #[test]
+#[cfg(unix)]
 fn what_has_the_name_of_a_part_stays_and_is_in_nobodys_way_and_two_runs_do_not_mix() {
     let dir = furnished();
     let path = dir.path().join("new");
