@@ -1,6 +1,7 @@
 //! `hums pack`: a recording becomes one log file, through the same framer and the same writer as on board, but without
 //! a card's file system, queues or checks. `hums decode` reads it back.
 
+use std::collections::VecDeque;
 use std::io::Write;
 
 use anyhow::{Context, Result, bail};
@@ -8,6 +9,7 @@ use hums_blackbox::record::{Clock, Loss, Lost, Note};
 use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
 use hums_core::time::Instant;
 use hums_link::{Check, Framer};
+use sha2::{Digest as _, Sha256};
 
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -35,18 +37,31 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     let context = || cannot_write(&args.output);
     let read = || format!("{}: cannot be read", args.input);
     // What waits for its first byte, as a pipe may for ever, leaves nothing behind.
-    let mut next = source.next().with_context(read)?;
-    let (session, utc_us) = (session_of(source.utc_start_us()), source.utc_start_us());
-    // Raw bytes tell no time: nothing tells such logs apart.
-    let of = utc_us.map(|_| format!("s{session:08x}"));
-    let file = Output::create(&args.output, &inputs, &made::LOG, of.as_deref())?;
+    let (mut first, mut hash, mut bytes) = (VecDeque::new(), Sha256::new(), 0);
+    while bytes < FIRST_BYTES
+        && let Some(chunk) = source.next().with_context(read)?
+    {
+        hash.update(chunk.at_us.to_le_bytes());
+        hash.update(&chunk.bytes);
+        bytes += chunk.bytes.len();
+        first.push_back(chunk);
+    }
+    let utc_us = source.utc_start_us();
+    hash.update(utc_us.unwrap_or(0).to_le_bytes());
+    let session = session_of(hash);
+    let of = format!("s{session:08x}");
+    let file = Output::create(&args.output, &inputs, &made::LOG, Some(&of))?;
     let mut packer = Packer::new(file, session);
     packer.start(utc_us).with_context(context)?;
     let mut last_us = 0;
-    while let Some(chunk) = next {
+    loop {
+        let next = match first.pop_front() {
+            Some(chunk) => Some(chunk),
+            None => source.next().with_context(read)?,
+        };
+        let Some(chunk) = next else { break };
         packer.chunk(chunk.at_us, &chunk.bytes, source.has_records()).with_context(context)?;
         last_us = chunk.at_us;
-        next = source.next().with_context(read)?;
     }
     let (done, mut file) = packer.finish(last_us).with_context(context)?;
     if done.frames == 0 {
@@ -72,11 +87,14 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The session's number by the recording's first time: a log packed twice is the same to the byte, and two recordings do
-/// not look like parts of one session.
-fn session_of(utc_us: Option<u64>) -> u32 {
-    let utc = utc_us.unwrap_or(0);
-    ((utc ^ (utc >> 32)) as u32) | 1
+/// So many bytes of frames make the session's number: few, because a recording that has grown is the same one.
+const FIRST_BYTES: usize = 2 * 1024;
+
+/// The session's number by the recording's first time and its first frames with theirs: a log packed twice is the same to the byte, and two
+/// recordings do not look like parts of one session.
+fn session_of(hash: Sha256) -> u32 {
+    let number: [u8; 4] = hash.finalize().first_chunk().copied().unwrap_or_default();
+    u32::from_be_bytes(number) | 1
 }
 
 /// What packing did.

@@ -17,6 +17,7 @@ use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::{counter_name, message_name};
 use crate::plural::are;
 use crate::progress;
+use crate::source::epochs::Epochs;
 use crate::source::item;
 use crate::source::recording::Format;
 use crate::source::told::Finding;
@@ -410,6 +411,8 @@ pub struct Overview {
     pub format: Option<Format>,
     /// Bytes of these files that are set aside for it.
     pub bytes_on_card: u64,
+    /// UTC by the clock of each part.
+    pub epochs: Epochs,
     /// What is in it.
     pub contents: Contents,
 }
@@ -439,7 +442,14 @@ impl Overview {
         let summary = read(log, new, &mut contents, |blocks| bar.set_position(blocks * 512))?;
         bar.finish_and_clear();
         contents.epoch_us = summary.epoch_us;
-        Ok(Self { ending: Ending::of(log, summary), format: None, bytes_on_card: log.bytes(), contents })
+        let epochs = Epochs::of(summary.epoch_us);
+        Ok(Self {
+            ending: Ending::of(log, summary),
+            format: None,
+            epochs,
+            bytes_on_card: log.bytes(),
+            contents,
+        })
     }
 
     /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark. A recording
@@ -459,7 +469,7 @@ impl Overview {
 
     /// UTC at this time, where it is known.
     pub fn utc_us(&self, at: Instant) -> Option<u64> {
-        self.contents.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()))
+        self.epochs.utc_us(at)
     }
 
     /// Bytes that the log takes: its sectors, without what is set aside.

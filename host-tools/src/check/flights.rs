@@ -141,6 +141,11 @@ impl Flights {
             self.landing();
         }
         // Otherwise nobody saw how it ended.
+        self.break_off();
+    }
+
+    /// What follows is of another vehicle: the flight ended where this one was heard last.
+    pub(super) fn break_off(&mut self) {
         self.close();
         self.crashed = false;
     }

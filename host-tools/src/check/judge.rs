@@ -22,10 +22,10 @@ use hums_link::sequence::Sequences;
 use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
-use super::epochs::Epochs;
 use super::flights::Flights;
 use super::judged::{Judged, JudgedBy};
 use super::problem::{LISTED_MAX, Problems};
+use crate::source::epochs::Epochs;
 use crate::source::item::{About, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
@@ -136,6 +136,7 @@ impl Judge {
 
     /// Takes the next item.
     pub fn item(&mut self, at: Instant, item: Item<'_>) {
+        self.epochs.take(at, &item);
         match item {
             Item::Observation(source, observation) => {
                 self.advance(at);
@@ -153,7 +154,6 @@ impl Judge {
                 self.tell(details::FAILSAFE);
             }
             Item::Fact(Fact { about: About::Emergency, words }) => self.emergency(at, words),
-            Item::Epoch(epoch_us) => self.epochs.epoch(epoch_us),
             Item::Fact(fact) => {
                 self.facts.insert(fact.about, fact.words.to_owned());
             }
@@ -178,7 +178,12 @@ impl Judge {
                 let words = if words.is_empty() { format!("event {number}") } else { words.to_owned() };
                 self.said(at, source, alert, words);
             }
-            Item::Text(_) | Item::Event(_) | Item::Frame(_) | Item::Mode(_) | Item::Row(_) => {}
+            Item::Epoch(_)
+            | Item::Text(_)
+            | Item::Event(_)
+            | Item::Frame(_)
+            | Item::Mode(_)
+            | Item::Row(_) => {}
         }
     }
 
@@ -224,12 +229,11 @@ impl Judge {
         }
     }
 
-    /// The autopilot's clock began again: another power-on in the same recording. Its own log begins anew with each: what it flew
-    /// before is over. (A box that is restarted in the air, or the clock of a ground station that is set, ends no flight.)
+    /// The autopilot's clock began again: another power-on in the same recording. Its own log begins anew with each, and raw frames have no
+    /// other clock that tells what passed between: what it flew before is over. (A box that is restarted in the air, or the clock of a ground station that is set, ends no flight.)
     fn restart(&mut self, at: Instant) {
         self.restarts += 1;
-        self.epochs.restart(at);
-        if matches!(self.format, Format::DataFlash | Format::Ulog) {
+        if matches!(self.format, Format::DataFlash | Format::Ulog | Format::Raw) {
             self.leave_off(at);
             self.monitor.begin_anew();
         }
@@ -260,7 +264,6 @@ impl Judge {
         if self.joints.len() < LISTED_MAX {
             self.joints.push(at);
         }
-        self.epochs.restart(at);
         self.monitor.begin_another_recording();
     }
 
@@ -330,6 +333,7 @@ impl Judge {
                     self.flights.take_off(now, from);
                 }
                 Happening::Landing => self.flights.landing(),
+                Happening::OtherVehicle => self.flights.break_off(),
                 Happening::Mishap(change) => self.flights.mishap(change, &self.monitor),
                 _ => {}
             }

@@ -7,9 +7,9 @@ use hums_core::health::Level;
 use hums_core::time::{Instant, Span};
 use hums_core::vehicle::Vehicle;
 
-use super::epochs::Epochs;
 use super::flights::Flight;
 use super::problem::Problem;
+use crate::source::epochs::Epochs;
 use crate::source::item::{About, Gap};
 use crate::source::told::Finding;
 

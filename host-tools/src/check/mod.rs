@@ -7,7 +7,6 @@ pub mod checked;
 mod clock;
 mod coverage;
 mod details;
-mod epochs;
 pub mod flights;
 pub mod json;
 pub mod judge;

@@ -70,6 +70,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     contents.gaps = judged.gaps.iter().map(Gap::to_own).collect();
     contents.gap_words = judged.gaps.iter().map(|gap| (gap.place, gap.words.clone())).collect();
     let (first, last) = judged.span.unzip();
+    let epochs = judged.epochs.clone();
     let summary = reader::Summary {
         epoch_us: judged.epochs.whole(),
         frames: contents.frames(),
@@ -84,6 +85,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     Ok(Overview {
         ending: Ending { name, files, summary, ..Ending::default() },
         format: Some(format),
+        epochs,
         bytes_on_card: if place.is_standard() { taken } else { place.bytes() },
         contents,
     })

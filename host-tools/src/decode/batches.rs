@@ -75,9 +75,9 @@ pub struct Times {
 
 impl Times {
     /// Adds one.
-    pub fn push(&mut self, at: Instant, epoch_us: Option<u64>) {
+    pub fn push(&mut self, at: Instant, utc_us: Option<u64>) {
         self.boot_s.push(at.as_secs_f64());
-        let utc = epoch_us.and_then(|epoch| i64::try_from(epoch.saturating_add(at.as_micros())).ok());
+        let utc = utc_us.and_then(|utc_us| i64::try_from(utc_us).ok());
         self.utc_us.push(utc);
     }
 
@@ -119,7 +119,7 @@ pub struct Rows {
 
 impl Batches {
     /// Adds a frame.
-    pub fn frame(&mut self, at: Instant, epoch_us: Option<u64>, frame: &Frame<'_>, known: Option<&Payload>) {
+    pub fn frame(&mut self, at: Instant, utc_us: Option<u64>, frame: &Frame<'_>, known: Option<&Payload>) {
         let table = table_of(frame, known.is_some());
         let columns = self.frames.entry(table).or_insert_with(|| {
             self.held_bytes += TABLE_BYTES;
@@ -129,7 +129,7 @@ impl Batches {
         let sent =
             known.and(frame.message()).map_or(2 * frame.payload.len(), |message| message.len_max.into());
         self.held_bytes += ROW_BYTES + FIELD_BYTES * columns.fields.len() + sent;
-        columns.times.push(at, epoch_us);
+        columns.times.push(at, utc_us);
         columns.system.push(frame.system);
         columns.component.push(frame.component);
         if let Some(payload) = known {
@@ -147,10 +147,10 @@ impl Batches {
     }
 
     /// Adds a row of the monitor's own.
-    pub fn row(&mut self, at: Instant, epoch_us: Option<u64>, row: &Row) {
+    pub fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
         let columns = self.rows.entry(row.table).or_default();
         self.held_bytes += ROW_BYTES + CELL_BYTES * (1 + row.cells.len());
-        columns.times.push(at, epoch_us);
+        columns.times.push(at, utc_us);
         columns.rows.push(row.clone());
     }
 

@@ -87,7 +87,7 @@ impl<'a> Collected<'a> {
         }
         self.frames += 1;
         if formats.tlog {
-            let utc = self.context.epoch_us.unwrap_or(0).saturating_add(at.as_micros());
+            let utc = self.context.epochs.utc_us(at).unwrap_or_else(|| at.as_micros());
             self.tlog.extend_from_slice(&utc.to_be_bytes());
             self.tlog.extend_from_slice(bytes);
         }
@@ -103,7 +103,7 @@ impl<'a> Collected<'a> {
             self.influx.frame(&self.context.tags, at, &frame, known.as_ref());
         }
         if formats.parquet {
-            self.parquet.frame(at, self.context.epoch_us, &frame, known.as_ref());
+            self.parquet.frame(at, self.context.epochs.utc_us(at), &frame, known.as_ref());
         }
     }
 
@@ -117,9 +117,9 @@ impl<'a> Collected<'a> {
     }
 
     fn csv_frame(&mut self, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
-        let epoch_us = self.context.epoch_us;
+        let utc_us = self.context.epochs.utc_us(at);
         let head = |out: &mut Vec<u8>| {
-            push_times_csv(out, at, epoch_us);
+            push_times_csv(out, at, utc_us);
             for number in [frame.system, frame.component] {
                 out.push(b',');
                 push_integer(out, u64::from(number));
@@ -149,7 +149,7 @@ impl<'a> Collected<'a> {
 
     fn json_frame(&mut self, at: Instant, frame: &Frame<'_>, known: Option<&Payload>) {
         let out = &mut self.jsonl;
-        push_times_json(out, at, self.context.epoch_us);
+        push_times_json(out, at, self.context.epochs.utc_us(at));
         for (name, number) in [(&b",\"system\":"[..], frame.system), (b",\"component\":", frame.component)] {
             out.extend_from_slice(name);
             push_integer(out, u64::from(number));
@@ -179,7 +179,7 @@ impl<'a> Collected<'a> {
                     .or_insert_with(|| row.cells.iter().map(|(name, _)| *name).collect());
                 let out = self.tables.entry(Table::Hums(row.table)).or_default();
                 let before = table_bytes(out);
-                push_times_csv(out, at, self.context.epoch_us);
+                push_times_csv(out, at, self.context.epochs.utc_us(at));
                 for (_, cell) in &row.cells {
                     out.push(b',');
                     cell.push_csv(out);
@@ -189,7 +189,7 @@ impl<'a> Collected<'a> {
             }
             if self.context.formats.jsonl {
                 let out = &mut self.jsonl;
-                push_times_json(out, at, self.context.epoch_us);
+                push_times_json(out, at, self.context.epochs.utc_us(at));
                 out.extend_from_slice(b",\"record\":");
                 push_json_text(out, row.table.as_bytes());
                 out.extend_from_slice(b",\"fields\":");
@@ -200,7 +200,7 @@ impl<'a> Collected<'a> {
                 self.influx.row(&self.context.tags, at, row);
             }
             if self.context.formats.parquet {
-                self.parquet.row(at, self.context.epoch_us, row);
+                self.parquet.row(at, self.context.epochs.utc_us(at), row);
             }
         }
     }
@@ -208,7 +208,7 @@ impl<'a> Collected<'a> {
     /// Adds a gap.
     pub fn gap(&mut self, gap: &Gap) {
         let from = gap.from.unwrap_or(Instant::ZERO);
-        if self.context.selection.overlaps(gap, self.context.epoch_us) {
+        if self.context.selection.overlaps(gap, &self.context.epochs) {
             self.rows(from, &[gap_row(gap)]);
         }
     }
@@ -217,7 +217,7 @@ impl<'a> Collected<'a> {
 impl Collect for Collected<'_> {
     fn entry(&mut self, entry: &Entry<'_>) {
         let (Entry::Frame { at, .. } | Entry::Record { at, .. }) = *entry;
-        let wanted = self.context.selection.has_time(at, self.context.epoch_us);
+        let wanted = self.context.selection.has_time(at, &self.context.epochs);
         if let Entry::Record { record: Record::Finding(finding), .. } = entry
             && wanted
         {
@@ -248,23 +248,23 @@ fn table_bytes(lines: &[u8]) -> usize {
 }
 
 /// The first two cells of every row.
-fn push_times_csv(out: &mut Vec<u8>, at: Instant, epoch_us: Option<u64>) {
+fn push_times_csv(out: &mut Vec<u8>, at: Instant, utc_us: Option<u64>) {
     push_seconds(out, at.as_micros());
     out.push(b',');
-    if let Some(epoch) = epoch_us {
-        push_iso8601(out, epoch.saturating_add(at.as_micros()));
+    if let Some(utc_us) = utc_us {
+        push_iso8601(out, utc_us);
     }
 }
 
 /// The first members of every object.
-fn push_times_json(out: &mut Vec<u8>, at: Instant, epoch_us: Option<u64>) {
+fn push_times_json(out: &mut Vec<u8>, at: Instant, utc_us: Option<u64>) {
     out.extend_from_slice(b"{\"time_boot\":");
     push_seconds(out, at.as_micros());
     out.extend_from_slice(b",\"time_utc\":");
-    match epoch_us {
-        Some(epoch) => {
+    match utc_us {
+        Some(utc_us) => {
             out.push(b'"');
-            push_iso8601(out, epoch.saturating_add(at.as_micros()));
+            push_iso8601(out, utc_us);
             out.push(b'"');
         }
         None => out.extend_from_slice(b"null"),

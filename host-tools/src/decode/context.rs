@@ -6,6 +6,7 @@ use super::influx::Tags;
 use super::selection::Selection;
 use crate::cli::Format;
 use crate::files::Inputs;
+use crate::source::epochs::Epochs;
 
 /// Which formats are asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,8 +57,8 @@ impl Formats {
 pub struct Context {
     /// What to write.
     pub formats: Formats,
-    /// UTC at power-on, microseconds since 1970.
-    pub epoch_us: Option<u64>,
+    /// UTC by the clock of each part: of a log of ours, that of the power-on.
+    pub epochs: Epochs,
     /// What of it is wanted.
     pub selection: Selection,
     /// Who flew and when, where a format asks for it.

@@ -11,6 +11,7 @@ use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, read};
 use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
+use crate::source::epochs::Epochs;
 use crate::utc::iso8601;
 
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
@@ -23,8 +24,8 @@ pub struct Identity {
     pub date: Option<String>,
     /// `s1a2b3c4d`: the session that the sectors name, which is as good as unique.
     pub session: String,
-    /// UTC at power-on, microseconds since 1970.
-    pub epoch_us: Option<u64>,
+    /// UTC by the clock of each part.
+    pub epochs: Epochs,
 }
 
 impl Identity {
@@ -46,7 +47,7 @@ impl Identity {
         let session =
             summary.session.map_or_else(|| "unknown".to_owned(), |session| format!("s{session:08x}"));
         let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
-        Ok(Self { vehicle, date, session, epoch_us: summary.epoch_us })
+        Ok(Self { vehicle, date, session, epochs: Epochs::of(summary.epoch_us) })
     }
 }
 

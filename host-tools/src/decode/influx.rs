@@ -26,6 +26,7 @@ use crate::hex::push_hex;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
 use crate::mavlink::values::{Payload, Scalar, Value};
+use crate::source::epochs::Epochs;
 
 /// Columns of records that are tags: few values, and what one groups by.
 const TAGS: [&str; 3] = ["subsystem", "check", "counter"];
@@ -329,13 +330,13 @@ pub struct Clock {
 
 impl Clock {
     /// Writes lines with their times, each a nanosecond after the one before at least.
-    pub fn write(&mut self, lines: &Lines, epoch_us: Option<u64>, out: &mut Vec<u8>) {
+    pub fn write(&mut self, lines: &Lines, epochs: &Epochs, out: &mut Vec<u8>) {
         let mut start = 0;
         for &(end, at) in &lines.ends {
             out.extend_from_slice(lines.text.get(start..end).unwrap_or_default());
             start = end;
             out.push(b' ');
-            push_integer(out, self.settle(epoch_us.unwrap_or(0).saturating_add(at.as_micros())));
+            push_integer(out, self.settle(epochs.utc_us(at).unwrap_or_else(|| at.as_micros())));
             out.push(b'\n');
         }
     }

@@ -61,6 +61,7 @@ use crate::logs::sessions::{Sessions, copy_words};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::{Kept, Outcome, differs, usage as usage_error};
 use crate::plural::count;
+use crate::source::epochs::Epochs;
 use crate::source::find::{find, sessions_of};
 use crate::source::recording::Place;
 use crate::summary::damaged_places;
@@ -224,6 +225,23 @@ impl Logged for Done {
     }
 }
 
+/// What of a log has no time of day, as a remark; a usage error where one is asked for and all of it has none.
+fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
+    let what = match context.epochs.untold() {
+        (0, _) => return Ok(None),
+        (untold, all) if untold == all => {
+            context.selection.check_without_utc(name)?;
+            "no frame told the time of day: UTC columns are empty, and tlog times count from power-on as 1970"
+                .to_owned()
+        }
+        (untold, all) => format!(
+            "in {untold} of its {all} parts (its clock began anew between them) nothing told the time of day: UTC columns are \
+             empty there, and tlog times count from power-on as 1970"
+        ),
+    };
+    Ok(Some(format!("{name}: {what}")))
+}
+
 impl Task<'_> {
     /// `taken` are the directories of Parquet tables that other logs of this command have.
     fn decode(&self, work: &Work<'_>, all: &[Work<'_>], taken: &Mutex<BTreeSet<PathBuf>>) -> Result<Done> {
@@ -236,13 +254,7 @@ impl Task<'_> {
         };
         let mut remarks = Vec::new();
         let mut context = self.context(work)?;
-        if context.epoch_us.is_none() {
-            context.selection.check_without_utc(&log.name)?;
-            remarks.push(format!(
-                "{}: no frame told the time of day: UTC columns are empty, and tlog times count from power-on as 1970",
-                log.name
-            ));
-        }
+        remarks.extend(check_clock(&log.name, &context)?);
         let mut parquet = None;
         if self.formats.parquet
             && let Ok(mut taken) = taken.lock()
@@ -265,7 +277,7 @@ impl Task<'_> {
         if let Some(epoch_us) = self.better_epoch(log, &context, &read)? {
             // Only its last group knew better: all of it again, with that.
             drop(read);
-            context.epoch_us = epoch_us;
+            context.epochs = Epochs::of(epoch_us);
             read = self.read(log, name, &context, parquet.as_deref());
         }
         let (summary, mut writers) = read?;
@@ -315,21 +327,21 @@ impl Task<'_> {
             let judges = self.formats.has_records();
             (context.identity, context.checked) = recorded::identity(work.log, judges)?;
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
-            context.epoch_us = context.identity.epoch_us;
+            context.epochs = context.identity.epochs.clone();
             return Ok(context);
         };
         // A box's log begins with the record of its start, and its monitor checks.
         if self.formats.has_records() && !work.traits.has_board() {
             context.checked = Checked::of(work.log)?;
         }
-        context.epoch_us = if self.formats.influx || self.formats.parquet {
+        context.epochs = if self.formats.influx || self.formats.parquet {
             context.identity = Identity::of(log)?;
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
-            context.identity.epoch_us
+            context.identity.epochs.clone()
         } else if self.standard_output {
-            reader::epoch(log)?
+            Epochs::of(reader::epoch(log)?)
         } else {
-            reader::likely_epoch(log)?
+            Epochs::of(reader::likely_epoch(log)?)
         };
         Ok(context)
     }
@@ -344,12 +356,13 @@ impl Task<'_> {
         read: &Result<(Summary, Writers<'_>)>,
     ) -> Result<Option<Option<u64>>> {
         let epoch_us = match (read, place.own()) {
+            (_, None) => return Ok(None),
             _ if self.standard_output => return Ok(None),
             (Ok((summary, _)), _) => summary.epoch_us,
             (Err(error), Some(log)) if differs(error).is_some() => reader::epoch(log)?,
             _ => return Ok(None),
         };
-        Ok(Some(epoch_us).filter(|epoch_us| *epoch_us != context.epoch_us))
+        Ok(Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole()))
     }
 
     /// Reads a log into its files, which are not whole yet.

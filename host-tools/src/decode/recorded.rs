@@ -22,6 +22,7 @@ use super::write::Writers;
 use crate::check::judge::{Judge, Limits};
 use crate::logs::reader::{Collect as _, Deliver as _, Summary};
 use crate::progress;
+use crate::source::epochs::Epochs;
 use crate::source::item::{Cause, Item, Kind, Rows, Table, Value, Want};
 use crate::source::recording::Place;
 use crate::utc::iso8601;
@@ -33,10 +34,10 @@ const PART_BYTES: usize = 4 << 20;
 /// has more of them is not made by an autopilot; its further tables are left out, and counted.
 const NAMES_BYTES_MAX: usize = 4 << 20;
 
-/// Who flew and when, and UTC at time zero; where it is asked for, what the monitor here says of it, as `hums check` does.
+/// Who flew and when, and UTC; where it is asked for, what the monitor here says of it, as `hums check` does.
 /// The recording is read through for it.
 pub fn identity(place: &Place, judges: bool) -> Result<(Identity, Option<Checked>)> {
-    let (mut epoch_us, mut first, mut system, mut uid) = (None, None, None, None);
+    let (mut epochs, mut first, mut system, mut uid) = (Epochs::default(), None, None, None);
     let mut hash = Sha256::new();
     let want = Want { observations: true, ..Want::default() };
     let recording = place.open()?;
@@ -45,18 +46,15 @@ pub fn identity(place: &Place, judges: bool) -> Result<(Identity, Option<Checked
         if let Some(judge) = &mut judge {
             judge.item(at, item);
         }
-        match item {
-            Item::Epoch(epoch) => epoch_us = Some(epoch),
-            Item::Observation(source, observation) => {
-                first.get_or_insert(at);
-                hash.update(at.as_micros().to_le_bytes());
-                match observation {
-                    Observation::Heartbeat(_) => system = system.or(Some(source.system)),
-                    Observation::Identity(told) if told.uid != 0 => uid = uid.or(Some(told.uid)),
-                    _ => {}
-                }
+        epochs.take(at, &item);
+        if let Item::Observation(source, observation) = item {
+            first.get_or_insert(at);
+            hash.update(at.as_micros().to_le_bytes());
+            match observation {
+                Observation::Heartbeat(_) => system = system.or(Some(source.system)),
+                Observation::Identity(told) if told.uid != 0 => uid = uid.or(Some(told.uid)),
+                _ => {}
             }
-            _ => {}
         }
         Ok(())
     })?;
@@ -65,14 +63,13 @@ pub fn identity(place: &Place, judges: bool) -> Result<(Identity, Option<Checked
         (None, Some(system)) => format!("system-{system}"),
         (None, None) => "unknown".to_owned(),
     };
-    let utc_us =
-        epoch_us.zip(first).map(|(epoch, first): (u64, Instant)| epoch.saturating_add(first.as_micros()));
+    let utc_us = first.and_then(|first| epochs.utc_us(first));
     let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
     // No recorder gave it a number: the times in it are its own.
     let number: [u8; 4] = hash.finalize().first_chunk().copied().unwrap_or_default();
     let session = format!("r{:08x}", u32::from_be_bytes(number));
     let checked = judge.and_then(|judge| Checked::new(judge.end()));
-    Ok((Identity { vehicle, date, session, epoch_us }, checked))
+    Ok((Identity { vehicle, date, session, epochs }, checked))
 }
 
 /// Reads a recording into the writers.
@@ -108,7 +105,7 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
             Item::Observation(source, observation) if !format.is_of_link() => {
                 part.collected.observed.push(Observed { at, source, observation: *observation });
             }
-            Item::Row(row) if context.selection.has_time(at, context.epoch_us) => {
+            Item::Row(row) if context.selection.has_time(at, &context.epochs) => {
                 part.row(at, row.table, row.values);
             }
             Item::Gap(gap) => {
@@ -129,7 +126,6 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
     writers.group(part.take())?;
     writers.leave_out(part.rows_left_out);
     bar.finish_and_clear();
-    summary.epoch_us = context.epoch_us;
     Ok(summary)
 }
 

@@ -8,6 +8,7 @@ use hums_core::time::Instant;
 
 use crate::cli;
 use crate::outcome::usage;
+use crate::source::epochs::Epochs;
 use crate::utc::When;
 
 /// Which entries are wanted.
@@ -52,22 +53,22 @@ impl Selection {
     }
 
     /// Whether this time is wanted.
-    pub fn has_time(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        !self.is_before(at, epoch_us) && !self.is_after(at, epoch_us)
+    pub fn has_time(&self, at: Instant, epochs: &Epochs) -> bool {
+        !self.is_before(at, epochs) && !self.is_after(at, epochs)
     }
 
     /// Whether any of a gap is in the time wanted.
-    pub fn overlaps(&self, gap: &Gap, epoch_us: Option<u64>) -> bool {
-        !gap.to.is_some_and(|to| self.is_before(to, epoch_us))
-            && !gap.from.is_some_and(|from| self.is_after(from, epoch_us))
+    pub fn overlaps(&self, gap: &Gap, epochs: &Epochs) -> bool {
+        !gap.to.is_some_and(|to| self.is_before(to, epochs))
+            && !gap.from.is_some_and(|from| self.is_after(from, epochs))
     }
 
-    fn is_before(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        self.from.and_then(|from| compare(at, from, epoch_us)).is_some_and(Ordering::is_lt)
+    fn is_before(&self, at: Instant, epochs: &Epochs) -> bool {
+        self.from.and_then(|from| compare(at, from, epochs)).is_some_and(Ordering::is_lt)
     }
 
-    fn is_after(&self, at: Instant, epoch_us: Option<u64>) -> bool {
-        self.to.and_then(|to| compare(at, to, epoch_us)).is_some_and(Ordering::is_gt)
+    fn is_after(&self, at: Instant, epochs: &Epochs) -> bool {
+        self.to.and_then(|to| compare(at, to, epochs)).is_some_and(Ordering::is_gt)
     }
 
     /// Whether frames of this message are wanted.
@@ -77,10 +78,10 @@ impl Selection {
 }
 
 /// How a time lies to a limit; `None` where one is UTC and the other cannot be.
-fn compare(at: Instant, limit: When, epoch_us: Option<u64>) -> Option<Ordering> {
+fn compare(at: Instant, limit: When, epochs: &Epochs) -> Option<Ordering> {
     match limit {
         When::Seconds(limit) => Some(at.as_micros().cmp(&limit)),
-        When::Utc(limit) => Some(epoch_us?.saturating_add(at.as_micros()).cmp(&limit)),
+        When::Utc(limit) => Some(epochs.utc_us(at)?.cmp(&limit)),
     }
 }
 

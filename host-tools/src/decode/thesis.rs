@@ -19,6 +19,7 @@ use super::reference::{MOTORS, Quantity, Reference};
 use super::selection::Selection;
 use crate::files::{Folder, FolderFile, buffered, settle};
 use crate::mavlink::values::Scalar;
+use crate::source::epochs::Epochs;
 
 /// A vehicle that was not heard for so long tells nothing about this second.
 const SILENCE_MAX: Span = Span::from_secs(10);
@@ -41,7 +42,7 @@ pub struct Thesis {
     tables: [(BufWriter<FolderFile>, PathBuf); 5],
     reference: Reference,
     selection: Selection,
-    epoch_us: Option<u64>,
+    epochs: Epochs,
     /// The next whole second, where the first frame has set it.
     next: Option<u64>,
     /// Rows written to each table.
@@ -50,7 +51,7 @@ pub struct Thesis {
 
 impl Thesis {
     /// Makes the tables in a folder.
-    pub fn new(folder: Folder, selection: Selection, epoch_us: Option<u64>) -> Result<Self> {
+    pub fn new(folder: Folder, selection: Selection, epochs: Epochs) -> Result<Self> {
         let table = |name: &str, header: &str| -> Result<(BufWriter<FolderFile>, PathBuf)> {
             let path = folder.path().join(name);
             let mut file = buffered(folder.file(name)?);
@@ -64,7 +65,7 @@ impl Thesis {
             table("vfr_hud.csv", VFR_HUD)?,
             table("gaps.csv", GAPS)?,
         ];
-        Ok(Self { folder, tables, reference: Reference::new(), selection, epoch_us, next: None, rows: 0 })
+        Ok(Self { folder, tables, reference: Reference::new(), selection, epochs, next: None, rows: 0 })
     }
 
     /// Takes an observation: first come the rows of the seconds that have passed.
@@ -78,7 +79,7 @@ impl Thesis {
                 next = at_us.next_multiple_of(SECOND_US).max(next + SECOND_US);
                 break;
             }
-            if self.selection.has_time(now, self.epoch_us) {
+            if self.selection.has_time(now, &self.epochs) {
                 self.rows(now)?;
             }
             next += SECOND_US;

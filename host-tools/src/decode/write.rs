@@ -123,15 +123,15 @@ impl Influx {
     /// The frames of a group as they are, and what they told of the reference system's quantities.
     fn put(&mut self, context: &Context, collected: &Collected<'_>) -> Result<()> {
         self.points.clear();
-        self.messages.write(&collected.influx, context.epoch_us, &mut self.points);
+        self.messages.write(&collected.influx, &context.epochs, &mut self.points);
         let mut lines = Lines::default();
         for observed in &collected.observed {
             let own = self.reference.observe(observed.at, observed.source, &observed.observation);
-            if own && context.selection.has_time(observed.at, context.epoch_us) {
+            if own && context.selection.has_time(observed.at, &context.epochs) {
                 lines.observed(&context.tags, observed.at, &self.reference, &observed.observation);
             }
         }
-        self.quantities.write(&lines, context.epoch_us, &mut self.points);
+        self.quantities.write(&lines, &context.epochs, &mut self.points);
         self.count += lines_of(&self.points);
         self.file.write(&self.points)
     }
@@ -163,7 +163,7 @@ impl<'a> Writers<'a> {
         };
         let csv = folder(formats.csv, destination.tables())?.map(Tables::new);
         let thesis = folder(formats.thesis, destination.thesis())?
-            .map(|folder| Thesis::new(folder, context.selection.clone(), context.epoch_us))
+            .map(|folder| Thesis::new(folder, context.selection.clone(), context.epochs.clone()))
             .transpose()?;
         let about = [
             ("hums.vehicle", context.identity.vehicle.clone()),
@@ -198,11 +198,11 @@ impl<'a> Writers<'a> {
         }
         let mut collected = Collected::new(context);
         for (at, row) in context.checked.iter().flat_map(Checked::findings) {
-            if context.selection.has_time(at, context.epoch_us) {
+            if context.selection.has_time(at, &context.epochs) {
                 collected.rows(at, &[row]);
             }
         }
-        let is_wanted = |at| context.selection.has_time(at, context.epoch_us);
+        let is_wanted = |at| context.selection.has_time(at, &context.epochs);
         let part: Option<&dyn Fn(Instant) -> bool> =
             if context.selection.has_limits() { Some(&is_wanted) } else { None };
         let row = context.checked.as_ref().map_or_else(|| self.on_board.row(), |checked| checked.row(part));
@@ -364,7 +364,7 @@ impl<'a> Deliver<Collected<'a>> for Writers<'a> {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
         let mut collected = Collected::new(self.context);
         collected.gap(gap);
-        if self.context.selection.overlaps(gap, self.context.epoch_us) {
+        if self.context.selection.overlaps(gap, &self.context.epochs) {
             self.gap_beside_tlog(gap)?;
         }
         if let Some(thesis) = &mut self.thesis {

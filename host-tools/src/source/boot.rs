@@ -5,10 +5,10 @@
 //! vehicle did not restart in the air just when a clock was set: it is another recording.
 
 use std::collections::VecDeque;
+use std::io::Read;
 
-use super::input::Input;
 use super::timeline::STEP_BACK_US_MAX;
-use super::tlog::Records;
+use super::tlog::records::Records;
 use crate::mavlink::frame;
 
 /// A clock that jumps by more than this may be that of another recording: microseconds.
@@ -25,7 +25,8 @@ pub(super) fn boot_ms(frame: &hums_link::Frame<'_>) -> Option<u32> {
     boot_ms_of(frame.id(), frame.component(), frame.payload())
 }
 
-fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> {
+/// The same of a frame by its parts.
+pub(super) fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> {
     let offset = match id {
         2 => 8,
         30 | 33 => 0,
@@ -56,10 +57,8 @@ const ASKED_MS: u32 = 5_000;
 const HELD_BACK_US: i64 = 10_000_000;
 
 impl Joints {
-    /// A frame of the recording, which came at this time of the recorder's clock.
-    pub(super) fn frame(&mut self, time_us: Option<u64>, frame: &hums_link::Frame<'_>) {
-        let Some(boot_ms) = boot_ms(frame) else { return };
-        let system = frame.system();
+    /// An autopilot of the recording told its time, at this time of the recorder's clock.
+    pub(super) fn told(&mut self, time_us: Option<u64>, system: u8, boot_ms: u32) {
         if self.last.is_some_and(|(last, before)| last == system && falls(before, boot_ms)) {
             self.ahead.clear();
         }
@@ -88,7 +87,12 @@ impl Joints {
     /// Where the recorder's clock was set from one time to another while the autopilot's went on: how much time passed,
     /// microseconds. A frame may come late, by as much as a link holds back, and never early: so a clock that falls was set, and
     /// one that jumps forward was where it jumps by more, or by as much as it fell before.
-    pub(super) fn elapsed_us(&self, before_us: u64, time_us: u64, after: &Records<Input>) -> Option<u64> {
+    pub(super) fn elapsed_us<R: Read>(
+        &self,
+        before_us: u64,
+        time_us: u64,
+        after: &Records<R>,
+    ) -> Option<u64> {
         let (system, before_ms) = self.last?;
         let jump_us = i64::try_from(i128::from(time_us) - i128::from(before_us)).ok()?;
         let is_regained = |us: i64| self.fell_us.is_some_and(|fell| us.abs_diff(fell) < STEP_BACK_US_MAX / 2);
@@ -126,7 +130,7 @@ impl Joints {
 
     /// Whether another recording begins where the recorder's clock goes from one time to another: the autopilot's does not
     /// go on. Where none tells its time, a jump by more than an hour says so.
-    pub(super) fn is_joint(&self, before_us: u64, time_us: u64, after: &Records<Input>) -> bool {
+    pub(super) fn is_joint<R: Read>(&self, before_us: u64, time_us: u64, after: &Records<R>) -> bool {
         let Some((system, before_ms)) = self.last else { return before_us.abs_diff(time_us) > JOINT_US };
         let told = after.frames_after(|bytes| match frame::peek(bytes) {
             frame::Peek::Frame(frame) if frame.system == system => {

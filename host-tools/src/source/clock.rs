@@ -251,7 +251,7 @@ impl Wrong {
     }
 
     /// Tells them as damage; nothing where there are none.
-    pub fn gap(self) -> Option<Gap> {
+    pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words =
             format!("{} with a wrong time, far from the times around it", count(self.count, "message"));

@@ -4,10 +4,8 @@ use anyhow::Result;
 use hums_core::time::Instant;
 use hums_link::framer::Framer;
 
-use super::boot::{JOINT_US, Joints, boot_ms};
+use super::boot::boot_ms;
 use super::checksums::Checksums;
-use super::clock::{Ahead, Clock, Reading, Rules, Stamp, Wrong};
-use super::doubt::Ends;
 use super::input::Input;
 use super::item::{About, Cause, Fact, Gap, Item, MessageCount, Reader, Summary, Take, Want};
 use super::paced::Paced;
@@ -15,7 +13,8 @@ use super::raw::Raw;
 use super::said::Said;
 use super::stream::Source as _;
 use super::timeline::Timeline;
-use super::tlog::{Record, Records, TIME_BYTES, UTC_US_MIN};
+use super::tlog::records::{Record, Records, TIME_BYTES};
+use super::tlog::times::{Begins, Times};
 use crate::names::message_name;
 use crate::plural::count;
 
@@ -68,92 +67,31 @@ impl TlogReader {
     }
 }
 
-/// Microseconds since 1970, by the clock of a ground station, which may be set; a link may be silent for seconds until its last
-/// frames come, and for longer after its first.
-const RULES: Rules = Rules {
-    from_first: true,
-    old_values: false,
-    ends: Ends { steady_us: 10_000_000, seldom_us: 60_000_000 },
-};
-
-/// The reading of a tlog.
-struct TlogReading {
-    clock: Clock,
-    joints: Joints,
-    wrong: Wrong,
-    now: Instant,
-    /// The time of the record at hand, where it is not wrong.
-    time_us: Option<u64>,
-}
-
-impl TlogReading {
-    /// Takes the time of a record, and hands on what it says of the clock; whether another recording begins.
-    fn time(
-        &mut self,
-        time_us: u64,
-        place: u64,
-        after: &Records<Input>,
-        take: &mut Take<'_>,
-    ) -> Result<bool> {
-        let (before, reached) = (self.clock.recorded_us(), self.now);
-        let stamp = |us| Stamp { us, series: 0 };
-        let ahead = |_: &dyn Fn(Stamp) -> bool| {
-            let (times, is_end) = after.times_after();
-            Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
-        };
-        let joints = &self.joints;
-        let passed = || joints.elapsed_us(before?, time_us, after);
-        let Reading::Sound(moment) = self.clock.take_beside(stamp(time_us), ahead, passed) else {
-            self.wrong.add(self.now, place);
-            self.time_us = None;
-            return Ok(false);
-        };
-        (self.now, self.time_us) = (moment.at, Some(time_us));
-        let is_joint = before.is_some_and(|before| {
-            let is_far = moment.restarted || time_us > before.saturating_add(JOINT_US);
-            is_far && self.joints.is_joint(before, time_us, after)
-        });
-        let passed_us = moment.at.since(reached).as_micros();
-        match before.filter(|_| moment.restarted) {
-            _ if is_joint => self.joints.forget(),
-            Some(before) => self.joints.set(before, time_us, passed_us),
-            None => {}
-        }
-        match (is_joint, moment.restarted) {
-            (true, _) => take(self.now, Item::Joint)?,
-            (false, true) => take(self.now, Item::Restart)?,
-            (false, false) if before.is_some() => return Ok(false),
-            (false, false) => {}
-        }
-        if let Some(epoch_us) = time_us.checked_sub(self.now.as_micros()).filter(|_| time_us >= UTC_US_MIN) {
-            take(self.now, Item::Epoch(epoch_us))?;
-        }
-        Ok(is_joint)
-    }
-}
-
 impl Reader for TlogReader {
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
-        let mut reading = TlogReading {
-            clock: Clock::new(RULES),
-            joints: Joints::default(),
-            wrong: Wrong::default(),
-            now: Instant::ZERO,
-            time_us: None,
-        };
+        let mut times = Times::default();
         let mut checksums = Checksums::default();
         let mut place = 0_u64;
         while let Some(record) = self.records.next_record()? {
             let bytes = match record {
                 Record::Frame { time_us, bytes } => {
-                    if reading.time(time_us, place, &self.records, take)? {
-                        // Nothing that was said before holds.
-                        said.end(take)?;
-                        (framer, said) = (Framer::new(), Said::default());
+                    let told = times.take(time_us, &bytes, place, &self.records);
+                    match told.begins {
+                        Some(Begins::Recording) => {
+                            // Nothing that was said before holds.
+                            said.end(take)?;
+                            (framer, said) = (Framer::new(), Said::default());
+                            take(times.now(), Item::Joint)?;
+                        }
+                        Some(Begins::Clock) => take(times.now(), Item::Restart)?,
+                        None => {}
+                    }
+                    if let Some(epoch_us) = told.epoch_us {
+                        take(times.now(), Item::Epoch(epoch_us))?;
                     }
                     place += TIME_BYTES as u64;
-                    checksums.begin(reading.now, place, &bytes);
+                    checksums.begin(times.now(), place, &bytes);
                     bytes
                 }
                 Record::Noise(bytes) => {
@@ -163,31 +101,66 @@ impl Reader for TlogReader {
                         (Cause::Damaged, "of no record of the tlog")
                     };
                     let words = format!("{what}: {}", count(bytes.len(), "byte"));
-                    take(reading.now, Item::Gap(&gap(reading.now, cause, place, bytes.len(), words)))?;
+                    let now = times.now();
+                    take(now, Item::Gap(&gap(now, cause, place, bytes.len(), words)))?;
                     bytes
                 }
             };
             place += bytes.len() as u64;
-            let TlogReading { joints, now, time_us, .. } = &mut reading;
+            let now = times.now();
             push(&mut framer, &bytes, true, &mut |frame| {
                 checksums.frame(&frame);
-                joints.frame(*time_us, &frame);
                 counts.add(frame.id(), frame.bytes().len());
-                said.frame(*now, &frame, want, take)
+                said.frame(now, &frame, want, take)
             })?;
             checksums.end();
         }
         if let Some(gap) = checksums.gap() {
-            take(reading.now, Item::Gap(&gap))?;
+            take(times.now(), Item::Gap(&gap))?;
         }
         if let Some(words) = checksums.words() {
-            take(reading.now, Item::Fact(Fact { about: About::Unchecked, words: &words }))?;
+            take(times.now(), Item::Fact(Fact { about: About::Unchecked, words: &words }))?;
         }
-        if let Some(gap) = reading.wrong.gap() {
-            take(reading.now, Item::Gap(&gap))?;
+        for gap in times.gaps() {
+            take(times.now(), Item::Gap(&gap))?;
         }
         said.end(take)?;
         Ok(counts.summary())
+    }
+}
+
+/// An autopilot that was powered on again in a recording tells its time by then; one whose time fell and that runs for longer is in
+/// another recording.
+const STARTS_MS: u32 = 10_000;
+/// Bytes of the same value in a row, 0x00 or 0xff, that no frame and no line makes (a payload is 255 bytes at most): a block of a file that was
+/// never written.
+const BLOCK_BYTES: u64 = 512;
+
+/// Finds blocks that were never written.
+#[derive(Default)]
+struct Blocks {
+    value: u8,
+    length: u64,
+    bytes: u64,
+    /// Where the first of them begins.
+    first: Option<u64>,
+    place: u64,
+}
+
+impl Blocks {
+    fn take(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.place += 1;
+            if byte != self.value || (byte != 0 && byte != 0xff) {
+                (self.value, self.length) = (byte, 0);
+            }
+            self.length += 1;
+            if matches!(byte, 0 | 0xff) && self.length >= BLOCK_BYTES {
+                let new = if self.length == BLOCK_BYTES { BLOCK_BYTES } else { 1 };
+                self.first.get_or_insert(self.place - BLOCK_BYTES);
+                self.bytes += new;
+            }
+        }
     }
 }
 
@@ -203,8 +176,8 @@ struct BootTimes {
 }
 
 impl BootTimes {
-    /// The time of a frame, and whether the autopilot's clock began again before it.
-    fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, bool) {
+    /// The time of a frame, and what begins with it.
+    fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, Option<Begins>) {
         let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
         if let Some(boot_ms) = told {
             let boot_us = u64::from(boot_ms) * 1_000;
@@ -213,9 +186,10 @@ impl BootTimes {
             }
             let timeline = self.timeline.get_or_insert_with(|| Timeline::from_first(boot_us));
             let moment = timeline.at(boot_us);
-            return (self.after_base(moment.at), moment.restarted);
+            let begins = if boot_ms > STARTS_MS { Begins::Recording } else { Begins::Clock };
+            return (self.after_base(moment.at), moment.restarted.then_some(begins));
         }
-        (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), false)
+        (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), None)
     }
 
     fn after_base(&self, at: Instant) -> Instant {
@@ -240,23 +214,43 @@ impl Reader for RawReader {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut now = Instant::ZERO;
         let mut line = Instant::ZERO;
-        let mut times = BootTimes::default();
+        let (mut times, mut blocks) = (BootTimes::default(), Blocks::default());
         let mut each = |line, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
             counts.add(frame.id(), frame.bytes().len());
-            let (at, restarted) = times.at(line, &frame);
+            let (at, begins) = times.at(line, &frame);
             now = at;
-            if restarted {
-                take(at, Item::Restart)?;
+            match begins {
+                Some(Begins::Recording) => {
+                    said.end(take)?;
+                    said = Said::default();
+                    take(at, Item::Joint)?;
+                }
+                Some(Begins::Clock) => take(at, Item::Restart)?,
+                None => {}
             }
             said.frame(at, &frame, want, take)
         };
         while let Some(chunk) = self.bytes.next()? {
             line = Instant::from_micros(chunk.at_us);
+            blocks.take(&chunk.bytes);
             push(&mut framer, &chunk.bytes, false, &mut |frame| each(line, frame, take))?;
         }
+        let (held, frames) = (framer.held(), framer.counts().frames);
         push(&mut framer, &[], true, &mut |frame| each(line, frame, take))?;
         said.end(take)?;
-        let noise = framer.counts().bytes_not_frames;
+        if let Some(place) = blocks.first {
+            let words = format!("of nothing but 0x00 or 0xff: {}", count(blocks.bytes, "byte"));
+            let bytes = usize::try_from(blocks.bytes).unwrap_or(usize::MAX);
+            take(now, Item::Gap(&gap(now, Cause::Damaged, place, bytes, words)))?;
+        }
+        let is_cut = held > 0 && framer.counts().frames == frames;
+        let cut = if is_cut { held } else { 0 };
+        if is_cut {
+            let place = blocks.place.saturating_sub(held as u64);
+            let words = format!("a frame that the end cuts off: {}", count(held, "byte"));
+            take(now, Item::Gap(&gap(now, Cause::Cut, place, held, words)))?;
+        }
+        let noise = framer.counts().bytes_not_frames.saturating_sub(blocks.bytes + cut as u64);
         if noise > 0 {
             // Noise on the line and damage of the file look alike here.
             let words = format!("of no frame, noise on the line: {}", count(noise, "byte"));

@@ -18,7 +18,7 @@
 //! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud |
 //! | UDP, TCP, serial | the clock's |
 //!
-//! Times are microseconds since the first byte and never fall: see [`tlog`] for what happens to clocks that jumped.
+//! Times are microseconds since the first byte and never fall: see [`tlog::times`] for what happens to clocks that jumped.
 //! Everything streams: memory does not grow with the input.
 
 mod boot;
@@ -26,6 +26,7 @@ mod checksums;
 pub mod clock;
 pub mod dataflash;
 pub mod doubt;
+pub mod epochs;
 pub mod find;
 pub mod format;
 pub mod input;
@@ -108,8 +109,10 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
         _ => Box::new(io::stdin()),
     };
     let (kind, input) = sniff::sniff(input).with_context(|| format!("{endpoint}"))?;
+    let is_file = matches!(endpoint, Endpoint::File(_));
     Ok(match (kind, timing.line_rate) {
         (sniff::Kind::Empty, _) => bail!("{endpoint}: is empty: not one byte would arrive"),
+        (sniff::Kind::Tlog, None) if is_file => Box::new(tlog::Tlog::ahead(input)),
         (sniff::Kind::Tlog, None) => Box::new(tlog::Tlog::new(input)),
         (sniff::Kind::Tlog, Some(baud)) => Box::new(paced::Paced::new(tlog::Tlog::new(input), baud)),
         (sniff::Kind::Raw, baud) => {

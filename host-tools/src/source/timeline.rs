@@ -2,7 +2,7 @@
 //!
 //! A recording's clock may fall (another power-on in the same file, a clock that was set) and damage may make it say
 //! anything. A small step back is a reordering: what comes late counts as coming now. A larger one is a restart, after
-//! which time goes on from where it was. A step forward beyond a day is damage or a clock that was set: it counts for
+//! which time goes on a microsecond behind where it was: each time is of one power-on. A step forward beyond a day is damage or a clock that was set: it counts for
 //! nothing, and if the clock stays there, time goes on from there. (Which times are wrong, [`super::doubt`] tells before.)
 
 use hums_core::time::Instant;
@@ -44,13 +44,13 @@ impl Timeline {
     /// Another recording goes on here, which begins at this time: time goes on from where it was.
     pub fn begin_again(&mut self, recorded_us: u64) {
         self.restarts += 1;
-        self.last = Some((recorded_us, self.now().as_micros()));
+        self.last = Some((recorded_us, self.now().as_micros().saturating_add(1)));
     }
 
     /// The clock was set to this time, and so much passed meanwhile.
     pub fn set(&mut self, recorded_us: u64, passed_us: u64) -> Moment {
         self.restarts += 1;
-        let at = self.now().as_micros().saturating_add(passed_us);
+        let at = self.now().as_micros().saturating_add(passed_us.max(1));
         self.last = Some((recorded_us, at));
         Moment { at: Instant::from_micros(at), restarted: true }
     }
@@ -69,7 +69,7 @@ impl Timeline {
             None if before - recorded_us <= STEP_BACK_US_MAX => {
                 return Moment { at: Instant::from_micros(reached), restarted: false };
             }
-            _ => (reached, true),
+            _ => (reached.saturating_add(1), true),
         };
         self.restarts += u64::from(restarted);
         self.last = Some((recorded_us, at));
@@ -128,7 +128,7 @@ mod tests {
         let got = times(&[60 * SECOND, 61 * SECOND, 2 * SECOND, 3 * SECOND]);
         assert_eq!(
             got,
-            [(60 * SECOND, false), (61 * SECOND, false), (61 * SECOND, true), (62 * SECOND, false)]
+            [(60 * SECOND, false), (61 * SECOND, false), (61 * SECOND + 1, true), (62 * SECOND + 1, false)]
         );
     }
 

@@ -555,21 +555,88 @@ fn a_failsafe_and_a_crash_are_found_by_their_names() {
     assert!(screen.contains("autopilot failsafe: emergency: vibration failsafe, crash check"), "{screen}");
 }
 
-/// A tlog as a computer whose clock is an hour ahead would have recorded it.
-fn an_hour_ahead(log: &[u8]) -> Vec<u8> {
+/// The records of a tlog: their times and their frames.
+fn records(mut rest: &[u8]) -> Vec<(u64, &[u8])> {
     const TIME_BYTES: usize = 8;
-    let (mut ahead, mut rest) = (Vec::new(), log);
+    let mut records = Vec::new();
     while let Some((time, frame)) =
         rest.split_first_chunk::<TIME_BYTES>().filter(|(_, frame)| frame.len() > 2)
     {
         // MAVLink 2 and 1: header, payload, checksum; a signature where the header says so.
         let (head, signature) = if frame[0] == 0xFD { (12, 13 * usize::from(frame[2] & 1)) } else { (8, 0) };
         let (frame, after) = frame.split_at((head + usize::from(frame[1]) + signature).min(frame.len()));
-        ahead.extend((u64::from_be_bytes(*time) + 3_600_000_000).to_be_bytes());
-        ahead.extend(frame);
+        records.push((u64::from_be_bytes(*time), frame));
         rest = after;
     }
-    ahead
+    records
+}
+
+/// A tlog with other times: of each record's number and its own.
+fn with_times(log: &[u8], time: impl Fn(usize, u64) -> u64) -> Vec<u8> {
+    let records = records(log).into_iter().enumerate();
+    records.flat_map(|(index, (us, frame))| [&time(index, us).to_be_bytes()[..], frame].concat()).collect()
+}
+
+/// A tlog as a computer whose clock is an hour ahead would have recorded it.
+fn an_hour_ahead(log: &[u8]) -> Vec<u8> {
+    with_times(log, |_, us| us + 3_600_000_000)
+}
+
+#[test]
+fn what_is_decoded_of_joined_recordings_has_the_time_of_day_of_its_own_part() {
+    let dir = tempfile::tempdir().expect("directory");
+    let [first, second] = ["ap_quad_guided.tlog", "ap_quad_faults.tlog"]
+        .map(|name| fs::read(flight(name)).expect("the recording"));
+    let day = 24 * 3_600_000_000;
+    let both = [with_times(&first, |_, us| us + 3 * day), with_times(&second, |_, us| us + day)].concat();
+    fs::write(dir.path().join("both.tlog"), &both).expect("written");
+    attempt(dir.path(), "decode both.tlog -o back.tlog --format tlog");
+    let back = fs::read(dir.path().join("back.tlog")).expect("decoded");
+    let (told, decoded) = (records(&both), records(&back));
+    assert_eq!(told.len(), decoded.len());
+    for (index, (told, decoded)) in told.iter().zip(&decoded).enumerate() {
+        assert!(told.0.abs_diff(decoded.0) < 1_000_000, "record {index}: {} as {}", told.0, decoded.0);
+    }
+}
+
+#[test]
+fn one_wrong_time_changes_no_other_time_of_what_is_packed() {
+    let dir = tempfile::tempdir().expect("directory");
+    faults(dir.path());
+    let log = fs::read(dir.path().join("faults.tlog")).expect("the recording");
+    // One bit: 19 hours.
+    fs::write(
+        dir.path().join("wrong.tlog"),
+        with_times(&log, |index, us| if index == 999 { us ^ 1 << 36 } else { us }),
+    )
+    .expect("written");
+    let pack = run(dir.path(), "pack wrong.tlog -o wrong.hum", 0);
+    let told = String::from_utf8_lossy(&pack.stderr).into_owned();
+    assert!(told.contains("1 message with a wrong time"), "{told}");
+    run(dir.path(), "pack faults.tlog -o faults.hum", 0);
+    let info = |name: &str| json(&attempt(dir.path(), &format!("info --json {name}")))["logs"][0].clone();
+    let (wrong, right) = (info("wrong.hum"), info("faults.hum"));
+    assert_eq!(wrong["duration_s"], right["duration_s"]);
+}
+
+#[test]
+fn two_recordings_with_the_same_first_time_are_not_packed_as_one_session() {
+    let dir = tempfile::tempdir().expect("directory");
+    for (name, of) in
+        [("one", "ap_quad_guided.tlog"), ("two", "ap_quad_faults.tlog"), ("again", "ap_quad_faults.tlog")]
+    {
+        let log = fs::read(flight(of)).expect("the recording");
+        let first = records(&log)[0].0;
+        let log = with_times(&log, |_, us| us - first + 1_800_000_000_000_000);
+        fs::write(dir.path().join(format!("{name}.tlog")), log).expect("written");
+        run(dir.path(), &format!("pack {name}.tlog -o {name}.hum"), 0);
+    }
+    let packed = |name: &str| fs::read(dir.path().join(format!("{name}.hum"))).expect("packed");
+    let session = |name: &str| {
+        json(&attempt(dir.path(), &format!("info --json {name}.hum")))["logs"][0]["session"].clone()
+    };
+    assert_ne!(session("one"), session("two"));
+    assert_eq!(packed("two"), packed("again"));
 }
 
 #[test]

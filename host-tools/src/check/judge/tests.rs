@@ -236,7 +236,8 @@ fn a_second_power_on_in_one_recording_is_a_restart_only_where_the_vehicle_was_ar
 #[test]
 fn another_power_on_in_an_autopilots_own_log_ends_the_flight_of_before_and_a_ground_stations_clock_does_not()
 {
-    for (format, flights) in [(Format::DataFlash, 2), (Format::Ulog, 2), (Format::Tlog, 1), (Format::Hums, 1)]
+    for (format, flights) in
+        [(Format::DataFlash, 2), (Format::Ulog, 2), (Format::Raw, 2), (Format::Tlog, 1), (Format::Hums, 1)]
     {
         let mut judge = Judge::new(&Limits::default(), format);
         half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
@@ -247,6 +248,24 @@ fn another_power_on_in_an_autopilots_own_log_ends_the_flight_of_before_and_a_gro
         assert_eq!(judged.flights.len(), flights, "{format:?}: {:?}", judged.flights);
         assert!(judged.flights.iter().all(|flight| !flight.landed), "{format:?}: {:?}", judged.flights);
     }
+}
+
+#[test]
+fn a_flight_does_not_go_on_as_another_vehicles() {
+    let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+    let other = Source { system: 2, component: 1 };
+    half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+    half_seconds(&mut judge, 5_000, 40_000, true, LandedState::InAir);
+    for at_ms in (40_000..120_000).step_by(500) {
+        let at = Instant::from_millis(at_ms);
+        judge.item(at, Item::Observation(other, &heartbeat(true)));
+        let landed = Observation::Landed(LandedState::InAir, VtolState::Unknown);
+        judge.item(at, Item::Observation(other, &landed));
+    }
+    let flights = judge.end().flights;
+    let [first, second] = &flights[..] else { panic!("{flights:?}") };
+    assert!(!first.landed && first.to <= Instant::from_millis(40_500), "{flights:?}");
+    assert!(second.from >= first.to, "{flights:?}");
 }
 
 #[test]

@@ -36,6 +36,7 @@ use crate::decode::record::rows;
 use crate::interrupt;
 use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
+use crate::source::epochs::Epochs;
 
 /// A batch is given away when it has this many bytes, far less than any database refuses.
 const BATCH_BYTES: usize = 256 * 1024;
@@ -148,7 +149,7 @@ impl Influx {
             return;
         }
         let clock = if quantities { &mut self.quantities } else { &mut self.messages };
-        clock.write(lines, Some(epoch_us), &mut self.batch.text);
+        clock.write(lines, &Epochs::of(Some(epoch_us)), &mut self.batch.text);
         self.batch.points += lines.len() as u64;
         self.begun.get_or_insert_with(Wall::now);
         if self.batch.text.len() >= BATCH_BYTES {

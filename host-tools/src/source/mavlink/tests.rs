@@ -217,3 +217,65 @@ fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_l
     let (times, restarts) = read(100, &[60_000, 61_000, 75_500]);
     assert!(times.len() == 3 && times[2] < 20 && restarts == 0, "no autopilot says so: {times:?}");
 }
+
+/// What is missing in raw bytes, and what begins in them.
+fn told_raw(bytes: Vec<u8>) -> Vec<String> {
+    let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
+    let mut told = Vec::new();
+    let read = reader.read(Want::default(), &mut |_, item| {
+        match item {
+            Item::Gap(gap) => told.push(format!("{:?} {:?} {}", gap.cause, gap.place, gap.words)),
+            Item::Restart => told.push("restart".to_owned()),
+            Item::Joint => told.push("joint".to_owned()),
+            _ => {}
+        }
+        Ok(())
+    });
+    assert!(read.is_ok());
+    told
+}
+
+/// Attitudes at these seconds of the autopilot's clock, raw.
+fn attitudes(seconds: std::ops::Range<u32>) -> Vec<u8> {
+    let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+    let frame = |second| encoder.frame(&mut buffer, &Packet::new(30).u32(0, second * 1_000)).to_vec();
+    seconds.flat_map(frame).collect()
+}
+
+#[test]
+fn raw_bytes_that_are_cut_or_were_never_written_are_damaged() {
+    let whole = attitudes(60..100);
+    assert_eq!(told_raw(whole.clone()), Vec::<String>::new());
+    let cut = told_raw(whole[..whole.len() - 5].to_vec());
+    let [words] = &cut[..] else { panic!("{cut:?}") };
+    assert!(words.starts_with("Cut Some(") && words.contains("a frame that the end cuts off"), "{words}");
+    for value in [0x00, 0xff] {
+        let told = told_raw([&whole[..], &vec![value; 20_000], &attitudes(100..140)].concat());
+        let place = whole.len();
+        let expected = format!("Damaged Some({place}) of nothing but 0x00 or 0xff: 20000 bytes");
+        assert_eq!(told, [expected]);
+    }
+}
+
+#[test]
+fn another_raw_recording_that_was_joined_on_is_told_from_a_restart() {
+    assert_eq!(told_raw([attitudes(60..100), attitudes(50..90)].concat()), ["joint"]);
+    assert_eq!(told_raw([attitudes(60..100), attitudes(3..40)].concat()), ["restart"]);
+}
+
+#[test]
+fn times_that_stand_still_or_are_no_microseconds_are_none() {
+    let seconds = |recorded: fn(u64) -> u64| {
+        let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+        let record = |second: u64| {
+            let packet = Packet::new(30).u32(0, second as u32 * 1_000);
+            [&recorded(second).to_be_bytes()[..], encoder.frame(&mut buffer, &packet)].concat()
+        };
+        let bytes: Vec<u8> = (60..260).flat_map(record).collect();
+        told_of(bytes).0
+    };
+    assert_eq!(seconds(|second| 1_700_000_000_000_000 + second * 1_000_000), []);
+    assert_eq!(seconds(|_| 0), [(Cause::NoTimes, None)]);
+    assert_eq!(seconds(|_| 1_700_000_000_000_000), [(Cause::NoTimes, None)]);
+    assert_eq!(seconds(|second| 1_700_000_000_000 + second * 1_000), [(Cause::NoTimes, None)]);
+}

@@ -331,8 +331,8 @@ fn a_log_that_was_joined_to_another_is_another_recording_with_its_own_definition
     let read = read(&log);
     assert_eq!((read.of("joint").len(), read.of("restart").len(), read.gaps.len()), (1, 0, 0));
     assert_eq!(read.of("row position_2"), ["0,2000000,1.25"]);
-    // A second and a bit after the last of the first one.
-    assert_eq!(read.items.last().map(|(at, _)| *at), Some(3 * SECOND + 900_000));
+    // A second and a bit after the last of the first one, and the microsecond that parts them.
+    assert_eq!(read.items.last().map(|(at, _)| *at), Some(3 * SECOND + 900_001));
 }
 
 #[test]

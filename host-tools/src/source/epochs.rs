@@ -2,10 +2,13 @@
 
 use hums_core::time::Instant;
 
-use super::problem::LISTED_MAX;
+use super::item::Item;
+
+/// Parts that are told apart at most.
+const PARTS_MAX: usize = 10_000;
 
 /// UTC at time zero by the clock of each part, microseconds since 1970; the parts begin with each restart of the clock.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Epochs {
     /// Of the first part.
     first_us: Option<u64>,
@@ -14,22 +17,42 @@ pub struct Epochs {
 }
 
 impl Epochs {
+    /// Of a log that has one clock, with this UTC at time zero.
+    pub fn of(epoch_us: Option<u64>) -> Self {
+        Self { first_us: epoch_us, later: Vec::new() }
+    }
+
+    /// Takes the next item.
+    pub fn take(&mut self, at: Instant, item: &Item<'_>) {
+        match item {
+            Item::Epoch(epoch_us) => self.epoch(*epoch_us),
+            Item::Restart | Item::Joint => self.restart(at),
+            _ => {}
+        }
+    }
+
     /// The part at hand tells its UTC.
-    pub(super) fn epoch(&mut self, epoch_us: u64) {
+    fn epoch(&mut self, epoch_us: u64) {
         let part = self.later.last_mut().map_or(&mut self.first_us, |(_, epoch_us)| epoch_us);
         *part = Some(epoch_us);
     }
 
     /// The clock begins again. Beyond so many restarts the time of day is not known.
-    pub(super) fn restart(&mut self, at: Instant) {
-        if self.later.len() < LISTED_MAX {
+    fn restart(&mut self, at: Instant) {
+        if self.later.len() < PARTS_MAX {
             self.later.push((at, None));
         } else if let Some((_, epoch_us)) = self.later.last_mut() {
             *epoch_us = None;
         }
     }
 
-    /// UTC at a time of the recording, by the clock of the part that it is in.
+    /// Parts whose UTC nobody told, and all parts.
+    pub fn untold(&self) -> (usize, usize) {
+        let parts = std::iter::once(self.first_us).chain(self.later.iter().map(|(_, epoch_us)| *epoch_us));
+        (parts.filter(Option::is_none).count(), 1 + self.later.len())
+    }
+
+    /// UTC at a time of the recording, microseconds since 1970, by the clock of the part that it is in.
     pub fn utc_us(&self, at: Instant) -> Option<u64> {
         let part = self.later.iter().rev().find(|(from, _)| *from <= at);
         let epoch_us = part.map_or(self.first_us, |(_, epoch_us)| *epoch_us)?;

@@ -1,0 +1,169 @@
+//! The records of a tlog.
+//!
+//! Damage is walked over: where no record stands, bytes are skipped up to the next place where one does, and what was
+//! skipped arrives as noise on the line, because nothing that was in the file may vanish unseen.
+
+use std::io::{self, Read};
+
+use crate::mavlink::frame::{Check, FRAME_BYTES_MAX, Peek, peek};
+use crate::source::doubt::ASKED;
+use crate::source::stream::read_some;
+
+pub(in crate::source) const TIME_BYTES: usize = 8;
+const BUFFER_BYTES: usize = 64 * 1024;
+/// Enough to see a record and the header of the next one.
+const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
+/// Enough to see those after it too that are asked whether its time is right, behind damage as well.
+const AHEAD_BYTES: usize = 256 * 1024;
+/// No record for so long: what follows is no part of the log.
+const NOTHING_BYTES: usize = 64 * 1024;
+
+/// Recorded times before 2000 count from some power-on: they tell no UTC.
+pub(in crate::source) const UTC_US_MIN: u64 = 946_684_800_000_000;
+/// No recording is from after the year 2255: a time beyond is damage. It may be small: time since boot.
+const TIME_US_MAX: u64 = 9_000_000_000_000_000;
+
+/// One record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Record {
+    /// A frame with the time before it, in microseconds (since 1970, if the recorder knew it).
+    Frame {
+        /// The recorded time.
+        time_us: u64,
+        /// The frame.
+        bytes: Vec<u8>,
+    },
+    /// Bytes that belong to no record.
+    Noise(Vec<u8>),
+}
+
+/// The records of a tlog, in order.
+pub struct Records<R> {
+    input: R,
+    buffer: Vec<u8>,
+    at: usize,
+    ended: bool,
+    /// How much is kept of what follows.
+    ahead_bytes: usize,
+}
+
+impl<R: Read> Records<R> {
+    /// Reads from `input`, no further than needs be: somebody may be writing it.
+    pub fn new(input: R) -> Self {
+        Self { input, buffer: Vec::new(), at: 0, ended: false, ahead_bytes: RECORD_BYTES }
+    }
+
+    /// Reads from `input`, and further on, so that those that follow can be asked.
+    pub(in crate::source) fn ahead(input: R) -> Self {
+        Self { ahead_bytes: AHEAD_BYTES, ..Self::new(input) }
+    }
+
+    fn rest(&self) -> &[u8] {
+        self.buffer.get(self.at..).unwrap_or_default()
+    }
+
+    /// The times of the next few records, and whether no more follow.
+    pub(in crate::source) fn times_after(&self) -> (Vec<u64>, bool) {
+        let mut times = Vec::with_capacity(ASKED);
+        let is_end = self.each_after(&mut |time_us, _| {
+            times.push(time_us);
+            times.len() < ASKED
+        });
+        (times, is_end)
+    }
+
+    /// What the first of the next frames tells that tells it, as far as they are here.
+    pub(in crate::source) fn frames_after<T>(&self, mut told: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
+        let mut found = None;
+        self.each_after(&mut |_, bytes| {
+            found = told(bytes);
+            found.is_none()
+        });
+        found
+    }
+
+    /// Hands on the next records until one says no; whether the recording ends with them.
+    pub(in crate::source) fn each_after(&self, each: &mut dyn FnMut(u64, &[u8]) -> bool) -> bool {
+        let (mut rest, mut nothing) = (self.rest(), 0);
+        while !rest.is_empty() {
+            let Some((time_us, length)) = record_at(rest, self.ended) else {
+                rest = rest.get(1..).unwrap_or_default();
+                nothing += 1;
+                continue;
+            };
+            if !each(time_us, rest.get(TIME_BYTES..TIME_BYTES + length).unwrap_or_default()) {
+                return false;
+            }
+            rest = rest.get(TIME_BYTES + length..).unwrap_or_default();
+            nothing = 0;
+        }
+        self.ended || nothing >= NOTHING_BYTES
+    }
+
+    /// Whether the input ended with these bytes, which were the last that came, in the middle of a record.
+    pub(in crate::source) fn is_cut(&self, noise: &[u8]) -> bool {
+        let frame = noise.get(TIME_BYTES..).filter(|frame| !frame.is_empty());
+        self.ended
+            && self.rest().is_empty()
+            && noise.first() == Some(&0)
+            && frame.is_none_or(|frame| matches!(peek(frame), Peek::Short))
+    }
+
+    fn fill(&mut self) -> io::Result<()> {
+        if self.ended || self.rest().len() >= self.ahead_bytes {
+            return Ok(());
+        }
+        self.buffer.drain(..self.at);
+        self.at = 0;
+        // Twice as much: what is left is not moved for each chunk.
+        while self.buffer.len() < 2 * self.ahead_bytes && !self.ended {
+            let old = self.buffer.len();
+            self.buffer.resize(old + BUFFER_BYTES, 0);
+            let got = read_some(&mut self.input, self.buffer.get_mut(old..).unwrap_or_default())?;
+            self.buffer.truncate(old + got);
+            self.ended = got == 0;
+        }
+        Ok(())
+    }
+
+    /// The next record; `None` at the end.
+    pub fn next_record(&mut self) -> io::Result<Option<Record>> {
+        let mut noise = Vec::new();
+        loop {
+            self.fill()?;
+            if self.rest().is_empty() {
+                return Ok((!noise.is_empty()).then_some(Record::Noise(noise)));
+            }
+            if let Some((time_us, length)) = record_at(self.rest(), self.ended) {
+                if !noise.is_empty() {
+                    return Ok(Some(Record::Noise(noise)));
+                }
+                let bytes = self.rest().get(TIME_BYTES..TIME_BYTES + length).unwrap_or_default().to_vec();
+                self.at += TIME_BYTES + length;
+                return Ok(Some(Record::Frame { time_us, bytes }));
+            }
+            noise.push(self.rest().first().copied().unwrap_or_default());
+            self.at += 1;
+            if noise.len() >= BUFFER_BYTES {
+                return Ok(Some(Record::Noise(noise)));
+            }
+        }
+    }
+}
+
+/// The time and the frame length of the record that begins here. A frame that does not check counts where the record
+/// after it, or the end of the file, stands where it should: that is another definition of the message, not damage.
+fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
+    let time_us = u64::from_be_bytes(bytes.get(..TIME_BYTES)?.try_into().ok()?);
+    if time_us > TIME_US_MAX {
+        return None;
+    }
+    let Peek::Frame(frame) = peek(bytes.get(TIME_BYTES..)?) else { return None };
+    let length = frame.bytes.len();
+    let after = bytes.get(TIME_BYTES + length..).unwrap_or_default();
+    let followed = match after.get(TIME_BYTES..) {
+        None => ended && after.is_empty(),
+        Some(next) => after.first() == Some(&0) && matches!(peek(next), Peek::Frame(_) | Peek::Short),
+    };
+    (frame.check() == Check::Good || followed).then_some((time_us, length))
+}
