@@ -165,10 +165,12 @@ fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is(
             .filter(|finding| finding.level == "critical")
             .map(|finding| (finding.time_s * 1e6) as u64)
             .collect();
-        // In order: each finding has its text.
-        assert_eq!(texts.len(), critical.len(), "{}", recording.display());
+        // What another finding explains has none.
+        assert!(texts.len() <= critical.len(), "{}", recording.display());
+        assert_eq!(texts.is_empty(), critical.is_empty(), "{}", recording.display());
         let (mut worst_begin, mut worst_end) = (0, 0);
-        for (found_us, (at_us, end_us, _)) in critical.iter().zip(&texts) {
+        for (at_us, end_us, _) in &texts {
+            let found_us = critical.iter().rev().find(|found_us| *found_us <= at_us).unwrap();
             worst_begin = worst_begin.max(at_us.saturating_sub(*found_us));
             worst_end = worst_end.max(end_us.saturating_sub(*found_us));
         }

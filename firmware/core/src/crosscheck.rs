@@ -7,14 +7,20 @@
 //! Accelerometers and gyros are compared, and vibration judged, where multicopters hover: they are not mounted at the same place, they
 //! are not sampled at the same moment, and a VTOL's transition or a fast leg sets them apart. An inertial sensor that says nothing but
 //! zeros is not fitted.
+//!
+//! Each sensor by itself: whether it is stuck ([`crate::stuck`]); the first barometer against the height of GPS ([`crate::heights`]).
 
 use crate::departure::Departure;
 use crate::flight::Flight;
+use crate::heights::{Heights, SCALE_HEIGHT_M};
 use crate::latest::Reading;
-use crate::observation::{Air, Estimator, EstimatorScale, Imu, LandedState, VehicleKind, VibrationScale};
+use crate::motion::{climb_mps, ground_speed_mps};
+use crate::observation::{Air, Estimator, EstimatorScale, Gnss, Imu, VehicleKind, VibrationScale};
+use crate::steady::{TURNED, hovers};
+use crate::stuck::Stuck;
 use crate::time::{Instant, Span};
 use crate::units::norm;
-use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
 /// Sensors of one kind that are compared.
 pub(crate) const SENSORS_MAX: usize = 3;
@@ -26,20 +32,18 @@ const EVERY: Span = Span::from_millis(100);
 const FRESH: Span = Span::from_secs(1);
 /// Time constant of the samples: sensors are not sampled at the same moment.
 const SMOOTHING_S: f32 = 0.5;
-/// What turns slower than [`crate::inertial`]'s fast for so long can be compared.
-const TURNED: Span = Span::from_secs(1);
 /// No sensor measures so much, in any of the units.
 const GARBAGE: f32 = 1e6;
 /// In the air for so long it has left the ground.
 const SETTLED: Span = Span::from_secs(3);
-/// A hover, m: above this height over home; m/s: over ground, and up or down.
-const LOW_M: f32 = 1.5;
-const SLOW_MPS: f32 = 6.0;
-const LEVEL_MPS: f32 = 2.0;
-/// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
-const SCALE_HEIGHT_M: f32 = 8_430.0;
 /// Ratios that the estimator told of its compass in flight, before their end says that it does not use it any more: at 1 Hz or more.
 const RATIOS_KNOWN: u8 = 20;
+/// What moves by so much changes the values of its sensors: m up or down and over ground, rad about any axis.
+const CLIMBED_M: f32 = 0.3;
+const TRAVELLED_M: f32 = 0.5;
+const TURNED_RAD: f32 = 0.02;
+/// Vibration comes at 1 Hz or faster; what comes after a longer pause is not of the same hover.
+const VIBRATION_PAUSE: Span = Span::from_secs(3);
 /// Vibration that rises by less did not rise: per axis, and PX4's metric, m/s2.
 const GRAIN_PER_AXIS: f32 = 3.0;
 const GRAIN_PX4: f32 = 1.0;
@@ -80,17 +84,23 @@ impl Kind {
     }
 }
 
-/// The smoothed samples of one sensor.
+/// The smoothed samples of one sensor, and whether they are always the same.
 #[derive(Clone, Copy, Debug)]
 struct Sensor {
     at: Option<Instant>,
     smooth: [f32; 3],
+    stuck: Stuck,
 }
 
 impl Sensor {
-    fn take(&mut self, at: Instant, sample: [f32; 3]) {
+    const NEW: Self = Self { at: None, smooth: [0.0; 3], stuck: Stuck::NEW };
+
+    fn take(&mut self, at: Instant, sample: [f32; 3], moved: Option<f32>) {
         if !sample.iter().all(|axis| axis.abs() <= GARBAGE) {
             return;
+        }
+        if let Some(moved) = moved {
+            self.stuck.take(at, sample.map(f32::to_bits), moved);
         }
         let step_s = self.at.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
         let weight = if step_s < 1.0 { step_s / (SMOOTHING_S + step_s) } else { 1.0 };
@@ -106,11 +116,41 @@ impl Sensor {
     }
 }
 
+/// How far the vehicle has moved in this flight, to and fro.
+#[derive(Clone, Copy, Debug)]
+struct Moved {
+    climbed_m: f32,
+    travelled_m: f32,
+    turned_rad: f32,
+    /// The attitude at the last step, rad.
+    attitude: [f32; 3],
+}
+
+impl Moved {
+    const NONE: Self = Self { climbed_m: 0.0, travelled_m: 0.0, turned_rad: 0.0, attitude: [0.0; 3] };
+
+    fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
+        self.climbed_m += climb_mps(now, vehicle).map_or(0.0, |climb| libm::fabsf(climb) * step_s);
+        self.travelled_m += ground_speed_mps(now, vehicle).map_or(0.0, |speed| speed * step_s);
+        if let Some(told) = vehicle.attitude.get() {
+            let attitude = [told.roll.0, told.pitch.0, told.yaw.0];
+            for (axis, before) in attitude.into_iter().zip(self.attitude) {
+                // Round north it jumps once a turn, which is a turn anyway.
+                self.turned_rad += libm::fabsf(axis - before).min(core::f32::consts::PI);
+            }
+            self.attitude = attitude;
+        }
+    }
+}
+
 /// The memory of all comparisons.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crosschecks {
     sensors: [[Sensor; SENSORS_MAX]; Kind::ALL.len()],
     pairs: [[Departure; SENSORS_MAX]; Kind::ALL.len()],
+    receivers: [Stuck; RECEIVERS_MAX],
+    moved: Moved,
+    heights: Heights,
     /// When sensors of a kind were compared last, and when that was tried.
     compared_at: [Option<Instant>; Kind::ALL.len()],
     stepped_at: Option<Instant>,
@@ -125,10 +165,12 @@ pub(crate) struct Crosschecks {
 impl Crosschecks {
     /// Nothing seen yet.
     pub(crate) const fn new() -> Self {
-        const SENSOR: Sensor = Sensor { at: None, smooth: [0.0; 3] };
         Self {
-            sensors: [[SENSOR; SENSORS_MAX]; Kind::ALL.len()],
+            sensors: [[Sensor::NEW; SENSORS_MAX]; Kind::ALL.len()],
             pairs: [[Departure::NEW; SENSORS_MAX]; Kind::ALL.len()],
+            receivers: [Stuck::NEW; RECEIVERS_MAX],
+            moved: Moved::NONE,
+            heights: Heights::new(),
             compared_at: [None; Kind::ALL.len()],
             stepped_at: None,
             vibration: Departure::NEW,
@@ -143,10 +185,11 @@ impl Crosschecks {
         self.sensors[kind as usize].get_mut(usize::from(instance))
     }
 
-    pub(crate) fn take_imu(&mut self, at: Instant, imu: &Imu) {
+    pub(crate) fn take_imu(&mut self, at: Instant, imu: &Imu, flight: &Flight) {
         let force = imu.acceleration.map(|force| force.map(|axis| axis.0));
         let rate = imu.rate.map(|rate| rate.map(|axis| axis.0));
         let field = imu.field.map(|field| field.map(|axis| axis.0));
+        let turned = flight.airborne().then_some(self.moved.turned_rad);
         // A gyro that stands still may measure zeros, but not beside an accelerometer that does.
         let is_fitted = force != Some([0.0; 3]);
         for (kind, sample) in [
@@ -155,15 +198,34 @@ impl Crosschecks {
             (Kind::Compass, field.filter(|field| field.iter().any(|axis| axis.abs() > 0.0))),
         ] {
             if let (Some(sample), Some(sensor)) = (sample, self.sensor(kind, imu.instance)) {
-                sensor.take(at, sample);
+                sensor.take(at, sample, turned);
             }
         }
     }
 
-    pub(crate) fn take_air(&mut self, at: Instant, air: &Air) {
+    pub(crate) fn take_air(&mut self, at: Instant, air: &Air, vehicle: &Vehicle, flight: &Flight) {
         let pressure = air.pressure.filter(|pressure| pressure.0 > 0.0);
+        let climbed = flight.airborne().then_some(self.moved.climbed_m);
         if let (Some(pressure), Some(sensor)) = (pressure, self.sensor(Kind::Barometer, air.instance)) {
-            sensor.take(at, [pressure.0, 0.0, 0.0]);
+            sensor.take(at, [pressure.0, 0.0, 0.0], climbed);
+            if air.instance == 0 {
+                self.heights.take_pressure(at, pressure, vehicle, flight);
+            }
+        }
+    }
+
+    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, flight: &Flight) {
+        let travelled_m = self.moved.travelled_m;
+        let place = gnss.position.filter(|_| gnss.fix >= 3 && flight.airborne());
+        let altitude = gnss.altitude.map_or(0.0, |altitude| altitude.0).to_bits();
+        let speed = gnss.speed.map_or(0.0, |speed| speed.0).to_bits();
+        if let (Some(place), Some(stuck)) = (place, self.receivers.get_mut(usize::from(gnss.instance))) {
+            let words = |degrees: f64| [degrees.to_bits() as u32, (degrees.to_bits() >> 32) as u32];
+            let place = words(place.latitude_deg).into_iter().chain(words(place.longitude_deg));
+            stuck.take(at, place.chain([altitude, speed]), travelled_m);
+        }
+        if gnss.instance == 0 {
+            self.heights.take_gnss(at, gnss, vehicle, flight);
         }
     }
 
@@ -194,13 +256,14 @@ impl Crosschecks {
         };
         let step_s = self.vibration_at.map_or(0.0, |before| at.since(before).as_secs_f32());
         self.vibration_at = Some(at);
-        if step_s > 0.0 && step_s < FRESH.as_secs_f32() {
+        if step_s > 0.0 && step_s < VIBRATION_PAUSE.as_secs_f32() {
             self.vibration.take(level, step_s, self.vibration_grain);
         }
     }
 
     /// A flight begins: nothing is usual yet.
-    pub(crate) const fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
+        self.sensors.as_flattened_mut().iter_mut().for_each(|sensor| sensor.stuck = Stuck::NEW);
         *self = Self { sensors: self.sensors, ..Self::new() };
     }
 
@@ -209,7 +272,9 @@ impl Crosschecks {
         if self.stepped_at.is_some_and(|at| now.since(at) < EVERY) || !flight.airborne() {
             return;
         }
+        let step_s = self.stepped_at.map_or(0.0, |at| now.since(at).min(FRESH).as_secs_f32());
         self.stepped_at = Some(now);
+        self.moved.step(now, step_s, vehicle);
         let turns_little = vehicle.inertial.turns_little(now, TURNED);
         let hovers = hovers(now, vehicle, flight);
         let calm = turns_little
@@ -247,6 +312,25 @@ impl Crosschecks {
         Reading::new(Some(at), beyond)
     }
 
+    /// For how long a sensor has repeated one value in flight, s; 0 where it does not.
+    pub(crate) fn stuck(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
+        let (moved, least) = match kind {
+            Kind::Barometer => (self.moved.climbed_m, CLIMBED_M),
+            Kind::Accelerometer | Kind::Gyro | Kind::Compass => (self.moved.turned_rad, TURNED_RAD),
+        };
+        self.sensors[kind as usize].get(usize::from(sensor))?.stuck.lasts(now, moved, least)
+    }
+
+    /// The same of a receiver.
+    pub(crate) fn receiver_stuck(&self, now: Instant, receiver: u8) -> Option<Reading> {
+        self.receivers.get(usize::from(receiver))?.lasts(now, self.moved.travelled_m, TRAVELLED_M)
+    }
+
+    /// The barometer against GPS, and its noise.
+    pub(crate) const fn heights(&self) -> &Heights {
+        &self.heights
+    }
+
     /// Whether the estimator stopped using a compass that it used in this flight.
     pub(crate) const fn compass_unused(&self) -> Option<Reading> {
         self.unused
@@ -256,19 +340,4 @@ impl Crosschecks {
     pub(crate) fn vibration_rise(&self) -> Option<Reading> {
         Reading::new(self.vibration_at, self.vibration.multiple(self.vibration_grain))
     }
-}
-
-/// A multicopter that is level and slow, does not turn, and does not touch the ground: contact and the propellers' wash there set
-/// sensors apart.
-fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
-    let slow = vehicle.global.within(now, FRESH).is_none_or(|global| {
-        let [north, east, down] = global.velocity.map(|speed| speed.0);
-        let level = north * north + east * east < SLOW_MPS * SLOW_MPS && libm::fabsf(down) < LEVEL_MPS;
-        level && libm::fabsf(global.relative_altitude.0) > LOW_M
-    });
-    let landed = vehicle.landed.within(now, LANDED_STATE_AGE);
-    slow && !matches!(landed, Some(LandedState::TakingOff | LandedState::Landing | LandedState::OnGround))
-        && vehicle.is_multicopter()
-        && flight.is_steady(now, vehicle)
-        && vehicle.inertial.turns_little(now, TURNED)
 }

@@ -1,8 +1,8 @@
 //! A figure against its own usual level in this flight.
 //!
 //! The figure is smoothed. Its usual level is the mean of the smoothed figure over the last minute, and its usual range that mean and
-//! [`SPREADS`] times the mean distance from it. What is beyond the range by as much as the caller names teaches nothing, so that a
-//! fault does not become usual; what is so from the beginning of a flight is usual.
+//! [`SPREADS`] times the mean distance from it. What is beyond the range by as much as the caller names teaches nothing, so
+//! that a fault does not become usual; what is so from the beginning of a flight is usual.
 
 /// Time constant of the figure that is judged, s.
 const SMOOTHING_S: f32 = 0.5;
@@ -27,29 +27,53 @@ impl Departure {
     /// Nothing learnt.
     pub(crate) const NEW: Self = Self { smooth: 0.0, mean: 0.0, spread: 0.0, learnt_s: 0.0 };
 
-    /// Takes the figure, which is 0 or more, `step_s` after the one before. Further beyond its usual range than `hold` it teaches nothing.
-    pub(crate) fn take(&mut self, figure: f32, step_s: f32, hold: f32) {
-        if !(0.0..=FIGURE_MAX).contains(&figure) {
+    /// Takes the figure, `step_s` after the one before, with the time constant of its kind; learns nothing.
+    pub(crate) fn follow(&mut self, figure: f32, step_s: f32, smoothing_s: f32) {
+        if !(-FIGURE_MAX..=FIGURE_MAX).contains(&figure) {
             return;
         }
         if self.learnt_s == 0.0 {
             (self.smooth, self.mean) = (figure, figure);
         }
-        self.smooth += step_s / (SMOOTHING_S + step_s) * (figure - self.smooth);
-        if self.beyond().is_some_and(|beyond| beyond > hold) {
-            return;
-        }
+        self.smooth += step_s / (smoothing_s + step_s) * (figure - self.smooth);
+    }
+
+    /// What it follows is usual.
+    pub(crate) fn learn(&mut self, step_s: f32) {
         self.learnt_s = (self.learnt_s + step_s).min(MEMORY_S);
-        let weight = step_s / self.learnt_s.max(step_s);
-        let off = self.smooth - self.mean;
+        let weight = if self.learnt_s > 0.0 { step_s / self.learnt_s } else { 1.0 };
+        let off = self.departed();
         self.mean += weight * off;
         self.spread += weight * (libm::fabsf(off) - self.spread);
     }
 
+    /// Both at once, of a figure that is wrong where it is large: further above its usual range than `hold` it teaches nothing.
+    pub(crate) fn take(&mut self, figure: f32, step_s: f32, hold: f32) {
+        self.follow(figure, step_s, SMOOTHING_S);
+        if self.beyond().is_none_or(|beyond| beyond <= hold) {
+            self.learn(step_s);
+        }
+    }
+
+    /// Whether its usual level is known.
+    pub(crate) fn is_known(&self) -> bool {
+        self.learnt_s >= KNOWN_S
+    }
+
+    /// How far the figure is from its usual level, with its sign.
+    pub(crate) fn departed(&self) -> f32 {
+        self.smooth - self.mean
+    }
+
     /// How far the figure is above its usual range, 0 at least; `None` until that is known.
     pub(crate) fn beyond(&self) -> Option<f32> {
-        let beyond = self.smooth - self.mean - SPREADS * self.spread;
-        (self.learnt_s >= KNOWN_S).then_some(beyond.max(0.0))
+        let beyond = self.departed() - SPREADS * self.spread;
+        self.is_known().then_some(beyond.max(0.0))
+    }
+
+    /// The figure as it is followed.
+    pub(crate) fn figure(&self) -> f32 {
+        self.smooth
     }
 
     /// The figure as a multiple of what is usual, where it is beyond its usual range by more than `grain`; 1 where it is not.

@@ -9,6 +9,7 @@ use crate::latest::{Latest, Reading};
 use crate::observation::{Battery, EscGroup, Imu, MOTORS_MAX, Observation};
 use crate::outputs::MotorOutputs;
 use crate::params::{Param, Params};
+use crate::response::Response;
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span};
 use crate::trend::{Rate, Resistance};
@@ -66,6 +67,7 @@ pub struct Derived {
     currents: Currents,
     crosschecks: Crosschecks,
     outputs: MotorOutputs,
+    response: Response,
     load_factor: Latest<f32>,
     /// When anything at all was heard of the vehicle.
     heard: Option<Instant>,
@@ -126,6 +128,7 @@ impl Derived {
             currents: Currents::new(),
             crosschecks: Crosschecks::new(),
             outputs: MotorOutputs::new(),
+            response: Response::new(),
             load_factor: Latest::nothing(),
             heard: None,
             resumed: Instant::ZERO,
@@ -154,17 +157,21 @@ impl Derived {
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
         self.hear(at);
         match observation {
-            Observation::Imu(imu) => self.take_imu(at, imu),
-            Observation::Air(air) => self.crosschecks.take_air(at, air),
+            Observation::Imu(imu) => self.take_imu(at, imu, flight),
+            Observation::Air(air) => self.crosschecks.take_air(at, air, vehicle, flight),
             Observation::ImuAndAir(imu, air) => {
-                self.take_imu(at, imu);
-                self.crosschecks.take_air(at, air);
+                self.take_imu(at, imu, flight);
+                self.crosschecks.take_air(at, air, vehicle, flight);
             }
+            Observation::Attitude(attitude) => self.response.take_attitude(at, attitude, flight),
+            Observation::Wanted(wanted) => self.response.take_wanted(at, wanted.rates),
+            Observation::Hud(hud) => self.response.take_hud(at, hud, vehicle, flight),
             Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator, flight),
             // On the scale that the vehicle knows.
             Observation::Vibration(_) => self.crosschecks.take_vibration(at, vehicle, flight),
             Observation::Outputs(outputs) => self.outputs.take(at, outputs, vehicle, flight),
             Observation::Gnss(gnss) => {
+                self.crosschecks.take_gnss(at, gnss, vehicle, flight);
                 if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
                     *had_fix |= gnss.fix >= 3;
                 }
@@ -195,8 +202,8 @@ impl Derived {
         }
     }
 
-    fn take_imu(&mut self, at: Instant, imu: &Imu) {
-        self.crosschecks.take_imu(at, imu);
+    fn take_imu(&mut self, at: Instant, imu: &Imu, flight: &Flight) {
+        self.crosschecks.take_imu(at, imu, flight);
         if imu.instance == 0
             && let Some(load_g) = imu.acceleration.and_then(load_factor_g)
         {
@@ -267,6 +274,7 @@ impl Derived {
         if matches!(event, Some(FlightEvent::TakeOff | FlightEvent::Resumed)) {
             self.crosschecks.begin();
             self.outputs.begin();
+            self.response.begin();
         }
         self.crosschecks.step(now, vehicle, flight);
         let clips = clips(vehicle).map_or(0, u64::from);
@@ -289,6 +297,11 @@ impl Derived {
     /// What the motors are given.
     pub(crate) const fn outputs(&self) -> &MotorOutputs {
         &self.outputs
+    }
+
+    /// What it does against what it is told to do.
+    pub(crate) const fn response(&self) -> &Response {
+        &self.response
     }
 
     /// What the motors take.

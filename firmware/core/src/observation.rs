@@ -181,6 +181,8 @@ pub struct Wanted {
     pub roll: Radians,
     /// Nose up is positive.
     pub pitch: Radians,
+    /// Body rates that it wants, about roll and pitch, where they are told.
+    pub rates: Option<[RadiansPerSecond; 2]>,
 }
 
 impl Wanted {
@@ -193,7 +195,7 @@ impl Wanted {
         }
         let roll = libm::atan2f(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y));
         let pitch = libm::asinf((2.0 * (w * y - z * x)).clamp(-1.0, 1.0));
-        Some(Self { roll: Radians(roll), pitch: Radians(pitch) })
+        Some(Self { roll: Radians(roll), pitch: Radians(pitch), rates: None })
     }
 }
 

@@ -6,26 +6,25 @@
 //! it is 2/3 of the loss at the weak motor, 1/6 at four others and -1/3 at the opposite one. What moves the vehicle's load, tilts it
 //! or turns it changes commands in pairs: as much down on one side as up on the other. What is judged is therefore how far the highest
 //! change is above the second, less how far the others are apart from each other: of four motors all others, of six without the
-//! lowest. It is in percent of what the motors are given on the average, smoothed, and against what was usual in this flight.
-//! (Derived from the geometry of regular frames, for this project.)
+//! lowest. It is in percent of what the motors are given on the average, smoothed, and against what was usual in this flight
+//! ([`crate::departure`]). (Derived from the geometry of regular frames, for this project.)
 //!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
 //! Other frames are not judged: three motors have no such pattern, eight and coaxial ones hardly any.
 
+use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, Outputs};
+use crate::steady::hovers;
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
 
 /// Motors of the largest frame that is judged.
 pub(crate) const JUDGED_MAX: usize = 6;
-/// Time constant of the commands, s.
-const SMOOTHING_S: f32 = 1.0;
-/// The usual shares are known after so long, s, and look back over so long.
-const KNOWN_S: f32 = 8.0;
-const MEMORY_S: f32 = 60.0;
+/// Time constant of the commands, s: gusts and corrections of course are over sooner.
+const SMOOTHING_S: f32 = 4.0;
 /// Pulses of a motor that does not turn are not longer than this, us.
 const IDLE_US: u16 = 1_150;
 /// Pulses begin here, us. What is shorter on the ground is on another scale, which begins at nothing.
@@ -33,16 +32,11 @@ const ZERO_US: f32 = 1_000.0;
 /// Motors that carry a vehicle are given so much more on the average.
 const CARRIES_US: f32 = 100.0;
 /// Further above the others a change teaches nothing, percent.
-const HOLD_PERCENT: f32 = 10.0;
+const HOLD_PERCENT: f32 = 5.0;
 /// Below this part of the average, percent, a motor was taken out.
 const OUT_PERCENT: f32 = -70.0;
 /// Messages that are further apart are not of the same hover.
 const PAUSE: Span = Span::from_secs(2);
-/// Tilted further, turning fast so short a time ago, or climbing faster, it does not hover.
-const TILT_RAD: f32 = 0.35;
-const TURNED: Span = Span::from_secs(1);
-const CLIMB_MPS: f32 = 2.0;
-const SETTLED: Span = Span::from_secs(3);
 
 /// The memory of the motors' commands.
 #[derive(Clone, Copy, Debug)]
@@ -51,10 +45,8 @@ pub(crate) struct MotorOutputs {
     port: Option<u8>,
     /// The shortest pulse on the ground.
     lowest: [u16; JUDGED_MAX],
-    /// Command against the average of all, percent, smoothed; and what is usual.
-    share: [f32; JUDGED_MAX],
-    usual: [f32; JUDGED_MAX],
-    learnt_s: f32,
+    /// Command against the average of all, percent.
+    share: [Departure; JUDGED_MAX],
     at: Option<Instant>,
     /// The motor that stands out, and how far, percent.
     alone: (u8, f32),
@@ -66,9 +58,7 @@ impl MotorOutputs {
         Self {
             port: None,
             lowest: [u16::MAX; JUDGED_MAX],
-            share: [0.0; JUDGED_MAX],
-            usual: [0.0; JUDGED_MAX],
-            learnt_s: 0.0,
+            share: [Departure::NEW; JUDGED_MAX],
             at: None,
             alone: (0, 0.0),
         }
@@ -109,19 +99,16 @@ impl MotorOutputs {
         let begins = self.at.is_none_or(|before| at.since(before) > PAUSE);
         let step_s = if begins { 0.0 } else { self.at.map_or(0.0, |before| at.since(before).as_secs_f32()) };
         self.at = Some(at);
-        let weight = if self.learnt_s == 0.0 { 1.0 } else { step_s / (SMOOTHING_S + step_s) };
         for (share, pulse) in self.share.iter_mut().zip(pulses) {
-            *share += weight * (given(pulse) / mean * 100.0 - 100.0 - *share);
+            share.follow(given(pulse) / mean * 100.0 - 100.0, step_s, SMOOTHING_S);
         }
         self.judge(count, step_s);
     }
 
     fn judge(&mut self, count: usize, step_s: f32) {
         let mut changes = [(0.0, 0); JUDGED_MAX];
-        for ((place, change), (share, usual)) in
-            (0_u8..).zip(&mut changes).zip(self.share.iter().zip(&self.usual)).take(count)
-        {
-            *change = (share - usual, place);
+        for ((place, change), share) in (0_u8..).zip(&mut changes).zip(&self.share).take(count) {
+            *change = (share.departed(), place);
         }
         let changes = &mut changes[..count];
         changes.sort_unstable_by(|one, other| other.0.total_cmp(&one.0));
@@ -129,20 +116,21 @@ impl MotorOutputs {
         let [first, second, .., lowest] = *changes else { return };
         let lowest = if count == JUDGED_MAX { changes[count - 2] } else { lowest };
         let stands_out = (first.0 - second.0) - (second.0 - lowest.0);
-        if self.learnt_s < KNOWN_S || stands_out < HOLD_PERCENT {
-            self.learnt_s = (self.learnt_s + step_s).min(MEMORY_S);
-            let weight = if self.learnt_s > 0.0 { step_s / self.learnt_s } else { 1.0 };
-            for (usual, share) in self.usual.iter_mut().zip(&self.share) {
-                *usual += weight * (share - *usual);
-            }
+        if !self.is_known() || stands_out < HOLD_PERCENT {
+            self.share.iter_mut().for_each(|share| share.learn(step_s));
         }
-        let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| **share < OUT_PERCENT);
+        let out = (0_u8..).zip(&self.share).take(count).find(|(_, share)| share.figure() < OUT_PERCENT);
         self.alone = out.map_or((first.1, stands_out), |(place, _)| (place, 100.0));
+    }
+
+    /// All learn together.
+    fn is_known(&self) -> bool {
+        self.share.iter().all(Departure::is_known)
     }
 
     /// How far a motor's command alone is above what is usual, percent of the average; 0 for those that do not stand out.
     pub(crate) fn alone(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
-        let at = self.at.filter(|at| now.since(*at) <= PAUSE && self.learnt_s >= KNOWN_S)?;
+        let at = self.at.filter(|at| now.since(*at) <= PAUSE && self.is_known())?;
         if usize::from(motor) >= motors(vehicle) {
             return None;
         }
@@ -159,19 +147,6 @@ fn motors(vehicle: &Vehicle) -> usize {
         Some(13) => JUDGED_MAX,
         _ => 0,
     }
-}
-
-/// It need not be slow: a fast leg changes commands in pairs.
-fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
-    let level = vehicle
-        .attitude
-        .get()
-        .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
-    let climbs = crate::motion::climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > CLIMB_MPS);
-    level
-        && !climbs
-        && flight.airborne_since().is_some_and(|since| now.since(since) > SETTLED)
-        && vehicle.inertial.turns_little(now, TURNED)
 }
 
 const _: () = assert!(JUDGED_MAX <= MOTORS_MAX);

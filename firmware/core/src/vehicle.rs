@@ -398,7 +398,7 @@ impl Vehicle {
     fn note_led(&mut self, at: Instant, attitude: &Attitude) {
         /// 0.6 degrees, which is more than rounding.
         const COPY_RAD: f32 = 0.01;
-        if let Some(Wanted { roll, pitch }) = self.wanted.within(at, LED)
+        if let Some(Wanted { roll, pitch, .. }) = self.wanted.within(at, LED)
             && ((roll.0 - attitude.roll.0).abs() > COPY_RAD || (pitch.0 - attitude.pitch.0).abs() > COPY_RAD)
         {
             self.led_at = Some(at);

@@ -9,11 +9,14 @@ use hums_core::Monitor;
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{
     Air, Attitude, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation, Outputs, VehicleKind,
+    Wanted,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::Instant;
-use hums_core::units::{Gauss, Hectopascals, MetresPerSecond2, Radians, RadiansPerSecond};
+use hums_core::units::{
+    Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
+};
 
 /// It takes off at 4 s; what is to be found begins at 30 s.
 const OFF_MS: u64 = 4_000;
@@ -31,6 +34,13 @@ struct Fitted {
     pulses: [f32; MOTORS_MAX],
     /// How fast it turns, rad/s.
     yaw_rate: f32,
+    /// Body rates about roll and pitch, and those that are wanted, rad/s.
+    turns: [f32; 2],
+    wanted: [f32; 2],
+    /// How far GPS is above sea level, m.
+    altitude: f32,
+    /// A second after this, GPS repeats its position.
+    gps_until_ms: u64,
 }
 
 /// A number between -1 and 1 for a moment and a sensor: the same one each time.
@@ -58,15 +68,43 @@ impl Fitted {
             [0, 1, 2].map(|sensor| [0.2, 0.05 * sensor as f32, 0.4 + 0.01 * noise(now_ms, sensor + 40)]);
         let pressure =
             [0, 1, 2].map(|sensor| 1_000.0 + 0.3 * sensor as f32 + 0.05 * noise(now_ms, sensor + 50));
-        Self { quad, force, rate, field, pressure, pulses, yaw_rate: 0.0 }
+        let turns = [0.1 * noise(now_ms, 70), 0.1 * noise(now_ms, 71)];
+        let altitude = 120.0 + noise(now_ms, 72);
+        Self {
+            quad,
+            force,
+            rate,
+            field,
+            pressure,
+            pulses,
+            yaw_rate: 0.0,
+            turns,
+            wanted: [0.0; 2],
+            altitude,
+            gps_until_ms: u64::MAX,
+        }
     }
 
     fn says(&self, now_ms: u64) -> Vec<Observation> {
         let mut said = self.quad.says(now_ms);
         said.retain(|said| !matches!(said, Observation::Imu(_) | Observation::Attitude(_)));
-        let rates = Some([0.0, 0.0, self.yaw_rate].map(RadiansPerSecond));
+        for observation in &mut said {
+            if let Observation::GlobalPosition(global) = observation {
+                global.velocity[0] = MetresPerSecond(1.0);
+            }
+            if let Observation::Gnss(gnss) = observation {
+                let moment = now_ms.min(self.gps_until_ms);
+                let latitude_deg = 47.0 + f64::from(noise(moment, 73)) * 1e-6;
+                gnss.position = Some(Position { latitude_deg, longitude_deg: 8.0 });
+                gnss.altitude = Some(Metres(if moment == now_ms { self.altitude } else { 120.0 }));
+            }
+        }
+        let [roll, pitch] = self.turns;
+        let rates = Some([roll, pitch, self.yaw_rate].map(RadiansPerSecond));
+        let wanted = Some(self.wanted.map(RadiansPerSecond));
+        said.push(Observation::Wanted(Wanted { rates: wanted, ..Wanted::default() }));
         said.push(Observation::Attitude(Attitude {
-            roll: Radians(self.quad.roll),
+            roll: Radians(self.quad.roll + 0.01 * noise(now_ms, 74)),
             rates,
             boot_ms: Some((now_ms + 100_000) as u32),
             ..Attitude::default()
@@ -135,9 +173,12 @@ fn of_three_sensors_the_one_that_comes_apart_is_named() {
         finds("accel_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.force[place][2] += 3.0);
         finds("gyro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.rate[place][0] += 0.4);
         finds("compass_mismatch", sensor, Level::Warning, 3_000, |_, fitted| {
-            fitted.field[place] = [0.5, 0.0, -0.1];
+            fitted.field[place] = [0.5, 0.1 * fitted.field[place][2], -0.1];
         });
-        finds("baro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.pressure[place] += 2.5);
+        // The first one leaves the height of GPS too.
+        if sensor > 0 {
+            finds("baro_mismatch", sensor, Level::Warning, 3_000, |_, fitted| fitted.pressure[place] += 2.5);
+        }
     }
 }
 
@@ -179,7 +220,7 @@ fn a_fast_turn_and_a_vtol_say_nothing_about_sensors() {
         if now_ms >= FAULT_MS {
             fitted.force[1][0] += 3.0;
             fitted.rate[1][0] += 0.4;
-            fitted.field[1] = [0.5, 0.0, -0.1];
+            fitted.field[1] = [0.5, 0.1 * fitted.field[1][2], -0.1];
         }
     };
     is_quiet(|now_ms, fitted| {
@@ -209,11 +250,11 @@ fn a_weak_motor_of_a_quadrotor_is_named() {
         finds("motor_output", motor, Level::Warning, 4_000, |_, fitted| {
             fitted.pulses[usize::from(motor)] += 150.0;
         });
-        finds("motor_output", motor, Level::Critical, 3_000, |_, fitted| {
+        finds("motor_output", motor, Level::Critical, 5_000, |_, fitted| {
             fitted.pulses[usize::from(motor)] += 400.0;
         });
     }
-    finds("motor_output", 1, Level::Critical, 4_000, |_, fitted| fitted.pulses[1] = 1_000.0);
+    finds("motor_output", 1, Level::Critical, 6_000, |_, fitted| fitted.pulses[1] = 1_000.0);
 }
 
 /// A hexarotor's commands, where one motor has lost thrust worth `loss` us: the projection on thrust, roll, pitch and yaw.
@@ -293,10 +334,99 @@ fn px4_that_stops_using_its_compass_is_named() {
     let told: Vec<_> = findings.iter().filter(|finding| finding.level != Level::Stale).collect();
     let [found] = told[..] else { panic!("{findings:?}") };
     assert_eq!((found.check, found.level), ("compass_unused", Level::Warning));
-    assert!((FAULT_MS + 1_000..FAULT_MS + 1_200).contains(&found.at.as_millis()), "{found:?}");
+    assert!((FAULT_MS + 500..FAULT_MS + 700).contains(&found.at.as_millis()), "{found:?}");
     // One that was never used is none that was lost.
     is_quiet(|_, fitted| {
         (fitted.quad.autopilot, fitted.quad.estimator) = (Autopilot::Px4, px4(None));
         fitted.quad.vibration.levels = [Some(0.0), Some(0.0), Some(1.0)];
+    });
+}
+
+/// What a sensor says at the moment of the fault, from then on.
+#[test]
+fn a_sensor_that_repeats_one_value_is_named() {
+    for sensor in 0..3_u8 {
+        let place = usize::from(sensor);
+        let held = Fitted::healthy(FAULT_MS);
+        finds("accel_stuck", sensor, Level::Warning, 1_500, |_, fitted| {
+            fitted.force[place] = held.force[place];
+        });
+        finds("gyro_stuck", sensor, Level::Warning, 1_500, |_, fitted| fitted.rate[place] = held.rate[place]);
+        finds("compass_stuck", sensor, Level::Warning, 1_500, |_, fitted| {
+            fitted.field[place] = held.field[place];
+        });
+        // It sinks with 0.1 m/s.
+        finds("baro_stuck", sensor, Level::Warning, 4_000, |_, fitted| {
+            fitted.pressure[place] = held.pressure[place];
+        });
+    }
+    finds("gps_stuck", 0, Level::Warning, 1_500, |_, fitted| fitted.gps_until_ms = FAULT_MS);
+}
+
+#[test]
+fn a_slow_sensor_and_one_that_always_says_the_same_are_not_stuck() {
+    is_quiet(|now_ms, fitted| {
+        let slow = Fitted::healthy(now_ms / 2_000 * 2_000);
+        (fitted.field, fitted.pressure, fitted.gps_until_ms) =
+            (slow.field, slow.pressure, now_ms / 2_000 * 2_000);
+    });
+    let first = Fitted::healthy(0);
+    is_quiet(|_, fitted| (fitted.field, fitted.force) = (first.field, first.force));
+}
+
+#[test]
+fn a_barometer_that_leaves_the_height_of_gps_is_named() {
+    // 10 m, at once and at half a metre a second.
+    finds("baro_height", 0, Level::Warning, 3_000, |_, fitted| {
+        fitted.pressure.iter_mut().for_each(|pressure| *pressure += 1.5);
+    });
+    finds("baro_height", 0, Level::Warning, 25_000, |now_ms, fitted| {
+        let drift_hpa = (now_ms - FAULT_MS) as f32 * 0.06 / 1_000.0;
+        fitted.pressure.iter_mut().for_each(|pressure| *pressure -= drift_hpa);
+    });
+}
+
+#[test]
+fn weather_a_warm_day_and_the_wind_of_the_flight_move_a_healthy_barometer() {
+    // 0.05 hPa in 10 s: 2 hPa in seven minutes.
+    is_quiet(|now_ms, fitted| {
+        let weather = now_ms as f32 * 0.005 / 1_000.0;
+        fitted.pressure.iter_mut().for_each(|pressure| *pressure += weather);
+    });
+    // 100 m up, by a scale that is wrong by 8 %.
+    is_quiet(|now_ms, fitted| {
+        let up_m = (now_ms.saturating_sub(10_000) as f32 / 1_000.0 * 1.8).min(100.0);
+        (fitted.quad.height, fitted.quad.climb) = (20.0 + up_m, if up_m < 100.0 { 1.8 } else { 0.0 });
+        fitted.altitude += up_m;
+        fitted.pressure.iter_mut().for_each(|pressure| *pressure -= up_m * 1.08 * 0.118);
+    });
+}
+
+#[test]
+fn a_noisy_barometer_is_named() {
+    finds("baro_noise", 0, Level::Warning, 3_000, |now_ms, fitted| {
+        fitted.pressure[0] += 0.6 * noise(now_ms, 80);
+    });
+}
+
+#[test]
+fn what_does_not_turn_as_it_is_told_is_named_and_what_turns_fast_is_not() {
+    for (axis, check) in ["roll_rate", "pitch_rate"].into_iter().enumerate() {
+        finds(check, 0, Level::Critical, 2_500, |_, fitted| fitted.wanted[axis] = -2.5);
+    }
+    is_quiet(|now_ms, fitted| {
+        // Hard turns to and fro, a tenth of a second late.
+        let turning = |now_ms: u64| [3.0 * (now_ms as f32 / 400.0).sin(), 0.0];
+        (fitted.wanted, fitted.turns) = (turning(now_ms), turning(now_ms.saturating_sub(100)));
+    });
+}
+
+#[test]
+fn full_throttle_without_a_climb_is_named() {
+    finds("thrust_lost", 0, Level::Warning, 2_500, |_, fitted| fitted.quad.throttle = 1.0);
+    is_quiet(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            (fitted.quad.throttle, fitted.quad.climb) = (1.0, 3.0);
+        }
     });
 }

@@ -46,6 +46,12 @@ const INPUTS: &[(&str, &str)] = &[
         "motor_output",
         "SERVO_OUTPUT_RAW: one motor's pulse alone above what is usual in this flight, percent of what motors are given; 100 where one gets next to nothing; quadrotors and hexarotors in level flight",
     ),
+    ("thrust_lost", "VFR_HUD: how long throttle was full without a climb; on wings, with a sink"),
+    (
+        "roll_rate",
+        "ATTITUDE_TARGET against ATTITUDE: body rate that is wanted and missing, less a part of what is wanted",
+    ),
+    ("pitch_rate", "the same messages"),
     (
         "motor_trend",
         "ESC_STATUS, ESC_TELEMETRY: the speed against the others with its sign, against its baseline",
@@ -87,6 +93,25 @@ const INPUTS: &[(&str, &str)] = &[
         "baro_mismatch",
         "SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: difference of the pressures as height, likewise",
     ),
+    (
+        "baro_height",
+        "SCALED_PRESSURE, HIGHRES_IMU: height of the first barometer against GPS_RAW_INT's, beyond its usual range in this flight",
+    ),
+    (
+        "baro_noise",
+        "the same messages: steps of that height from sample to sample less the climb of GLOBAL_POSITION_INT, LOCAL_POSITION_NED or VFR_HUD, likewise",
+    ),
+    (
+        "accel_stuck",
+        "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: how long forces were the same",
+    ),
+    ("gyro_stuck", "the same messages: rates"),
+    ("compass_stuck", "the same messages: fields"),
+    (
+        "baro_stuck",
+        "SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: how long the pressure was the same",
+    ),
+    ("gps_stuck", "GPS_RAW_INT, GPS2_RAW: how long position, height and speed were the same"),
     ("gps_satellites", "GPS_RAW_INT, GPS2_RAW"),
     ("gps_hdop", "GPS_RAW_INT, GPS2_RAW"),
     ("gps_accuracy", "GPS_RAW_INT, GPS2_RAW: horizontal accuracy"),

@@ -201,7 +201,17 @@ const FAULTS: [(&str, u8, Level, Fault); 97] = [
 
 /// Found by scripts of their own: silence, restarts and rates in `scripted_faults.rs`, what departs from a baseline in
 /// `trends.rs`, mishaps in `mishap.rs`, what departs from its usual level in a flight in `crosscheck.rs`.
-const ELSEWHERE: [&str; 21] = [
+const ELSEWHERE: [&str; 31] = [
+    "baro_height",
+    "baro_noise",
+    "accel_stuck",
+    "gyro_stuck",
+    "compass_stuck",
+    "baro_stuck",
+    "gps_stuck",
+    "thrust_lost",
+    "roll_rate",
+    "pitch_rate",
     "accel_mismatch",
     "gyro_mismatch",
     "compass_mismatch",
@@ -362,7 +372,8 @@ fn there_are_as_many_of_each_check_as_there_may_be_of_what_it_watches() {
         let instances = match check.name {
             name if name.starts_with("batt_") || name.starts_with("cell_") => 4,
             "motor_output" => 6,
-            name if name.ends_with("_mismatch") => 3,
+            "gps_stuck" => 2,
+            name if name.ends_with("_mismatch") || name.ends_with("_stuck") => 3,
             name if name.starts_with("esc_") || name.starts_with("motor_") => 12,
             name if name.starts_with("gps_") => 2,
             _ => 1,
@@ -404,7 +415,8 @@ fn flags_that_are_not_set_and_parts_that_are_not_due_make_nothing_healthy() {
     ];
     for check in checks() {
         let due = DUE.iter().any(|(name, _)| *name == check.name);
-        let flag = flags.contains(&check.name) || check.name.ends_with("_alert");
+        let flag =
+            flags.contains(&check.name) || check.name.ends_with("_alert") || check.name.ends_with("_stuck");
         assert_eq!(check.alarm_only, due || flag, "{}", check.name);
     }
 }

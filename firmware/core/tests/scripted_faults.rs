@@ -168,7 +168,7 @@ fn an_estimator_that_diverges() {
 #[test]
 fn one_figure_of_the_estimator_alone_is_a_warning() {
     let findings = fly(|_, quad| quad.estimator.compass = Some(1.2));
-    found(&findings, "ekf_compass", 0, Level::Warning, 1_000, &[]);
+    found(&findings, "ekf_compass", 0, Level::Warning, 500, &[]);
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn gps_that_is_jammed() {
 #[test]
 fn a_fix_that_is_lost() {
     let findings = fly(|_, quad| quad.gnss.fix = 1);
-    found(&findings, "gps_fix", 0, Level::Critical, 1_000, &[]);
+    found(&findings, "gps_fix", 0, Level::Critical, 200, &[]);
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod seen;
 pub mod sequence;
 pub mod signing;
 pub mod summary;
+mod telling;
 pub mod text;
 
 pub use frame::{Check, Frame};

@@ -20,6 +20,7 @@ use crate::frame::Frame;
 use crate::messages;
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
+use crate::telling::Telling;
 use crate::text::{Severity, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
@@ -142,6 +143,7 @@ pub struct Summary {
     /// The most urgent first, then in order.
     waiting: heapless::Vec<Finding, WAITING_MAX>,
     dropped: u32,
+    telling: Telling,
     heartbeat_at: Option<Instant>,
 }
 
@@ -161,6 +163,7 @@ impl Summary {
             next_value: 0,
             waiting: heapless::Vec::new(),
             dropped: 0,
+            telling: Telling::new(),
             heartbeat_at: None,
         }
     }
@@ -227,9 +230,11 @@ impl Summary {
         self.outlet.fits_besides(now, class, bytes, first.1)
     }
 
-    /// Tells a finding that a pilot should hear of, now or as soon as the budget allows.
+    /// Tells a finding that a pilot should hear of, now or as soon as the budget and [`Telling`] allow.
     pub fn finding(&mut self, now: Instant, finding: &Finding, out: &mut impl FnMut(&[u8])) {
-        if severity(finding).is_none() {
+        // What was not told yet is out of date.
+        self.waiting.retain(|other| (other.check, other.instance) != (finding.check, finding.instance));
+        if severity(finding).is_none() || !self.telling.is_news(finding) {
             return;
         }
         if self.waiting.is_full() {
@@ -246,12 +251,16 @@ impl Summary {
     fn tell(&mut self, now: Instant, out: &mut impl FnMut(&[u8])) {
         while let Some(finding) = self.waiting.first() {
             let class = if finding.level == Level::Critical { Class::Critical } else { Class::Finding };
+            if !self.telling.has_room(now, finding.level) {
+                return;
+            }
             let severity = severity(finding).unwrap_or(Severity::Notice);
             let packet = messages::status_text(severity, text(finding).as_str());
             if !self.outlet.send(now, class, &packet, out) {
                 return;
             }
-            self.waiting.remove(0);
+            let told = self.waiting.remove(0);
+            self.telling.told(now, &told);
         }
     }
 

@@ -234,6 +234,7 @@ impl Check {
             limit: change.limit,
             unit: self.unit,
             feeds,
+            because: "",
         }
     }
 }

@@ -133,6 +133,8 @@ pub struct Finding {
     pub unit: &'static str,
     /// Of a battery: what it feeds.
     pub feeds: Feeds,
+    /// The check whose alarm explains this one; empty where none does. Such a finding is recorded and not told to the ground.
+    pub because: &'static str,
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod attitude;
 pub mod check;
 mod common;
 mod computer;
+mod consequence;
 mod engine;
 pub mod exceedance;
 pub mod finding;
@@ -43,7 +44,7 @@ pub struct Health {
     states: [State; STATES],
 }
 
-const _: () = assert!(size_of::<Health>() <= 4 * 1024 + 512);
+const _: () = assert!(size_of::<Health>() <= 5 * 1024);
 
 impl Default for Health {
     fn default() -> Self {
@@ -70,7 +71,7 @@ impl Health {
         let over =
             inputs.mishap.is_going() && (!heard || (inputs.mishap.is_down() && !inputs.vehicle.armed()));
         let quiet = inputs.mishap.is_going() && !over;
-        let mut states = self.states.iter_mut();
+        let mut slots = 0..STATES;
         for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
             let quiet = quiet && check.when != When::Always;
             let applies = match check.when {
@@ -80,7 +81,8 @@ impl Health {
                 When::Armed => inputs.vehicle.armed(),
                 When::InFlight => inputs.flight.airborne(),
             };
-            for (instance, state) in (0..check.instances).zip(&mut states) {
+            for (instance, slot) in (0..check.instances).zip(&mut slots) {
+                let Some(state) = self.states.get_mut(slot) else { return };
                 // Most have nothing to say and never had: a step would change nothing.
                 let is_new = state.is_new();
                 if is_new && !applies {
@@ -106,11 +108,19 @@ impl Health {
                     continue;
                 };
                 let feeds = power::feeds(check, inputs, instance);
-                let finding = check.finding(instance, inputs.now, change, feeds);
+                let because = self.because(check, change.level);
+                let finding = Finding { because, ..check.finding(instance, inputs.now, change, feeds) };
                 exceedances.change(place, check.side, &finding);
                 findings(&finding);
             }
         }
+    }
+
+    /// The check whose alarm explains another one's change to a level; empty where none does.
+    fn because(&self, effect: &Check, level: Level) -> &'static str {
+        let alarms = self.levels().filter(|(.., level)| matches!(level, Level::Warning | Level::Critical));
+        let alarms = alarms.map(|(check, _, level)| (check.name, level));
+        consequence::because(effect.name, level, alarms).unwrap_or_default()
     }
 
     /// Every check instance that has had something to say, with its level.

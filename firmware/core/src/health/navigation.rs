@@ -21,7 +21,8 @@ const ESTIMATOR: Check = Check {
     warn: Some(Param::EkfVarWarn),
     critical: None,
     hysteresis: 0.05,
-    debounce_warn: Span::from_secs(1),
+    // Two messages at 2 Hz. ArduPilot's failsafe waits for a second, and acts then.
+    debounce_warn: Span::from_millis(500),
     debounce_critical: Span::from_secs(1),
     when: When::InFlight,
     stale_after: STALE,
@@ -56,6 +57,19 @@ const MISMATCH: Check = Check {
     instances: SENSORS_MAX as u8,
     read: |inputs, sensor| mismatch(inputs, Kind::Accelerometer, sensor),
     ..ESTIMATOR
+};
+
+/// A sensor that repeats one value ([`crate::stuck`]). Never stale, and no word about how good it is.
+const STUCK: Check = Check {
+    name: "accel_stuck",
+    words: "accel stuck",
+    unit: "s",
+    warn: Some(Param::StuckWarn),
+    hysteresis: 0.0,
+    debounce_warn: Span::ZERO,
+    alarm_only: true,
+    read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
+    ..MISMATCH
 };
 
 pub(super) const CHECKS: &[Check] = &[
@@ -93,6 +107,8 @@ pub(super) const CHECKS: &[Check] = &[
         warn: Some(Param::EkfRatioWarn),
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
+        // PX4 tells none of a compass that it does not use: that is `compass_unused`.
+        stale_after: None,
         ..ESTIMATOR
     },
     Check {
@@ -133,6 +149,54 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor),
         ..MISMATCH
     },
+    Check {
+        name: "baro_height",
+        words: "baro and GPS height apart",
+        unit: "m",
+        warn: Some(Param::BaroGpsWarn),
+        hysteresis: 1.0,
+        debounce_warn: Span::from_secs(1),
+        instances: 1,
+        read: |inputs, _| inputs.derived.crosschecks().heights().apart(),
+        ..MISMATCH
+    },
+    Check {
+        name: "baro_noise",
+        words: "baro noise",
+        unit: "m",
+        warn: Some(Param::BaroNoiseWarn),
+        hysteresis: 0.5,
+        debounce_warn: Span::from_secs(1),
+        instances: 1,
+        read: |inputs, _| inputs.derived.crosschecks().heights().noise(),
+        ..MISMATCH
+    },
+    STUCK,
+    Check {
+        name: "gyro_stuck",
+        words: "gyro stuck",
+        read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor),
+        ..STUCK
+    },
+    Check {
+        name: "compass_stuck",
+        words: "compass stuck",
+        read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor),
+        ..STUCK
+    },
+    Check {
+        name: "baro_stuck",
+        words: "baro stuck",
+        read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor),
+        ..STUCK
+    },
+    Check {
+        name: "gps_stuck",
+        words: "GPS stuck",
+        instances: RECEIVERS_MAX as u8,
+        read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
+        ..STUCK
+    },
     GNSS,
     Check {
         name: "gps_hdop",
@@ -159,6 +223,8 @@ pub(super) const CHECKS: &[Check] = &[
         words: "GPS fix lost",
         warn: None,
         critical: Some(Param::GpsFixCrit),
+        // Two messages without one.
+        debounce_critical: Span::from_millis(200),
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix))),
         ..GNSS
     },
@@ -197,6 +263,10 @@ pub(super) const CHECKS: &[Check] = &[
 
 fn mismatch(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {
     inputs.derived.crosschecks().mismatch(inputs.now, kind, sensor)
+}
+
+fn stuck(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {
+    inputs.derived.crosschecks().stuck(inputs.now, kind, sensor)
 }
 
 fn estimator(

@@ -118,6 +118,46 @@ pub(super) const CHECKS: &[Check] = &[
         ..ESC
     },
     Check {
+        name: "thrust_lost",
+        words: "full throttle, no climb",
+        unit: "s",
+        warn: Some(Param::ThrustWarn),
+        critical: None,
+        hysteresis: 0.0,
+        when: When::InFlight,
+        instances: 1,
+        read: |inputs, _| inputs.derived.response().full_in_vain(),
+        ..ESC
+    },
+    Check {
+        name: "roll_rate",
+        words: "roll does not follow",
+        unit: "deg/s",
+        warn: Some(Param::RateWarn),
+        critical: Some(Param::RateCrit),
+        hysteresis: 5.0,
+        debounce_warn: Span::from_millis(200),
+        debounce_critical: Span::from_millis(200),
+        when: When::InFlight,
+        instances: 1,
+        read: |inputs, _| inputs.derived.response().rate_missing(0),
+        ..ESC
+    },
+    Check {
+        name: "pitch_rate",
+        words: "pitch does not follow",
+        unit: "deg/s",
+        warn: Some(Param::RateWarn),
+        critical: Some(Param::RateCrit),
+        hysteresis: 5.0,
+        debounce_warn: Span::from_millis(200),
+        debounce_critical: Span::from_millis(200),
+        when: When::InFlight,
+        instances: 1,
+        read: |inputs, _| inputs.derived.response().rate_missing(1),
+        ..ESC
+    },
+    Check {
         name: "motor_trend",
         words: "motor changed",
         unit: "%",

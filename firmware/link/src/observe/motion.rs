@@ -192,11 +192,16 @@ pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
 /// `ArduPilot`: whole degrees in old versions.
 pub(super) fn nav_controller_output(payload: &[u8]) -> Option<Wanted> {
     let [roll, pitch] = [0, 4].map(|at| Radians(float(payload, at).to_radians()));
-    (roll.0.is_finite() && pitch.0.is_finite()).then_some(Wanted { roll, pitch })
+    (roll.0.is_finite() && pitch.0.is_finite()).then_some(Wanted { roll, pitch, rates: None })
 }
 
+/// `type_mask` names what is to be ignored: the rate of roll 1, of pitch 2.
 pub(super) fn attitude_target(payload: &[u8]) -> Option<Wanted> {
-    Wanted::from_quaternion([4, 8, 12, 16].map(|at| float(payload, at)))
+    const RATES: u8 = 3;
+    let [roll, pitch] = [20, 24].map(|at| float(payload, at));
+    let told = Fields(payload).u8(36) & RATES == 0 && roll.is_finite() && pitch.is_finite();
+    let rates = told.then_some([RadiansPerSecond(roll), RadiansPerSecond(pitch)]);
+    Some(Wanted { rates, ..Wanted::from_quaternion([4, 8, 12, 16].map(|at| float(payload, at)))? })
 }
 
 fn float(payload: &[u8], at: usize) -> f32 {

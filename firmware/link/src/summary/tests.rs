@@ -16,6 +16,7 @@ fn finding(level: Level) -> Finding {
         limit: 15.0,
         unit: "%",
         feeds: Feeds::Vehicle,
+        because: "",
     }
 }
 
@@ -174,8 +175,10 @@ fn a_stream_of_one_a_second_is_not_halved_by_its_jitter() {
 fn a_critical_finding_overtakes_those_that_wait() {
     let mut summary = Summary::new(&Params::defaults());
     summary.outlet.set(Instant::ZERO, 0, 57_600);
-    for level in [Level::Warning, Level::Stale, Level::Critical, Level::Warning] {
-        summary.finding(Instant::ZERO, &finding(level), &mut |_| panic!("there is no budget"));
+    let levels = [Level::Warning, Level::Stale, Level::Critical, Level::Warning];
+    for (instance, level) in (0..).zip(levels) {
+        let finding = Finding { instance, ..finding(level) };
+        summary.finding(Instant::ZERO, &finding, &mut |_| panic!("there is no budget"));
     }
     let order: Vec<_> = summary.waiting.iter().map(|finding| finding.level).collect();
     assert_eq!(order, [Level::Critical, Level::Warning, Level::Warning, Level::Stale]);
@@ -193,4 +196,53 @@ fn the_state_holds_every_subsystem() {
     });
     assert!(parts.eq(Subsystem::ALL));
     assert!(VALUES_TOLD.iter().all(|(name, _)| name.len() <= 10));
+}
+
+/// What is told of findings that come at these seconds: their instances, by second.
+fn told(findings: &[(u64, u8, Level, Level, &'static str)]) -> Vec<(u64, u8)> {
+    let mut summary = Summary::new(&Params::defaults());
+    let monitor = Monitor::new(Params::defaults());
+    let mut told = Vec::new();
+    for now_s in 0..120 {
+        let now = Instant::from_millis(now_s * 1_000);
+        // The number after the `#` of a STATUSTEXT.
+        let mut out = |bytes: &[u8]| {
+            let number = bytes.windows(2).find(|two| two[0] == b'#' && two[1].is_ascii_digit());
+            if let (Some([_, digit]), Some(253)) = (number, bytes.get(7)) {
+                told.push((now_s, digit - b'1'));
+            }
+        };
+        for (_, instance, level, previous, because) in findings.iter().filter(|(at_s, ..)| *at_s == now_s) {
+            let finding = Finding { instance: *instance, previous: *previous, because, ..finding(*level) };
+            summary.finding(now, &finding, &mut out);
+        }
+        summary.tick(now, &monitor, &mut out);
+    }
+    told
+}
+
+#[test]
+fn in_any_half_minute_at_most_five_are_told_and_the_worst_first() {
+    let warnings = (0..6).map(|instance| (0, instance, Level::Warning, Level::Ok, ""));
+    let critical = (6..9).map(|instance| (1, instance, Level::Critical, Level::Ok, ""));
+    let told = told(&warnings.chain(critical).collect::<Vec<_>>());
+    assert_eq!(told, [(0, 0), (0, 1), (0, 2), (1, 6), (1, 7), (30, 8), (31, 3), (31, 4), (60, 5)]);
+}
+
+#[test]
+fn what_another_one_explains_is_not_told_nor_that_it_is_over() {
+    let both = [
+        (1, 0, Level::Critical, Level::Ok, ""),
+        (1, 1, Level::Critical, Level::Ok, "gps_fix"),
+        (5, 0, Level::Ok, Level::Critical, ""),
+        (5, 1, Level::Ok, Level::Critical, ""),
+    ];
+    assert_eq!(told(&both), [(1, 0), (5, 0)]);
+}
+
+#[test]
+fn what_is_over_before_it_was_told_is_not_told() {
+    let mut findings: Vec<_> = (0..4).map(|instance| (0, instance, Level::Warning, Level::Ok, "")).collect();
+    findings.push((2, 3, Level::Ok, Level::Warning, ""));
+    assert_eq!(told(&findings), [(0, 0), (0, 1), (0, 2)]);
 }

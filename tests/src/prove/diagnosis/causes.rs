@@ -28,6 +28,9 @@ pub(super) const CLASSES: &[Class] = &[
             "motor_loss",
             "motor_imbalance",
             "motor_output",
+            "thrust_lost",
+            "roll_rate",
+            "pitch_rate",
             "drive_alert",
             // They tell people to look at propellers and motors first.
             "vibration",
@@ -62,19 +65,39 @@ pub(super) const CLASSES: &[Class] = &[
             "gps_fix",
             "gps_jamming",
             "gps_spoofing",
+            "gps_stuck",
             "gnss_alert",
         ],
     },
     Class {
         name: "compass",
         about: "compasses",
-        checks: &["compass_alert", "ekf_compass", "ekf_mag_ratio", "compass_unused", "compass_mismatch"],
+        checks: &[
+            "compass_alert",
+            "ekf_compass",
+            "ekf_mag_ratio",
+            "compass_unused",
+            "compass_mismatch",
+            "compass_stuck",
+        ],
     },
-    Class { name: "barometer", about: "barometers", checks: &["baro_alert", "baro_mismatch"] },
+    Class {
+        name: "barometer",
+        about: "barometers",
+        checks: &["baro_alert", "baro_mismatch", "baro_height", "baro_noise", "baro_stuck"],
+    },
     Class {
         name: "inertial",
         about: "accelerometers, gyros, airspeed",
-        checks: &["accel_alert", "gyro_alert", "airspeed_alert", "accel_mismatch", "gyro_mismatch"],
+        checks: &[
+            "accel_alert",
+            "gyro_alert",
+            "airspeed_alert",
+            "accel_mismatch",
+            "gyro_mismatch",
+            "accel_stuck",
+            "gyro_stuck",
+        ],
     },
     Class {
         name: "vibration",
@@ -84,7 +107,7 @@ pub(super) const CLASSES: &[Class] = &[
     Class {
         name: "attitude",
         about: "loss of attitude",
-        checks: &["roll", "pitch", "tumbling", "overturned", "attitude_alert"],
+        checks: &["roll", "pitch", "roll_rate", "pitch_rate", "tumbling", "overturned", "attitude_alert"],
     },
     Class {
         name: "crash",

@@ -18,6 +18,7 @@ fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
         limit: 45.0,
         unit: "deg",
         feeds: Feeds::Vehicle,
+        because: "",
     }
 }
 

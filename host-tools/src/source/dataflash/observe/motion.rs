@@ -178,7 +178,7 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         && [roll, pitch].into_iter().all(|degrees: f32| degrees.abs() <= TURN_DEG)
     {
         let [roll, pitch] = [roll, pitch].map(|degrees| Radians(degrees.to_radians()));
-        out.observe(&Observation::Wanted(Wanted { roll, pitch }));
+        out.observe(&Observation::Wanted(Wanted { roll, pitch, rates: None }));
     }
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }

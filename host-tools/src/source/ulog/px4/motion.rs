@@ -312,7 +312,7 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
 fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
     let angles = || {
         let [roll, pitch] = [said.fields.finite(1)?, said.fields.finite(2)?].map(Radians);
-        Some(Wanted { roll, pitch })
+        Some(Wanted { roll, pitch, rates: None })
     };
     let wanted = said.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
     if let Some(wanted) = wanted {

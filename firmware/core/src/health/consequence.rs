@@ -1,0 +1,183 @@
+//! One cause, one finding: which check's alarm explains that of which other one.
+//!
+//! A dead motor tips the vehicle over, a receiver without a fix makes the estimator doubt, and what is silent has no data at all. Who
+//! hears of all of it at once does not hear the cause. So a finding names the check that explains it, where that has an alarm which is
+//! as bad or worse; it is recorded like any other, and not told to the ground.
+
+use super::finding::{Level, Subsystem};
+use super::tables::check_named;
+
+const GNSS: &[&str] = &[
+    "gps_fix",
+    "gps_jamming",
+    "gps_spoofing",
+    "gps_stuck",
+    "gnss_alert",
+    "gps_accuracy",
+    "gps_satellites",
+    "gps_hdop",
+];
+const SENSORS: &[&str] = &[
+    "accel_stuck",
+    "gyro_stuck",
+    "compass_stuck",
+    "baro_stuck",
+    "accel_alert",
+    "gyro_alert",
+    "compass_alert",
+    "baro_alert",
+    "airspeed_alert",
+    "accel_mismatch",
+    "gyro_mismatch",
+    "compass_mismatch",
+    "baro_mismatch",
+    "baro_noise",
+    "baro_height",
+    "compass_unused",
+    "ekf_compass",
+    "ekf_mag_ratio",
+];
+const SHAKING: &[&str] = &["vibration", "vibration_px4", "vibration_rise", "clipping", "vibration_alert"];
+const DRIVE: &[&str] =
+    &["motor_loss", "motor_output", "motor_imbalance", "esc_failure", "drive_alert", "esc_silent"];
+const BATTERY: &[&str] =
+    &["cell_voltage", "batt_remaining", "batt_fault", "batt_state", "battery_alert", "cell_deviation"];
+const LINKS: &[&str] = &["rc_alert", "gcs_alert", "heartbeat"];
+const ESTIMATOR: &[&str] = &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert"];
+/// What the autopilot does because of anything.
+const ACTS: &[&str] = &["failsafe_alert", "autopilot_state", "autopilot_alert"];
+
+/// What explains, and what it explains: the nearest to the cause first.
+const ROWS: &[(&[&str], &[&str])] = &[
+    (&["heartbeat"], &["frames_lost", "esc_silent", "gcs_alert"]),
+    (&["autopilot_reboot"], &["esc_silent", "ekf_alert"]),
+    (DRIVE, &["roll_rate", "pitch_rate", "roll", "pitch", "attitude_alert", "thrust_lost", "vibration_rise"]),
+    (&["motor_loss"], &["motor_output", "motor_imbalance", "drive_alert"]),
+    (&["motor_output", "motor_imbalance"], &["drive_alert"]),
+    (&["roll_rate", "pitch_rate"], &["roll", "pitch", "attitude_alert", "thrust_lost"]),
+    (
+        &["gps_fix", "gps_jamming", "gps_spoofing"],
+        &["gnss_alert", "gps_accuracy", "gps_satellites", "gps_hdop"],
+    ),
+    (GNSS, ESTIMATOR),
+    (GNSS, &["baro_height"]),
+    (&["accel_stuck", "accel_alert"], &["accel_mismatch"]),
+    (&["gyro_stuck", "gyro_alert"], &["gyro_mismatch", "compass_unused", "ekf_compass", "ekf_mag_ratio"]),
+    (
+        &["compass_stuck", "compass_alert", "compass_mismatch"],
+        &["ekf_compass", "ekf_mag_ratio", "compass_unused"],
+    ),
+    (&["compass_unused"], &["ekf_compass", "ekf_mag_ratio"]),
+    (&["baro_stuck", "baro_alert"], &["baro_height", "baro_noise", "baro_mismatch"]),
+    (SENSORS, ESTIMATOR),
+    (SHAKING, ESTIMATOR),
+    (SHAKING, &["accel_mismatch", "gyro_mismatch"]),
+    (&["vibration", "vibration_px4"], &["vibration_rise", "clipping", "vibration_alert"]),
+    (&["cell_voltage", "batt_remaining"], &["batt_state", "battery_alert"]),
+    (&["batt_state"], &["battery_alert"]),
+    (BATTERY, ACTS),
+    (LINKS, ACTS),
+    (GNSS, ACTS),
+    (SENSORS, ACTS),
+    (DRIVE, ACTS),
+    (ESTIMATOR, ACTS),
+    (&["failsafe_alert"], &["autopilot_state"]),
+];
+
+/// Whether a mishap explains what a part says.
+const fn is_of_mishap(part: Subsystem) -> bool {
+    matches!(
+        part,
+        Subsystem::Propulsion
+            | Subsystem::Structure
+            | Subsystem::Navigation
+            | Subsystem::Computer
+            | Subsystem::Attitude
+    )
+}
+
+/// Which of the checks that have an alarm (a warning, or critical) explains that of `effect`, which went to `level`.
+pub(super) fn because(
+    effect: &'static str,
+    level: Level,
+    mut alarms: impl Iterator<Item = (&'static str, Level)>,
+) -> Option<&'static str> {
+    let at_least = match level {
+        // What is silent has no data.
+        Level::Stale => return alarms.any(|(cause, _)| cause == "heartbeat").then_some("heartbeat"),
+        Level::Warning | Level::Critical => level as u8,
+        Level::Ok | Level::Advisory => return None,
+    };
+    let by_mishap = check_named(effect).is_some_and(|check| is_of_mishap(check.subsystem));
+    let is_mishap =
+        |cause: &str| check_named(cause).is_some_and(|check| check.subsystem == Subsystem::Mishap);
+    // A mishap before all, then by row.
+    let place = |cause: &'static str| {
+        if by_mishap && is_mishap(cause) {
+            return Some(0);
+        }
+        let explains =
+            |(causes, effects): &(&[&str], &[&str])| effects.contains(&effect) && causes.contains(&cause);
+        ROWS.iter().position(explains).map(|row| row + 1)
+    };
+    alarms
+        .filter(|(_, level)| *level as u8 >= at_least)
+        .filter_map(|(cause, _)| Some((place(cause)?, cause)))
+        .min_by_key(|(place, _)| *place)
+        .map(|(_, cause)| cause)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALARMS: [(&str, Level); 3] =
+        [("gps_fix", Level::Critical), ("vibration", Level::Warning), ("heartbeat", Level::Warning)];
+
+    fn why(effect: &'static str, level: Level) -> Option<&'static str> {
+        because(effect, level, ALARMS.into_iter())
+    }
+
+    #[test]
+    fn each_name_is_a_check_and_nothing_explains_itself() {
+        for (causes, effects) in ROWS {
+            for name in causes.iter().chain(*effects) {
+                assert!(check_named(name).is_some(), "there is no check {name}");
+            }
+            assert!(causes.iter().all(|cause| !effects.contains(cause)), "{causes:?}");
+        }
+    }
+
+    #[test]
+    fn no_two_explain_each_other() {
+        let explains = |cause: &str, effect: &str| {
+            ROWS.iter().any(|(causes, effects)| causes.contains(&cause) && effects.contains(&effect))
+        };
+        for (causes, effects) in ROWS {
+            for (cause, effect) in
+                causes.iter().flat_map(|cause| effects.iter().map(move |effect| (cause, effect)))
+            {
+                assert!(!explains(effect, cause), "{cause} and {effect}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_cause_is_named_where_it_is_as_bad() {
+        assert_eq!(why("ekf_failsafe", Level::Critical), Some("gps_fix"));
+        assert_eq!(why("accel_mismatch", Level::Warning), Some("vibration"));
+        assert_eq!(why("accel_mismatch", Level::Critical), None, "worse than what would explain it");
+        assert_eq!(why("cell_voltage", Level::Critical), None);
+        assert_eq!(why("cell_voltage", Level::Stale), Some("heartbeat"));
+        assert_eq!(why("ekf_failsafe", Level::Ok), None);
+    }
+
+    #[test]
+    fn a_mishap_comes_before_all_but_the_battery_and_the_links() {
+        let alarms = || [("gps_fix", Level::Critical), ("overturned", Level::Critical)].into_iter();
+        assert_eq!(because("ekf_failsafe", Level::Critical, alarms()), Some("overturned"));
+        assert_eq!(because("load_factor", Level::Warning, alarms()), Some("overturned"));
+        assert_eq!(because("cell_voltage", Level::Warning, alarms()), None);
+        assert_eq!(because("impact", Level::Critical, alarms()), None);
+    }
+}

@@ -1,0 +1,141 @@
+//! The first barometer against the height of GPS, and its noise.
+//!
+//! The height that a pressure means and that of GPS are apart by what weather and site make of it; that is learnt in each flight
+//! ([`crate::departure`]). What comes to it in flight is told, less what air does to a healthy barometer: a scale that is wrong by the
+//! air's temperature, [`SCALE_PART`] of what it is above or below its usual height, and the wind of the flight on its housing, a half of
+//! what the dynamic pressure is above or below its usual one.
+//!
+//! Noise is how far the height steps from sample to sample, less the climb.
+
+use crate::departure::Departure;
+use crate::flight::Flight;
+use crate::latest::Reading;
+use crate::motion::{climb_mps, ground_speed_mps};
+use crate::observation::Gnss;
+use crate::steady::{TURNED, is_clear};
+use crate::time::{Instant, Span};
+use crate::units::{GRAVITY, Hectopascals};
+use crate::vehicle::Vehicle;
+
+/// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
+pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
+/// A standard atmosphere is wrong by so much of a climb where the air is 28 K warmer or colder than it says.
+const SCALE_PART: f32 = 0.1;
+/// Receivers are some tenths of a second late: faster than this, m/s, the two heights are not of the same moment.
+const CLIMB_MPS: f32 = 2.0;
+/// Less exact positions are not compared: accuracy in metres, dilution of precision.
+const ACCURACY_M: f32 = 3.0;
+const HDOP: f32 = 2.5;
+/// Time constants of the difference, and of usual height and speed, s.
+const SMOOTHING_S: f32 = 0.5;
+const AIR_S: f32 = 30.0;
+/// Beyond half of the default limits nothing is learnt.
+const APART_HOLD_M: f32 = 4.0;
+const NOISE_HOLD_M: f32 = 1.0;
+/// In the air for so long it has left the ground.
+const SETTLED: Span = Span::from_secs(3);
+/// Samples further apart are not compared.
+const PAUSE: Span = Span::from_secs(2);
+
+/// The memory of both.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heights {
+    /// The first pressure of the flight, hPa; 0 before it.
+    first_hpa: f32,
+    /// Height above that, m, and when it was measured.
+    height: Option<(Instant, f32)>,
+    noise: Departure,
+    apart: Departure,
+    /// When they were compared last.
+    apart_at: Option<Instant>,
+    /// Height and a half of the dynamic pressure, both in m; the means of the last minute; and what they explain.
+    air: [f32; 2],
+    taken_off_m: f32,
+}
+
+impl Heights {
+    /// Nothing seen.
+    pub(crate) const fn new() -> Self {
+        Self {
+            first_hpa: 0.0,
+            height: None,
+            noise: Departure::NEW,
+            apart: Departure::NEW,
+            apart_at: None,
+            air: [0.0; 2],
+            taken_off_m: 0.0,
+        }
+    }
+
+    pub(crate) fn take_pressure(
+        &mut self,
+        at: Instant,
+        pressure: Hectopascals,
+        vehicle: &Vehicle,
+        flight: &Flight,
+    ) {
+        let flies = flight.airborne_since().is_some_and(|since| at.since(since) > SETTLED);
+        if !flies || !pressure.0.is_finite() || pressure.0 <= 0.0 {
+            return;
+        }
+        if self.first_hpa == 0.0 {
+            self.first_hpa = pressure.0;
+        }
+        let height_m = SCALE_HEIGHT_M * libm::logf(self.first_hpa / pressure.0);
+        let before = self.height.replace((at, height_m));
+        let calm = is_clear(at, vehicle) && vehicle.inertial.turns_little(at, TURNED);
+        if let (Some((before, before_m)), Some(climb_mps), true) = (before, climb_mps(at, vehicle), calm) {
+            let step = at.since(before);
+            if step > Span::ZERO && step <= PAUSE {
+                let step_s = step.as_secs_f32();
+                let off_m = libm::fabsf(height_m - before_m - climb_mps * step_s);
+                self.noise.take(off_m, step_s, NOISE_HOLD_M);
+            }
+        }
+    }
+
+    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, flight: &Flight) {
+        let before = self.apart_at;
+        let height = self.height.filter(|(measured, _)| at.since(*measured) <= PAUSE);
+        let good = gnss.fix >= 3
+            && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
+            && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
+        let climbs = climb_mps(at, vehicle).is_none_or(|climb| libm::fabsf(climb) > CLIMB_MPS);
+        let (Some((_, height_m)), Some(altitude)) = (height, gnss.altitude) else { return };
+        if !good || climbs || !is_clear(at, vehicle) || !flight.airborne() {
+            return;
+        }
+        self.apart_at = Some(at);
+        let step_s = before.map_or(0.0, |before| at.since(before).min(PAUSE).as_secs_f32());
+        let airspeed = vehicle.hud.get().and_then(|hud| hud.airspeed).map_or(0.0, |speed| speed.0);
+        let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0).max(airspeed);
+        let air = [height_m, speed_mps * speed_mps / (4.0 * GRAVITY)];
+        if before.is_none() {
+            self.air = air;
+        }
+        let [up_m, faster_m] = [0, 1].map(|part| libm::fabsf(air[part] - self.air[part]));
+        self.taken_off_m = SCALE_PART * up_m + faster_m;
+        self.apart.follow(height_m - altitude.0, step_s, SMOOTHING_S);
+        // Its usual level, and not its range: a slow drift would widen that as it goes.
+        if !self.apart.is_known() || self.apart_m() <= APART_HOLD_M {
+            self.apart.learn(step_s);
+            for (mean, now) in self.air.iter_mut().zip(air) {
+                *mean += step_s / (AIR_S + step_s) * (now - *mean);
+            }
+        }
+    }
+
+    fn apart_m(&self) -> f32 {
+        (libm::fabsf(self.apart.departed()) - self.taken_off_m).max(0.0)
+    }
+
+    /// How far the barometer is apart from GPS, beyond what is usual, m.
+    pub(crate) fn apart(&self) -> Option<Reading> {
+        Reading::new(self.apart_at, self.apart.is_known().then(|| self.apart_m()))
+    }
+
+    /// How far the barometer's height steps, beyond what is usual, m.
+    pub(crate) fn noise(&self) -> Option<Reading> {
+        Reading::new(self.height.map(|(at, _)| at), self.noise.beyond())
+    }
+}

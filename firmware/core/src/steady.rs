@@ -1,0 +1,41 @@
+//! Whether a vehicle flies so that what its sensors say, and what its motors are given, can be compared.
+
+use crate::flight::Flight;
+use crate::motion::climb_mps;
+use crate::observation::LandedState;
+use crate::time::{Instant, Span};
+use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+
+/// What turns slower than [`crate::inertial`]'s fast for so long can be compared.
+pub(crate) const TURNED: Span = Span::from_secs(1);
+/// Older motion says nothing.
+const FRESH: Span = Span::from_secs(1);
+/// A hover, m: above this height over home; m/s: over ground, and up or down.
+const LOW_M: f32 = 1.5;
+const SLOW_MPS: f32 = 6.0;
+const LEVEL_MPS: f32 = 2.0;
+
+/// Whether it is a multicopter that is level and slow, turns and climbs little, and does not touch the ground: contact and the
+/// propellers' wash there set sensors apart, motors do what the legs make them do, and a fast leg has a trim of its own.
+pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+    let slow = vehicle.global.within(now, FRESH).is_none_or(|global| {
+        let [north, east, _] = global.velocity.map(|speed| speed.0);
+        north * north + east * east < SLOW_MPS * SLOW_MPS
+    });
+    let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
+    slow && !climbs
+        && vehicle.is_multicopter()
+        && is_clear(now, vehicle)
+        && flight.is_steady(now, vehicle)
+        && vehicle.inertial.turns_little(now, TURNED)
+}
+
+/// Whether it is away from the ground, as far as that is known.
+pub(crate) fn is_clear(now: Instant, vehicle: &Vehicle) -> bool {
+    let landed = vehicle.landed.within(now, LANDED_STATE_AGE);
+    !matches!(landed, Some(LandedState::TakingOff | LandedState::Landing | LandedState::OnGround))
+        && vehicle
+            .global
+            .within(now, FRESH)
+            .is_none_or(|global| libm::fabsf(global.relative_altitude.0) > LOW_M)
+}

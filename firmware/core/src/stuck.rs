@@ -1,0 +1,109 @@
+//! A sensor that repeats one value, bit for bit, while the vehicle flies.
+//!
+//! In flight the noise of a sensor is far above the last digit of its messages, so that the same value seldom comes twice. How often it
+//! does depends on the sensor, on the message and on how fast it is sent, and is learnt in each flight: the longest time that a value has
+//! been repeated so far is usual. What lasts [`TIMES`] as long is stuck, and is told from [`REPEATS_MIN`] repeats on, once the vehicle has
+//! moved so that the value must have changed: a simulator without noise, and a vehicle on a string, may hold still.
+//!
+//! Two messages may tell of the same sensor in digits of their own, so a value counts as repeated where it is one of the last two.
+
+use crate::latest::Reading;
+use crate::time::Instant;
+
+/// Values that differed before anything is usual.
+const CHANGES_KNOWN: u8 = 20;
+/// Fewer repeats say nothing, however slow the message.
+const REPEATS_MIN: u8 = 3;
+/// What lasts so many times what is usual is none of it.
+const TIMES: u32 = 4;
+
+/// Each so long, ms, it must have moved again.
+const MOVES_MS: f32 = 3_000.0;
+
+/// One sensor.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stuck {
+    /// Check sums of the last two values that differed.
+    values: [u32; 2],
+    /// When the last one came first, and when any came last: milliseconds modulo 2^32.
+    since_ms: u32,
+    at_ms: u32,
+    usual_ms: u32,
+    /// How far the vehicle had moved when the last one came first.
+    moved: f32,
+    repeats: u8,
+    changes: u8,
+}
+
+impl Stuck {
+    /// Nothing seen.
+    pub(crate) const NEW: Self =
+        Self { values: [0; 2], since_ms: 0, at_ms: 0, usual_ms: 0, moved: 0.0, repeats: 0, changes: 0 };
+
+    /// Takes a value, as the bits of all it consists of, while the vehicle flies; and how far it has moved in this flight.
+    pub(crate) fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
+        // FNV-1a, of words.
+        let value =
+            bits.into_iter().fold(0x811C_9DC5_u32, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193));
+        if self.values.contains(&value) {
+            self.repeats = self.repeats.saturating_add(1);
+        } else {
+            if self.changes > 0 {
+                self.usual_ms = self.usual_ms.max(self.lasts_ms());
+            }
+            self.values = [value, self.values[0]];
+            (self.since_ms, self.moved, self.repeats) = (at.as_millis() as u32, moved, 0);
+            self.changes = self.changes.saturating_add(1);
+        }
+        self.at_ms = at.as_millis() as u32;
+    }
+
+    const fn lasts_ms(&self) -> u32 {
+        self.at_ms.wrapping_sub(self.since_ms)
+    }
+
+    /// For how long it has been stuck, s; 0 while it is not. The vehicle has moved so far, and must have moved by `least`
+    /// meanwhile, and again by as much each [`MOVES_MS`].
+    pub(crate) fn lasts(&self, now: Instant, moved: f32, least: f32) -> Option<Reading> {
+        let stuck = self.repeats >= REPEATS_MIN
+            && self.lasts_ms() > self.usual_ms.saturating_mul(TIMES)
+            && moved - self.moved >= least * (self.lasts_ms() as f32 / MOVES_MS).max(1.0);
+        let value = if stuck { self.lasts_ms() as f32 / 1_000.0 } else { 0.0 };
+        (self.changes >= CHANGES_KNOWN).then_some(Reading { at: now, value })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values a tenth of a second apart.
+    fn taken(values: impl IntoIterator<Item = u32>) -> Option<f32> {
+        let mut stuck = Stuck::NEW;
+        for (tenth, value) in (0_u64..).zip(values) {
+            stuck.take(Instant::from_millis(tenth * 100), [value, 7], 0.0);
+        }
+        stuck.lasts(Instant::from_millis(999_999), 100.0, 0.5).map(|reading| reading.value)
+    }
+
+    #[test]
+    fn a_value_that_is_repeated_is_stuck_and_one_that_always_was_is_not() {
+        assert_eq!(taken((0..15).chain([1; 30])), None, "not seen for long enough");
+        assert_eq!(taken(0..60), Some(0.0));
+        assert!(taken((0..60).chain([99; 21])).is_some_and(|lasts_s| (lasts_s - 2.0).abs() < 0.01));
+        assert_eq!(taken([5; 600]), None);
+    }
+
+    #[test]
+    fn a_slow_sensor_in_a_fast_message_is_not_stuck() {
+        let slow = || (0..300).map(|tenth| tenth / 10);
+        assert_eq!(taken(slow()), Some(0.0));
+        assert!(taken(slow().chain([99; 61])).is_some_and(|lasts_s| (lasts_s - 6.0).abs() < 0.01));
+    }
+
+    #[test]
+    fn two_messages_of_one_sensor_do_not_hide_each_other() {
+        let both = (0..120).chain((0..60).map(|tenth| 500 + tenth % 2));
+        assert!(taken(both).is_some_and(|lasts_s| lasts_s > 5.0));
+    }
+}
