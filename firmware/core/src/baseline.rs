@@ -4,6 +4,10 @@
 //! weighs more than its closeness to the others deserves. At landing that figure moves the baseline: the first
 //! [`FLIGHTS_MIN`] flights make it, each later one moves it by a tenth of the difference at most, and one that is
 //! beyond the limit of a warning does not move it at all, so that a fault never becomes normal.
+//!
+//! With the mean goes the spread of the flights' figures. What a next flight's figure may be follows from both and from what is known
+//! of such quantities before ([`Baseline::spread`]): Student's t distribution (normal figures of unknown mean and spread, the spread with
+//! a conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2 and 3.3).
 
 use crate::bytes::{Put, Take, Unreadable};
 use crate::observation::MOTORS_MAX;
@@ -13,6 +17,10 @@ use crate::vehicle::BATTERIES_MAX;
 pub const FLIGHTS_MIN: u16 = 3;
 /// Weight of a flight in a baseline that stands.
 const WEIGHT: f32 = 0.1;
+/// As many flights as a baseline remembers.
+const REMEMBERED: u16 = 10;
+/// What is known before of a quantity's spread counts as so many flights.
+const PRIOR_FLIGHTS: f32 = 8.0;
 
 /// A quantity that has a baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,13 +67,15 @@ impl Quantity {
 pub struct Baseline {
     /// In the quantity's unit.
     pub value: f32,
+    /// Mean square distance of the flights' figures from it.
+    pub variance: f32,
     /// Flights that it was learned from; it holds from [`FLIGHTS_MIN`] on.
     pub flights: u16,
 }
 
 impl Baseline {
     /// Nothing learned.
-    pub const NONE: Self = Self { value: 0.0, flights: 0 };
+    pub const NONE: Self = Self { value: 0.0, variance: 0.0, flights: 0 };
 
     /// The baseline, once enough flights made it.
     pub fn known(&self) -> Option<f32> {
@@ -78,8 +88,22 @@ impl Baseline {
             return;
         }
         let weight = (1.0 / (f32::from(self.flights) + 1.0)).max(WEIGHT);
-        self.value += weight * (figure - self.value);
+        let off = figure - self.value;
+        // Mean and variance with weights: D. H. D. West, Communications of the ACM 22, 1979.
+        self.variance =
+            if self.flights == 0 { 0.0 } else { (1.0 - weight) * (self.variance + weight * off * off) };
+        self.value += weight * off;
         self.flights = self.flights.saturating_add(1);
+    }
+}
+
+impl Baseline {
+    /// How far the next flight's figure is from the baseline on the average, where nothing changed; `prior` is the spread that such a
+    /// quantity has as a rule.
+    pub fn spread(&self, prior: f32) -> f32 {
+        let flights = f32::from(self.flights.clamp(1, REMEMBERED));
+        let squares = PRIOR_FLIGHTS * prior * prior + flights * self.variance;
+        libm::sqrtf(squares / (PRIOR_FLIGHTS + flights) * (1.0 + 1.0 / flights))
     }
 }
 
@@ -87,7 +111,9 @@ impl Baseline {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baselines([Baseline; Quantity::COUNT]);
 
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
+/// Before there were spreads.
+const WITHOUT_SPREADS: u8 = 1;
 
 impl Default for Baselines {
     fn default() -> Self {
@@ -96,8 +122,8 @@ impl Default for Baselines {
 }
 
 impl Baselines {
-    /// Length of the stored form: version, then value (f32) and flights (u16) of each quantity by [`Quantity::index`].
-    pub const BYTES: usize = 1 + Quantity::COUNT * 6;
+    /// Length of the stored form: version, then value, variance (f32) and flights (u16) of each quantity by [`Quantity::index`].
+    pub const BYTES: usize = 1 + Quantity::COUNT * 10;
 
     /// Nothing learned.
     pub const fn new() -> Self {
@@ -128,20 +154,28 @@ impl Baselines {
         let mut put = Put::new(out);
         put.u8(VERSION);
         for baseline in &self.0 {
-            put.f32(baseline.value).u16(baseline.flights);
+            put.f32(baseline.value).f32(baseline.variance).u16(baseline.flights);
         }
     }
 
-    /// Reads the stored form, of this version or a later one.
+    /// Reads the stored form, of any version.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut take = Take::new(stored);
         let mut baselines = Self::new();
-        if take.u8()? < VERSION {
+        let version = take.u8()?;
+        if version < WITHOUT_SPREADS {
             return Err(Unreadable);
         }
         for baseline in &mut baselines.0 {
-            let stored = Baseline { value: take.f32()?, flights: take.u16()? };
-            *baseline = if stored.value.is_finite() { stored } else { Baseline::NONE };
+            let value = take.f32()?;
+            let variance = if version == WITHOUT_SPREADS { 0.0 } else { take.f32()? };
+            let stored = Baseline { value, variance, flights: take.u16()? };
+            let sane = value.is_finite() && variance.is_finite() && variance >= 0.0;
+            *baseline = if sane { stored } else { Baseline::NONE };
+        }
+        if version == WITHOUT_SPREADS {
+            // It was the throttle as it is, and is now that of a set voltage at sea level.
+            baselines.forget(Quantity::HoverThrottle);
         }
         Ok(baselines)
     }
@@ -171,6 +205,35 @@ mod tests {
         assert_eq!(baseline.known(), Some(11.0));
         baseline.learn(f32::NAN);
         assert_eq!(baseline.known(), Some(11.0));
+    }
+
+    #[test]
+    fn the_spread_comes_from_what_is_known_before_and_then_from_the_flights() {
+        let mut baseline = Baseline::NONE;
+        (0..3).for_each(|_| baseline.learn(10.0));
+        let few = baseline.spread(1.0);
+        assert!((0.8..1.2).contains(&few), "{few}");
+        for flight in 0..200 {
+            baseline.learn(if flight % 2 == 0 { 13.0 } else { 7.0 });
+        }
+        let wide = baseline.spread(1.0);
+        assert!((1.8..2.8).contains(&wide), "{wide}");
+        (0..200).for_each(|_| baseline.learn(10.0));
+        let narrow = baseline.spread(1.0);
+        assert!((0.5..0.8).contains(&narrow), "{narrow}");
+    }
+
+    #[test]
+    fn baselines_of_before_there_were_spreads_are_read() {
+        let mut stored = vec![1];
+        for quantity in 0..Quantity::COUNT {
+            stored.extend((quantity as f32).to_le_bytes());
+            stored.extend(5_u16.to_le_bytes());
+        }
+        let baselines = Baselines::decode(&stored).expect("readable");
+        let known = baselines.get(Quantity::Resistance(1));
+        assert_eq!(known, Baseline { value: 3.0, variance: 0.0, flights: 5 });
+        assert_eq!(baselines.get(Quantity::HoverThrottle), Baseline::NONE, "it meant another thing");
     }
 
     #[test]

@@ -162,6 +162,11 @@ impl Cells {
         }
     }
 
+    /// Whether the autopilot compensates its motors for the voltage of the first battery (`MOT_BAT_VOLT_MAX`).
+    pub(crate) fn is_compensated(&self) -> bool {
+        self.settings.first().is_some_and(|settings| settings[Setting::Full as usize] > 0.0)
+    }
+
     /// What the parameters leave of these counts; what contradicts all of them is not believed.
     fn by_settings(&self, id: u8, possible: Counts) -> (Counts, bool) {
         let Some(settings) = self.settings.get(usize::from(id)) else { return (possible, false) };

@@ -536,7 +536,7 @@ pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
 }
 
 /// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.
-fn pack_v(vehicle: &Vehicle, battery: usize) -> Option<f32> {
+pub(crate) fn pack_v(vehicle: &Vehicle, battery: usize) -> Option<f32> {
     let known = vehicle.batteries.get(battery)?.get();
     let system = || vehicle.system.get().filter(|_| battery == 0).and_then(|system| system.voltage);
     known.map_or_else(system, |known| known.voltage).map(|voltage| voltage.0)

@@ -275,7 +275,7 @@ impl Monitor {
         if event.is_some_and(|event| trends.event(event, params, baselines)) {
             saving.change(ItemKey::Baselines);
         }
-        trends.step(now, vehicle, flight, derived);
+        trends.step(now, vehicle, flight, derived, params);
     }
 
     /// One component a tick: there is time, and divisions cost.

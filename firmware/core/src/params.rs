@@ -141,10 +141,10 @@ params! {
     HardLanding "HARD_LANDING" "m/s" 2.0 0.1 20.0 "four times ArduPilot's LAND_SPEED of 0.5 m/s";
     BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: as the autopilot has it (BATT_CAPACITY, BAT1_CAPACITY)";
     GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead";
-    TrdVibeWarn "TRD_VIBE_WARN" "%" 50.0 0.0 10_000.0 "steady vibration above its baseline; off from 10,000";
-    TrdVibeCrit "TRD_VIBE_CRIT" "%" 150.0 0.0 10_000.0 "steady vibration above its baseline";
-    TrdThrWarn "TRD_THR_WARN" "%" 15.0 0.0 10_000.0 "hover throttle above its baseline: heavier, or less thrust";
-    TrdThrCrit "TRD_THR_CRIT" "%" 30.0 0.0 10_000.0 "hover throttle above its baseline";
+    TrdVibeWarn "TRD_VIBE_WARN" "%" 30.0 0.0 10_000.0 "steady vibration above or below its baseline, of real cut propellers 35 below; off from 10,000";
+    TrdVibeCrit "TRD_VIBE_CRIT" "%" 150.0 0.0 10_000.0 "steady vibration above or below its baseline";
+    TrdThrWarn "TRD_THR_WARN" "%" 3.0 0.0 10_000.0 "hover throttle above its baseline: heavier, or less thrust; real propellers cut by 10 mm and more 10 to 20, by 5 mm 2 to 4";
+    TrdThrCrit "TRD_THR_CRIT" "%" 20.0 0.0 10_000.0 "hover throttle above its baseline";
     TrdEscWarn "TRD_ESC_WARN" "%" 5.0 0.0 100.0 "LogHat: a motor's speed against the others, from its baseline";
     TrdEscCrit "TRD_ESC_CRIT" "%" 15.0 0.0 100.0 "a motor's speed against the others, from its baseline";
     ProtAction "PROT_ACTION" "" 0.0 0.0 2.0 "0 none, 1 return (MAV_CMD 20), 2 land (MAV_CMD 21)";

@@ -3,11 +3,19 @@
 //! Once a second in steady flight each quantity gives a sample to a mean that looks back over a minute. A sample that is
 //! far from that mean counts only as far as it may be believed, so that neither a gust nor garbage moves it much. What
 //! the mean is at landing is the flight's figure, from which the baseline learns.
+//!
+//! The throttle that hovers depends on the air and on the battery's voltage: rotors turn with both of duty and voltage, and their thrust
+//! goes with the square of that and with the air's density. Throttle of `ArduPilot` is linear in thrust, that of PX4 in speed (its
+//! `THR_MDL_FAC` is 0 by default). So what is compared is the throttle at 3.8 V a cell and at sea level. Where `ArduPilot` compensates the
+//! voltage itself (`MOT_BAT_VOLT_MAX`) that is not done twice.
+//!
+//! A departure counts where it is more than [`SPREADS`] spreads of this airframe's flights ([`crate::baseline`]): one flight in 400 in
+//! which nothing changed goes so far either way (Student's t with ten degrees of freedom: 0.25 %).
 
 use crate::baseline::{Baselines, Quantity};
-use crate::derived::Derived;
+use crate::derived::{Derived, pack_v};
 use crate::flight::{Flight, FlightEvent, Phase};
-use crate::observation::{MOTORS_MAX, VehicleKind, VibrationScale};
+use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind, VibrationScale};
 use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
@@ -20,6 +28,13 @@ const SAMPLES_MIN: u16 = 20;
 const SAMPLES: u16 = 60;
 /// A sample moves the mean as if it were no further away than this part of it (and [`Quantity::grain`]).
 const BELIEVED: f32 = 0.5;
+/// A departure that counts, in spreads.
+const SPREADS: f32 = 4.0;
+/// What the hover throttle is told for: voltage of a cell; pressure at sea level, hPa.
+const CELL_V: f32 = 3.8;
+const SEA_LEVEL_HPA: f32 = 1_013.25;
+/// The exponent of density over pressure in the standard atmosphere, as a slope: 1 % wrong at 2,000 m.
+const DENSITY_SLOPE: f32 = 0.81;
 /// A value holds this long.
 const FRESH: Span = Span::from_secs(2);
 
@@ -31,6 +46,17 @@ impl Quantity {
             Self::Vibration | Self::MotorSpeed(_) => 1.0,
             Self::HoverThrottle => 0.05,
             Self::Resistance(_) => 0.002,
+        }
+    }
+
+    /// How far flights differ where nothing changed: in its own unit, or as a part of the baseline. Hover throttle: 0.7 % in real flights
+    /// of one quadrotor, at one place and day.
+    fn prior(self, normal: f32) -> f32 {
+        match self {
+            Self::Vibration => 0.1 * normal,
+            Self::HoverThrottle => 0.007 * normal,
+            Self::Resistance(_) => 0.05 * normal,
+            Self::MotorSpeed(_) => 1.0,
         }
     }
 
@@ -48,7 +74,7 @@ impl Quantity {
     fn is_sane(self, value: f32) -> bool {
         match self {
             Self::Vibration => (0.0..=1_000.0).contains(&value),
-            Self::HoverThrottle => (0.02..=1.0).contains(&value),
+            Self::HoverThrottle => (0.02..=2.0).contains(&value),
             Self::Resistance(_) => (0.0005..=1.0).contains(&value),
             Self::MotorSpeed(_) => value.abs() <= 100.0,
         }
@@ -104,7 +130,14 @@ impl Trends {
     }
 
     /// One step, after flight and derived quantities.
-    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, derived: &Derived) {
+    pub(crate) fn step(
+        &mut self,
+        now: Instant,
+        vehicle: &Vehicle,
+        flight: &Flight,
+        derived: &Derived,
+        params: &Params,
+    ) {
         if self.sampled_at.is_some_and(|at| now.since(at) < EVERY) || !flight.airborne() {
             return;
         }
@@ -113,7 +146,7 @@ impl Trends {
         for (quantity, track) in quantities().zip(&mut self.tracks) {
             // The resistance shows under a load that changes; it has a mean of its own.
             let counts = steady || matches!(quantity, Quantity::Resistance(_));
-            let value = if counts { sample(now, quantity, vehicle, derived) } else { None };
+            let value = if counts { sample(now, quantity, vehicle, derived, params) } else { None };
             if let Some(value) = value.filter(|value| quantity.is_sane(*value)) {
                 track.take(value, quantity.grain());
             }
@@ -125,13 +158,20 @@ impl Trends {
         self.tracks.get(quantity.index()).filter(|track| track.samples >= SAMPLES_MIN).map(|track| track.mean)
     }
 
-    /// How far a quantity is from its baseline: percent of it above it; of motor speeds, percent of the mean speed either
-    /// way. `None` without a baseline or without enough steady flight.
+    /// How far a quantity is from its baseline: percent of it above it, of vibration either way; of motor speeds, percent of the mean
+    /// speed either way. 0 where that is within [`SPREADS`] of this airframe's flights. `None` without a baseline or without enough
+    /// steady flight.
     pub(crate) fn departure(&self, quantity: Quantity, baselines: &Baselines) -> Option<f32> {
-        let (figure, normal) = (self.figure(quantity)?, baselines.get(quantity).known()?);
+        let baseline = baselines.get(quantity);
+        let (figure, normal) = (self.figure(quantity)?, baseline.known()?);
+        let off = figure - normal;
+        if libm::fabsf(off) <= SPREADS * baseline.spread(quantity.prior(normal)) {
+            return Some(0.0);
+        }
         Some(match quantity {
-            Quantity::MotorSpeed(_) => (figure - normal).abs(),
-            _ => (figure - normal) / normal.max(quantity.grain()) * 100.0,
+            Quantity::MotorSpeed(_) => off.abs(),
+            Quantity::Vibration => off.abs() / normal.max(quantity.grain()) * 100.0,
+            Quantity::HoverThrottle | Quantity::Resistance(_) => off / normal.max(quantity.grain()) * 100.0,
         })
     }
 
@@ -164,7 +204,13 @@ fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     level && (phase == Phase::Hover || (wings && phase == Phase::Cruise))
 }
 
-fn sample(now: Instant, quantity: Quantity, vehicle: &Vehicle, derived: &Derived) -> Option<f32> {
+fn sample(
+    now: Instant,
+    quantity: Quantity,
+    vehicle: &Vehicle,
+    derived: &Derived,
+    params: &Params,
+) -> Option<f32> {
     match quantity {
         Quantity::Vibration => {
             let vibration = vehicle.vibration.within(now, FRESH)?;
@@ -173,13 +219,37 @@ fn sample(now: Instant, quantity: Quantity, vehicle: &Vehicle, derived: &Derived
                 VibrationScale::Px4Metrics => vibration.levels[2],
             }
         }
-        Quantity::HoverThrottle => Some(vehicle.hud.within(now, FRESH)?.throttle?.0),
+        Quantity::HoverThrottle => {
+            let throttle = vehicle.hud.within(now, FRESH)?.throttle?.0;
+            Some(throttle * lift(now, vehicle, derived, params)?)
+        }
         Quantity::Resistance(battery) => derived.resistance(usize::from(battery))?.ohm(),
         Quantity::MotorSpeed(motor) => {
             let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
             (now.since(at) <= FRESH).then(|| derived.motor_departure(motor)).flatten()
         }
     }
+}
+
+/// What the throttle is multiplied by to be that of [`CELL_V`] at sea level. `None` where the voltage of a cell is not known; 1 on wings.
+fn lift(now: Instant, vehicle: &Vehicle, derived: &Derived, params: &Params) -> Option<f32> {
+    if vehicle.hovers(now) != Some(true) {
+        return Some(1.0);
+    }
+    let pressure =
+        vehicle.air.get().and_then(|air| air.pressure).map_or(SEA_LEVEL_HPA, |pressure| pressure.0);
+    let density = 1.0 + DENSITY_SLOPE * (pressure / SEA_LEVEL_HPA - 1.0);
+    let volts = match pack_v(vehicle, 0) {
+        Some(pack_v) if !derived.cells().is_compensated() => {
+            let cells = derived.cell_count(vehicle, 0, params);
+            pack_v / (CELL_V * f32::from((cells > 0).then_some(cells)?))
+        }
+        _ => 1.0,
+    };
+    let lift = volts * volts * density;
+    let linear_in_thrust =
+        vehicle.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot);
+    Some(if linear_in_thrust { lift } else { libm::sqrtf(lift.max(0.0)) })
 }
 
 const _: () = assert!(Quantity::COUNT == 2 + BATTERIES_MAX + MOTORS_MAX);

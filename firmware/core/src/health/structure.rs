@@ -84,7 +84,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "vibration_trend",
-        words: "vibration up",
+        words: "vibration changed",
         unit: "%",
         warn: Some(Param::TrdVibeWarn),
         critical: Some(Param::TrdVibeCrit),

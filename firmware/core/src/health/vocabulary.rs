@@ -155,7 +155,8 @@ vocabulary! {
     "The airframe carried a high load: a hard manoeuvre, a shock or a landing.";
     "Inspect the airframe and the landing gear.";
     "vibration_trend" Stored "vibration against earlier flights", "", needs "vibration of earlier flights to compare with";
-    "Vibration has risen against earlier flights."; "Check propellers, bearings and mounting.";
+    "Vibration has changed against earlier flights; a cut propeller can lower it.";
+    "Check propellers, bearings and mounting.";
     "airframe_due" Stored "airframe life", "", needs "airframe registered with the monitor on board";
     "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
