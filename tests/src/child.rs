@@ -107,7 +107,12 @@ fn wait(child: &mut Child, limit: Duration) -> (Option<ExitStatus>, u64) {
     }
 }
 
+/// The most memory that a process had. None while it is between `vfork` and `exec`: its memory is this program's own then.
 fn resident_kib_max(process: u32) -> Option<u64> {
+    let program = |of: &str| fs::read_link(format!("/proc/{of}/exe")).ok();
+    if program(&process.to_string())? == program("self")? {
+        return None;
+    }
     let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.split_whitespace().next()?.parse().ok()
