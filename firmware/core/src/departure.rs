@@ -71,6 +71,11 @@ impl Departure {
         self.is_known().then_some(beyond.max(0.0))
     }
 
+    /// Its mean distance from its usual level.
+    pub(crate) fn spread(&self) -> f32 {
+        self.spread
+    }
+
     /// The figure as it is followed.
     pub(crate) fn figure(&self) -> f32 {
         self.smooth

@@ -7,7 +7,7 @@
 //! or turns it changes commands in pairs: as much down on one side as up on the other. What is judged is therefore how far the highest
 //! change is above the second, less how far the others are apart from each other: of four motors all others, of six without the
 //! lowest. It is in percent of what the motors are given on the average, smoothed, and against what was usual in this flight
-//! ([`crate::departure`]). (Derived from the geometry of regular frames, for this project.)
+//! ([`crate::departure`]), less what commands vary by anyway. (Derived from the geometry of regular frames, for this project.)
 //!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
@@ -17,7 +17,7 @@ use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, Outputs};
-use crate::steady::hovers;
+use crate::steady::flies_evenly;
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
 
@@ -32,7 +32,9 @@ const ZERO_US: f32 = 1_000.0;
 /// Motors that carry a vehicle are given so much more on the average.
 const CARRIES_US: f32 = 100.0;
 /// Further above the others a change teaches nothing, percent.
-const HOLD_PERCENT: f32 = 5.0;
+const HOLD_PERCENT: f32 = 4.0;
+/// Where commands vary much, a change must be larger: by so many of their mean distances from what is usual.
+const SPREADS: f32 = 1.5;
 /// Below this part of the average, percent, a motor was taken out.
 const OUT_PERCENT: f32 = -70.0;
 /// Messages that are further apart are not of the same hover.
@@ -86,7 +88,7 @@ impl MotorOutputs {
         }
         let lowest = &self.lowest[..count];
         // What has no idle pulse on the ground is a servo.
-        if lowest.iter().any(|lowest| *lowest > IDLE_US) || !hovers(at, vehicle, flight) {
+        if lowest.iter().any(|lowest| *lowest > IDLE_US) || !flies_evenly(at, vehicle, flight) {
             return;
         }
         let zero_us =
@@ -115,7 +117,8 @@ impl MotorOutputs {
         // Of six the opposite one is lowered.
         let [first, second, .., lowest] = *changes else { return };
         let lowest = if count == JUDGED_MAX { changes[count - 2] } else { lowest };
-        let stands_out = (first.0 - second.0) - (second.0 - lowest.0);
+        let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
+        let stands_out = (first.0 - second.0) - (second.0 - lowest.0) - SPREADS * spread;
         if !self.is_known() || stands_out < HOLD_PERCENT {
             self.share.iter_mut().for_each(|share| share.learn(step_s));
         }

@@ -230,7 +230,7 @@ params! {
     MagMismWarn "MAG_MISM_WARN" "%" 40.0 1.0 1000.0 "compasses apart beyond usual, of the field; ArduPilot arms up to 200 mG, which is 40 % of it";
     BaroMismWarn "BARO_MISM_WARN" "m" 8.0 0.5 10_000.0 "barometers apart beyond usual; above what wind and motors do to one of them";
     VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, in hover";
-    MotOutWarn "MOT_OUT_WARN" "%" 10.0 1.0 1000.0 "a motor's output alone above its usual share; healthy hovers reach 5, a real quadrotor in gusts 9";
+    MotOutWarn "MOT_OUT_WARN" "%" 8.0 1.0 1000.0 "a motor's output alone above its usual share and what it varies by; healthy flights stay below 7";
     MotOutCrit "MOT_OUT_CRIT" "%" 35.0 1.0 1000.0 "a motor's output alone above its usual share: it gives two thirds of its thrust";
     StuckWarn "SENS_STUCK_WARN" "s" 1.0 0.3 1000.0 "a sensor repeats one value in flight, four times as long as it ever did before in it";
     BaroGpsWarn "BARO_GPS_WARN" "m" 8.0 1.0 10_000.0 "barometer and GPS height apart beyond usual, a tenth of the climb and half of the dynamic pressure";

@@ -2,7 +2,7 @@
 
 use crate::flight::Flight;
 use crate::motion::climb_mps;
-use crate::observation::LandedState;
+use crate::observation::{Attitude, LandedState};
 use crate::time::{Instant, Span};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
@@ -14,20 +14,30 @@ const FRESH: Span = Span::from_secs(1);
 const LOW_M: f32 = 1.5;
 const SLOW_MPS: f32 = 6.0;
 const LEVEL_MPS: f32 = 2.0;
+/// Further it does not lean steadily, rad; and it has left the ground for so long.
+const LEANS_RAD: f32 = 0.6;
+const SETTLED: Span = Span::from_secs(3);
 
-/// Whether it is a multicopter that is level and slow, turns and climbs little, and does not touch the ground: contact and the
-/// propellers' wash there set sensors apart, motors do what the legs make them do, and a fast leg has a trim of its own.
+/// Whether a multicopter turns and climbs little, and does not touch the ground: contact and the propellers' wash there set sensors
+/// apart, and motors do what the legs make them do. It may be fast, and lean against the wind.
+pub(crate) fn flies_evenly(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+    let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
+    let leans = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > LEANS_RAD;
+    !climbs
+        && vehicle.is_multicopter()
+        && !vehicle.attitude.get().is_some_and(leans)
+        && flight.airborne_since().is_some_and(|since| now.since(since) > SETTLED)
+        && is_clear(now, vehicle)
+        && vehicle.inertial.turns_little(now, TURNED)
+}
+
+/// Whether it does so, and is level and slow.
 pub(crate) fn hovers(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     let slow = vehicle.global.within(now, FRESH).is_none_or(|global| {
         let [north, east, _] = global.velocity.map(|speed| speed.0);
         north * north + east * east < SLOW_MPS * SLOW_MPS
     });
-    let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
-    slow && !climbs
-        && vehicle.is_multicopter()
-        && is_clear(now, vehicle)
-        && flight.is_steady(now, vehicle)
-        && vehicle.inertial.turns_little(now, TURNED)
+    slow && flight.is_steady(now, vehicle) && flies_evenly(now, vehicle, flight)
 }
 
 /// Whether it is away from the ground, as far as that is known.
