@@ -67,10 +67,6 @@ pub(crate) trait Transmit {
 
 /// Why the machine started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-#[cfg_attr(
-    feature = "board-emulated",
-    expect(dead_code, reason = "the emulator knows only how to be started")
-)]
 pub(crate) enum ResetCause {
     /// Power came.
     PowerOn,
