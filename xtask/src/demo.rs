@@ -59,13 +59,13 @@ pub(crate) fn as_test() -> Result<()> {
 pub(crate) fn run(options: &Options) -> Result<()> {
     let start = Instant::now();
     let outcome = setup::ensure(&[Need::Linker, Need::FirmwareTarget], false);
-    let emulated = !options.pc && outcome.has(Need::FirmwareTarget);
-    if !emulated && !options.pc {
+    let flashed = !options.pc && outcome.has(Need::FirmwareTarget);
+    if !flashed && !options.pc {
         eprintln!("\nNo firmware here (what to type is above): the same pipeline runs on this PC instead.\n");
     }
     // Both at once: the last part of each build is one core's work.
     let (program, image) = std::thread::scope(|scope| {
-        let firmware = scope.spawn(|| emulated.then(|| firmware::build(Board::F405)).transpose());
+        let firmware = scope.spawn(|| flashed.then(|| firmware::build(Board::F405)).transpose());
         (hums::build(), firmware.join())
     });
     program?;

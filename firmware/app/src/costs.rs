@@ -5,11 +5,9 @@
 
 use core::cell::Cell;
 
+use cortex_m::peripheral::DWT;
 use critical_section::{CriticalSection, Mutex};
 use hums_core::time::Instant;
-
-use crate::boards::board;
-use crate::boards::machine::CYCLE_BITS;
 
 /// The parts that are measured apart; `hums emulate --costs` has their names in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +44,7 @@ static STAGE_CYCLES: [Mutex<Cell<u64>>; STAGES] = [const { Mutex::new(Cell::new(
 /// The stage that runs, and the counter when it began.
 static CURRENT: Mutex<Cell<(Stage, u32)>> = Mutex::new(Cell::new((Stage::Idle, 0)));
 
-/// Runs `work` on the account of `stage`. Longer than 2^24 cycles (0.1 s) in one go counts modulo that.
+/// Runs `work` on the account of `stage`. Longer than 2^32 cycles (25 s) in one go counts modulo that.
 pub(crate) fn measure<R>(stage: Stage, work: impl FnOnce() -> R) -> R {
     let interrupted = switch_to(stage);
     let result = work();
@@ -70,9 +68,9 @@ fn busy() -> u64 {
 
 fn switch_to(stage: Stage) -> Stage {
     critical_section::with(|cs| {
-        let now = board::cycles();
+        let now = DWT::cycle_count();
         let (before, since) = CURRENT.borrow(cs).replace((stage, now));
-        let spent = now.wrapping_sub(since) & ((1 << CYCLE_BITS) - 1);
+        let spent = now.wrapping_sub(since);
         if let Some(total) = STAGE_CYCLES.get(before as usize) {
             let total = total.borrow(cs);
             total.set(total.get().wrapping_add(u64::from(spent)));

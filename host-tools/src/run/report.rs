@@ -73,7 +73,7 @@ pub struct Report {
     /// Cycles of the processor by stage, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cycles: Option<serde_json::Value>,
-    /// What the processor was busy in the worst second, in percent, where measured.
+    /// What the processor was busy in the worst second but the first, in percent, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub busy_percent_max: Option<f64>,
 }

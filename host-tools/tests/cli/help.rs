@@ -83,7 +83,8 @@ fn copy(from: &Path, to: &Path) {
 /// Runs an example to its end.
 fn works(dir: &Path, example: &str) {
     // Where there is no firmware the demo runs the same pipeline on this PC.
-    let output = hums().current_dir(dir).env("HUMS_FIRMWARE", "none").args(example.split_whitespace()).output();
+    let output =
+        hums().current_dir(dir).env("HUMS_FIRMWARE", "none").args(example.split_whitespace()).output();
     let output = output.expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr);
     // 3: what an example of a fault recorded has losses; 4: a check found something.

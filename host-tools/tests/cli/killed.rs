@@ -214,7 +214,12 @@ fn a_demo_removes_what_a_demo_made_and_nothing_else() {
         let input = px4().display().to_string();
         let words = ["demo", "--input", &input, "--dir", ".", "--dashboard", "never"];
         // Without the firmware it records on this PC.
-        let ended = hums().current_dir(dir.path()).env("HUMS_FIRMWARE", "none").args(words).output().expect("it runs");
+        let ended = hums()
+            .current_dir(dir.path())
+            .env("HUMS_FIRMWARE", "none")
+            .args(words)
+            .output()
+            .expect("it runs");
         let said = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert_eq!(ended.status.code(), Some(code), "{said}");
         said

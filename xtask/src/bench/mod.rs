@@ -295,7 +295,8 @@ pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -
         .arg(image)
         .arg("--input")
         .arg(&input)
-        .args(["--line-rate", BAUD, "--sd"])
+        // On a small card the first segment alone takes 0.7 s.
+        .args(["--line-rate", BAUD, "--card-size", "4096", "--sd"])
         .arg(&card)
         .output_and_code()?;
     serde_json::from_str(&json).context("the report of hums emulate")

@@ -23,7 +23,7 @@ use super::machine::{Boot, Parts};
 use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
 pub(crate) use super::stm32f4::{
     AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, Watchdog,
-    crystal_failed, cycles, restart,
+    crystal_failed, restart,
 };
 use super::stm32f4::{CardPort, PortRx, PortTx, line, random_number, reset_cause, start};
 

@@ -12,7 +12,6 @@
 //! | `Board` | its [`Machine`](machine::Machine): the type of each of its parts |
 //! | `Idle::run()` | what the processor does while all tasks wait; never returns |
 //! | `crystal_failed()` | whether the clock has gone over to a less exact oscillator |
-//! | `cycles()` | a free running counter of [`CYCLE_BITS`](machine::CYCLE_BITS) bits, for measuring |
 //! | `LATE_TURNS` | when the watchdog counts as late (`watch`) |
 //! | `restart()` | after a fault |
 

@@ -23,10 +23,10 @@ const LEAD: Ps = 30 * MS;
 /// How long power is away when it goes for a moment.
 const AWAY: Ps = 100 * MS;
 /// What is in memory at the end is written after so long: a sector in progress waits for 0.15 s (`hums_onboard::monitoring`).
-const LEAST: Ps = 800 * MS;
+const LEAST: Ps = 2_400 * MS;
 /// Or, where the card is slow, once it was not written for so long; before the silence is a finding (3 s).
 const QUIET: Ps = 200 * MS;
-const MOST: Ps = 2_500 * MS;
+const MOST: Ps = 3_000 * MS;
 /// The ports are looked after this often.
 const STEP: Ps = 20 * MS;
 /// The autopilot's port and the radio's.
@@ -75,10 +75,11 @@ pub(super) struct Board {
     load: Load,
 }
 
-/// The part of each second that the processor did not sleep.
+/// The part of each second that the processor did not sleep; not of the first one, in which the card is mounted.
 #[derive(Debug)]
 struct Load {
-    since: (Ps, u64, u64),
+    /// When this second began, with the cycles and those asleep by then.
+    since: Option<(Ps, u64, u64)>,
     worst: f64,
 }
 
@@ -108,7 +109,6 @@ impl Board {
         if let Some(flash) = chip.chip.flash.content.all_mut().get_mut(STORE) {
             flash.copy_from_slice(store);
         }
-        let since = (LEAD, 0, 0);
         Self {
             chip,
             medium: medium.clone(),
@@ -118,7 +118,7 @@ impl Board {
             reboots,
             came: Framer::new(),
             went: Framer::new(),
-            load: Load { since, worst: 0.0 },
+            load: Load { since: None, worst: 0.0 },
         }
     }
 
@@ -247,14 +247,16 @@ impl run::Machine for Board {
 
 impl Load {
     fn look(&mut self, chip: &Chip) {
-        let (at, cycles, slept) = self.since;
-        if chip.now() < at + SECOND {
+        let begun = self.since.map_or(LEAD, |(at, ..)| at);
+        if chip.now() < begun + SECOND {
             return;
         }
         let now = (chip.now(), chip.core.cycles(), chip.core.slept());
-        let asleep = (now.2 - slept) as f64 / (now.1 - cycles).max(1) as f64;
-        self.worst = self.worst.max(100.0 - 100.0 * asleep);
-        self.since = now;
+        if let Some((_, cycles, slept)) = self.since {
+            let asleep = (now.2 - slept) as f64 / (now.1 - cycles).max(1) as f64;
+            self.worst = self.worst.max(100.0 - 100.0 * asleep);
+        }
+        self.since = Some(now);
     }
 }
 

@@ -1,8 +1,8 @@
 //! The microSD card on an SPI bus: its port; the driver is `hums_recorder::spi`.
 //!
 //! A block goes by DMA, and the processor sleeps meanwhile. A card is busy for some milliseconds after a block, and says so by a low
-//! line: bytes that are zero (SD specification, 7.2.4). The driver looks again and again; after some looks in a row the
-//! processor sleeps before the next one. An interrupt wakes it, at the latest reception's, each millisecond.
+//! line: bytes that are zero (SD specification, 7.2.4); while it looks for a block that is to be read, the line is high. The driver
+//! looks again and again; after some looks in a row the processor sleeps for a moment before the next one.
 
 use core::future::Future;
 use core::pin::pin;
@@ -16,12 +16,15 @@ use hums_core::time::{Instant, Span};
 use hums_recorder::SpiCard;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
+use super::time;
 use crate::costs::{Stage, measure};
 
 /// Bytes that the driver exchanges at most to look whether the card is busy.
 const LOOK_BYTES: usize = 4;
-/// Looks in a row that find the card busy before the processor sleeps: some 50 µs.
+/// Looks in a row that find nothing before the processor sleeps: some 50 µs.
 const LOOKS: u32 = 16;
+/// How long it sleeps before the next look, in microseconds.
+const NAP_US: u32 = 100;
 /// Fewer bytes go one by one: to set the DMA up takes as long as some tens of them.
 const DMA_BYTES_MIN: usize = 128;
 /// A block takes 13 ms at the slowest clock.
@@ -36,8 +39,8 @@ pub(crate) type Card = SpiCard<CardPort>;
 pub(crate) struct CardPort {
     bus: Spi<'static, Async, Master>,
     select: Output<'static>,
-    /// Looks in a row that found the card busy.
-    busy: u32,
+    /// Looks in a row that found nothing.
+    looks: u32,
 }
 
 impl CardPort {
@@ -48,7 +51,7 @@ impl CardPort {
 
     /// The port on this bus, mode 0, with its select pin high.
     pub(crate) const fn new(bus: Spi<'static, Async, Master>, select: Output<'static>) -> Self {
-        Self { bus, select, busy: 0 }
+        Self { bus, select, looks: 0 }
     }
 }
 
@@ -58,8 +61,8 @@ impl Port for CardPort {
     }
 
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
-        if self.busy > LOOKS {
-            measure(Stage::Idle, cortex_m::asm::wfi);
+        if self.looks > LOOKS {
+            time::nap(NAP_US);
         }
         if by_dma(bytes) {
             wait(self.bus.transfer_in_place(bytes))?;
@@ -67,7 +70,7 @@ impl Port for CardPort {
             self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)?;
         }
         let is_busy = bytes.len() <= LOOK_BYTES && bytes.iter().all(|byte| *byte == 0);
-        self.busy = if is_busy { self.busy.saturating_add(1) } else { 0 };
+        self.looks = if is_busy || *bytes == [0xFF] { self.looks.saturating_add(1) } else { 0 };
         Ok(())
     }
 

@@ -10,7 +10,6 @@ mod supply;
 mod time;
 mod watchdog;
 
-use cortex_m::peripheral::DWT;
 use cortex_m::peripheral::syst::SystClkSource;
 use embassy_stm32::gpio::{Level, Output, Pull};
 use embassy_stm32::{Peripherals, rcc, usart};
@@ -127,9 +126,4 @@ impl Idle {
             cortex_m::asm::wfi();
         }
     }
-}
-
-/// Processor cycles.
-pub(crate) fn cycles() -> u32 {
-    DWT::cycle_count()
 }
