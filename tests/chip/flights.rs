@@ -46,10 +46,19 @@ const CARD_MIB: [&str; 2] = ["--card-size", "4096"];
 /// Every step of the checks, on both machines.
 const TICK_US: u64 = 50_000;
 
+/// What is compared with this PC.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Against {
+    /// Which records there are, by kind and texts.
+    Kinds,
+    /// Their times and numbers as well, and what goes to the ground station.
+    Numbers,
+}
+
 /// Records one flight by the image, and compares it with the recording and with what this PC makes of the same frames at the same
 /// times.
 #[track_caller]
-fn the_record_is_the_one_of_this_pc(path: &Path, manifest: &Manifest) {
+fn the_record_is_the_one_of_this_pc(path: &Path, manifest: &Manifest, against: Against) {
     let data = fs::read(path).unwrap();
     let input = manifest.frames_of(path, &data);
     let found = manifest.found(path);
@@ -69,8 +78,10 @@ fn the_record_is_the_one_of_this_pc(path: &Path, manifest: &Manifest) {
     let of_chip = records(&chip.image(), &[0, 3]);
     let dir = tempfile::tempdir().unwrap();
     let (of_pc, gs) = on_this_pc(&chip.image(), phase_us(&of_chip), &dir.path().join("card.img"));
-    assert_same_records(&of_chip, &of_pc);
-    assert_same_stream(&fs::read(chip.gs()).unwrap(), &gs, &manifest.seeds);
+    assert_same_records(&of_chip, &of_pc, against);
+    if against == Against::Numbers {
+        assert_same_stream(&fs::read(chip.gs()).unwrap(), &gs, &manifest.seeds);
+    }
 
     let ground = oracle::ground_station(&chip.gs());
     assert_eq!(ground["frames"].as_u64(), Some(chip.number("gs_frames")));
@@ -156,7 +167,7 @@ const STORE_IS_NEW: &str = "HUMS: the store is new, all counters begin";
 
 /// The same records in the same order of their kinds, at the same times but for a step, with the same fields but for those of the machine.
 #[track_caller]
-fn assert_same_records(of_chip: &[Value], of_pc: &[Value]) {
+fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
     assert!(of_chip.len() > 50, "{} records", of_chip.len());
     let key = |record: &Value| {
         let fields = record["fields"].as_object().unwrap();
@@ -187,6 +198,9 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value]) {
         differ.is_empty() && other.is_empty(),
         "only on the chip: {differ:#?}, only on this PC: {other:#?}"
     );
+    if against == Against::Kinds {
+        return;
+    }
     let (mut all, mut odd) = (0, Vec::new());
     for (a, b) in chip.values().flatten().zip(pc.values().flatten()) {
         all += 1;
@@ -251,7 +265,7 @@ fn assert_same_stream(of_chip: &[u8], of_pc: &[u8], seeds: &Seeds) {
 
 #[test]
 fn the_demos_flight_leaves_the_record_that_this_pc_makes_of_it() {
-    the_record_is_the_one_of_this_pc(&own(FLIGHT), Manifest::own());
+    the_record_is_the_one_of_this_pc(&own(FLIGHT), Manifest::own(), Against::Kinds);
 }
 
 #[test]
@@ -275,13 +289,13 @@ fn a_signed_flight_is_recorded_bit_for_bit() {
 fn every_further_recording_leaves_the_record_that_this_pc_makes_of_it() {
     let own = ["ap_quad_guided.tlog", "px4_hil_quad_low.tlog"].map(own);
     for file in &own {
-        the_record_is_the_one_of_this_pc(file, Manifest::own());
+        the_record_is_the_one_of_this_pc(file, Manifest::own(), Against::Numbers);
     }
     let files = flights::further();
     let manifest = oracle::manifest(&files);
     for file in files {
         eprintln!("{}", file.display());
-        the_record_is_the_one_of_this_pc(&file, &manifest);
+        the_record_is_the_one_of_this_pc(&file, &manifest, Against::Numbers);
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
     setup::ensure(&[Need::Linker, Need::FirmwareTarget, Need::StaticTarget], false).require_all()?;
     ensure_cyclonedx()?;
     // `cargo xtask test` leaves out the board that none of its steps runs on.
-    for board in Board::ALL.into_iter() {
+    for board in Board::ALL {
         firmware::lint(board)?;
     }
     budgets::check(&Board::ALL)?;
@@ -77,7 +77,7 @@ impl Release {
 
     fn make(&self) -> Result<Vec<File>> {
         let mut files = Vec::new();
-        for board in Board::ALL.into_iter() {
+        for board in Board::ALL {
             self.build(&board.cargo_arguments())?;
             let (_, elf) = read("", &self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))?;
             files.extend(firmware::files(board, elf)?);

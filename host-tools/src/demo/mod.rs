@@ -1,4 +1,4 @@
-//! `hums demo`: a recorded flight is recorded by the firmware (in the emulator, where there is one), the card is
+//! `hums demo`: a recorded flight is recorded by the firmware (on the model of its chip, where there is an image), the card is
 //! decoded, what came of it is summed up, and the dashboard plays the card.
 
 mod earlier;

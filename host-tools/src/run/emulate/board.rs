@@ -3,15 +3,15 @@
 use std::collections::VecDeque;
 use std::io::Write;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, anyhow};
 use hums_link::framer::Framer;
 use hums_sdcard::{Card, Kind, Medium, Model, Slot};
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board as Parts, Machine as Chip};
 use stm32f405_model::memory::FLASH;
-use stm32f405_model::report::Report;
 use stm32f405_model::time::{MS, Ps, SECOND, US};
+use stm32f405_model::usart::Usart;
 
 use crate::run;
 use crate::source::Chunk;
@@ -130,7 +130,7 @@ impl Board {
     fn run_until(&mut self, until: Ps) -> Result<()> {
         while self.chip.now() < until {
             let to = self.chip.now().saturating_add(STEP).min(until);
-            self.chip.run_until(to).map_err(stopped)?;
+            self.chip.run_until(to).map_err(|report| anyhow!("the firmware stopped: {report}"))?;
             self.take_sent()?;
             self.load.look(&self.chip);
         }
@@ -154,7 +154,7 @@ impl Board {
         self.run_until(at)?;
         let (Some(line), Some(usual)) = (self.lines.get_mut(port), BAUDS.get(port)) else { return Ok(()) };
         // Both ends are set alike.
-        let set = self.chip.chip.usarts.get(port).map_or(0.0, |usart| usart.baud());
+        let set = self.chip.chip.usarts.get(port).map_or(0.0, Usart::baud);
         let baud = if set > 0.0 { nearest(set) } else { *usual };
         line.free = self.chip.send(port, &chunk.bytes, at.max(line.free), baud);
         Ok(())
@@ -265,10 +265,4 @@ fn nearest(baud: f64) -> f64 {
     const USUAL: [f64; 9] =
         [9_600.0, 19_200.0, 38_400.0, 57_600.0, 115_200.0, 230_400.0, 460_800.0, 921_600.0, 1_500_000.0];
     USUAL.into_iter().find(|usual| (usual / baud - 1.0).abs() < 0.03).unwrap_or(baud)
-}
-
-/// A machine that cannot go on, with where it was.
-#[expect(clippy::boxed_local, reason = "as the model gives it")]
-fn stopped(report: Box<Report>) -> anyhow::Error {
-    anyhow::anyhow!("the firmware stopped: {report}")
 }
