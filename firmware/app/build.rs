@@ -17,7 +17,6 @@ fn main() {
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     copy("../../memory.x", &out.join("memory.x"));
-    // QEMU has the real board's memories.
     let board = if env::var_os("CARGO_FEATURE_BOARD_F429").is_some() { "f429" } else { "f405" };
     copy(&format!("src/boards/{board}.x"), &out.join("board.x"));
     println!("cargo::rustc-link-search={}", out.display());

@@ -1,7 +1,8 @@
 //! What fails round the processor, as a review saw it on another model of the chip (issue 22), each as it is to be.
 
+use hums_tests::chip::BAUD;
 use hums_tests::chip::record::{Compared, Session};
-use hums_tests::chip::rig::Rig;
+use hums_tests::chip::rig::{Rig, heartbeat, set};
 use stm32f405_model::flash::Speed;
 use stm32f405_model::machine::Board;
 use stm32f405_model::rcc::Cause;
@@ -178,4 +179,30 @@ fn transmitters_that_stand_still_are_told_and_cost_nothing() {
     assert_told(&rig, "HUMS: sending to the autopilot stands still");
     assert_told(&rig, "HUMS: sending to the radio stands still");
     assert_no_reset(&rig);
+}
+
+/// 8: the flash refuses a word. The ground is told, and what is set after that is saved.
+#[test]
+fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    // A new value, from the ground station, on the ground.
+    let set = |rig: &mut Rig, value: f32| {
+        let now = rig.machine.now();
+        let end = rig.machine.send(0, &heartbeat(1), now, BAUD);
+        rig.sent.push((end, heartbeat(1)));
+        rig.machine.send(1, &set("BAT_TEMP_WARN", value, 1), now + 100 * MS, 57_600.0);
+        rig.run(now + 3 * SECOND, false).unwrap();
+        rig.machine.chip.flash.counts.1
+    };
+    rig.machine.chip.flash.refuses = 1;
+    let refused = set(&mut rig, 41.0);
+    assert_told(&rig, "HUMS: saving failed, have the board replaced");
+    assert_eq!(rig.machine.chip.flash.refuses, 0, "nothing was refused: this has tried nothing");
+    let saved = set(&mut rig, 42.0);
+    assert!(saved > refused, "{refused} words, and then {saved}");
+    assert_no_reset(&rig);
+    let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();
+    assert!(String::from_utf8_lossy(&heard).contains("HUMS: saving failed"), "the ground was not told");
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use hums_tests::chip;
+use hums_tests::program;
 use sha2::{Digest as _, Sha256};
 use stm32f405_model::image::{Image, Refused};
 use stm32f405_model::machine::{Board, Machine};
@@ -14,7 +14,7 @@ const NOWHERE: [u8; 8] = [0x00, 0x48, 0x00, 0x47, 0x01, 0x00, 0x00, 0x30];
 
 /// The files of a release: ELF, DFU, raw image.
 fn files() -> [Vec<u8>; 3] {
-    ["elf", "dfu", "bin"].map(|kind| fs::read(chip::image_path().with_extension(kind)).unwrap())
+    ["elf", "dfu", "bin"].map(|kind| fs::read(program::firmware().with_extension(kind)).unwrap())
 }
 
 #[test]

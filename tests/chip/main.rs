@@ -9,9 +9,13 @@ mod faults;
 #[cfg(feature = "chip")]
 mod flights;
 #[cfg(feature = "chip")]
-mod hangs;
-#[cfg(feature = "chip")]
 mod images;
+#[cfg(feature = "chip")]
+mod persistence;
+#[cfg(feature = "chip")]
+mod power;
+#[cfg(feature = "chip")]
+mod program;
 
 /// In the list of what was ignored: what was not tested is no success.
 #[cfg(not(feature = "chip"))]
@@ -22,9 +26,9 @@ fn the_image_on_the_model_of_its_chip() {}
 /// The F405's image, and a PX4 flight's frames to send.
 #[cfg(feature = "chip")]
 fn bench() -> hums_tests::chip::rig::Bench {
-    use hums_tests::{chip, flights};
+    use hums_tests::{chip, flights, program};
 
-    let file = std::fs::read(chip::image_path()).unwrap();
+    let file = std::fs::read(program::firmware()).unwrap();
     let image = stm32f405_model::image::Image::parse(&file).unwrap();
     let tlog = std::fs::read(flights::own("px4_hil_quad_low.tlog")).unwrap();
     let frames = chip::frames(&tlog).into_iter().map(|(_, frame)| frame.to_vec()).collect();

@@ -108,12 +108,13 @@ fn caches(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Who has the processor at full rate: samples of a second and a half, by the exception's number.
+/// Who has the processor at full rate: samples of a second and a half, by the exception's number, and by the function.
 fn shares(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 4 * SECOND;
     rig.run(begin, true)?;
     let mut counts = std::collections::BTreeMap::<&str, u32>::new();
+    let mut functions = std::collections::BTreeMap::<String, u32>::new();
     for sample in 1..=15_000_u64 {
         rig.run(begin + sample * 101 * US, true)?;
         let who = match rig.machine.core.xpsr() & 0x1FF {
@@ -127,9 +128,19 @@ fn shares(bench: &Bench) -> Outcome {
             _ => "others",
         };
         *counts.entry(who).or_default() += 1;
+        if who != "sleep" {
+            let image = rig.machine.image();
+            let name = image.symbol(rig.machine.core.register(15)).map_or("?", |(name, _)| name);
+            *functions.entry(format!("{who} {name}")).or_default() += 1;
+        }
     }
     for (who, count) in counts {
         println!("    {who}: {:.1} %", f64::from(count) / 150.0);
+    }
+    let mut functions: Vec<_> = functions.into_iter().collect();
+    functions.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    for (name, count) in functions.iter().take(40) {
+        println!("    {:5.2} % {name}", f64::from(*count) / 150.0);
     }
     Ok(())
 }

@@ -241,8 +241,7 @@ fn a_parameter_file_that_is_wrong_is_told_with_line_and_range_and_leaves_nothing
                     .map(std::ffi::OsStr::to_owned);
             let more = ["--sd".into(), image.clone().into(), "--params".into(), file.clone().into()];
             let outcome = hums(arguments.into_iter().chain(more)).expect_code(&[1, 2]);
-            // Where there is no emulator, it is that what is told.
-            assert!(outcome.stderr.contains(why) || command == "emulate", "{}", outcome.stderr);
+            assert!(outcome.stderr.contains(why), "{}", outcome.stderr);
         }
         assert!(!image.exists());
     }

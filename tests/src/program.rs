@@ -17,8 +17,8 @@ use crate::frames::{self, Frame, Seeds};
 /// No command of the tests may take longer on this PC; one that does hangs.
 pub const LIMIT: Duration = Duration::from_mins(2);
 
-/// The emulator takes bytes at the pace of its UART, and two runs share two cores with all else.
-pub const LIMIT_EMULATED: Duration = Duration::from_mins(20);
+/// A second of flight takes some 0.15 s on the model of the chip, on a core of its own.
+pub const LIMIT_CHIP: Duration = Duration::from_mins(20);
 
 /// Where `hums` lies: `HUMS_BIN` names it, or it is built, once.
 pub fn path() -> &'static Path {
@@ -39,14 +39,14 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
-/// The image of the firmware of the emulated board: `HUMS_FIRMWARE` names it, otherwise it is where xtask leaves it.
+/// The F405's image, made as a release is: `HUMS_FIRMWARE` names the ELF file, otherwise it is where xtask leaves it.
 ///
 /// # Panics
 /// If it is not there.
 pub fn firmware() -> PathBuf {
-    let built = || root().join("target/firmware/hums-emulated.elf");
+    let built = || root().join("target/firmware/hums-f405.elf");
     let path = std::env::var_os("HUMS_FIRMWARE").map_or_else(built, PathBuf::from);
-    assert!(path.is_file(), "{} is missing: `cargo xtask firmware --board emulated`", path.display());
+    assert!(path.is_file(), "{} is missing: `cargo xtask firmware`", path.display());
     path
 }
 
@@ -68,8 +68,8 @@ pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome 
 pub enum Machine {
     /// `hums sim`: this PC.
     Sim,
-    /// `hums emulate`: the firmware in QEMU.
-    Emulated,
+    /// `hums emulate`: the image that is flashed, on the model of its chip.
+    Chip,
 }
 
 /// A recording that was made, in a folder that goes with it.
@@ -87,14 +87,14 @@ impl Recording {
         let dir = tempfile::tempdir().unwrap();
         let (name, limit) = match machine {
             Machine::Sim => ("sim", LIMIT),
-            Machine::Emulated => ("emulate", LIMIT_EMULATED),
+            Machine::Chip => ("emulate", LIMIT_CHIP),
         };
         let mut command = command([name, "--json", "--input"]);
         command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.arg("--gs").arg(dir.path().join("gs.bin")).args(flags);
         match machine {
             Machine::Sim => command.args(["--speed", "max"]),
-            Machine::Emulated => command.arg("--firmware").arg(firmware()),
+            Machine::Chip => command.arg("--firmware").arg(firmware()),
         };
         let outcome = child::run(&mut command, limit);
         Self { dir, outcome }
@@ -138,11 +138,7 @@ impl Recording {
     /// The monitor's own records on the card, in order, with their times.
     #[track_caller]
     pub fn records(&self) -> Vec<Value> {
-        let image = self.image();
-        let mut command = command(["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()]);
-        let text = child::run(command.args(["--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
-        let records = text.lines().filter(|line| line.contains("\"record\":"));
-        records.map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+        records(&self.image(), &[0])
     }
 
     /// Everything on the card, decoded; the exit code is one of `codes`.
@@ -150,6 +146,15 @@ impl Recording {
     pub fn decode(&self, codes: &[i32]) -> Decoded {
         Decoded::of(&self.image(), codes)
     }
+}
+
+/// The monitor's own records on a card, in order, with their times; the exit code is one of `codes`.
+#[track_caller]
+pub fn records(image: &Path, codes: &[i32]) -> Vec<Value> {
+    let mut command = command(["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()]);
+    let text = child::run(command.args(["--format", "jsonl"]), LIMIT).expect_code(codes).text();
+    let records = text.lines().filter(|line| line.contains("\"record\":"));
+    records.map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
 }
 
 /// A decoded card or log.

@@ -30,10 +30,10 @@ pub(crate) struct Bytes {
     pub(crate) reason: String,
 }
 
-/// One limit of `budgets.toml`, in instructions.
+/// One limit of `budgets.toml`, in cycles of the processor.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Instructions {
+pub(crate) struct Cycles {
     /// For each frame.
     pub(crate) per_frame_max: f64,
     pub(crate) reason: String,
@@ -43,7 +43,7 @@ pub(crate) struct Instructions {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Load {
-    /// In percent, of all of it.
+    /// In percent, of all of it, in the worst second.
     pub(crate) percent_max: f64,
     pub(crate) reason: String,
 }
@@ -62,11 +62,10 @@ struct OfBoard {
 pub(crate) struct Budgets {
     f405: OfBoard,
     f429: OfBoard,
-    emulated: OfBoard,
     /// By urgency.
     pub(crate) stack: BTreeMap<String, Bytes>,
     /// By stage.
-    pub(crate) instructions: BTreeMap<String, Instructions>,
+    pub(crate) cycles: BTreeMap<String, Cycles>,
     pub(crate) load: Load,
 }
 
@@ -86,7 +85,6 @@ impl Budgets {
         match board {
             Board::F405 => &self.f405,
             Board::F429 => &self.f429,
-            Board::Emulated => &self.emulated,
         }
     }
 }
@@ -231,7 +229,7 @@ mod tests {
         for board in Board::ALL {
             assert!(MEMORIES.iter().all(|(memory, ..)| budgets.of(board).memory.contains_key(*memory)));
         }
-        assert!(budgets.stack_bytes() > 0 && !budgets.instructions.is_empty());
+        assert!(budgets.stack_bytes() > 0 && !budgets.cycles.is_empty());
     }
 
     #[test]

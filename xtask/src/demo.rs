@@ -22,7 +22,7 @@ const DONE_WITH_LOSSES: i32 = 3;
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Options {
     flight: PathBuf,
-    /// On this PC even if there is an emulator.
+    /// On this PC, without the firmware.
     pc: bool,
     /// At the end, until Ctrl-C.
     dashboard: bool,
@@ -51,21 +51,21 @@ impl Options {
     }
 }
 
-/// In CI the demo must run in the emulator, and end. Program and firmware are there already.
+/// In CI the demo must run the firmware, and end. Program and firmware are there already.
 pub(crate) fn as_test() -> Result<()> {
-    fly(&Options::parse(&["--no-dashboard"])?, Some(&Board::Emulated.image()), Duration::ZERO)
+    fly(&Options::parse(&["--no-dashboard"])?, Some(&Board::F405.image()), Duration::ZERO)
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
     let start = Instant::now();
-    let outcome = setup::ensure(&[Need::Linker, Need::FirmwareTarget, Need::Qemu], false);
-    let emulated = !options.pc && outcome.has(Need::FirmwareTarget) && outcome.has(Need::Qemu);
-    if !emulated && !options.pc {
-        eprintln!("\nNo emulator here (what to type is above): the same pipeline runs on this PC instead.\n");
+    let outcome = setup::ensure(&[Need::Linker, Need::FirmwareTarget], false);
+    let flashed = !options.pc && outcome.has(Need::FirmwareTarget);
+    if !flashed && !options.pc {
+        eprintln!("\nNo firmware here (what to type is above): the same pipeline runs on this PC instead.\n");
     }
     // Both at once: the last part of each build is one core's work.
     let (program, image) = std::thread::scope(|scope| {
-        let firmware = scope.spawn(|| emulated.then(|| firmware::build(Board::Emulated)).transpose());
+        let firmware = scope.spawn(|| flashed.then(|| firmware::build(Board::F405)).transpose());
         (hums::build(), firmware.join())
     });
     program?;
@@ -99,7 +99,7 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     show_figures(&run);
     println!("{:<30} {}", "the flight", repo::shown(&options.flight));
     let by = if image.is_some() {
-        "the firmware, in the emulator"
+        "the image that is flashed, on a model of its chip"
     } else {
         "this PC, with the firmware's pipeline"
     };

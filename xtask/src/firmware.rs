@@ -18,17 +18,15 @@ pub(crate) enum Board {
     F405,
     /// A NUCLEO-F429ZI.
     F429,
-    /// The first one's chip in QEMU.
-    Emulated,
 }
 
 impl Board {
-    pub(crate) const ALL: [Self; 3] = [Self::F405, Self::F429, Self::Emulated];
+    pub(crate) const ALL: [Self; 2] = [Self::F405, Self::F429];
 
     pub(crate) fn parse(name: &str) -> Result<Self> {
         match Self::ALL.into_iter().find(|board| board.name() == name) {
             Some(board) => Ok(board),
-            None => bail!("there is no board {name}: f405, f429 or emulated"),
+            None => bail!("there is no board {name}: f405 or f429"),
         }
     }
 
@@ -36,14 +34,13 @@ impl Board {
         match self {
             Self::F405 => "f405",
             Self::F429 => "f429",
-            Self::Emulated => "emulated",
         }
     }
 
     /// Bytes of memory that can be written to: RAM and CCM (`firmware/app/src/boards/*.x`).
     pub(crate) fn ram_bytes(self) -> u64 {
         match self {
-            Self::F405 | Self::Emulated => (128 + 64) * 1024,
+            Self::F405 => (128 + 64) * 1024,
             Self::F429 => (192 + 64) * 1024,
         }
     }
@@ -143,11 +140,11 @@ mod tests {
         for board in Board::ALL {
             assert_eq!(Board::parse(board.name()).unwrap(), board);
         }
-        assert!(Board::parse("f407").unwrap_err().to_string().contains("f405, f429 or emulated"));
+        assert!(Board::parse("f407").unwrap_err().to_string().contains("f405 or f429"));
     }
 
     #[test]
     fn each_board_keeps_its_own_image() {
-        assert_ne!(Board::F405.image(), Board::Emulated.image());
+        assert_ne!(Board::F405.image(), Board::F429.image());
     }
 }

@@ -3,7 +3,6 @@
 //! Each command first sees to what it needs ([`setup`]): it installs what is missing where it may, and where it may
 //! not it says what to type and goes on as far as that goes. Nothing here is needed to use `hums` itself.
 
-mod apt;
 mod bench;
 mod budgets;
 mod costs;
@@ -35,8 +34,8 @@ const HELP: &str = "\
 cargo xtask COMMAND
 
   demo [--flight FILE] [--pc] [--no-dashboard]
-                                 a recorded flight through the firmware in the emulator, and what came of it;
-                                 without an emulator, or with --pc, through the same pipeline on this PC;
+                                 a recorded flight through the image that is flashed, on a model of its chip, and what came
+                                 of it; with --pc through the same pipeline on this PC;
                                  on a terminal the dashboard plays it at the end, until Ctrl-C
   test [--only STEP]... [--list] everything that CI checks, or the steps named with what they need; a table at the end
   prove [NAME]... [--short] [--seed N] [--runs N] [--list]
@@ -45,16 +44,16 @@ cargo xtask COMMAND
   prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]
                                  faults found and false alarms, on the labelled flights of the repository and of folders;
                                  --write makes docs/diagnosis.md
-  prove emulator                 the recordings of HUMS_FLIGHTS through the firmware in the emulator
-  firmware [--board BOARD]       build the firmware: f405 (the default) or f429, which are real, or emulated
-  bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, instructions; how fast logs are checked
+  prove chip [TEST]...           the long tests of the image that is flashed, on the model of its chip
+  firmware [--board BOARD]       build the firmware: f405 (the default) or f429
+  bench [sizes|speed|cost|logs]... what the record takes: bytes, decoding time, cycles; how fast logs are checked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   dist [--check]                 the files of a release, in target/dist; --check builds them twice and compares
   flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
                                  boot loader (dfu-util); what the board has stored stays
   attach [--board BOARD]         show the log of a board that runs (probe-rs)
   size                           flash and RAM of all boards against budgets.toml
-  costs                          instructions and stack, in the emulator, against budgets.toml
+  costs                          cycles, load and stack, on the model of the chip, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
   structure                      draw docs/modules.svg from the code, and count; a circle of imports is an error
   manifest                       make tests/flights/manifest.json anew with pymavlink
@@ -133,7 +132,7 @@ impl Command {
             "firmware" => match rest.as_slice() {
                 [] => Ok(Self::Firmware(Board::F405)),
                 ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
-                _ => bail!("firmware takes --board f405, f429 or emulated"),
+                _ => bail!("firmware takes --board f405 or f429"),
             },
             "dist" => match rest.as_slice() {
                 [] => Ok(Self::Dist { check: false }),

@@ -19,7 +19,7 @@ use crate::shell::Shell;
 pub(crate) const CHOICE: [&str; 4] = ["--workspace", "--exclude=hums-app", "--features", FEATURES];
 
 /// All of the end-to-end tests.
-const FEATURES: &str = "hums-tests/emulator,hums-tests/chip,hums-tests/browser,hums-tests/databases";
+const FEATURES: &str = "hums-tests/chip,hums-tests/browser,hums-tests/databases";
 
 /// The package of the end-to-end tests and of the campaigns.
 const END_TO_END: &str = "hums-tests";
@@ -104,8 +104,7 @@ pub(crate) fn short_campaigns() -> Result<()> {
 fn run(program: &TestProgram, options: &[&str]) -> Result<()> {
     println!("\n{} {}", program.package, program.name);
     Shell::new(&program.path)
-        .env("HUMS_FIRMWARE", Board::Emulated.image())
-        .env("HUMS_IMAGE", Board::F405.image())
+        .env("HUMS_FIRMWARE", Board::F405.image())
         .env("HUMS_DIALECT", oracle::dialect())
         .env("HUMS_PYTHON", oracle::python())
         .env("HUMS_BIN", hums::program())

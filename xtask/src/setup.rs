@@ -5,17 +5,13 @@
 //! the environment nothing is installed.
 
 use std::collections::BTreeSet;
+use std::env;
 use std::path::{Path, PathBuf};
-use std::{env, fs};
 
 use anyhow::{Result, bail};
 
-use crate::apt::{self, Distribution, SourceFile};
 use crate::repo::FIRMWARE_TARGET;
 use crate::shell::{Shell, is_root};
-
-/// The emulator's first version that has the STM32F405's 128 KiB of SRAM and its 64 KiB of CCM.
-const QEMU_MAJOR_MIN: u32 = 8;
 
 /// The target of a `hums` that needs no library of the machine it runs on.
 pub(crate) const STATIC_TARGET: &str =
@@ -30,7 +26,6 @@ pub(crate) enum Need {
     StaticTarget,
     Rustfmt,
     Clippy,
-    Qemu,
     Mtools,
     Dosfstools,
     PythonVenv,
@@ -41,13 +36,12 @@ pub(crate) enum Need {
 }
 
 impl Need {
-    pub(crate) const ALL: [Self; 13] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Linker,
         Self::FirmwareTarget,
         Self::StaticTarget,
         Self::Rustfmt,
         Self::Clippy,
-        Self::Qemu,
         Self::Mtools,
         Self::Dosfstools,
         Self::PythonVenv,
@@ -65,7 +59,6 @@ impl Need {
             Self::StaticTarget => "Rust's musl target, for the static hums of a release",
             Self::Rustfmt => "rustfmt, for the check of the formatting",
             Self::Clippy => "clippy, for the lints",
-            Self::Qemu => "qemu-system-arm 8.0 or later, which runs the firmware",
             Self::Mtools => "mtools, which reads the card's image independently of our own reader",
             Self::Dosfstools => "dosfstools (fsck.vfat), which checks the card's file system",
             Self::PythonVenv => "python3 with venv, for pymavlink, the independent reader of MAVLink",
@@ -84,7 +77,6 @@ impl Need {
             Self::StaticTarget => target_installed(STATIC_TARGET),
             Self::Rustfmt => cargo_has("fmt"),
             Self::Clippy => cargo_has("clippy"),
-            Self::Qemu => qemu_major().is_some_and(|major| major >= QEMU_MAJOR_MIN),
             Self::Mtools => find_program("mcopy").is_some(),
             Self::Dosfstools => find_program("fsck.vfat").is_some(),
             Self::PythonVenv => Shell::new("python3").args(["-c", "import venv, ensurepip"]).ask().is_some(),
@@ -110,7 +102,6 @@ impl Need {
     fn packages(self) -> &'static [&'static str] {
         match self {
             Self::Linker => &["gcc", "libc6-dev"],
-            Self::Qemu => &["qemu-system-arm"],
             Self::Mtools => &["mtools"],
             Self::Dosfstools => &["dosfstools"],
             Self::PythonVenv => &["python3-venv"],
@@ -195,100 +186,24 @@ fn install_from_apt(missing: &[Need], install: bool) {
         }
         return;
     }
-    let plain: Vec<&str> = wanted
-        .iter()
-        .filter(|need| **need != Need::Qemu)
-        .flat_map(|need| need.packages().iter().copied())
-        .collect();
+    let packages: Vec<&str> = wanted.iter().flat_map(|need| need.packages().iter().copied()).collect();
     let install = install && may_be_root();
     if install {
         attempt(Shell::as_root("apt-get").args(["update", "-qq"]));
     } else {
         advise("sudo apt-get update");
     }
-    if !plain.is_empty() {
-        apt_install(&plain, None, install);
-    }
-    if wanted.contains(&Need::Qemu) {
-        install_qemu(install);
-    }
-}
-
-fn apt_install(packages: &[&str], suite: Option<&str>, install: bool) {
-    let suite: Vec<&str> = suite.map_or_else(Vec::new, |suite| vec!["-t", suite]);
     if install {
         attempt(
             Shell::as_root("env")
                 .args(["DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-y", "-qq"])
                 .args(["--no-install-recommends", "-o", "DPkg::Lock::Timeout=300"])
-                .args(&suite)
                 .args(packages)
                 .quiet(),
         );
     } else {
-        let words: Vec<&str> = ["sudo apt-get install -y --no-install-recommends"]
-            .into_iter()
-            .chain(suite)
-            .chain(packages.iter().copied())
-            .collect();
-        advise(&words.join(" "));
+        advise(&format!("sudo apt-get install -y --no-install-recommends {}", packages.join(" ")));
     }
-}
-
-/// The distribution's own emulator if it is new enough, otherwise the one of Debian's backports.
-fn install_qemu(install: bool) {
-    let offered = || Shell::new("apt-cache").args(["madison", "qemu-system-arm"]).ask().unwrap_or_default();
-    let own = Shell::new("apt-cache").args(["policy", "qemu-system-arm"]).ask().unwrap_or_default();
-    let candidate = own.lines().find_map(|line| line.trim().strip_prefix("Candidate: ")?.into());
-    if candidate.and_then(apt::major_version).is_some_and(|major| major >= QEMU_MAJOR_MIN) {
-        return apt_install(&["qemu-system-arm"], None, install);
-    }
-    if let Some(suite) = apt::suite_with(&offered(), QEMU_MAJOR_MIN) {
-        return apt_install(&["qemu-system-arm"], Some(&suite), install);
-    }
-    let distribution = Distribution::parse(&fs::read_to_string("/etc/os-release").unwrap_or_default());
-    let source = apt::backports(&source_files(Path::new("/etc/apt")), &distribution.codename);
-    match source {
-        Some(source) if distribution.is_debian() => {
-            add_source(&source, install);
-            let suite = format!("{}-backports", distribution.codename);
-            apt_install(&["qemu-system-arm"], Some(&suite), install);
-        }
-        _ => {
-            eprintln!("This system's packages have no qemu-system-arm of version {QEMU_MAJOR_MIN} or later.");
-            if distribution.id == "ubuntu" {
-                eprintln!("Ubuntu's own cloud archive carries one for 22.04:");
-                advise("sudo apt-get install -y software-properties-common");
-                advise("sudo add-apt-repository -y cloud-archive:caracal");
-                advise("sudo apt-get install -y qemu-system-arm");
-            }
-        }
-    }
-}
-
-fn add_source(source: &SourceFile, install: bool) {
-    let path = format!("/etc/apt/sources.list.d/{}", source.name);
-    if install {
-        eprintln!("adding Debian's backports, from the same archive as the rest:\n{}", source.text);
-        if let Err(error) = Shell::as_root("tee").arg(&path).run_with_input(&source.text) {
-            eprintln!("warning: {error:#}");
-        }
-        attempt(Shell::as_root("apt-get").args(["update", "-qq"]));
-    } else {
-        advise(&format!("sudo tee {path} <<'END'\n{}END", source.text));
-        advise("sudo apt-get update");
-    }
-}
-
-/// The names and texts of the machine's package sources, in the order in which apt reads them.
-fn source_files(apt: &Path) -> Vec<(String, String)> {
-    let mut paths: Vec<PathBuf> = fs::read_dir(apt.join("sources.list.d"))
-        .map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())).collect())
-        .unwrap_or_default();
-    paths.sort();
-    paths.insert(0, apt.join("sources.list"));
-    let named = |path: PathBuf| Some((path.display().to_string(), fs::read_to_string(path).ok()?));
-    paths.into_iter().filter_map(named).collect()
 }
 
 /// Says what to type.
@@ -301,10 +216,6 @@ fn target_installed(target: &str) -> bool {
         .args(["--print", "target-libdir", "--target", target])
         .ask();
     library.is_some_and(|dir| Path::new(dir.trim()).is_dir())
-}
-
-fn qemu_major() -> Option<u32> {
-    apt::major_version(&Shell::new("qemu-system-arm").arg("--version").ask()?)
 }
 
 /// Where a program lies. The system folders are looked at too: a user's `PATH` on Debian leaves them out.
@@ -324,9 +235,9 @@ mod tests {
 
     #[test]
     fn a_missing_thing_is_named_and_fails_only_what_needs_it() {
-        let outcome = Outcome { missing: [Need::Qemu].into() };
-        assert!(!outcome.has(Need::Qemu) && outcome.has(Need::Mtools));
-        assert!(outcome.require_all().unwrap_err().to_string().contains("qemu-system-arm 8.0"));
+        let outcome = Outcome { missing: [Need::Graphviz].into() };
+        assert!(!outcome.has(Need::Graphviz) && outcome.has(Need::Mtools));
+        assert!(outcome.require_all().unwrap_err().to_string().contains("graphviz"));
         Outcome::default().require_all().unwrap();
     }
 

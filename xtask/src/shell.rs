@@ -1,7 +1,6 @@
 //! Running other programs: every command is shown before it runs, so that what xtask does can be typed by hand.
 
 use std::ffi::OsStr;
-use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
@@ -108,25 +107,6 @@ impl Shell {
     pub(crate) fn ask(mut self) -> Option<String> {
         let output = self.command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
-    }
-
-    /// Runs it with `text` on its stdin.
-    pub(crate) fn run_with_input(mut self, text: &str) -> Result<()> {
-        eprintln!("$ {}", self.shown);
-        let mut child = self
-            .command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .with_context(|| format!("cannot run {}", self.shown))?;
-        if let Some(mut stdin) = child.stdin.take() {
-            stdin.write_all(text.as_bytes())?;
-        }
-        let status = child.wait()?;
-        if !status.success() {
-            bail!("`{}` ended with {status}", self.shown);
-        }
-        Ok(())
     }
 }
 

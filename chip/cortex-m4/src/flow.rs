@@ -139,6 +139,7 @@ impl Core {
             exc_return &= !0x10;
         }
         self.cycles += timing::ENTRY;
+        self.depths.interrupted(self.r[13]);
         self.push_frame(bus);
         self.entering = Some(exc_return);
         self.deadline = 0;
@@ -226,6 +227,7 @@ impl Core {
         let Some(number) = self.exceptions.first() else {
             // Taken back while the registers were stacked: nothing is left to enter, so that they are unstacked.
             self.entering = None;
+            self.depths.resumed();
             self.unstack(bus, exc_return);
             return;
         };
@@ -236,6 +238,7 @@ impl Core {
         if self.ipsr == 0 && self.process_stack {
             core::mem::swap(&mut self.r[13], &mut self.other_sp);
         }
+        self.depths.entered(number, self.r[13]);
         self.exceptions.activate(number);
         self.ipsr = number;
         self.r[14] = exc_return;
@@ -281,6 +284,7 @@ impl Core {
             return;
         }
         self.leave_handler(returning);
+        self.depths.returned();
         self.exclusive = false;
         self.event = true;
         if self.due_after_return(value) {
@@ -290,6 +294,7 @@ impl Core {
             return;
         }
         self.cycles += timing::RETURN;
+        self.depths.resumed();
         self.unstack(bus, value);
         if value & 8 != 0 && self.control.scr & 2 != 0 && self.ipsr == 0 {
             self.sleeping = Some(Sleep::Interrupt);

@@ -24,6 +24,7 @@ mod bus;
 mod cache;
 mod control;
 mod decode;
+mod depths;
 mod exceptions;
 mod execute;
 mod flow;

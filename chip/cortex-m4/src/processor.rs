@@ -2,6 +2,7 @@
 
 use crate::bus::Bus;
 use crate::cache::Cache;
+use crate::depths::Depths;
 use crate::exceptions::Exceptions;
 use crate::mpu::Mpu;
 use crate::psr::Flags;
@@ -93,6 +94,7 @@ pub struct Core {
     pub(crate) breakpoints_stop: bool,
     pub(crate) slept: u64,
     pub(crate) cyccnt_sleeps: bool,
+    pub(crate) depths: Depths,
 }
 
 /// Which instruction sleeps.
@@ -148,6 +150,7 @@ impl Core {
             breakpoints_stop: false,
             slept: 0,
             cyccnt_sleeps: true,
+            depths: Depths::default(),
         }
     }
 
@@ -162,6 +165,7 @@ impl Core {
         self.breakpoints_stop = old.breakpoints_stop;
         self.cyccnt_sleeps = old.cyccnt_sleeps;
         self.slept = old.slept;
+        self.depths = old.depths;
         self.systick.divider = old.systick.divider;
         self.control.vtor = 0;
         self.r[14] = 0xFFFF_FFFF;
@@ -170,6 +174,7 @@ impl Core {
         match (word(bus, vectors), word(bus, vectors.wrapping_add(4))) {
             (Ok(stack), Ok(entry)) => {
                 self.r[13] = stack & !3;
+                self.depths.begin(self.r[13]);
                 self.pc = entry & !1;
                 self.thumb = entry & 1 == 1;
             }
@@ -190,6 +195,12 @@ impl Core {
     /// Cycles that it slept of these.
     pub fn slept(&self) -> u64 {
         self.slept
+    }
+
+    /// How many bytes of the main stack this exception alone took at its deepest, its frame included, in all that was run; 0 is
+    /// thread mode. What interrupted it counts on its own.
+    pub fn stack_depth(&self, exception: u16) -> u32 {
+        self.depths.of(exception)
     }
 
     /// Whether WFI or WFE waits.

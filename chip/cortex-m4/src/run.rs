@@ -60,6 +60,7 @@ impl Core {
         }
         self.execute(bus, entry.op)?;
         self.r[13] &= !3;
+        self.depths.lowest = self.depths.lowest.min(self.r[13]);
         self.previous = entry.writes;
         self.pc = self.next;
         Ok(())

@@ -1,30 +1,50 @@
-//! What each stage costs: cycles of the processor, or, in the emulator under `-icount`, instructions.
+//! What each stage costs, in cycles of the processor.
 //!
 //! Stages interrupt each other, so time is charged to the stage that runs: entering one stops the clock of the one it
 //! interrupts. Idle is a stage too; what it leaves of the whole is the load.
 
-use core::cell::RefCell;
+use core::cell::Cell;
 
-use critical_section::Mutex;
+use cortex_m::peripheral::DWT;
+use critical_section::{CriticalSection, Mutex};
 use hums_core::time::Instant;
 
-use crate::boards::board;
-use crate::boards::machine::CYCLE_BITS;
-use crate::report::{STAGES, Stage};
+/// The parts that are measured apart; `hums emulate --costs` has their names in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// Nothing else; also the interrupts of ports and clock.
+    Idle,
+    /// Everything in a task that is none of the below: the executors, waiting and waking.
+    Tasks,
+    /// Bytes to frames.
+    Framer,
+    /// Frames out of their queue.
+    Monitor,
+    /// Frames to sectors.
+    Encode,
+    /// Frames to observations, and those to what the monitor knows.
+    Observe,
+    /// Frames on to the ground station.
+    Summary,
+    /// What happens by the clock: checks for silence, the summary.
+    Tick,
+    /// Sectors to the card.
+    Storage,
+}
+
+/// Number of stages.
+const STAGES: usize = 9;
 
 /// The processor's clock, 168 MHz on every board.
 const CYCLES_A_MICROSECOND: u64 = 168;
 
-struct Meter {
-    current: Stage,
-    since: u32,
-    totals: [u64; STAGES],
-}
+/// Cycles of each stage since the start. The model of the chip reads it by its name.
+#[unsafe(no_mangle)]
+static STAGE_CYCLES: [Mutex<Cell<u64>>; STAGES] = [const { Mutex::new(Cell::new(0)) }; STAGES];
+/// The stage that runs, and the counter when it began.
+static CURRENT: Mutex<Cell<(Stage, u32)>> = Mutex::new(Cell::new((Stage::Idle, 0)));
 
-static METER: Mutex<RefCell<Meter>> =
-    Mutex::new(RefCell::new(Meter { current: Stage::Idle, since: 0, totals: [0; STAGES] }));
-
-/// Runs `work` on the account of `stage`. Longer than 2^24 cycles (0.1 s) in one go counts modulo that.
+/// Runs `work` on the account of `stage`. Longer than 2^32 cycles (25 s) in one go counts modulo that.
 pub(crate) fn measure<R>(stage: Stage, work: impl FnOnce() -> R) -> R {
     let interrupted = switch_to(stage);
     let result = work();
@@ -37,21 +57,23 @@ pub(crate) fn enter(stage: Stage) {
     switch_to(stage);
 }
 
-/// Cycles of each stage since power-on, in the order of [`Stage::NAMES`].
-pub(crate) fn totals() -> [u64; STAGES] {
-    critical_section::with(|cs| METER.borrow_ref(cs).totals)
+/// Cycles of all stages but idle since the start.
+fn busy() -> u64 {
+    let cycles = |cs: CriticalSection<'_>| {
+        let all = STAGE_CYCLES.iter().skip(Stage::Idle as usize + 1);
+        all.fold(0, |sum: u64, stage| sum.wrapping_add(stage.borrow(cs).get()))
+    };
+    critical_section::with(cycles)
 }
 
 fn switch_to(stage: Stage) -> Stage {
     critical_section::with(|cs| {
-        let mut meter = METER.borrow_ref_mut(cs);
-        let now = board::cycles();
-        let spent = now.wrapping_sub(meter.since) & ((1 << CYCLE_BITS) - 1);
-        meter.since = now;
-        let before = meter.current;
-        meter.current = stage;
-        if let Some(total) = meter.totals.get_mut(before as usize) {
-            *total = total.wrapping_add(u64::from(spent));
+        let now = DWT::cycle_count();
+        let (before, since) = CURRENT.borrow(cs).replace((stage, now));
+        let spent = now.wrapping_sub(since);
+        if let Some(total) = STAGE_CYCLES.get(before as usize) {
+            let total = total.borrow(cs);
+            total.set(total.get().wrapping_add(u64::from(spent)));
         }
         before
     })
@@ -76,10 +98,7 @@ impl Load {
         if micros < 1_000_000 {
             return None;
         }
-        let idle = Stage::Idle as usize;
-        let counted =
-            totals().iter().enumerate().filter(|(stage, _)| *stage != idle).map(|(_, cycles)| cycles).sum();
-        let busy = board::busy_cycles(counted);
+        let busy = busy();
         let permille = 1_000 * busy.wrapping_sub(self.busy) / (micros * CYCLES_A_MICROSECOND);
         (self.since, self.busy) = (now, busy);
         let permille = permille.min(1_000) as u16;

@@ -33,6 +33,16 @@ pub(crate) fn number_of(task: Task) -> u16 {
     16 + interrupt as u16
 }
 
+/// How little urgent it is, by the number of its exception: interrupts, then the tasks, then idle.
+pub(crate) fn rank(number: u16) -> usize {
+    let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
+    match tasks.into_iter().position(|task| number_of(task) == number) {
+        Some(place) => 1 + place,
+        None if number == 0 => 1 + tasks.len(),
+        None => 0,
+    }
+}
+
 /// The most urgent task that has begun and not come to its end, for want of a stacked number: it ran until now.
 pub(crate) fn begun() -> u16 {
     // As they interrupt each other.

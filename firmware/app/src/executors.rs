@@ -16,10 +16,8 @@ use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 
 use crate::boards::board;
-use crate::costs;
+use crate::costs::{self, Stage};
 use crate::exceptions::{DOWNLINK, MONITOR, RECEPTION, STORAGE};
-use crate::memory::depth;
-use crate::report::Stage;
 
 static RECEPTION_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static MONITOR_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
@@ -52,29 +50,28 @@ pub(crate) fn start() -> Spawners {
     }
 }
 
-/// Runs a task's executor, on the account of the urgency at this place of `memory::depth::NAMES`.
-fn run(executor: &'static InterruptExecutor, urgency: usize) {
+/// Runs a task's executor.
+fn run(executor: &'static InterruptExecutor) {
     // SAFETY: only the interrupt that the executor was started with calls this, and its start unmasks that interrupt.
-    let work = || costs::measure(Stage::Tasks, || unsafe { executor.on_interrupt() });
-    depth::of(urgency, work);
+    costs::measure(Stage::Tasks, || unsafe { executor.on_interrupt() });
 }
 
 #[interrupt]
 fn CAN1_TX() {
-    run(&RECEPTION_EXECUTOR, 1);
+    run(&RECEPTION_EXECUTOR);
 }
 
 #[interrupt]
 fn CAN1_RX0() {
-    run(&MONITOR_EXECUTOR, 2);
+    run(&MONITOR_EXECUTOR);
 }
 
 #[interrupt]
 fn CAN1_RX1() {
-    run(&DOWNLINK_EXECUTOR, 3);
+    run(&DOWNLINK_EXECUTOR);
 }
 
 #[interrupt]
 fn CAN1_SCE() {
-    run(&STORAGE_EXECUTOR, 4);
+    run(&STORAGE_EXECUTOR);
 }

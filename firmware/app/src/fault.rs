@@ -195,12 +195,6 @@ impl Seen {
     }
 }
 
-/// How many starts there were since power-on, this one included.
-#[cfg(feature = "board-emulated")]
-pub(crate) fn starts() -> u32 {
-    STARTS.count.load(Ordering::Relaxed)
-}
-
 /// Counts a start; how many there were since power-on, this one included.
 pub(crate) fn count_start() -> u32 {
     let starts = if STARTS.mark.swap(MARK, Ordering::Relaxed) == MARK {
@@ -217,29 +211,32 @@ pub(crate) fn silent(task: Option<Task>) {
     SILENT.store(task.map_or(0, |task| u32::from(exceptions::number_of(task))), Ordering::Relaxed);
 }
 
-/// The watchdog is about to bite. `interrupted` ran until now; `None`: nothing did, all tasks wait.
+/// The watchdog is about to bite. `interrupted` ran until now.
 ///
 /// To blame is the task that is silent. If none is known to be, the monitor does not look any more: because it waits, or
-/// because what runs does not let it.
-pub(crate) fn late(interrupted: Option<&ExceptionFrame>) {
-    let running = interrupted.map_or(0, |frame| (frame.xpsr() & 0x1FF) as u16);
-    let blamed = match SILENT.load(Ordering::Relaxed) as u16 {
+/// because what runs does not let it: then what hangs lets nobody run that is less urgent, and so the least urgent that was seen
+/// running since the last feeding is to blame.
+pub(crate) fn late(interrupted: &ExceptionFrame) {
+    let running = (interrupted.xpsr() & 0x1FF) as u16;
+    let silent = SILENT.load(Ordering::Relaxed) as u16;
+    let noted = NOTE.mark.load(Ordering::Relaxed) == MARK;
+    let before = NOTE.task.load(Ordering::Relaxed) as u16;
+    if silent == 0 && noted && exceptions::rank(running) < exceptions::rank(before) {
+        return;
+    }
+    let blamed = match silent {
         0 if running == 0 => exceptions::number_of(Task::Monitor),
         0 => running,
         silent => silent,
     };
-    match interrupted.filter(|_| running == blamed) {
-        Some(frame) => {
-            NOTE.keep_registers(stacked(frame));
-            let place = format_args!("pc {:08x}", frame.pc());
-            NOTE.keep(Kind::Watchdog, blamed, place, format_args!("hangs"));
-        }
-        // Keeps what an earlier look may have found.
-        None if NOTE.mark.load(Ordering::Relaxed) == MARK => {}
-        None => {
-            NOTE.keep_registers(Registers::default());
-            NOTE.keep(Kind::Watchdog, blamed, format_args!("waits"), format_args!("silent"));
-        }
+    if running == blamed {
+        NOTE.keep_registers(stacked(interrupted));
+        let place = format_args!("pc {:08x}", interrupted.pc());
+        NOTE.keep(Kind::Watchdog, blamed, place, format_args!("hangs"));
+    } else if !noted {
+        // Else an earlier look has found more.
+        NOTE.keep_registers(Registers::default());
+        NOTE.keep(Kind::Watchdog, blamed, format_args!("waits"), format_args!("silent"));
     }
 }
 

@@ -17,18 +17,6 @@ pub(crate) static GS: Link = Signal::new();
 pub(crate) static UPLINK: Link = Signal::new();
 /// Monitor to requests: there may be frames for the autopilot.
 pub(crate) static AUTOPILOT: Link = Signal::new();
-/// Reception to monitor: the input has ended, its last frame is queued.
-pub(crate) static INPUT_ENDED: Link = Signal::new();
-/// Monitor to storage: the last sector is queued. Looked at, not waited for: `SECTORS` wakes.
-pub(crate) static RECORD_ENDED: Link = Signal::new();
-/// Storage to monitor: the log is closed; how many frames found no card.
-pub(crate) static LOG_CLOSED: Link<u64> = Signal::new();
-/// Monitor to storage: the session ends, so an erase does no harm. Looked at, not waited for.
-pub(crate) static ENDING: Link = Signal::new();
-/// Storage to monitor: the store took something, so that there is room for more. Listened to at the end only.
-pub(crate) static STORED: Link = Signal::new();
-/// Downlink to monitor: everything is sent.
-pub(crate) static GS_EMPTY: Link = Signal::new();
 
 /// The board's clock, as everything below the app counts time.
 pub(crate) fn now() -> Instant {

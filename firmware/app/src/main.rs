@@ -18,7 +18,6 @@ mod fault;
 mod links;
 mod memory;
 mod registers;
-mod report;
 mod status;
 mod tasks;
 mod trap;
@@ -59,7 +58,6 @@ fn main() -> ! {
 fn start() -> board::Idle {
     // SAFETY: this is the program's first statement: nobody has touched CCM, no interrupt is unmasked.
     unsafe { memory::init() };
-    board::remember();
     let boots = fault::count_start();
     let parts = board::take();
     defmt::info!("start {=u32}, {}, id {=[u8]:02x}", boots, parts.boot.cause, parts.boot.id);
@@ -84,7 +82,6 @@ fn start() -> board::Idle {
     let monitoring = monitoring(monitor, identity);
     monitoring.restore_signing(keeper);
 
-    memory::depth::end_start();
     let on = executors::start();
     let (autopilot_rx, autopilot_tx) = parts.autopilot;
     let (gs_rx, gs_tx) = parts.gs;

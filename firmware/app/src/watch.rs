@@ -12,7 +12,6 @@ use cortex_m_rt::ExceptionFrame;
 
 use crate::boards::board;
 use crate::fault;
-use crate::memory::depth;
 
 /// The watchdog does not run yet.
 const NEVER: u32 = u32::MAX;
@@ -36,21 +35,15 @@ unsafe extern "C" fn SysTick() {
 }
 
 extern "C" fn turn(interrupted: *const ExceptionFrame) {
-    depth::of(0, || look(interrupted));
-}
-
-fn look(interrupted: *const ExceptionFrame) {
     // SAFETY: the processor stacked its registers there as this exception began.
     let frame = unsafe { &*interrupted };
     let since = SINCE_FED.load(Ordering::Relaxed);
-    if since == NEVER || !board::is_watched() {
+    if since == NEVER {
         return;
     }
-    let idle = frame.xpsr() & 0x1FF == 0;
-    let since = if idle && board::TIME_STOPS_WITH_TASKS { 0 } else { since.saturating_add(1).min(NEVER - 1) };
+    let since = since.saturating_add(1).min(NEVER - 1);
     SINCE_FED.store(since, Ordering::Relaxed);
     if since >= board::LATE_TURNS {
-        fault::late(Some(frame));
-        board::bites_soon();
+        fault::late(frame);
     }
 }

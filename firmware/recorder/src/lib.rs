@@ -13,7 +13,7 @@
 //! * Of a vehicle that is recorded by arming, while it is disarmed, only the last while is kept: small segments that are
 //!   renamed and overwritten in turn.
 //!
-//! [`spi`] is the driver of a real card; the PC's and the emulator's cards are files.
+//! [`spi`] is the driver of a real card; the PC's cards are files.
 //!
 //! Nothing on a card may stop the monitor: [`layout::Layout`] is checked before `embedded-sdmmc` sees the card, and
 //! `gate::Gate` checks what it reads of the FAT and bounds how much it may read.

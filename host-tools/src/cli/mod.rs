@@ -55,7 +55,7 @@ pub struct Cli {
 pub enum Command {
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
     Sim(Sim),
-    /// The same with the real Cortex-M4 firmware image, in QEMU
+    /// The same with the image that is flashed, on a model of its chip
     Emulate(Emulate),
     /// Turn logs into files for other tools: tlog, CSV, JSON lines, line protocol, Parquet, the thesis's tables
     Decode(Decode),

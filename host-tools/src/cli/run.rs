@@ -118,25 +118,9 @@ pub struct Sim {
 
 const EMULATE_EXAMPLES: &str = "Examples:
   hums emulate --input flight.tlog --sd card.img
-  hums emulate --input flight.tlog --sd card.img --json --firmware target/thumbv7em-none-eabihf/firmware/hums-firmware
+  hums emulate --input flight.tlog --sd card.img --json --firmware hums-f405.elf
 
-Needs qemu-system-arm 8.0 or later. Inside the source tree a missing firmware image is built first.";
-
-/// What the firmware understands of `--provoke`.
-fn provoked(text: &str) -> Result<String, String> {
-    let (what, at_s) = text.split_once('@').unwrap_or((text, "0"));
-    let (what, task) = what.split_once(':').unwrap_or((what, "downlink"));
-    let one_of = |word: &str, known: &[&str]| {
-        known.contains(&word).then_some(()).ok_or(format!("{word} is none of {}", known.join(", ")))
-    };
-    one_of(what, &["panic", "bus-fault", "overflow", "spin", "silence", "supply"])?;
-    one_of(task, &["reception", "monitor", "downlink", "storage"])?;
-    if what == "silence" && task != "downlink" {
-        return Err(format!("{task} has no place where it could wait for ever: only downlink has; or spin"));
-    }
-    at_s.parse::<u32>().map_err(|_| format!("{at_s} is no whole number of seconds"))?;
-    Ok(text.to_owned())
-}
+A second of flight takes some 0.15 s. Inside the source tree a missing image is built first (cargo xtask firmware).";
 
 /// `hums emulate`
 #[derive(Args, Clone, Debug)]
@@ -145,14 +129,11 @@ pub struct Emulate {
     /// The run.
     #[command(flatten)]
     pub run: Run,
-    /// The firmware image (ELF) of the emulated board; otherwise the one that the source tree built
-    #[arg(long, value_name = "ELF")]
+    /// The firmware image of the board f405 (ELF, DFU or raw); otherwise the one that the source tree built
+    #[arg(long, value_name = "IMAGE")]
     pub firmware: Option<PathBuf>,
-    /// What is to go wrong, once, in the firmware itself: panic, bus-fault, overflow (of the stack), spin, silence or
-    /// supply; in reception, monitor, downlink (the default) or storage; from some second on (0)
-    #[arg(long, value_name = "WHAT[:TASK][@SECONDS]", value_parser = provoked)]
-    pub provoke: Option<String>,
-    /// Count the instructions of each stage of the pipeline, for `instructions` in the JSON
+    /// Measure what the stages of the pipeline cost the processor and the stack: `cycles`, `stack_by_urgency` and
+    /// `busy_percent_max` in the JSON, modelled
     #[arg(long)]
     pub costs: bool,
 }

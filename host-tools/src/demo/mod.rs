@@ -1,4 +1,4 @@
-//! `hums demo`: a recorded flight is recorded by the firmware (in the emulator, where there is one), the card is
+//! `hums demo`: a recorded flight is recorded by the firmware (on the model of its chip, where there is an image), the card is
 //! decoded, what came of it is summed up, and the dashboard plays the card.
 
 mod earlier;
@@ -15,7 +15,7 @@ use crate::files::{InPlacePart, Inputs, make_directory};
 use crate::logs;
 use crate::outcome::{Outcome, usage};
 use crate::output::line;
-use crate::run::{emulate, qemu, sim};
+use crate::run::{emulate, sim};
 use crate::summary::Overview;
 use crate::{decode, info, live, report};
 
@@ -134,7 +134,7 @@ fn flight(args: &cli::Demo) -> Result<Endpoint> {
     }
 }
 
-/// By the firmware in the emulator; where there is none, by the same pipeline on this PC.
+/// By the firmware on the model of its chip; where there is no image, by the same pipeline on this PC.
 fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
     let run = cli::Run {
         input: flight.clone(),
@@ -149,17 +149,14 @@ fn record(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
         faults: FaultFlags::default(),
     };
     let here = |why: &anyhow::Error| -> Result<Outcome> {
-        note!("not in the emulator: {why:#}");
+        note!("not by the firmware: {why:#}");
         line("   recorded by the same pipeline on this PC")?;
         sim::run(&cli::Sim { run: run.clone(), tap: None })
     };
-    if let Err(why) = qemu::check() {
-        return here(&why);
-    }
     let firmware = match emulate::firmware(None) {
         Ok(firmware) => firmware,
         Err(why) => return here(&why),
     };
-    line("   recorded by the firmware itself, in QEMU")?;
-    emulate::run(&cli::Emulate { run, firmware: Some(firmware), costs: false, provoke: None })
+    line("   recorded by the image that is flashed, on a model of its chip")?;
+    emulate::run(&cli::Emulate { run, firmware: Some(firmware), costs: false })
 }

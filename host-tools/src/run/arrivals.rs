@@ -12,8 +12,7 @@ use crate::made;
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
 
-/// The most bytes that arrive at once: what the emulated board hands to reception in one call. `sim` cuts alike, so
-/// that both machines' logs agree.
+/// The most bytes that arrive at once: as much as the board's ring holds.
 pub const CHUNK_BYTES_MAX: usize = 2048;
 
 /// The stream of arrivals.

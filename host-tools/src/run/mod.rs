@@ -1,7 +1,7 @@
 //! `hums sim` and `hums emulate`: a recording goes in at the UART and comes out on a card.
 //!
 //! Both get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]); what differs is the machine:
-//! [`sim`] runs the tasks' bodies on this PC, [`emulate`] the firmware itself in QEMU.
+//! [`sim`] runs the tasks' bodies on this PC, [`emulate`] the image that is flashed on the model of its chip.
 
 pub mod arrivals;
 mod earlier;
@@ -9,7 +9,6 @@ pub mod emulate;
 pub mod ground;
 pub(crate) mod params;
 mod paths;
-pub mod qemu;
 pub mod report;
 mod salt;
 pub mod sim;

@@ -70,9 +70,21 @@ pub struct Report {
     /// The deepest that each urgency alone took it, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_by_urgency: Option<serde_json::Value>,
-    /// Instructions by stage, where measured.
+    /// Cycles of the processor by stage, where measured.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub instructions: Option<serde_json::Value>,
+    pub cycles: Option<serde_json::Value>,
+    /// What the processor was busy in the worst second but the first, in percent, where measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub busy_percent_max: Option<f64>,
+}
+
+/// What the logs of a run are, by the card.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OnCard {
+    /// Bytes of log.
+    pub bytes: u64,
+    /// The recorder's last figures, where it has told any.
+    pub stats: Option<Stats>,
 }
 
 /// Changes of level that are kept one by one: a run may go on for days.
@@ -150,9 +162,11 @@ impl Report {
         self.gs_bytes = stats.gs_bytes;
     }
 
-    /// Adds what the card's logs of this run say, and which earlier ones it overwrote; gives the frames of the run's.
-    pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<u64> {
+    /// Adds what the card's logs of this run say, and which earlier ones it overwrote; gives how many frames the run's have in how
+    /// many bytes, and the recorder's last figures.
+    pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<(u64, OnCard)> {
         let mut frames = 0;
+        let mut on_card = OnCard::default();
         // A card that cannot be read has no log to tell of; the counters say what was lost.
         let logs = logs::on_card(card);
         if !logs.is_empty() {
@@ -162,6 +176,8 @@ impl Report {
         for log in logs.iter().filter(|log| !earlier.has(log)) {
             let overview = Overview::of(log)?;
             frames += overview.contents.frames();
+            on_card.bytes += overview.log_bytes();
+            on_card.stats = overview.contents.stats.or(on_card.stats);
             self.log_files.extend(log.files.iter().cloned());
             self.usage =
                 overview.contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
@@ -169,7 +185,7 @@ impl Report {
                 self.findings.push(Finding::from(finding));
             }
         }
-        Ok(frames)
+        Ok((frames, on_card))
     }
 
     /// Prints it, and says how the run ended: what was lost because power was cut on purpose is no loss of the recorder.

@@ -100,6 +100,25 @@ impl FileFlash {
         self.0.borrow().flash.is_dead()
     }
 
+    /// All of it.
+    pub(super) fn bytes(&self) -> Vec<u8> {
+        self.0.borrow().flash.bytes().to_vec()
+    }
+
+    /// Makes a store of it where it is empty: a first start would erase it, which takes half a second.
+    pub(super) fn prepare(&self) -> Result<()> {
+        if self.bytes().iter().any(|byte| *byte != 0xFF) {
+            return Ok(());
+        }
+        Store::mount(self.clone()).map(drop).map_err(|error| anyhow!("the store cannot be made: {error:?}"))
+    }
+
+    /// Holds this from now on.
+    pub(super) fn set(&self, bytes: &[u8]) {
+        self.0.borrow_mut().flash = SimFlash::with(bytes);
+        self.write_out(0, BYTES);
+    }
+
     /// The error of the file itself, if there was one.
     pub(super) fn take_error(&self) -> Option<io::Error> {
         self.0.borrow_mut().error.take()

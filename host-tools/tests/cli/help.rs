@@ -13,7 +13,7 @@ use super::support::{hums, px4, run, text};
 
 /// What runs until Ctrl-C, and is well when it has told where its page is.
 const SERVES: &str = "live";
-/// Commands whose examples need an emulator (`tests/emulator` runs it) or a board (`tests/sim/companion.rs` plays one).
+/// Commands whose examples need the firmware (`tests/chip` runs it) or a board (`tests/sim/companion.rs` plays one).
 const ELSEWHERE: [&str; 4] = ["emulate", "params", "pull", "format"];
 
 /// The examples of a help text, without remarks and without what stands after a pipe.
@@ -82,8 +82,9 @@ fn copy(from: &Path, to: &Path) {
 
 /// Runs an example to its end.
 fn works(dir: &Path, example: &str) {
-    // Without a path there is no emulator: the demo runs the same pipeline on this PC.
-    let output = hums().current_dir(dir).env("PATH", "").args(example.split_whitespace()).output();
+    // Where there is no firmware the demo runs the same pipeline on this PC.
+    let output =
+        hums().current_dir(dir).env("HUMS_FIRMWARE", "none").args(example.split_whitespace()).output();
     let output = output.expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr);
     // 3: what an example of a fault recorded has losses; 4: a check found something.

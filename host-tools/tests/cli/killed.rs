@@ -139,8 +139,8 @@ fn a_demo_that_was_killed_is_in_the_next_ones_way_nowhere() {
     fs::write(&mine, "mine").expect("written");
     let demo = || {
         let mut demo = Command::new(env!("CARGO_BIN_EXE_hums"));
-        // Without a path there is no emulator.
-        demo.current_dir(dir.path()).env("PATH", "").stdout(Stdio::null()).stderr(Stdio::null());
+        // Without the firmware it records on this PC.
+        demo.current_dir(dir.path()).env("HUMS_FIRMWARE", "none").stdout(Stdio::null()).stderr(Stdio::null());
         demo.args(["demo", "--input", &input, "--dir", ".", "--dashboard", "never"]);
         demo
     };
@@ -213,8 +213,13 @@ fn a_demo_removes_what_a_demo_made_and_nothing_else() {
     let demo = |code: i32| -> String {
         let input = px4().display().to_string();
         let words = ["demo", "--input", &input, "--dir", ".", "--dashboard", "never"];
-        // Without a path there is no emulator.
-        let ended = hums().current_dir(dir.path()).env("PATH", "").args(words).output().expect("it runs");
+        // Without the firmware it records on this PC.
+        let ended = hums()
+            .current_dir(dir.path())
+            .env("HUMS_FIRMWARE", "none")
+            .args(words)
+            .output()
+            .expect("it runs");
         let said = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert_eq!(ended.status.code(), Some(code), "{said}");
         said

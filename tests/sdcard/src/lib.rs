@@ -13,11 +13,13 @@ mod fault;
 mod medium;
 mod model;
 mod slot;
+mod wire;
 
 pub use fault::{Fault, Plan};
 pub use medium::Medium;
 pub use model::{Kind, Model};
 pub use slot::{Counts, Event, SimPort, SimSpi, Slot};
+pub use wire::Card;
 
 /// Nanoseconds of a millisecond.
 pub const MS: u64 = 1_000_000;

@@ -3,6 +3,8 @@
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::convert::Infallible;
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::rc::Rc;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
@@ -32,6 +34,44 @@ impl Medium {
         assert!(format(&medium, size ^ 0x5D5D_0001).is_ok(), "{size} blocks are too few");
         medium.writes.set(0);
         medium
+    }
+
+    /// One that holds what this image has, which may be sparse. A last part of a block is left out.
+    ///
+    /// # Errors
+    /// Of the image's reading; `InvalidInput` where it has more blocks than a card can.
+    pub fn load(mut image: &File) -> io::Result<Self> {
+        const CHUNK: usize = 2_048 * 512;
+        let size = u32::try_from(image.metadata()?.len() / 512).map_err(|_| io::ErrorKind::InvalidInput)?;
+        let medium = Self::new(size);
+        let mut chunk = vec![0; CHUNK];
+        for first in (0..size).step_by(CHUNK / 512) {
+            let blocks = (size - first).min((CHUNK / 512) as u32) as usize;
+            let from = u64::from(first) * 512;
+            if is_hole(image, from, (blocks * 512) as u64) {
+                continue;
+            }
+            image.seek(SeekFrom::Start(from))?;
+            image.read_exact(&mut chunk[..blocks * 512])?;
+            let blocks = chunk[..blocks * 512].as_chunks::<512>().0;
+            let written = (first..).zip(blocks).filter(|(_, block)| **block != [0; 512]);
+            medium.blocks.borrow_mut().extend(written.map(|(at, block)| (at, *block)));
+        }
+        Ok(medium)
+    }
+
+    /// Writes what it holds into this image, in place.
+    ///
+    /// # Errors
+    /// Of the image's writing.
+    pub fn save(&self, mut image: &File) -> io::Result<()> {
+        if image.metadata()?.len() < u64::from(self.size) * 512 {
+            image.set_len(u64::from(self.size) * 512)?;
+        }
+        self.blocks.borrow().iter().try_for_each(|(at, block)| {
+            image.seek(SeekFrom::Start(u64::from(*at) * 512))?;
+            image.write_all(block)
+        })
     }
 
     /// How many blocks it has.
@@ -68,6 +108,22 @@ impl Medium {
     /// Blocks written since it was made or formatted.
     pub fn writes(&self) -> u64 {
         self.writes.get()
+    }
+}
+
+/// Whether a sparse file has nothing there; reading it would tell as much, and take long.
+#[cfg(not(target_os = "linux"))]
+fn is_hole(_file: &File, _from: u64, _bytes: u64) -> bool {
+    false
+}
+
+/// Whether a sparse file has nothing there.
+#[cfg(target_os = "linux")]
+fn is_hole(file: &File, from: u64, bytes: u64) -> bool {
+    match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(from)) {
+        Ok(data) => data >= from + bytes,
+        // No data up to the end.
+        Err(error) => error == rustix::io::Errno::NXIO,
     }
 }
 

@@ -5,28 +5,13 @@ pub mod record;
 pub mod rig;
 
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use hums_recorder::spi::{Clock, Port};
-use hums_sdcard::{Kind, Medium, Model, Plan, SimPort, Slot};
+use hums_sdcard::{Card, Kind, Medium, Model, Plan, Slot};
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board, Machine};
-use stm32f405_model::spi::Wire;
 use stm32f405_model::time::{Ps, SECOND, US};
-
-use crate::flights::root;
-
-/// The F405's image, made as a release is: `HUMS_IMAGE` names the ELF file, otherwise it is where xtask leaves it.
-///
-/// # Panics
-/// If it is not there.
-pub fn image_path() -> PathBuf {
-    let built = || root().join("target/firmware/hums-f405.elf");
-    let path = std::env::var_os("HUMS_IMAGE").map_or_else(built, PathBuf::from);
-    assert!(path.is_file(), "{} is missing: `cargo xtask firmware`", path.display());
-    path
-}
 
 /// The autopilot's rate.
 pub const BAUD: f64 = 921_600.0;
@@ -87,52 +72,6 @@ pub fn frames(mut tlog: &[u8]) -> Vec<(u64, &[u8])> {
     frames
 }
 
-/// A card in its slot, byte by byte at a bus.
-pub struct Card {
-    slot: Slot,
-    port: SimPort,
-    hz: u32,
-}
-
-impl Card {
-    /// At the bus's beginning.
-    pub fn new(slot: &Slot) -> Self {
-        Self { slot: slot.clone(), port: slot.port(), hz: 0 }
-    }
-}
-
-impl Wire for Card {
-    fn exchange(&mut self, ps: u64, hz: u32, sent: u8) -> u8 {
-        if hz != self.hz {
-            self.hz = hz;
-            self.port.set_clock(if hz <= 400_000 { Clock::Identification } else { Clock::Transfer });
-        }
-        // The slot adds the byte's own time.
-        self.slot.advance_to((ps / 1_000).saturating_sub(8_000_000_000 / u64::from(hz.max(1))));
-        let mut byte = [sent];
-        let _ = self.port.exchange(&mut byte);
-        if std::env::var_os("TRACE_CARD").is_some() {
-            eprintln!("{} us {hz} Hz {sent:02x} -> {:02x}", ps / US, byte[0]);
-        }
-        byte[0]
-    }
-
-    fn select(&mut self, ps: u64, selected: bool) {
-        self.slot.advance_to(ps / 1_000);
-        self.port.select(selected);
-        if std::env::var_os("TRACE_CARD").is_some() {
-            eprintln!("{} us select {selected}", ps / US);
-        }
-    }
-
-    fn power(&mut self, ps: u64, on: bool) {
-        if !on && self.slot.has_card() {
-            self.slot.advance_to(ps / 1_000);
-            self.slot.event(hums_sdcard::Event::Bounce);
-        }
-    }
-}
-
 /// Blocks of the card: 4 GB, a multiple of what a CSD counts in.
 pub const BLOCKS: u32 = 8_388_608;
 
@@ -152,11 +91,5 @@ pub fn board_with(image: Image, board: Board, plans: Vec<Plan>) -> (Machine, Slo
 
 /// Writes a card's image to a file.
 pub fn save(medium: &Medium, path: &Path) -> std::io::Result<()> {
-    use std::os::unix::fs::FileExt;
-    let file = std::fs::File::create(path)?;
-    file.set_len(u64::from(medium.size()) * 512)?;
-    for (at, block) in medium.content() {
-        file.write_all_at(&block, u64::from(at) * 512)?;
-    }
-    Ok(())
+    medium.save(&std::fs::File::create(path)?)
 }

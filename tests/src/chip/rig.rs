@@ -116,28 +116,28 @@ impl Rig {
         Ok(())
     }
 
-    /// The task whose interrupt's handler this is hangs, at full rate, until the next reset (4 s at the most): the handler begins with
-    /// a branch to itself. Gives the handler's address.
+    /// The interrupt's handler of this name begins with other instructions until the next reset (15 s at the most), at full rate or on a
+    /// line that is at rest. Gives the handler's address.
     ///
     /// # Panics
     /// If the image has no such handler.
-    pub fn hang(&mut self, handler: &str) -> Result<u32, Box<Report>> {
+    pub fn replace(&mut self, handler: &str, code: &[u8], busy: bool) -> Result<u32, Box<Report>> {
         let symbol = self.machine.image().symbols.iter().find(|symbol| symbol.name == handler);
         let address = symbol.expect("a handler of the image's").address;
         let at = (address - FLASH.0) as usize;
-        let swap = |rig: &mut Self, with: [u8; 2]| {
-            let place = &mut rig.machine.chip.flash.content.all_mut()[at..at + 2];
-            let was = [place[0], place[1]];
-            place.copy_from_slice(&with);
-            rig.machine.core.forget_code(address, 2);
+        let swap = |rig: &mut Self, with: &[u8]| {
+            let place = &mut rig.machine.chip.flash.content.all_mut()[at..at + with.len()];
+            let was = place.to_vec();
+            place.copy_from_slice(with);
+            rig.machine.core.forget_code(address, with.len() as u32);
             was
         };
-        let was = swap(self, [0xFE, 0xE7]);
-        let (resets, end) = (self.machine.resets.len(), self.machine.now() + 4 * SECOND);
+        let was = swap(self, code);
+        let (resets, end) = (self.machine.resets.len(), self.machine.now() + 15 * SECOND);
         while self.machine.resets.len() == resets && self.machine.now() < end {
-            self.run(self.machine.now() + MS, true)?;
+            self.run(self.machine.now() + MS, busy)?;
         }
-        swap(self, was);
+        swap(self, &was);
         Ok(address)
     }
 

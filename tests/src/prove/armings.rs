@@ -132,8 +132,14 @@ impl Subject {
         for (name, value) in [("REC_MODE", 1.0), ("REC_BEFORE", BEFORE_S as f32), ("REC_AFTER", 0.0)] {
             params.set(name, value).map_err(|error| anyhow::anyhow!("{name}: {error:?}"))?;
         }
-        let done =
-            power_on(&card.device(hums::card::Faults::default())?, &params, 1, stream.chunks(), |_| Ok(()))?;
+        let done = power_on(
+            &card.device(hums::card::Faults::default())?,
+            &params,
+            1,
+            &mut std::io::sink(),
+            stream.chunks(),
+            |_| Ok(()),
+        )?;
         ensure!(done.stats.frames_lost == 0, "frames were lost");
         let files = on_card(&card.path()).iter().map(files_of).collect::<Result<Vec<_>>>()?.concat();
         let dir = tempfile::tempdir()?;

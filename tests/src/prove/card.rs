@@ -49,7 +49,7 @@ impl Card {
     /// Records all of a stream in one power-on.
     pub(super) fn record(&self, stream: &Stream, boots: u32) -> Result<PowerOn> {
         let device = self.device(Faults::default())?;
-        power_on(&device, &Params::defaults(), boots, stream.chunks(), |_| Ok(()))
+        power_on(&device, &Params::defaults(), boots, &mut std::io::sink(), stream.chunks(), |_| Ok(()))
     }
 
     /// All of it.

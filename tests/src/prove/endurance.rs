@@ -70,17 +70,24 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let (look_at, looked) = (Cell::new(seconds * 1_000_000 / looks), Cell::new(0_u64));
     let mut seen = Vec::new();
     let path = card.path();
-    let done = power_on(&device, &Params::defaults(), 1, Day::new(&streams, seconds), |chunk| {
-        if chunk.at_us < look_at.get() {
-            return Ok(());
-        }
-        looked.set(looked.get() + 1);
-        look_at.set((looked.get() + 1) * seconds * 1_000_000 / looks);
-        let about =
-            look(&path, form, chunk.at_us).with_context(|| format!("after {} s", chunk.at_us / 1_000_000))?;
-        seen.push(about);
-        Ok(())
-    })?;
+    let done = power_on(
+        &device,
+        &Params::defaults(),
+        1,
+        &mut std::io::sink(),
+        Day::new(&streams, seconds),
+        |chunk| {
+            if chunk.at_us < look_at.get() {
+                return Ok(());
+            }
+            looked.set(looked.get() + 1);
+            look_at.set((looked.get() + 1) * seconds * 1_000_000 / looks);
+            let about = look(&path, form, chunk.at_us)
+                .with_context(|| format!("after {} s", chunk.at_us / 1_000_000))?;
+            seen.push(about);
+            Ok(())
+        },
+    )?;
     card.check()?;
     let last = look(&path, form, seconds * 1_000_000).context("at the end")?;
     ensure!(done.stats.frames_lost == 0, "{} frames lost", done.stats.frames_lost);

@@ -256,7 +256,7 @@ impl Session {
             params.set(name, *value).map_err(|error| anyhow::anyhow!("{name}: {error:?}"))?;
         }
         let boots = scenario.earlier + 1;
-        let done = power_on(&device, &params, boots, stream.chunks(), |_| Ok(()))?;
+        let done = power_on(&device, &params, boots, &mut std::io::sink(), stream.chunks(), |_| Ok(()))?;
         ensure!(done.stats.frames_lost == 0 && done.frames_left == 0, "frames were lost: {:?}", done.stats);
         let drops = done.card.segments_released > 0;
         ensure!(drops == (scenario.disarmed_s > 0.0), "{} segments dropped", done.card.segments_released);

@@ -76,7 +76,7 @@ fn stall(stream: &Stream, at_s: u64) -> Result<Stats> {
     let stall = Stall { from_us: at_s * 1_000_000, for_us: STALL_MS * 1_000 };
     let card = Card::new(256)?;
     let device = card.device(Faults { stalls: vec![stall], ..Faults::default() })?;
-    let done = power_on(&device, &Params::defaults(), 1, stream.chunks(), |_| Ok(()))?;
+    let done = power_on(&device, &Params::defaults(), 1, &mut std::io::sink(), stream.chunks(), |_| Ok(()))?;
     let stats = done.stats;
     // The write that meets it comes a little after it has begun.
     ensure!(stats.sd_stall_ms_max >= STALL_MS - 250, "the card never stood still");

@@ -42,7 +42,7 @@ pub(super) enum Builds {
 
 /// In the order in which they begin, as far as what they need is there: first what fails soonest, then what others
 /// wait for, then what takes longest.
-pub(super) const STEPS: [Step; 20] = [
+pub(super) const STEPS: [Step; 19] = [
     Step {
         name: "fmt",
         about: "the formatting",
@@ -77,35 +77,27 @@ pub(super) const STEPS: [Step; 20] = [
     },
     Step {
         name: "budgets",
-        about: "the firmware builds for the boards f405 and emulated, within budgets.toml",
+        about: "the firmware builds for the board f405, within budgets.toml",
         needs: &[Need::FirmwareTarget],
         after: &[],
         builds: Some(Builds::Firmware),
         run: check_budgets,
     },
     Step {
-        name: "emulator",
-        about: "end to end with the firmware in the emulator",
-        needs: &[Need::Qemu, Need::PythonVenv, Need::FirmwareTarget, Need::Dosfstools],
-        after: &["oracle", "build", "budgets"],
-        builds: None,
-        run: || pc::end_to_end("emulator", &[]),
-    },
-    Step {
         name: "chip",
-        about: "the image that is flashed, on the model of its chip",
-        needs: &[Need::FirmwareTarget],
-        after: &["build", "budgets"],
+        about: "end to end with the image that is flashed, on the model of its chip",
+        needs: &[Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools],
+        after: &["oracle", "build", "budgets"],
         builds: None,
         run: chip,
     },
     Step {
         name: "clippy-firmware",
-        about: "lints of the firmware for the boards f405 and emulated, warnings as errors",
+        about: "lints of the firmware for the board f405, warnings as errors",
         needs: &[Need::Clippy, Need::FirmwareTarget],
         after: &[],
         builds: Some(Builds::Firmware),
-        run: || FLOWN.into_iter().try_for_each(firmware::lint),
+        run: || firmware::lint(FLOWN),
     },
     Step {
         name: "clippy",
@@ -173,16 +165,16 @@ pub(super) const STEPS: [Step; 20] = [
     },
     Step {
         name: "costs",
-        about: "instructions and stack of the firmware against budgets.toml",
-        needs: &[Need::Qemu, Need::FirmwareTarget],
+        about: "cycles, load and stack of the firmware against budgets.toml",
+        needs: &[Need::FirmwareTarget],
         after: &["build", "budgets"],
         builds: None,
-        run: || costs::check_built(&hums::program(), &Board::Emulated.image()),
+        run: || costs::check_built(&hums::program(), &FLOWN.image()),
     },
     Step {
         name: "demo",
         about: "cargo xtask demo",
-        needs: &[Need::Qemu, Need::FirmwareTarget],
+        needs: &[Need::FirmwareTarget],
         after: &["build", "budgets"],
         builds: None,
         run: demo::as_test,
@@ -205,19 +197,18 @@ pub(super) const STEPS: [Step; 20] = [
     },
 ];
 
-/// The boards that every change is tried for: the one that flies and the one of the emulator, which is built first
-/// because other steps wait for it. `cargo xtask dist` looks at all of them.
-const FLOWN: [Board; 2] = [Board::Emulated, Board::F405];
+/// The board that every change is tried for. `cargo xtask dist` looks at all of them.
+const FLOWN: Board = Board::F405;
 
 fn check_budgets() -> Result<()> {
     println!("{NOT_TESTED}board f429 (cargo xtask dist lints and measures it)");
-    budgets::check(&FLOWN)
+    budgets::check(&[FLOWN])
 }
 
 /// What is flashed is what is tested: the sums are those of `cargo xtask dist` of the same sources.
 fn chip() -> Result<()> {
-    let elf = Board::F405.image();
-    let files = firmware::files(Board::F405, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
+    let elf = FLOWN.image();
+    let files = firmware::files(FLOWN, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
     print!("{}", dist::sums(&files));
     pc::end_to_end("chip", &[])
 }
@@ -251,7 +242,7 @@ fn sim() -> Result<()> {
     pc::end_to_end("sim", &options)
 }
 
-/// The tests of further recordings are left out where there are none. In the emulator they are for `cargo xtask prove`.
+/// The tests of further recordings are left out where there are none. On the model of the chip they are for `cargo xtask prove`.
 fn further() -> &'static [&'static str] {
     let given = std::env::var_os("HUMS_FLIGHTS").is_some_and(|folder| !folder.is_empty());
     if given { &["--include-ignored"] } else { &[] }

@@ -6,13 +6,13 @@
 //! | PA9 | USART1 TX, to the autopilot's TELEM RX | DMA2 stream 7 |
 //! | PA2 | USART2 TX, to the ground station's radio | DMA1 stream 6 |
 //! | PA3 | USART2 RX, from the radio | DMA1 stream 5, ring of [`GS_RING_BYTES`] |
-//! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz; MISO pulled up |
+//! | PA4, PA5, PA6, PA7 | microSD CS, SCK, MISO, MOSI (SPI1) | DMA2 streams 0 and 3; 400 kHz, then 21 MHz; MISO pulled up |
 //! | PC12 | LED, lit when low | |
 
 use embassy_stm32::dma::{self, Request};
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH2, DMA2_CH7};
+use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH2, DMA2_CH3, DMA2_CH7};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::usart::Uart;
 use embassy_stm32::{bind_interrupts, pac, rcc};
@@ -21,18 +21,23 @@ use static_cell::ConstStaticCell;
 use super::machine::{Boot, Parts};
 use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
 pub(crate) use super::stm32f4::{
-    AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash,
-    TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, crystal_failed, cycles, done, ended,
-    is_watched, remember, restart,
+    AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, Watchdog,
+    crystal_failed, restart,
 };
 use super::stm32f4::{CardPort, PortRx, PortTx, line, random_number, reset_cause, start};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f405";
 
-/// What moves the ports' bytes: more urgent than every task.
-pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 4] =
-    [interrupt::DMA2_STREAM2, interrupt::DMA2_STREAM7, interrupt::DMA1_STREAM5, interrupt::DMA1_STREAM6];
+/// What moves the bytes of ports and card: more urgent than every task.
+pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 6] = [
+    interrupt::DMA2_STREAM2,
+    interrupt::DMA2_STREAM7,
+    interrupt::DMA1_STREAM5,
+    interrupt::DMA1_STREAM6,
+    interrupt::DMA2_STREAM0,
+    interrupt::DMA2_STREAM3,
+];
 
 /// What both ports' channels are called on all four streams (RM0090, tables 42 and 43).
 const USART_REQUEST: Request = 4;
@@ -40,6 +45,8 @@ const USART_REQUEST: Request = 4;
 bind_interrupts!(struct Irqs {
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
     DMA2_STREAM7 => dma::InterruptHandler<DMA2_CH7>;
+    DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
+    DMA2_STREAM3 => dma::InterruptHandler<DMA2_CH3>;
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
 });
@@ -72,7 +79,7 @@ pub(crate) fn take() -> Parts<Board> {
     let mut bus = spi::Config::default();
     bus.frequency = CardPort::IDENTIFICATION;
     bus.miso_pull = Pull::Up;
-    let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
+    let bus = Spi::new(p.SPI1, p.PA5, p.PA7, p.PA6, p.DMA2_CH3, p.DMA2_CH0, Irqs, bus);
     Parts {
         autopilot,
         gs,

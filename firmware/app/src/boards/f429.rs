@@ -7,13 +7,13 @@
 //! | PG14 (D1) | USART6 TX, to the autopilot's TELEM RX | DMA2 stream 6 |
 //! | PD5 (CN9, 6) | USART2 TX, to the ground station's radio | DMA1 stream 6 |
 //! | PD6 (CN9, 4) | USART2 RX, from the radio | DMA1 stream 5, ring of [`GS_RING_BYTES`] |
-//! | PD14, PA5, PA6, PA7 (D10, D13, D12, D11) | microSD CS, SCK, MISO, MOSI (SPI1) | 400 kHz, then 21 MHz; MISO pulled up; JP6 off, which gives PA7 to the Ethernet |
+//! | PD14, PA5, PA6, PA7 (D10, D13, D12, D11) | microSD CS, SCK, MISO, MOSI (SPI1) | DMA2 streams 0 and 3; 400 kHz, then 21 MHz; MISO pulled up; JP6 off, which gives PA7 to the Ethernet |
 //! | PB0 | LED LD1, lit when high | |
 
 use embassy_stm32::dma::{self, Request};
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH1, DMA2_CH6};
+use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, DMA2_CH0, DMA2_CH1, DMA2_CH3, DMA2_CH6};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::usart::Uart;
 use embassy_stm32::{bind_interrupts, pac, rcc};
@@ -22,18 +22,23 @@ use static_cell::ConstStaticCell;
 use super::machine::{Boot, Parts};
 use super::stm32f4::{AUTOPILOT_BAUD, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES};
 pub(crate) use super::stm32f4::{
-    AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash,
-    TIME_STOPS_WITH_TASKS, Watchdog, bites_soon, busy_cycles, crystal_failed, cycles, done, ended,
-    is_watched, remember, restart,
+    AutopilotRx, AutopilotTx, Board, Card, GsRx, GsTx, Idle, LATE_TURNS, Led, StoreFlash, Watchdog,
+    crystal_failed, restart,
 };
 use super::stm32f4::{CardPort, PortRx, PortTx, line, random_number, reset_cause, start};
 
 /// The board's name.
 pub(crate) const NAME: &str = "f429";
 
-/// What moves the ports' bytes: more urgent than every task.
-pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 4] =
-    [interrupt::DMA2_STREAM1, interrupt::DMA2_STREAM6, interrupt::DMA1_STREAM5, interrupt::DMA1_STREAM6];
+/// What moves the bytes of ports and card: more urgent than every task.
+pub(crate) const PORT_INTERRUPTS: [interrupt::Interrupt; 6] = [
+    interrupt::DMA2_STREAM1,
+    interrupt::DMA2_STREAM6,
+    interrupt::DMA1_STREAM5,
+    interrupt::DMA1_STREAM6,
+    interrupt::DMA2_STREAM0,
+    interrupt::DMA2_STREAM3,
+];
 
 /// What USART6's channel is called on its streams, and USART2's on its own (RM0090, tables 42 and 43).
 const USART6_REQUEST: Request = 5;
@@ -42,6 +47,8 @@ const USART2_REQUEST: Request = 4;
 bind_interrupts!(struct Irqs {
     DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
     DMA2_STREAM6 => dma::InterruptHandler<DMA2_CH6>;
+    DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
+    DMA2_STREAM3 => dma::InterruptHandler<DMA2_CH3>;
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
 });
@@ -74,7 +81,7 @@ pub(crate) fn take() -> Parts<Board> {
     let mut bus = spi::Config::default();
     bus.frequency = CardPort::IDENTIFICATION;
     bus.miso_pull = Pull::Up;
-    let bus = Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus);
+    let bus = Spi::new(p.SPI1, p.PA5, p.PA7, p.PA6, p.DMA2_CH3, p.DMA2_CH0, Irqs, bus);
     Parts {
         autopilot,
         gs,

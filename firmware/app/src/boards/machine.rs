@@ -3,11 +3,8 @@
 use embedded_storage::nor_flash::NorFlash;
 use hums_recorder::CardDevice;
 
-/// Bits of `cycles()` that count: `SysTick` has 24, and the cycle counter is read as if it had no more.
-pub(crate) const CYCLE_BITS: u32 = 24;
-
 /// What `SysTick` begins again with: all of its bits, 0.1 s at 168 MHz.
-pub(crate) const SYSTICK_RELOAD: u32 = (1 << CYCLE_BITS) - 1;
+pub(crate) const SYSTICK_RELOAD: u32 = (1 << 24) - 1;
 
 /// Bytes that reception fetches at a time: 5 ms at 921,600 baud, five times what comes between two looks. After a delay
 /// it takes several, without a pause between them.
@@ -67,10 +64,6 @@ pub(crate) trait Transmit {
 
 /// Why the machine started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-#[cfg_attr(
-    feature = "board-emulated",
-    expect(dead_code, reason = "the emulator knows only how to be started")
-)]
 pub(crate) enum ResetCause {
     /// Power came.
     PowerOn,

@@ -35,7 +35,6 @@ pub(crate) async fn run(mut port: board::GsTx, mut queue: GsOut<'static>) -> ! {
         if let Some(length) = queue.take(&mut frame) {
             send(&mut port, frame.get(..length).unwrap_or_default(), &GS_STOOD_STILL).await;
         } else {
-            links::GS_EMPTY.signal(());
             // Either way it looks into the queue.
             let _ = with_timeout(REPORT, links::GS.wait()).await;
         }

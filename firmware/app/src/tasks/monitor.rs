@@ -3,7 +3,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use embassy_futures::select::{Either4, select4};
+use embassy_futures::select::{Either3, select3};
 use embassy_time::Ticker;
 use hums_onboard::monitoring::{Machine, Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
@@ -13,11 +13,10 @@ use hums_recorder::CardState;
 use super::downlink::{AUTOPILOT_STOOD_STILL, BAUD_AUTOPILOT, BAUD_GS, GS_STOOD_STILL};
 use crate::boards::board;
 use crate::boards::machine::{Boot, ResetCause};
-use crate::costs::{self, measure};
+use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};
 use crate::memory;
-use crate::report::{Report, Stage};
 use crate::status::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
 use crate::watch;
 
@@ -53,11 +52,10 @@ pub(crate) async fn run(
     loop {
         SUPERVISOR.report(Task::Monitor, now());
         // Frames first where both are due: they came before this tick.
-        let work = (links::FRAMES.wait(), ticker.next(), links::UPLINK.wait(), links::INPUT_ENDED.wait());
-        match select4(work.0, work.1, work.2, work.3).await {
-            Either4::First(()) => drain(body, &mut ends),
-            Either4::Third(()) => uplink(body, &mut ends),
-            Either4::Second(()) => {
+        match select3(links::FRAMES.wait(), ticker.next(), links::UPLINK.wait()).await {
+            Either3::First(()) => drain(body, &mut ends),
+            Either3::Third(()) => uplink(body, &mut ends),
+            Either3::Second(()) => {
                 if let Some((cpu_permille, cpu_permille_max)) = load.step(now()) {
                     let (stack_bytes_max, stack_bytes) = memory::stack_used();
                     let (stack_bytes_max, stack_bytes) = (stack_bytes_max as u32, stack_bytes as u32);
@@ -81,21 +79,8 @@ pub(crate) async fn run(
                     watch::fed();
                 }
             }
-            Either4::Fourth(()) => break,
         }
         wake_others();
-    }
-    drain(body, &mut ends);
-    save_all(body, &mut ends, handover).await;
-    finish(body, &mut ends);
-    links::RECORD_ENDED.signal(());
-    links::GS_EMPTY.reset();
-    wake_others();
-    let frames_left = links::LOG_CLOSED.wait().await;
-    links::GS_EMPTY.wait().await;
-    report(body, &ends, frames_left);
-    loop {
-        core::future::pending::<()>().await;
     }
 }
 
@@ -153,17 +138,6 @@ fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
     while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
 }
 
-/// Hands over everything that is to outlive power, as fast as the store takes it.
-async fn save_all(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
-    links::ENDING.signal(());
-    body.save_signing(now(), handover);
-    while !handover.finish(now(), body.monitor_mut()) {
-        wake_others();
-        links::STORED.wait().await;
-    }
-    note(body, ends, handover);
-}
-
 /// Records what is new about the store.
 #[inline(never)]
 fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
@@ -199,17 +173,6 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
 fn hand_over(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) {
     handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
     body.save_signing(now(), handover);
-}
-
-#[inline(never)]
-fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
-    body.finish(now(), &mut ends.sectors, &ends.gs);
-}
-
-#[inline(never)]
-fn report(body: &Monitoring<'static>, ends: &Ends, frames_left: u64) {
-    let stats = body.stats(&ends.gs);
-    board::done(&Report { stats, frames_left, costs: costs::totals(), stack: memory::stack_used() });
 }
 
 fn wake_others() {

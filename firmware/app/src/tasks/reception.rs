@@ -1,6 +1,5 @@
 //! Reception: the autopilot's bytes to frames. The most urgent task, because bytes wait nowhere but in the port's ring.
 
-use embassy_futures::select::{Either, select};
 use embassy_time::with_timeout;
 use hums_onboard::Task;
 use hums_onboard::queues::FramesIn;
@@ -8,9 +7,8 @@ use hums_onboard::reception::{Reception, SILENCE};
 
 use crate::boards::board;
 use crate::boards::machine::{FETCH_BYTES, Receive};
-use crate::costs::measure;
+use crate::costs::{Stage, measure};
 use crate::links::{self, now};
-use crate::report::Stage;
 use crate::status::{PORT_STATUS, SUPERVISOR};
 
 #[embassy_executor::task]
@@ -19,22 +17,14 @@ pub(crate) async fn run(mut port: board::AutopilotRx, mut frames: FramesIn<'stat
     let mut bytes = [0; FETCH_BYTES];
     loop {
         SUPERVISOR.report(Task::Reception, now());
-        let received = with_timeout(links::wait(SILENCE), port.receive(&mut bytes));
-        match select(received, board::ended()).await {
-            Either::First(Ok(Ok(count))) => {
+        match with_timeout(links::wait(SILENCE), port.receive(&mut bytes)).await {
+            Ok(Ok(count)) => {
                 let bytes = bytes.get(..count).unwrap_or_default();
                 measure(Stage::Framer, || body.bytes(now(), bytes, &mut frames));
             }
-            Either::First(Ok(Err(overrun))) => PORT_STATUS.count_overrun(overrun.blind_ms),
-            Either::First(Err(_silence)) => body.idle(now(), &mut frames),
-            Either::Second(()) => break,
+            Ok(Err(overrun)) => PORT_STATUS.count_overrun(overrun.blind_ms),
+            Err(_silence) => body.idle(now(), &mut frames),
         }
         links::FRAMES.signal(());
-    }
-    body.idle(now(), &mut frames);
-    links::INPUT_ENDED.signal(());
-    loop {
-        // The supervisor is not asked any more.
-        core::future::pending::<()>().await;
     }
 }

@@ -2,8 +2,7 @@
 //! nobody but idle.
 
 use embassy_time::{Duration, Timer, with_timeout};
-use hums_core::time::{Instant, Span};
-use hums_onboard::persist::Kept;
+use hums_core::time::Instant;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
@@ -14,14 +13,11 @@ use static_cell::{ConstStaticCell, StaticCell};
 use crate::status::{CARD_STATUS, SUPERVISOR};
 
 use crate::boards::board;
-use crate::costs::measure;
+use crate::costs::{Stage, measure};
 use crate::links::{self, now};
-use crate::report::Stage;
 
 /// How often it reports in while there is nothing to write.
 const REPORT: Duration = Duration::from_secs(1);
-/// How long the end waits for a card that is out, before what waits for it is lost.
-const CARD_PATIENCE: Span = Span::from_secs(5);
 
 /// What the task calls.
 type Body = Storage<'static, board::Card>;
@@ -45,41 +41,29 @@ pub(crate) async fn run(
     keeper: &'static mut Keeper<'static, board::StoreFlash>,
 ) -> ! {
     let body = prepare(card, entropy);
-    let mut ended_at = None;
     loop {
         SUPERVISOR.report(Task::Storage, now());
         let begun = now();
         let service = service(body, begun, &mut sectors);
         CARD_STATUS.end_service(now().since(begun).as_millis() as u32);
         keep(keeper);
-        if ended_at.is_none() && links::RECORD_ENDED.signaled() {
-            ended_at = Some(begun);
-        }
         match service {
             Service::Wrote => {}
-            Service::Idle if !sectors.is_empty() => {}
-            Service::Idle if ended_at.is_some() => break,
-            Service::Idle if serve(body, &mut shelf) => {}
+            Service::Idle if !sectors.is_empty() || serve(body, &mut shelf) => {}
             Service::Idle => wait_for_work(&sectors, &shelf, keeper).await,
-            Service::NoCard if ended_at.is_some_and(|at| now().since(at) > CARD_PATIENCE) => break,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
     }
-    while keep(keeper) == Kept::Took {}
-    links::LOG_CLOSED.signal(finish(body, &mut sectors));
-    loop {
-        core::future::pending::<()>().await;
-    }
 }
 
-/// Returns when there is a sector, or no more to come.
+/// Returns when there is a sector or a question.
 async fn wait_for_work(
     sectors: &SectorsOut<'_>,
     shelf: &Server<'_>,
     keeper: &mut Keeper<'static, board::StoreFlash>,
 ) {
     let mut asked = shelf.is_wanted();
-    while sectors.is_empty() && !asked && !links::RECORD_ENDED.signaled() {
+    while sectors.is_empty() && !asked {
         SUPERVISOR.report(Task::Storage, now());
         keep(keeper);
         // Either way it looks again.
@@ -100,19 +84,8 @@ fn serve(body: &mut Body, shelf: &mut Server<'static>) -> bool {
     measure(Stage::Storage, || body.serve(shelf))
 }
 
-/// Closes the log; how many frames found no card.
-#[inline(never)]
-fn finish(body: &mut Body, sectors: &mut SectorsOut<'static>) -> u64 {
-    body.finish();
-    body.abandon(sectors)
-}
-
 /// Saves one item, if there is one.
 #[inline(never)]
-fn keep(keeper: &mut Keeper<'static, board::StoreFlash>) -> Kept {
-    let kept = measure(Stage::Storage, || keeper.service(links::ENDING.signaled()));
-    if kept == Kept::Took {
-        links::STORED.signal(());
-    }
-    kept
+fn keep(keeper: &mut Keeper<'static, board::StoreFlash>) {
+    measure(Stage::Storage, || keeper.service(false));
 }

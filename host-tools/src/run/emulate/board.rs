@@ -1,185 +1,268 @@
-//! The emulated board over all its starts: what power loss and resets leave, and the input from there on.
+//! The board on the model of its chip: what comes to its ports, what leaves them, its card and its power.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::io::Write;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, anyhow};
+use hums_link::framer::Framer;
+use hums_sdcard::{Card, Kind, Medium, Model, Slot};
+use stm32f405_model::gpio::Pin;
+use stm32f405_model::image::Image;
+use stm32f405_model::machine::{Board as Parts, Machine as Chip};
+use stm32f405_model::memory::FLASH;
+use stm32f405_model::time::{MS, Ps, SECOND, US};
+use stm32f405_model::usart::Usart;
 
-use crate::run::Machine;
-use crate::run::qemu::{Again, Ended, Ground, Qemu, Start};
+use crate::run;
 use crate::source::Chunk;
 
-/// Input that is kept to be sent again after a reset: more than the pipes to the emulator hold.
-const KEPT_BYTES: usize = 1 << 20;
-/// A firmware that is reset more often than this never gets anywhere.
-const RESETS_MAX: u32 = 16;
+/// The store in the chip's flash: sectors 1 and 2.
+const STORE: std::ops::Range<usize> = 16 * 1024..48 * 1024;
+/// Power comes so long before the first byte: a start takes some 20 ms until it listens.
+const LEAD: Ps = 30 * MS;
+/// How long power is away when it goes for a moment.
+const AWAY: Ps = 100 * MS;
+/// What is in memory at the end is written after so long: a sector in progress waits for 0.15 s (`hums_onboard::monitoring`).
+const LEAST: Ps = 2_400 * MS;
+/// Or, where the card is slow, once it was not written for so long; before the silence is a finding (3 s).
+const QUIET: Ps = 200 * MS;
+const MOST: Ps = 3_000 * MS;
+/// The ports are looked after this often.
+const STEP: Ps = 20 * MS;
+/// The autopilot's port and the radio's.
+const PORTS: [usize; 2] = [0, 1];
+/// The rate of the autopilot's port, and that of the radio's until a parameter sets another.
+const BAUDS: [f64; 2] = [921_600.0, 57_600.0];
+/// The card's bus and its select pin.
+const CARD: (usize, Pin) = (0, Pin(0, 4));
 
-/// What stays the same over all starts.
-pub(super) struct Fixed {
-    /// What stands for true randomness at the first start; later ones count on from it.
-    pub(super) entropy: u32,
-    pub(super) firmware: PathBuf,
-    pub(super) card: PathBuf,
-    pub(super) store: PathBuf,
-    pub(super) gs: Ground,
-    pub(super) autopilot: Ground,
-    pub(super) costs: bool,
-    /// What is to go wrong in the firmware itself.
-    pub(super) provoke: Option<String>,
-    /// When power goes for a moment, in microseconds since the first byte; sorted.
-    pub(super) reboots: VecDeque<u64>,
-}
+/// The stages of the firmware's own account, in its order; the first is idle.
+const STAGES: [&str; 9] =
+    ["idle", "tasks", "framer", "monitor", "encode", "observe", "summary", "tick", "storage"];
+/// Where that account is.
+const STAGE_CYCLES: &str = "STAGE_CYCLES";
+/// What runs as which exceptions, from the most urgent down (`firmware/app/src/executors.rs`; numbers: RM0090, table 62, and 16).
+const URGENCIES: [(&str, &[u16]); 8] = [
+    ("watch", &[15, 17]),
+    ("ports", &[32, 33, 72, 74, 75, 86]),
+    ("clock", &[44]),
+    ("reception", &[35]),
+    ("monitor", &[36]),
+    ("downlink", &[37]),
+    ("storage", &[38]),
+    ("start", &[0]),
+];
 
-/// What the starts before the last one came to.
-#[derive(Default)]
-pub(super) struct Earlier {
-    pub(super) frames_in: u64,
-    pub(super) bytes_in: u64,
-    pub(super) bytes_not_frames: u64,
-    pub(super) blocks_written: u64,
-    /// How many there were.
-    pub(super) starts: u32,
+/// A line into a port.
+#[derive(Debug, Default)]
+struct Line {
+    /// When what was sent last ends.
+    free: Ps,
 }
 
 /// The board.
 pub(super) struct Board {
-    fixed: Fixed,
-    qemu: Option<Qemu>,
-    earlier: Earlier,
-    resets: u32,
-    /// When this start was, in microseconds since the first byte.
-    started_us: u64,
-    /// The newest input since this start, and how many bytes of it were sent before that.
-    sent: VecDeque<Chunk>,
-    sent_bytes: usize,
-    forgotten: u64,
+    chip: Chip,
+    medium: Medium,
+    to_ground: Box<dyn Write + Send>,
+    to_autopilot: Box<dyn Write + Send>,
+    lines: [Line; 2],
+    /// When power goes for a moment, sorted.
+    reboots: VecDeque<u64>,
+    /// What a framer makes of what came, and of what went to the ground station.
+    came: Framer,
+    went: Framer,
+    load: Load,
+}
+
+/// The part of each second that the processor did not sleep; not of the first one, in which the card is mounted.
+#[derive(Debug)]
+struct Load {
+    /// When this second began, with the cycles and those asleep by then.
+    since: Option<(Ps, u64, u64)>,
+    worst: f64,
+}
+
+/// What the ports had.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Traffic {
+    pub(super) frames_in: u64,
+    pub(super) bytes_in: u64,
+    pub(super) bytes_not_frames: u64,
+    pub(super) gs_frames: u64,
+    pub(super) gs_bytes: u64,
 }
 
 impl Board {
-    pub(super) fn start(fixed: Fixed) -> Result<Self> {
-        let mut board = Self {
-            fixed,
-            qemu: None,
-            earlier: Earlier::default(),
-            resets: 0,
-            started_us: 0,
-            sent: VecDeque::new(),
-            sent_bytes: 0,
-            forgotten: 0,
-        };
-        board.power_on(None)?;
-        Ok(board)
-    }
-
-    fn power_on(&mut self, survived: Option<Vec<u8>>) -> Result<()> {
-        let Fixed { firmware, card, store, gs, autopilot, costs, provoke, .. } = &self.fixed;
-        let mut arguments = vec![format!("seed={}", self.fixed.entropy.wrapping_add(self.earlier.starts))];
-        // Once, also where power is lost in between.
-        arguments.extend(provoke.iter().filter(|_| self.resets == 0).map(|what| format!("provoke={what}")));
-        let (gs, autopilot, costs) = (gs.clone(), autopilot.clone(), *costs);
-        let start = Start { firmware, card, store, gs, autopilot, arguments, costs, survived };
-        self.qemu = Some(Qemu::start(start)?);
-        Ok(())
-    }
-
-    /// The input has ended: the counters of the last start, one JSON object, and those of the starts before.
-    pub(super) fn finish(mut self) -> Result<(String, Earlier)> {
-        loop {
-            let Some(qemu) = self.qemu.take() else { bail!("the firmware does not run") };
-            match qemu.finish()? {
-                Ended::Done(json) => return Ok((json, self.earlier)),
-                Ended::Again(again) => self.start_again(again)?,
-            }
+    /// A board with this program, card and store, whose power comes a moment before the first byte.
+    pub(super) fn new(
+        image: Image,
+        seed: u32,
+        medium: &Medium,
+        store: &[u8],
+        (to_ground, to_autopilot): (Box<dyn Write + Send>, Box<dyn Write + Send>),
+        reboots: VecDeque<u64>,
+    ) -> Self {
+        let slot = Slot::new(Some(Model::new(Kind::Sdhc, medium.clone())));
+        let mut chip = Chip::new(image, Parts { seed: u64::from(seed), ..Parts::default() });
+        chip.connect(CARD.0, CARD.1, Box::new(Card::new(&slot)));
+        if let Some(flash) = chip.chip.flash.content.all_mut().get_mut(STORE) {
+            flash.copy_from_slice(store);
+        }
+        Self {
+            chip,
+            medium: medium.clone(),
+            to_ground,
+            to_autopilot,
+            lines: Default::default(),
+            reboots,
+            came: Framer::new(),
+            went: Framer::new(),
+            load: Load { since: None, worst: 0.0 },
         }
     }
 
-    /// Power goes at `at_us`, and comes back at once.
+    /// Microseconds since the first byte, in the chip's time.
+    fn moment(at_us: u64) -> Ps {
+        LEAD.saturating_add(at_us.saturating_mul(US))
+    }
+
+    fn run_until(&mut self, until: Ps) -> Result<()> {
+        while self.chip.now() < until {
+            let to = self.chip.now().saturating_add(STEP).min(until);
+            self.chip.run_until(to).map_err(|report| anyhow!("the firmware stopped: {report}"))?;
+            self.take_sent()?;
+            self.load.look(&self.chip);
+        }
+        Ok(())
+    }
+
+    fn take_sent(&mut self) -> Result<()> {
+        let [autopilot, ground] =
+            PORTS.map(|port| self.chip.take_sent(port).into_iter().map(|(_, byte)| byte).collect::<Vec<_>>());
+        self.to_autopilot.write_all(&autopilot).context("to the autopilot")?;
+        if !ground.is_empty() {
+            self.went.push(&ground, &mut |_| {});
+            self.to_ground.write_all(&ground).context("--gs: cannot be written")?;
+            self.to_ground.flush().context("--gs: cannot be written")?;
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, port: usize, chunk: &Chunk) -> Result<()> {
+        let at = Self::moment(chunk.at_us);
+        self.run_until(at)?;
+        let (Some(line), Some(usual)) = (self.lines.get_mut(port), BAUDS.get(port)) else { return Ok(()) };
+        // Both ends are set alike.
+        let set = self.chip.chip.usarts.get(port).map_or(0.0, Usart::baud);
+        let baud = if set > 0.0 { nearest(set) } else { *usual };
+        line.free = self.chip.send(port, &chunk.bytes, at.max(line.free), baud);
+        Ok(())
+    }
+
+    /// Power goes at `at_us`, and comes back.
     fn lose_power(&mut self, at_us: u64) -> Result<()> {
-        loop {
-            let Some(mut qemu) = self.qemu.take() else { bail!("the firmware does not run") };
-            qemu.power_off(at_us.saturating_sub(self.started_us))?;
-            let Ended::Again(again) = qemu.finish()? else { bail!("the firmware ended without its power") };
-            let was_power = again.what == "power";
-            self.start_again(again)?;
-            if was_power {
-                // What was still on its way in when it came, to the byte, is lost on the line.
-                return Ok(());
-            }
-        }
-    }
-
-    /// Starts the firmware anew, and sends again what it had not taken.
-    fn start_again(&mut self, again: Again) -> Result<()> {
-        self.resets += u32::from(again.what == "reset");
-        if self.resets > RESETS_MAX {
-            bail!("the firmware is reset again and again");
-        }
-        let Earlier { frames_in, bytes_in, bytes_not_frames, blocks_written, starts } = &mut self.earlier;
-        *frames_in += again.frames_in;
-        *bytes_in += again.bytes_in;
-        *bytes_not_frames += again.bytes_not_frames;
-        *blocks_written += again.blocks_written;
-        *starts += 1;
-        self.started_us += again.at_us;
-        let mut untaken = self.untaken(again.taken)?;
-        self.power_on(again.survived)?;
-        while let Some(chunk) = untaken.pop_front() {
-            // A reset within is met at the next arrival, or at the end.
-            self.send(chunk)?;
-        }
+        self.run_until(Self::moment(at_us))?;
+        self.chip.power_off();
+        self.run_until(self.chip.now().saturating_add(AWAY))?;
+        self.chip.power_on();
         Ok(())
     }
 
-    /// What was sent beyond the first `taken` bytes.
-    fn untaken(&mut self, taken: u64) -> Result<VecDeque<Chunk>> {
-        let Some(mut skip) = taken.checked_sub(self.forgotten) else {
-            bail!("the firmware was reset so far back that its input is not known any more");
-        };
-        let mut untaken = std::mem::take(&mut self.sent);
-        while let Some(chunk) = untaken.front_mut().filter(|chunk| chunk.bytes.len() as u64 <= skip) {
-            skip -= chunk.bytes.len() as u64;
-            untaken.pop_front();
+    /// The input has ended: goes on until all of it is on the card.
+    pub(super) fn settle(&mut self) -> Result<()> {
+        self.run_until(self.lines[0].free.max(self.lines[1].free).max(self.chip.now()))?;
+        let end = self.chip.now();
+        self.run_until(end.saturating_add(LEAST))?;
+        let mut writes = None;
+        while self.chip.now() < end.saturating_add(MOST) && writes.replace(self.medium.writes()) != writes {
+            self.run_until(self.chip.now().saturating_add(QUIET))?;
         }
-        if let Some(chunk) = untaken.front_mut() {
-            chunk.bytes.drain(..usize::try_from(skip)?);
-        }
-        (self.sent_bytes, self.forgotten) = (0, 0);
-        Ok(untaken)
+        // What is still in the framer is whole, or nothing.
+        self.came.idle(&mut |_| {});
+        self.went.idle(&mut |_| {});
+        self.to_ground.flush().context("--gs: cannot be written")
     }
 
-    /// Sends a chunk and keeps it; `false` when the firmware is being reset.
-    fn send(&mut self, chunk: Chunk) -> Result<bool> {
-        let Some(qemu) = &mut self.qemu else { bail!("the firmware does not run") };
-        let taken = qemu.arrive(chunk.at_us.saturating_sub(self.started_us), &chunk.bytes)?;
-        self.sent_bytes += chunk.bytes.len();
-        self.sent.push_back(chunk);
-        while self.sent_bytes > KEPT_BYTES
-            && let Some(oldest) = self.sent.pop_front()
-        {
-            self.sent_bytes -= oldest.bytes.len();
-            self.forgotten += oldest.bytes.len() as u64;
+    /// What the store holds.
+    pub(super) fn store(&self) -> &[u8] {
+        self.chip.memory(FLASH.0 + STORE.start as u32, STORE.len() as u32)
+    }
+
+    pub(super) fn traffic(&self) -> Traffic {
+        let (came, went) = (self.came.counts(), self.went.counts());
+        Traffic {
+            frames_in: came.frames,
+            bytes_in: came.bytes,
+            bytes_not_frames: came.bytes_not_frames,
+            gs_frames: went.frames,
+            gs_bytes: went.bytes,
         }
-        Ok(taken)
+    }
+
+    /// In percent, modelled.
+    pub(super) const fn busy_percent_max(&self) -> f64 {
+        self.load.worst
+    }
+
+    /// Cycles by stage since the last start, by the firmware's own account; `None` where the image has no such name.
+    pub(super) fn stage_cycles(&self) -> Option<serde_json::Value> {
+        let symbol = self.chip.image().symbols.iter().find(|symbol| symbol.name == STAGE_CYCLES)?;
+        let words = self.chip.memory(symbol.address, 8 * STAGES.len() as u32).as_chunks::<8>().0;
+        let cycles = STAGES.iter().zip(words).skip(1);
+        Some(
+            cycles
+                .map(|(name, word)| ((*name).to_owned(), serde_json::Value::from(u64::from_le_bytes(*word))))
+                .collect(),
+        )
+    }
+
+    /// Bytes of stack that each urgency took at its deepest.
+    pub(super) fn stack_by_urgency(&self) -> serde_json::Value {
+        let deepest = |exceptions: &[u16]| {
+            exceptions.iter().map(|number| self.chip.core.stack_depth(*number)).max().unwrap_or(0)
+        };
+        URGENCIES
+            .iter()
+            .map(|(name, exceptions)| ((*name).to_owned(), serde_json::Value::from(deepest(exceptions))))
+            .collect()
     }
 }
 
-impl Machine for Board {
+impl run::Machine for Board {
     fn arrive(&mut self, chunk: &Chunk) -> Result<bool> {
-        while let Some(at_us) = self.fixed.reboots.pop_front_if(|at_us| *at_us <= chunk.at_us) {
+        while let Some(at_us) = self.reboots.pop_front_if(|at_us| *at_us <= chunk.at_us) {
             self.lose_power(at_us)?;
         }
-        if !self.send(Chunk { at_us: chunk.at_us, bytes: chunk.bytes.clone() })? {
-            let Some(qemu) = self.qemu.take() else { bail!("the firmware does not run") };
-            let Ended::Again(again) = qemu.finish()? else { bail!("the firmware ended before its input") };
-            self.start_again(again)?;
-        }
+        self.came.push(&chunk.bytes, &mut |_| {});
+        self.send(0, chunk)?;
         Ok(true)
     }
 
     fn hear(&mut self, chunk: &Chunk) -> Result<bool> {
-        let Some(qemu) = &mut self.qemu else { bail!("the firmware does not run") };
-        // Nobody hears it while the firmware is being reset, which the next arrival notices.
-        qemu.hear(chunk.at_us.saturating_sub(self.started_us), &chunk.bytes)?;
+        self.send(1, chunk)?;
         Ok(true)
     }
+}
+
+impl Load {
+    fn look(&mut self, chip: &Chip) {
+        let begun = self.since.map_or(LEAD, |(at, ..)| at);
+        if chip.now() < begun + SECOND {
+            return;
+        }
+        let now = (chip.now(), chip.core.cycles(), chip.core.slept());
+        if let Some((_, cycles, slept)) = self.since {
+            let asleep = (now.2 - slept) as f64 / (now.1 - cycles).max(1) as f64;
+            self.worst = self.worst.max(100.0 - 100.0 * asleep);
+        }
+        self.since = Some(now);
+    }
+}
+
+/// The usual rate that a port's divider stands for.
+fn nearest(baud: f64) -> f64 {
+    const USUAL: [f64; 9] =
+        [9_600.0, 19_200.0, 38_400.0, 57_600.0, 115_200.0, 230_400.0, 460_800.0, 921_600.0, 1_500_000.0];
+    USUAL.into_iter().find(|usual| (usual / baud - 1.0).abs() < 0.03).unwrap_or(baud)
 }

@@ -1,22 +1,19 @@
-//! `hums emulate`: the firmware image of the emulated board, in QEMU.
+//! `hums emulate`: the image that is flashed, on the model of its chip (`docs/chip.md`).
 
 mod board;
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
-use board::{Board, Earlier, Fixed};
-use serde::Deserialize;
+use anyhow::{Context, Result, anyhow, bail};
+use board::{Board, Traffic};
+use hums_sdcard::Medium;
+use stm32f405_model::image::Image;
 
 use super::earlier::EarlierSessions;
-use super::qemu;
-use super::report::Report;
+use super::report::{OnCard, Report};
 use super::{
     arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card, salt, store,
 };
@@ -27,8 +24,7 @@ use crate::outcome::{Outcome, usage};
 /// The environment variable that names the image as `--firmware` does.
 const FIRMWARE_VARIABLE: &str = "HUMS_FIRMWARE";
 /// Where a build in the source tree leaves the image.
-const IMAGES: [&str; 2] =
-    ["target/firmware/hums-emulated.elf", "target/thumbv7em-none-eabihf/firmware/hums-firmware"];
+const IMAGE: &str = "target/firmware/hums-f405.elf";
 
 /// Runs `hums emulate`.
 pub fn run(args: &cli::Emulate) -> Result<Outcome> {
@@ -37,67 +33,71 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     check_standard_output(run)?;
     let (speed, live) = pace(run)?;
     let inputs = paths::inputs(run, None, args.firmware.as_deref())?;
-    qemu::check()?;
-    let firmware = firmware(args.firmware.as_deref())?;
     let params = params::read(run.params.as_deref())?;
-    let dir = tempfile::Builder::new().prefix("hums-").tempdir().context("no temporary directory")?;
-    // The board's flash is a file in any case; without --store it ends with the run.
-    let store = run.store.clone().unwrap_or_else(|| dir.path().join("store"));
+    let image = image(&firmware(args.firmware.as_deref())?)?;
     // Open, so that no other run uses them.
-    let (mut arrivals, _in_use) = Arrivals::open(run, None, || {
+    let (mut arrivals, (card, flash)) = Arrivals::open(run, None, || {
         run.store.as_deref().map_or(Ok(()), store::check)?;
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
-        Ok((card, store::open(Some(&store), &params)?))
+        Ok((card, store::open(run.store.as_deref(), &params)?))
     })?;
+    flash.prepare()?;
     let earlier = EarlierSessions::of(run, &params)?;
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run, &inputs)?;
-    let entropy = salt::salt(run, &mut arrivals)?;
-    let mut board = Board::start(Fixed {
-        entropy,
-        firmware,
-        card: run.sd.clone(),
-        store,
-        gs: Arc::new(Mutex::new(gs)),
-        autopilot: Arc::new(Mutex::new(arrivals.take_autopilot())),
-        costs: args.costs,
-        provoke: args.provoke.clone(),
-        reboots,
-    })?;
-    drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)?;
-    let (json, before) = board.finish()?;
+    let seed = salt::salt(run, &mut arrivals)?;
+    let medium = Medium::load(&card).with_context(|| format!("{}: cannot be read", run.sd.display()))?;
+    let mut board =
+        Board::new(image, seed, &medium, &flash.bytes(), (gs, arrivals.take_autopilot()), reboots);
+    let flown = drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)
+        .and_then(|_| board.settle());
+    // Also of a run that came to an early end: what a card has it has.
+    medium.save(&card).with_context(|| format!("{}: cannot be written", run.sd.display()))?;
+    flash.set(board.store());
+    if let Some(error) = flash.take_error() {
+        bail!("--store {}: {error}", run.store.as_deref().unwrap_or(Path::new("")).display());
+    }
+    flown?;
     ground.finish()?;
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
     }
-    let counters: Counters = serde_json::from_str(&json)
-        .with_context(|| format!("the firmware's counters are not understood: {json}"))?;
-    let mut report = counters.into_report();
-    let frames = report.read_card(&run.sd, &earlier)?;
-    before.add_to(&mut report, frames);
+    let mut report = Report::default();
+    let (frames, on_card) = report.read_card(&run.sd, &earlier)?;
+    tell(&mut report, &board.traffic(), frames, &on_card);
+    report.blocks_written = medium.writes();
+    if args.costs {
+        report.cycles = Some(board.stage_cycles().context("--costs: wants an ELF file of this version's")?);
+        report.stack_by_urgency = Some(board.stack_by_urgency());
+        report.busy_percent_max = Some(board.busy_percent_max());
+    }
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");
     }
     report.print(run.json, run.gs == Some(Endpoint::Standard))
 }
 
-impl Earlier {
-    /// What came in before the last start, and what of it is on the card, which alone knows that.
-    fn add_to(&self, report: &mut Report, frames_on_card: u64) {
-        if self.starts == 0 {
-            return;
-        }
-        report.frames_in += self.frames_in;
-        report.bytes_in += self.bytes_in;
-        report.bytes_not_frames += self.bytes_not_frames;
-        report.blocks_written += self.blocks_written;
-        report.frames_logged = frames_on_card.min(report.frames_in);
-        report.frames_lost = report.frames_in - report.frames_logged;
+/// What the ports had, and what of it the card has.
+fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
+    report.frames_in = traffic.frames_in;
+    report.frames_logged = frames.min(traffic.frames_in);
+    report.frames_lost = report.frames_in - report.frames_logged;
+    report.bytes_in = traffic.bytes_in;
+    report.bytes_not_frames = traffic.bytes_not_frames;
+    report.gs_frames = traffic.gs_frames;
+    report.gs_bytes = traffic.gs_bytes;
+    report.bytes_logged = on_card.bytes;
+    if let Some(stats) = &on_card.stats {
+        report.queue_bytes_max = stats.queue_bytes_max;
+        report.queue_bytes_capacity = stats.queue_bytes_capacity;
+        report.sd_stall_ms_max = stats.sd_stall_ms_max;
+        report.stack_bytes_max = Some(stats.stack_bytes_max);
+        report.stack_bytes = Some(stats.stack_bytes_capacity);
     }
 }
 
-/// Faults of the card are the simulated card's: the emulated board writes to the image file itself.
+/// Faults of the card are `hums sim`'s.
 fn check_flags(run: &cli::Run) -> Result<()> {
     let faults = &run.faults;
     let given = [
@@ -109,12 +109,17 @@ fn check_flags(run: &cli::Run) -> Result<()> {
     ];
     for (flag, given) in given {
         if given {
-            return Err(usage(format!(
-                "{flag} works with hums sim only: the emulated board writes to the image file itself"
-            )));
+            return Err(usage(format!("{flag} works with hums sim only")));
         }
     }
     Ok(())
+}
+
+/// What the file holds.
+fn image(path: &Path) -> Result<Image> {
+    let file = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    Image::parse(&file)
+        .map_err(|why| anyhow!("{}: is no firmware image of the STM32F405: {why}", path.display()))
 }
 
 /// The image: as named, as built, or built now.
@@ -122,39 +127,24 @@ pub(crate) fn firmware(named: Option<&Path>) -> Result<PathBuf> {
     let variable = std::env::var_os(FIRMWARE_VARIABLE).map(PathBuf::from);
     if let Some(path) = named.map(Path::to_owned).or(variable) {
         if !path.is_file() {
-            bail!(
-                "{}: there is no such firmware image; `cargo xtask firmware --board emulated` builds one",
-                path.display()
-            );
-        }
-        if !is_arm_elf(&path) {
-            bail!("{}: is no firmware image (an ELF file for ARM)", path.display());
+            bail!("{}: there is no such firmware image; `cargo xtask firmware` builds one", path.display());
         }
         return Ok(std::path::absolute(path)?);
     }
     let Some(tree) = source_tree() else {
         bail!(
             "no firmware image: this is not inside the source tree of hums. There, type\n  \
-             cargo xtask firmware --board emulated\nand name what it prints here with --firmware"
+             cargo xtask firmware\nand name what it prints here with --firmware"
         );
     };
-    if let Some(image) = IMAGES.iter().map(|image| tree.join(image)).find(|image| image.is_file()) {
-        return Ok(image);
-    }
-    build(&tree)
-}
-
-fn is_arm_elf(path: &Path) -> bool {
-    let mut head = [0; 20];
-    let read = File::open(path).and_then(|mut file| file.read_exact(&mut head));
-    // Magic, and the machine's number at offset 18: 40 is ARM.
-    read.is_ok() && head.starts_with(b"\x7fELF") && head.ends_with(&[40, 0])
+    let built = tree.join(IMAGE);
+    if built.is_file() { Ok(built) } else { build(&tree) }
 }
 
 fn build(tree: &Path) -> Result<PathBuf> {
-    note!("no firmware image yet: building it (cargo xtask firmware --board emulated)");
+    note!("no firmware image yet: building it (cargo xtask firmware)");
     let output = Command::new("cargo")
-        .args(["xtask", "firmware", "--board", "emulated"])
+        .args(["xtask", "firmware"])
         .current_dir(tree)
         .stdin(Stdio::null())
         .stderr(Stdio::inherit())
@@ -164,7 +154,7 @@ fn build(tree: &Path) -> Result<PathBuf> {
     let image = printed.lines().last().map(PathBuf::from).filter(|image| image.is_file());
     match image {
         Some(image) if output.status.success() => Ok(image),
-        _ => bail!("the firmware was not built; see what `cargo xtask firmware --board emulated` says above"),
+        _ => bail!("the firmware was not built; see what `cargo xtask firmware` says above"),
     }
 }
 
@@ -176,50 +166,4 @@ pub fn source_tree() -> Option<PathBuf> {
     let is_tree =
         |dir: &&Path| dir.join("firmware/app/Cargo.toml").is_file() && dir.join("xtask/Cargo.toml").is_file();
     starts.flat_map(|start| start.ancestors()).find(is_tree).map(Path::to_owned)
-}
-
-/// What the firmware prints at its end. What it does not know is zero.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct Counters {
-    frames_in: u64,
-    frames_logged: u64,
-    frames_lost: u64,
-    bytes_in: u64,
-    bytes_not_frames: u64,
-    bytes_logged: u64,
-    blocks_written: u64,
-    queue_bytes_max: u64,
-    queue_bytes_capacity: u64,
-    sd_stall_ms_max: u64,
-    gs_frames: u64,
-    gs_bytes: u64,
-    stack_bytes_max: Option<u64>,
-    stack_bytes: Option<u64>,
-    stack_by_urgency: Option<serde_json::Value>,
-    instructions: Option<serde_json::Value>,
-}
-
-impl Counters {
-    fn into_report(self) -> Report {
-        Report {
-            frames_in: self.frames_in,
-            frames_logged: self.frames_logged,
-            frames_lost: self.frames_lost,
-            bytes_in: self.bytes_in,
-            bytes_not_frames: self.bytes_not_frames,
-            bytes_logged: self.bytes_logged,
-            blocks_written: self.blocks_written,
-            queue_bytes_max: self.queue_bytes_max,
-            queue_bytes_capacity: self.queue_bytes_capacity,
-            sd_stall_ms_max: self.sd_stall_ms_max,
-            gs_frames: self.gs_frames,
-            gs_bytes: self.gs_bytes,
-            stack_bytes_max: self.stack_bytes_max,
-            stack_bytes: self.stack_bytes,
-            stack_by_urgency: self.stack_by_urgency,
-            instructions: self.instructions,
-            ..Report::default()
-        }
-    }
 }

@@ -107,20 +107,22 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
 /// Records chunks until there are none, on a card that may hold anything, as one power-on: for those who ask more of
 /// the recorder than the command line does. `boots` tells one power-on on a card from another.
 ///
-/// `moment` is called with each chunk before it arrives. A card whose power went ends it.
+/// `gs` gets what the ground station does. `moment` is called with each chunk before it arrives. A card whose power went
+/// ends it.
 pub fn power_on(
     card: &SimCard,
     params: &Params,
     boots: u32,
+    gs: &mut (dyn Write + Send),
     chunks: impl IntoIterator<Item = Chunk>,
     mut moment: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<PowerOn> {
     let mut memory = Memory::new(params);
-    let (mut gs, mut autopilot) = (std::io::sink(), std::io::sink());
+    let mut autopilot = std::io::sink();
     let outside = Outside {
         card,
         flash: &store::open(None, &[])?,
-        gs: &mut gs,
+        gs,
         autopilot: &mut autopilot,
         findings: &mut drop,
         power_on_us: 0,
@@ -250,7 +252,7 @@ impl World<'_> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();
         let findings = std::mem::take(&mut report.findings);
-        let frames = report.read_card(card, earlier)?;
+        let (frames, _) = report.read_card(card, earlier)?;
         // What the monitor said at the time, also where the card did not take it.
         report.findings = findings;
         if !self.frames_on_card && !self.overwritten {

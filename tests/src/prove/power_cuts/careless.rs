@@ -409,7 +409,14 @@ impl Subject {
         let before: BTreeMap<_, _> = names().into_iter().flatten().collect();
         let device = card.device(hums::card::Faults::default())?;
         device.start_trace();
-        let done = power_on(&device, &Params::defaults(), NEXT_BOOTS, self.next.chunks(), |_| Ok(()))?;
+        let done = power_on(
+            &device,
+            &Params::defaults(),
+            NEXT_BOOTS,
+            &mut std::io::sink(),
+            self.next.chunks(),
+            |_| Ok(()),
+        )?;
         let written: BTreeSet<_> = device.take_trace().into_iter().map(|write| write.block).collect();
         let after: BTreeMap<_, _> = names().into_iter().flatten().collect();
 

@@ -1,31 +1,46 @@
 //! The microSD card on an SPI bus: its port; the driver is `hums_recorder::spi`.
 //!
-//! A card is busy for some milliseconds after a block, and says so by a low line: bytes that are zero (SD specification, 7.2.4). The
-//! driver looks again and again; after some looks in a row the processor sleeps before the next one. An interrupt wakes it,
-//! at the latest reception's, each millisecond.
+//! A block goes by DMA, and the processor sleeps meanwhile. A card is busy for some milliseconds after a block, and says so by a low
+//! line: bytes that are zero (SD specification, 7.2.4); while it looks for a block that is to be read, the line is high. The driver
+//! looks again and again; after some looks in a row the processor sleeps for a moment before the next one.
+
+use core::future::Future;
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
 
 use embassy_stm32::gpio::{Level, Output};
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::spi::{Spi, mode::Master};
+use embassy_stm32::mode::Async;
+use embassy_stm32::spi::{Error, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
-use hums_core::time::Instant;
+use hums_core::time::{Instant, Span};
 use hums_recorder::SpiCard;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
+use super::time;
+use crate::costs::{Stage, measure};
+
 /// Bytes that the driver exchanges at most to look whether the card is busy.
 const LOOK_BYTES: usize = 4;
-/// Looks in a row that find the card busy before the processor sleeps: some 50 µs.
+/// Looks in a row that find nothing before the processor sleeps: some 50 µs.
 const LOOKS: u32 = 16;
+/// How long it sleeps before the next look, in microseconds.
+const NAP_US: u32 = 100;
+/// Fewer bytes go one by one: to set the DMA up takes as long as some tens of them.
+const DMA_BYTES_MIN: usize = 128;
+/// A block takes 13 ms at the slowest clock.
+const TRANSFER_MAX: Span = Span::from_millis(20);
+/// RAM begins here; below is core coupled memory, which DMA does not reach.
+const RAM: usize = 0x2000_0000;
 
 /// The microSD card. Nothing less urgent runs while its driver waits for the card: only the least urgent task may use it.
 pub(crate) type Card = SpiCard<CardPort>;
 
 /// The card's port.
 pub(crate) struct CardPort {
-    bus: Spi<'static, Blocking, Master>,
+    bus: Spi<'static, Async, Master>,
     select: Output<'static>,
-    /// Looks in a row that found the card busy.
-    busy: u32,
+    /// Looks in a row that found nothing.
+    looks: u32,
 }
 
 impl CardPort {
@@ -35,8 +50,8 @@ impl CardPort {
     const TRANSFER: Hertz = Hertz(21_000_000);
 
     /// The port on this bus, mode 0, with its select pin high.
-    pub(crate) const fn new(bus: Spi<'static, Blocking, Master>, select: Output<'static>) -> Self {
-        Self { bus, select, busy: 0 }
+    pub(crate) const fn new(bus: Spi<'static, Async, Master>, select: Output<'static>) -> Self {
+        Self { bus, select, looks: 0 }
     }
 }
 
@@ -46,17 +61,25 @@ impl Port for CardPort {
     }
 
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
-        if self.busy > LOOKS {
-            cortex_m::asm::wfi();
+        if self.looks > LOOKS {
+            time::nap(NAP_US);
         }
-        self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)?;
+        if by_dma(bytes) {
+            wait(self.bus.transfer_in_place(bytes))?;
+        } else {
+            self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)?;
+        }
         let is_busy = bytes.len() <= LOOK_BYTES && bytes.iter().all(|byte| *byte == 0);
-        self.busy = if is_busy { self.busy.saturating_add(1) } else { 0 };
+        self.looks = if is_busy || *bytes == [0xFF] { self.looks.saturating_add(1) } else { 0 };
         Ok(())
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
-        self.bus.blocking_write(bytes).map_err(|_| PortFailed)
+        if by_dma(bytes) {
+            wait(self.bus.write(bytes))
+        } else {
+            self.bus.blocking_write(bytes).map_err(|_| PortFailed)
+        }
     }
 
     fn set_clock(&mut self, clock: Clock) {
@@ -72,4 +95,29 @@ impl Port for CardPort {
     fn now(&self) -> Instant {
         crate::links::now()
     }
+}
+
+fn by_dma(bytes: &[u8]) -> bool {
+    bytes.len() >= DMA_BYTES_MIN && bytes.as_ptr().addr() >= RAM
+}
+
+/// Sleeps until a transfer is done. One that does not come to its end is stopped.
+fn wait(transfer: impl Future<Output = Result<(), Error>>) -> Result<(), PortFailed> {
+    let end = crate::links::now() + TRANSFER_MAX;
+    let mut transfer = pin!(transfer);
+    let mut context = Context::from_waker(Waker::noop());
+    while crate::links::now() < end {
+        // Masked: an interrupt that comes between the two ends the sleep all the same, and is served right after it.
+        let polled = cortex_m::interrupt::free(|_| {
+            let polled = transfer.as_mut().poll(&mut context);
+            if polled.is_pending() {
+                measure(Stage::Idle, cortex_m::asm::wfi);
+            }
+            polled
+        });
+        if let Poll::Ready(done) = polled {
+            return done.map_err(|_| PortFailed);
+        }
+    }
+    Err(PortFailed)
 }

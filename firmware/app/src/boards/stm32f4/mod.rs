@@ -10,7 +10,6 @@ mod supply;
 mod time;
 mod watchdog;
 
-use cortex_m::peripheral::DWT;
 use cortex_m::peripheral::syst::SystClkSource;
 use embassy_stm32::gpio::{Level, Output, Pull};
 use embassy_stm32::{Peripherals, rcc, usart};
@@ -25,7 +24,6 @@ pub(crate) use reset::{reset_cause, restart};
 pub(crate) use watchdog::Watchdog;
 
 use crate::boards::machine::{Machine, SYSTICK_RELOAD};
-use crate::report::{Report, Stage};
 
 use defmt_rtt as _;
 
@@ -40,8 +38,6 @@ pub(crate) const FETCH_EVERY: Duration = Duration::from_millis(1);
 /// Turns of `SysTick` without the watchdog being fed after which it counts as late: 0.6 s, as the watchdog's own clock may
 /// be fast by half (datasheet, table 36), so that its second is 0.68 s.
 pub(crate) const LATE_TURNS: u32 = 6;
-/// Time goes on while tasks run.
-pub(crate) const TIME_STOPS_WITH_TASKS: bool = false;
 /// 88 ms at 57,600 baud.
 pub(crate) const GS_RING_BYTES: usize = 512;
 /// How often the uplink looks into its ring: nobody there is in a hurry.
@@ -70,9 +66,6 @@ impl Machine for Board {
     type Watchdog = Watchdog;
     type Idle = Idle;
 }
-
-/// RAM survives a reset by itself.
-pub(crate) const fn remember() {}
 
 /// Starts clocks, counters and the watches over the machine; the chip's parts. `mode`: what is at the clock's pins.
 pub(crate) fn start(mode: rcc::HseMode) -> Peripherals {
@@ -127,43 +120,10 @@ impl Led {
 pub(crate) struct Idle(pub(crate) ());
 
 impl Idle {
-    #[expect(clippy::unused_self, reason = "on the emulated board idle reads the feed")]
+    #[expect(clippy::unused_self, reason = "whoever has it may sleep")]
     pub(crate) fn run(self) -> ! {
         loop {
             cortex_m::asm::wfi();
         }
     }
-}
-
-/// A vehicle's input has no end: the power goes.
-pub(crate) async fn ended() {
-    core::future::pending::<()>().await;
-}
-
-/// Processor cycles.
-pub(crate) fn cycles() -> u32 {
-    DWT::cycle_count()
-}
-
-/// What was counted while tasks ran, in cycles.
-pub(crate) const fn busy_cycles(counted: u64) -> u64 {
-    counted
-}
-
-/// The watchdog is to be fed.
-pub(crate) const fn is_watched() -> bool {
-    true
-}
-
-/// The watchdog is about to bite, and needs no help.
-pub(crate) const fn bites_soon() {}
-
-/// The log is closed: the card can be pulled.
-pub(crate) fn done(report: &Report) {
-    let Report { stats, frames_left, costs, stack } = report;
-    defmt::info!("log closed: {=u64} frames in, {=u64} without a card", stats.frames_in, frames_left);
-    for ((_, name), cycles) in Stage::NAMES.iter().zip(costs) {
-        defmt::info!("{=str}: {=u64} cycles", name, cycles);
-    }
-    defmt::info!("stack: {=usize} of {=usize} bytes", stack.0, stack.1);
 }

@@ -10,6 +10,7 @@ use embassy_stm32::interrupt;
 use embassy_stm32::pac;
 
 use super::reset::restart;
+use super::watchdog;
 use crate::fault;
 
 /// The PVD's line into the interrupt controller (RM0090, 12.2.5).
@@ -42,6 +43,9 @@ pub(super) fn is_low() -> bool {
 #[interrupt]
 fn PVD() {
     fault::supply_low();
-    while is_low() {}
+    while is_low() {
+        // A reset would not bring it back, and the note tells why nobody else feeds it.
+        watchdog::reload();
+    }
     restart();
 }

@@ -16,6 +16,8 @@ use embassy_stm32::rcc;
 use embassy_time_driver::{Driver, TICK_HZ};
 use embassy_time_queue_utils::Queue;
 
+use crate::costs::{Stage, measure};
+
 /// What the counter's alarm is set to at the latest: half of its range, so that no alarm is mistaken for a later one.
 const AHEAD_MAX: u64 = 1 << 31;
 
@@ -85,6 +87,15 @@ pub(super) fn start() {
     TIM2.cr1().write(|w| w.set_cen(true));
     // SAFETY: the handler below is the driver's own, and nobody relies on its being masked.
     unsafe { interrupt::TIM2.enable() };
+}
+
+/// The processor sleeps for so many microseconds, or until an interrupt that comes before. For one task, the least urgent: by the
+/// counter's second channel.
+pub(super) fn nap(micros: u32) {
+    TIM2.ccr(1).write_value(TIM2.cnt().read().wrapping_add(micros));
+    TIM2.dier().modify(|w| w.set_ccie(1, true));
+    measure(Stage::Idle, cortex_m::asm::wfi);
+    TIM2.dier().modify(|w| w.set_ccie(1, false));
 }
 
 #[interrupt]

@@ -1,0 +1,151 @@
+//! Faults of the program itself, provoked from outside: each leaves a note of what happened, and where; the next start records it,
+//! tells the ground station, and goes on recording.
+
+use hums_tests::chip::rig::Rig;
+use stm32f405_model::machine::Board;
+use stm32f405_model::memory::CCM;
+use stm32f405_model::rcc::Cause;
+use stm32f405_model::time::{MS, SECOND};
+
+use crate::bench;
+
+/// The tasks' handlers, as the vector table names them.
+const RECEPTION: &str = "CAN1_TX";
+const MONITOR: &str = "CAN1_RX0";
+const DOWNLINK: &str = "CAN1_RX1";
+const STORAGE: &str = "CAN1_SCE";
+
+/// `b .`
+const HANG: [u8; 2] = [0xFE, 0xE7];
+/// `mov.w r0, #0x30000000`, where there is nothing; `ldr r0, [r0]`
+const BUS_FAULT: [u8; 6] = [0x4F, 0xF0, 0x40, 0x50, 0x00, 0x68];
+/// `push {r0-r7, lr}`, again and again.
+const OVERFLOW: [u8; 4] = [0xFF, 0xB5, 0xFD, 0xE7];
+
+/// From the moment that a task hangs: the watchdog's second and what is left of a tick.
+const NOTICED_MS: u64 = 1_100;
+/// Storage may wait for its card: it has to report in each 10 s only (`hums_onboard::supervisor`).
+const STORAGE_NOTICED_MS: u64 = 11_100;
+/// What a reset may cost, in frames of full rate: what was in memory, a quarter of a second, and the start.
+const LOST_MAX: usize = 700;
+
+/// What is to come of a fault.
+struct Expected<'a> {
+    cause: Cause,
+    /// As the record has it.
+    fault: &'a str,
+    /// What the ground station is told.
+    told: &'a str,
+    within_ms: u64,
+}
+
+/// Half a second of full rate on a board that has made its store.
+fn flying() -> Rig {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    rig.run(begin + 500 * MS, true).unwrap();
+    rig
+}
+
+/// Goes on after a reset, and looks at what was left of it; `since` is when it went wrong.
+#[track_caller]
+fn survives(rig: &mut Rig, since: u64, expected: &Expected<'_>) {
+    let (at, cause) = *rig.machine.resets.last().unwrap();
+    let after_ms = (at - since) / MS;
+    assert!(cause == expected.cause && after_ms < expected.within_ms, "{cause:?} after {after_ms} ms");
+    rig.machine.take_sent(1);
+    rig.run(at + 500 * MS, true).unwrap();
+    rig.run(at + 2_000 * MS, false).unwrap();
+    let session = rig.sessions().pop().unwrap();
+    assert!(session.frames.len() > 500, "{} frames after it", session.frames.len());
+    let Expected { fault, told, .. } = expected;
+    assert!(session.texts.iter().any(|text| text == fault), "not «{fault}» but {:#?}", session.texts);
+    let before = session.texts.iter().find_map(|text| text.strip_prefix("restart at "));
+    let (_, messages) =
+        before.and_then(|text| text.split_once("; last messages: ")).expect("the last messages");
+    assert_eq!(messages.split(", ").count(), 8, "{messages}");
+    let heard: Vec<u8> = rig.machine.take_sent(1).into_iter().map(|(_, byte)| byte).collect();
+    let heard = String::from_utf8_lossy(&heard);
+    assert!(heard.contains(told), "the ground station never heard «{told}»");
+    let compared = rig.compared();
+    let missed = if cause == Cause::Watchdog { NOTICED_MS as usize * 2 } else { 0 };
+    assert!(compared.wrong == 0 && compared.missing < LOST_MAX + missed, "{compared:?}");
+}
+
+#[test]
+fn a_task_that_never_comes_back_is_named_by_the_next_start_however_urgent_it_is() {
+    for (handler, task, within_ms) in [
+        (RECEPTION, "reception", NOTICED_MS),
+        (MONITOR, "monitor", NOTICED_MS),
+        (STORAGE, "storage", STORAGE_NOTICED_MS),
+    ] {
+        let mut rig = flying();
+        let since = rig.machine.now();
+        let address = rig.replace(handler, &HANG, handler != STORAGE).unwrap();
+        let fault = format!("fault: hangs in {task} at pc {address:08x}");
+        let told = format!("HUMS: restarted after: watchdog ({task})");
+        survives(
+            &mut rig,
+            since,
+            &Expected { cause: Cause::Watchdog, fault: &fault, told: &told, within_ms },
+        );
+    }
+}
+
+#[test]
+fn a_fault_of_the_processor_is_survived_recorded_and_told() {
+    let mut rig = flying();
+    let since = rig.machine.now();
+    let address = rig.replace(STORAGE, &BUS_FAULT, true).unwrap();
+    let fault = format!("fault: processor fault in storage at pc {:08x}", address + 4);
+    let told = "HUMS: restarted after: processor fault (storage)";
+    survives(
+        &mut rig,
+        since,
+        &Expected { cause: Cause::Software, fault: &fault, told, within_ms: NOTICED_MS },
+    );
+}
+
+#[test]
+fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
+    let mut rig = flying();
+    let since = rig.machine.now();
+    // What is pushed is no return address: the nearest one is what called nobody.
+    rig.replace(MONITOR, &OVERFLOW, true).unwrap();
+    let fault = "fault: stack overflow in monitor at called from 00000000";
+    let told = "HUMS: restarted after: stack overflow (monitor)";
+    survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
+}
+
+/// The handler divides by zero, as code of a file of this name would.
+#[test]
+fn a_panic_is_survived_recorded_and_told() {
+    const FILE: &[u8] = b"firmware/provoked.rs";
+    let mut rig = flying();
+    // At the stack's lower end, where nobody comes: where the place is, and its text behind.
+    let place = CCM.0 + 64;
+    let words = [place + 16, FILE.len() as u32, 7, 1];
+    let bytes = words.iter().flat_map(|word| word.to_le_bytes()).chain(FILE.iter().copied());
+    for (at, byte) in (place..).zip(bytes) {
+        rig.machine.poke(at, |_| byte);
+    }
+    let panics = rig.machine.image().find("panic_const_div_by_zero").unwrap().address | 1;
+    // `movw r0`, `movt r0`, `movw r1`, `movt r1`, `bx r1`
+    let code = [load(0, place), load(1, panics)].concat();
+    let since = rig.machine.now();
+    rig.replace(DOWNLINK, &[&code[..], &[0x08, 0x47]].concat(), true).unwrap();
+    let fault = "fault: attempt to divide by zero in downlink at firmware/provoked.rs:7";
+    let told = "HUMS: restarted after: panic (downlink)";
+    survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
+}
+
+/// `movw` and `movt` of a word into this register.
+fn load(register: u16, word: u32) -> Vec<u8> {
+    let half = |first: u16, value: u16| {
+        let (imm4, i, imm3, imm8) = (value >> 12, value >> 11 & 1, value >> 8 & 7, value & 0xFF);
+        [first | i << 10 | imm4, imm3 << 12 | register << 8 | imm8]
+    };
+    let code = [half(0xF240, word as u16), half(0xF2C0, (word >> 16) as u16)].concat();
+    code.into_iter().flat_map(u16::to_le_bytes).collect()
+}

@@ -1,0 +1,46 @@
+//! The card at a bus of the chip's model: what the flashed image sees of it.
+
+use hums_recorder::spi::{Clock, Port as _};
+use stm32f405_model::spi::Wire;
+
+use crate::{Event, SimPort, Slot};
+
+/// A card in its slot, byte by byte at a bus.
+pub struct Card {
+    slot: Slot,
+    port: SimPort,
+    hz: u32,
+}
+
+impl Card {
+    /// At the bus's beginning.
+    pub fn new(slot: &Slot) -> Self {
+        Self { slot: slot.clone(), port: slot.port(), hz: 0 }
+    }
+}
+
+impl Wire for Card {
+    fn exchange(&mut self, ps: u64, hz: u32, sent: u8) -> u8 {
+        if hz != self.hz {
+            self.hz = hz;
+            self.port.set_clock(if hz <= 400_000 { Clock::Identification } else { Clock::Transfer });
+        }
+        // The slot adds the byte's own time.
+        self.slot.advance_to((ps / 1_000).saturating_sub(8_000_000_000 / u64::from(hz.max(1))));
+        let mut byte = [sent];
+        let _ = self.port.exchange(&mut byte);
+        byte[0]
+    }
+
+    fn select(&mut self, ps: u64, selected: bool) {
+        self.slot.advance_to(ps / 1_000);
+        self.port.select(selected);
+    }
+
+    fn power(&mut self, ps: u64, on: bool) {
+        if !on && self.slot.has_card() {
+            self.slot.advance_to(ps / 1_000);
+            self.slot.event(Event::Bounce);
+        }
+    }
+}
