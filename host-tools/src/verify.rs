@@ -1,8 +1,8 @@
 //! `hums verify`: every check there is, each with what it looked at and what failed.
 
 use anyhow::Result;
-use hums_blackbox::Cause;
 use hums_blackbox::record::Lost;
+use hums_blackbox::{BlockCounts, Cause};
 use hums_core::time::Instant;
 use serde::Serialize;
 
@@ -212,7 +212,7 @@ impl LogJson {
             gaps => format!("{} of which nothing tells how many: one each at least", count(gaps, "gap")),
         };
         let mut checks = vec![
-            check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, String::new()),
+            check("sector checksums", blocks.sectors + blocks.damaged, blocks.damaged, repaired(&blocks)),
             check("sector sequence", blocks.sectors, missing, gaps_detail(log)),
             check("group decoding", summary.groups, useless, newer(log)),
             check("frames complete", contents.frames(), contents.not_frames, String::new()),
@@ -302,6 +302,15 @@ fn power_on(power_on: PowerOn) -> Check {
     let checked = u64::from(!matches!(power_on, PowerOn::First | PowerOn::NotRead));
     let detail = wrong.clone().unwrap_or_else(|| power_on.words().to_owned());
     Check { name: "same power-on", checked, failed: u64::from(wrong.is_some()), detail }
+}
+
+/// What was made again from parity.
+fn repaired(blocks: &BlockCounts) -> String {
+    match blocks.repaired {
+        0 => String::new(),
+        1 => "1 sector was lost or damaged, and was made again from parity".to_owned(),
+        sectors => format!("{sectors} sectors were lost or damaged, and were made again from parity"),
+    }
 }
 
 fn gaps_detail(log: &Overview) -> String {

@@ -10,6 +10,7 @@
 
 use heapless::Deque;
 
+use crate::parity::Parity;
 use crate::sector::{Header, NotASector, SECTOR_BYTES, Sector};
 
 /// Sectors of the largest page that a card may put in the wrong place: 16 KiB.
@@ -37,6 +38,10 @@ pub struct BlockCounts {
     /// Blocks that begin as a sector and fail the check of one, and are not of this session as far as can be told: of an
     /// older one, or of none.
     pub unsound: u64,
+    /// Parity sectors of this session, sound or not; those of others are stale.
+    pub parity: u64,
+    /// Sectors that were made again from parity, and are counted as what they are; for whoever does that.
+    pub repaired: u64,
     /// All zeros.
     pub empty: u64,
     /// All ones: erased.
@@ -59,6 +64,8 @@ impl BlockCounts {
             damaged: self.damaged - before.damaged,
             stale: self.stale - before.stale,
             unsound: self.unsound - before.unsound,
+            parity: self.parity - before.parity,
+            repaired: self.repaired - before.repaired,
             empty: self.empty - before.empty,
             erased: self.erased - before.erased,
             foreign: self.foreign - before.foreign,
@@ -338,6 +345,11 @@ impl Assembler {
     }
 
     fn count(&mut self, error: NotASector, block: &[u8; SECTOR_BYTES]) {
+        if Parity::begins(block) {
+            let is_own = self.session == Some(Sector::from_bytes(*block).session());
+            *(if is_own { &mut self.counts.parity } else { &mut self.counts.stale }) += 1;
+            return;
+        }
         let is_own = matches!(error, NotASector::Foreign | NotASector::Damaged) && self.is_own(block);
         self.bad_own = self.bad_own.saturating_add(u32::from(is_own));
         match error {

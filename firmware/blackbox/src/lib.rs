@@ -6,7 +6,7 @@
 //! * An *entry* is a frame as it was received or a record of the monitor's own, with its time.
 //! * The *model* (`codec`) predicts each entry from those before and codes only what it did not foresee.
 //! * A *group* of up to 64 sectors (32 KiB) starts the model afresh: reading can start there, damage ends there.
-//! * A *sector* says what it is and is checked.
+//! * A *sector* says what it is and is checked; *parity* makes those again that a card has lost.
 //!
 //! `docs/log-format.md` describes the format completely. Everything here is bounded and needs no allocation.
 #![cfg_attr(not(test), no_std)]
@@ -20,6 +20,7 @@ mod distribution;
 mod group;
 pub mod layouts;
 mod limits;
+pub mod parity;
 mod preamble;
 mod reader;
 pub mod record;

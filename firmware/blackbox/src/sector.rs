@@ -73,6 +73,15 @@ impl Sector {
         self.bytes[CRC_AT..].copy_from_slice(&crc.to_le_bytes());
     }
 
+    /// From what parity gives of a lost sector.
+    pub(crate) fn made_again(bytes: &[u8; SECTOR_BYTES], session: u32, number: u32) -> Self {
+        let mut sector = Self { bytes: *bytes };
+        (sector.bytes[0], sector.bytes[1]) = (MAGIC, 0xb0 | VERSION);
+        sector.bytes[11..15].copy_from_slice(&number.to_le_bytes());
+        sector.seal(session);
+        sector
+    }
+
     /// The bytes to write.
     pub const fn bytes(&self) -> &[u8; SECTOR_BYTES] {
         &self.bytes
@@ -81,6 +90,11 @@ impl Sector {
     /// Whether it is a copy of a sector in progress, which a later one with its number supersedes.
     pub const fn is_partial(&self) -> bool {
         self.bytes[2] & PARTIAL != 0
+    }
+
+    /// Whether it is the last one of a log that was ended in order.
+    pub const fn is_closed(&self) -> bool {
+        self.bytes[2] & CLOSED != 0
     }
 
     /// Makes it a copy of a sector in progress, or the sector itself; to be sealed after that.
@@ -172,7 +186,7 @@ pub enum NotASector {
     Empty,
     /// All ones: flash memory that was erased and not written, or whose writing failed.
     Erased,
-    /// It does not begin as a sector does: some other file's data.
+    /// It does not begin as a sector does: parity ([`crate::parity`]), or some other file's data.
     Foreign,
     /// It begins as a sector of another format version does, and its check is right.
     OtherVersion(u8),

@@ -22,8 +22,10 @@ use core::fmt;
 
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use heapless::Vec;
+use hums_blackbox::parity::PARITY_SECTORS;
 
 use crate::layout::Layout;
+use crate::parity::Parity;
 
 /// Metadata blocks held back in a transaction: the FAT blocks of the segment in work, its directory block, and the
 /// information sector. An 8 MiB segment's chain lies in up to three blocks of each FAT where clusters have 32 KiB, as on
@@ -67,8 +69,8 @@ enum Kind {
     Directory,
 }
 
+/// Where a block that is held back belongs. It lies in the block of the same place of the lent ones.
 struct Held {
-    block: Block,
     at: u32,
     kind: Kind,
 }
@@ -76,18 +78,27 @@ struct Held {
 /// Blocks of log that are written with one command at most: the gain of more is small, and they take RAM.
 pub(crate) const BATCH_BLOCKS: usize = 8;
 
-/// Room for the blocks that are held back, and for the sectors that are being written. Lent, because gate and recorder
-/// are moved with the card and this, 10 KiB, would come along on the firmware's stack each time.
+const _: () = assert!(HELD_BLOCKS <= PARITY_SECTORS as usize);
+
+/// Room for the blocks that are held back, for the sectors that are being written, and for their parity. Lent, because gate
+/// and recorder are moved with the card and this, 12 KiB, would come along on the firmware's stack each time.
+///
+/// Blocks are held back while a segment is made, and then there is no parity: both have the same room.
 #[derive(Default)]
 pub struct HeldBlocks {
     metadata: RefCell<Vec<Held, HELD_BLOCKS>>,
     pub(crate) batch: RefCell<Vec<Block, BATCH_BLOCKS>>,
+    pub(crate) parity: RefCell<Parity>,
 }
 
 impl HeldBlocks {
     /// Nothing held.
     pub const fn new() -> Self {
-        Self { metadata: RefCell::new(Vec::new()), batch: RefCell::new(Vec::new()) }
+        Self {
+            metadata: RefCell::new(Vec::new()),
+            batch: RefCell::new(Vec::new()),
+            parity: RefCell::new(Parity::new()),
+        }
     }
 }
 
@@ -98,7 +109,7 @@ pub(crate) struct Gate<'a, D: BlockDevice> {
     transaction: Cell<bool>,
     discard: Cell<bool>,
     reads_left: Cell<u32>,
-    held: &'a RefCell<Vec<Held, HELD_BLOCKS>>,
+    held: &'a HeldBlocks,
     /// What failed first in a transaction.
     failure: Cell<Option<D::Error>>,
 }
@@ -114,7 +125,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             transaction: Cell::new(false),
             discard: Cell::new(false),
             reads_left: Cell::new(0),
-            held: &held.metadata,
+            held,
             failure: Cell::new(None),
         }
     }
@@ -147,7 +158,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     /// Holds metadata back from now on.
     pub(crate) fn begin(&self) {
         self.failure.set(None);
-        self.held.borrow_mut().clear();
+        self.held.metadata.borrow_mut().clear();
         self.transaction.set(true);
     }
 
@@ -160,10 +171,10 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     pub(crate) fn commit(&self) -> Result<(), GateError<D::Error>> {
         self.transaction.set(false);
         self.discard.set(false);
-        let mut held = self.held.borrow_mut();
+        let (mut held, mut parity) = (self.held.metadata.borrow_mut(), self.held.parity.borrow_mut());
         for kind in [Kind::Fat, Kind::Info, Kind::Directory] {
-            for entry in held.iter().filter(|entry| entry.kind == kind) {
-                self.write_device(&entry.block, entry.at)?;
+            for (entry, block) in held.iter().zip(parity.lend()).filter(|(entry, _)| entry.kind == kind) {
+                self.write_device(block, entry.at)?;
             }
         }
         held.clear();
@@ -188,7 +199,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     pub(crate) fn abort(&self) {
         self.transaction.set(false);
         self.discard.set(false);
-        self.held.borrow_mut().clear();
+        self.held.metadata.borrow_mut().clear();
     }
 
     /// Writes blocks of a file in place, in one command. Not for use within a transaction.
@@ -215,8 +226,10 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     fn read_block(&self, block: &mut Block, at: u32) -> Result<(), GateError<D::Error>> {
         let left = self.reads_left.get().checked_sub(1).ok_or(GateError::Runaway)?;
         self.reads_left.set(left);
-        if let Some(held) = self.held.borrow().iter().find(|held| held.at == at) {
-            *block = held.block.clone();
+        if let Some(place) = self.held.metadata.borrow().iter().position(|held| held.at == at)
+            && let Some(held) = self.held.parity.borrow_mut().lend().get(place)
+        {
+            *block = held.clone();
             return Ok(());
         }
         self.device.read(core::slice::from_mut(block), BlockIdx(at)).map_err(|error| self.fail(error))?;
@@ -279,7 +292,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         }
         // The only blocks of zeros that the library writes here are those of a cluster that makes the directory
         // longer: nothing refers to it yet, so it can be cleared at once.
-        let known = self.held.borrow().iter().any(|held| held.at == at);
+        let known = self.held.metadata.borrow().iter().any(|held| held.at == at);
         if !known && block.iter().all(|byte| *byte == 0) {
             return self.write_device(block, at);
         }
@@ -288,7 +301,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
 
     /// A FAT block with entries that were shown as bad clusters must not be written with them.
     fn refuse_damaged(&self, at: u32) -> Result<(), GateError<D::Error>> {
-        if self.held.borrow().iter().any(|held| held.at == at) {
+        if self.held.metadata.borrow().iter().any(|held| held.at == at) {
             return Ok(());
         }
         let mut block = [Block::new()];
@@ -299,18 +312,23 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
     }
 
     fn hold(&self, block: &Block, at: u32, kind: Kind) -> Result<(), GateError<D::Error>> {
-        let mut held = self.held.borrow_mut();
-        if let Some(entry) = held.iter_mut().find(|entry| entry.at == at) {
-            entry.block = block.clone();
-            return Ok(());
-        }
-        if held.is_full() {
+        let (mut held, mut parity) = (self.held.metadata.borrow_mut(), self.held.parity.borrow_mut());
+        let blocks = parity.lend();
+        let known = held.iter().position(|entry| entry.at == at);
+        if known.is_none() && held.is_full() {
             // Nothing refers to the new chain before the directory entry is written, so its blocks may go early.
             let oldest = held.iter().position(|entry| entry.kind == Kind::Fat).ok_or(GateError::Refused)?;
             let early = held.remove(oldest);
-            self.write_device(&early.block, early.at)?;
+            let left = blocks.get_mut(oldest..=held.len()).ok_or(GateError::Refused)?;
+            left.rotate_left(1);
+            self.write_device(left.last().ok_or(GateError::Refused)?, early.at)?;
         }
-        held.push(Held { block: block.clone(), at, kind }).map_err(|_| GateError::Refused)
+        let place = known.unwrap_or(held.len());
+        *blocks.get_mut(place).ok_or(GateError::Refused)? = block.clone();
+        if known.is_none() {
+            held.push(Held { at, kind }).map_err(|_| GateError::Refused)?;
+        }
+        Ok(())
     }
 }
 

@@ -9,6 +9,7 @@
 //!   between leaves unused clusters, nothing else.
 //! * When the card is full the oldest segment is renamed, one block write, and written anew ([`card::Card::recycle`]).
 //!
+//! * What a card loses of a segment is made again from parity, at the segment's end (`hums_blackbox::parity`).
 //! * Sectors that wait together and lie in a row are written with one command (`chain::Chain`).
 //! * Of a vehicle that is recorded by arming, while it is disarmed, only the last while is kept: small segments that are
 //!   renamed and overwritten in turn.
@@ -27,6 +28,7 @@ pub mod format;
 mod gate;
 pub mod layout;
 mod name;
+mod parity;
 pub mod recorder;
 mod ring;
 mod room;

@@ -5,6 +5,9 @@
 //! is written alternately at its own place and at the next one, so that a torn write never takes the older copy with it.
 //! Where the newest copy lies at the sector's own place, the whole sector is first written as a copy at the next one.
 //!
+//! Each stretch of a segment has its parity at the segment's end: written when it is full, when the segment is left, when the
+//! log ends in order, and every 10 s meanwhile. It may fail without consequence: the sectors themselves are there.
+//!
 //! Of what a disarmed vehicle sends, when it is recorded by arming, only the last while is kept: small segments in a
 //! ring, of which the oldest is renamed and written anew once those after it hold enough. The monitor says when
 //! ([`CardStatus::wait_from`]) and says so in the record.
@@ -18,6 +21,7 @@ mod slot;
 mod trouble;
 
 use embedded_sdmmc::Block;
+use hums_blackbox::parity::{STRETCH_SECTORS, data_blocks, parity_block};
 use hums_blackbox::{GROUP_SECTORS, Sector};
 use hums_core::time::{Instant, Span};
 
@@ -207,6 +211,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Ends the session: nothing more is written, and the card can be pulled.
     pub fn finish(&mut self) {
         self.finished = true;
+        self.write_parity();
         if self.slot.is_mounted() {
             self.status.set_state(CardState::Finished);
         }
@@ -268,7 +273,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             self.segments.ring.begin(log.name, now);
         }
         let mut at = number.wrapping_sub(*log.base.get_or_insert(number));
-        let blocks = self.mounted()?.open_blocks();
+        let blocks = data_blocks(self.mounted()?.open_blocks());
         let has_next = at + 1 < blocks;
         let count = if first.is_partial() {
             let further = log.partial_further && has_next;
@@ -280,13 +285,60 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
                 self.write_copy(log.session, at + 1)?;
             }
             (log.partial_further, log.copy_in_place) = (true, false);
-            self.count_in_row(number, most.min((blocks - at) as usize))
+            self.begin_stretch(at / STRETCH_SECTORS);
+            let in_stretch = STRETCH_SECTORS - at % STRETCH_SECTORS;
+            self.count_in_row(number, most.min((blocks - at).min(in_stretch) as usize))
         };
         let written = self.write_sealed(&log, at, count)?;
         self.status.count_blocks(written as u32);
         self.segments.log = Some(log);
+        let is_closed = self.add_to_parity(now, at, written);
         self.drop_written(written);
+        if is_closed || self.held.parity.borrow().is_overdue(now) {
+            self.write_parity();
+        }
         Ok(())
+    }
+
+    /// The next sector is of this stretch.
+    fn begin_stretch(&mut self, stretch: u32) {
+        if self.held.parity.borrow().stretch() != stretch {
+            self.write_parity();
+            self.held.parity.borrow_mut().begin(stretch);
+        }
+    }
+
+    /// The first sectors that wait are on the card, from block `at` on; whether the log ends in order with one of them.
+    fn add_to_parity(&self, now: Instant, at: u32, written: usize) -> bool {
+        let (batch, mut parity) = (self.held.batch.borrow(), self.held.parity.borrow_mut());
+        let mut is_closed = false;
+        for (at, block) in (at..).zip(batch.iter().take(written)) {
+            let sector = sector_of(block);
+            if !sector.is_partial() {
+                parity.add(now, at, sector.bytes());
+                is_closed |= sector.is_closed();
+            }
+        }
+        is_closed
+    }
+
+    /// Writes the parity of the stretch in work, if there is any that is not on the card. What fails is counted.
+    fn write_parity(&mut self) {
+        let held = self.held;
+        let mut parity = held.parity.borrow_mut();
+        let Some(Log { session, base: Some(base), .. }) = self.segments.log else { return };
+        let Some(card) = self.slot.card().filter(|_| parity.is_due()) else { return };
+        let mut at = parity_block(card.open_blocks(), parity.stretch());
+        let mut blocks = parity.blocks(session, base);
+        while !blocks.is_empty() {
+            let Ok(written) = card.write(at, blocks) else {
+                self.status.count_write_errors(1);
+                return;
+            };
+            self.status.count_blocks(written as u32);
+            at += written as u32;
+            blocks = blocks.get(written..).unwrap_or_default();
+        }
     }
 
     /// Writes the first sector that waits as a partial copy, at the place after its own: a torn write at its own place then
@@ -315,7 +367,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Whether this sector belongs into a new segment.
     fn must_move(&mut self, now: Instant, sector: &Sector) -> Result<bool, CardError<D::Error>> {
         let Some(Log { base: Some(base), .. }) = self.segments.log else { return Ok(false) };
-        let blocks = self.mounted()?.open_blocks();
+        let blocks = data_blocks(self.mounted()?.open_blocks());
         let at = sector.number().wrapping_sub(base);
         if at >= blocks {
             // Also a number from before this segment (a restarted count) gets a segment of its own.
@@ -351,12 +403,17 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Opens a segment on a card just mounted.
     fn begin(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
         let card = self.slot.card().ok_or(CardError::NotOpen)?;
-        self.await_group = self.segments.begin(now, card)?;
+        let begun = self.segments.begin(now, card);
+        self.held.parity.borrow_mut().begin(0);
+        self.await_group = begun?;
         Ok(())
     }
 
     fn next_segment(&mut self, now: Instant) -> Result<(), CardError<D::Error>> {
-        self.segments.next(now, self.slot.card().ok_or(CardError::NotOpen)?)
+        self.write_parity();
+        let next = self.segments.next(now, self.slot.card().ok_or(CardError::NotOpen)?);
+        self.held.parity.borrow_mut().begin(0);
+        next
     }
 
     fn mounted(&mut self) -> Result<&mut Card<'a, D>, CardError<D::Error>> {

@@ -7,6 +7,9 @@ use std::rc::Rc;
 
 use common::{MIB_BLOCKS, MemCard, held};
 use embedded_sdmmc::Block;
+use hums_blackbox::parity::{
+    COLUMNS, Column, PARITY_SECTORS, Parity, STRETCH_SECTORS, data_blocks, parity_block,
+};
 use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
 use hums_core::time::{Instant, Span};
@@ -227,7 +230,8 @@ fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
         writer.finish(&mut sink);
         assert_eq!(put(&mut recorder, Instant::ZERO, &sink.0[0]), Written::Done);
         assert_eq!(numbers(&device), [0], "the sector itself is whole");
-        let torn = device.journal.borrow().last().expect("a write").0;
+        let is_sector = |(_, bytes): &&(u32, [u8; 512])| Header::read(bytes).is_ok();
+        let torn = device.journal.borrow().iter().rfind(is_sector).expect("a write").0;
         device.blocks.borrow_mut().get_mut(&torn).expect("written")[256..].fill(0);
         let left = stored(&device).into_iter().map(|(.., header)| header.frames).max();
         assert!(left >= Some(frames), "{copies} copies: {left:?} of {frames} frames");
@@ -251,7 +255,7 @@ fn sectors_that_wait_together_are_written_together() {
         assert_eq!(recorder.write(Instant::ZERO), Written::Done);
     }
     assert_eq!(numbers(&device), (0..all.len() as u32).collect::<Vec<_>>());
-    let (blocks, commands) = (all.len() as u32, device.writes.get());
+    let (blocks, commands) = (all.len() as u32 + PARITY_SECTORS, device.writes.get());
     assert_eq!((status.read().blocks_written, status.read().writes), (blocks, commands));
     println!("{blocks} blocks in {commands} commands");
     assert!(commands * 7 < blocks, "{blocks} blocks in {commands} commands");
@@ -309,6 +313,63 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     assert_eq!(last, Some(7), "each session has its own log");
     assert_eq!(status.read().segments_overwritten, 0);
     assert!(status.read().write_errors > 500, "{:?}", status.read());
+}
+
+/// Of any two pages of a stretch all sectors are made again, also of one that is not full, and behind a segment that was left
+/// because the card refused a block.
+#[test]
+fn lost_pages_are_made_again_from_parity() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    let all = sectors(6_000);
+    let (mut left, mut now) = (all.len() - 1, Instant::ZERO);
+    // Power goes before the last sector; the one before came 10 s after the parity was written last.
+    for (index, sector) in all[..left].iter().enumerate() {
+        if index == 700 {
+            device.fail_after.set(Some(0));
+        }
+        now = now + Span::from_millis(if index == left - 1 { 10_000 } else { 1 });
+        assert_eq!(put(&mut recorder, now, sector), Written::Done);
+    }
+    let status = CardStatus::new();
+    let card = Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
+    let mut segment = card.segment(LogName { session: 1, segment: 0 }).expect("it is there");
+    let blocks = segment.blocks();
+    let mut read = |at: u32| {
+        let mut block = Block::new();
+        card.read(&mut segment, at, &mut block).expect("it reads");
+        block.contents
+    };
+    assert_eq!(read(0)[11..15], [0; 4], "the first sector is where the file begins");
+    let mut stretch = 0;
+    while left > 0 {
+        let sectors = (STRETCH_SECTORS as usize).min(left) as u32;
+        let first = stretch * STRETCH_SECTORS;
+        let header = Header::read(&read(first)).expect("a sector");
+        assert!(first + sectors <= data_blocks(blocks));
+        for column in 0..COLUMNS as u32 {
+            let mut sums = Column::new(header.session);
+            for sum in [column, column + COLUMNS as u32] {
+                let block = read(parity_block(blocks, stretch) + sum);
+                let parity = Parity::read(&block).expect("parity");
+                assert!(
+                    parity.last + COLUMNS as u32 >= first + sectors,
+                    "all but what came after it is covered"
+                );
+                sums.sum(&parity, &block);
+            }
+            let rows = (first + column..first + sectors).step_by(COLUMNS);
+            let lost: Vec<_> = rows.clone().filter(|at| [7, 23].contains(&((at - first) / 8))).collect();
+            rows.filter(|at| !lost.contains(at)).for_each(|at| sums.sector(at, &read(at)));
+            let made = sums.solve(&lost);
+            for (lost, made) in lost.iter().zip(made) {
+                assert_eq!(made.expect("it is made again").bytes(), &read(*lost), "sector {lost}");
+            }
+        }
+        (stretch, left) = (stretch + 1, left - sectors as usize);
+    }
+    assert!(stretch >= 2, "{stretch} stretches");
 }
 
 /// Of a disarmed vehicle's record the last while is kept, in few segments; once all is kept, nothing goes any more.
@@ -407,9 +468,10 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     let first = first.expect("a sector was written");
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
     let reads = device.reads.get() - reads_before;
-    // Of them some 80 are the FAT of the session before, which is followed once on its way to room for the next one: clusters
-    // of a block, as on this small card, take 64 times the FAT that those of a large card take.
-    assert!(reads < 500, "{reads} blocks were read");
+    // Of them some 80 are the FAT of the session before, which is followed once on its way to room for the next one, and some
+    // 60 that of the new one, on the way to its parity: clusters of a block, as on this small card, take 64 times the FAT that
+    // those of a large card take.
+    assert!(reads < 600, "{reads} blocks were read");
     for page in (1..all.len() as u32 / 8 - 1).step_by(3) {
         device.blocks.replace(whole.clone());
         for at in 8 * page..8 * page + 8 {

@@ -80,6 +80,10 @@ pub struct BlocksJson {
     misplaced: u64,
     damaged: u64,
     other_session: u64,
+    /// Sectors from which others can be made again.
+    parity: u64,
+    /// Sectors that were lost or damaged and were made again from these.
+    repaired: u64,
     zero: u64,
     erased: u64,
     /// They begin as a sector and fail the check of one, and are not of this session as far as can be told.
@@ -97,6 +101,8 @@ impl BlocksJson {
             misplaced: counts.misplaced,
             damaged: counts.damaged,
             other_session: counts.stale,
+            parity: counts.parity,
+            repaired: counts.repaired,
             zero: counts.empty,
             erased: counts.erased,
             unsound: counts.unsound,

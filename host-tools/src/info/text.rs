@@ -120,6 +120,9 @@ fn ending(text: &mut String, log: &Overview) {
     for strange in ending.noise().into_iter().chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }
+    if summary.blocks.repaired > 0 {
+        let _ = writeln!(text, "  parity   {} made again", count(summary.blocks.repaired, "sector"));
+    }
     let (superseded, misplaced) = (summary.blocks.superseded, summary.blocks.misplaced);
     if superseded > 0 || misplaced > 0 {
         let _ = writeln!(

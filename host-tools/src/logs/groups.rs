@@ -8,6 +8,7 @@ use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Step};
 use super::board::{Board, HEADING_GROUPS, heading};
 use super::joined::Joints;
 use super::places::{BLOCK_BYTES, Blocks, Log};
+use super::repair::Repairs;
 use super::strangers::{Strange, Strangers};
 
 /// Sectors that belong together, in order: a group, or a part of one whose beginning is missing.
@@ -26,7 +27,7 @@ const HEADING_BLOCKS: u64 = (4 * HEADING_GROUPS * GROUP_SECTORS) as u64;
 /// Who recorded the file that begins where `blocks` are, if one begins there.
 fn begins_here(blocks: &Blocks<'_>) -> Result<Option<Board>> {
     let rest = blocks.from_here(HEADING_BLOCKS);
-    let mut groups = Groups { strangers: None, joints: None, ..Groups::new(&rest) };
+    let mut groups = Groups { strangers: None, joints: None, repairs: None, ..Groups::new(&rest) };
     for _ in 0..HEADING_GROUPS {
         // What lies behind a gap is no part of what begins here.
         let group = groups
@@ -74,6 +75,10 @@ pub struct Groups<'a> {
     strangers: Option<Strangers>,
     /// The same.
     joints: Option<Joints>,
+    /// What was made again of the file of the last block, which is the one that is named. None as with `strangers`.
+    repairs: Option<(Option<usize>, Repairs)>,
+    /// Sectors that were made again.
+    repaired: u64,
 }
 
 impl<'a> Groups<'a> {
@@ -95,6 +100,8 @@ impl<'a> Groups<'a> {
             first: None,
             strangers: log.session.is_none().then(|| Strangers::new(log.pieces.len())),
             joints: log.session.is_none().then(Joints::default),
+            repairs: log.session.is_none().then(Default::default),
+            repaired: 0,
         }
     }
 
@@ -163,7 +170,7 @@ impl<'a> Groups<'a> {
     fn next_block(&mut self) -> Result<()> {
         let held = self.first.take();
         let is_held = held.is_some();
-        let block = if is_held { held } else { self.blocks.next_block()? };
+        let block = if is_held { held } else { self.read_block()? };
         let (file, _) = self.blocks.place();
         if !is_held && block.is_some() && file != std::mem::replace(&mut self.file, file) {
             self.assembler.begin_file();
@@ -182,6 +189,20 @@ impl<'a> Groups<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The next block as it was written, where that can be known.
+    fn read_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
+        let (Some(block), (file, at)) = (self.blocks.next_block()?, self.blocks.place()) else {
+            return Ok(None);
+        };
+        let Some((of, repairs)) = &mut self.repairs else { return Ok(Some(block)) };
+        if of.replace(file) != Some(file) {
+            *repairs = Repairs::of(self.blocks.log(), file, self.assembler.session())?;
+        }
+        let made = repairs.at(at).filter(|made| **made != block);
+        self.repaired += u64::from(made.is_some());
+        Ok(Some(made.copied().unwrap_or(block)))
     }
 
     fn feed(&mut self, block: &[u8; BLOCK_BYTES]) -> Result<()> {
@@ -206,7 +227,7 @@ impl<'a> Groups<'a> {
         let (file, at) = self.blocks.place();
         match seen {
             BlockCounts { stale: 1.., .. } => strangers.other(file, at, block, joined),
-            BlockCounts { damaged: 0, empty: 0, erased: 0, foreign: 0, unsound: 0, .. } => {
+            BlockCounts { damaged: 0, parity: 0, empty: 0, erased: 0, foreign: 0, unsound: 0, .. } => {
                 strangers.own(file, at, block);
             }
             _ => {}
@@ -229,7 +250,7 @@ impl<'a> Groups<'a> {
     pub fn counts(&self) -> BlockCounts {
         let (counts, shifts) =
             (self.assembler.counts(), self.strangers.as_ref().map_or(0, Strangers::shifts));
-        BlockCounts { misplaced: counts.misplaced + shifts, ..counts }
+        BlockCounts { misplaced: counts.misplaced + shifts, repaired: self.repaired, ..counts }
     }
 
     /// What lies behind the last sector.

@@ -20,6 +20,7 @@ mod look;
 mod marks;
 pub mod places;
 pub mod reader;
+mod repair;
 mod scan;
 pub mod sessions;
 pub mod side_by_side;

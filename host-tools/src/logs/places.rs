@@ -85,7 +85,12 @@ pub struct Blocks<'a> {
     at: usize,
 }
 
-impl Blocks<'_> {
+impl<'a> Blocks<'a> {
+    /// The log whose blocks they are.
+    pub(super) const fn log(&self) -> &'a Log {
+        self.log
+    }
+
     /// The next block; `None` at the end.
     pub fn next_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
         loop {

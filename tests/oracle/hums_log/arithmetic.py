@@ -48,6 +48,20 @@ def crc32c_table():
 CRC32C = list(crc32c_table())
 
 
+def gf_product(a, b):
+    """In GF(256) with x^8 + x^4 + x^3 + x^2 + 1."""
+    product = 0
+    while b:
+        product ^= a if b & 1 else 0
+        a = (a << 1) ^ (0x11D if a & 0x80 else 0)
+        b >>= 1
+    return product
+
+
+def gf_inverse(a):
+    return next(b for b in range(1, 256) if gf_product(a, b) == 1)
+
+
 def crc16_mcrf4xx(data):
     crc = 0xFFFF
     for byte in data:

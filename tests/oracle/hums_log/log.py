@@ -1,10 +1,17 @@
-"""Sections 1 and 2: sectors and groups."""
+"""Sections 1 and 2: sectors, parity and groups."""
 
 import struct
+from collections import Counter
 
-from arithmetic import M32, crc32c
+from arithmetic import M32, crc32c, gf_inverse, gf_product
 from group import Group
 from tables import read_layouts, read_links
+
+
+DATA, SUMS = b"\x48\xb1", [b"\x48\xc1", b"\x48\xd1"]
+POWERS = [1]
+while len(POWERS) < 255:
+    POWERS.append(gf_product(POWERS[-1], 2))
 
 
 class Sector:
@@ -18,17 +25,62 @@ class Sector:
 
 def sectors_of(data):
     """The sound sectors by their number, of the session of the first one; the best copy of each."""
-    sectors, session = {}, None
+    sectors, whole, parity, bases, session, begins = {}, {}, {}, Counter(), None, None
     for at in range(0, len(data) - 511, 512):
         block = data[at:at + 512]
-        if block[:2] != b"\x48\xb1" or crc32c(block[:508]) != int.from_bytes(block[508:], "little"):
+        if block[:2] not in (DATA, *SUMS) or crc32c(block[:508]) != int.from_bytes(block[508:], "little"):
             continue
         sector = Sector(block)
+        if block[:2] in SUMS:
+            parity[sector.session, sector.number, SUMS.index(block[:2])] = block
+            continue
         session = sector.session if session is None else session
+        if sector.session == session and begins is None:
+            begins = sector.number - at // 512
         known = sectors.get(sector.number)
         if sector.session == session and (known is None or sector.rank > known.rank):
             sectors[sector.number] = sector
+            if not sector.partial:
+                whole[sector.number] = block
+                bases[sector.number - at // 512] += 1
+    if bases:
+        own = {(last, kind): block for (of, last, kind), block in parity.items() if of == session}
+        for block in made_again(whole, own, max(begins, bases.most_common(1)[0][0])):
+            sector = Sector(block)
+            sectors[sector.number] = sector
     return sectors
+
+
+def made_again(whole, parity, base):
+    """The sectors that are lost, from the parity sectors by (last number, P or Q): of up to two in a column, of one age."""
+    for last in sorted({last for last, _ in parity if last >= base}):
+        numbers = [base + at for at in range((last - base) // 504 * 504 + (last - base) % 8, last - base + 1, 8)]
+        lost = [number for number in numbers if number not in whole]
+        sums = [parity.get((last, kind)) for kind in (0, 1)]
+        if not 1 <= len(lost) <= sum(held is not None for held in sums):
+            continue
+        rests = []
+        for kind, held in enumerate(sums):
+            if held is not None:
+                rest = bytearray(held[2:7] + held[15:508])
+                for number in set(numbers) - set(lost):
+                    weight = POWERS[(last - number) // 8 % 255] if kind else 1
+                    part = whole[number][2:7] + whole[number][15:508]
+                    rest = bytearray(a ^ gf_product(weight, b) for a, b in zip(rest, part))
+                rests.append((kind, rest))
+        weights = [POWERS[(last - number) // 8 % 255] for number in lost]
+        if len(lost) == 1:
+            kind, rest = rests[0]
+            parts = [bytes(gf_product(gf_inverse(weights[0]) if kind else 1, byte) for byte in rest)]
+        else:
+            (_, p), (_, q) = rests
+            over = gf_inverse(weights[0] ^ weights[1])
+            one = bytes(gf_product(over, b ^ gf_product(weights[1], a)) for a, b in zip(p, q))
+            parts = [one, bytes(a ^ b for a, b in zip(p, one))]
+        session = next(held for held in sums if held is not None)[7:11]
+        for number, part in zip(lost, parts):
+            if any(part):
+                yield DATA + part[:5] + session + number.to_bytes(4, "little") + part[5:] + bytes(4)
 
 
 def groups_of(sectors):

@@ -31,12 +31,13 @@ pub(super) const LABELS: Labels = Labels {
         "of them single bits",
         "of them bursts of 2 to 4096 bits",
         "of them noticed",
-        "frames lost at most, of one group",
+        "frames lost",
         "frames given out, all of them right",
         "damaged pages and ends",
         "of them noticed: `verify` does not call it good",
         "of them read as the other session, and told",
         "of them told: whole up to the end mark that is named, and no further",
+        "of them told: nothing is missing, and what was made again from parity is said",
         "missed, or told wrong",
         "frames given out after them, all of them right",
     ],
@@ -62,10 +63,7 @@ fn bits(options: &Options, figures: &mut Figures) -> Result<()> {
     figures.fact("of them single bits", sum(|one| one.single));
     figures.fact("of them bursts of 2 to 4096 bits", sum(|one| one.bursts));
     figures.fact("of them noticed", noticed);
-    figures.fact(
-        "frames lost at most, of one group",
-        outcomes.iter().map(|one| one.lost_max).max().unwrap_or(0),
-    );
+    figures.fact("frames lost", outcomes.iter().map(|one| one.lost_max).max().unwrap_or(0));
     figures.fact("frames given out, all of them right", sum(|one| one.frames));
     ensure!(noticed == errors, "{} of {errors} errors in bits were not noticed", errors - noticed);
     Ok(())
@@ -93,6 +91,8 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
     figures.fact("of them noticed: `verify` does not call it good", all.noticed);
     figures.fact("of them read as the other session, and told", all.other);
     figures.fact("of them told: whole up to the end mark that is named, and no further", all.told);
+    figures
+        .fact("of them told: nothing is missing, and what was made again from parity is said", all.repaired);
     figures.fact("missed, or told wrong", all.missed);
     figures.fact("frames given out after them, all of them right", all.frames);
     let misses: Vec<_> = outcomes.iter().flat_map(|one| &one.misses).take(10).map(String::as_str).collect();
@@ -195,7 +195,8 @@ impl Subject {
 
     fn judge(&self, damaged: &Record, touched: &BTreeSet<usize>, outcome: &mut Outcome) -> Result<()> {
         let blocks = &damaged.summary.blocks;
-        let is_noticed = !damaged.gaps.is_empty() || blocks.damaged > 0 || blocks.foreign > 0;
+        let is_noticed =
+            !damaged.gaps.is_empty() || blocks.damaged > 0 || blocks.foreign > 0 || blocks.repaired > 0;
         outcome.noticed += u64::from(is_noticed);
         // What came out is what was there, in its order; what is missing is known by its place.
         let mut missing = Vec::new();

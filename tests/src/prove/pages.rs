@@ -2,7 +2,7 @@
 //!
 //! A log is recorded once. Then its file is cut, pages of it are erased, zeroed, copied, exchanged or replaced by what an
 //! older session left there, or it goes on with the second half of another log, or with all of one; what is left is read and verified, and
-//! compared with the whole log. *Noticed* is what `hums verify` does not call good. A cut behind an end mark cannot be
+//! compared with the whole log. What parity makes again is *told* as that. *Noticed* is what `hums verify` does not call good. A cut behind an end mark cannot be
 //! told from power that went there: that is *told* if `verify` says up to which mark the log is whole, and all of it is.
 
 use std::collections::BTreeSet;
@@ -16,6 +16,7 @@ use hums::logs::fat::Extent;
 use hums::logs::{Log, Piece, on_card};
 use hums::summary::Overview;
 use hums::verify::{Verdict, verdict};
+use hums_blackbox::parity::{COLUMNS, Parity};
 use hums_blackbox::{Header, PAGE_SECTORS};
 use tempfile::TempDir;
 
@@ -93,6 +94,8 @@ pub(super) struct Tally {
     pub(super) noticed: u64,
     /// `verify` calls it whole up to an end mark, or good so far as it says, and it is.
     pub(super) told: u64,
+    /// Of those: nothing is missing, and `verify` says what was made again.
+    pub(super) repaired: u64,
     /// Read as the other session, because its sector is the first one.
     pub(super) other: u64,
     pub(super) missed: u64,
@@ -105,6 +108,7 @@ impl Tally {
         self.damages += other.damages;
         self.noticed += other.noticed;
         self.told += other.told;
+        self.repaired += other.repaired;
         self.other += other.other;
         self.missed += other.missed;
         self.lost_max = self.lost_max.max(other.lost_max);
@@ -147,6 +151,13 @@ struct Damage {
     touched: Vec<usize>,
 }
 
+impl Damage {
+    /// What parity always makes again: up to eight sectors in a row are not what they were.
+    fn is_one_page(&self) -> bool {
+        matches!(self.kind, Kind::Erased | Kind::Copied | Kind::Stale) && self.touched.len() <= COLUMNS
+    }
+}
+
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.kind.name(), self.what)
@@ -156,11 +167,12 @@ impl fmt::Display for Damage {
 /// A log that was recorded, whole.
 pub(super) struct Subject {
     dir: TempDir,
-    /// Its sectors, and some space behind them.
+    /// Its sectors, and some space behind them; then, of one that was closed, the parity.
     bytes: Vec<u8>,
     sectors: usize,
     /// The number of each sector's group, from 0.
     group_of: Vec<usize>,
+    has_parity: bool,
     whole: Record,
 }
 
@@ -174,18 +186,24 @@ impl Subject {
         let done = card.record(&stream, boots)?;
         ensure!(done.stats.frames_lost == 0, "frames were lost");
         let log = on_card(&card.path()).pop().context("no log")?;
-        let mut bytes = Vec::new();
+        let (mut bytes, mut parity) = (Vec::new(), Vec::new());
         let mut blocks = log.blocks();
         while let Some(block) = blocks.next_block()? {
             if Header::read(&block).is_ok() {
                 bytes.extend_from_slice(&block);
+            } else if Parity::read(&block).is_some() {
+                parity.extend_from_slice(&block);
             }
         }
+        ensure!(!parity.is_empty(), "there is no parity");
         if !closed {
             bytes.truncate(bytes.len() - BLOCK);
         }
         let sectors = bytes.len() / BLOCK;
         bytes.resize(bytes.len() + SPACE_BLOCKS * BLOCK, 0);
+        if closed {
+            bytes.extend(parity);
+        }
         let mut group_of = Vec::new();
         for block in bytes.as_chunks::<BLOCK>().0.iter().take(sectors) {
             let header = Header::read(block).ok().context("a copy among the sectors")?;
@@ -194,7 +212,8 @@ impl Subject {
             group_of.push(begun);
         }
         let dir = tempfile::tempdir()?;
-        let mut subject = Self { dir, bytes, sectors, group_of, whole: Record::default() };
+        let mut subject =
+            Self { dir, bytes, sectors, group_of, has_parity: closed, whole: Record::default() };
         let log = subject.log(&subject.bytes)?;
         let (whole, overview) = (Record::of(&log)?, Overview::verified(&log)?);
         let expected = if closed { Verdict::Holds } else { Verdict::ToMark };
@@ -345,8 +364,15 @@ impl Subject {
         if let Some(lost) = missing.iter().find(|index| !touched.contains(&group(index))) {
             anyhow::bail!("frame {lost} of group {} is lost, which was not touched", group(lost));
         }
+        let repaired = overview.ending.summary.blocks.repaired;
+        if missing.is_empty() && repaired > 0 {
+            tally.repaired += 1;
+        } else if damage.is_one_page() && self.has_parity {
+            anyhow::bail!("{} frames are missing, of one page of 4 KiB at most", missing.len());
+        }
         match (verdict, overview.ending.proof) {
             (Verdict::NotProved, _) => tally.noticed += 1,
+            (Verdict::Holds, _) if missing.is_empty() && repaired > 0 => tally.told += 1,
             (Verdict::ToMark, Proof::Mark(at, _)) => {
                 let to = at.as_millis();
                 let first = missing.first().map(|index| self.whole.frames[*index].at_ms);

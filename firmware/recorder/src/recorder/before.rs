@@ -5,6 +5,7 @@
 //! card, in which frames wait in the sector queue.
 
 use embedded_sdmmc::Block;
+use hums_blackbox::parity::data_blocks;
 use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{GROUP_SECTORS, Header, Sector};
 
@@ -52,7 +53,7 @@ fn end_of<D: CardDevice>(card: &Card<'_, D>, name: LogName) -> Result<Option<Bef
     let session = header.session;
     // Number less place: that of the segment's first sector.
     let base = header.number.wrapping_sub(last);
-    let mut end = reader.segment.blocks();
+    let mut end = data_blocks(reader.segment.blocks());
     while last + 1 < end {
         let middle = last + (end - last) / 2;
         match reader.probe(middle, Some(session))? {

@@ -1,0 +1,373 @@
+//! Parity: sectors from which others that the card has lost are made again.
+//!
+//! A file's sectors are taken in *stretches* of [`STRETCH_SECTORS`], from its first one on, and those of a stretch in
+//! [`COLUMNS`] *columns*: sector `i` of a stretch is in column `i mod 8`, so that no run of eight sectors, wherever a page
+//! begins, has two of a column. Each column has two parity sectors, P and Q. With one of them one lost sector of the column
+//! is made again, with both two: any two pages of 4 KiB of a stretch, or one of 8 KiB.
+//!
+//! P is the exclusive-or of the sectors, Q their sum in GF(256), each sector times `2^n`, where `n` counts from the last one
+//! of the column back (H. P. Anvin, "The mathematics of RAID-6"). Both are of what a reader does not know of a lost sector:
+//! all but the magic byte and the version, the session, the number and the check.
+//!
+//! A parity sector may be written while its stretch is not full: it names the last sector that it covers.
+
+use crate::crc::crc32c;
+use crate::sector::{Header, SECTOR_BYTES, Sector};
+
+/// Sectors of a stretch: 252 KiB.
+pub const STRETCH_SECTORS: u32 = 504;
+/// Columns of a stretch: the sectors of a page of 4 KiB.
+pub const COLUMNS: usize = 8;
+/// Parity sectors of a stretch: P of each column, then Q of each.
+pub const PARITY_SECTORS: u32 = 2 * COLUMNS as u32;
+
+const _: () = assert!(STRETCH_SECTORS.is_multiple_of(COLUMNS as u32));
+
+const MAGIC: u8 = b'H';
+const CRC_AT: usize = SECTOR_BYTES - 4;
+/// Of the polynomial x^8 + x^4 + x^3 + x^2 + 1, without its highest term.
+const POLYNOMIAL: u8 = 0x1d;
+
+/// How many of `blocks` of a file are for data sectors. The others, at its end, are for parity: those of stretch `n` begin at
+/// block `blocks - 16 (n + 1)`.
+pub const fn data_blocks(blocks: u32) -> u32 {
+    blocks.saturating_sub(blocks.div_ceil(STRETCH_SECTORS + PARITY_SECTORS) * PARITY_SECTORS)
+}
+
+/// The block of a file of `blocks` at which the parity of its stretch `stretch` begins.
+pub const fn parity_block(blocks: u32, stretch: u32) -> u32 {
+    blocks.saturating_sub(stretch.saturating_add(1).saturating_mul(PARITY_SECTORS))
+}
+
+/// Which of the two sums of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sum {
+    /// The exclusive-or.
+    P,
+    /// Weighted by powers of two.
+    Q,
+}
+
+impl Sum {
+    /// Both, in the order in which they lie on the card.
+    pub const ALL: [Self; 2] = [Self::P, Self::Q];
+
+    const fn mark(self) -> u8 {
+        match self {
+            Self::P => 0xc0 | crate::VERSION,
+            Self::Q => 0xd0 | crate::VERSION,
+        }
+    }
+
+    /// Adds a sector to what stands in `block`, after those before it in its column.
+    pub fn add(self, block: &mut [u8; SECTOR_BYTES], sector: &[u8; SECTOR_BYTES]) {
+        if self == Self::Q {
+            double(block);
+        }
+        add(block, sector, 1);
+    }
+
+    /// The same for a sector that is nowhere: it counts as zeros.
+    pub fn pass(self, block: &mut [u8; SECTOR_BYTES]) {
+        if self == Self::Q {
+            double(block);
+        }
+    }
+
+    /// Makes a parity sector of what stands in `block`: the last sector that it covers has the number `last`.
+    pub fn seal(self, block: &mut [u8; SECTOR_BYTES], session: u32, last: u32) {
+        (block[0], block[1]) = (MAGIC, self.mark());
+        block[7..11].copy_from_slice(&session.to_le_bytes());
+        block[11..15].copy_from_slice(&last.to_le_bytes());
+        let crc = crc32c(&block[..CRC_AT]);
+        block[CRC_AT..].copy_from_slice(&crc.to_le_bytes());
+    }
+}
+
+/// What a parity sector says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parity {
+    /// Which sum it is.
+    pub sum: Sum,
+    /// The session whose sectors it covers.
+    pub session: u32,
+    /// The number of the last sector that it covers. The others are every eighth before it, to the stretch's beginning.
+    pub last: u32,
+}
+
+impl Parity {
+    /// Whether a block begins as a parity sector does.
+    pub fn begins(block: &[u8; SECTOR_BYTES]) -> bool {
+        block[0] == MAGIC && Sum::ALL.iter().any(|sum| sum.mark() == block[1])
+    }
+
+    /// Checks a block; `None` where it is no parity sector, or not a sound one.
+    pub fn read(block: &[u8; SECTOR_BYTES]) -> Option<Self> {
+        let sum = Sum::ALL.into_iter().find(|sum| block[..2] == [MAGIC, sum.mark()])?;
+        let sector = Sector::from_bytes(*block);
+        let (check, _) = block[CRC_AT..].split_first_chunk()?;
+        let is_sound = crc32c(&block[..CRC_AT]) == u32::from_le_bytes(*check);
+        is_sound.then(|| Self { sum, session: sector.session(), last: sector.number() })
+    }
+}
+
+/// Finds the sectors of one column that are lost, from its sums and from those that are there.
+#[derive(Clone, Debug)]
+pub struct Column {
+    session: u32,
+    /// What is left of each sum that is there, and the last number that it covers.
+    sums: [Option<(u32, [u8; SECTOR_BYTES])>; 2],
+}
+
+impl Column {
+    /// A column of which no sum is known.
+    pub const fn new(session: u32) -> Self {
+        Self { session, sums: [None, None] }
+    }
+
+    /// Takes a parity sector of the column, which [`Parity::read`] has checked. That which covers more counts.
+    pub fn sum(&mut self, parity: &Parity, block: &[u8; SECTOR_BYTES]) {
+        let [p, q] = &mut self.sums;
+        let held = if parity.sum == Sum::P { p } else { q };
+        if held.as_ref().is_none_or(|(last, _)| *last < parity.last) {
+            *held = Some((parity.last, *block));
+        }
+    }
+
+    /// The last number that any sum covers.
+    pub fn last(&self) -> Option<u32> {
+        self.sums.iter().flatten().map(|(last, _)| *last).max()
+    }
+
+    /// Takes a sector of the column that is there: what is left of the sums is of those that are not.
+    pub fn sector(&mut self, number: u32, bytes: &[u8; SECTOR_BYTES]) {
+        for (sum, held) in Sum::ALL.into_iter().zip(&mut self.sums) {
+            if let Some((last, rest)) = held
+                && let Some(weight) = weight(sum, *last, number)
+            {
+                add(rest, bytes, weight);
+            }
+        }
+    }
+
+    /// The sectors of these numbers, which are all of the column that are lost, as far as they can be made again.
+    pub fn solve(mut self, lost: &[u32]) -> [Option<Sector>; 2] {
+        let mut found = [None, None];
+        // One that a sum has lost alone is made of it, and may leave the other sum with one.
+        for _ in 0..lost.len().min(2) {
+            for held in 0..self.sums.len() {
+                let Some((place, number)) = self.alone(held, lost, &found) else { continue };
+                let Some((sum, last, rest)) = self.held(held) else { continue };
+                let Some(weight) = weight(sum, last, number) else { continue };
+                let sector = self.sector_of(number, &rest, inverse(weight));
+                if let Some(bytes) = &sector {
+                    self.sector(number, bytes.bytes());
+                }
+                found[place] = sector;
+            }
+        }
+        if let ([one, two], [None, None]) = (lost, &found)
+            && let (Some((_, last_p, p)), Some((_, last_q, q))) = (self.held(0), self.held(1))
+            && one.max(two) <= &last_p
+            && let (Some(a), Some(b)) = (weight(Sum::Q, last_q, *one), weight(Sum::Q, last_q, *two))
+        {
+            // p = x + y, q = a x + b y: x = (q + b p) / (a + b).
+            let mut x = [0; SECTOR_BYTES];
+            add(&mut x, &q, inverse(a ^ b));
+            add(&mut x, &p, product(b, inverse(a ^ b)));
+            let mut y = p;
+            add(&mut y, &x, 1);
+            found = [self.sector_of(*one, &x, 1), self.sector_of(*two, &y, 1)];
+        }
+        found
+    }
+
+    fn held(&self, index: usize) -> Option<(Sum, u32, [u8; SECTOR_BYTES])> {
+        let (last, rest) = self.sums.get(index)?.as_ref()?;
+        Some((*Sum::ALL.get(index)?, *last, *rest))
+    }
+
+    /// The only lost one that a sum covers and that was not found: its place among the lost ones, and its number.
+    fn alone(&self, index: usize, lost: &[u32], found: &[Option<Sector>; 2]) -> Option<(usize, u32)> {
+        let (_, last, _) = self.held(index)?;
+        let is_open = |place: usize| found.get(place).is_none_or(Option::is_none);
+        let mut covered =
+            lost.iter().enumerate().filter(|(place, number)| **number <= last && is_open(*place));
+        let (place, number) = covered.next()?;
+        (covered.next().is_none() && place < found.len()).then_some((place, *number))
+    }
+
+    /// A sector of what the sums leave for it; `None` where that is none.
+    fn sector_of(&self, number: u32, rest: &[u8; SECTOR_BYTES], weight: u8) -> Option<Sector> {
+        let mut bytes = [0; SECTOR_BYTES];
+        add(&mut bytes, rest, weight);
+        let sector = Sector::made_again(&bytes, self.session, number);
+        let header = Header::read(sector.bytes()).ok()?;
+        let beyond = sector.body().get(header.body_bytes..)?;
+        let is_nothing = header.starts_group() && header.body_bytes == 0;
+        (!is_nothing && !header.partial && beyond.iter().all(|byte| *byte == 0)).then_some(sector)
+    }
+}
+
+/// What a sector of this number counts in a sum whose last one has the number `last`; `None` where it is not covered.
+fn weight(sum: Sum, last: u32, number: u32) -> Option<u8> {
+    let rows = last.checked_sub(number)? / COLUMNS as u32;
+    Some(match sum {
+        Sum::P => 1,
+        Sum::Q => (0..rows % 255).fold(1, |weight, _| product(weight, 2)),
+    })
+}
+
+/// What is summed up of a sector: all that its place and its session do not tell.
+const PARTS: [core::ops::Range<usize>; 2] = [2..7, 15..CRC_AT];
+
+fn add(to: &mut [u8; SECTOR_BYTES], from: &[u8; SECTOR_BYTES], weight: u8) {
+    for part in PARTS {
+        for (to, from) in to[part.clone()].iter_mut().zip(&from[part]) {
+            *to ^= if weight == 1 { *from } else { product(weight, *from) };
+        }
+    }
+}
+
+/// Everything times two, four bytes at a time.
+fn double(block: &mut [u8; SECTOR_BYTES]) {
+    for word in block.as_chunks_mut().0 {
+        let bits = u32::from_le_bytes(*word);
+        let carried = (bits >> 7) & 0x0101_0101;
+        *word = (((bits & 0x7f7f_7f7f) << 1) ^ carried.wrapping_mul(POLYNOMIAL as u32)).to_le_bytes();
+    }
+}
+
+/// The product in GF(256).
+const fn product(a: u8, b: u8) -> u8 {
+    let (mut a, mut b, mut product) = (a, b, 0);
+    while b != 0 {
+        if b & 1 == 1 {
+            product ^= a;
+        }
+        a = (a << 1) ^ if a & 0x80 == 0 { 0 } else { POLYNOMIAL };
+        b >>= 1;
+    }
+    product
+}
+
+/// The inverse in GF(256), which is the 254th power; 0 of 0.
+const fn inverse(a: u8) -> u8 {
+    let (mut power, mut square, mut bit) = (1, a, 1);
+    while bit < 8 {
+        square = product(square, square);
+        power = product(power, square);
+        bit += 1;
+    }
+    power
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SESSION: u32 = 0x1234_5678;
+
+    fn sector(number: u32) -> Sector {
+        let mut bytes = [0; SECTOR_BYTES];
+        for (index, byte) in bytes.iter_mut().enumerate() {
+            *byte = (number.wrapping_mul(0x9e37_79b1).wrapping_add(index as u32 * 0x85eb) >> 11) as u8;
+        }
+        let header = Header {
+            session: SESSION,
+            number,
+            since_first: (number % 64) as u8,
+            partial: false,
+            closed: false,
+            body_bytes: crate::BODY_BYTES - (number % 5) as usize,
+            frames: number as u16,
+            records: (number % 3) as u8,
+        };
+        let mut sector = Sector::from_bytes(bytes);
+        sector.set_header(&header);
+        sector.seal(SESSION);
+        sector
+    }
+
+    /// The sums of a column of the first `rows` sectors from `first` on.
+    fn sums(first: u32, rows: u32, absent: Option<u32>) -> [[u8; SECTOR_BYTES]; 2] {
+        Sum::ALL.map(|sum| {
+            let mut block = [0; SECTOR_BYTES];
+            for row in 0..rows {
+                match first + 8 * row {
+                    number if Some(number) == absent => sum.pass(&mut block),
+                    number => sum.add(&mut block, sector(number).bytes()),
+                }
+            }
+            sum.seal(&mut block, SESSION, first + 8 * (rows - 1));
+            block
+        })
+    }
+
+    fn column(sums: &[[u8; SECTOR_BYTES]], first: u32, rows: u32, lost: &[u32]) -> [Option<Sector>; 2] {
+        let mut column = Column::new(SESSION);
+        for block in sums {
+            column.sum(&Parity::read(block).expect("it is sound"), block);
+        }
+        let numbers = (0..rows).map(|row| first + 8 * row).filter(|number| !lost.contains(number));
+        numbers.for_each(|number| column.sector(number, sector(number).bytes()));
+        column.solve(lost)
+    }
+
+    #[test]
+    fn any_one_or_two_lost_sectors_of_a_column_are_made_again() {
+        let (first, rows) = (70_003, STRETCH_SECTORS / 8);
+        let [p, q] = sums(first, rows, None);
+        for one in (0..rows).map(|row| first + 8 * row) {
+            for sums in [&[p][..], &[q], &[p, q]] {
+                assert_eq!(column(sums, first, rows, &[one]), [Some(sector(one)), None]);
+            }
+            for two in ((one + 8)..first + 8 * rows).step_by(8 * 9) {
+                let both = [Some(sector(one)), Some(sector(two))];
+                assert_eq!(column(&[p, q], first, rows, &[one, two]), both, "{one} {two}");
+                assert_eq!(column(&[p], first, rows, &[one, two]), [None, None]);
+            }
+        }
+        assert_eq!(column(&[p, q], first, rows, &[first, first + 8, first + 16]), [None, None]);
+    }
+
+    #[test]
+    fn sums_of_different_age_give_what_each_of_them_covers() {
+        let [_, q] = sums(3, 20, None);
+        let [p, _] = sums(3, 30, None);
+        let (early, late) = (3 + 8 * 5, 3 + 8 * 25);
+        assert_eq!(column(&[p, q], 3, 30, &[early, late]), [Some(sector(early)), Some(sector(late))]);
+        let both = [early, early + 8];
+        assert_eq!(column(&[p, q], 3, 30, &both), both.map(|number| Some(sector(number))));
+    }
+
+    #[test]
+    fn a_sector_that_never_was_there_counts_as_zeros_and_is_not_invented() {
+        let sums = sums(0, 10, Some(16));
+        assert_eq!(column(&sums, 0, 10, &[16, 40]), [None, Some(sector(40))]);
+    }
+
+    #[test]
+    fn a_wrong_sum_makes_no_sector_of_what_cannot_be_one() {
+        let [mut p, _] = sums(0, 10, None);
+        p[3] ^= 0xff;
+        Sum::P.seal(&mut p, SESSION, 72);
+        assert_eq!(column(&[p], 0, 10, &[16]), [None, None]);
+        p[20] ^= 1;
+        assert_eq!(Parity::read(&p), None);
+    }
+
+    #[test]
+    fn every_number_but_zero_has_its_inverse_and_data_and_parity_share_a_file() {
+        assert!((1..=255).all(|a| product(a, inverse(a)) == 1));
+        for blocks in [0, 15, 16, 17, 512, 520, 521, 16_384] {
+            let data = data_blocks(blocks);
+            let stretches = data.div_ceil(STRETCH_SECTORS);
+            assert!(
+                data <= blocks && (stretches == 0 || parity_block(blocks, stretches - 1) >= data),
+                "{blocks}"
+            );
+        }
+        assert_eq!((data_blocks(512), data_blocks(520), data_blocks(16_384)), (496, 504, 15_872));
+    }
+}

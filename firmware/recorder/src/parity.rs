@@ -1,0 +1,97 @@
+//! The parity of the stretch in work: sums that grow with each sector that is on the card.
+
+use embedded_sdmmc::Block;
+use hums_blackbox::SECTOR_BYTES;
+use hums_blackbox::parity::{COLUMNS, PARITY_SECTORS, STRETCH_SECTORS, Sum};
+use hums_core::time::{Instant, Span};
+
+/// A stretch that is not full has its parity written so often, while sectors come: what a card loses of the last while before
+/// power goes cannot be made again.
+const EVERY: Span = Span::from_secs(10);
+
+/// The sums of a stretch, in the blocks in which they are written.
+pub(crate) struct Parity {
+    blocks: [Block; PARITY_SECTORS as usize],
+    /// Sectors that each column has so far, with those that are nowhere.
+    rows: [u8; COLUMNS],
+    stretch: u32,
+    /// The first sector that came since the sums were written.
+    since: Option<Instant>,
+}
+
+impl Default for Parity {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Parity {
+    pub(crate) const fn new() -> Self {
+        Self {
+            blocks: [const { Block { contents: [0; SECTOR_BYTES] } }; PARITY_SECTORS as usize],
+            rows: [0; COLUMNS],
+            stretch: 0,
+            since: None,
+        }
+    }
+
+    /// The room, for blocks of the file system while a segment is made. Then there is nothing to be written until
+    /// [`Self::begin`].
+    pub(crate) const fn lend(&mut self) -> &mut [Block; PARITY_SECTORS as usize] {
+        self.since = None;
+        &mut self.blocks
+    }
+
+    /// Starts afresh.
+    pub(crate) fn begin(&mut self, stretch: u32) {
+        self.blocks.iter_mut().for_each(|block| block.contents.fill(0));
+        self.rows = [0; COLUMNS];
+        (self.stretch, self.since) = (stretch, None);
+    }
+
+    /// Which stretch of the file it is of.
+    pub(crate) const fn stretch(&self) -> u32 {
+        self.stretch
+    }
+
+    /// A sector of the stretch is on the card, at this block of the file.
+    pub(crate) fn add(&mut self, now: Instant, at: u32, sector: &[u8; SECTOR_BYTES]) {
+        let index = (at % STRETCH_SECTORS) as usize;
+        let (row, column) = ((index / COLUMNS) as u8, index % COLUMNS);
+        let Some(rows) = self.rows.get_mut(column) else { return };
+        let passed = row.saturating_sub(*rows);
+        *rows = row + 1;
+        for (sum, blocks) in Sum::ALL.into_iter().zip(self.blocks.chunks_mut(COLUMNS)) {
+            if let Some(block) = blocks.get_mut(column) {
+                (0..passed).for_each(|_| sum.pass(&mut block.contents));
+                sum.add(&mut block.contents, sector);
+            }
+        }
+        self.since.get_or_insert(now);
+    }
+
+    /// Whether there is anything to write.
+    pub(crate) const fn is_due(&self) -> bool {
+        self.since.is_some()
+    }
+
+    /// Whether it has waited for long enough, though the stretch is not full.
+    pub(crate) fn is_overdue(&self, now: Instant) -> bool {
+        self.since.is_some_and(|since| now.since(since) >= EVERY)
+    }
+
+    /// What is to be written, of a file whose first sector has the number `base`. It is not due again until more comes.
+    pub(crate) fn blocks(&mut self, session: u32, base: u32) -> &[Block] {
+        self.since = None;
+        let first = base.wrapping_add(self.stretch.wrapping_mul(STRETCH_SECTORS));
+        for (sum, blocks) in Sum::ALL.into_iter().zip(self.blocks.chunks_mut(COLUMNS)) {
+            for (column, (block, rows)) in (0..).zip(blocks.iter_mut().zip(self.rows)) {
+                if let Some(row) = rows.checked_sub(1) {
+                    let index = u32::from(row) * COLUMNS as u32 + column;
+                    sum.seal(&mut block.contents, session, first.wrapping_add(index));
+                }
+            }
+        }
+        &self.blocks
+    }
+}

@@ -1,0 +1,128 @@
+//! Sectors that a card has lost, made again from parity before anything else looks at a log.
+//!
+//! The sector with the number `n` lies at block `n - base` of its file, so whoever knows the file's base knows what is lost:
+//! every place that holds another sector, or none. The base is the one that most sound sectors of the file agree on, unless
+//! the file begins with a newer one: then the recorder had just begun to write it anew.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use hums_blackbox::Header;
+use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS};
+
+use super::places::{BLOCK_BYTES, Log};
+
+/// Of more lost sectors in a column none is made again.
+const LOST_MAX: usize = 2;
+
+/// What was made again of one file, by its block.
+#[derive(Debug, Default)]
+pub(super) struct Repairs(BTreeMap<u64, [u8; BLOCK_BYTES]>);
+
+impl Repairs {
+    /// Of this file of a log; its session is the one given, or that of its first sound sector.
+    pub(super) fn of(log: &Log, file: usize, session: Option<u32>) -> Result<Self> {
+        let Some(piece) = log.pieces.get(file) else { return Ok(Self::default()) };
+        let file = Log { pieces: vec![piece.clone()], ..log.clone() };
+        let Some(found) = Found::of(&file, session)? else { return Ok(Self::default()) };
+        let mut columns = found.columns();
+        if columns.is_empty() {
+            return Ok(Self::default());
+        }
+        let mut blocks = file.blocks();
+        let mut at = 0;
+        while let Some(block) = blocks.next_block()? {
+            if let Some(number) = found.in_place(at)
+                && let Some((column, _)) = columns.get_mut(&column_of(at))
+            {
+                column.sector(number, &block);
+            }
+            at += 1;
+        }
+        let made = columns.into_values().flat_map(|(column, lost)| {
+            let made = column.solve(&lost).into_iter().flatten();
+            made.map(|sector| (u64::from(sector.number().wrapping_sub(found.base)), *sector.bytes()))
+        });
+        Ok(Self(made.collect()))
+    }
+
+    /// What is to be read in this block instead of what is there.
+    pub(super) fn at(&self, block: u64) -> Option<&[u8; BLOCK_BYTES]> {
+        self.0.get(&block)
+    }
+}
+
+/// A stretch of a file and a column of it.
+const fn column_of(at: u32) -> (u32, u32) {
+    (at / STRETCH_SECTORS, at % COLUMNS as u32)
+}
+
+/// What a file holds.
+struct Found {
+    session: u32,
+    base: u32,
+    /// The number of the whole sector of the session in each block, where there is one.
+    numbers: Vec<Option<u32>>,
+    parity: Vec<(Parity, [u8; BLOCK_BYTES])>,
+}
+
+impl Found {
+    /// `None` where there is nothing to be made again from.
+    fn of(file: &Log, session: Option<u32>) -> Result<Option<Self>> {
+        let (mut session, mut numbers, mut parity) = (session, Vec::new(), Vec::new());
+        let (mut bases, mut begins) = (BTreeMap::<u32, u32>::new(), None);
+        let (mut blocks, mut at) = (file.blocks(), 0_u32);
+        while let Some(block) = blocks.next_block()? {
+            let header = Header::read(&block).ok();
+            if let Some(header) = header {
+                session.get_or_insert(header.session);
+            }
+            let own = header.filter(|header| Some(header.session) == session);
+            if let Some(own) = own {
+                begins.get_or_insert(own.number.wrapping_sub(at));
+            }
+            let own = own.filter(|own| !own.partial);
+            if let Some(own) = own {
+                *bases.entry(own.number.wrapping_sub(at)).or_default() += 1;
+            } else if header.is_none()
+                && let Some(one) = Parity::read(&block)
+            {
+                parity.push((one, block));
+            }
+            numbers.push(own.map(|own| own.number));
+            at = at.saturating_add(1);
+        }
+        let base = bases.into_iter().max_by_key(|(_, count)| *count).map(|(base, _)| base);
+        let (Some(session), Some(base)) = (session, base.max(begins)) else { return Ok(None) };
+        parity.retain(|(one, _)| one.session == session);
+        Ok((!parity.is_empty()).then_some(Self { session, base, numbers, parity }))
+    }
+
+    /// The number of the sector in this block, if it is the one that belongs there.
+    fn in_place(&self, at: u32) -> Option<u32> {
+        let number = self.numbers.get(at as usize).copied().flatten();
+        number.filter(|number| *number == self.base.wrapping_add(at))
+    }
+
+    /// The columns that have lost sectors, and can be made whole: with the numbers of those.
+    fn columns(&self) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
+        let mut columns = BTreeMap::new();
+        for (one, block) in &self.parity {
+            // What the file held before covers what was before it, or lies far off.
+            let last = one.last.checked_sub(self.base);
+            let Some(last) = last.filter(|last| (*last as usize) < self.numbers.len()) else { continue };
+            let empty = || (Column::new(self.session), Vec::new());
+            let (column, _) = columns.entry(column_of(last)).or_insert_with(empty);
+            column.sum(one, block);
+        }
+        for ((stretch, first), (column, lost)) in &mut columns {
+            let first = stretch.saturating_mul(STRETCH_SECTORS).saturating_add(*first);
+            let last = column.last().map_or(0, |last| last.wrapping_sub(self.base));
+            let rows = (first..=last).step_by(COLUMNS);
+            let gone = rows.filter(|at| self.in_place(*at).is_none());
+            lost.extend(gone.map(|at| self.base.wrapping_add(at)).take(LOST_MAX + 1));
+        }
+        columns.retain(|_, (_, lost)| (1..=LOST_MAX).contains(&lost.len()));
+        columns
+    }
+}
