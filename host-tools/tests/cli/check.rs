@@ -70,7 +70,8 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         "CRITICAL    4:20.7  cell voltage, battery 1: 3.4 V (limit 3.5 V), for 1:36",
         "The weakest cell was close to empty",
         "Check the pack under load",
-        "no failure flags of ESCs: esc_failure",
+        "no battery temperature: batt_temperature",
+        "no failure flags of ESCs",
     ] {
         assert!(screen.contains(words), "{words}\n{screen}");
     }

@@ -77,6 +77,19 @@ pub(super) const TOPICS: &[Topic] = &[
         take: attitude_setpoint,
     },
     Topic {
+        name: "vehicle_rates_setpoint",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["roll", "pitch"],
+        take: |px4, said| {
+            let rates = [said.fields.finite(0), said.fields.finite(1)];
+            px4.motion.rates_wanted = match rates {
+                [Some(roll), Some(pitch)] => Some([roll, pitch].map(RadiansPerSecond)),
+                _ => None,
+            };
+        },
+    },
+    Topic {
         name: "vehicle_local_position",
         instances: 1,
         every_us: MEDIUM_US,
@@ -316,7 +329,7 @@ fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
     };
     let wanted = said.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
     if let Some(wanted) = wanted {
-        px4.observe(Observation::Wanted(wanted));
+        px4.observe(Observation::Wanted(Wanted { rates: px4.motion.rates_wanted, ..wanted }));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
-use hums_core::units::{Amperes, Fraction, Gauss, Volts};
+use hums_core::units::{Amperes, Fraction, Gauss, RadiansPerSecond, Volts};
 
 use super::super::fields::Fields;
 
@@ -137,6 +137,8 @@ pub(super) struct Status {
 pub(super) struct Motion {
     pub(super) combined: bool,
     pub(super) rate: Option<[f32; 3]>,
+    /// The body rates that are wanted, about roll and pitch.
+    pub(super) rates_wanted: Option<[RadiansPerSecond; 2]>,
     /// What each compass measured last, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; 3],
     pub(super) local: Option<Local>,

@@ -201,6 +201,22 @@ fn the_wanted_attitude_is_a_quaternion_and_before_v1_6_two_angles() {
 }
 
 #[test]
+fn the_wanted_rates_go_with_the_wanted_attitude() {
+    let log = Writer::new(SECOND)
+        .format("vehicle_attitude_setpoint:uint64_t timestamp;float[4] q_d;")
+        .format("vehicle_rates_setpoint:uint64_t timestamp;float roll;float pitch;float yaw;")
+        .subscribe(0, 0, "vehicle_attitude_setpoint")
+        .subscribe(1, 0, "vehicle_rates_setpoint");
+    let log = log.data(1, 2 * SECOND, &floats(&[0.5, -0.25, 0.0]));
+    let log = log.data(0, 2 * SECOND, &floats(&[1.0, 0.0, 0.0, 0.0]));
+    let wanted = observations(&read(&log.bytes), "Wanted(");
+    assert!(
+        wanted[0].contains("rates: Some([RadiansPerSecond(0.5), RadiansPerSecond(-0.25)])"),
+        "{wanted:?}"
+    );
+}
+
+#[test]
 fn the_rates_of_an_attitude_are_its_own_or_those_of_the_gyros() {
     let attitude = [1.0, 0.0, 0.0, 0.0];
     let old =
