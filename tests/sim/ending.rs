@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use hums_blackbox::Header;
+use hums_blackbox::parity::COLUMNS;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_tests::flights::own;
@@ -13,6 +14,8 @@ use serde_json::Value;
 
 const FLIGHT: &str = "ap_quad_guided.tlog";
 const BLOCK: usize = 512;
+/// An orderly end is one sector and the parity of the last stretch.
+const CLOSING_WRITES: u64 = 1 + 2 * COLUMNS as u64;
 
 /// Records the flight onto a card; power goes at this block write. How many there were.
 fn record(image: &Path, cut: Option<u64>) -> u64 {
@@ -43,7 +46,7 @@ fn power_that_goes_after_the_disarming_leaves_a_log_that_is_whole_to_it() {
     let writes = record(&image, None);
     assert_eq!(verify(&image, 0)[0]["end"]["proof"], "closed");
     fs::remove_file(&image).unwrap();
-    record(&image, Some(writes - 1));
+    record(&image, Some(writes - CLOSING_WRITES));
     let logs = verify(&image, 0);
     let end = &logs[0]["end"];
     assert_eq!((&end["proof"], &end["mark"]["why"]), (&"mark".into(), &"disarmed".into()), "{end}");
@@ -72,7 +75,7 @@ fn the_next_log_on_the_card_tells_that_the_end_of_the_one_before_is_gone() {
     let image = dir.path().join("card.img");
     let writes = record(&image, None);
     fs::remove_file(&image).unwrap();
-    record(&image, Some(writes - 1));
+    record(&image, Some(writes - CLOSING_WRITES));
     record(&image, None);
     let logs = verify(&image, 0);
     assert_eq!(logs[0]["end"]["proof"], "next_start", "{}", logs[0]);
@@ -91,7 +94,8 @@ fn the_next_log_on_the_card_tells_that_the_end_of_the_one_before_is_gone() {
         end["sectors_missing"].as_u64().unwrap() >= 28 && end["frames_missing"].as_u64().unwrap() > 0,
         "{end}"
     );
-    assert_eq!(end["behind"]["erased"], 30, "{end}");
+    // A partial sector that a whole one had superseded may be among them.
+    assert!(end["behind"]["erased"].as_u64().is_some_and(|erased| (29..=30).contains(&erased)), "{end}");
     assert_eq!(logs[1]["end"]["proof"], "closed");
 }
 

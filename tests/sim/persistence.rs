@@ -158,11 +158,13 @@ fn a_component_that_a_command_says_is_replaced_begins_anew_and_that_is_recorded(
         let time_us = 1_700_000_000_000_000 + second * 1_000_000;
         [&time_us.to_be_bytes()[..], &build_v2(second as u8, id, payload, seeds[&id])].concat()
     };
-    let said = [
-        entry(0, HEARTBEAT, &[0, 0, 0, 0, 6, 8, 0, 4, 3]),
-        entry(100, COMMAND_LONG, &command),
-        entry(250, COMMAND_LONG, &command),
-    ];
+    let said: Vec<Vec<u8>> = (0..260)
+        .flat_map(|second| {
+            let asked = [100, 250].contains(&second).then(|| entry(second, COMMAND_LONG, &command));
+            [Some(entry(second, HEARTBEAT, &[0, 0, 0, 0, 6, 8, 0, 4, 3])), asked]
+        })
+        .flatten()
+        .collect();
     fs::write(path("gs.tlog"), said.concat()).unwrap();
     let store = path("store.bin");
     let run = |more: [String; 2]| {

@@ -2,7 +2,7 @@
 //!
 //! The sector with the number `n` lies at block `n - base` of its file, so whoever knows the file's base knows what is lost:
 //! every place that holds another sector, or none. The base is the one that most sound sectors of the file agree on, unless
-//! the file begins with a newer one: then the recorder had just begun to write it anew.
+//! the file begins with a number that comes after all that it has room for: then the recorder had just begun to write it anew.
 
 use std::collections::BTreeMap;
 
@@ -93,7 +93,11 @@ impl Found {
             at = at.saturating_add(1);
         }
         let base = bases.into_iter().max_by_key(|(_, count)| *count).map(|(base, _)| base);
-        let (Some(session), Some(base)) = (session, base.max(begins)) else { return Ok(None) };
+        // A first sector whose number has a place further on in the file was only put there.
+        let anew =
+            |begins: &u32| base.is_none_or(|base| begins.checked_sub(base).is_some_and(|ahead| ahead >= at));
+        let base = begins.filter(anew).or(base);
+        let (Some(session), Some(base)) = (session, base) else { return Ok(None) };
         parity.retain(|(one, _)| one.session == session);
         Ok((!parity.is_empty()).then_some(Self { session, base, numbers, parity }))
     }
