@@ -277,14 +277,16 @@ fn a_signed_flight_is_recorded_bit_for_bit() {
     fs::write(&part, &data[..BYTES]).unwrap();
     let manifest = Manifest::own();
     let input = manifest.frames_of(&flight, &data);
-    // The last frame before a silence may not be on the card when the run ends: it counts as lost.
+    // In a first start one frame may come damaged, which is told: the record's loss counts it.
     let chip = Recording::attempt(Machine::Chip, &part, &CARD_MIB).expect_code(&[0, 3]);
-    let lost = chip.json()["frames_lost"].as_u64();
-    assert!(lost <= Some(1), "{lost:?}");
+    let lost = chip.number("frames_lost");
+    assert!(lost <= 1, "{lost}");
     let log = chip.decode(&[0, 3]);
     let recorded = log.frames(&manifest.seeds);
     assert!(recorded.len() > 3_000, "{} frames", recorded.len());
-    frames::assert_same(&input[..recorded.len()], &recorded, &[]);
+    let same = input.iter().zip(&recorded).take_while(|(said, heard)| said == heard).count();
+    let after = same + lost as usize;
+    frames::assert_same(&input[after..after + recorded.len() - same], &recorded[same..], &[]);
 }
 
 #[test]

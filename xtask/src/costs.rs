@@ -100,7 +100,7 @@ mod tests {
 
     const REPORT: &str = r#"{"frames_in": 10, "bytes_in": 1000, "stack_bytes": 16384, "busy_percent_max": 35.5,
         "cycles": {"framer": 1000, "encode": 2000, "observe": 100, "tick": 10, "summary": 10, "tasks": 80},
-        "stack_by_urgency": {"watch": 200, "ports": 150, "clock": 200, "reception": 900, "monitor": 5000, "downlink": 800, "storage": 4000,
+        "stack_by_urgency": {"watch": 200, "ports": 150, "clock": 150, "reception": 900, "monitor": 5000, "downlink": 800, "storage": 4000,
         "start": 9000}}"#;
 
     fn over(report: &str) -> Vec<String> {
