@@ -2,7 +2,7 @@
 //!
 //! The sector with the number `n` lies at block `n - base` of its file, so whoever knows the file's base knows what is lost:
 //! every place that holds another sector, or none. The base is the one that most sound sectors of the file agree on, unless
-//! the file begins with a number that comes after all that it has room for: then the recorder had just begun to write it anew.
+//! the file begins with a number that comes after all others in it: then the recorder had just begun to write it anew.
 
 use std::collections::BTreeMap;
 
@@ -93,9 +93,13 @@ impl Found {
             at = at.saturating_add(1);
         }
         let base = bases.into_iter().max_by_key(|(_, count)| *count).map(|(base, _)| base);
-        // A first sector whose number has a place further on in the file was only put there.
-        let anew =
-            |begins: &u32| base.is_none_or(|base| begins.checked_sub(base).is_some_and(|ahead| ahead >= at));
+        // A first sector that belongs before others of the file was only put there.
+        let anew = |begins: &u32| {
+            let mut others =
+                (0_u32..).zip(&numbers).filter_map(|(at, number)| number.map(|number| (at, number)));
+            base.is_none_or(|base| base < *begins)
+                && others.all(|(at, number)| number.wrapping_sub(at) == *begins || number < *begins)
+        };
         let base = begins.filter(anew).or(base);
         let (Some(session), Some(base)) = (session, base) else { return Ok(None) };
         parity.retain(|(one, _)| one.session == session);
