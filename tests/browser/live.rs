@@ -236,7 +236,8 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
     assert!((second.0.1 - first.1.1).abs() < 15.0, "it goes on where it was: {used:?}");
     assert_eq!((first.0.0.as_str(), second.1.0.as_str()), ("good", "due"), "{used:?}");
 
-    let wrong = hums(["live", "--input", input, "--session", "99999"]).expect_code(&[2]);
+    let wrong =
+        hums(["live", "--listen", "127.0.0.1:0", "--input", input, "--session", "99999"]).expect_code(&[2]);
     assert!(wrong.stderr.contains(names[0]), "it says which there are");
 }
 

@@ -68,7 +68,8 @@ fn readers(path: &Path, out: &Path) -> Vec<Vec<OsString>> {
         [words(&["check"]), vec![input.clone()]].concat(),
         [words(&["report", "-o"]), vec![page, input.clone()]].concat(),
         [words(&["decode", "--format", "csv", "-o"]), vec![tables, input.clone()]].concat(),
-        [words(&["live", "--input"]), vec![input]].concat(),
+        // Any free port: the default one may be another program's.
+        [words(&["live", "--listen", "127.0.0.1:0", "--input"]), vec![input]].concat(),
     ]
 }
 

@@ -95,9 +95,7 @@ impl Baseline {
         self.value += weight * off;
         self.flights = self.flights.saturating_add(1);
     }
-}
 
-impl Baseline {
     /// How far the next flight's figure is from the baseline on the average, where nothing changed; `prior` is the spread that such a
     /// quantity has as a rule.
     pub fn spread(&self, prior: f32) -> f32 {

@@ -34,8 +34,6 @@ const FRESH: Span = Span::from_secs(1);
 const SMOOTHING_S: f32 = 0.5;
 /// No sensor measures so much, in any of the units.
 const GARBAGE: f32 = 1e6;
-/// In the air for so long it has left the ground.
-const SETTLED: Span = Span::from_secs(3);
 /// Ratios that the estimator told of its compass in flight, before their end says that it does not use it any more: at 1 Hz or more.
 const RATIOS_KNOWN: u8 = 20;
 /// What moves by so much changes the values of its sensors: m up or down and over ground, rad about any axis.
@@ -279,7 +277,7 @@ impl Crosschecks {
         let hovers = hovers(now, vehicle, flight);
         let calm = turns_little
             && matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Plane)
-            && flight.airborne_since().is_some_and(|since| now.since(since) > SETTLED);
+            && flight.is_settled(now);
         for kind in Kind::ALL {
             let compares = match kind {
                 Kind::Accelerometer | Kind::Gyro => hovers,

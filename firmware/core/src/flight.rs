@@ -29,8 +29,9 @@ use crate::observation::{LandedState, VehicleKind};
 use crate::time::{Instant, Span};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
-/// Steady flight: in the air for this long, and not tilted further.
-const STEADY_AFTER: Span = Span::from_secs(3);
+/// In the air for so long it has left the ground.
+const SETTLED: Span = Span::from_secs(3);
+/// Steady flight is not tilted further.
 const STEADY_TILT_RAD: f32 = 0.26;
 
 const TAKEOFF_HEIGHT_M: f32 = 1.0;
@@ -156,9 +157,14 @@ impl Flight {
         self.airborne_since.is_some()
     }
 
-    /// In the air for a moment, and not tilted far.
+    /// In the air for a moment: it flies, and does not just leave the ground.
+    pub(crate) fn is_settled(&self, now: Instant) -> bool {
+        self.airborne_since.is_some_and(|since| now.since(since) > SETTLED)
+    }
+
+    /// Settled, and not tilted far.
     pub(crate) fn is_steady(&self, now: Instant, vehicle: &Vehicle) -> bool {
-        self.airborne_since().is_some_and(|since| now.since(since) > STEADY_AFTER)
+        self.is_settled(now)
             && vehicle.attitude.get().is_none_or(|attitude| {
                 attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
             })

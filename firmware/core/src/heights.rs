@@ -32,8 +32,6 @@ const AIR_S: f32 = 30.0;
 /// Beyond half of the default limits nothing is learnt.
 const APART_HOLD_M: f32 = 4.0;
 const NOISE_HOLD_M: f32 = 1.0;
-/// In the air for so long it has left the ground.
-const SETTLED: Span = Span::from_secs(3);
 /// Samples further apart are not compared.
 const PAUSE: Span = Span::from_secs(2);
 
@@ -74,8 +72,7 @@ impl Heights {
         vehicle: &Vehicle,
         flight: &Flight,
     ) {
-        let flies = flight.airborne_since().is_some_and(|since| at.since(since) > SETTLED);
-        if !flies || !pressure.0.is_finite() || pressure.0 <= 0.0 {
+        if !flight.is_settled(at) || !pressure.0.is_finite() || pressure.0 <= 0.0 {
             return;
         }
         if self.first_hpa == 0.0 {

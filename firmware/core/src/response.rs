@@ -20,8 +20,6 @@ const FRESH: Span = Span::from_millis(500);
 const LATE_PART: f32 = 0.3;
 /// No vehicle turns faster, rad/s: garbage.
 const RATE_MAX: f32 = 60.0;
-/// In the air for so long it is flown, and does not leave the ground.
-const SETTLED: Span = Span::from_secs(3);
 /// Throttle at its end.
 const FULL: f32 = 0.95;
 /// With it multicopters climb faster than this, m/s, while they are not tilted further, rad; what flies on wings does not sink faster.
@@ -64,12 +62,11 @@ impl Response {
     }
 
     pub(crate) fn take_attitude(&mut self, at: Instant, attitude: &Attitude, flight: &Flight) {
-        let flies = flight.airborne_since().is_some_and(|since| at.since(since) > SETTLED);
         let (Some(wanted), Some([roll, pitch, _])) = (self.wanted.within(at, FRESH), attitude.rates) else {
             return;
         };
         let sane = |rate: &RadiansPerSecond| rate.0.abs() <= RATE_MAX;
-        if !flies || !wanted.iter().chain(&[roll, pitch]).all(sane) {
+        if !flight.is_settled(at) || !wanted.iter().chain(&[roll, pitch]).all(sane) {
             return;
         }
         let step_s = self.compared_at.map_or(0.0, |before| at.since(before).min(FRESH).as_secs_f32());
@@ -83,7 +80,6 @@ impl Response {
 
     /// A pilot's display: throttle.
     pub(crate) fn take_hud(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle, flight: &Flight) {
-        let flies = flight.airborne_since().is_some_and(|since| at.since(since) > SETTLED);
         let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };
         let level = vehicle
             .attitude
@@ -95,7 +91,8 @@ impl Response {
             None => false,
         };
         self.full_at = Some(at);
-        self.full_since = (flies && throttle.0 >= FULL && in_vain).then(|| self.full_since.unwrap_or(at));
+        self.full_since =
+            (flight.is_settled(at) && throttle.0 >= FULL && in_vain).then(|| self.full_since.unwrap_or(at));
     }
 
     /// A flight begins.

@@ -14,9 +14,8 @@ const FRESH: Span = Span::from_secs(1);
 const LOW_M: f32 = 1.5;
 const SLOW_MPS: f32 = 6.0;
 const LEVEL_MPS: f32 = 2.0;
-/// Further it does not lean steadily, rad; and it has left the ground for so long.
+/// Further it does not lean steadily, rad.
 const LEANS_RAD: f32 = 0.6;
-const SETTLED: Span = Span::from_secs(3);
 
 /// Whether a multicopter turns and climbs little, and does not touch the ground: contact and the propellers' wash there set sensors
 /// apart, and motors do what the legs make them do. It may be fast, and lean against the wind.
@@ -26,7 +25,7 @@ pub(crate) fn flies_evenly(now: Instant, vehicle: &Vehicle, flight: &Flight) -> 
     !climbs
         && vehicle.is_multicopter()
         && !vehicle.attitude.get().is_some_and(leans)
-        && flight.airborne_since().is_some_and(|since| now.since(since) > SETTLED)
+        && flight.is_settled(now)
         && is_clear(now, vehicle)
         && vehicle.inertial.turns_little(now, TURNED)
 }

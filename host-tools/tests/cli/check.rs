@@ -451,15 +451,21 @@ fn a_log_in_which_there_was_nothing_to_judge_does_not_look_good_to_a_script() {
     assert!(table.contains("1  no vehicle in it"), "{table}");
 }
 
+/// A ULog's header.
+fn ulog_begun() -> Vec<u8> {
+    [&b"ULog\x01\x12\x35\x01"[..], &1_000_000_u64.to_le_bytes()].concat()
+}
+
+fn ulog_message(log: &mut Vec<u8>, kind: u8, body: &[u8]) {
+    log.extend((body.len() as u16).to_le_bytes());
+    log.push(kind);
+    log.extend(body);
+}
+
 /// A ULog of a topic that no check reads.
 fn ulog_of_nothing_known() -> Vec<u8> {
-    let mut log = b"ULog\x01\x12\x35\x01".to_vec();
-    log.extend(1_000_000_u64.to_le_bytes());
-    let mut message = |kind: u8, body: &[u8]| {
-        log.extend((body.len() as u16).to_le_bytes());
-        log.push(kind);
-        log.extend(body);
-    };
+    let mut log = ulog_begun();
+    let mut message = |kind: u8, body: &[u8]| ulog_message(&mut log, kind, body);
     message(b'F', b"camera_stuff:uint64_t timestamp;uint8_t shots;");
     message(b'A', &[&[0, 0, 0][..], b"camera_stuff"].concat());
     for second in 1..20_u64 {
@@ -470,13 +476,8 @@ fn ulog_of_nothing_known() -> Vec<u8> {
 
 /// A ULog in which a vehicle is heard for 20 s, and whose logger lost something.
 fn ulog_with_a_dropout() -> Vec<u8> {
-    let mut log = b"ULog\x01\x12\x35\x01".to_vec();
-    log.extend(1_000_000_u64.to_le_bytes());
-    let mut message = |kind: u8, body: &[u8]| {
-        log.extend((body.len() as u16).to_le_bytes());
-        log.push(kind);
-        log.extend(body);
-    };
+    let mut log = ulog_begun();
+    let mut message = |kind: u8, body: &[u8]| ulog_message(&mut log, kind, body);
     message(
         b'F',
         b"vehicle_status:uint64_t timestamp;uint8_t arming_state;uint8_t nav_state;uint8_t system_type;",

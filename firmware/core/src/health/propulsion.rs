@@ -32,6 +32,19 @@ const ESC: Check = Check {
     read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
 };
 
+/// A body rate that does not become what is wanted.
+const RATE: Check = Check {
+    unit: "deg/s",
+    warn: Some(Param::RateWarn),
+    critical: Some(Param::RateCrit),
+    hysteresis: 5.0,
+    debounce_warn: Span::from_millis(200),
+    debounce_critical: Span::from_millis(200),
+    when: When::InFlight,
+    instances: 1,
+    ..ESC
+};
+
 pub(super) const CHECKS: &[Check] = &[
     ESC,
     Check {
@@ -132,30 +145,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "roll_rate",
         words: "roll does not follow",
-        unit: "deg/s",
-        warn: Some(Param::RateWarn),
-        critical: Some(Param::RateCrit),
-        hysteresis: 5.0,
-        debounce_warn: Span::from_millis(200),
-        debounce_critical: Span::from_millis(200),
-        when: When::InFlight,
-        instances: 1,
         read: |inputs, _| inputs.derived.response().rate_missing(0),
-        ..ESC
+        ..RATE
     },
     Check {
         name: "pitch_rate",
         words: "pitch does not follow",
-        unit: "deg/s",
-        warn: Some(Param::RateWarn),
-        critical: Some(Param::RateCrit),
-        hysteresis: 5.0,
-        debounce_warn: Span::from_millis(200),
-        debounce_critical: Span::from_millis(200),
-        when: When::InFlight,
-        instances: 1,
         read: |inputs, _| inputs.derived.response().rate_missing(1),
-        ..ESC
+        ..RATE
     },
     Check {
         name: "motor_trend",
