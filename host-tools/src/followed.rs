@@ -162,7 +162,10 @@ impl<T: Logged> Followed<T> {
         let frames = next.summary.frames_before.zip(earlier.frames_end);
         let frames = frames.map(|(here, there)| here.wrapping_sub(there)).filter(|frames| *frames < 1 << 31);
         match (missing, absent) {
-            (0, 0) => PowerOn::Follows,
+            (0, 0) => {
+                self.prove(earlier, next, first);
+                PowerOn::Follows
+            }
             (0, _) => PowerOn::Renamed { after },
             (_, 0) if self.shorten(next, missing, frames.filter(|_| from == first)) => PowerOn::Follows,
             _ => {
@@ -173,13 +176,32 @@ impl<T: Logged> Followed<T> {
         }
     }
 
-    /// The end of the log before `next` is missing; whether that log is at hand.
-    fn shorten(&mut self, next: &Ending, sectors: u32, frames: Option<u32>) -> bool {
+    /// The log before `next` of the same power-on, if it is at hand.
+    fn before(&mut self, next: &Ending) -> Option<&mut Ending> {
         let is_before = |log: &&mut Ending| {
             log.summary.session == next.summary.session && place(&log.name).0 == place(&next.name).0
         };
-        let held = self.held.iter_mut().filter_map(Logged::ending);
-        let Some(log) = held.rev().find(is_before) else { return false };
+        self.held.iter_mut().filter_map(Logged::ending).rev().find(is_before)
+    }
+
+    /// Of the log before `next` nothing is missing: `next`, which begins with sector `first`, has what came then, or a vehicle
+    /// that waited did not keep it.
+    fn prove(&mut self, earlier: &Latest, next: &Ending, first: u32) {
+        let frames = next.summary.frames_before.zip(earlier.frames_end);
+        // The sector in progress is in the next log again.
+        let has_all = frames.is_some_and(|(here, there)| there.wrapping_sub(here) < 1 << 31);
+        let goes_on = first == earlier.end && has_all;
+        if let Some(log) = self.before(next).filter(|log| !log.proof.is_whole()) {
+            let waited = log.summary.keep.is_some() && log.summary.marks.moved.is_none();
+            if goes_on || first > earlier.end && waited {
+                log.proof = Proof::NextLog;
+            }
+        }
+    }
+
+    /// The end of the log before `next` is missing; whether that log is at hand.
+    fn shorten(&mut self, next: &Ending, sectors: u32, frames: Option<u32>) -> bool {
+        let Some(log) = self.before(next) else { return false };
         log.proof = Proof::Short { sectors, frames, by: Teller::NextLog };
         true
     }

@@ -490,6 +490,95 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
 }
 
+/// Power goes in the ring of a vehicle that waits, at each write around the beginning of a file: what that file held before is not
+/// taken for the end, on an empty card and on one that is full of older sessions. A frame that is in a copy of a sector and in the
+/// sector after it counts once.
+#[test]
+fn the_end_is_found_wherever_power_goes_while_a_vehicle_waits() {
+    let (mut begun, mut fuller_copies) = (0, 0);
+    for older_sessions in [0, 20] {
+        let device = MemCard::formatted(40 * MIB_BLOCKS);
+        for session in 0..older_sessions {
+            let mut recorder = Recorder::new(device.clone(), leaked(), held(), session);
+            for sector in sectors(300) {
+                assert_eq!(put(&mut recorder, Instant::ZERO, &sector), Written::Done);
+            }
+        }
+        device.journal.borrow_mut().clear();
+        let mut blocks = device.blocks.borrow().clone();
+        let session = wait(&device);
+        let (mut frames, mut newest, mut since_begun) = (0, None::<Header>, u32::MAX);
+        for (at, block) in device.journal.take() {
+            let held_before = blocks.insert(at, block).unwrap_or([0; 512]);
+            let own = Header::read(&block).ok().filter(|header| header.session == session);
+            let is_metadata = own.is_none() && Parity::read(&block).is_none();
+            since_begun = if is_metadata { 0 } else { since_begun.saturating_add(1) };
+            let (before, mut is_fuller) = (newest, false);
+            if let Some(own) = own {
+                match before.filter(|before| before.number == own.number) {
+                    // The copy before the sector itself.
+                    Some(before) if !before.partial => continue,
+                    Some(before) => is_fuller = !own.partial && before.frames > own.frames,
+                    None => {}
+                }
+                frames += if own.partial { 0 } else { u32::from(own.frames) };
+                newest = Some(own);
+            }
+            fuller_copies += u32::from(is_fuller);
+            let Some(newest) = newest.filter(|_| since_begun < 4 || is_fuller) else { continue };
+            begun += u32::from(is_metadata);
+            let card = MemCard::with(device.size, blocks.clone());
+            let found = found_at_next_start(&card);
+            let frames = frames + if newest.partial { u32::from(newest.frames) } else { 0 };
+            let number = newest.number;
+            let ends = (found.found, found.session, found.sectors, found.frames);
+            assert_eq!(
+                ends,
+                (Found::Frames, session, number + 1, frames),
+                "{older_sessions}, sector {number}"
+            );
+            // The same write, torn.
+            let Some(before) = before.filter(|_| own.is_some()) else { continue };
+            let mut torn = held_before;
+            torn[..256].copy_from_slice(&block[..256]);
+            card.blocks.borrow_mut().insert(at, torn);
+            let found = found_at_next_start(&card);
+            let ends = [before.number + 1, number + 1];
+            assert!(found.session == session && ends.contains(&found.sectors), "{found:?} of {ends:?}");
+        }
+    }
+    assert!(begun > 20 && fuller_copies > 0, "{begun} writes to begin files, {fuller_copies} fuller copies");
+}
+
+/// Records a vehicle that waits for a minute, with a copy of the sector in progress after most frames; the session.
+fn wait(device: &MemCard) -> u32 {
+    let status = leaked();
+    status.wait_from(0, Span::from_secs(5));
+    let mut recorder = Recorder::new(device.clone(), status, held(), 99);
+    let (mut writer, mut sink) = (Box::new(Writer::new()), Sink(Vec::new()));
+    let mut partial = Sector::zeroed();
+    for index in 0..1200_u32 {
+        let now = Instant::from_millis(u64::from(index) * 50);
+        if status.take_group_wanted() {
+            assert!(writer.restart(&mut sink));
+        }
+        let noise: [u8; 6] =
+            std::array::from_fn(|at| ((index * 6 + at as u32).wrapping_mul(0x9e37_79b1) >> 13) as u8);
+        writer.frame(now, &noise, false, &mut sink).expect("there is room");
+        for sector in sink.0.drain(..) {
+            assert_eq!(put(&mut recorder, now, &sector), Written::Done);
+        }
+        if index % 5 > 0 && writer.partial(&mut partial) {
+            assert_eq!(put(&mut recorder, now, &partial), Written::Done);
+        }
+    }
+    recorder.log_session().expect("it records")
+}
+
+fn leaked() -> &'static CardStatus {
+    Box::leak(Box::default())
+}
+
 /// Looking for the session before takes a while in which nothing is written: the session's first sector does not wait.
 #[test]
 fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {

@@ -69,7 +69,7 @@ impl Files<'_> {
     /// A file that the next start found empty was made when the power went; so was one that was to be written anew, which
     /// still holds what it held before.
     fn is_usual(&self, strange: &Strange) -> bool {
-        let is_empty = strange.hollow && self.proof == Proof::NextStart(None);
+        let is_empty = strange.hollow && matches!(self.proof, Proof::NextStart(None) | Proof::NextLog);
         match strange.others {
             Some(others) => is_empty && self.is_begun_anew(strange, &others),
             None if strange.shift.is_some() => false,
@@ -81,10 +81,10 @@ impl Files<'_> {
         strange.file + 1 == self.names.len()
     }
 
-    /// Whether all that a file holds is another log from its beginning on, as of one that was to be written anew. Its first
-    /// sector may be torn.
+    /// Whether all that a file holds is another log from its beginning on, as of one that was to be written anew, and what
+    /// that one had not written over. Its first sector may be torn.
     fn is_begun_anew(&self, strange: &Strange, others: &Others) -> bool {
-        strange.hollow && self.is_last(strange) && others.first <= 1 && !others.several
+        strange.hollow && self.is_last(strange) && others.first <= 1
     }
 
     /// Another log of the same power-on is in its files.

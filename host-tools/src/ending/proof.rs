@@ -15,6 +15,8 @@ pub enum Proof {
     /// The next start on the card found that it ends there; with when the vehicle was armed or took off, if power went
     /// then: what the card did not take any more nobody knows.
     NextStart(Option<Instant>),
+    /// The next log of the same power-on begins where it ends, or as much later as a vehicle that waited did not keep.
+    NextLog,
     /// It is whole to its last end mark.
     Mark(Instant, Resting),
     /// Nothing: it has no end mark, or the vehicle was armed or took off after the last one.
@@ -70,18 +72,19 @@ impl Proof {
 
     /// Whether nothing is known to be missing at the end, up to the last end mark at least.
     pub const fn holds(self) -> bool {
-        matches!(self, Self::Closed | Self::NextStart(None) | Self::Mark(..))
+        self.is_whole() || matches!(self, Self::Mark(..))
     }
 
     /// Whether all of the end is proved.
     pub const fn is_whole(self) -> bool {
-        matches!(self, Self::Closed | Self::NextStart(None))
+        matches!(self, Self::Closed | Self::NextStart(None) | Self::NextLog)
     }
 
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Closed => "closed",
             Self::NextStart(_) => "next_start",
+            Self::NextLog => "next_log",
             Self::Mark(..) => "mark",
             Self::None => "none",
             Self::Short { .. } => "short",
@@ -97,6 +100,9 @@ impl Proof {
                 "nothing was written into it, as the next start found".to_owned()
             }
             Self::NextStart(None) => "whole to its end, as the next start found it".to_owned(),
+            Self::NextLog => {
+                "whole as far as it was to be kept: the next log of the same power-on goes on".to_owned()
+            }
             Self::NextStart(Some(moved)) => format!(
                 "whole to its end, as the next start found it; armed or in the air since {} when power went: what was \
                  not written then is not known",

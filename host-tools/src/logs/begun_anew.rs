@@ -242,6 +242,11 @@ fn before(log: &Log) -> Option<Before> {
     at_beginning(log, |boot| Some(boot.before).filter(Before::has_end))
 }
 
+/// Whether a log's beginning says that there was none on its card.
+pub(super) fn found_nothing(log: &Log) -> bool {
+    own(log).is_some_and(|before| before.found == Found::Nothing)
+}
+
 /// What a log's beginning first says of what was on its card.
 fn own(log: &Log) -> Option<Before> {
     at_beginning(log, |boot| Some(boot.before).filter(|before| before.found != Found::Unknown))

@@ -7,12 +7,13 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::Header;
-use hums_recorder::LogName;
 use hums_recorder::layout::{Layout, LayoutError};
 
-use super::fat::{CardFile, Extent, ReadAt as _, Volume, Walk};
+use super::begun_anew;
+use super::fat::{CardFile, Deleted, Extent, ReadAt as _, Volume, Walk};
 use super::found::{Found, Image, belong};
 use super::places::{BLOCK_BYTES, Log, Piece};
+use super::reader::likely_epoch;
 use super::scan::{Files, Scan, scan};
 use crate::card::{ReadOnlyImage, length};
 
@@ -122,12 +123,13 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
     // Older logs are deleted to make room; the newest one is what a card is read for. The first digit of a deleted one is
     // lost: of the numbers that it may have had, the next one to those that are there counts.
     let newest = walk.files.iter().filter_map(|file| Some(file.name?.session)).max();
-    let after = |(deleted, place): &(LogName, Extent)| {
-        let ahead = (deleted.session + DIGITS - newest? % DIGITS) % DIGITS;
-        (1..DIGITS / 2).contains(&ahead).then_some((newest? + ahead, *place))
+    let after = |deleted: &Deleted| {
+        let ahead = (deleted.name.session + DIGITS - newest? % DIGITS) % DIGITS;
+        (1..DIGITS / 2).contains(&ahead).then_some((newest? + ahead, *deleted))
     };
-    if let Some((number, place)) = walk.deleted.iter().filter_map(after).max_by_key(|(number, _)| *number)
-        && has_sector(path, vec![place])?
+    if let Some((number, deleted)) = walk.deleted.iter().filter_map(after).max_by_key(|(number, _)| *number)
+        && let Some(first) = first_sector(path, vec![deleted.place])?
+        && !is_older_than_all(path, &deleted, first.session, &walk.files)
     {
         about
             .damage
@@ -135,6 +137,19 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
     }
     about.deleted_logs = walk.deleted_logs;
     Ok(walk.files)
+}
+
+/// Whether a deleted log was recorded before the first one that is there, which found none on its card, and is newer by its
+/// clock: numbers began anew after all logs had been deleted.
+fn is_older_than_all(path: &Path, deleted: &Deleted, session: u32, files: &[CardFile]) -> bool {
+    let extent = Extent { length: deleted.bytes, ..deleted.place };
+    let deleted = Log { session: Some(session), ..lost(path, vec![extent]) };
+    let epoch = |log: &Log| likely_epoch(log).ok().flatten();
+    let logs = sessions_of(path, files);
+    let first = logs.first().filter(|first| begun_anew::found_nothing(first));
+    first.is_some_and(|first| {
+        epoch(first).zip(epoch(&deleted)).is_some_and(|(first, deleted)| deleted < first)
+    })
 }
 
 /// The sessions of which there are sectors outside of the logs that the file system knows of.
@@ -178,20 +193,30 @@ fn cut_short(file: &File, device: &ReadOnlyImage) -> io::Result<Option<String>> 
 
 /// Whether there is a sector of a log here.
 fn has_sector(path: &Path, extents: Vec<Extent>) -> Result<bool> {
-    let lost = Log {
+    Ok(first_sector(path, extents)?.is_some())
+}
+
+/// The first sector of a log here.
+fn first_sector(path: &Path, extents: Vec<Extent>) -> Result<Option<Header>> {
+    let lost = lost(path, extents);
+    let mut blocks = lost.blocks();
+    while let Some(block) = blocks.next_block()? {
+        if let Ok(header) = Header::read(&block) {
+            return Ok(Some(header));
+        }
+    }
+    Ok(None)
+}
+
+/// What lies here, which no file has.
+fn lost(path: &Path, extents: Vec<Extent>) -> Log {
+    Log {
         name: String::new(),
         files: Vec::new(),
         pieces: vec![Piece { path: path.to_owned(), extents }],
         session: None,
         left_over: false,
-    };
-    let mut blocks = lost.blocks();
-    while let Some(block) = blocks.next_block()? {
-        if Header::read(&block).is_ok() {
-            return Ok(true);
-        }
     }
-    Ok(false)
 }
 
 /// The segments of each session together, and each file of another name by itself.

@@ -67,6 +67,17 @@ pub struct CardFile {
     pub extents: Vec<Extent>,
 }
 
+/// A deleted segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Deleted {
+    /// Its name, of which the first digit is lost and taken for 0.
+    pub name: LogName,
+    /// Its first cluster.
+    pub place: Extent,
+    /// The size that it had. What lay behind its first cluster nobody knows: the recorder's files mostly lie in a row.
+    pub bytes: u64,
+}
+
 /// What a walk over the volume found.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
@@ -81,9 +92,8 @@ pub struct Walk {
     pub lost_clusters: u64,
     /// Where they lie, as far as there is room to keep it.
     pub lost: Vec<Extent>,
-    /// The deleted segments whose first clusters are free, and where these lie. A deleted entry has lost its name's first
-    /// digit, which is taken for 0.
-    pub deleted: Vec<(LogName, Extent)>,
+    /// The deleted segments whose first clusters are free.
+    pub deleted: Vec<Deleted>,
     /// Deleted segments whose first cluster is free and begins with a sector of a log.
     pub deleted_logs: u64,
 }
@@ -289,7 +299,7 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         self.walk.deleted_logs += u64::from(self.begins_as_log(child)?);
         if self.walk.deleted.len() < DELETED_MAX {
             let place = Extent { start: self.place(child.first), length: self.cluster_bytes() };
-            self.walk.deleted.push((name, place));
+            self.walk.deleted.push(Deleted { name, place, bytes: u64::from(child.size) });
         }
         Ok(())
     }

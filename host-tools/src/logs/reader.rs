@@ -383,7 +383,9 @@ impl Stitch {
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);
-                if let Some(error) = group.error {
+                // All entries that its sectors say they complete were decoded, and not so many of each kind: a header is wrong.
+                let is_other = group.frames != group.frames_said;
+                if let Some(error) = group.error.or(is_other.then_some(GroupError::Corrupt)) {
                     let gap = self.gap(cause_of(error));
                     gap.frames = Some(group.frames_said.saturating_sub(group.frames));
                     gap.sectors_skipped += 1;

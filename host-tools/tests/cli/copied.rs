@@ -5,6 +5,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
+use hums_blackbox::{Header, Sector};
 use tempfile::TempDir;
 
 use crate::support::{attempt, flight, json, px4, run, text};
@@ -240,6 +241,79 @@ fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
     );
 }
 
+/// Deletes a file as an operating system does it: its entry and its chain in the FAT.
+fn delete(image: &mut [u8], name: &[u8; 11]) {
+    let at = image.windows(11).position(|bytes| bytes == name).expect("an entry");
+    let word = |image: &[u8], at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));
+    let partition = word(image, 446 + 8) as usize * BLOCK;
+    let fat = partition + (word(image, partition + 14) & 0xffff) as usize * BLOCK;
+    image[at] = 0xe5;
+    let mut next = (word(image, at + 26) & 0xffff | word(image, at + 20) << 16) as usize;
+    while next < 0x0fff_fff8 {
+        let entry = fat + 4 * next;
+        next = word(image, entry) as usize & 0x0fff_ffff;
+        image[entry..entry + 4].fill(0);
+    }
+}
+
+#[test]
+fn numbers_begin_anew_where_all_logs_were_deleted() {
+    let dir = copied(2, "");
+    let path = dir.path().join("card.img");
+    let rewrite = |names: &[&[u8; 11]]| {
+        let mut image = fs::read(&path).expect("an image");
+        for name in names {
+            delete(&mut image, name);
+        }
+        fs::write(&path, image).expect("written");
+    };
+    let record = |flight: &Path| {
+        run(dir.path(), &format!("sim --input {} --sd card.img", flight.display()), 0);
+    };
+    rewrite(&[b"00001_00HUM", b"00002_00HUM"]);
+    // Its clock is 23 minutes later than that of the deleted session 00002.
+    record(&flight("ap_quad_faults.tlog"));
+    all_say(dir.path(), "card.img", 0, &[]);
+    let logs = json(&run(dir.path(), "verify card.img --json", 0));
+    assert_eq!(logs["logs"].as_array().map(Vec::len), Some(1), "the deleted ones are not the card's");
+    // One that was recorded after it, of which no clock tells that it is older.
+    record(&px4());
+    rewrite(&[b"00002_00HUM"]);
+    all_say(
+        dir.path(),
+        "card.img",
+        3,
+        &["session 00002, which is newer than all that are there, was deleted"],
+    );
+}
+
+/// A header with a right check, of which frames and records are not what comes out: an entry that is none, or one that is lost.
+#[test]
+fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
+    let dir = copied(1, "");
+    let path = dir.path().join("copied/00001_00.HUM");
+    let whole = fs::read(&path).expect("a log");
+    let blocks = || whole.as_chunks::<BLOCK>().0.iter();
+    let header = |block: &[u8; BLOCK]| Header::read(block).ok();
+    let closed =
+        blocks().position(|block| header(block).is_some_and(|header| header.closed)).expect("it is closed");
+    for (at, [frames, records]) in [(closed, [0, 1]), (closed, [1, 0]), (closed / 2, [-1, 0])] {
+        let mut bytes = whole.clone();
+        let block = bytes.as_chunks_mut::<BLOCK>().0.get_mut(at).expect("a block");
+        let own = header(block).expect("a sector");
+        let add = |byte: u8, number: i8| byte.wrapping_add_signed(number);
+        (block[4], block[5]) = (add(block[4], 2 * records), add(block[5], frames));
+        let mut sector = Sector::from_bytes(*block);
+        sector.seal(own.session);
+        *block = *sector.bytes();
+        fs::write(&path, &bytes).expect("written");
+        all_say(dir.path(), "copied", 3, &[]);
+        let said = text(&attempt(dir.path(), "verify copied"));
+        let told = said.lines().any(|line| line.contains("FAILED  group decoding"));
+        assert!(told, "sector {at}: {said}");
+    }
+}
+
 #[test]
 fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     let dir = copied(2, "");
@@ -252,20 +326,8 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     };
     assert_eq!(codes(), [0; 4]);
     let entry = |name: &[u8]| image.windows(11).position(|bytes| bytes == name).expect("an entry");
-    // The newest one, as an operating system deletes it: its entry and its chain in the FAT.
-    let at = entry(b"00002_00HUM");
-    let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));
-    let cluster = word(at + 26) & 0xffff | word(at + 20) << 16;
-    let partition = word(446 + 8) as usize * BLOCK;
-    let fat = partition + (word(partition + 14) & 0xffff) as usize * BLOCK;
     let mut deleted = image.clone();
-    deleted[at] = 0xe5;
-    let mut next = cluster as usize;
-    while next < 0x0fff_fff8 {
-        let following = word(fat + 4 * next) as usize & 0x0fff_ffff;
-        deleted[fat + 4 * next..fat + 4 * next + 4].fill(0);
-        next = following;
-    }
+    delete(&mut deleted, b"00002_00HUM");
     fs::write(&path, &deleted).expect("written");
     all_say(
         dir.path(),

@@ -3,6 +3,9 @@
 //! A segment is allocated whole and written from its beginning, so its last sector is found by bisection: some sixty
 //! reads of a segment of 8 MiB, and as many again at most to count the frames of its last group. That is 0.1 s of a usual
 //! card, in which frames wait in the sector queue.
+//!
+//! A file that was written anew holds older sectors behind its own, and nothing else before its first one is there. The file
+//! before it tells them apart: what goes on with that one's session has higher numbers.
 
 use embedded_sdmmc::Block;
 use hums_blackbox::parity::data_blocks;
@@ -20,18 +23,21 @@ const SEGMENTS_MAX: u32 = 3;
 
 /// What the newest log on the card, whose last segment is `newest`, ended with.
 pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: LogName) -> Before {
+    let unreadable = Before { found: Found::Unreadable, number: newest.session, ..Before::default() };
+    search(card, newest).ok().flatten().unwrap_or(unreadable)
+}
+
+fn search<D: CardDevice>(card: &Card<'_, D>, newest: LogName) -> Result<Option<Before>, CardError<D::Error>> {
     let mut name = newest;
-    let unreadable = Before { found: Found::Unreadable, number: name.session, ..Before::default() };
     for _ in 0..SEGMENTS_MAX {
-        match end_of(card, name) {
-            Ok(Some(before)) => return before,
-            Ok(None) => {}
-            Err(_) => return unreadable,
+        let older = older(card, name)?;
+        if let Some(before) = end_of(card, name, older)? {
+            return Ok(Some(before));
         }
-        let Ok(Some(older)) = older(card, name) else { break };
+        let Some(older) = older else { break };
         name = older;
     }
-    unreadable
+    Ok(None)
 }
 
 /// The newest segment that is older than this one.
@@ -45,18 +51,36 @@ fn older<D: CardDevice>(card: &Card<'_, D>, than: LogName) -> Result<Option<LogN
     Ok(older)
 }
 
-/// Where this segment ends; `None` where it has no sector.
-fn end_of<D: CardDevice>(card: &Card<'_, D>, name: LogName) -> Result<Option<Before>, CardError<D::Error>> {
+/// Where this segment ends; `None` where it has no sector of its own. `older` is the segment before it.
+fn end_of<D: CardDevice>(
+    card: &Card<'_, D>,
+    name: LogName,
+    older: Option<LogName>,
+) -> Result<Option<Before>, CardError<D::Error>> {
     let mut segment = card.segment(name)?;
     let mut reader = Reader { card, segment: &mut segment, block: Block::new() };
-    let Some((mut last, mut header)) = reader.probe(0, None)? else { return Ok(None) };
+    let begin = match older.and_then(|older| Some((older, first(card, older).ok()??))) {
+        None => reader.probe(0, |_| true)?,
+        Some((older, before)) => {
+            let goes_on =
+                |header: &Header| header.session == before.session && is_later(header.number, before.number);
+            match reader.probe(0, goes_on)? {
+                // A further segment of a log has nothing else; a log's first one may be of another power-on.
+                None if older.session != name.session => {
+                    reader.probe(0, |header| header.session != before.session)?
+                }
+                found => found,
+            }
+        }
+    };
+    let Some((mut last, mut header)) = begin else { return Ok(None) };
     let session = header.session;
     // Number less place: that of the segment's first sector.
     let base = header.number.wrapping_sub(last);
     let mut end = data_blocks(reader.segment.blocks());
     while last + 1 < end {
         let middle = last + (end - last) / 2;
-        match reader.probe(middle, Some(session))? {
+        match reader.probe(middle, |header| header.session == session)? {
             // A partial copy may lie one place further than its own; what is far from its place is another's.
             Some((at, found)) if at.wrapping_sub(found.number.wrapping_sub(base)) <= 1 && at < end => {
                 (last, header) = (at, found);
@@ -74,6 +98,19 @@ fn end_of<D: CardDevice>(card: &Card<'_, D>, name: LogName) -> Result<Option<Bef
     }))
 }
 
+/// The first sound sector of a segment.
+fn first<D: CardDevice>(card: &Card<'_, D>, name: LogName) -> Result<Option<Header>, CardError<D::Error>> {
+    let mut segment = card.segment(name)?;
+    let mut reader = Reader { card, segment: &mut segment, block: Block::new() };
+    Ok(reader.probe(0, |_| true)?.map(|(_, header)| header))
+}
+
+/// Whether a sector's number comes after another one's, modulo 2^32.
+const fn is_later(number: u32, than: u32) -> bool {
+    let ahead = number.wrapping_sub(than);
+    ahead > 0 && ahead < 1 << 31
+}
+
 /// Reads a segment's blocks one by one.
 struct Reader<'r, 'a, D: CardDevice> {
     card: &'r Card<'a, D>,
@@ -88,17 +125,15 @@ impl<D: CardDevice> Reader<'_, '_, D> {
         Ok(Header::read(&self.block.contents).ok())
     }
 
-    /// The first sound sector from this block on, of this session or of any.
+    /// The first sound sector from this block on that is wanted.
     fn probe(
         &mut self,
         from: u32,
-        session: Option<u32>,
+        wanted: impl Fn(&Header) -> bool,
     ) -> Result<Option<(u32, Header)>, CardError<D::Error>> {
         let end = from.saturating_add(PROBE_BLOCKS).min(self.segment.blocks());
         for at in from..end {
-            if let Some(header) = self.header(at)?
-                && session.is_none_or(|session| session == header.session)
-            {
+            if let Some(header) = self.header(at)?.filter(&wanted) {
                 return Ok(Some((at, header)));
             }
         }
@@ -113,21 +148,24 @@ impl<D: CardDevice> Reader<'_, '_, D> {
         }
         let Some(begin) = self.header(first)? else { return Ok(None) };
         let Some(preamble) = Sector::from_bytes(self.block.contents).preamble() else { return Ok(None) };
-        let mut frames = preamble.frames_before;
-        let (mut number, mut fullest) = (begin.number, u32::from(begin.frames));
+        let (mut frames, mut sector) = (preamble.frames_before, begin);
         for at in first + 1..=last {
             let Some(next) = self.header(at)?.filter(|next| next.session == header.session) else {
                 return Ok(None);
             };
-            if next.number == number {
-                fullest = fullest.max(u32::from(next.frames));
-            } else if next.number == number.wrapping_add(1) {
-                frames = frames.wrapping_add(fullest);
-                (number, fullest) = (next.number, u32::from(next.frames));
+            if next.number == sector.number {
+                // Of several copies the whole sector counts, though a copy may have more: it ends within an entry.
+                let is_fuller = !next.partial || next.frames > sector.frames;
+                if sector.partial && is_fuller {
+                    sector = next;
+                }
+            } else if next.number == sector.number.wrapping_add(1) {
+                frames = frames.wrapping_add(u32::from(sector.frames));
+                sector = next;
             } else {
                 return Ok(None);
             }
         }
-        Ok((number == header.number).then_some(frames.wrapping_add(fullest)))
+        Ok((sector.number == header.number).then_some(frames.wrapping_add(u32::from(sector.frames))))
     }
 }

@@ -74,7 +74,7 @@ impl<'a> Segments<'a> {
             // The numbers end at 99,999; the last session number then goes on with its segments.
             let name = name.or_else(|| newest.and_then(LogName::next_segment)).ok_or(CardError::Full)?;
             let session = mix(mix(volume_id, name.session), self.entropy);
-            Log { name, session, volume_id, base: None, partial_further: true, copy_in_place: false }
+            Log { name, session, volume_id, base: None, partial_further: false, copy_in_place: false }
         };
         let before = self.log.replace(log);
         self.ring.clear();
@@ -133,7 +133,8 @@ impl<'a> Segments<'a> {
         if let Some(log) = &mut self.log {
             log.name = name;
             log.base = None;
-            log.partial_further = true;
+            // Of a file that is written anew the first block is the first one that is the new file's.
+            log.partial_further = false;
             log.copy_in_place = false;
         }
         self.ring.begin(name, now);
