@@ -50,10 +50,10 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
     }
 }
 
-/// What the estimator's flags say (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`), where it had attitude and position before.
-/// Bits that both have: 0 attitude, 3 and 4 position. PX4: 10 GPS glitch, 11 accelerometer error. ArduPilot: 15 GPS glitching,
-/// which it also sets where there is no GPS.
-fn of_estimator(estimator: &Estimator, had_both: bool) -> Causes {
+/// What the estimator's flags say (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`), where it had attitude and position before, and a
+/// receiver a fix. Bits that both have: 0 attitude, 3 and 4 position. PX4: 10 GPS glitch, 11 accelerometer error. ArduPilot: 15 GPS
+/// glitching, which it also sets where there is no GPS: indoors it flies by beacons, optical flow or vision.
+fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
     const PX4_GLITCH: u32 = 1 << 10;
     const PX4_ACCELEROMETER: u32 = 1 << 11;
     const ARDUPILOT_GLITCH: u32 = 1 << 15;
@@ -62,7 +62,7 @@ fn of_estimator(estimator: &Estimator, had_both: bool) -> Causes {
         EstimatorScale::TestRatio => (PX4_GLITCH, PX4_ACCELEROMETER),
         EstimatorScale::Variance => (ARDUPILOT_GLITCH, 0),
     };
-    let glitch = if had_both { glitch } else { 0 };
+    let glitch = if had_both && has_fix { glitch } else { 0 };
     let said =
         Causes::of_bits(u32::from(flags), &[(glitch, Cause::Gnss), (accelerometer, Cause::Accelerometer)]);
     if had_both && !has_both(flags) { said.with(Cause::Estimator) } else { said }
@@ -98,8 +98,9 @@ impl Flags {
 /// What the autopilot says is wrong, now. Only what is said while it is armed counts: before, it is about arming.
 #[derive(Clone, Copy, Debug)]
 pub struct Alerts {
-    /// Of each cause, until when what was said once holds, milliseconds; and how bad it is.
-    told: [Option<(u32, Urgency)>; Cause::COUNT],
+    /// Of each cause, how bad it was said to be, and until when what was said once holds, milliseconds.
+    told: [Option<Urgency>; Cause::COUNT],
+    until_ms: [u32; Cause::COUNT],
     sensors: Flags,
     failures: Flags,
     estimator: Flags,
@@ -115,6 +116,7 @@ impl Alerts {
     pub(crate) const fn new() -> Self {
         Self {
             told: [None; Cause::COUNT],
+            until_ms: [0; Cause::COUNT],
             sensors: Flags::NONE,
             failures: Flags::NONE,
             estimator: Flags::NONE,
@@ -141,13 +143,17 @@ impl Alerts {
     pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
         let crashed = alert.cause == Cause::Crash
             && self.armed_at.is_some_and(|armed_at| at.since(armed_at) <= DISARMED);
-        let Some(place) = self.told.get_mut(alert.cause as usize).filter(|_| self.armed || crashed) else {
+        let place = alert.cause as usize;
+        let (Some(told), Some(until_ms)) = (self.told.get_mut(place), self.until_ms.get_mut(place)) else {
             return;
         };
-        let held = place.filter(|(until, _)| !is_past(at, *until)).map(|(_, urgency)| urgency);
-        *place = match alert.urgency {
-            Urgency::Over => place.map(|_| (at.as_millis() as u32, Urgency::Over)),
-            urgency => Some(((at + HOLDS).as_millis() as u32, held.unwrap_or(urgency).max(urgency))),
+        if !self.armed && !crashed {
+            return;
+        }
+        let held = told.filter(|_| !is_past(at, *until_ms));
+        (*told, *until_ms) = match alert.urgency {
+            Urgency::Over => (told.map(|_| Urgency::Over), at.as_millis() as u32),
+            urgency => (Some(held.unwrap_or(urgency).max(urgency)), (at + HOLDS).as_millis() as u32),
         };
     }
 
@@ -163,16 +169,16 @@ impl Alerts {
         self.failures.take(at, causes);
     }
 
-    /// The estimator's flags.
-    pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator) {
+    /// The estimator's flags, and whether a GNSS receiver has a 3D fix.
+    pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator, has_fix: bool) {
         self.had_both |= has_both(estimator.flags);
-        self.estimator.take(at, of_estimator(estimator, self.had_both));
+        self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix));
     }
 
     /// How bad the autopilot says it is, as [`Urgency`] numbers it; `None` where nothing was ever said. In a mishap flags only echo it.
     pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
-        let told = self.told.get(cause as usize).copied().flatten();
-        let told = told.map(|(until, urgency)| if is_past(now, until) { Urgency::Over } else { urgency });
+        let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
+        let told = told.map(|urgency| if is_past(now, *until_ms) { Urgency::Over } else { urgency });
         let all = [&self.sensors, &self.failures, &self.estimator];
         let known = all.iter().any(|flags| flags.at.is_some());
         let flagged = self.armed

@@ -40,6 +40,10 @@ const RATIOS_KNOWN: u8 = 20;
 const CLIMBED_M: f32 = 0.3;
 const TRAVELLED_M: f32 = 0.5;
 const TURNED_RAD: f32 = 0.02;
+/// Less is no move, m/s and rad: an estimator trembles and has offsets where a simulator without noise hangs still, and the last digits
+/// of its sensors do not change.
+const HANGS_MPS: f32 = 0.3;
+const TREMBLES_RAD: f32 = 0.01;
 /// Vibration comes at 1 Hz or faster; what comes after a longer pause is not of the same hover.
 const VIBRATION_PAUSE: Span = Span::from_secs(3);
 /// Vibration that rises by less did not rise: per axis, and PX4's metric, m/s2.
@@ -120,7 +124,7 @@ struct Moved {
     climbed_m: f32,
     travelled_m: f32,
     turned_rad: f32,
-    /// The attitude at the last step, rad.
+    /// The attitude when a turn was counted last, rad.
     attitude: [f32; 3],
 }
 
@@ -128,15 +132,17 @@ impl Moved {
     const NONE: Self = Self { climbed_m: 0.0, travelled_m: 0.0, turned_rad: 0.0, attitude: [0.0; 3] };
 
     fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
-        self.climbed_m += climb_mps(now, vehicle).map_or(0.0, |climb| libm::fabsf(climb) * step_s);
+        let climb_mps = climb_mps(now, vehicle).map_or(0.0, libm::fabsf);
+        self.climbed_m += if climb_mps > HANGS_MPS { climb_mps * step_s } else { 0.0 };
         self.travelled_m += ground_speed_mps(now, vehicle).map_or(0.0, |speed| speed * step_s);
         if let Some(told) = vehicle.attitude.get() {
             let attitude = [told.roll.0, told.pitch.0, told.yaw.0];
-            for (axis, before) in attitude.into_iter().zip(self.attitude) {
-                // Round north it jumps once a turn, which is a turn anyway.
-                self.turned_rad += libm::fabsf(axis - before).min(core::f32::consts::PI);
+            // Round north it jumps once a turn, which is a turn anyway.
+            let apart = |(axis, before): (f32, f32)| libm::fabsf(axis - before).min(core::f32::consts::PI);
+            let turned_rad: f32 = attitude.into_iter().zip(self.attitude).map(apart).sum();
+            if turned_rad >= TREMBLES_RAD {
+                (self.turned_rad, self.attitude) = (self.turned_rad + turned_rad, attitude);
             }
-            self.attitude = attitude;
         }
     }
 }

@@ -163,7 +163,7 @@ impl Derived {
                 self.take_imu(at, imu, flight);
                 self.crosschecks.take_air(at, air, vehicle, flight);
             }
-            Observation::Attitude(attitude) => self.response.take_attitude(at, attitude, flight),
+            Observation::Attitude(attitude) => self.response.take_attitude(at, attitude, vehicle, flight),
             Observation::Wanted(wanted) => self.response.take_wanted(at, wanted.rates),
             Observation::Hud(hud) => self.response.take_hud(at, hud, vehicle, flight),
             Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator, flight),

@@ -41,6 +41,8 @@ const PLANE_FLYING_MPS: f32 = 8.0;
 const FLYING_THROTTLE: f32 = 0.2;
 const IDLE_THROTTLE: f32 = 0.1;
 const FULL_THROTTLE: f32 = 0.95;
+/// Near the ground.
+const HPA_PER_METRE: f32 = 0.12;
 const STILL_MPS: f32 = 0.5;
 /// What climbs, sinks or goes faster than this moves, whatever wind and noise make of what stands.
 const MOVES_MPS: f32 = 1.5;
@@ -123,6 +125,10 @@ pub struct Flight {
     armed: bool,
     /// Height where it was armed.
     armed_height_m: Option<f32>,
+    /// The pressure where it was armed, hPa; whether it changed since, and by more than a take-off does.
+    armed_hpa: Option<f32>,
+    pressure_changed: bool,
+    rose: bool,
     /// The pilot's display of the altitude while it stood without thrust.
     idle_altitude_m: Option<f32>,
     /// It had throttle to fly with since its arming: what is told of the throttle means something.
@@ -144,6 +150,9 @@ impl Flight {
             seen_on_ground: false,
             armed: false,
             armed_height_m: None,
+            armed_hpa: None,
+            pressure_changed: false,
+            rose: false,
             idle_altitude_m: None,
             driven: false,
             changing_since: None,
@@ -272,6 +281,15 @@ impl Flight {
             self.armed_height_m = height_m(now, vehicle);
         }
         self.armed = heartbeat.armed;
+        let pressure =
+            vehicle.air.get().and_then(|air| air.pressure).filter(|pressure| pressure.0.is_finite());
+        if !self.armed {
+            (self.armed_hpa, self.pressure_changed, self.rose) = (None, false, false);
+        } else if let Some(pressure) = pressure {
+            let off_hpa = libm::fabsf(pressure.0 - *self.armed_hpa.get_or_insert(pressure.0));
+            self.pressure_changed |= off_hpa > 0.0;
+            self.rose |= off_hpa >= TAKEOFF_HEIGHT_M * HPA_PER_METRE;
+        }
         let flying = |throttle| throttle >= FLYING_THROTTLE;
         self.driven = self.armed && (self.driven || throttle(now, vehicle).is_some_and(flying));
         let idles = !self.armed || throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
@@ -340,6 +358,9 @@ impl Flight {
     /// call a vehicle that is armed on the bench, spools up, or came down under a pilot's sticks, not landed. What glides moves;
     /// what is thrown, falls or autorotates does too.
     fn idles(&self, now: Instant, vehicle: &Vehicle) -> bool {
+        if vehicle.hovers(now) == Some(true) && self.never_rose() && vehicle.inertial.is_calm(now) {
+            return true;
+        }
         let throttle = throttle(now, vehicle);
         let enough = if self.airborne() { IDLE_THROTTLE } else { FLYING_THROTTLE };
         let little = throttle.is_some_and(|throttle| throttle < enough);
@@ -383,6 +404,12 @@ impl Flight {
             }
             None => false,
         }
+    }
+
+    /// Whether the air pressure has stayed that of the place of arming, though it changes at all. What is heard first in the air
+    /// was not seen there.
+    fn never_rose(&self) -> bool {
+        self.seen_on_ground && self.pressure_changed && !self.rose
     }
 
     /// Whether it stands without thrust.

@@ -6,6 +6,10 @@
 //! what the dynamic pressure is above or below its usual one.
 //!
 //! Noise is how far the height steps from sample to sample, less the climb.
+//!
+//! The estimator's climb against that of the barometer: vibration that an accelerometer folds into an offset lets an estimator fall
+//! while the vehicle climbs, and height control gives full throttle. On rotors only, whose climb is told by `VFR_HUD`. What wind makes
+//! of it, the change of the whole dynamic pressure, is taken off.
 
 use crate::departure::Departure;
 use crate::flight::Flight;
@@ -26,12 +30,15 @@ const CLIMB_MPS: f32 = 2.0;
 /// Less exact positions are not compared: accuracy in metres, dilution of precision.
 const ACCURACY_M: f32 = 3.0;
 const HDOP: f32 = 2.5;
-/// Time constants of the difference, and of usual height and speed, s.
+/// Time constants of the difference of heights, of climbs, and of usual height and speed, s.
 const SMOOTHING_S: f32 = 0.5;
+const CLIMBS_S: f32 = 1.0;
 const AIR_S: f32 = 30.0;
 /// Beyond half of the default limits nothing is learnt.
 const APART_HOLD_M: f32 = 4.0;
 const NOISE_HOLD_M: f32 = 1.0;
+/// No rotors climb or fall faster, m/s: garbage.
+const CLIMB_MAX_MPS: f32 = 200.0;
 /// Samples further apart are not compared.
 const PAUSE: Span = Span::from_secs(2);
 
@@ -40,9 +47,11 @@ const PAUSE: Span = Span::from_secs(2);
 pub(crate) struct Heights {
     /// The first pressure of the flight, hPa; 0 before it.
     first_hpa: f32,
-    /// Height above that, m, and when it was measured.
-    height: Option<(Instant, f32)>,
+    /// Height above that, the dynamic pressure of the speed over ground as a height, both in m; and when they were measured.
+    height: Option<(Instant, f32, f32)>,
     noise: Departure,
+    /// The climb that is missing in the estimator's, smoothed, m/s.
+    climbs_mps: Option<f32>,
     apart: Departure,
     /// When they were compared last.
     apart_at: Option<Instant>,
@@ -58,6 +67,7 @@ impl Heights {
             first_hpa: 0.0,
             height: None,
             noise: Departure::NEW,
+            climbs_mps: None,
             apart: Departure::NEW,
             apart_at: None,
             air: [0.0; 2],
@@ -79,9 +89,15 @@ impl Heights {
             self.first_hpa = pressure.0;
         }
         let height_m = SCALE_HEIGHT_M * libm::logf(self.first_hpa / pressure.0);
-        let before = self.height.replace((at, height_m));
+        let speed_mps = ground_speed_mps(at, vehicle).unwrap_or(0.0);
+        let wind_m = speed_mps * speed_mps / (2.0 * GRAVITY);
+        let before = self.height.replace((at, height_m, wind_m));
+        if let Some((before, before_m, wind_before_m)) = before {
+            let by_wind_m = libm::fabsf(wind_m - wind_before_m);
+            self.take_climb(at, at.since(before), height_m - before_m, by_wind_m, vehicle);
+        }
         let calm = is_clear(at, vehicle) && vehicle.inertial.turns_little(at, TURNED);
-        if let (Some((before, before_m)), Some(climb_mps), true) = (before, climb_mps(at, vehicle), calm) {
+        if let (Some((before, before_m, _)), Some(climb_mps), true) = (before, climb_mps(at, vehicle), calm) {
             let step = at.since(before);
             if step > Span::ZERO && step <= PAUSE {
                 let step_s = step.as_secs_f32();
@@ -91,14 +107,34 @@ impl Heights {
         }
     }
 
+    /// Takes how far it climbed by the barometer in a step, and what the wind may have made of it.
+    fn take_climb(&mut self, at: Instant, step: Span, climbed_m: f32, by_wind_m: f32, vehicle: &Vehicle) {
+        let told = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
+        // Nothing but zeros is what is sent where no climb is known.
+        let told = told.filter(|climb| climb.abs() > 0.0 && climb.abs() <= CLIMB_MAX_MPS);
+        let Some(climb_mps) = told.filter(|_| vehicle.hovers(at) == Some(true)) else { return };
+        if step > Span::ZERO && step <= PAUSE {
+            let step_s = step.as_secs_f32();
+            let missing_m = climbed_m - step_s * climb_mps;
+            let beyond_m = libm::copysignf((libm::fabsf(missing_m) - by_wind_m).max(0.0), missing_m);
+            let climbs_mps = self.climbs_mps.get_or_insert(0.0);
+            *climbs_mps += (beyond_m - step_s * *climbs_mps) / (CLIMBS_S + step_s);
+        }
+    }
+
+    /// How far the estimator's climb is from that of the barometer, m/s.
+    pub(crate) fn climbs_apart(&self) -> Option<Reading> {
+        Reading::new(self.height.map(|(at, ..)| at), self.climbs_mps.map(libm::fabsf))
+    }
+
     pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, flight: &Flight) {
         let before = self.apart_at;
-        let height = self.height.filter(|(measured, _)| at.since(*measured) <= PAUSE);
+        let height = self.height.filter(|(measured, ..)| at.since(*measured) <= PAUSE);
         let good = gnss.fix >= 3
             && gnss.accuracy.is_none_or(|accuracy| accuracy.0 <= ACCURACY_M)
             && gnss.hdop.is_none_or(|hdop| hdop <= HDOP);
         let climbs = climb_mps(at, vehicle).is_none_or(|climb| libm::fabsf(climb) > CLIMB_MPS);
-        let (Some((_, height_m)), Some(altitude)) = (height, gnss.altitude) else { return };
+        let (Some((_, height_m, _)), Some(altitude)) = (height, gnss.altitude) else { return };
         if !good || climbs || !is_clear(at, vehicle) || !flight.airborne() {
             return;
         }
@@ -133,6 +169,6 @@ impl Heights {
 
     /// How far the barometer's height steps, beyond what is usual, m.
     pub(crate) fn noise(&self) -> Option<Reading> {
-        Reading::new(self.height.map(|(at, _)| at), self.noise.beyond())
+        Reading::new(self.height.map(|(at, ..)| at), self.noise.beyond())
     }
 }

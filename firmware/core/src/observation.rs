@@ -76,6 +76,11 @@ pub struct Heartbeat {
     pub mode: u32,
 }
 
+impl Heartbeat {
+    /// `MAV_STATE_FLIGHT_TERMINATION`: also what a pilot's kill switch makes of a PX4 that is armed.
+    pub const TERMINATED: u8 = 8;
+}
+
 /// The autopilot's processor and its idea of the (first) battery: `SYS_STATUS`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SystemStatus {
@@ -540,6 +545,8 @@ pub enum Observation {
     Attitude(Attitude),
     /// `ATTITUDE_TARGET`, `NAV_CONTROLLER_OUTPUT`
     Wanted(Wanted),
+    /// `POSITION_TARGET_LOCAL_NED`: the climb that the autopilot wants, up is positive.
+    ClimbWanted(MetresPerSecond),
     /// `LOCAL_POSITION_NED`
     LocalPosition(LocalPosition),
     /// `GLOBAL_POSITION_INT`

@@ -238,6 +238,8 @@ params! {
     RateWarn "RATE_MISS_WARN" "deg/s" 30.0 5.0 1000.0 "body rate that is wanted and missing, over a second; healthy flights reach 12";
     RateCrit "RATE_MISS_CRIT" "deg/s" 60.0 5.0 1000.0 "body rate that is wanted and missing, over a second";
     ThrustWarn "THRUST_WARN" "s" 2.0 0.5 1000.0 "full throttle without a climb; ArduPilot warns of thrust loss after 1 s, and looks at the attitude too";
+    EkfClimbWarn "EKF_CLIMB_WARN" "m/s" 8.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; up to 6.6 in healthy real flights";
+    EkfClimbCrit "EKF_CLIMB_CRIT" "m/s" 12.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; 14 and 24 where height control ran away";
 }
 
 impl Param {

@@ -6,8 +6,9 @@
 
 use crate::flight::Flight;
 use crate::latest::{Latest, Reading};
+use crate::modes::has_pilots_throttle;
 use crate::motion::climb_mps;
-use crate::observation::{Attitude, Hud};
+use crate::observation::{Attitude, Hud, VehicleKind};
 use crate::time::{Instant, Span};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
@@ -61,12 +62,20 @@ impl Response {
         }
     }
 
-    pub(crate) fn take_attitude(&mut self, at: Instant, attitude: &Attitude, flight: &Flight) {
+    pub(crate) fn take_attitude(
+        &mut self,
+        at: Instant,
+        attitude: &Attitude,
+        vehicle: &Vehicle,
+        flight: &Flight,
+    ) {
+        // A VTOL's two sets of actuators share the work in a transition, and a tail-sitter on its wings has other axes than it says.
+        let judged = vehicle.kind() != VehicleKind::Vtol || vehicle.hovers(at) == Some(true);
         let (Some(wanted), Some([roll, pitch, _])) = (self.wanted.within(at, FRESH), attitude.rates) else {
             return;
         };
         let sane = |rate: &RadiansPerSecond| rate.0.abs() <= RATE_MAX;
-        if !flight.is_settled(at) || !wanted.iter().chain(&[roll, pitch]).all(sane) {
+        if !judged || !flight.is_settled(at) || !wanted.iter().chain(&[roll, pitch]).all(sane) {
             return;
         }
         let step_s = self.compared_at.map_or(0.0, |before| at.since(before).min(FRESH).as_secs_f32());
@@ -87,7 +96,8 @@ impl Response {
             .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
         let in_vain = match vehicle.hovers(at) {
             Some(true) => level && climb_mps < CLIMBS_MPS,
-            Some(false) => climb_mps < SINKS_MPS,
+            // A pilot may dive with all his throttle.
+            Some(false) => climb_mps < SINKS_MPS && !has_pilots_throttle(vehicle),
             None => false,
         };
         self.full_at = Some(at);

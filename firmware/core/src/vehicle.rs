@@ -15,6 +15,7 @@ use crate::observation::{
     VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
 use crate::time::{Instant, Span};
+use crate::units::MetresPerSecond;
 
 /// Batteries that are monitored.
 pub const BATTERIES_MAX: usize = 4;
@@ -126,6 +127,10 @@ pub struct Vehicle {
     odd_boot: Option<(u32, Instant)>,
     /// Whether it was armed when a boot time was believed last.
     boot_armed: bool,
+    /// Since when it has called its flight terminated.
+    pub(crate) terminated_since: Option<Instant>,
+    /// The climb that the autopilot wants.
+    pub(crate) climb_wanted: Latest<MetresPerSecond>,
 }
 
 impl Default for Vehicle {
@@ -189,6 +194,8 @@ impl Vehicle {
             boot: None,
             odd_boot: None,
             boot_armed: false,
+            terminated_since: None,
+            climb_wanted: Latest::nothing(),
         }
     }
 
@@ -293,6 +300,8 @@ impl Vehicle {
         match *observation {
             Observation::Heartbeat(heartbeat) => {
                 self.alerts.take_armed(at, heartbeat.armed);
+                let terminated = heartbeat.state == Heartbeat::TERMINATED;
+                self.terminated_since = terminated.then(|| self.terminated_since.unwrap_or(at));
                 self.heartbeat.set(at, heartbeat);
             }
             Observation::SystemStatus(system) => {
@@ -322,6 +331,7 @@ impl Vehicle {
                 self.attitude.set(at, attitude);
             }
             Observation::Wanted(wanted) => self.wanted.set(at, wanted),
+            Observation::ClimbWanted(climb) => self.climb_wanted.set(at, climb),
             Observation::LocalPosition(local) => self.local.set(at, local),
             Observation::GlobalPosition(global) => self.global.set(at, global),
             Observation::Hud(hud) => self.hud.set(at, hud),
@@ -330,7 +340,8 @@ impl Vehicle {
             Observation::Rails(rails) => self.rails.set(at, rails),
             Observation::Battery(battery) => self.take_battery(at, component, battery),
             Observation::Estimator(estimator) => {
-                self.alerts.take_estimator(at, &estimator);
+                let has_fix = self.gnss.iter().filter_map(Latest::get).any(|gnss| gnss.fix >= 3);
+                self.alerts.take_estimator(at, &estimator, has_fix);
                 self.estimator.set(at, estimator);
             }
             Observation::Vibration(vibration) => self.take_vibration(at, vibration),

@@ -39,6 +39,10 @@ struct Fitted {
     wanted: [f32; 2],
     /// How far GPS is above sea level, m.
     altitude: f32,
+    /// How far its attitude trembles, rad.
+    attitude_noise: f32,
+    /// The climb of `VFR_HUD`, m/s.
+    hud_climb: Option<f32>,
     /// A second after this, GPS repeats its position.
     gps_until_ms: u64,
 }
@@ -81,6 +85,8 @@ impl Fitted {
             turns,
             wanted: [0.0; 2],
             altitude,
+            attitude_noise: 0.01,
+            hud_climb: None,
             gps_until_ms: u64::MAX,
         }
     }
@@ -91,6 +97,9 @@ impl Fitted {
         for observation in &mut said {
             if let Observation::GlobalPosition(global) = observation {
                 global.velocity[0] = MetresPerSecond(1.0);
+            }
+            if let Observation::Hud(hud) = observation {
+                hud.climb = self.hud_climb.map(MetresPerSecond);
             }
             if let Observation::Gnss(gnss) = observation {
                 let moment = now_ms.min(self.gps_until_ms);
@@ -104,7 +113,7 @@ impl Fitted {
         let wanted = Some(self.wanted.map(RadiansPerSecond));
         said.push(Observation::Wanted(Wanted { rates: wanted, ..Wanted::default() }));
         said.push(Observation::Attitude(Attitude {
-            roll: Radians(self.quad.roll + 0.01 * noise(now_ms, 74)),
+            roll: Radians(self.quad.roll + self.attitude_noise * noise(now_ms, 74)),
             rates,
             boot_ms: Some((now_ms + 100_000) as u32),
             ..Attitude::default()
@@ -355,9 +364,12 @@ fn a_sensor_that_repeats_one_value_is_named() {
         finds("compass_stuck", sensor, Level::Warning, 1_500, |_, fitted| {
             fitted.field[place] = held.field[place];
         });
-        // It sinks with 0.1 m/s.
-        finds("baro_stuck", sensor, Level::Warning, 4_000, |_, fitted| {
+        // It sinks with half a metre a second.
+        finds("baro_stuck", sensor, Level::Warning, 2_500, |now_ms, fitted| {
             fitted.pressure[place] = held.pressure[place];
+            if now_ms >= FAULT_MS {
+                fitted.quad.climb = -0.5;
+            }
         });
     }
     finds("gps_stuck", 0, Level::Warning, 1_500, |_, fitted| fitted.gps_until_ms = FAULT_MS);
@@ -427,6 +439,48 @@ fn full_throttle_without_a_climb_is_named() {
     is_quiet(|now_ms, fitted| {
         if now_ms >= FAULT_MS {
             (fitted.quad.throttle, fitted.quad.climb) = (1.0, 3.0);
+        }
+    });
+}
+
+/// Pressures and the pilot's display of what climbs with so many m/s by each.
+fn climbs(fitted: &mut Fitted, seconds: f32, by_pressure: f32, by_estimator: f32) {
+    fitted.pressure.iter_mut().for_each(|pressure| *pressure -= 0.12 * by_pressure * seconds);
+    fitted.hud_climb = Some(by_estimator + 0.01);
+    fitted.altitude += by_pressure * seconds;
+    fitted.quad.climb = by_pressure;
+}
+
+#[test]
+fn an_estimator_that_falls_while_the_barometer_climbs_is_named() {
+    let climb = |now_ms: u64, by_estimator: f32| {
+        move |fitted: &mut Fitted| {
+            let seconds = now_ms.saturating_sub(FAULT_MS) as f32 / 1_000.0;
+            let (by_pressure, by_estimator) =
+                if now_ms < FAULT_MS { (0.0, 0.0) } else { (3.0, by_estimator) };
+            climbs(fitted, seconds, by_pressure, by_estimator);
+        }
+    };
+    is_quiet(|now_ms, fitted| climb(now_ms, 3.0)(fitted));
+    is_quiet(|now_ms, fitted| climb(now_ms, 0.0)(fitted));
+    for (by_estimator, level, within_ms) in [(-7.0, Level::Warning, 3_000), (-17.0, Level::Critical, 3_000)] {
+        finds("ekf_climb", 0, level, within_ms, |now_ms, fitted| climb(now_ms, by_estimator)(fitted));
+    }
+    is_quiet(|now_ms, fitted| {
+        climb(now_ms, -15.0)(fitted);
+        (fitted.quad.kind, fitted.quad.type_number) = (VehicleKind::Vtol, 20);
+    });
+}
+
+#[test]
+fn a_simulator_without_noise_that_trembles_in_a_hover_has_no_stuck_sensors() {
+    is_quiet(|now_ms, fitted| {
+        if now_ms >= FAULT_MS {
+            let still = Fitted::healthy(FAULT_MS);
+            (fitted.force, fitted.rate, fitted.field) = (still.force, still.rate, still.field);
+            fitted.pressure = still.pressure;
+            // An estimator's attitude in its last digits, and a climb with an offset.
+            (fitted.attitude_noise, fitted.quad.climb) = (0.001, -0.11);
         }
     });
 }

@@ -102,6 +102,10 @@ const INPUTS: &[(&str, &str)] = &[
         "the same messages: steps of that height from sample to sample less the climb of GLOBAL_POSITION_INT, LOCAL_POSITION_NED or VFR_HUD, likewise",
     ),
     (
+        "ekf_climb",
+        "the same messages: climb by that height against VFR_HUD's, over a second, less the change of the dynamic pressure of the speed; on rotors",
+    ),
+    (
         "accel_stuck",
         "RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: how long forces were the same",
     ),
@@ -137,7 +141,10 @@ const INPUTS: &[(&str, &str)] = &[
     ("frames_lost", "sequence numbers on the autopilot's port, ten seconds"),
     ("rc_rssi", "RC_CHANNELS; device scale"),
     ("radio_rssi", "RADIO_STATUS; device scale"),
-    ("radio_margin", "RADIO_STATUS: signal above noise, the worse end"),
+    (
+        "radio_margin",
+        "RADIO_STATUS: signal above noise, the worse end; not of a radio that hears no other one",
+    ),
     ("rc_alert", "STATUSTEXT, EVENT; SYS_STATUS: a receiver that was healthy; HIGH_LATENCY2"),
     ("gcs_alert", "STATUSTEXT, EVENT; HIGH_LATENCY2"),
     ("load", "SYS_STATUS"),
@@ -174,7 +181,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("disarmed_in_air", "HEARTBEAT: disarmed out of a flight, and then it falls, sinks or glides"),
     (
         "sinking",
-        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies; or a loss of 7 m with full throttle",
+        "GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies and does not want it (POSITION_TARGET_LOCAL_NED); or a loss of 7 m with full throttle",
     ),
     (
         "overturned",

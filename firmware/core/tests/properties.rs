@@ -285,7 +285,8 @@ impl Random {
     }
 
     fn rare(&mut self) -> Observation {
-        match self.below(5) {
+        match self.below(6) {
+            5 => Observation::ClimbWanted(MetresPerSecond(self.f32())),
             4 => Observation::Parameter(self.below(20) as u8, self.f32()),
             0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.u32() }),
             1 => Observation::CommandAck(CommandAck {

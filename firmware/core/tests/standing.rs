@@ -4,11 +4,11 @@ mod common;
 
 use common::{AUTOPILOT, Quad};
 use hums_core::Monitor;
-use hums_core::observation::{Hud, LandedState, Observation, VehicleKind};
+use hums_core::observation::{Air, Hud, Imu, LandedState, Observation, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::Instant;
-use hums_core::units::{Fraction, Metres, MetresPerSecond, RadiansPerSecond};
+use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};
 use hums_core::usage::UsageCounter;
 
 /// Flights and landings of two minutes, of what a script says.
@@ -171,4 +171,37 @@ fn an_estimator_that_drifts_away_while_the_sensors_rest_begins_no_second_flight(
     };
     assert_eq!(counts(drifts(true)), (1, 1));
     assert_ne!(counts(drifts(false)), (1, 1), "what turns may fall");
+}
+
+#[test]
+fn what_rotors_do_not_shake_and_the_barometer_never_saw_rise_does_not_fly_whatever_an_estimator_makes_of_it()
+{
+    // Motors without propellers, half of the throttle, and an estimator that falls by 10 m.
+    let script = |step_mps2: f32, rise_m: f32| {
+        move |now_ms: u64| {
+            let height = if now_ms < 20_000 { 0.0 } else { -((now_ms - 20_000) as f32 / 1_000.0).min(10.0) };
+            let quad =
+                Quad { height, throttle: if now_ms < 10_000 { 0.0 } else { 0.5 }, ..called_in_air(now_ms) };
+            let noise = (now_ms / 100 % 3) as f32;
+            let flies = (20_000..100_000).contains(&now_ms);
+            let pressure = 960.0 + 0.01 * noise - if flies { 0.12 * rise_m } else { 0.0 };
+            let force = [0.0, 0.0, -9.8 + step_mps2 * noise].map(MetresPerSecond2);
+            let imu =
+                Imu { acceleration: Some(force), rate: Some([RadiansPerSecond(0.01); 3]), ..Imu::default() };
+            let air = Air { pressure: Some(Hectopascals(pressure)), ..Air::default() };
+            let own = |said: &Observation| !matches!(said, Observation::Imu(_));
+            let said = quad.says(now_ms).into_iter().filter(own);
+            said.chain([Observation::Imu(imu), Observation::Air(air)]).collect()
+        }
+    };
+    assert_eq!(counts(script(0.03, 0.5)).0, 0);
+    assert_eq!(counts(script(0.03, 8.0)).0, 1, "it rose: a simulator without noise");
+    assert_eq!(counts(script(0.5, 0.5)).0, 1, "it shakes: low over the ground");
+    let heard_in_air = |now_ms: u64| -> Vec<Observation> {
+        let hovers = Quad { armed: true, throttle: 0.5, ..called_in_air(now_ms) }.says(now_ms);
+        let sensor = |said: &Observation| matches!(said, Observation::Imu(_) | Observation::Air(_));
+        let still = script(0.03, 0.0)(now_ms).into_iter().filter(sensor);
+        hovers.into_iter().filter(|said| !sensor(said)).chain(still).collect()
+    };
+    assert_eq!(counts(heard_in_air), (1, 0), "a simulator that hovers when it is heard first");
 }

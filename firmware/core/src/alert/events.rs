@@ -154,13 +154,15 @@ const EVENTS: &[Row] = &[
     warn("logger_storage_full", Cause::Logging),
     warn("check_cpuload_too_high", Cause::Processor),
     warn("check_ram_usage_too_high", Cause::Processor),
-    act("check_system_flight_term_active", Cause::Crash),
     act("vtol_att_ctrl_quadchute_alt_loss", Cause::Crash),
     act("vtol_att_ctrl_quadchute_max_pitch", Cause::Crash),
     act("vtol_att_ctrl_quadchute_max_roll", Cause::Crash),
     act("vtol_att_ctrl_quadchute_min_alt", Cause::Crash),
     act("vtol_att_ctrl_quadchute_tout", Cause::Crash),
     act("vtol_att_ctrl_quadchute_trans_alt_err", Cause::Crash),
+    // Also of a pilot's kill switch, after a landing too: HEARTBEAT says the same, and whether that matters is seen there.
+    fine("check_system_flight_term_active"),
+    fine("commander_kill_sw_engaged"),
     // Which mode may not be flown now, and why arming is refused: not that anything broke.
     fine("check_modes_angular_velocity"),
     fine("check_modes_attitude"),

@@ -32,6 +32,8 @@ fn texts_are_told_by_what_they_mean() {
         (2, "Vibration compensation OFF", over(Cause::Vibration)),
         (2, "Auto mission changed, restarted command", None),
         (2, "Preflight Fail: Attitude failure (roll)", act(Cause::Attitude)),
+        (4, "[health_and_arming_checks] Preflight Fail: Flight termination active", None),
+        (2, "AFS: terminating due to fence", act(Cause::Crash)),
         (2, "Accel 0 clipping, not safe to fly!\t", warn(Cause::Vibration)),
         (3, "MAG #0 failed:  TIMEOUT!", warn(Cause::Compass)),
         (2, "Failsafe activated\t", warn(Cause::Failsafe)),
@@ -71,6 +73,10 @@ fn an_event_tells_its_cause_by_its_number_and_its_arguments() {
         assert_eq!(said, Some(Alert::warning(told)), "{cause}");
     }
     assert_eq!(of_event(hold, 2, &[]), Some(Alert::warning(Cause::Failsafe)), "cut short");
+    for name in ["commander_kill_sw_engaged", "check_system_flight_term_active"] {
+        let killed = 1 << 24 | 0x00FF_FFFF & fnv1a(name);
+        assert_eq!(of_event(killed, 2, &[]), None, "the pilot's kill switch, also after a landing: {name}");
+    }
     assert_eq!(of_event(7, 2, &[]), Some(Alert::warning(Cause::Other)), "not known and severe");
     assert_eq!(of_event(7, 3, &[]), None, "not known");
 }
@@ -150,18 +156,27 @@ fn a_remote_control_is_lost_only_where_there_was_one() {
 #[test]
 fn the_estimators_flags_are_read_on_either_scale() {
     const GOOD: u16 = 0x37F;
-    let says = |scale, flags: [u16; 3]| {
+    let with = |has_fix, scale, flags: [u16; 3]| {
         let mut alerts = armed();
         for (second, flags) in (0..).zip(flags) {
-            alerts.take_estimator(after(second), &Estimator { scale, flags, ..Estimator::default() });
+            let told = Estimator { scale, flags, ..Estimator::default() };
+            alerts.take_estimator(after(second), &told, has_fix);
         }
         let level = |cause| alerts.level(after(2), cause, false) == Some(1.0);
         (level(Cause::Gnss), level(Cause::Accelerometer), level(Cause::Estimator))
     };
+    let says = |scale, flags| with(true, scale, flags);
     let (px4, ardupilot) = (EstimatorScale::TestRatio, EstimatorScale::Variance);
     assert_eq!(says(px4, [GOOD; 3]), (false, false, false));
     assert_eq!(says(px4, [GOOD, GOOD | 1 << 10, GOOD | 1 << 10]), (true, false, false));
     assert_eq!(says(ardupilot, [0x80A7; 3]), (false, false, false), "no GPS, and the glitch bit set");
+    let glitches = [GOOD | 1 << 15; 3];
+    assert_eq!(
+        with(false, ardupilot, glitches),
+        (false, false, false),
+        "it flies by beacons, and no receiver has a fix"
+    );
+    assert_eq!(with(true, ardupilot, glitches), (true, false, false));
     assert_eq!(says(px4, [GOOD, GOOD | 1 << 11, GOOD | 1 << 11]), (false, true, false));
     assert_eq!(says(ardupilot, [GOOD, GOOD | 1 << 15, GOOD | 1 << 15]), (true, false, false));
     assert_eq!(says(ardupilot, [GOOD, 0xA7, 0xA7]), (false, false, true), "position lost");

@@ -103,6 +103,8 @@ const TEXTS: &[Row] = &[
     warn("hard landing", Cause::Crash),
     act("parachute*releas", Cause::Crash),
     act("parachute*deploy", Cause::Crash),
+    // PX4, also of a pilot's kill switch, after a landing too: its HEARTBEAT says the same, and whether that matters is seen there.
+    fine("flight termination active"),
     act("terminat", Cause::Crash),
     // Motors, before sensors: "thrust loss", "imbalanced propeller".
     warn("thrust loss", Cause::Propulsion),

@@ -6,8 +6,16 @@ use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::cause::Cause;
 use crate::latest::Reading;
+use crate::motion::{climb_mps, ground_speed_mps};
+use crate::observation::Heartbeat;
 use crate::params::Param;
 use crate::time::Span;
+
+/// What was killed at its touch-down rests after so long, level and still for the second of these, and slower than this, m/s. In two
+/// real landings the sensors were still 0.6 and 1.2 s after the kill.
+const COMES_TO_REST: Span = Span::from_secs(2);
+const RESTS: Span = Span::from_millis(300);
+const SLOW_MPS: f32 = 1.0;
 
 const LOAD: Check = Check {
     name: "load",
@@ -64,10 +72,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_critical: Span::from_millis(500),
         when: When::Armed,
         alarm_only: true,
-        read: |inputs, _| {
-            let slot = &inputs.vehicle.heartbeat;
-            Reading::new(slot.at(), slot.get().map(|heartbeat| f32::from(heartbeat.state)))
-        },
+        read: state,
         ..LOAD
     },
     alert::<{ Cause::Processor as usize }>("processor alert", Subsystem::Computer),
@@ -80,6 +85,23 @@ pub(super) const CHECKS: &[Check] = &[
 fn load_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let slot = &inputs.vehicle.system;
     Reading::new(slot.at(), slot.get()?.load.map(|load| load.0 * 100.0))
+}
+
+/// `MAV_STATE`. PX4's kill switch makes a termination of it, and pilots press it when they have touched down. What was terminated in
+/// the air falls, glides or hangs on a parachute after [`COMES_TO_REST`].
+fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
+    const ACTIVE: u8 = 4;
+    let Inputs { now, vehicle, .. } = *inputs;
+    let slow = |speed_mps: Option<f32>| speed_mps.is_none_or(|speed_mps| libm::fabsf(speed_mps) < SLOW_MPS);
+    let rests = || {
+        vehicle.inertial.is_level_for(now, RESTS)
+            && slow(climb_mps(now, vehicle))
+            && slow(ground_speed_mps(now, vehicle))
+    };
+    let ended = vehicle.terminated_since.is_some_and(|since| now.since(since) >= COMES_TO_REST) && !rests();
+    let counts = |state| if state == Heartbeat::TERMINATED && !ended { ACTIVE } else { state };
+    let slot = &vehicle.heartbeat;
+    Reading::new(slot.at(), slot.get().map(|heartbeat| f32::from(counts(heartbeat.state))))
 }
 
 /// 1 for half a minute after a restart while it was armed.

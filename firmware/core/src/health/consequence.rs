@@ -43,7 +43,7 @@ const DRIVE: &[&str] =
 const BATTERY: &[&str] =
     &["cell_voltage", "batt_remaining", "batt_fault", "batt_state", "battery_alert", "cell_deviation"];
 const LINKS: &[&str] = &["rc_alert", "gcs_alert", "heartbeat"];
-const ESTIMATOR: &[&str] = &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert"];
+const ESTIMATOR: &[&str] = &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_climb", "ekf_alert"];
 /// What the autopilot does because of anything.
 const ACTS: &[&str] = &["failsafe_alert", "autopilot_state", "autopilot_alert"];
 
@@ -72,6 +72,8 @@ const ROWS: &[(&[&str], &[&str])] = &[
     (SENSORS, ESTIMATOR),
     (SHAKING, ESTIMATOR),
     (SHAKING, &["accel_mismatch", "gyro_mismatch"]),
+    // Height control follows the estimator.
+    (&["ekf_climb"], &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_alert", "thrust_lost"]),
     (&["vibration", "vibration_px4"], &["vibration_rise", "clipping", "vibration_alert"]),
     (&["cell_voltage", "batt_remaining"], &["batt_state", "battery_alert"]),
     (&["batt_state"], &["battery_alert"]),

@@ -97,11 +97,12 @@ fn rc_rssi(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     Reading::new(slot.at(), slot.get()?.rssi.map(f32::from))
 }
 
-/// The weaker end's signal above its noise. An end that tells 0 of both tells nothing: a radio that does not measure, or one that
-/// was never heard.
+/// The weaker end's signal above its noise. A radio that does not hear another one (its signal at the other end is 0) has no link
+/// that could be weak, and goes on telling what it heard last. An end that tells 0 of both tells nothing: a radio that does not
+/// measure.
 fn radio_margin(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let slot = &inputs.vehicle.radio;
-    let radio = slot.get()?;
+    let radio = slot.get().filter(|radio| radio.remote_rssi != Some(0))?;
     let margin = |rssi: Option<u8>, noise: Option<u8>| {
         let (rssi, noise) = (rssi?, noise?);
         ((rssi, noise) != (0, 0)).then(|| f32::from(rssi) - f32::from(noise))

@@ -171,6 +171,19 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.derived.crosschecks().heights().noise(),
         ..MISMATCH
     },
+    Check {
+        name: "ekf_climb",
+        words: "EKF climb off baro",
+        unit: "m/s",
+        warn: Some(Param::EkfClimbWarn),
+        critical: Some(Param::EkfClimbCrit),
+        hysteresis: 1.0,
+        debounce_warn: Span::from_millis(500),
+        debounce_critical: Span::from_millis(500),
+        instances: 1,
+        read: |inputs, _| inputs.derived.crosschecks().heights().climbs_apart(),
+        ..MISMATCH
+    },
     STUCK,
     Check {
         name: "gyro_stuck",

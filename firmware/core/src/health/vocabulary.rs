@@ -193,6 +193,9 @@ vocabulary! {
     "Check the barometer, its cover and the airflow at it, and the GPS antenna's view.";
     "baro_noise" Vehicle "barometer noise", "", needs "air pressure and climb rate";
     "The barometer became noisy in flight."; "Check the barometer, its cover and the airflow at it.";
+    "ekf_climb" Vehicle "estimator's climb against the barometer", "", needs "air pressure and climb rate on rotors";
+    "The estimator's climb was not that of the barometer: height control may run away.";
+    "Do not fly until vibration, accelerometers, the barometer and its cover are checked.";
     "accel_stuck" Vehicle "accelerometer repeats a value", "accelerometer", needs "acceleration in flight";
     "The accelerometer repeated one value: it has failed."; "Do not fly until the autopilot's accelerometers are checked.";
     "gyro_stuck" Vehicle "gyro repeats a value", "gyro", needs "body rates of a gyro in flight";

@@ -27,6 +27,9 @@ const LEVEL: Span = Span::from_millis(500);
 /// Rotors that pull downwards for a moment more than level, by the estimator's attitude alone.
 const OVERTURNED_DEG: f32 = 100.0;
 const SINKS: Span = Span::from_millis(500);
+/// A sink that is wanted so lately, and is followed within this, m/s, is what the autopilot was told to do.
+const WANTED_AGE: Span = Span::from_secs(1);
+const FOLLOWS_MPS: f32 = 2.0;
 /// So much height is lost with all the thrust by what stalls, or has lost a propeller; gusts take less.
 const LOST_M: f32 = 7.0;
 /// What sinks slower than this with all its thrust follows a glide path against the wind, m/s: a height is forgotten so fast.
@@ -208,8 +211,9 @@ impl Mishap {
         let on_wings = vehicle.hovers(at) == Some(false);
         let least = if on_wings { FULL_ON_WINGS } else { FULL_THROTTLE };
         let full = throttle(at, vehicle).is_some_and(|part| part >= least);
-        let told_to = has_pilots_throttle(vehicle);
-        let lost_m = self.lose_height(at, full && !told_to, vehicle);
+        let by_hand = has_pilots_throttle(vehicle);
+        let told_to = by_hand || is_told_to_sink(at, sink_mps, limit_mps, vehicle);
+        let lost_m = self.lose_height(at, full && !by_hand, vehicle);
         let sinks = match vehicle.hovers(at) {
             // It descends as it is told to, but not with all its thrust.
             Some(true) => (sink_mps > limit_mps && (full || !told_to)) || lost_m > LOST_M,
@@ -250,4 +254,11 @@ impl Mishap {
         let least = (THRUST_PART * self.hover_throttle).max(IDLE_THROTTLE);
         !is_thrown(vehicle) && throttle(at, vehicle).is_none_or(|part| part > least)
     }
+}
+
+/// Whether the autopilot wants it to sink faster than the limit, and it does not sink much faster than that: a mission, a script or an
+/// offboard computer asks for it.
+fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
+    let wanted_mps = vehicle.climb_wanted.within(at, WANTED_AGE).map(|climb| -climb.0);
+    wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)
 }

@@ -33,6 +33,10 @@ pub struct Quad {
     /// Metres above home.
     pub height: f32,
     pub throttle: f32,
+    /// `MAV_STATE`
+    pub state: u8,
+    /// The climb that the autopilot wants, upwards, where it is sent.
+    pub climb_wanted: Option<f32>,
     /// The autopilot's own mode number.
     pub mode: u32,
     pub autopilot: Autopilot,
@@ -99,6 +103,8 @@ impl Quad {
             lost: 0.0,
             height: 20.0,
             throttle: 0.5,
+            state: 4,
+            climb_wanted: None,
             mode: 4,
             autopilot: Autopilot::ArduPilot,
             kind: VehicleKind::Rotorcraft,
@@ -122,7 +128,7 @@ impl Quad {
             kind: self.kind,
             type_number: self.type_number,
             armed: self.armed,
-            state: 4,
+            state: self.state,
             mode: self.mode,
             ..Heartbeat::default()
         };
@@ -148,6 +154,7 @@ impl Quad {
             Observation::SystemStatus(self.system),
             Observation::Battery(self.battery),
         ];
+        said.extend(self.climb_wanted.map(|climb| Observation::ClimbWanted(MetresPerSecond(climb))));
         if now_ms.is_multiple_of(500) {
             said.push(Observation::Heartbeat(heartbeat));
             said.push(Observation::SystemTime(SystemTime { boot_ms, utc_micros: None }));

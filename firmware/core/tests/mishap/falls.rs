@@ -173,3 +173,37 @@ fn every_text_of_a_mishap_fits() {
     let report = Report { change: Change::Began(Kind::Impact), place, touch: 0 };
     assert_eq!(report.text(), "mishap at 47.397742,-8.545594 30 m");
 }
+
+/// Whether the autopilot's state was told as critical.
+fn tells_state(outcome: &Outcome) -> bool {
+    outcome
+        .findings
+        .iter()
+        .any(|finding| finding.check == "autopilot_state" && finding.level == Level::Critical)
+}
+
+#[test]
+fn a_kill_switch_at_the_touch_down_is_no_alarm_and_in_the_air_it_is_one() {
+    for of in ROTORS {
+        let lands = Quad { height: 0.2, ..hovering(of) };
+        let killed = fly(&lands, |ms, quad, motion| {
+            (quad.state, quad.height, quad.climb) = (8, 0.0, 0.0);
+            // The bounce of its legs.
+            motion.load_g = if ms < 600 && ms % 100 == 0 { 2.5 } else { 1.0 };
+            quad.armed = ms < 5_000;
+        });
+        assert!(killed.told().is_empty() && !tells_state(&killed), "{of:?}: {:?}", killed.findings);
+        let falls = fly(&hovering(of), |ms, quad, motion| {
+            fall(ms, quad, motion);
+            quad.state = 8;
+        });
+        assert_eq!(falls.told().first(), Some(&"free_fall"), "{of:?}");
+        let parachute = fly(&Quad { height: 100.0, ..hovering(of) }, |ms, quad, motion| {
+            let sunk_m = 5.0 * ms as f32 / 1_000.0;
+            (quad.state, quad.throttle) = (8, 0.0);
+            (quad.climb, quad.height) = if sunk_m < 100.0 { (-5.0, 100.0 - sunk_m) } else { (0.0, 0.0) };
+            motion.rates = [0.1, 0.0, 0.0];
+        });
+        assert!(tells_state(&parachute), "{of:?}: {:?}", parachute.findings);
+    }
+}

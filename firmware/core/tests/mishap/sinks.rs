@@ -133,3 +133,26 @@ fn an_estimator_that_believes_itself_makes_no_mishap_against_the_air() {
         assert_eq!(stuck.told(), ["sinking"], "{of:?}: a barometer that never changes says nothing");
     }
 }
+
+#[test]
+fn a_sink_that_the_autopilot_wants_and_follows_is_none() {
+    let sinks: Script = |ms, quad, _| {
+        if ms < 2_000 {
+            (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
+        }
+        quad.climb_wanted = Some(if ms < 2_000 { -8.5 } else { 0.0 });
+    };
+    for of in ROTORS {
+        assert!(fly(&hovering(of), sinks).told().is_empty(), "{of:?}: a script asks for it");
+        let faster = fly(&hovering(of), |ms, quad, motion| {
+            fall(ms, quad, motion);
+            (motion.load_g, quad.climb_wanted) = (0.5, Some(-6.5));
+        });
+        assert_eq!(faster.told(), ["sinking"], "{of:?}: it falls, and was to sink");
+        let wants_little = fly(&hovering(of), |ms, quad, _| {
+            quad.climb = if ms < 2_000 { -8.0 } else { 0.0 };
+            quad.climb_wanted = Some(-2.0);
+        });
+        assert_eq!(wants_little.told(), ["sinking"], "{of:?}");
+    }
+}

@@ -45,6 +45,7 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         74 => Observation::Hud(motion::hud(payload)?),
         77 => Observation::CommandAck(system::command_ack(payload)),
         83 => Observation::Wanted(motion::attitude_target(payload)?),
+        85 => Observation::ClimbWanted(motion::climb_wanted(payload)?),
         105 => {
             let (imu, air) = motion::highres_imu(payload)?;
             Observation::ImuAndAir(imu, air)

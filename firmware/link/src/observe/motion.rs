@@ -204,6 +204,13 @@ pub(super) fn attitude_target(payload: &[u8]) -> Option<Wanted> {
     Some(Wanted { rates, ..Wanted::from_quaternion([4, 8, 12, 16].map(|at| float(payload, at)))? })
 }
 
+/// `POSITION_TARGET_LOCAL_NED`: `type_mask` 32 says that the vertical speed is to be ignored.
+pub(super) fn climb_wanted(payload: &[u8]) -> Option<MetresPerSecond> {
+    const NO_VZ: u16 = 32;
+    let down = float(payload, 24);
+    (Fields(payload).u16(48) & NO_VZ == 0 && down.is_finite()).then_some(MetresPerSecond(-down))
+}
+
 fn float(payload: &[u8], at: usize) -> f32 {
     f32::from_bits(Fields(payload).u32(at))
 }

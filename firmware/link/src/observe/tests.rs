@@ -3,7 +3,9 @@ use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::observation::{
     Autopilot, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
 };
-use hums_core::units::{Amperes, Celsius, Fraction, Gauss, Hectopascals, MetresPerSecond2, Volts};
+use hums_core::units::{
+    Amperes, Celsius, Fraction, Gauss, Hectopascals, MetresPerSecond, MetresPerSecond2, Volts,
+};
 use mavlink::dialects::ardupilotmega as ap;
 use mavlink::{MavlinkVersion, MessageData};
 use proptest::prelude::*;
@@ -54,6 +56,16 @@ fn the_wanted_attitude_is_told_in_degrees_and_as_a_quaternion() {
     let [roll, pitch] = wanted(said(&target)).unwrap();
     assert!(roll.abs() < 1e-3 && (pitch + 30.0).abs() < 1e-3, "{roll} {pitch}");
     assert_eq!(wanted(said(&ap::ATTITUDE_TARGET_DATA { q: [0.0; 4], ..target })), None, "nothing yet");
+}
+
+#[test]
+fn the_climb_that_is_wanted_is_read_where_it_is_meant() {
+    let target = |mask: u16, down: f32| {
+        let packet = Packet::new(85).f32(24, down).u16(48, mask).u8(50, 1);
+        by_id(85, packet.payload())
+    };
+    assert_eq!(target(0, 9.5), Some(Observation::ClimbWanted(MetresPerSecond(-9.5))));
+    assert_eq!((target(32, 9.5), target(0, f32::NAN)), (None, None));
 }
 
 #[test]

@@ -84,7 +84,7 @@ pub(super) const CLASSES: &[Class] = &[
     Class {
         name: "barometer",
         about: "barometers",
-        checks: &["baro_alert", "baro_mismatch", "baro_height", "baro_noise", "baro_stuck"],
+        checks: &["baro_alert", "baro_mismatch", "baro_height", "baro_noise", "baro_stuck", "ekf_climb"],
     },
     Class {
         name: "inertial",

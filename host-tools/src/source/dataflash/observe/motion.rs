@@ -149,7 +149,7 @@ pub(super) const HANDLERS: &[Handler] = &[
     },
     Handler {
         names: &[("CTUN", 0), ("THR", 0)],
-        columns: &[&["ThO", "ThrOut"], &["CRt", "CRate"], &["As", "Aspd"]],
+        columns: &[&["ThO", "ThrOut"], &["CRt", "CRate"], &["As", "Aspd"], &["DCRt", "DCRate"]],
         take: hud,
         ..MOTION
     },
@@ -289,15 +289,16 @@ fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut
     // The receiver's own course, where no estimator tells better.
     if let Some([speed, course]) = given.singles(7) {
         let (east, north) = course.to_radians().sin_cos();
-        let down = given.single(9).unwrap_or(0.0);
-        if state.velocity.within(given.at, TOGETHER).is_none() {
-            state.velocity.set(given.at, [speed * north, speed * east, down]);
-        }
+        let of_barometer = || state.climb.within(given.at, TOGETHER);
+        let climb = || state.told_climb.within(given.at, TOGETHER).or_else(of_barometer);
+        let down = given.single(9).or_else(|| climb().map(|climb| -climb)).unwrap_or(0.0);
+        state.receiver_velocity.set(given.at, [speed * north, speed * east, down]);
     }
 }
 
 fn velocity(state: &State, given: &Given<'_>) -> [f32; 3] {
-    state.velocity.within(given.at, TOGETHER).unwrap_or_default()
+    let of_receiver = || state.receiver_velocity.within(given.at, TOGETHER);
+    state.velocity.within(given.at, TOGETHER).or_else(of_receiver).unwrap_or_default()
 }
 
 fn accuracy(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
@@ -442,8 +443,16 @@ fn vibration(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 }
 
 fn hud(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
-    // A copter's climb rate is in cm/s in CTUN; a plane's CTUN has none.
-    let climb = given.single(1).map(|climb| if given.is_integer(1) { climb / 100.0 } else { climb });
+    // A copter's climb rates are in cm/s in CTUN; a plane's CTUN has none.
+    let rate =
+        |slot| given.single(slot).map(|climb| if given.is_integer(slot) { climb / 100.0 } else { climb });
+    let climb = rate(1);
+    if let Some(climb) = climb {
+        state.told_climb.set(given.at, climb);
+    }
+    if let Some(wanted) = rate(3) {
+        out.observe(&Observation::ClimbWanted(MetresPerSecond(wanted)));
+    }
     let throttle = given.single(0).map(|throttle| match state.facts.craft {
         Craft::Plane | Craft::Rover => throttle / 100.0,
         // A part of one since 3.4, thousandths before.

@@ -104,10 +104,14 @@ pub(in crate::source::dataflash) struct State {
     pub(super) fields: [Option<[Gauss; 3]>; INSTANCES],
     /// Velocity of the estimator, north, east, down.
     pub(super) velocity: Dated<[f32; 3]>,
+    /// The same of the receiver, where the estimator tells none.
+    pub(super) receiver_velocity: Dated<[f32; 3]>,
     pub(super) primary_core: u8,
     pub(super) altitude: Dated<f32>,
     pub(super) baro_height: Dated<f32>,
     pub(super) climb: Dated<f32>,
+    /// The estimator's, of CTUN.
+    pub(super) told_climb: Dated<f32>,
     pub(super) airspeed: Dated<f32>,
     pub(super) ground_speed: Dated<f32>,
     pub(super) heading_deg: Dated<f32>,

@@ -336,6 +336,21 @@ fn the_attitude_that_is_wanted_stands_beside_the_one_that_is() {
 }
 
 #[test]
+fn the_climb_that_is_wanted_is_in_centimetres_where_it_is_whole() {
+    let wanted = |kind: &str, value: &[u8]| {
+        let mut log = Writer::new();
+        log.format(150, "CTUN", &format!("Qf{kind}"), "TimeUS,ThO,DCRt");
+        log.raw(150, &[&1_000_000_u64.to_le_bytes(), &0.5_f32.to_le_bytes(), value]);
+        seen(&log.bytes).find(|seen| match seen {
+            Observation::ClimbWanted(climb) => Some(climb.0),
+            _ => None,
+        })
+    };
+    assert_eq!(wanted("h", &(-924_i16).to_le_bytes()), [-9.24]);
+    assert_eq!(wanted("f", &(-2.5_f32).to_le_bytes()), [-2.5]);
+}
+
+#[test]
 fn failsafes_are_in_force_by_name_until_they_are_resolved_or_it_is_disarmed() {
     let mut log = Writer::new();
     log.format(160, "MSG", "QZ", "TimeUS,Message");

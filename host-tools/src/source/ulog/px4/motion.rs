@@ -110,6 +110,17 @@ pub(super) const TOPICS: &[Topic] = &[
         take: local_position,
     },
     Topic {
+        name: "vehicle_local_position_setpoint",
+        instances: 1,
+        every_us: MEDIUM_US,
+        fields: &["vz"],
+        take: |px4, said| {
+            if let Some(down) = said.fields.finite(0) {
+                px4.observe(Observation::ClimbWanted(MetresPerSecond(-down)));
+            }
+        },
+    },
+    Topic {
         name: "vehicle_global_position",
         instances: 1,
         every_us: MEDIUM_US,

@@ -123,6 +123,8 @@ pub(super) struct System {
 pub(super) struct Status {
     pub(super) arming: u8,
     pub(super) nav: u8,
+    /// The mode that the pilot asked for, since v1.14.
+    pub(super) meant: Option<u8>,
     pub(super) failsafe: bool,
     pub(super) type_number: u8,
     pub(super) hil: bool,

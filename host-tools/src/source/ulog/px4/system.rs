@@ -24,6 +24,7 @@ pub(super) const TOPICS: &[Topic] = &[
             "onboard_control_sensors_enabled",
             "onboard_control_sensors_health",
             "calibration_enabled",
+            "nav_state_user_intention",
         ],
         take: status,
     },
@@ -205,6 +206,12 @@ impl System {
         }
     }
 
+    /// Whether another computer flies it, or is meant to.
+    fn is_offboard(&self) -> bool {
+        const OFFBOARD: u8 = 14;
+        self.status.is_some_and(|status| status.nav == OFFBOARD || status.meant == Some(OFFBOARD))
+    }
+
     fn heartbeat(&self) -> Option<Heartbeat> {
         let status = self.status?;
         let type_number =
@@ -318,6 +325,7 @@ fn status(px4: &mut Px4, said: &Said<'_>) {
         takeoff_us: fields.count(5),
         unhealthy: sensors(),
         calibrating: fields.flag(9),
+        meant: fields.byte(10),
     };
     px4.system.status = Some(status);
     px4.failsafes();
@@ -332,12 +340,15 @@ fn status(px4: &mut Px4, said: &Said<'_>) {
 fn failsafe_flags(px4: &mut Px4, said: &Said<'_>) {
     // `BATTERY_WARNING_CRITICAL`: a low battery alone is a warning.
     const BATTERY: &str = "battery";
+    const OFFBOARD: &str = "offboard control";
     const CRITICAL: f64 = 2.0;
     let mut names: Vec<&str> = Vec::new();
     for (field, name) in FAILSAFES.into_iter().enumerate() {
         let least = if name == BATTERY { CRITICAL } else { 1.0 };
         let is_set = said.fields.get(field).is_some_and(|value| value >= least);
-        if is_set && !names.contains(&name) {
+        // It is so on each vehicle that no other computer flies.
+        let is_meant = name != OFFBOARD || px4.system.is_offboard();
+        if is_set && is_meant && !names.contains(&name) {
             names.push(name);
         }
     }

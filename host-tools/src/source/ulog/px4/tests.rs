@@ -273,6 +273,41 @@ fn flags_of_failsafes_are_named_while_the_vehicle_is_in_failsafe() {
 }
 
 #[test]
+fn that_no_other_computer_flies_it_is_a_failsafe_in_the_offboard_mode_only() {
+    let status = format!("{STATUS}uint8_t nav_state_user_intention;");
+    let told = |nav: u8, meant: u8| {
+        let read = log(&[
+            ("vehicle_status", &status, &[(2, vec![2, nav, 1, 2, meant])]),
+            (
+                "failsafe_flags",
+                "bool offboard_control_signal_lost;uint8_t battery_warning;",
+                &[(3, vec![1, 2])],
+            ),
+        ]);
+        let facts = read.of("fact");
+        facts.iter().rfind(|fact| fact.starts_with("Failsafes")).map(|fact| (*fact).to_owned())
+    };
+    for (nav, meant, offboard) in [(1, 1, false), (14, 14, true), (4, 14, true)] {
+        let told = told(nav, meant).expect("a failsafe");
+        assert!(
+            told.contains("battery") && told.contains("offboard control") == offboard,
+            "{nav} {meant}: {told}"
+        );
+    }
+}
+
+#[test]
+fn the_climb_that_is_wanted_is_that_of_the_position_setpoint() {
+    let read = log(&[(
+        "vehicle_local_position_setpoint",
+        "float vz;",
+        &[(2, floats(&[9.5])), (3, floats(&[f32::NAN]))],
+    )]);
+    let wanted = observations(&read, "ClimbWanted(");
+    assert!(wanted.len() == 1 && wanted[0].contains("-9.5"), "{wanted:?}");
+}
+
+#[test]
 fn the_throttle_is_that_of_the_motors_where_nothing_else_tells_it() {
     let motors = [&[0.5, 0.7, f32::NAN, 0.0][..], &[f32::NAN; 8]].concat();
     let throttle = |thrust: bool| {
