@@ -75,18 +75,18 @@ pub struct Differs {
 }
 
 /// Why a file was not replaced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 enum Reason {
     /// Nobody said `--replace`.
     NotSaid,
     /// It may be an original, or was made of another input.
     Original,
-    /// It has more in it than what would take its place, in bytes.
+    /// It has more in it than what would take its place.
     Less {
-        /// What is there.
-        there: u64,
+        /// What is there, in words.
+        there: String,
         /// What would take its place.
-        new: u64,
+        new: String,
     },
 }
 
@@ -101,8 +101,8 @@ impl Differs {
         Self { path: path.to_owned(), why: Reason::Original }
     }
 
-    /// What is there was made of the same log, of more of it: so many bytes, and so many would take their place.
-    pub fn less(path: &Path, there: u64, new: u64) -> Self {
+    /// What is there was made of the same log, of more of it, or of a better copy: both in words.
+    pub fn less(path: &Path, there: String, new: String) -> Self {
         Self { path: path.to_owned(), why: Reason::Less { there, new } }
     }
 }
@@ -110,7 +110,7 @@ impl Differs {
 impl fmt::Display for Differs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let path = self.path.display();
-        match self.why {
+        match &self.why {
             Reason::NotSaid => write!(
                 f,
                 "{path}: is there already with other content, and was not replaced; name another output, move it away, \
@@ -123,7 +123,7 @@ impl fmt::Display for Differs {
             ),
             Reason::Less { there, new } => write!(
                 f,
-                "{path}: is there already with more in it ({there} bytes; this would be {new}), and --replace does not \
+                "{path}: is there already with more in it ({there}; this would be {new}), and --replace does not \
                  make it less; name another output, or delete it by hand"
             ),
         }

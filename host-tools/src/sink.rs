@@ -2,15 +2,16 @@
 
 use std::io::{self, BufWriter, Write};
 use std::sync::mpsc::{Receiver, TryRecvError, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
-use crate::files::{Inputs, Output, check_standard_output_is_open};
+use crate::files::{Inputs, Output, check_standard_output_is_open, settle};
 use crate::made;
+use crate::outcome::Outcome;
 use crate::output::Stdout;
 
 /// How long the reader waits before it looks whether anybody still listens.
@@ -23,37 +24,98 @@ const BUFFER_BYTES: usize = 65_536;
 /// The other side of the ground station's port.
 pub struct Ground {
     /// What goes to it.
-    pub writer: Box<dyn Write + Send>,
+    pub writer: Beside,
     /// What comes from it.
     pub heard: Heard,
-    /// The file that `writer` writes, where it is one.
-    pub file: Option<SinkFile>,
 }
 
-/// A file that a run writes, and whoever ends the run makes whole.
-#[derive(Clone, Debug)]
-pub struct SinkFile(Arc<Mutex<Output>>);
+/// What is written beside a recording: `--gs`, `--tap`. Where it fails, that is said at once, and the recording goes on
+/// without it: writing never fails. A clone writes the same.
+#[derive(Clone)]
+pub struct Beside(Arc<Mutex<Inside>>);
 
-impl SinkFile {
-    /// The run is over: the file gets its name.
-    pub fn finish(&self) -> Result<()> {
-        self.with(|file| Ok(file.finish())).context("--gs: cannot be written")?
+struct Inside {
+    /// What asked for it.
+    flag: &'static str,
+    to: To,
+    failed: bool,
+}
+
+enum To {
+    /// Nobody reads.
+    Nowhere,
+    File(Box<Output>),
+    Stream(Box<dyn Write + Send>),
+}
+
+impl Beside {
+    /// A writer that nobody reads.
+    pub fn nowhere() -> Self {
+        Self::new("", To::Nowhere)
     }
 
-    fn with<T>(&self, act: impl FnOnce(&mut Output) -> io::Result<T>) -> io::Result<T> {
-        let mut file = self.0.lock().map_err(|_| io::Error::other("a thread that wrote it has failed"))?;
-        let done = act(&mut file);
-        done.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", file.path().display())))
+    /// A file.
+    pub fn file(flag: &'static str, file: Output) -> Self {
+        Self::new(flag, To::File(Box::new(file)))
+    }
+
+    fn new(flag: &'static str, to: To) -> Self {
+        Self(Arc::new(Mutex::new(Inside { flag, to, failed: false })))
+    }
+
+    /// The run is over: a file gets its name. `Losses` where not all of it was written.
+    pub fn finish(&self) -> Outcome {
+        let mut inside = self.lock();
+        let Inside { to, .. } = &mut *inside;
+        let finished = match to {
+            To::Nowhere => Ok(()),
+            To::File(file) => file.finish(),
+            To::Stream(stream) => stream.flush().map_err(anyhow::Error::new),
+        };
+        if let Err(error) = finished {
+            inside.fail(&error);
+        }
+        Outcome::lossy(inside.failed)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inside> {
+        // What a thread that failed has left is whole.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Write for SinkFile {
+impl Inside {
+    /// Tries something with what is written; after an error nothing more is.
+    fn attempt(&mut self, act: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
+        let done = match &mut self.to {
+            To::Nowhere => Ok(()),
+            To::File(file) => {
+                let done = act(&mut **file);
+                settle(done, file.path())
+            }
+            To::Stream(stream) => act(stream).context("cannot be written"),
+        };
+        if let Err(error) = done {
+            self.fail(&error);
+        }
+    }
+
+    fn fail(&mut self, error: &anyhow::Error) {
+        note!("{}: {error:#}; what is recorded on the card does not depend on it", self.flag);
+        // A file that is not whole goes, and leaves its room to the card's image.
+        (self.to, self.failed) = (To::Nowhere, true);
+    }
+}
+
+impl Write for Beside {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.with(|file| file.write(bytes))
+        self.lock().attempt(|to| to.write_all(bytes));
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.with(Output::flush)
+        self.lock().attempt(|to| to.flush());
+        Ok(())
     }
 }
 
@@ -79,22 +141,27 @@ impl Heard {
     }
 }
 
+/// What `--gs` is called where it fails.
+const FLAG: &str = "--gs";
+
 /// Opens SINK, which is none of the inputs.
 pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
     let heard = Heard::nobody();
     match endpoint {
         Endpoint::File(path) => {
-            let file = SinkFile(Arc::new(Mutex::new(Output::create(path, inputs, &made::RAW, None)?)));
-            Ok(Ground { writer: Box::new(file.clone()), heard, file: Some(file) })
+            let file = Output::create(path, inputs, &made::RAW, None)?;
+            Ok(Ground { writer: Beside::file(FLAG, file), heard })
         }
         Endpoint::Standard => {
             inputs.refuse_standard_output()?;
             check_standard_output_is_open()?;
-            Ok(Ground { writer: Box::new(BufWriter::new(Stdout::new())), heard, file: None })
+            let stream = To::Stream(Box::new(BufWriter::new(Stdout::new())));
+            Ok(Ground { writer: Beside::new(FLAG, stream), heard })
         }
         _ => {
             let duplex = duplex::open(endpoint, SILENCE)?;
-            Ok(Ground { writer: duplex.writer, heard: listen(duplex.reader), file: None })
+            let writer = Beside::new(FLAG, To::Stream(duplex.writer));
+            Ok(Ground { writer, heard: listen(duplex.reader) })
         }
     }
 }

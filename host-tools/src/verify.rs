@@ -68,7 +68,8 @@ pub fn run(args: &cli::Verify) -> Result<Outcome> {
     } else {
         let logs = count(logs, "session");
         let worst = if ok { worst } else { Verdict::NotProved };
-        output::line(&format!("{logs}: {}", without_earlier.verdict(worst)))?;
+        let verdict = without_earlier.verdict(worst, found.has_passed_over());
+        output::line(&format!("{logs}: {verdict}"))?;
     }
     Ok(Outcome::lossy(!ok))
 }
@@ -92,14 +93,17 @@ impl WithoutEarlier {
     }
 
     /// What is said of all logs: no more than of those that were read.
-    fn verdict(&self, worst: Verdict) -> String {
-        let Some(first) = &self.first else { return worst.words().to_owned() };
-        let words = if worst == Verdict::Holds { "all that was read holds" } else { worst.words() };
+    fn verdict(&self, worst: Verdict, has_passed_over: bool) -> String {
+        let all = self.first.is_none() && !has_passed_over;
+        let words = if worst == Verdict::Holds && !all { "all that was read holds" } else { worst.words() };
         let more = match self.more {
             0 => String::new(),
             more => format!(" and before {}", count(more, "more log")),
         };
-        format!("{words}; the logs before {}{more} were not read", word(first))
+        let first = self.first.as_ref();
+        let earlier = first.map(|first| format!("; the logs before {}{more} were not read", word(first)));
+        let passed_over = if has_passed_over { "; what was passed over was not read" } else { "" };
+        format!("{words}{}{passed_over}", earlier.unwrap_or_default())
     }
 }
 

@@ -102,16 +102,21 @@ fn text_is_no_recording_and_no_log() {
 fn an_image_that_is_no_fat_costs_counted_frames_and_is_left_as_it_was() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
-    let before = Random::new(6).bytes(8 << 20);
-    fs::write(&image, &before).unwrap();
     let flight = own("px4_hil_quad_low.tlog");
     let sim = ["sim".as_ref(), "--json".as_ref(), "--input".as_ref(), flight.as_os_str()];
-    // As the box would: without a card that it can use, and with all frames counted as lost.
-    let outcome = hums(sim.into_iter().chain(["--sd".as_ref(), image.as_os_str()])).expect_code(&[3]);
+    let sim = || hums(sim.into_iter().chain(["--sd".as_ref(), image.as_os_str()]));
+    let somebodys = Random::new(6).bytes(40 << 20);
+    fs::write(&image, &somebodys).unwrap();
+    sim().expect_code(&[1]);
+    assert!(fs::read(&image).unwrap() == somebodys, "somebody else's data was overwritten");
+    // Nothing is on it. As the box would: without a card that it can use, and with all frames counted as lost.
+    let before = vec![0; 40 << 20];
+    fs::write(&image, &before).unwrap();
+    let outcome = sim().expect_code(&[3]);
     let json: serde_json::Value = serde_json::from_str(&outcome.text()).unwrap();
     assert!(json["frames_lost"] == json["frames_in"] && json["blocks_written"] == 0, "{json}");
     assert!(json["findings"].to_string().contains("critical"), "it says so: {json}");
-    assert!(fs::read(&image).unwrap() == before, "somebody else's data was overwritten");
+    assert!(fs::read(&image).unwrap() == before, "nobody asked for a format");
 }
 
 #[test]

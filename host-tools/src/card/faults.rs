@@ -17,6 +17,9 @@ pub struct Faults {
     pub write_error: f64,
     /// Makes the write errors repeatable.
     pub seed: u64,
+    /// Block 0 is write protected: the recorder writes it only where it formats a card, and what a user's image holds is not
+    /// formatted over.
+    pub keeps_table: bool,
 }
 
 /// `--cut-after-writes N[:torn]`

@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use hums_recorder::format::BLOCKS_MIN;
+use hums_recorder::layout::{Layout, LayoutError};
 
 use crate::files::{is_seekable, lock_in_place, make_in_place};
 use crate::outcome::usage;
@@ -65,24 +66,77 @@ fn open(path: &Path, about: &Metadata, size_mib: Option<u64>) -> Result<File> {
     Ok(file)
 }
 
-/// Why nothing can be recorded on an image, as far as its first block tells: a sentence without its name.
-pub fn trouble(file: &File) -> io::Result<Option<String>> {
-    let bytes = length(file)?;
+/// Refuses an image that is no card: one on which the recorder finds no file system that it can use is only taken where
+/// nothing at all is in it, because such a card may be formatted by command. Gives what there is to say of an empty one.
+pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
+    let context = || format!("{}: cannot be read", path.display());
+    let bytes = length(file).with_context(context)?;
     if bytes < SIZE_MIB_MIN << 20 {
+        bail!(
+            "{}: is no image of an SD card: it has {bytes} bytes, and a FAT32 card has {SIZE_MIB_MIN} MiB at least; name an \
+             image of a card, or a new file, which is made as one",
+            path.display()
+        );
+    }
+    let why = match Layout::read(&ReadOnlyImage::new(file.try_clone()?)?) {
+        Ok(_) => return Ok(None),
+        Err(LayoutError::Device(error)) => return Err(error).with_context(context),
+        Err(why) => why,
+    };
+    // A partition table alone, as a card may have it whose partition nobody has formatted, is nothing to lose.
+    let from = if matches!(why, LayoutError::NoPartitionTable) { 0 } else { Block::LEN as u64 };
+    if is_zero(file, from).with_context(context)? {
         return Ok(Some(format!(
-            "is no image of an SD card: {bytes} bytes, and a FAT32 card has {SIZE_MIB_MIN} MiB at least; nothing can \
-             be recorded on it"
+            "{why}, so that nothing can be recorded on it before it is formatted; name an image of a card, or a new file, \
+             which is made as one"
         )));
     }
-    let (mut file, mut block) = (file, [0; Block::LEN]);
-    file.seek(SeekFrom::Start(0))?;
-    file.read_exact(&mut block)?;
-    // The signature of a master boot record.
-    Ok((!block.ends_with(&[0x55, 0xaa])).then(|| {
-        "has no partition table (MBR), so that nothing can be recorded on it; name an image of a card, or a new file, \
-         which is made as one"
-            .to_owned()
-    }))
+    bail!(
+        "{}: {why}, so that nothing can be recorded on it, and what is in it stays; name an image of a card, or a new file, \
+         which is made as one (logs may be in it all the same: hums info --salvage)",
+        path.display()
+    )
+}
+
+/// Whether an image has a partition table and a FAT32 volume: nobody writes that table anew.
+pub fn is_card(file: &File) -> io::Result<bool> {
+    Ok(Layout::read(&ReadOnlyImage::new(file.try_clone()?)?).is_ok())
+}
+
+/// Whether a file has nothing but zeros from here on. What a sparse file does not hold is not read.
+fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
+    let mut bytes = vec![0; 1 << 20];
+    loop {
+        let Some(data) = data_from(file, at)? else { return Ok(true) };
+        at = data;
+        file.seek(SeekFrom::Start(at))?;
+        let got = file.read(&mut bytes)?;
+        if got == 0 {
+            return Ok(true);
+        }
+        if bytes.iter().take(got).any(|byte| *byte != 0) {
+            return Ok(false);
+        }
+        at += got as u64;
+    }
+}
+
+/// Where a sparse file holds something from here on; none up to its end.
+#[cfg(target_os = "linux")]
+fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
+    match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(at)) {
+        Ok(data) => Ok(Some(data)),
+        Err(rustix::io::Errno::NXIO) => Ok(None),
+        // A file system that does not know.
+        Err(rustix::io::Errno::INVAL) => Ok(Some(at)),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The same where no system tells.
+#[cfg(not(target_os = "linux"))]
+fn data_from(_: &File, at: u64) -> io::Result<Option<u64>> {
+    Ok(Some(at))
 }
 
 /// Bytes of a file, or of a raw device, whose metadata says 0.

@@ -209,6 +209,9 @@ impl BlockDevice for SimCard {
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
         self.begin(COMMAND_US + BLOCK_US * blocks.len() as u64)?;
         self.check_range(start, blocks.len())?;
+        if self.faults.keeps_table && start.0 == 0 {
+            return Err(CardError::WriteRefused);
+        }
         for (index, block) in (0..).zip(blocks) {
             let before_end = BLOCK_US * (blocks.len() as u64 - u64::from(index));
             self.write_block(&block.contents, start.0 + index, self.clock().saturating_sub(before_end))?;
@@ -298,6 +301,17 @@ mod tests {
         assert_eq!(run(1), run(1));
         assert_ne!(run(1), run(2));
         assert!(run(1).contains(&true) && run(1).contains(&false));
+    }
+
+    #[test]
+    fn a_card_that_keeps_its_table_cannot_be_formatted() {
+        for keeps_table in [true, false] {
+            let image = tempfile::tempfile().expect("temporary file");
+            image.set_len(34 << 20).expect("the smallest card");
+            let card = SimCard::new(image, Faults { keeps_table, ..Faults::default() }).expect("card");
+            assert_eq!(hums_recorder::format::format(&card, 1).is_err(), keeps_table);
+            assert_eq!(card.writes() == 0, keeps_table, "nothing of it was written");
+        }
     }
 
     #[test]

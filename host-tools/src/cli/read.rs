@@ -21,7 +21,7 @@ OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/sess
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
 No input is ever written over. What is there already is left as it is: if it is the same as what would be written, all is
 well; if not, the command fails. With --replace it is replaced, when all of the new one is there, if hums made it of
-the same log and it does not become less.
+the same log, all of it, and it does not become less.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
 /// `hums decode`

@@ -287,7 +287,7 @@ impl Task<'_> {
         }
         let not_checked = writers.checked(summary.last)?;
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
-        let written = writers.finish()?;
+        let written = writers.finish(summary.gaps)?;
         let mut outcome = Outcome::Done;
         let ending =
             log.own().map(|own| Ending { name: log.name.clone(), ..Ending::of(own, summary.clone()) });

@@ -17,7 +17,7 @@ use super::record::gap_row;
 use super::reference::Reference;
 use super::tables::{Tables, UNKNOWN_TABLES_MAX};
 use super::thesis::Thesis;
-use crate::files::{Folder, Kind, Origin, Output, appended, make_parent, settle};
+use crate::files::{Amount, Folder, Kind, Origin, Output, appended, make_parent, settle};
 use crate::logs::reader::Deliver;
 use crate::made;
 use crate::plural::count;
@@ -102,6 +102,8 @@ pub struct Writers<'a> {
     gaps_left_out: u64,
     frames: u64,
     records: u64,
+    /// Of these, what was read: no gaps, and nothing that this program found.
+    entries: u64,
     /// JSON's.
     objects: u64,
     on_board: OnBoard,
@@ -183,6 +185,7 @@ impl<'a> Writers<'a> {
             gaps_left_out: 0,
             frames: 0,
             records: 0,
+            entries: 0,
             objects: 0,
             on_board: OnBoard::default(),
             rows_left_out: 0,
@@ -280,8 +283,9 @@ impl<'a> Writers<'a> {
         self.frames == 0 && self.records == 0
     }
 
-    /// All of the log is there: the files get their names. Says what was written.
-    pub fn finish(mut self) -> Result<Written> {
+    /// All of the log is there, with so many gaps that are damage: the files get their names. Says what was written.
+    pub fn finish(mut self, gaps: u64) -> Result<Written> {
+        let amount = Amount { entries: self.entries, gaps };
         let mut lines = Vec::new();
         let frames = count(self.frames, "frame");
         let rows = if self.frames == 0 {
@@ -292,6 +296,7 @@ impl<'a> Writers<'a> {
         // None gets its name where another one of them is not what is there.
         let influx = self.influx.as_mut().map(|influx| &mut influx.file);
         for file in [&mut self.tlog, &mut self.jsonl, &mut self.gaps].into_iter().flatten().chain(influx) {
+            file.0.set_amount(amount);
             file.0.end()?;
         }
         self.check_earlier_gaps()?;
@@ -311,7 +316,7 @@ impl<'a> Writers<'a> {
         if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
             let tables = count(csv.count() as u64, "table");
             let shared = csv.has_shared();
-            csv.finish()?;
+            csv.finish(amount)?;
             lines.push(format!("{}: {tables}, {rows}", dir.display()));
             if shared {
                 lines.push(format!(
@@ -321,11 +326,11 @@ impl<'a> Writers<'a> {
             }
         }
         if let Some(thesis) = self.thesis.take() {
-            let (dir, seconds) = thesis.finish()?;
+            let (dir, seconds) = thesis.finish(amount)?;
             lines.push(format!("{}: {}", dir.display(), count(seconds, "second")));
         }
         if let Some(parquet) = self.parquet.take() {
-            let (dir, tables) = parquet.finish()?;
+            let (dir, tables) = parquet.finish(amount)?;
             lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
         }
         Ok(Written { lines, rows_left_out: self.rows_left_out, gaps_left_out: self.gaps_left_out })
@@ -374,6 +379,7 @@ impl<'a> Deliver<Collected<'a>> for Writers<'a> {
     }
 
     fn group(&mut self, collected: Collected<'a>) -> Result<()> {
+        self.entries += collected.frames + collected.records;
         self.put(collected)
     }
 }

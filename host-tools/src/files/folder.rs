@@ -5,7 +5,7 @@
 //! what would be written, file by file; only with `--replace` is it replaced, and only where nothing lies in it but
 //! what its stamp names.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 
+use super::amount::{Amount, Content};
 use super::inputs::Inputs;
 use super::part::{free_part, lock, lock_folder_of, sync_folder_of};
 use super::paths::{cannot_write, make_parent, settle, target_of};
@@ -32,6 +33,8 @@ pub struct Folder {
     /// As the user named it.
     path: PathBuf,
     made_of: String,
+    /// How much of it is in the files.
+    amount: Option<Amount>,
     /// The files so far, and how many bytes each has.
     files: Mutex<BTreeMap<String, Arc<AtomicU64>>>,
     to: To,
@@ -84,7 +87,8 @@ impl Folder {
         } else {
             To::There
         };
-        Ok(Self { path: path.to_owned(), made_of: made_of.to_owned(), files: Mutex::default(), to })
+        let (path, made_of) = (path.to_owned(), made_of.to_owned());
+        Ok(Self { path, made_of, amount: None, files: Mutex::default(), to })
     }
 
     /// Whether nothing is there, or an empty folder.
@@ -104,6 +108,11 @@ impl Folder {
     /// The folder's path, as the user named it.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// How much of its log is in it, before it gets its name: it takes the place of no folder that has more.
+    pub fn set_amount(&mut self, amount: Amount) {
+        self.amount = Some(amount);
     }
 
     /// A new file in it.
@@ -149,7 +158,8 @@ impl Folder {
         match self.to {
             To::There => is_all_there(&self.path, &files),
             To::Part(mut part) => {
-                let stamp = Stamp { made_of: self.made_of, files: files.into_keys().collect() };
+                let (made_of, amount) = (self.made_of, self.amount);
+                let stamp = Stamp { made_of, amount, files: files.into_keys().collect() };
                 part.finish(&self.path, &stamp)
             }
         }
@@ -188,15 +198,12 @@ impl Part {
         // Again: somebody may have put something there meanwhile.
         if self.replaces {
             check_ours(path)?;
-            let bytes = |folder: &Path, files: &BTreeSet<String>| -> u64 {
+            let content = |folder: &Path, stamp: &Stamp| {
                 let length = |name| fs::metadata(folder.join(name)).map_or(0, |about| about.len());
-                files.iter().map(length).sum()
+                Content { amount: stamp.amount, bytes: stamp.files.iter().map(length).sum() }
             };
-            let there = bytes(path, &Stamp::of(path).unwrap_or_default().files);
-            let new = bytes(&self.path, &stamp.files);
-            if new < there {
-                return Err(Differs::less(path, there, new).into());
-            }
+            let there = content(path, &Stamp::of(path).unwrap_or_default());
+            content(&self.path, stamp).check_replaces(there, path)?;
         } else if !Folder::is_free(path) {
             return Err(Differs::new(path).into());
         }

@@ -1,9 +1,11 @@
 //! What a command makes, told by its content: `--replace` replaces nothing else, and of that nothing that may be an
-//! original.
+//! original, or has something behind it.
 
 use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::{self, Read as _, Seek as _};
 use std::path::Path;
+
+use super::amount::Amount;
 
 /// How much of a file is looked at.
 const LOOK_BYTES: u64 = 64 * 1024;
@@ -24,8 +26,15 @@ pub struct Kind {
 pub enum Origin {
     /// Nothing else makes such files, and nothing original is in them.
     Ours,
-    /// Its beginning tells of which log it was made (`s1a2b3c4d`); `None`: of nobody knows what.
-    Told(fn(&[u8]) -> Option<String>),
+    /// Its content tells.
+    Told {
+        /// Of which log (`s1a2b3c4d`), by its beginning; `None`: of nobody knows what.
+        of: fn(&[u8]) -> Option<String>,
+        /// Whether all of the file was made of that one, to its end.
+        all: fn(File, &str) -> io::Result<bool>,
+        /// How much of it is in the file, where its beginning tells that.
+        amount: fn(&[u8]) -> Option<Amount>,
+    },
     /// Its content does not tell: others make such files too.
     Unknown,
 }
@@ -33,8 +42,8 @@ pub enum Origin {
 /// What a file that is there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// It was made of the same log.
-    Same,
+    /// It was made of the same log, and has so much of it, where that is known.
+    Same(Option<Amount>),
     /// Of that kind, and perhaps an original, or made of another log.
     Kind,
     /// Anything else.
@@ -42,21 +51,31 @@ pub(super) enum Found {
 }
 
 impl Kind {
-    /// What the file at `path` is, where this kind is to be made of the log `of`. A file whose name tells the log was made
-    /// of it: nothing but this program names files so.
+    /// What the file at `path`, which is no link, is where this kind is to be made of the log `of`. A file whose name tells
+    /// the log was made of it: nothing but this program names files so.
     pub(super) fn found(&self, path: &Path, of: Option<&str>) -> io::Result<Found> {
+        let mut file = File::open(path)?;
         let mut start = Vec::new();
-        File::open(path)?.take(LOOK_BYTES).read_to_end(&mut start)?;
+        file.by_ref().take(LOOK_BYTES).read_to_end(&mut start)?;
         if !(self.is)(&start) {
             return Ok(Found::Other);
         }
-        let same = match self.origin {
-            Origin::Ours => true,
-            _ if of.is_some_and(|of| is_named_after(path, of)) => true,
-            Origin::Told(told) => of.is_some() && told(&start).as_deref() == of,
-            Origin::Unknown => false,
-        };
-        Ok(if same { Found::Same } else { Found::Kind })
+        let is_named = of.is_some_and(|of| is_named_after(path, of));
+        Ok(match self.origin {
+            Origin::Ours => Found::Same(None),
+            Origin::Told { of: told, all, amount } => {
+                let told = told(&start);
+                let is_same = is_named || of.is_some() && told.as_deref() == of;
+                file.rewind()?;
+                if is_same && all(file, &told.unwrap_or_default())? {
+                    Found::Same(amount(&start))
+                } else {
+                    Found::Kind
+                }
+            }
+            Origin::Unknown if is_named => Found::Same(None),
+            Origin::Unknown => Found::Kind,
+        })
     }
 }
 

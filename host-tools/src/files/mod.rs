@@ -7,6 +7,7 @@
 //! Two kinds of files are updated in place by design and are not made here: a simulated card's image (`--sd`) and the
 //! simulated board's flash (`--store`). A test in `host-tools/tests/cli/inputs.rs` holds every other file to this module.
 
+mod amount;
 mod ends;
 mod folder;
 mod identity;
@@ -18,6 +19,7 @@ mod paths;
 mod stamp;
 mod there;
 
+pub use amount::Amount;
 pub use ends::{add_ends, digest, short};
 pub use folder::{Folder, FolderFile, buffered};
 pub use identity::{FileId, check_standard_output, check_standard_output_is_open, means_standard_output};

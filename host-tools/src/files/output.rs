@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
+use super::amount::{Amount, Content};
 use super::identity::{
     check_standard_output, check_standard_output_is_open, descriptor, is_standard_output,
     means_standard_output, refuse_overwriting,
@@ -57,8 +58,10 @@ struct Part {
     permissions: Option<Permissions>,
     /// It may replace a file that is its own beginning: nothing of that is lost.
     replaces_beginning: bool,
-    /// It replaces no file that is longer.
-    keeps_longer: bool,
+    /// What is in the file that it replaces; none where that may become less.
+    there: Option<Content>,
+    /// How much is in it.
+    amount: Option<Amount>,
     /// An earlier run may have begun it: it stays when it is dropped.
     resumed: bool,
 }
@@ -116,7 +119,7 @@ impl Output {
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
         check(path, &about)?;
-        let is_kind = || -> io::Result<bool> { Ok(kind.found(path, None)? != Found::Other) };
+        let is_kind = || -> io::Result<bool> { Ok(!matches!(kind.found(path, None)?, Found::Other)) };
         if about.is_file() && (about.len() == 0 || is_kind().with_context(|| cannot_write(path))?) {
             return Ok(());
         }
@@ -142,7 +145,8 @@ impl Output {
             target,
             permissions: None,
             replaces_beginning: true,
-            keeps_longer: false,
+            there: None,
+            amount: None,
             resumed: true,
         };
         if fs::symlink_metadata(&part.path).is_ok_and(|about| !about.is_file()) {
@@ -230,6 +234,13 @@ impl Output {
     /// Where the bytes are until the file is whole.
     pub fn part(&self) -> &Path {
         self.part.as_ref().map_or(&self.path, |part| &part.path)
+    }
+
+    /// How much of its log is in it, before it gets its name: it takes the place of no file that has more.
+    pub fn set_amount(&mut self, amount: Amount) {
+        if let Some(part) = &mut self.part {
+            part.amount = Some(amount);
+        }
     }
 
     /// Whether it goes into a pipe or a device, or into what somebody opened for us: nothing has a place beside it.
@@ -324,15 +335,14 @@ impl Part {
     fn of(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Place> {
         inputs.refuse(path)?;
         let target = target_of(path)?;
-        // A table beside a file is shorter where that has become whole.
-        let keeps_longer = !matches!(kind.origin, Origin::Ours);
-        let part = |target: PathBuf, permissions, replaces_beginning| -> Result<Place> {
-            let (path, resumed) = (PathBuf::new(), false);
-            Ok(Place::Free(Self { path, target, permissions, replaces_beginning, keeps_longer, resumed }))
+        let part = |target: PathBuf, permissions, replaces_beginning, there| -> Result<Place> {
+            let (path, amount, resumed) = (PathBuf::new(), None, false);
+            Ok(Place::Free(Self { path, target, permissions, replaces_beginning, there, amount, resumed }))
         };
+        let mut there = None;
         let about = match fs::metadata(path) {
             Ok(about) => about,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(target, None, false),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(target, None, false, None),
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
         check(path, &about)?;
@@ -343,23 +353,33 @@ impl Part {
             if !inputs.may_replace(path) {
                 return Ok(Place::Taken);
             }
-            if check_kind(path, kind, of)? == Found::Kind {
-                return part(target, None, true);
+            // By what a link leads to: the link may have another file's name.
+            match check_kind(path, &target, kind, of)? {
+                Found::Same(amount) => there = Some(Content { amount, bytes: about.len() }),
+                Found::Kind | Found::Other => return part(target, None, true, None),
             }
+            // A table beside a file is shorter where that has become whole.
+            there = there.filter(|_| !matches!(kind.origin, Origin::Ours));
         }
         if about.permissions().readonly() {
             bail!("{}: is read-only; make it writable or name another output", path.display());
         }
-        part(target, Some(about.permissions()), false)
+        part(target, Some(about.permissions()), false, there)
     }
 
     /// Gives it its name.
     fn place(&self, file: &File) -> io::Result<()> {
         if let Some(permissions) = &self.permissions {
-            let there = fs::metadata(&self.target).map_or(0, |about| about.len());
-            let new = file.metadata()?.len();
-            if self.keeps_longer && new < there {
-                return Err(io::Error::other(Differs::less(&self.target, there, new)));
+            if let Some(there) = self.there {
+                // Somebody may have written to it meanwhile.
+                let there = Content { bytes: fs::metadata(&self.target)?.len(), ..there };
+                let new = Content { amount: self.amount, bytes: file.metadata()?.len() };
+                if let Err(less) = new.check_replaces(there, &self.target) {
+                    return match likeness(&self.target, &self.path)? {
+                        Likeness::Equal => fs::remove_file(&self.path),
+                        Likeness::Beginning | Likeness::Other => Err(io::Error::other(less)),
+                    };
+                }
             }
             file.set_permissions(permissions.clone())?;
             return fs::rename(&self.path, &self.target);
@@ -404,9 +424,9 @@ fn check(path: &Path, about: &Metadata) -> Result<()> {
 }
 
 /// What is replaced is of the kind that the command makes: a slip of the finger is not enough to lose a card's image.
-fn check_kind(path: &Path, kind: &Kind, of: Option<&str>) -> Result<Found> {
-    let found = kind.found(path, of).with_context(|| format!("{}: cannot be read", path.display()))?;
-    if found != Found::Other {
+fn check_kind(path: &Path, target: &Path, kind: &Kind, of: Option<&str>) -> Result<Found> {
+    let found = kind.found(target, of).with_context(|| format!("{}: cannot be read", path.display()))?;
+    if !matches!(found, Found::Other) {
         return Ok(found);
     }
     bail!(

@@ -97,7 +97,7 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
         let entry = entry.with_context(context)?;
         let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
         if is_part(&path) {
-            found.remark(format!(
+            found.pass_over(format!(
                 "{}: has the name of what a run of hums has not ended, and is passed over; to read it, rename it",
                 path.display()
             ));
@@ -106,7 +106,7 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
         } else if kind.is_file() {
             entries.file(path, found);
         } else {
-            found.remark(passed_over(&path, kind));
+            found.pass_over(passed_over(&path, kind));
         }
     }
     Ok(entries)

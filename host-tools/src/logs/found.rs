@@ -29,6 +29,8 @@ pub struct Found {
     pub(super) logs_more: u64,
     /// Files or folders were not looked into, because there were too many.
     left_out: bool,
+    /// Something in a folder was not read for what it is: a link, a pipe, or what is not whole yet.
+    passed_over: bool,
     /// Files that were looked at, by device and number: one that has two names is one log.
     seen: BTreeSet<FileId>,
 }
@@ -41,6 +43,12 @@ impl Found {
         } else {
             self.remarks_more += 1;
         }
+    }
+
+    /// Something in a folder is not read for what it is; a log may be behind it.
+    pub(super) fn pass_over(&mut self, sentence: String) {
+        self.passed_over = true;
+        self.remark(sentence);
     }
 
     /// Something was left out for want of room, and may hold a log.
@@ -85,6 +93,11 @@ impl Found {
         if self.remarks_more > 0 {
             self.remarks.push(format!("and {} more were passed over", self.remarks_more));
         }
+    }
+
+    /// Whether something that may be a log was not read for what it is: no damage, and not all there is.
+    pub fn has_passed_over(&self) -> bool {
+        self.passed_over
     }
 
     /// Whether logs were left out, or what may hold one.

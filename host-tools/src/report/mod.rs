@@ -26,7 +26,7 @@ use anyhow::{Result, bail};
 use crate::check;
 use crate::cli;
 use crate::decode::naming::{Named, Names, Traits, without_made};
-use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
+use crate::files::{Amount, Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{Followed, HELD_MAX};
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
@@ -135,17 +135,21 @@ fn make(
     of: Option<&str>,
     inputs: &Inputs,
 ) -> Result<()> {
-    let html = page::html(overview, &replay::Replay::of(place)?, trend, of)?;
-    write(path, &html, inputs, of)?;
+    let contents = &overview.contents;
+    let gaps = overview.ending.summary.gaps;
+    let amount = Amount { entries: contents.frames() + contents.records, gaps };
+    let html = page::html(overview, &replay::Replay::of(place)?, trend, of, amount)?;
+    write(path, &html, inputs, of, amount)?;
     let bytes = count(html.len() as u64, "byte");
     output::line(&format!("{}: session {}, {bytes}", shown(path), word(&place.name)))
 }
 
-fn write(path: &Path, html: &str, inputs: &Inputs, of: Option<&str>) -> Result<()> {
+fn write(path: &Path, html: &str, inputs: &Inputs, of: Option<&str>, amount: Amount) -> Result<()> {
     inputs.refuse(path)?;
     make_parent(path)?;
     let mut file = Output::create(path, inputs, &made::PAGE, of)?;
     settle(file.write_all(html.as_bytes()), path)?;
+    file.set_amount(amount);
     file.finish()
 }
 

@@ -14,6 +14,7 @@ use super::plots::{About, Plot, about};
 use super::program::program;
 use super::replay::{Point, Replay, Said};
 use super::trend::Trend;
+use crate::files::Amount;
 use crate::info::json::LogJson;
 use crate::series::{GridJson, SeriesJson};
 use crate::summary::Overview;
@@ -92,8 +93,14 @@ impl From<&Stats> for StatsJson {
     }
 }
 
-/// A session's page; `of` is what its name ends with: `s1a2b3c4d`.
-pub fn html(log: &Overview, replay: &Replay, trend: &Trend, of: Option<&str>) -> Result<String> {
+/// A session's page; `of` is what its name ends with: `s1a2b3c4d`. `amount` is what of its log is on it.
+pub fn html(
+    log: &Overview,
+    replay: &Replay,
+    trend: &Trend,
+    of: Option<&str>,
+    amount: Amount,
+) -> Result<String> {
     let data = Data {
         version: env!("CARGO_PKG_VERSION"),
         log: LogJson::new(log),
@@ -119,6 +126,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, of: Option<&str>) ->
     for (mark, text) in [
         ("{{scripts}}", hashes.join(" ").as_str()),
         ("{{log}}", of.unwrap_or("unknown")),
+        ("{{amount}}", amount.to_string().as_str()),
         ("{{style}}", [UPLOT_STYLE, STYLE].concat().as_str()),
         ("{{uplot}}", UPLOT),
         ("{{program}}", program.as_str()),
@@ -175,7 +183,9 @@ mod tests {
     #[test]
     fn each_mark_of_the_template_stands_once() {
         let program = program();
-        for mark in ["{{scripts}}", "{{log}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"] {
+        for mark in
+            ["{{scripts}}", "{{log}}", "{{amount}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"]
+        {
             assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
             assert!(!UPLOT.contains(mark) && !program.contains(mark) && !STYLE.contains(mark), "{mark}");
         }

@@ -7,8 +7,10 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::cli::Run;
-use crate::files::{Inputs, Output, settle};
+use crate::files::{Inputs, Output};
 use crate::made;
+use crate::outcome::Outcome;
+use crate::sink::{Beside, nowhere};
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
 
@@ -20,7 +22,7 @@ pub struct Arrivals {
     source: Noisy<Box<dyn Source>>,
     name: String,
     waiting: VecDeque<Chunk>,
-    tap: Option<Output>,
+    tap: Beside,
     bytes: u64,
     /// To the autopilot, where there is a live one.
     autopilot: Option<Box<dyn Write + Send>>,
@@ -48,7 +50,7 @@ impl Arrivals {
             source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
             name: run.input.to_string(),
             waiting: VecDeque::new(),
-            tap: tap.map(|(path, inputs)| Output::create(path, inputs, &made::RAW, None)).transpose()?,
+            tap: tap.map_or_else(|| Ok(Beside::nowhere()), |(path, inputs)| tap_of(path, inputs))?,
             bytes: 0,
             autopilot,
         })
@@ -62,9 +64,7 @@ impl Arrivals {
         let context = || format!("{}: cannot be read", self.name);
         let Some(chunk) = self.source.next().with_context(context)? else { return Ok(None) };
         self.bytes += chunk.bytes.len() as u64;
-        if let Some(tap) = &mut self.tap {
-            settle(tap.write_all(&chunk.bytes), tap.path()).context("--tap")?;
-        }
+        self.tap.write_all(&chunk.bytes)?;
         if chunk.bytes.len() <= CHUNK_BYTES_MAX {
             return Ok(Some(chunk));
         }
@@ -73,9 +73,9 @@ impl Arrivals {
         Ok(self.waiting.pop_front())
     }
 
-    /// The run is over: the copy of the bytes is whole.
-    pub fn finish(&mut self) -> Result<()> {
-        self.tap.as_mut().map_or(Ok(()), Output::finish).context("--tap")
+    /// The run is over: the copy of the bytes is whole, unless something failed, which was said.
+    pub fn finish(&self) -> Outcome {
+        self.tap.finish()
     }
 
     /// The machine did not take this one: its power went before.
@@ -85,7 +85,7 @@ impl Arrivals {
 
     /// The way to the autopilot, once; nobody hears what is sent to a recording.
     pub fn take_autopilot(&mut self) -> Box<dyn Write + Send> {
-        self.autopilot.take().unwrap_or_else(crate::sink::nowhere)
+        self.autopilot.take().unwrap_or_else(nowhere)
     }
 
     /// Bytes that have arrived.
@@ -97,4 +97,9 @@ impl Arrivals {
     pub fn remark(&self) -> Option<String> {
         self.source.remark().map(|remark| format!("{}: {remark}", self.name))
     }
+}
+
+/// A file for a copy of the bytes, which is none of the inputs.
+fn tap_of(path: &Path, inputs: &Inputs) -> Result<Beside> {
+    Ok(Beside::file("--tap", Output::create(path, inputs, &made::RAW, None)?))
 }

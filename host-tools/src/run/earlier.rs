@@ -10,7 +10,7 @@ use hums_recorder::recorder::SEGMENT_BYTES_MAX;
 
 use crate::cli;
 use crate::logs::sessions::first_session;
-use crate::logs::{self, Log, Room};
+use crate::logs::{self, Log, Room, segment_name};
 use crate::outcome::usage;
 
 /// The recorder makes a segment as long as this part of a card at most, so that a small card holds several.
@@ -47,11 +47,12 @@ pub struct EarlierSessions {
 impl EarlierSessions {
     /// Looks at a card. A usage error where a session would have to be overwritten for the run to begin.
     pub fn of(run: &cli::Run, params: &[(&ParamSpec, f32)]) -> Result<Self> {
-        let sessions: Vec<Session> = logs::on_card(&run.sd).iter().map(Session::of).collect();
+        let logs = logs::on_card(&run.sd);
+        let sessions: Vec<Session> = logs.iter().map(Session::of).collect();
         let by_arming = params.iter().any(|(spec, value)| spec.name == BY_ARMING && *value > 0.0);
         // What a store holds is known once it runs; what is overwritten then is said in the end.
         let is_known = !by_arming && run.store.is_none() && !run.overwrite_oldest;
-        if let Some(oldest) = sessions.first().filter(|_| is_known && !has_room(&run.sd)) {
+        if let Some(oldest) = oldest(&logs).filter(|_| is_known && !has_room(&run.sd)) {
             return Err(usage(format!(
                 "{}: the card is full, and the run would overwrite its oldest session ({}); name another image, or say \
                  --overwrite-oldest",
@@ -86,8 +87,40 @@ impl EarlierSessions {
     }
 }
 
+/// The session that a recorder without room overwrites. It knows the root directory only: what lies in folders are copies that
+/// somebody made.
+fn oldest(logs: &[Log]) -> Option<&Log> {
+    let is_segment = |file: &String| !file.contains('/') && segment_name(Path::new(file)).is_some();
+    logs.iter().find(|log| log.files.iter().any(is_segment))
+}
+
 /// Whether a card has room for a segment. One that cannot be read has no session to lose.
 fn has_room(card: &Path) -> bool {
     logs::room(card)
         .is_none_or(|Room { free, all }| free >= (all / SEGMENTS_MIN).min(u64::from(SEGMENT_BYTES_MAX)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_in_folders_of_a_card_is_not_what_a_recorder_overwrites() {
+        let log = |name: &str, files: &[&str]| Log {
+            name: name.to_owned(),
+            files: files.iter().map(|file| (*file).to_owned()).collect(),
+            pieces: Vec::new(),
+            session: None,
+            left_over: false,
+        };
+        let mut logs = vec![
+            log("00001", &["BACKUP/00001_00.HUM"]),
+            log("00014", &["BACKUP/00014_00.HUM", "00014_00.HUM"]),
+            log("00015", &["00015_00.HUM"]),
+            log("COPY_HUM", &["COPY.HUM"]),
+        ];
+        assert_eq!(oldest(&logs).map(|log| log.name.as_str()), Some("00014"));
+        logs.drain(1..3);
+        assert!(oldest(&logs).is_none());
+    }
 }

@@ -8,7 +8,8 @@ use anyhow::{Context, Result};
 use super::arrivals::CHUNK_BYTES_MAX;
 use crate::cli::Run;
 use crate::files::Inputs;
-use crate::sink::{self, Heard, SinkFile};
+use crate::outcome::Outcome;
+use crate::sink::{self, Beside, Heard};
 use crate::source::{self, Chunk, Source, Timing};
 
 /// What the ground station sends.
@@ -16,27 +17,24 @@ pub struct Ground {
     heard: Heard,
     stored: Option<Box<dyn Source>>,
     next: Option<Chunk>,
-    file: Option<SinkFile>,
+    got: Beside,
 }
 
 /// Opens both directions as the command line says it. What is written is none of the inputs.
 pub fn open(run: &Run, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
-    let (writer, heard, file) = match &run.gs {
-        Some(endpoint) => {
-            let ground = sink::open(endpoint, inputs)?;
-            (ground.writer, ground.heard, ground.file)
-        }
-        None => (sink::nowhere(), Heard::nobody(), None),
+    let sink::Ground { writer, heard } = match &run.gs {
+        Some(endpoint) => sink::open(endpoint, inputs)?,
+        None => sink::Ground { writer: Beside::nowhere(), heard: Heard::nobody() },
     };
     let timing = Timing { line_rate: None };
     let stored = run.gs_input.as_ref().map(|input| source::open(input, timing)).transpose()?;
-    Ok((Ground { heard, stored, next: None, file }, writer))
+    Ok((Ground { heard, stored, next: None, got: writer.clone() }, Box::new(writer)))
 }
 
 impl Ground {
-    /// The run is over: a file of what it got is whole.
-    pub fn finish(&self) -> Result<()> {
-        self.file.as_ref().map_or(Ok(()), SinkFile::finish)
+    /// The run is over: a file of what it got is whole, unless something failed, which was said.
+    pub fn finish(&self) -> Outcome {
+        self.got.finish()
     }
 
     /// What it sent by `now_us`, the oldest first; `None` when that is all.

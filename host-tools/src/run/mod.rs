@@ -122,11 +122,9 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
             anyhow::anyhow!("{}: {why}", context())
         })
     })?;
-    // What a recorder does with such a card is worth a run, too.
-    if let Some(trouble) =
-        image::trouble(&file).with_context(|| format!("{}: cannot be read", path.display()))?
-    {
-        note!("{}: {trouble}", path.display());
+    // What a recorder does with an empty card is worth a run, too.
+    if let Some(words) = image::check(&file, path)? {
+        note!("{}: {words}", path.display());
     }
     Ok(file)
 }

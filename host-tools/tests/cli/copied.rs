@@ -123,6 +123,19 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
 }
 
 #[test]
+fn not_everything_holds_where_something_was_passed_over() {
+    let dir = copied(2, "");
+    let verdict = || {
+        let said = text(&run(dir.path(), "verify copied", 0));
+        said.lines().last().expect("a verdict").to_owned()
+    };
+    assert_eq!(verdict(), "2 sessions: everything holds");
+    let link = dir.path().join("copied/00003_00.HUM");
+    std::os::unix::fs::symlink("nowhere", &link).expect("a link");
+    assert_eq!(verdict(), "2 sessions: all that was read holds; what was passed over was not read");
+}
+
+#[test]
 fn files_that_are_named_one_by_one_are_judged_as_their_folder_is() {
     let dir = copied(3, "");
     let at = |name: &str| dir.path().join("copied").join(name);

@@ -53,10 +53,54 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     let said = run(dir.path(), "sim --input PX4 --sd card.img", 3);
     let said = String::from_utf8_lossy(&said.stderr);
     assert!(
-        said.contains("card.img: has no partition table (MBR), so that nothing can be recorded on it"),
+        said.contains("the card has no partition table (MBR), so that nothing can be recorded on it"),
         "{said}"
     );
     assert!(said.contains("name an image of a card, or a new file"), "{said}");
+}
+
+#[test]
+fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = |name: &str| dir.path().join(name);
+    run(dir.path(), "sim --input PX4 --sd card.img --card-size 34", 0);
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    let [tlog, log] = [px4(), at("log.hum")].map(|path| fs::read(path).expect("a recording"));
+    let card = fs::read(at("card.img")).expect("an image");
+    let mut damaged = card.clone();
+    let volume = 2048 * 512;
+    damaged[volume..volume + 512].fill(0x5a);
+    let mut exfat = card[..512].to_vec();
+    exfat[450] = 7;
+    let mut used = exfat.clone();
+    used.resize(1 << 20, 0);
+    used.extend_from_slice(b"somebody's files");
+    for (name, bytes, why) in [
+        ("flight.tlog", tlog.as_slice(), "has no partition table"),
+        ("joined.hum", &log, "has no partition table"),
+        ("damaged.img", &damaged, "volume is damaged"),
+        ("exfat.img", &used, "is of type 0x07, not FAT32"),
+    ] {
+        // As long as the smallest card, so that it could be formatted.
+        fs::write(at(name), bytes).expect("written");
+        fs::File::options().write(true).open(at(name)).and_then(|file| file.set_len(40 << 20)).expect("room");
+        let before = fs::read(at(name)).expect("there");
+        let said = run(dir.path(), &format!("sim --input PX4 --sd {name}"), 1);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(said.contains(why) && said.contains("what is in it stays; name an image"), "{name}: {said}");
+        assert!(fs::read(at(name)).expect("there") == before, "{name}");
+    }
+    fs::write(at("few.tlog"), &tlog[..4000]).expect("written");
+    let said = run(dir.path(), "sim --input PX4 --sd few.tlog", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("is no image of an SD card"));
+    // A card on which there is nothing but a table may be formatted by command, and is told.
+    fs::write(at("new.img"), &exfat).expect("written");
+    fs::File::options()
+        .write(true)
+        .open(at("new.img"))
+        .and_then(|file| file.set_len(40 << 20))
+        .expect("room");
+    run(dir.path(), "sim --input PX4 --sd new.img", 3);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::support::{attempt, contents, flight, frames_of, hums, named, px4, run, until};
+use crate::support::{attempt, contents, flight, frames_of, hums, json, named, px4, run, until};
 
 /// Files and folders that are not whole.
 fn parts(dir: &Path) -> Vec<String> {
@@ -55,7 +55,30 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
             assert_eq!(left, Vec::new(), "{line}");
         }
     }
-    run(dir.path(), "sim --input PX4 --sd card.img --gs /dev/full", 1);
+}
+
+#[test]
+fn what_is_written_beside_a_recording_may_fail_and_the_recording_goes_on() {
+    let dir = tempfile::tempdir().expect("directory");
+    let frames =
+        |image: &str| json(&run(dir.path(), &format!("info {image} --json"), 0))["logs"][0]["frames"].clone();
+    let said = run(dir.path(), "sim --input PX4 --sd full.img --gs /dev/full --tap /dev/full", 3);
+    let said = String::from_utf8_lossy(&said.stderr);
+    for flag in ["--gs", "--tap"] {
+        let words = format!("{flag}: /dev/full: cannot be written");
+        assert_eq!(said.matches(&words).count(), 1, "{said}");
+    }
+    assert_eq!(frames("full.img"), 16_645);
+    // Whoever read it has gone.
+    let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"));
+    sim.args(["sim", "--sd", "pipe.img", "--gs", "-", "--input"]).arg(px4()).current_dir(dir.path());
+    let mut sim = sim.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+    drop(sim.stdout.take());
+    let ended = sim.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(3), "{said}");
+    assert!(said.contains("--gs: cannot be written: standard output was closed"), "{said}");
+    assert_eq!(frames("pipe.img"), 16_645);
 }
 
 #[test]

@@ -234,6 +234,96 @@ fn what_was_made_of_the_same_log_is_replaced_and_what_was_made_of_another_one_is
 }
 
 #[test]
+fn what_stands_in_a_file_beside_what_was_made_of_the_log_is_not_replaced() {
+    let dir = tempfile::tempdir().expect("directory");
+    let at = |name: &str| dir.path().join(name);
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    run(dir.path(), &format!("pack {} -o other.hum", flight("ap_quad_guided.tlog").display()), 0);
+    for log in ["log", "other"] {
+        run(dir.path(), &format!("decode {log}.hum -o {log}.lp --format influx --message HEARTBEAT"), 0);
+    }
+    run(dir.path(), "report log.hum -o log.html --replace", 0);
+    let read = |name: &str| fs::read(at(name)).expect("there");
+    let (points, others) = (read("log.lp"), read("other.lp"));
+    let log = &read("log.hum")[..60 * 512];
+    let page = read("log.html");
+    let kept = |line: &str, there: &[u8]| {
+        fs::write(at("out"), there).expect("written");
+        let said = run(dir.path(), &format!("{line} -o out --replace"), 1);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(said.contains("may be an original"), "{line}: {said}");
+        assert!(read("out") == there, "{line}");
+    };
+    let influx = "decode log.hum --format influx";
+    kept(influx, &[points.as_slice(), &others].concat());
+    kept(influx, &[points.as_slice(), b"# what I found\n"].concat());
+    kept(influx, &points[..points.len() - 1]);
+    for behind in [&read("other.hum")[..10 * 512], b"mine"] {
+        kept("pack PX4", &[log, behind].concat());
+    }
+    kept("report log.hum", &[page.as_slice(), b"<p>bent arm"].concat());
+    // Without that it is replaced.
+    for (line, there) in [(influx, points.as_slice()), ("pack PX4", log), ("report log.hum", &page)] {
+        fs::write(at("out"), there).expect("written");
+        run(dir.path(), &format!("{line} -o out --replace"), 0);
+    }
+    // A link that has the name of the log's file leads to another one.
+    run(dir.path(), "decode log.hum -o made/ --format tlog", 0);
+    let name = format!("{}.tlog", named(&at("made"), "log"));
+    let original = fs::read(flight("ap_quad_guided.tlog")).expect("a recording");
+    fs::write(at("original.tlog"), &original[..50_000]).expect("written");
+    fs::remove_file(at("made").join(&name)).expect("removed");
+    std::os::unix::fs::symlink("../original.tlog", at("made").join(&name)).expect("a link");
+    let said = run(dir.path(), "decode log.hum -o made/ --format tlog --replace", 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("may be an original"));
+    assert!(read("original.tlog") == original[..50_000]);
+}
+
+#[test]
+fn a_damaged_copy_takes_the_place_of_nothing_and_the_sound_log_that_of_a_damaged_copy() {
+    let dir = tempfile::tempdir().expect("directory");
+    let out = dir.path().join("out");
+    for folder in ["whole", "damaged"] {
+        fs::create_dir(dir.path().join(folder)).expect("a directory");
+    }
+    run(dir.path(), "pack PX4 -o whole/log.hum", 0);
+    let mut log = fs::read(dir.path().join("whole/log.hum")).expect("a log");
+    // Few frames are lost, and a table of gaps comes to the others.
+    log[127 * 512 + 100] ^= 4;
+    fs::write(dir.path().join("damaged/log.hum"), log).expect("written");
+    let formats = "tlog,jsonl,influx,csv,parquet,thesis";
+    let lines = |log: &str| {
+        [format!("decode {log}/log.hum -o out --format {formats}"), format!("report {log}/log.hum -o out/")]
+    };
+    let mut each =
+        formats.split(',').map(|format| format!("decode damaged/log.hum -o out --format {format}"));
+    for line in lines("whole") {
+        run(dir.path(), &line, 0);
+    }
+    let made = contents(&out);
+    for line in each.by_ref().chain(["report damaged/log.hum -o out/".to_owned()]) {
+        let said = run(dir.path(), &format!("{line} --replace"), 1);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(said.contains("does not make it less"), "{line}: {said}");
+        assert!(contents(&out) == made, "{line} changed something");
+    }
+    fs::remove_dir_all(&out).expect("removed");
+    for line in lines("damaged") {
+        run(dir.path(), &line, 3);
+    }
+    // The same again is no less.
+    let damaged = contents(&out);
+    for line in lines("damaged") {
+        run(dir.path(), &format!("{line} --replace"), 3);
+    }
+    assert!(contents(&out) == damaged);
+    for line in lines("whole") {
+        run(dir.path(), &format!("{line} --replace"), 0);
+    }
+    assert!(contents(&out) == made);
+}
+
+#[test]
 fn a_command_with_all_files_of_a_folder_can_be_called_again() {
     let dir = tempfile::tempdir().expect("directory");
     fs::copy(px4(), dir.path().join("flight.tlog")).expect("a copy");

@@ -17,6 +17,7 @@ use super::report::{OnCard, Report};
 use super::{
     arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card, salt, store,
 };
+use crate::card::image::is_card;
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::outcome::{Outcome, usage};
@@ -47,11 +48,16 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run, &inputs)?;
     let seed = salt::salt(run, &mut arrivals)?;
-    let medium = Medium::load(&card).with_context(|| format!("{}: cannot be read", run.sd.display()))?;
+    let unread = || format!("{}: cannot be read", run.sd.display());
+    let (is_card, medium) = (is_card(&card).with_context(unread)?, Medium::load(&card).with_context(unread)?);
+    let table = medium.get(0);
     let mut board =
         Board::new(image, seed, &medium, &flash.bytes(), (gs, arrivals.take_autopilot()), reboots);
     let flown = drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)
         .and_then(|_| board.settle());
+    if is_card && medium.get(0) != table {
+        bail!("{}: was formatted by command in this run, and is left as it was before", run.sd.display());
+    }
     // Also of a run that came to an early end: what a card has it has.
     medium.save(&card).with_context(|| format!("{}: cannot be written", run.sd.display()))?;
     flash.set(board.store());
@@ -59,7 +65,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
         bail!("--store {}: {error}", run.store.as_deref().unwrap_or(Path::new("")).display());
     }
     flown?;
-    ground.finish()?;
+    let beside = ground.finish();
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
     }
@@ -75,7 +81,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");
     }
-    report.print(run.json, run.gs == Some(Endpoint::Standard))
+    Ok(report.print(run.json, run.gs == Some(Endpoint::Standard))?.and(beside))
 }
 
 /// What the ports had, and what of it the card has.
@@ -133,8 +139,8 @@ pub(crate) fn firmware(named: Option<&Path>) -> Result<PathBuf> {
     }
     let Some(tree) = source_tree() else {
         bail!(
-            "no firmware image: this is not inside the source tree of hums. There, type\n  \
-             cargo xtask firmware\nand name what it prints here with --firmware"
+            "no firmware image: this is not inside the source tree of hums. There, type `cargo xtask firmware`, and name \
+             what it prints here with --firmware"
         );
     };
     let built = tree.join(IMAGE);

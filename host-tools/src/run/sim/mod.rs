@@ -28,6 +28,7 @@ use super::ground::{self, Ground};
 use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
 use super::{check_standard_output, drive, pace, params, paths, prepare_card, salt};
+use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::endpoint::Endpoint;
@@ -80,9 +81,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         let store = run.store.as_deref().unwrap_or(Path::new(""));
         bail!("--store {}: {error}", store.display());
     }
-    world.gs.flush().context("--gs: cannot be written")?;
-    ground.finish()?;
-    arrivals.finish()?;
+    let beside = ground.finish().and(arrivals.finish());
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
     }
@@ -90,7 +89,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");
     }
-    report.print(run.json, run.gs == Some(Endpoint::Standard))
+    Ok(report.print(run.json, run.gs == Some(Endpoint::Standard))?.and(beside))
 }
 
 fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
@@ -100,6 +99,7 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
         outs: flags.card_out.clone(),
         write_error: flags.write_error.unwrap_or(0.0),
         seed: flags.seed,
+        keeps_table: is_card(&image)?,
     };
     SimCard::new(image, faults)
 }
