@@ -186,6 +186,24 @@ fn a_log_of_very_many_sessions_takes_little_memory_with_any_command() {
     assert_all_bounded(&hostile::starts(dir.path(), count), empty);
 }
 
+/// The longest file in which lost sectors are made again, 16 MiB, and a longer one.
+#[test]
+fn a_file_of_nothing_but_parity_takes_little_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let empty = empty_run(dir.path());
+    for blocks in [(32 << 10) - 1, 200 << 10] {
+        let log = hostile::parity(dir.path(), blocks);
+        for command in ["info", "verify"] {
+            let words = [command, log.to_str().unwrap()];
+            assert_bounded(
+                &format!("{command} of {blocks} parity sectors"),
+                run(&words).memory_kib_max,
+                empty,
+            );
+        }
+    }
+}
+
 #[test]
 fn cards_full_of_entries_or_sessions_take_little_memory() {
     let dir = tempfile::tempdir().unwrap();

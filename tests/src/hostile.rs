@@ -5,7 +5,8 @@ use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use hums::card::ReadOnlyImage;
-use hums_blackbox::{SECTOR_BYTES, Sector};
+use hums_blackbox::parity::Sum;
+use hums_blackbox::{Header, SECTOR_BYTES, Sector};
 use hums_dialect::crc;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
@@ -41,6 +42,22 @@ pub fn starts(dir: &Path, count: u32) -> PathBuf {
     for session in 0..count {
         sector.seal(1_000_000 + session);
         file.write_all(sector.bytes()).unwrap();
+    }
+    file.flush().unwrap();
+    path
+}
+
+/// A log of ten heartbeats, and behind it so many parity sectors of its session.
+pub fn parity(dir: &Path, count: u32) -> PathBuf {
+    let log = heartbeats(dir, 10);
+    let session = Header::read(fs::read(&log).unwrap().first_chunk().unwrap()).unwrap().session;
+    let path = dir.join("parity.hum");
+    fs::rename(log, &path).unwrap();
+    let mut file = BufWriter::new(File::options().append(true).open(&path).unwrap());
+    for last in 0..count {
+        let mut block = [0; SECTOR_BYTES];
+        Sum::ALL[last as usize % 2].seal(&mut block, session, last / 2);
+        file.write_all(&block).unwrap();
     }
     file.flush().unwrap();
     path

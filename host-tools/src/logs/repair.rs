@@ -3,17 +3,23 @@
 //! The sector with the number `n` lies at block `n - base` of its file, so whoever knows the file's base knows what is lost:
 //! every place that holds another sector, or none. The base is the one that most sound sectors of the file agree on, unless
 //! the file begins with a number that comes after all others in it: then the recorder had just begun to write it anew.
+//!
+//! A file that is longer than any recorder makes one is read as it is: what is kept of a file is bounded by its length.
 
 use std::collections::BTreeMap;
 
 use anyhow::Result;
 use hums_blackbox::Header;
 use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS};
+use hums_recorder::recorder::SEGMENT_BYTES_MAX;
 
 use super::places::{BLOCK_BYTES, Log};
 
 /// Of more lost sectors in a column none is made again.
 const LOST_MAX: usize = 2;
+/// In a longer file nothing is made again: twice the longest that the recorder makes. A hostile one of nothing but parity is held
+/// whole.
+const FILE_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 
 /// What was made again of one file, by its block.
 #[derive(Debug, Default)]
@@ -24,6 +30,9 @@ impl Repairs {
     pub(super) fn of(log: &Log, file: usize, session: Option<u32>) -> Result<Self> {
         let Some(piece) = log.pieces.get(file) else { return Ok(Self::default()) };
         let file = Log { pieces: vec![piece.clone()], ..log.clone() };
+        if file.bytes() > FILE_BYTES_MAX {
+            return Ok(Self::default());
+        }
         let Some(found) = Found::of(&file, session)? else { return Ok(Self::default()) };
         let mut columns = found.columns();
         if columns.is_empty() {
