@@ -14,7 +14,7 @@ use crate::departure::Departure;
 use crate::flight::Flight;
 use crate::heights::{Heights, SCALE_HEIGHT_M};
 use crate::latest::Reading;
-use crate::motion::{climb_mps, ground_speed_mps};
+use crate::motion::{climb_mps, ground_speed_mps, throttle};
 use crate::observation::{Air, Estimator, EstimatorScale, Gnss, Imu, VehicleKind, VibrationScale};
 use crate::steady::{TURNED, hovers};
 use crate::stuck::Stuck;
@@ -44,6 +44,8 @@ const TURNED_RAD: f32 = 0.02;
 /// of its sensors do not change.
 const HANGS_MPS: f32 = 0.3;
 const TREMBLES_RAD: f32 = 0.01;
+/// With less no rotors carry anything.
+const IDLE_THROTTLE: f32 = 0.1;
 /// Vibration comes at 1 Hz or faster; what comes after a longer pause is not of the same hover.
 const VIBRATION_PAUSE: Span = Span::from_secs(3);
 /// Vibration that rises by less did not rise: per axis, and PX4's metric, m/s2.
@@ -278,7 +280,11 @@ impl Crosschecks {
         }
         let step_s = self.stepped_at.map_or(0.0, |at| now.since(at).min(FRESH).as_secs_f32());
         self.stepped_at = Some(now);
-        self.moved.step(now, step_s, vehicle);
+        // What stands does not move, whatever an estimator makes of the touch-down.
+        let idles = throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
+        if !(idles && vehicle.hovers(now) == Some(true) && vehicle.inertial.is_level(now)) {
+            self.moved.step(now, step_s, vehicle);
+        }
         let turns_little = vehicle.inertial.turns_little(now, TURNED);
         let hovers = hovers(now, vehicle, flight);
         let calm = turns_little

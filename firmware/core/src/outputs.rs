@@ -6,8 +6,9 @@
 //! it is 2/3 of the loss at the weak motor, 1/6 at four others and -1/3 at the opposite one. What moves the vehicle's load, tilts it
 //! or turns it changes commands in pairs: as much down on one side as up on the other. What is judged is therefore how far the highest
 //! change is above the second, less how far the others are apart from each other: of four motors all others, of six without the
-//! lowest. It is in percent of what the motors are given on the average, smoothed, and against what was usual in this flight
-//! ([`crate::departure`]), less what commands vary by anyway. (Derived from the geometry of regular frames, for this project.)
+//! lowest. Of six it is half of the loss, and counts twice. It is in percent of what the motors are given on the average, smoothed, and
+//! against what was usual in this flight ([`crate::departure`]), less what commands vary by anyway. (Derived from the geometry of
+//! regular frames, for this project.)
 //!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
@@ -116,9 +117,9 @@ impl MotorOutputs {
         changes.sort_unstable_by(|one, other| other.0.total_cmp(&one.0));
         // Of six the opposite one is lowered.
         let [first, second, .., lowest] = *changes else { return };
-        let lowest = if count == JUDGED_MAX { changes[count - 2] } else { lowest };
+        let (lowest, part) = if count == JUDGED_MAX { (changes[count - 2], 0.5) } else { (lowest, 1.0) };
         let spread = self.share.iter().take(count).map(Departure::spread).sum::<f32>() / count as f32;
-        let stands_out = (first.0 - second.0) - (second.0 - lowest.0) - SPREADS * spread;
+        let stands_out = ((first.0 - second.0) - (second.0 - lowest.0) - SPREADS * spread) / part;
         if !self.is_known() || stands_out < HOLD_PERCENT {
             self.share.iter_mut().for_each(|share| share.learn(step_s));
         }

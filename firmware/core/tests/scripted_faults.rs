@@ -418,3 +418,25 @@ fn a_clock_that_jumps_is_no_fault_and_counts_no_time() {
         assert!((25.0..=30.0).contains(&counted_s), "{}: {counted_s}", counter.name());
     }
 }
+
+#[test]
+fn an_alarm_that_outlives_the_one_that_explained_it_is_told_by_itself_once() {
+    let script = |gnss_until_ms: u64| {
+        move |now_ms: u64, quad: &mut Quad| {
+            quad.gnss.fix = if now_ms < gnss_until_ms { 1 } else { 3 };
+            quad.estimator.velocity = Some(if now_ms < 22_000 { 0.1 } else { 1.5 });
+        }
+    };
+    let of_estimator = |gnss_until_ms| {
+        let findings = fly(script(gnss_until_ms));
+        let end = findings.iter().find(|one| one.check == "gps_fix" && one.level == Level::Ok);
+        let end_ms = end.expect("it comes back").at.as_millis();
+        let mine = findings.iter().filter(|one| one.check == "ekf_variance" && one.level != Level::Ok);
+        (end_ms, mine.map(|one| (one.at.as_millis(), one.because, one.previous)).collect::<Vec<_>>())
+    };
+    let (end_ms, told) = of_estimator(40_000);
+    let [(_, "gps_fix", Level::Ok), (at_ms, "", Level::Warning)] = told[..] else { panic!("{told:?}") };
+    assert!((end_ms + 6_000..end_ms + 17_000).contains(&at_ms), "{at_ms} after {end_ms}");
+    let (_, told) = of_estimator(END_MS);
+    assert_eq!(told.len(), 1, "{told:?}");
+}

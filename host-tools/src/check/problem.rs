@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hums_core::health::{Level, Side, Subsystem, checks};
+use hums_core::health::{Level, Side, Subsystem, because, checks};
 use hums_core::time::{Instant, Span};
 
 use crate::source::told::Finding;
@@ -42,6 +42,8 @@ pub struct Problem {
     pub unit: String,
     /// What it was of, where the check is of several: failsafes, sensors. By their names.
     pub details: Vec<String>,
+    /// The check that explains it: one whose alarm was as bad, each time that it was wrong.
+    pub because: Option<String>,
 }
 
 /// How bad a level is as a problem; stale is not known, and so is none.
@@ -76,8 +78,31 @@ pub(super) struct Problems {
     pub findings: Vec<Finding>,
     /// How many there were.
     pub findings_count: u64,
-    /// By check and part: what was wrong, and since when it is again, with the sum of the gaps until then.
-    open: BTreeMap<(String, u8), (Problem, Option<Since>)>,
+    /// By check and part.
+    open: BTreeMap<(String, u8), Followed>,
+}
+
+/// One check of one part.
+#[derive(Debug)]
+struct Followed {
+    problem: Problem,
+    /// Since when it is wrong again, with the sum of the gaps until then.
+    since: Option<Since>,
+    /// Its level now.
+    level: Level,
+    /// Nothing explains it this time; nothing did at some time.
+    unexplained: bool,
+    alone: bool,
+}
+
+impl Followed {
+    /// It is so no more.
+    fn end(&mut self, at: Instant, gaps: Span) {
+        if let Some(since) = self.since.take() {
+            self.problem.lasted = self.problem.lasted + lasted(since, at, gaps);
+            self.alone |= self.unexplained;
+        }
+    }
 }
 
 impl Problems {
@@ -106,8 +131,17 @@ impl Problems {
             limit: finding.limit,
             unit: finding.unit.clone(),
             details: Vec::new(),
+            because: None,
         };
-        let (problem, since) = self.open.entry(key).or_insert_with(|| (new(), None));
+        let followed = self.open.entry(key).or_insert_with(|| Followed {
+            problem: new(),
+            since: None,
+            level: finding.level,
+            unexplained: true,
+            alone: false,
+        });
+        followed.level = finding.level;
+        let Followed { problem, since, unexplained, .. } = followed;
         if rank(finding.level) > rank(problem.level) {
             (problem.level, problem.at, problem.limit) = (finding.level, finding.at, finding.limit);
         }
@@ -116,32 +150,54 @@ impl Problems {
             if since.is_none() {
                 problem.times += 1;
                 *since = Some((finding.at, gaps));
+                *unexplained = true;
             }
-        } else if let Some(since) = since.take() {
-            problem.lasted = problem.lasted + lasted(since, finding.at, gaps);
+            self.explain();
+        } else {
+            followed.end(finding.at, gaps);
+        }
+    }
+
+    /// Looks for what explains what is wrong now: also what came later, since the consequence may be seen first.
+    fn explain(&mut self) {
+        let alarms: Vec<(String, Level)> = self
+            .open
+            .values()
+            .filter(|followed| followed.since.is_some())
+            .map(|followed| (followed.problem.check.clone(), followed.level))
+            .collect();
+        for followed in
+            self.open.values_mut().filter(|followed| followed.since.is_some() && followed.unexplained)
+        {
+            let alarms = alarms.iter().map(|(check, level)| (check.as_str(), *level));
+            if let Some(cause) = because(&followed.problem.check, followed.level, alarms) {
+                followed.problem.because = Some(cause.to_owned());
+                followed.unexplained = false;
+            }
         }
     }
 
     /// The worst value of a part, where more is known of it than its changes tell.
     pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
-        if let Some((problem, _)) = self.open.get_mut(&(check.to_owned(), instance)) {
+        if let Some(Followed { problem, .. }) = self.open.get_mut(&(check.to_owned(), instance)) {
             problem.value = worse(problem.value, value, check);
         }
     }
 
     /// Whether it is wrong now.
     pub(super) fn is_open(&self, check: &str) -> bool {
-        self.open.get(&(check.to_owned(), 0)).is_some_and(|(_, since)| since.is_some())
+        self.open.get(&(check.to_owned(), 0)).is_some_and(|followed| followed.since.is_some())
     }
 
     /// Since when it is wrong, while it is.
     pub(super) fn open_since(&self, check: &str) -> Option<Instant> {
-        self.open.get(&(check.to_owned(), 0)).and_then(|(_, since)| since.map(|(since, _)| since))
+        self.open.get(&(check.to_owned(), 0)).and_then(|followed| followed.since.map(|(since, _)| since))
     }
 
     /// What a check of several is of, while it is wrong.
     pub(super) fn detail(&mut self, check: &str, name: &str) {
-        let Some((problem, Some(_))) = self.open.get_mut(&(check.to_owned(), 0)) else { return };
+        let known = self.open.get_mut(&(check.to_owned(), 0)).filter(|followed| followed.since.is_some());
+        let Some(Followed { problem, .. }) = known else { return };
         if problem.details.len() < DETAILS_MAX && !problem.details.iter().any(|known| known == name) {
             problem.details.push(name.to_owned());
         }
@@ -157,26 +213,27 @@ impl Problems {
 
     /// What was wrong is so no more: nobody knows how it ended.
     pub(super) fn break_off(&mut self, at: Instant, gaps: Span) {
-        for (problem, since) in self.open.values_mut() {
-            if let Some(since) = since.take() {
-                problem.lasted = problem.lasted + lasted(since, at, gaps);
-            }
-        }
+        self.open.values_mut().for_each(|followed| followed.end(at, gaps));
     }
 
     /// Nothing follows.
     pub(super) fn end(&mut self, at: Instant, gaps: Span) {
-        for (problem, since) in self.open.values_mut() {
-            if let Some(since) = since.take() {
-                problem.lasted = problem.lasted + lasted(since, at, gaps);
-                problem.lasting = true;
-            }
+        for followed in self.open.values_mut() {
+            followed.problem.lasting |= followed.since.is_some();
+            followed.end(at, gaps);
         }
     }
 
     /// What was wrong, worst first, and of the same level what came first.
     pub(super) fn worst_first(self) -> Vec<Problem> {
-        let mut problems: Vec<_> = self.open.into_values().map(|(problem, _)| problem).collect();
+        let mut problems: Vec<_> = self
+            .open
+            .into_values()
+            .map(|Followed { problem, alone, .. }| Problem {
+                because: problem.because.clone().filter(|_| !alone),
+                ..problem
+            })
+            .collect();
         problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.at));
         problems
     }
@@ -225,6 +282,37 @@ mod tests {
         assert_eq!((problem.level, problem.at), (Level::Critical, Instant::from_millis(15_000)));
         assert_eq!((problem.times, problem.lasted, problem.lasting), (2, Span::from_secs(14), false));
         assert_eq!((problem.value, problem.limit), (3.4, 3.5));
+    }
+
+    #[test]
+    fn what_another_alarm_explains_each_time_names_it_also_where_it_was_seen_first() {
+        let of = |check: &str, at_s: u64, level: Level| Finding {
+            check: check.to_owned(),
+            subsystem: Subsystem::Navigation,
+            ..change(at_s, level, 1.0)
+        };
+        let because = |alone_at_s: Option<u64>| {
+            let mut problems = Problems::default();
+            let effect = |at_s, level| of("ekf_variance", at_s, level);
+            for finding in [
+                effect(10, Level::Warning),
+                of("gps_fix", 11, Level::Critical),
+                of("gps_fix", 20, Level::Ok),
+                effect(25, Level::Ok),
+            ] {
+                problems.take(&finding, Span::ZERO);
+            }
+            if let Some(at_s) = alone_at_s {
+                problems.take(&effect(at_s, Level::Warning), Span::ZERO);
+            }
+            problems.end(Instant::from_millis(40_000), Span::ZERO);
+            let found = problems.worst_first();
+            found.iter().map(|one| (one.check.clone(), one.because.clone())).collect::<Vec<_>>()
+        };
+        let gps = ("gps_fix".to_owned(), None);
+        let explained = |cause: Option<&str>| ("ekf_variance".to_owned(), cause.map(str::to_owned));
+        assert_eq!(because(None), [gps.clone(), explained(Some("gps_fix"))]);
+        assert_eq!(because(Some(30)), [gps, explained(None)]);
     }
 
     #[test]

@@ -317,22 +317,57 @@ fn verdict(judged: &Judged) -> String {
 
 fn problems(text: &mut String, judged: &Judged) {
     let groups = groups(&judged.problems);
-    for (place, group) in groups.iter().enumerate() {
+    let (causes, effects): (Vec<_>, Vec<_>) =
+        groups.iter().partition(|group| cause(group, &groups).is_none());
+    for (place, group) in causes.iter().enumerate() {
         let Some(first) = group.first() else { continue };
         let words = vocabulary(&first.check);
         let level = if first.level == Level::Critical { "CRITICAL" } else { "warning" };
         let _ = writeln!(text, "  {level:<8} {:>9}  {}", moment(first.at), word(&sentence(group)));
         if let Some(words) = words.filter(|_| place < SHOWN_MAX) {
             let _ = writeln!(text, "                      {}", words.meaning);
-            let _ = writeln!(text, "                      {}\n", words.action);
+            let _ = writeln!(text, "                      {}", words.action);
+        }
+        // The first of its groups has what it explains.
+        let is_first = causes.iter().position(|group| check_of(group) == first.check) == Some(place);
+        for effect in effects.iter().filter(|effect| is_first && cause(effect, &groups) == Some(&first.check))
+        {
+            let at = effect.first().map(|effect| moment(effect.at)).unwrap_or_default();
+            let _ = writeln!(text, "                      with it {at}  {}", word(&sentence(effect)));
+        }
+        if place < SHOWN_MAX {
+            text.push('\n');
         }
     }
-    if groups.len() > SHOWN_MAX {
+    if causes.len() > SHOWN_MAX {
         text.push('\n');
     }
     if judged.by == JudgedBy::Board && judged.findings_count > 0 {
         text.push_str("  (found by the monitor on board)\n");
     }
+}
+
+/// The check of a group.
+fn check_of<'a>(group: &[&'a Problem]) -> &'a str {
+    group.first().map_or("", |problem| &problem.check)
+}
+
+/// The check that explains all of a group, and is explained by none; `None` where there is none among these groups.
+fn cause<'a>(group: &[&'a Problem], groups: &[Vec<&'a Problem>]) -> Option<&'a str> {
+    let explains = |group: &[&'a Problem]| {
+        let cause = group.first()?.because.as_deref()?;
+        let of_all = group.iter().all(|problem| problem.because.as_deref() == Some(cause));
+        groups.iter().find(|group| of_all && check_of(group) == cause)
+    };
+    let mut cause = explains(group)?;
+    // No more steps than there are groups: a circle has no beginning.
+    for _ in groups {
+        match explains(cause) {
+            Some(deeper) => cause = deeper,
+            None => return Some(check_of(cause)),
+        }
+    }
+    None
 }
 
 /// Problems of one check and level, which differ in the part alone, together; in the order of the first of each.
@@ -490,6 +525,7 @@ mod tests {
             limit: 10.0,
             unit: String::new(),
             details: Vec::new(),
+            because: None,
         };
         let shown = |check: &str, values: [f32; 3]| {
             let all: Vec<Problem> =

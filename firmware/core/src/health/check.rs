@@ -159,7 +159,8 @@ impl Samples {
     }
 }
 
-/// How often a level was reached again, and the worst one that was reached, since the check began to apply; in a byte.
+/// How often a level was reached again, and the worst one that was reached, since the check began to apply; and how often the level was
+/// looked at since another check explained it. In a byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Repeats(u8);
 
@@ -182,9 +183,18 @@ impl Repeats {
             Level::Critical => 2,
             _ => 0,
         };
-        let (rank, worst) = (if rank(level) > rank(previous) { rank(level) } else { 0 }, self.0 >> 2);
+        let (rank, worst) = (if rank(level) > rank(previous) { rank(level) } else { 0 }, self.0 >> 2 & 3);
         let again = u32::from(rank > 0 && rank <= worst);
         self.0 = (self.count() + again).min(Self::MOST) as u8 | worst.max(rank) << 2;
+    }
+
+    /// 0 where no other check explained the level, 1 where one does, 2 where none did at the last look.
+    const fn looks(self) -> u8 {
+        self.0 >> 4
+    }
+
+    const fn set_looks(&mut self, looks: u8) {
+        self.0 = self.0 & 0xF | looks << 4;
     }
 }
 
@@ -221,6 +231,13 @@ pub struct Change {
 }
 
 impl Check {
+    /// The limit of a level; NaN where there is none.
+    pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
+        let of = |param: Option<Param>| param.map_or(f32::NAN, |param| params.get(param));
+        let (warn, critical) = (of(self.warn), of(self.critical));
+        if level == Level::Critical || warn.is_nan() { critical } else { warn }
+    }
+
     /// What a change of its level is told as.
     pub(super) const fn finding(&self, instance: u8, at: Instant, change: Change, feeds: Feeds) -> Finding {
         Finding {
@@ -257,6 +274,27 @@ impl State {
     /// The level, or `None` while the check has had nothing to say.
     pub const fn level(&self) -> Option<Level> {
         self.level
+    }
+
+    /// Another check's alarm explains its level, or does not, at the change to it.
+    pub(super) const fn explain(&mut self, explained: bool) {
+        self.repeats.set_looks(explained as u8);
+    }
+
+    /// Whether another check's alarm explained its level at the change to it.
+    pub(super) const fn was_explained(&self) -> bool {
+        self.repeats.looks() > 0
+    }
+
+    /// The same some time later, of what was explained. `true` where it is not for the second time: then it is a finding of its own.
+    pub(super) const fn outlives(&mut self, explained: bool) -> bool {
+        let looks = match (explained, self.repeats.looks()) {
+            (true, _) => 1,
+            (false, 1) => 2,
+            (false, _) => 0,
+        };
+        self.repeats.set_looks(looks);
+        looks == 0
     }
 
     /// Whether it never had a value since it began to apply, nor a level: then a step without a value changes nothing.
@@ -388,8 +426,7 @@ impl State {
         } else {
             Level::Ok
         };
-        let limit = if next == Level::Critical || warn.is_nan() { critical } else { warn };
-        self.go(next, value, limit)
+        self.go(next, value, check.limit(next, params))
     }
 
     /// Changes the level; the first time, good news is no news.

@@ -2,7 +2,7 @@
 //!
 //! A dead motor tips the vehicle over, a receiver without a fix makes the estimator doubt, and what is silent has no data at all. Who
 //! hears of all of it at once does not hear the cause. So a finding names the check that explains it, where that has an alarm which is
-//! as bad or worse; it is recorded like any other, and not told to the ground.
+//! as bad or worse; it is recorded like any other, and not told to the ground. Where it outlives that alarm it is told by itself.
 
 use super::finding::{Level, Subsystem};
 use super::tables::check_named;
@@ -99,11 +99,11 @@ const fn is_of_mishap(part: Subsystem) -> bool {
 }
 
 /// Which of the checks that have an alarm (a warning, or critical) explains that of `effect`, which went to `level`.
-pub(super) fn because(
-    effect: &'static str,
+pub fn because<'a>(
+    effect: &str,
     level: Level,
-    mut alarms: impl Iterator<Item = (&'static str, Level)>,
-) -> Option<&'static str> {
+    mut alarms: impl Iterator<Item = (&'a str, Level)>,
+) -> Option<&'a str> {
     let at_least = match level {
         // What is silent has no data.
         Level::Stale => return alarms.any(|(cause, _)| cause == "heartbeat").then_some("heartbeat"),
@@ -114,7 +114,7 @@ pub(super) fn because(
     let is_mishap =
         |cause: &str| check_named(cause).is_some_and(|check| check.subsystem == Subsystem::Mishap);
     // A mishap before all, then by row.
-    let place = |cause: &'static str| {
+    let place = |cause: &str| {
         if by_mishap && is_mishap(cause) {
             return Some(0);
         }

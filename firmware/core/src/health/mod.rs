@@ -22,7 +22,9 @@ mod structure;
 mod tables;
 mod vocabulary;
 
+use check::Change;
 pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
+pub use consequence::because;
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
 pub use tables::{check_named, checks, instances, words};
@@ -42,9 +44,11 @@ pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsyst
 #[derive(Clone, Copy, Debug)]
 pub struct Health {
     states: [State; STATES],
+    /// The state that is looked at next: whether what explained its alarm still does. One a step, each every 8 s.
+    looked_at: u8,
 }
 
-const _: () = assert!(size_of::<Health>() <= 5 * 1024);
+const _: () = assert!(size_of::<Health>() <= 5 * 1024 && STATES <= u8::MAX as usize);
 
 impl Default for Health {
     fn default() -> Self {
@@ -55,10 +59,11 @@ impl Default for Health {
 impl Health {
     /// Nothing seen yet.
     pub const fn new() -> Self {
-        Self { states: [const { State::new() }; STATES] }
+        Self { states: [const { State::new() }; STATES], looked_at: 0 }
     }
 
-    /// One step of all checks, at least every 50 ms; each change of level is a finding.
+    /// One step of all checks, at least every 50 ms; each change of level is a finding, and so is an alarm that outlives the one that
+    /// explained it.
     pub fn step(
         &mut self,
         inputs: &Inputs<'_>,
@@ -71,6 +76,8 @@ impl Health {
         let over =
             inputs.mishap.is_going() && (!heard || (inputs.mishap.is_down() && !inputs.vehicle.armed()));
         let quiet = inputs.mishap.is_going() && !over;
+        let looked_at = usize::from(self.looked_at);
+        self.looked_at = ((looked_at + 1) % STATES) as u8;
         let mut slots = 0..STATES;
         for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
             let quiet = quiet && check.when != When::Always;
@@ -100,16 +107,25 @@ impl Health {
                     continue;
                 }
                 let change = if latched { state.hold(&before, change) } else { state.release(change) };
+                let feeds = || power::feeds(check, inputs, instance);
                 let Some(change) = change else {
-                    if let (Some(Level::Warning | Level::Critical), Some(reading)) = (state.level(), reading)
+                    if let (Some(level @ (Level::Warning | Level::Critical)), Some(reading)) =
+                        (state.level(), reading)
                     {
                         exceedances.note(place, instance, check.side, reading.value);
+                        if slot == looked_at && state.was_explained() && self.outlives(slot, check, level) {
+                            let limit = check.limit(level, inputs.params);
+                            let change = Change { level, previous: level, value: reading.value, limit };
+                            findings(&check.finding(instance, inputs.now, change, feeds()));
+                        }
                     }
                     continue;
                 };
-                let feeds = power::feeds(check, inputs, instance);
                 let because = self.because(check, change.level);
-                let finding = Finding { because, ..check.finding(instance, inputs.now, change, feeds) };
+                if let Some(state) = self.states.get_mut(slot) {
+                    state.explain(!because.is_empty());
+                }
+                let finding = Finding { because, ..check.finding(instance, inputs.now, change, feeds()) };
                 exceedances.change(place, check.side, &finding);
                 findings(&finding);
             }
@@ -121,6 +137,12 @@ impl Health {
         let alarms = self.levels().filter(|(.., level)| matches!(level, Level::Warning | Level::Critical));
         let alarms = alarms.map(|(check, _, level)| (check.name, level));
         consequence::because(effect.name, level, alarms).unwrap_or_default()
+    }
+
+    /// Whether nothing has explained an alarm any more for a while, though something did.
+    fn outlives(&mut self, slot: usize, check: &Check, level: Level) -> bool {
+        let explained = !self.because(check, level).is_empty();
+        self.states.get_mut(slot).is_some_and(|state| state.outlives(explained))
     }
 
     /// Every check instance that has had something to say, with its level.
