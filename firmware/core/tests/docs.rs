@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use hums_core::exposure;
-use hums_core::health::{Check, Side, VOCABULARY, When, checks};
+use hums_core::health::{Check, Said, Side, VOCABULARY, When, checks};
 use hums_core::params::{Param, Params, TABLE, WORDS};
 use hums_core::time::Span;
 use hums_core::usage::UsageCounter;
@@ -289,17 +289,47 @@ fn every_check_is_explained_as_people_are_told() {
     const END: &str = "<!-- end of words -->\n";
     let mut table = "| check | name | means | do | needs |\n|---|---|---|---|---|\n".to_owned();
     for words in VOCABULARY {
-        let part = if words.part.is_empty() { String::new() } else { format!(", by {}", words.part) };
+        let Said { check, name, part, .. } = words.said;
+        let part = if part.is_empty() { String::new() } else { format!(", by {part}") };
         let _ = writeln!(
             table,
-            "| {} | {}{part} | {} | {} | {} |",
-            words.check, words.name, words.meaning, words.action, words.needs
+            "| {check} | {name}{part} | {} | {} | {} |",
+            words.meaning, words.action, words.needs
         );
     }
     let found = fs::read_to_string(path("check.md")).unwrap();
     let (before, rest) = found.split_once(BEGIN).expect("docs/check.md has a place for the words");
     let (_, after) = rest.split_once(END).expect("and it ends");
     assert_is("check.md", &format!("{before}{BEGIN}{table}{END}{after}"));
+}
+
+#[test]
+fn every_text_of_a_check_is_in_the_runbook() {
+    const BEGIN: &str = "<!-- texts: made by firmware/core/tests/docs.rs -->\n";
+    const END: &str = "<!-- end of texts -->\n";
+    let mut table = "| HUMS: | if critical | what is so | what to do |\n|---|---|---|---|\n".to_owned();
+    let mut told = Vec::new();
+    for (words, check) in VOCABULARY.iter().zip(checks()) {
+        let Said { alarm, advice, .. } = words.said;
+        // The same fault on another autopilot's scale, or after another time, has the same text.
+        if told.contains(&alarm) {
+            continue;
+        }
+        told.push(alarm);
+        let alarm = alarm.replace('#', "*n*");
+        let value = match check.unit {
+            _ if check.is_flag => String::new(),
+            "" => ": *value*".to_owned(),
+            "degC" => ": *value* C".to_owned(),
+            "1/min" => ": *value* per min".to_owned(),
+            unit => format!(": *value* {unit}"),
+        };
+        let _ = writeln!(table, "| {alarm}{value} | {advice} | {} | {} |", words.meaning, words.action);
+    }
+    let found = fs::read_to_string(path("runbook.md")).unwrap();
+    let (before, rest) = found.split_once(BEGIN).expect("docs/runbook.md has a place for the texts");
+    let (_, after) = rest.split_once(END).expect("and it ends");
+    assert_is("runbook.md", &format!("{before}{BEGIN}{table}{END}{after}"));
 }
 
 #[test]

@@ -8,6 +8,8 @@
 //! after it; so each becomes the highest in time, and nothing starves. One that has waited four times its interval
 //! goes like a heartbeat.
 
+use core::fmt::Write as _;
+
 use hums_core::Monitor;
 use hums_core::health::Subsystem;
 use hums_core::health::{self, Finding, Level};
@@ -21,7 +23,7 @@ use crate::messages;
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
 use crate::telling::Telling;
-use crate::text::{Severity, Text};
+use crate::text::{Severity, TEXT_BYTES_MAX, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
@@ -389,32 +391,42 @@ fn urgency(finding: &Finding) -> u8 {
     }
 }
 
-/// A finding in words a pilot understands, for instance `HUMS: battery low 14.9 % (limit 15)`, or of a battery that does not
-/// keep the vehicle up `HUMS: payload battery low #2 14.9 %`.
+/// A finding in words a pilot understands: what is wrong with which part, the value, and what to do where it is critical, for
+/// instance `HUMS: battery 1 low: 6.8 %, LAND NOW`. What is good again is called by what is watched, not by what was wrong.
 pub fn text(finding: &Finding) -> Text {
-    let check = health::check_named(finding.check);
-    let words = check.map_or(finding.check, |check| check.words);
-    let (instances, is_flag) = check.map_or((0, false), |check| (check.instances, check.is_flag));
-    let of = match finding.feeds {
-        Feeds::Vehicle | Feeds::Unsaid => "",
-        Feeds::Avionics => "avionics ",
-        Feeds::Payload => "payload ",
-    };
-    let number = finding.instance + 1;
-    let Finding { value, limit, unit, .. } = *finding;
-    // Room is for what tells something.
-    let digits = if value.abs() < 1_000.0 { 2 } else { 0 };
-    match (finding.level, instances) {
-        (Level::Ok, 0 | 1) => Text::new(format_args!("HUMS: ok again: {words}")),
-        (Level::Ok, _) => Text::new(format_args!("HUMS: ok again: {of}{words} #{number}")),
-        (Level::Stale, 0 | 1) => Text::new(format_args!("HUMS: no data: {words}")),
-        (Level::Stale, _) => Text::new(format_args!("HUMS: no data: {of}{words} #{number}")),
-        (_, 0 | 1) if is_flag => Text::new(format_args!("HUMS: {words}")),
-        _ if is_flag => Text::new(format_args!("HUMS: {of}{words} #{number}")),
-        (_, 0 | 1) => Text::new(format_args!("HUMS: {words} {value:.digits$} {unit} (limit {limit})")),
-        _ if !of.is_empty() => Text::new(format_args!("HUMS: {of}{words} #{number} {value:.digits$} {unit}")),
-        _ => Text::new(format_args!("HUMS: {words} #{number} {value:.digits$} {unit} (limit {limit})")),
+    let Finding { check, instance, level, value, feeds, .. } = *finding;
+    let Some(said) = health::said(check) else { return Text::new(format_args!("HUMS: {check}")) };
+    match level {
+        Level::Ok => return Text::new(format_args!("HUMS: ok: {}", said.name_of(instance))),
+        Level::Stale => return Text::new(format_args!("HUMS: no data: {}", said.name_of(instance))),
+        Level::Advisory | Level::Warning | Level::Critical => {}
     }
+    let mut text = Text::new(format_args!("HUMS: {}", said.alarm_of(instance, feeds)));
+    // Nobody lands because of a camera's battery.
+    let is_told = level == Level::Critical && !said.advice.is_empty() && feeds != Feeds::Payload;
+    let advice = if is_told { Text::new(format_args!(", {}", said.advice)) } else { Text::default() };
+    let is_flag = health::check_named(check).is_some_and(|check| check.is_flag);
+    if !is_flag && value.is_finite() {
+        let value = quantity(value, finding.unit);
+        // What to do says more than how much.
+        if text.as_str().len() + value.as_str().len() + advice.as_str().len() <= TEXT_BYTES_MAX {
+            let _ = text.write_str(value.as_str());
+        }
+    }
+    let _ = text.write_str(advice.as_str());
+    text
+}
+
+/// `: 14.9 %`, as exact as a pilot needs it.
+fn quantity(value: f32, unit: &str) -> Text {
+    let (unit, digits) = match unit {
+        "degC" => ("C", 0),
+        "V" => ("V", 2),
+        "1/min" => ("per min", 0),
+        unit => (unit, usize::from(value.abs() < 100.0)),
+    };
+    let space = if unit.is_empty() { "" } else { " " };
+    Text::new(format_args!(": {value:.digits$}{space}{unit}"))
 }
 
 #[cfg(test)]

@@ -398,16 +398,22 @@ fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
 /// What it was: the check, the parts, the worst value, its limit, how long.
 fn sentence(group: &[&Problem]) -> String {
     let Some(first) = worst_of(group) else { return String::new() };
-    let part = vocabulary(&first.check).map_or("", |words| words.part);
-    let mut text = name(&first.check).to_owned();
-    if !part.is_empty() {
-        let numbers: Vec<String> =
-            group.iter().map(|problem| (u16::from(problem.instance) + 1).to_string()).collect();
-        let plural = if numbers.len() > 1 && part != "GPS" { "s" } else { "" };
-        let plural = if part == "battery" && numbers.len() > 1 { "ies" } else { plural };
-        let part = if plural == "ies" { "batter" } else { part };
-        let _ = write!(text, ", {part}{plural} {}", numbers.join(", "));
-    }
+    let part = vocabulary(&first.check).map_or("", |words| words.said.part);
+    let name = name(&first.check);
+    let mut text = match name.strip_prefix(part) {
+        Some(rest) if !part.is_empty() => {
+            let numbers: Vec<String> =
+                group.iter().map(|problem| (u16::from(problem.instance) + 1).to_string()).collect();
+            let parts = match (part, numbers.len()) {
+                (_, 1) | ("GPS", _) => part.to_owned(),
+                ("battery", _) => "batteries".to_owned(),
+                ("compass", _) => "compasses".to_owned(),
+                _ => format!("{part}s"),
+            };
+            format!("{parts} {}{rest}", numbers.join(", "))
+        }
+        _ => name.to_owned(),
+    };
     let unit = if first.unit.is_empty() { String::new() } else { format!(" {}", first.unit) };
     // The limit of a state is a number between two of them, which tells nobody anything.
     let state = states::name(&first.check, first.value);
@@ -438,7 +444,7 @@ fn sentence(group: &[&Problem]) -> String {
 
 /// A check's name for people.
 fn name(check: &str) -> &str {
-    vocabulary(check).map_or(check, |words| words.name)
+    vocabulary(check).map_or(check, |words| words.said.name)
 }
 
 fn not_judged(text: &mut String, judged: &Judged) {
@@ -533,7 +539,7 @@ mod tests {
             sentence(&all.iter().collect::<Vec<_>>())
         };
         let motors = shown("motor_imbalance", [f32::NAN, 12.0, 31.0]);
-        assert!(motors.contains("motors 1, 2, 3: 31 "), "{motors}");
+        assert!(motors.contains("motors 1, 2, 3 balance: 31 "), "{motors}");
         let cells = shown("cell_voltage", [3.5, 3.2, 3.4]);
         assert!(cells.contains(": 3.2 "), "{cells}");
     }

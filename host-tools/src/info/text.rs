@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use hums_blackbox::Cause;
 use hums_core::health;
+use hums_core::observation::Feeds;
 use hums_core::time::Instant;
 
 use super::json::{duration_s, finite, losses, vehicle};
@@ -162,13 +163,9 @@ fn findings_text(text: &mut String, log: &Overview) {
 /// What was found, in the words that the pilot saw, and the check that found it.
 fn sentence(finding: &FindingLine) -> String {
     let FindingLine { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
-    let known = health::checks().find(|known| known.name == *check);
-    let words = known.map_or(check.as_str(), |check| check.words);
-    let number = match known.map_or(0, |check| check.instances) {
-        0 | 1 => String::new(),
-        _ => format!(" {}", u16::from(*instance) + 1),
-    };
-    let mut sentence = format!("{subsystem}: {words}{number}");
+    let words = health::said(check)
+        .map_or_else(|| check.clone(), |said| said.alarm_of(*instance, Feeds::Unsaid).to_string());
+    let mut sentence = format!("{subsystem}: {words}");
     // The limit of a state is a number between two of them.
     if let Some(state) = states::name(check, *value) {
         let _ = write!(sentence, ", {state}");
@@ -347,7 +344,7 @@ mod tests {
             unit: unit.to_owned(),
         };
         let state = sentence(&finding("autopilot_state", 6.0, 4.5, ""));
-        assert_eq!(state, "computer: autopilot failsafe, emergency; was ok [autopilot_state]");
+        assert_eq!(state, "computer: autopilot in failsafe, emergency; was ok [autopilot_state]");
         let load = sentence(&finding("load", 97.0, 95.0, "%"));
         assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
     }

@@ -67,7 +67,7 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
         "quadrotor, ArduPilot",
         "in 1 flight",
         "not fit to fly before this is cleared up: 2 critical findings, 3 warnings",
-        "CRITICAL    4:20.7  cell voltage, battery 1: 3.4 V (limit 3.5 V), for 1:36",
+        "CRITICAL    4:20.7  battery 1 cell voltage: 3.4 V (limit 3.5 V), for 1:36",
         "The weakest cell was close to empty",
         "Check the pack under load",
         "no battery temperature: batt_temperature",

@@ -25,7 +25,6 @@ const WANTED_AGE: Span = Span::from_secs(2);
 
 const ROLL: Check = Check {
     name: "roll",
-    words: "roll",
     subsystem: Subsystem::Attitude,
     unit: "deg",
     side: Side::Above,
@@ -47,11 +46,10 @@ pub(super) const CHECKS: &[Check] = &[
     ROLL,
     Check {
         name: "pitch",
-        words: "pitch",
         read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, |wanted| wanted.pitch),
         ..ROLL
     },
-    alert::<{ Cause::Attitude as usize }>("attitude alert", Subsystem::Attitude),
+    alert::<{ Cause::Attitude as usize }>(Subsystem::Attitude),
 ];
 
 fn degrees(

@@ -52,8 +52,6 @@ pub enum When {
 pub struct Check {
     /// Stable name, at most 16 characters of `a-z0-9_`.
     pub name: &'static str,
-    /// What it means, in a few words that a pilot understands.
-    pub words: &'static str,
     /// The part of the vehicle.
     pub subsystem: Subsystem,
     /// The unit of value and limits.
@@ -79,7 +77,7 @@ pub struct Check {
     /// Its silence says nothing: a flag that is not set, a restart that did not happen. Such a check can make its part
     /// of the vehicle worse, and never by itself make it healthy.
     pub alarm_only: bool,
-    /// Its value is a flag or the number of a state, which tells a pilot nothing: the words alone are told.
+    /// Its value is a flag or the number of a state, which tells a pilot nothing: the alarm alone is told.
     pub is_flag: bool,
     /// Reads the value; `None` while it has never been measured.
     pub read: fn(&Inputs<'_>, u8) -> Option<Reading>,

@@ -15,10 +15,9 @@ pub(super) const STALE: Option<Span> = Some(Span::from_secs(5));
 pub(super) const STALE_SLOW: Option<Span> = Some(Span::from_secs(12));
 
 /// What the autopilot itself says is wrong with `CAUSE`, the number of a [`Cause`]: 1 a warning, 2 critical.
-pub(super) const fn alert<const CAUSE: usize>(words: &'static str, subsystem: Subsystem) -> Check {
+pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem) -> Check {
     Check {
         name: Cause::ALL[CAUSE].check(),
-        words,
         subsystem,
         unit: "",
         side: Side::Above,
@@ -47,7 +46,6 @@ pub(super) const fn alert<const CAUSE: usize>(words: &'static str, subsystem: Su
 pub(super) const fn due(subsystem: Subsystem) -> Check {
     Check {
         name: "",
-        words: "",
         subsystem,
         unit: "%",
         side: Side::Above,

@@ -19,7 +19,6 @@ const SLOW_MPS: f32 = 1.0;
 
 const LOAD: Check = Check {
     name: "load",
-    words: "CPU load",
     subsystem: Subsystem::Computer,
     unit: "%",
     side: Side::Above,
@@ -40,7 +39,6 @@ pub(super) const CHECKS: &[Check] = &[
     LOAD,
     Check {
         name: "mcu_temperature",
-        words: "MCU hot",
         unit: "degC",
         warn: Some(Param::McuTempWarn),
         critical: Some(Param::McuTempCrit),
@@ -50,7 +48,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "autopilot_reboot",
         is_flag: true,
-        words: "autopilot reboot",
         unit: "",
         warn: None,
         critical: Some(Param::RebootCrit),
@@ -64,7 +61,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "autopilot_state",
         is_flag: true,
-        words: "autopilot failsafe",
         unit: "",
         warn: None,
         critical: Some(Param::StateCrit),
@@ -75,11 +71,11 @@ pub(super) const CHECKS: &[Check] = &[
         read: state,
         ..LOAD
     },
-    alert::<{ Cause::Processor as usize }>("processor alert", Subsystem::Computer),
-    alert::<{ Cause::Logging as usize }>("autopilot not logging", Subsystem::Computer),
-    alert::<{ Cause::Fence as usize }>("geofence breached", Subsystem::Computer),
-    alert::<{ Cause::Failsafe as usize }>("failsafe", Subsystem::Computer),
-    alert::<{ Cause::Other as usize }>("autopilot alert", Subsystem::Computer),
+    alert::<{ Cause::Processor as usize }>(Subsystem::Computer),
+    alert::<{ Cause::Logging as usize }>(Subsystem::Computer),
+    alert::<{ Cause::Fence as usize }>(Subsystem::Computer),
+    alert::<{ Cause::Failsafe as usize }>(Subsystem::Computer),
+    alert::<{ Cause::Other as usize }>(Subsystem::Computer),
 ];
 
 fn load_percent(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

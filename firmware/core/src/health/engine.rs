@@ -12,7 +12,6 @@ use crate::time::Span;
 
 const ENGINE: Check = Check {
     name: "cylinder_head",
-    words: "cylinder hot",
     subsystem: Subsystem::Engine,
     unit: "degC",
     side: Side::Above,
@@ -33,7 +32,6 @@ pub(super) const CHECKS: &[Check] = &[
     ENGINE,
     Check {
         name: "exhaust_gas",
-        words: "exhaust hot",
         warn: Some(Param::EngEgtWarn),
         critical: Some(Param::EngEgtCrit),
         read: |inputs, _| read(inputs, |engine| engine.exhaust.map(|temperature| temperature.0)),
@@ -41,7 +39,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "fuel_pressure",
-        words: "fuel pressure",
         unit: "hPa",
         side: Side::Below,
         warn: Some(Param::EngFuelWarn),
@@ -50,7 +47,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| read(inputs, |engine| engine.fuel_pressure.map(|pressure| pressure.0)),
         ..ENGINE
     },
-    Check { name: "engine_due", words: "engine due", ..due(Subsystem::Engine) },
+    Check { name: "engine_due", ..due(Subsystem::Engine) },
 ];
 
 fn read(inputs: &Inputs<'_>, value: impl FnOnce(&Engine) -> Option<f32>) -> Option<Reading> {

@@ -11,7 +11,6 @@ use crate::time::Span;
 
 const HEARTBEAT: Check = Check {
     name: "heartbeat",
-    words: "autopilot silent",
     subsystem: Subsystem::Link,
     unit: "s",
     side: Side::Above,
@@ -30,7 +29,6 @@ const HEARTBEAT: Check = Check {
 
 const RADIO: Check = Check {
     name: "rc_rssi",
-    words: "RC signal",
     unit: "",
     side: Side::Below,
     warn: Some(Param::RcRssiWarn),
@@ -48,7 +46,6 @@ pub(super) const CHECKS: &[Check] = &[
     HEARTBEAT,
     Check {
         name: "frames_lost",
-        words: "frames lost",
         unit: "%",
         warn: Some(Param::LinkLossWarn),
         critical: Some(Param::LinkLossCrit),
@@ -61,7 +58,6 @@ pub(super) const CHECKS: &[Check] = &[
     RADIO,
     Check {
         name: "radio_rssi",
-        words: "radio signal",
         warn: Some(Param::RadioRssiWarn),
         critical: None,
         read: |inputs, _| {
@@ -73,14 +69,13 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "radio_margin",
-        words: "radio margin",
         warn: Some(Param::RadioMargWarn),
         critical: None,
         read: radio_margin,
         ..RADIO
     },
-    alert::<{ Cause::RemoteControl as usize }>("RC lost", Subsystem::Link),
-    alert::<{ Cause::GroundStation as usize }>("ground station lost", Subsystem::Link),
+    alert::<{ Cause::RemoteControl as usize }>(Subsystem::Link),
+    alert::<{ Cause::GroundStation as usize }>(Subsystem::Link),
 ];
 
 fn heartbeat_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -11,7 +11,6 @@ use crate::time::Span;
 
 const FREE_FALL: Check = Check {
     name: Kind::FreeFall.name(),
-    words: "mishap: free fall",
     subsystem: Subsystem::Mishap,
     unit: "s",
     side: Side::Above,
@@ -32,7 +31,6 @@ pub(super) const CHECKS: &[Check] = &[
     FREE_FALL,
     Check {
         name: Kind::Impact.name(),
-        words: "mishap: impact",
         unit: "g",
         critical: Some(Param::MisImpact),
         read: |inputs, _| inputs.mishap.reading(Kind::Impact, inputs.now, inputs.vehicle),
@@ -40,7 +38,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: Kind::Tumbling.name(),
-        words: "mishap: tumbling",
         unit: "deg/s",
         critical: Some(Param::MisTumble),
         read: |inputs, _| inputs.mishap.reading(Kind::Tumbling, inputs.now, inputs.vehicle),
@@ -48,7 +45,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: Kind::Disarmed.name(),
-        words: "mishap: disarmed in air",
         unit: "m",
         alarm_only: true,
         critical: Some(Param::MisDisarm),
@@ -57,7 +53,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: Kind::Sinking.name(),
-        words: "mishap: sinking",
         unit: "m/s",
         critical: Some(Param::MisSink),
         read: |inputs, _| inputs.mishap.reading(Kind::Sinking, inputs.now, inputs.vehicle),
@@ -65,11 +60,10 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: Kind::Overturned.name(),
-        words: "mishap: overturned",
         unit: "deg",
         critical: Some(Param::MisOverturn),
         read: |inputs, _| inputs.mishap.reading(Kind::Overturned, inputs.now, inputs.vehicle),
         ..FREE_FALL
     },
-    alert::<{ Cause::Crash as usize }>("crash or termination", Subsystem::Mishap),
+    alert::<{ Cause::Crash as usize }>(Subsystem::Mishap),
 ];

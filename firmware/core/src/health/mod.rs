@@ -27,8 +27,8 @@ pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Side, State, When};
 pub use consequence::because;
 pub use finding::{Finding, Level, Subsystem};
 pub use inputs::Inputs;
-pub use tables::{check_named, checks, instances, words};
-pub use vocabulary::{Scope, VOCABULARY, Words, vocabulary};
+pub use tables::{check_named, checks, instances};
+pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::params::Param;
 use crate::time::Span;

@@ -14,7 +14,6 @@ use crate::vehicle::RECEIVERS_MAX;
 
 const ESTIMATOR: Check = Check {
     name: "ekf_variance",
-    words: "EKF variance",
     subsystem: Subsystem::Navigation,
     unit: "",
     side: Side::Above,
@@ -34,7 +33,6 @@ const ESTIMATOR: Check = Check {
 
 const GNSS: Check = Check {
     name: "gps_satellites",
-    words: "GPS satellites",
     side: Side::Below,
     warn: Some(Param::GpsSatsWarn),
     hysteresis: 0.0,
@@ -47,7 +45,6 @@ const GNSS: Check = Check {
 /// Two sensors of a kind against each other ([`crate::crosscheck`]).
 const MISMATCH: Check = Check {
     name: "accel_mismatch",
-    words: "accel mismatch",
     unit: "m/s2",
     warn: Some(Param::AccMismWarn),
     hysteresis: 0.2,
@@ -62,7 +59,6 @@ const MISMATCH: Check = Check {
 /// A sensor that repeats one value ([`crate::stuck`]). Never stale, and no word about how good it is.
 const STUCK: Check = Check {
     name: "accel_stuck",
-    words: "accel stuck",
     unit: "s",
     warn: Some(Param::StuckWarn),
     hysteresis: 0.0,
@@ -78,7 +74,6 @@ pub(super) const CHECKS: &[Check] = &[
         // ArduPilot's failsafe wants two of compass, velocity and position beyond the limit; where nothing hovers there is none:
         // a plane flies on by its airspeed.
         name: "ekf_failsafe",
-        words: "EKF failing",
         warn: None,
         critical: Some(Param::EkfVarCrit),
         read: |inputs, _| {
@@ -89,13 +84,11 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ekf_compass",
-        words: "compass variance",
         read: |inputs, _| estimator(inputs, EstimatorScale::Variance, |estimator| estimator.compass),
         ..ESTIMATOR
     },
     Check {
         name: "ekf_test_ratio",
-        words: "EKF test ratio",
         warn: Some(Param::EkfRatioWarn),
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest),
@@ -103,7 +96,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ekf_mag_ratio",
-        words: "compass test ratio",
         warn: Some(Param::EkfRatioWarn),
         critical: Some(Param::EkfRatioCrit),
         read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
@@ -114,7 +106,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "compass_unused",
         is_flag: true,
-        words: "compass not used",
         warn: Some(Param::AlertWarn),
         // That it is used says nothing about how well it is.
         alarm_only: true,
@@ -124,7 +115,6 @@ pub(super) const CHECKS: &[Check] = &[
     MISMATCH,
     Check {
         name: "gyro_mismatch",
-        words: "gyro mismatch",
         unit: "rad/s",
         warn: Some(Param::GyroMismWarn),
         hysteresis: 0.02,
@@ -133,7 +123,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "compass_mismatch",
-        words: "compass mismatch",
         unit: "%",
         warn: Some(Param::MagMismWarn),
         hysteresis: 5.0,
@@ -142,7 +131,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "baro_mismatch",
-        words: "baro mismatch",
         unit: "m",
         warn: Some(Param::BaroMismWarn),
         hysteresis: 1.0,
@@ -151,7 +139,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "baro_height",
-        words: "baro and GPS height apart",
         unit: "m",
         warn: Some(Param::BaroGpsWarn),
         hysteresis: 1.0,
@@ -162,7 +149,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "baro_noise",
-        words: "baro noise",
         unit: "m",
         warn: Some(Param::BaroNoiseWarn),
         hysteresis: 0.5,
@@ -173,7 +159,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "ekf_climb",
-        words: "EKF climb off baro",
         unit: "m/s",
         warn: Some(Param::EkfClimbWarn),
         critical: Some(Param::EkfClimbCrit),
@@ -185,27 +170,11 @@ pub(super) const CHECKS: &[Check] = &[
         ..MISMATCH
     },
     STUCK,
-    Check {
-        name: "gyro_stuck",
-        words: "gyro stuck",
-        read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor),
-        ..STUCK
-    },
-    Check {
-        name: "compass_stuck",
-        words: "compass stuck",
-        read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor),
-        ..STUCK
-    },
-    Check {
-        name: "baro_stuck",
-        words: "baro stuck",
-        read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor),
-        ..STUCK
-    },
+    Check { name: "gyro_stuck", read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor), ..STUCK },
+    Check { name: "compass_stuck", read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor), ..STUCK },
+    Check { name: "baro_stuck", read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor), ..STUCK },
     Check {
         name: "gps_stuck",
-        words: "GPS stuck",
         instances: RECEIVERS_MAX as u8,
         read: |inputs, receiver| inputs.derived.crosschecks().receiver_stuck(inputs.now, receiver),
         ..STUCK
@@ -213,7 +182,6 @@ pub(super) const CHECKS: &[Check] = &[
     GNSS,
     Check {
         name: "gps_hdop",
-        words: "GPS HDOP",
         side: Side::Above,
         warn: Some(Param::GpsHdopWarn),
         hysteresis: 0.1,
@@ -222,7 +190,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "gps_accuracy",
-        words: "GPS accuracy",
         unit: "m",
         side: Side::Above,
         warn: Some(Param::GpsHaccWarn),
@@ -233,7 +200,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_fix",
         is_flag: true,
-        words: "GPS fix lost",
         warn: None,
         critical: Some(Param::GpsFixCrit),
         // Two messages without one.
@@ -244,7 +210,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_jamming",
         is_flag: true,
-        words: "GPS jamming",
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
         critical: Some(Param::GpsJamCrit),
@@ -255,7 +220,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "gps_spoofing",
         is_flag: true,
-        words: "GPS spoofing",
         side: Side::Above,
         warn: Some(Param::GpsJamWarn),
         critical: Some(Param::GpsJamCrit),
@@ -263,15 +227,15 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, receiver| integrity(inputs, receiver, |_, spoofing| spoofing),
         ..GNSS
     },
-    alert::<{ Cause::Gyro as usize }>("gyro alert", Subsystem::Navigation),
-    alert::<{ Cause::Accelerometer as usize }>("accelerometer alert", Subsystem::Navigation),
-    alert::<{ Cause::Compass as usize }>("compass alert", Subsystem::Navigation),
-    alert::<{ Cause::Barometer as usize }>("barometer alert", Subsystem::Navigation),
-    alert::<{ Cause::Airspeed as usize }>("airspeed alert", Subsystem::Navigation),
-    alert::<{ Cause::Gnss as usize }>("GPS alert", Subsystem::Navigation),
-    alert::<{ Cause::Ranging as usize }>("rangefinder alert", Subsystem::Navigation),
-    alert::<{ Cause::Terrain as usize }>("terrain data alert", Subsystem::Navigation),
-    alert::<{ Cause::Estimator as usize }>("EKF alert", Subsystem::Navigation),
+    alert::<{ Cause::Gyro as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Accelerometer as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Compass as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Barometer as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Airspeed as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Gnss as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Ranging as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Terrain as usize }>(Subsystem::Navigation),
+    alert::<{ Cause::Estimator as usize }>(Subsystem::Navigation),
 ];
 
 fn mismatch(inputs: &Inputs<'_>, kind: Kind, sensor: u8) -> Option<Reading> {

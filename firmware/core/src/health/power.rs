@@ -15,7 +15,6 @@ const BATTERIES: u8 = BATTERIES_MAX as u8;
 
 const BATTERY: Check = Check {
     name: "batt_remaining",
-    words: "battery low",
     subsystem: Subsystem::Power,
     unit: "%",
     side: Side::Below,
@@ -36,7 +35,6 @@ pub(super) const CHECKS: &[Check] = &[
     BATTERY,
     Check {
         name: "cell_voltage",
-        words: "cell voltage",
         unit: "V",
         warn: Some(Param::CellVoltWarn),
         critical: Some(Param::CellVoltCrit),
@@ -50,7 +48,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "cell_deviation",
-        words: "cells uneven",
         unit: "V",
         side: Side::Above,
         warn: Some(Param::CellDevWarn),
@@ -64,7 +61,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "cell_dev_lasting",
-        words: "cells uneven",
         side: Side::Above,
         unit: "V",
         warn: None,
@@ -78,7 +74,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "batt_resistance",
-        words: "battery ageing",
         side: Side::Above,
         warn: Some(Param::BatResWarn),
         critical: Some(Param::BatResCrit),
@@ -94,7 +89,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "batt_fault",
         is_flag: true,
-        words: "battery fault",
         unit: "",
         side: Side::Above,
         warn: Some(Param::BatFaultWarn),
@@ -106,7 +100,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "batt_temperature",
-        words: "battery hot",
         unit: "degC",
         side: Side::Above,
         warn: Some(Param::BatTempWarn),
@@ -118,7 +111,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "batt_state",
         is_flag: true,
-        words: "autopilot: battery low",
         unit: "",
         side: Side::Above,
         warn: Some(Param::BatStateWarn),
@@ -139,7 +131,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "rail_5v_low",
-        words: "5 V rail low",
         unit: "V",
         warn: Some(Param::RailLowWarn),
         critical: Some(Param::RailLowCrit),
@@ -154,7 +145,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "rail_5v_high",
-        words: "5 V rail high",
         unit: "V",
         side: Side::Above,
         warn: Some(Param::RailHighWarn),
@@ -166,8 +156,8 @@ pub(super) const CHECKS: &[Check] = &[
         read: rail_v,
         ..BATTERY
     },
-    Check { name: "battery_due", words: "battery due", ..due(Subsystem::Power) },
-    alert::<{ Cause::Power as usize }>("battery alert", Subsystem::Power),
+    Check { name: "battery_due", ..due(Subsystem::Power) },
+    alert::<{ Cause::Power as usize }>(Subsystem::Power),
 ];
 
 /// What the battery feeds that a check is of.

@@ -15,7 +15,6 @@ use crate::vehicle::Motor;
 
 const ESC: Check = Check {
     name: "esc_silent",
-    words: "ESC silent",
     subsystem: Subsystem::Propulsion,
     unit: "s",
     side: Side::Above,
@@ -49,7 +48,6 @@ pub(super) const CHECKS: &[Check] = &[
     ESC,
     Check {
         name: "esc_temperature",
-        words: "ESC hot",
         unit: "degC",
         warn: Some(Param::EscTempWarn),
         critical: Some(Param::EscTempCrit),
@@ -64,7 +62,6 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         name: "esc_failure",
         is_flag: true,
-        words: "ESC failure",
         unit: "",
         warn: Some(Param::EscFailWarn),
         critical: Some(Param::EscFailCrit),
@@ -76,7 +73,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "esc_errors",
-        words: "ESC errors",
         unit: "1/min",
         warn: Some(Param::EscErrWarn),
         critical: None,
@@ -88,7 +84,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_loss",
-        words: "motor lost",
         unit: "%",
         side: Side::Below,
         warn: None,
@@ -101,7 +96,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_imbalance",
-        words: "motor off",
         unit: "%",
         warn: Some(Param::MotImbalWarn),
         critical: Some(Param::MotImbalCrit),
@@ -118,7 +112,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "motor_output",
-        words: "motor weak",
         unit: "%",
         warn: Some(Param::MotOutWarn),
         critical: Some(Param::MotOutCrit),
@@ -132,7 +125,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "thrust_lost",
-        words: "full throttle, no climb",
         unit: "s",
         warn: Some(Param::ThrustWarn),
         critical: None,
@@ -142,21 +134,10 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.derived.response().full_in_vain(),
         ..ESC
     },
-    Check {
-        name: "roll_rate",
-        words: "roll does not follow",
-        read: |inputs, _| inputs.derived.response().rate_missing(0),
-        ..RATE
-    },
-    Check {
-        name: "pitch_rate",
-        words: "pitch does not follow",
-        read: |inputs, _| inputs.derived.response().rate_missing(1),
-        ..RATE
-    },
+    Check { name: "roll_rate", read: |inputs, _| inputs.derived.response().rate_missing(0), ..RATE },
+    Check { name: "pitch_rate", read: |inputs, _| inputs.derived.response().rate_missing(1), ..RATE },
     Check {
         name: "motor_trend",
-        words: "motor changed",
         unit: "%",
         warn: Some(Param::TrdEscWarn),
         critical: Some(Param::TrdEscCrit),
@@ -169,7 +150,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "throttle_trend",
-        words: "hover throttle up",
         unit: "%",
         warn: Some(Param::TrdThrWarn),
         critical: Some(Param::TrdThrCrit),
@@ -181,8 +161,8 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| departure(inputs, Quantity::HoverThrottle),
         ..ESC
     },
-    Check { name: "drive_due", words: "motor/prop/ESC due", ..due(Subsystem::Propulsion) },
-    alert::<{ Cause::Propulsion as usize }>("motor alert", Subsystem::Propulsion),
+    Check { name: "drive_due", ..due(Subsystem::Propulsion) },
+    alert::<{ Cause::Propulsion as usize }>(Subsystem::Propulsion),
 ];
 
 fn motor(inputs: &Inputs<'_>, motor: u8) -> Option<Motor> {

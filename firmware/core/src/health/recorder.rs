@@ -11,7 +11,6 @@ use crate::time::Span;
 
 const STATE: Check = Check {
     name: "recording",
-    words: "not recording",
     subsystem: Subsystem::Recorder,
     unit: "",
     side: Side::Above,
@@ -32,7 +31,6 @@ pub(super) const CHECKS: &[Check] = &[
     STATE,
     Check {
         name: "record_queue",
-        words: "card slow",
         unit: "%",
         warn: Some(Param::RecQueueWarn),
         critical: Some(Param::RecQueueCrit),
@@ -44,7 +42,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "record_lost",
-        words: "log frames lost",
         unit: "frames",
         warn: Some(Param::RecLostWarn),
         critical: None,
@@ -54,7 +51,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "card_stall",
-        words: "card waits",
         unit: "ms",
         warn: Some(Param::RecStallWarn),
         critical: Some(Param::RecStallCrit),
@@ -65,7 +61,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "card_errors",
-        words: "card refuses writes",
         warn: Some(Param::RecErrWarn),
         critical: None,
         debounce_warn: Span::ZERO,
@@ -74,7 +69,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "card_room",
-        words: "other files on card",
         unit: "%",
         side: Side::Below,
         warn: Some(Param::RecRoomWarn),
@@ -83,7 +77,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| Some(Reading { at: inputs.now, value: inputs.recorder.room? * 100.0 }),
         ..STATE
     },
-    Check { name: "card_due", words: "card due", ..due(Subsystem::Recorder) },
+    Check { name: "card_due", ..due(Subsystem::Recorder) },
 ];
 
 /// 0 recording, 1 not recording, 2 not recording while armed.

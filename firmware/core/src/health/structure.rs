@@ -13,7 +13,6 @@ use crate::time::Span;
 
 const VIBRATION: Check = Check {
     name: "vibration",
-    words: "vibration",
     subsystem: Subsystem::Structure,
     unit: "m/s2",
     side: Side::Above,
@@ -34,7 +33,6 @@ pub(super) const CHECKS: &[Check] = &[
     VIBRATION,
     Check {
         name: "vibration_px4",
-        words: "vibration",
         warn: Some(Param::VibePx4Warn),
         critical: Some(Param::VibePx4Crit),
         hysteresis: 0.5,
@@ -43,8 +41,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "vibration_rise",
-        words: "vibration jump",
-        unit: "",
+        unit: "times",
         warn: Some(Param::VibeRiseWarn),
         critical: None,
         hysteresis: 0.5,
@@ -57,7 +54,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "clipping",
-        words: "accel clipping",
         unit: "",
         warn: Some(Param::ClipWarn),
         critical: Some(Param::ClipCrit),
@@ -70,7 +66,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "load_factor",
-        words: "load factor",
         unit: "g",
         warn: Some(Param::LoadFacWarn),
         critical: Some(Param::LoadFacCrit),
@@ -84,7 +79,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         name: "vibration_trend",
-        words: "vibration changed",
         unit: "%",
         warn: Some(Param::TrdVibeWarn),
         critical: Some(Param::TrdVibeCrit),
@@ -97,8 +91,8 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| departure(inputs, Quantity::Vibration),
         ..VIBRATION
     },
-    Check { name: "airframe_due", words: "airframe due", ..due(Subsystem::Structure) },
-    alert::<{ Cause::Vibration as usize }>("vibration alert", Subsystem::Structure),
+    Check { name: "airframe_due", ..due(Subsystem::Structure) },
+    alert::<{ Cause::Vibration as usize }>(Subsystem::Structure),
 ];
 
 fn per_axis(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

@@ -41,11 +41,6 @@ pub fn check_named(name: &str) -> Option<&'static Check> {
     checks().find(|check| check.name == name)
 }
 
-/// What a check means, in a few words that a pilot understands; its name where there is no such check.
-pub fn words(name: &'static str) -> &'static str {
-    check_named(name).map_or(name, |check| check.words)
-}
-
 /// How many instances a check has; 0 where there is no such check.
 pub fn instances(name: &str) -> u8 {
     check_named(name).map_or(0, |check| check.instances)

@@ -1,8 +1,13 @@
-//! What each check means to people: one table for every text, page and document. The firmware links only what it uses.
+//! What each check means to people: one table for every text, page and document.
 //!
-//! `meaning` says what is so while the check's level is a warning or critical, `action` what to do about it (on the
-//! ground, before the next flight, where nothing else is said). `needs` names what the check reads, so that whoever
-//! reads a log can say why a check had nothing to judge.
+//! `alarm` and `advice` are what a radio text says of it ([`Said`], all that the firmware links). `meaning` says what is so
+//! while the check's level is a warning or critical, `action` what to do about it (on the ground, before the next flight,
+//! where nothing else is said). `needs` names what the check reads, so that whoever reads a log can say why a check had
+//! nothing to judge.
+
+use core::fmt;
+
+use crate::observation::Feeds;
 
 /// What a check can be judged from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,15 +28,68 @@ pub enum Scope {
     Stored,
 }
 
-/// What is known of a check besides its limits.
+/// What a radio text says of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Words {
+pub struct Said {
     /// The check: [`super::Check::name`].
     pub check: &'static str,
     /// Its name for people: what is watched, not what is wrong.
     pub name: &'static str,
     /// What there may be several of, as the autopilot counts them from 1; empty where there is one.
     pub part: &'static str,
+    /// What is wrong, in a few words; `#` stands for the number of the part.
+    pub alarm: &'static str,
+    /// What a pilot does at once where it is critical; empty where it never is.
+    pub advice: &'static str,
+}
+
+impl Said {
+    /// What is wrong with one part, which is counted from 0: `battery 2 (payload) low`.
+    pub fn alarm_of(&self, instance: u8, feeds: Feeds) -> impl fmt::Display {
+        let (before, after) = self.alarm.split_once('#').unwrap_or((self.alarm, ""));
+        let number = Number { instance, feeds };
+        let several = !self.part.is_empty();
+        fmt::from_fn(
+            move |f| {
+                if several { write!(f, "{before}{number}{after}") } else { f.write_str(before) }
+            },
+        )
+    }
+
+    /// The name of one part, which is counted from 0: `battery 2 cell voltage`.
+    pub fn name_of(&self, instance: u8) -> impl fmt::Display {
+        let Self { name, part, .. } = *self;
+        let number = Number { instance, feeds: Feeds::Unsaid };
+        fmt::from_fn(move |f| match name.strip_prefix(part) {
+            Some(rest) if !part.is_empty() => write!(f, "{part} {number}{rest}"),
+            _ => f.write_str(name),
+        })
+    }
+}
+
+/// The number of a part, as the autopilot counts from 1, and of a battery what it feeds if that is not what keeps the vehicle up.
+#[derive(Clone, Copy)]
+struct Number {
+    instance: u8,
+    feeds: Feeds,
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of = match self.feeds {
+            Feeds::Vehicle | Feeds::Unsaid => "",
+            Feeds::Avionics => " (avionics)",
+            Feeds::Payload => " (payload)",
+        };
+        write!(f, "{}{of}", u16::from(self.instance) + 1)
+    }
+}
+
+/// All that is known of a check besides its limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// What a radio text says.
+    pub said: Said,
     /// What is so, as a sentence.
     pub meaning: &'static str,
     /// What to do, as a sentence.
@@ -44,17 +102,28 @@ pub struct Words {
 
 /// The words of a check.
 pub fn vocabulary(check: &str) -> Option<&'static Words> {
-    VOCABULARY.iter().find(|words| words.check == check)
+    VOCABULARY.iter().find(|words| words.said.check == check)
+}
+
+/// What a radio text says of a check.
+pub fn said(check: &str) -> Option<&'static Said> {
+    SAID.iter().find(|said| said.check == check)
 }
 
 macro_rules! vocabulary {
-    ($($check:literal $scope:ident $name:literal, $part:literal, needs $needs:literal;
+    ($($check:literal $scope:ident $name:literal, $part:literal, says $alarm:literal, $advice:literal, needs $needs:literal;
        $meaning:literal; $action:literal;)*) => {
-        /// Every check, in the order of the subsystems' tables.
-        pub const VOCABULARY: &[Words] = &[$(Words {
+        const SAID: &[Said] = &[$(Said {
             check: $check,
             name: $name,
             part: $part,
+            alarm: $alarm,
+            advice: $advice,
+        },)*];
+
+        /// Every check, in the order of the subsystems' tables.
+        pub const VOCABULARY: &[Words] = &[$(Words {
+            said: Said { check: $check, name: $name, part: $part, alarm: $alarm, advice: $advice },
             meaning: $meaning,
             action: $action,
             needs: $needs,
@@ -64,264 +133,264 @@ macro_rules! vocabulary {
 }
 
 vocabulary! {
-    "batt_remaining" Vehicle "battery remaining", "battery", needs "battery level";
+    "batt_remaining" Vehicle "battery remaining", "battery", says "battery # low", "LAND NOW", needs "battery level";
     "The battery was nearly empty."; "Land earlier, or take a fuller or larger battery.";
-    "cell_voltage" Vehicle "cell voltage", "battery", needs "battery voltage of a known number of cells";
+    "cell_voltage" Vehicle "battery cell voltage", "battery", says "battery # cell low", "LAND NOW", needs "battery voltage of a known number of cells";
     "The weakest cell was close to empty, or sagged under the load.";
     "Check the pack under load; replace it if it was charged full before the flight.";
-    "cell_deviation" Vehicle "cell balance", "battery", needs "voltages of single cells";
+    "cell_deviation" Vehicle "battery cell balance", "battery", says "battery # cells uneven", "LAND", needs "voltages of single cells";
     "The cells of the battery differed in voltage."; "Balance the pack; replace it if it happens again.";
-    "cell_dev_lasting" Vehicle "cell balance, lasting", "battery", needs "voltages of single cells";
+    "cell_dev_lasting" Vehicle "battery cell balance, lasting", "battery", says "battery # cells uneven", "LAND", needs "voltages of single cells";
     "The cells of the battery differed in voltage for more than a minute."; "Replace the pack.";
-    "batt_resistance" Stored "battery resistance", "battery", needs "resistance of earlier flights to compare with";
+    "batt_resistance" Stored "battery resistance", "battery", says "battery # worn", "REPLACE IT", needs "resistance of earlier flights to compare with";
     "The battery's internal resistance has risen since it was new."; "Replace the pack soon.";
-    "batt_fault" Vehicle "battery fault", "battery", needs "battery status";
+    "batt_fault" Vehicle "battery fault", "battery", says "battery # fault", "", needs "battery status";
     "The battery reported a fault of its own."; "Do not use the battery until its fault is known.";
-    "batt_temperature" Vehicle "battery temperature", "battery", needs "battery temperature";
+    "batt_temperature" Vehicle "battery temperature", "battery", says "battery # hot", "LAND NOW", needs "battery temperature";
     "The battery was too hot."; "Let it cool before charging; look for a high load or a damaged cell.";
-    "batt_state" Vehicle "battery by the autopilot's thresholds", "battery", needs "charge state of a battery";
+    "batt_state" Vehicle "battery charge state", "battery", says "autopilot: battery # low", "LAND", needs "charge state of a battery";
     "The autopilot called the battery low by its own thresholds."; "Land earlier; check the pack and the thresholds.";
-    "rail_5v_low" Vehicle "5 V supply, low", "", needs "voltage of the 5 V supply";
+    "rail_5v_low" Vehicle "5 V supply, low", "", says "5 V supply low", "LAND NOW", needs "voltage of the 5 V supply";
     "The autopilot's 5 V supply was too low: it can restart in flight.";
     "Check the power module and its wiring; take loads off the 5 V supply.";
-    "rail_5v_high" Vehicle "5 V supply, high", "", needs "voltage of the 5 V supply";
+    "rail_5v_high" Vehicle "5 V supply, high", "", says "5 V supply high", "", needs "voltage of the 5 V supply";
     "The autopilot's 5 V supply was too high: it can be damaged."; "Check the power module before the next flight.";
-    "battery_due" Stored "battery life", "", needs "battery registered with the monitor on board";
+    "battery_due" Stored "battery life", "", says "battery life used", "REPLACE IT", needs "battery registered with the monitor on board";
     "A battery has reached the end of its life."; "Replace it, and tell the monitor.";
 
-    "battery_alert" Said "autopilot's alert: battery", "", needs "texts, events or health flags of the autopilot";
+    "battery_alert" Said "autopilot's alert: battery", "", says "autopilot warns: battery", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a battery or a supply was low or had failed.";
     "Read its messages of that time; check pack, power module and wiring.";
 
-    "esc_silent" Vehicle "ESC telemetry", "motor", needs "ESC telemetry";
+    "esc_silent" Vehicle "ESC telemetry", "ESC", says "ESC # silent", "LAND", needs "ESC telemetry";
     "The ESC of this motor stopped answering."; "Check the ESC, its wiring and its telemetry line.";
-    "esc_temperature" Vehicle "ESC temperature", "motor", needs "ESC temperature";
+    "esc_temperature" Vehicle "ESC temperature", "ESC", says "ESC # hot", "LAND", needs "ESC temperature";
     "The ESC of this motor was too hot."; "Check its cooling, the propeller and the motor for drag.";
-    "esc_failure" Vehicle "ESC failure", "motor", needs "failure flags of ESCs";
+    "esc_failure" Vehicle "ESC failure", "ESC", says "ESC # failed", "LAND NOW", needs "failure flags of ESCs";
     "The ESC of this motor reported a failure."; "Do not fly until the ESC and the motor are checked.";
-    "esc_errors" Vehicle "ESC errors", "motor", needs "error counts of ESCs";
+    "esc_errors" Vehicle "ESC errors", "ESC", says "ESC # errors", "", needs "error counts of ESCs";
     "The ESC of this motor counted many errors."; "Check its signal and telemetry wiring.";
-    "motor_loss" Vehicle "motor current", "motor", needs "current of single motors";
+    "motor_loss" Vehicle "motor current", "motor", says "motor # lost, current", "LAND NOW", needs "current of single motors";
     "The motor took almost no current while the others worked: it or its propeller was lost.";
     "Do not fly until motor, propeller and ESC are checked.";
-    "motor_imbalance" Vehicle "motor balance", "motor", needs "speeds of single motors in steady flight";
+    "motor_imbalance" Vehicle "motor balance", "motor", says "motor # speed differs", "LAND", needs "speeds of single motors in steady flight";
     "The motor's speed differed from the others' in steady flight.";
     "Check this arm: propeller, motor, its tilt, and the centre of gravity.";
-    "motor_output" Vehicle "motor output", "motor", needs "motor outputs of a quadrotor or hexarotor, on the ground and in flight";
+    "motor_output" Vehicle "motor output", "motor", says "motor # weak, output", "LAND NOW", needs "motor outputs of a quadrotor or hexarotor, on the ground and in flight";
     "The motor was driven far harder than the others: it or its propeller gives less thrust.";
     "Do not fly until its propeller, motor and ESC are checked.";
-    "thrust_lost" Vehicle "climb with full throttle", "", needs "throttle and climb";
+    "thrust_lost" Vehicle "climb with full throttle", "", says "full throttle, no climb", "", needs "throttle and climb";
     "Full throttle did not make the vehicle climb, or a plane keep its height.";
     "Do not fly until propellers, motors, ESCs, battery and weight are checked.";
-    "roll_rate" Vehicle "roll rate against what is wanted", "", needs "body rates that the autopilot wants";
+    "roll_rate" Vehicle "roll rate against what is wanted", "", says "roll does not follow", "LAND NOW", needs "body rates that the autopilot wants";
     "The vehicle did not roll as the autopilot wanted: a motor, propeller, servo or surface failed.";
     "Do not fly until motors, propellers, servos and control surfaces are checked.";
-    "pitch_rate" Vehicle "pitch rate against what is wanted", "", needs "body rates that the autopilot wants";
+    "pitch_rate" Vehicle "pitch rate against what is wanted", "", says "pitch does not follow", "LAND NOW", needs "body rates that the autopilot wants";
     "The vehicle did not pitch as the autopilot wanted: a motor, propeller, servo or surface failed.";
     "Do not fly until motors, propellers, servos and control surfaces are checked.";
-    "motor_trend" Stored "motor balance against earlier flights", "motor", needs "speeds of earlier flights to compare with";
+    "motor_trend" Stored "motor balance trend", "motor", says "motor # speed changed", "CHECK IT", needs "speeds of earlier flights to compare with";
     "The motor's speed has changed against earlier flights."; "Check its propeller and bearings.";
-    "throttle_trend" Stored "hover throttle against earlier flights", "", needs "throttle of earlier flights to compare with";
+    "throttle_trend" Stored "hover throttle trend", "", says "hover throttle up", "CHECK MOTORS", needs "throttle of earlier flights to compare with";
     "Hovering took more throttle than in earlier flights."; "Check weight, propellers, motors and the battery.";
-    "drive_due" Stored "life of motors, propellers, ESCs", "", needs "motor, propeller or ESC registered with the monitor on board";
+    "drive_due" Stored "life of motors, propellers, ESCs", "", says "motor/prop/ESC life used", "REPLACE IT", needs "motor, propeller or ESC registered with the monitor on board";
     "A motor, propeller or ESC has reached the end of its life."; "Replace it, and tell the monitor.";
 
-    "drive_alert" Said "autopilot's alert: motors", "", needs "texts, events or health flags of the autopilot";
+    "drive_alert" Said "autopilot's alert: motors", "", says "autopilot warns: motor", "LAND NOW", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a motor, propeller or ESC had failed or gave too little thrust.";
     "Do not fly until motors, propellers and ESCs are checked.";
 
-    "cylinder_head" Vehicle "cylinder head temperature", "", needs "engine data";
+    "cylinder_head" Vehicle "cylinder head temperature", "", says "cylinder hot", "LAND", needs "engine data";
     "The engine's cylinder head was too hot."; "Check cooling and mixture before the next flight.";
-    "exhaust_gas" Vehicle "exhaust gas temperature", "", needs "engine data";
+    "exhaust_gas" Vehicle "exhaust gas temperature", "", says "exhaust hot", "LAND", needs "engine data";
     "The engine's exhaust gas was too hot."; "Check the mixture before the next flight.";
-    "fuel_pressure" Vehicle "fuel pressure", "", needs "engine data";
+    "fuel_pressure" Vehicle "fuel pressure", "", says "fuel pressure low", "LAND NOW", needs "engine data";
     "The fuel pressure was too low."; "Check pump, filter and lines before the next flight.";
-    "engine_due" Stored "engine life", "", needs "engine registered with the monitor on board";
+    "engine_due" Stored "engine life", "", says "engine life used", "SERVICE IT", needs "engine registered with the monitor on board";
     "The engine is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
-    "vibration" ArduPilot "vibration", "", needs "vibration levels";
+    "vibration" ArduPilot "vibration", "", says "vibration high", "LAND", needs "vibration levels";
     "Vibration was strong enough to disturb the estimator.";
     "Balance propellers and motors, and check the autopilot's mounting.";
-    "vibration_px4" Px4 "vibration", "", needs "vibration metrics";
+    "vibration_px4" Px4 "vibration", "", says "vibration high", "LAND", needs "vibration metrics";
     "Vibration was strong enough to disturb the estimator.";
     "Balance propellers and motors, and check the autopilot's mounting.";
-    "vibration_rise" Vehicle "vibration within the flight", "", needs "vibration levels of a multicopter in hover";
+    "vibration_rise" Vehicle "vibration within the flight", "", says "vibration rose", "", needs "vibration levels of a multicopter in hover";
     "Vibration rose to a multiple of what it was before in the same flight.";
     "Check propellers, motor bearings and mounting before the next flight.";
-    "clipping" Vehicle "accelerometer clipping", "", needs "clipping counts";
+    "clipping" Vehicle "accelerometer clipping", "", says "accelerometer clipping", "LAND", needs "clipping counts";
     "The accelerometers were at the end of their range: the estimator flew partly blind.";
     "Find the source of vibration or shock, and check the mounting.";
-    "load_factor" Vehicle "load factor", "", needs "acceleration";
+    "load_factor" Vehicle "load factor", "", says "load factor high", "EASE OFF", needs "acceleration";
     "The airframe carried a high load: a hard manoeuvre, a shock or a landing.";
     "Inspect the airframe and the landing gear.";
-    "vibration_trend" Stored "vibration against earlier flights", "", needs "vibration of earlier flights to compare with";
+    "vibration_trend" Stored "vibration trend", "", says "vibration changed", "CHECK PROPS", needs "vibration of earlier flights to compare with";
     "Vibration has changed against earlier flights; a cut propeller can lower it.";
     "Check propellers, bearings and mounting.";
-    "airframe_due" Stored "airframe life", "", needs "airframe registered with the monitor on board";
+    "airframe_due" Stored "airframe life", "", says "airframe life used", "SERVICE IT", needs "airframe registered with the monitor on board";
     "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
 
-    "vibration_alert" Said "autopilot's alert: vibration", "", needs "texts, events or health flags of the autopilot";
+    "vibration_alert" Said "autopilot's alert: vibration", "", says "autopilot warns: vibration", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that vibration or clipping disturbed it.";
     "Balance propellers and motors, and check the autopilot's mounting.";
 
-    "ekf_variance" ArduPilot "estimator variance", "", needs "estimator variances";
+    "ekf_variance" ArduPilot "estimator variance", "", says "EKF doubts a sensor", "", needs "estimator variances";
     "The estimator did not trust one of its sensors."; "Look at compass, GNSS and vibration at that time.";
-    "ekf_failsafe" ArduPilot "estimator, two sensors", "", needs "estimator variances";
+    "ekf_failsafe" ArduPilot "estimator, two sensors", "", says "EKF failing", "LAND, MANUAL", needs "estimator variances";
     "The estimator did not trust two of compass, velocity and position: it could lose its position.";
     "Do not fly until compass and GNSS are checked.";
-    "ekf_compass" ArduPilot "estimator variance of the compass", "", needs "estimator variances";
+    "ekf_compass" ArduPilot "estimator variance of the compass", "", says "EKF doubts compass", "", needs "estimator variances";
     "The estimator did not trust the compass."; "Check the compass, its calibration and currents or magnets near it.";
-    "ekf_test_ratio" Px4 "estimator test ratio", "", needs "estimator test ratios";
+    "ekf_test_ratio" Px4 "estimator test ratio", "", says "EKF rejects a sensor", "LAND", needs "estimator test ratios";
     "The estimator rejected, or nearly rejected, a sensor."; "Look at compass, GNSS and vibration at that time.";
-    "ekf_mag_ratio" Px4 "estimator test ratio of the compass", "", needs "estimator test ratios";
+    "ekf_mag_ratio" Px4 "estimator test ratio of the compass", "", says "EKF rejects compass", "LAND", needs "estimator test ratios";
     "The estimator rejected, or nearly rejected, the compass.";
     "Check the compass, its calibration and currents or magnets near it.";
-    "compass_unused" Px4 "compass in use", "", needs "estimator test ratio of the compass";
+    "compass_unused" Px4 "compass in use", "", says "EKF dropped compass", "", needs "estimator test ratio of the compass";
     "The estimator stopped using the compass."; "Check the compass, its calibration and currents or magnets near it.";
-    "accel_mismatch" Vehicle "accelerometers against each other", "accelerometer", needs "second accelerometer on a multicopter";
+    "accel_mismatch" Vehicle "accelerometer agreement", "accelerometer", says "accelerometer # disagrees", "", needs "second accelerometer on a multicopter";
     "Two accelerometers came apart in flight: one of them is wrong.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "gyro_mismatch" Vehicle "gyros against each other", "gyro", needs "second gyro on a multicopter";
+    "gyro_mismatch" Vehicle "gyro agreement", "gyro", says "gyro # disagrees", "", needs "second gyro on a multicopter";
     "Two gyros came apart in flight: one of them is wrong."; "Do not fly until the autopilot's gyros are checked.";
-    "compass_mismatch" Vehicle "compasses against each other", "compass", needs "second compass";
+    "compass_mismatch" Vehicle "compass agreement", "compass", says "compass # disagrees", "", needs "second compass";
     "Two compasses came apart in flight: one of them is wrong, or a current or magnet is near it.";
     "Check the compasses, their wiring, and currents or magnets near them.";
-    "baro_mismatch" Vehicle "barometers against each other", "barometer", needs "second barometer";
+    "baro_mismatch" Vehicle "barometer agreement", "barometer", says "barometer # disagrees", "", needs "second barometer";
     "Two barometers came apart in flight: one of them is wrong."; "Check the barometers, their cover and the airflow at them.";
-    "baro_height" Vehicle "barometer against GPS height", "", needs "air pressure and GPS height";
+    "baro_height" Vehicle "barometer against GPS height", "", says "barometer off GPS height", "", needs "air pressure and GPS height";
     "The heights of barometer and GPS came apart in flight: one of them is wrong.";
     "Check the barometer, its cover and the airflow at it, and the GPS antenna's view.";
-    "baro_noise" Vehicle "barometer noise", "", needs "air pressure and climb rate";
+    "baro_noise" Vehicle "barometer noise", "", says "barometer noisy", "", needs "air pressure and climb rate";
     "The barometer became noisy in flight."; "Check the barometer, its cover and the airflow at it.";
-    "ekf_climb" Vehicle "estimator's climb against the barometer", "", needs "air pressure and climb rate on rotors";
+    "ekf_climb" Vehicle "estimator's climb", "", says "EKF climb off baro", "LAND, MANUAL", needs "air pressure and climb rate on rotors";
     "The estimator's climb was not that of the barometer: height control may run away.";
     "Do not fly until vibration, accelerometers, the barometer and its cover are checked.";
-    "accel_stuck" Vehicle "accelerometer repeats a value", "accelerometer", needs "acceleration in flight";
+    "accel_stuck" Vehicle "accelerometer activity", "accelerometer", says "accelerometer # frozen", "", needs "acceleration in flight";
     "The accelerometer repeated one value: it has failed."; "Do not fly until the autopilot's accelerometers are checked.";
-    "gyro_stuck" Vehicle "gyro repeats a value", "gyro", needs "body rates of a gyro in flight";
+    "gyro_stuck" Vehicle "gyro activity", "gyro", says "gyro # frozen", "", needs "body rates of a gyro in flight";
     "The gyro repeated one value: it has failed."; "Do not fly until the autopilot's gyros are checked.";
-    "compass_stuck" Vehicle "compass repeats a value", "compass", needs "magnetic field in flight";
+    "compass_stuck" Vehicle "compass activity", "compass", says "compass # frozen", "", needs "magnetic field in flight";
     "The compass repeated one value: it has failed."; "Check the compass and its wiring.";
-    "baro_stuck" Vehicle "barometer repeats a value", "barometer", needs "air pressure in flight";
+    "baro_stuck" Vehicle "barometer activity", "barometer", says "barometer # frozen", "", needs "air pressure in flight";
     "The barometer repeated one value: it has failed, or its port is closed."; "Check the barometer and its port.";
-    "gps_stuck" Vehicle "GPS repeats a position", "GPS", needs "GPS position in flight";
+    "gps_stuck" Vehicle "GPS activity", "GPS", says "GPS # frozen", "", needs "GPS position in flight";
     "The receiver repeated one position: it has failed."; "Check the receiver, its wiring and its firmware.";
-    "gps_satellites" Vehicle "GPS satellites", "GPS", needs "GPS satellite count";
+    "gps_satellites" Vehicle "GPS satellites", "GPS", says "GPS # few satellites", "", needs "GPS satellite count";
     "Few satellites were in use: the position was not exact."; "Wait for more satellites; check the antenna's view.";
-    "gps_hdop" Vehicle "GPS dilution of precision", "GPS", needs "GPS dilution of precision";
+    "gps_hdop" Vehicle "GPS dilution of precision", "GPS", says "GPS # poor geometry", "", needs "GPS dilution of precision";
     "The satellites stood badly: the position was not exact."; "Wait for more satellites; check the antenna's view.";
-    "gps_accuracy" Vehicle "GPS accuracy", "GPS", needs "GPS accuracy";
+    "gps_accuracy" Vehicle "GPS accuracy", "GPS", says "GPS # inaccurate", "", needs "GPS accuracy";
     "The receiver estimated its own position as not exact."; "Check the antenna's view and sources of interference.";
-    "gps_fix" Vehicle "GPS fix", "GPS", needs "GPS fix";
+    "gps_fix" Vehicle "GPS fix", "GPS", says "GPS # position lost", "FLY MANUALLY", needs "GPS fix";
     "The receiver lost its position in flight."; "Check antenna, wiring and sources of interference.";
-    "gps_jamming" Vehicle "GPS jamming", "GPS", needs "jamming or spoofing state of a GPS receiver";
+    "gps_jamming" Vehicle "GPS jamming", "GPS", says "GPS # jammed", "FLY MANUALLY", needs "jamming or spoofing state of a GPS receiver";
     "The receiver was jammed."; "Fly elsewhere, or without depending on GPS; look for transmitters on board.";
-    "gps_spoofing" Vehicle "GPS spoofing", "GPS", needs "jamming or spoofing state of a GPS receiver";
+    "gps_spoofing" Vehicle "GPS spoofing", "GPS", says "GPS # spoofed", "FLY MANUALLY", needs "jamming or spoofing state of a GPS receiver";
     "The receiver detected false signals: its position could be wrong."; "Do not depend on GPS there.";
 
-    "gyro_alert" Said "autopilot's alert: gyro", "", needs "texts, events or health flags of the autopilot";
+    "gyro_alert" Said "autopilot's alert: gyro", "", says "autopilot warns: gyro", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a gyro had failed or could not be trusted."; "Do not fly until the autopilot's gyros are checked.";
-    "accel_alert" Said "autopilot's alert: accelerometer", "", needs "texts, events or health flags of the autopilot";
+    "accel_alert" Said "autopilot's alert: accelerometer", "", says "autopilot warns: accelerometer", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an accelerometer had failed or could not be trusted.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "compass_alert" Said "autopilot's alert: compass", "", needs "texts, events or health flags of the autopilot";
+    "compass_alert" Said "autopilot's alert: compass", "", says "autopilot warns: compass", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a compass had failed or could not be trusted.";
     "Check the compass, its wiring, its calibration and currents or magnets near it.";
-    "baro_alert" Said "autopilot's alert: barometer", "", needs "texts, events or health flags of the autopilot";
+    "baro_alert" Said "autopilot's alert: barometer", "", says "autopilot warns: barometer", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a barometer had failed or could not be trusted.";
     "Check the barometer, its cover and the airflow at it.";
-    "airspeed_alert" Said "autopilot's alert: airspeed", "", needs "texts, events or health flags of the autopilot";
+    "airspeed_alert" Said "autopilot's alert: airspeed", "", says "autopilot warns: airspeed", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an airspeed sensor had failed or could not be trusted.";
     "Check the pitot tube for water and dirt, its hoses and its calibration.";
-    "gnss_alert" Said "autopilot's alert: GPS", "", needs "texts, events or health flags of the autopilot";
+    "gnss_alert" Said "autopilot's alert: GPS", "", says "autopilot warns: GPS", "FLY MANUALLY", needs "texts, events or health flags of the autopilot";
     "The autopilot said that GPS was lost, jammed, spoofed or not to be trusted.";
     "Check the antenna's view, wiring and sources of interference.";
-    "ranging_alert" Said "autopilot's alert: rangefinder", "", needs "texts, events or health flags of the autopilot";
+    "ranging_alert" Said "autopilot's alert: rangefinder", "", says "autopilot warns: rangefinder", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a rangefinder, optical flow, vision or proximity sensor had failed.";
     "Check that sensor and its wiring.";
-    "terrain_alert" Said "autopilot's alert: terrain data", "", needs "texts, events or health flags of the autopilot";
+    "terrain_alert" Said "autopilot's alert: terrain data", "", says "autopilot warns: terrain", "CLIMB", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it lacked the heights of the ground, or could hit it.";
     "Load terrain data before the flight; check the mission's heights.";
-    "ekf_alert" Said "autopilot's alert: estimator", "", needs "texts, events or health flags of the autopilot";
+    "ekf_alert" Said "autopilot's alert: estimator", "", says "autopilot warns: EKF", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
     "The autopilot said that its estimator doubted or had lost attitude, velocity, position or height.";
     "Look at compass, GPS, barometer and vibration at that time.";
 
-    "heartbeat" Wire "autopilot's heartbeat", "", needs "monitor on the autopilot's wire";
+    "heartbeat" Wire "autopilot's heartbeat", "", says "autopilot silent", "LAND", needs "monitor on the autopilot's wire";
     "The autopilot fell silent."; "Check the wire between autopilot and monitor, and the autopilot's supply.";
-    "frames_lost" Wire "frames lost on the wire", "", needs "monitor on the autopilot's wire";
+    "frames_lost" Wire "frames lost on the wire", "", says "autopilot's data lost", "CHECK WIRE", needs "monitor on the autopilot's wire";
     "Messages of the autopilot were lost on the way."; "Check the wire, and lower the message rates or raise the baud rate.";
-    "rc_rssi" Vehicle "remote control signal", "", needs "signal strength of the remote control";
+    "rc_rssi" Vehicle "remote control signal", "", says "RC signal weak", "FLY BACK", needs "signal strength of the remote control";
     "The remote control's signal was weak."; "Check antennas and range.";
-    "radio_rssi" Vehicle "telemetry signal", "", needs "telemetry radio status";
+    "radio_rssi" Vehicle "telemetry signal", "", says "telemetry signal weak", "", needs "telemetry radio status";
     "The telemetry radio's signal was weak."; "Check antennas and range.";
-    "radio_margin" Vehicle "telemetry signal above noise", "", needs "telemetry radio status";
+    "radio_margin" Vehicle "telemetry signal above noise", "", says "telemetry near noise", "", needs "telemetry radio status";
     "The telemetry radio's signal was hardly above the noise."; "Check antennas, range and sources of interference.";
 
-    "rc_alert" Said "autopilot's alert: remote control", "", needs "texts, events or health flags of the autopilot";
+    "rc_alert" Said "autopilot's alert: remote control", "", says "autopilot warns: RC lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the remote control was lost."; "Check transmitter, receiver, antennas and range.";
-    "gcs_alert" Said "autopilot's alert: ground station", "", needs "texts, events or health flags of the autopilot";
+    "gcs_alert" Said "autopilot's alert: ground station", "", says "autopilot warns: no station", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the ground station or a companion was lost."; "Check the telemetry link and its range.";
 
-    "load" Vehicle "processor load", "", needs "processor load";
+    "load" Vehicle "processor load", "", says "autopilot CPU full", "LAND", needs "processor load";
     "The autopilot's processor was nearly full."; "Switch off what is not needed; lower logging and stream rates.";
-    "mcu_temperature" Vehicle "processor temperature", "", needs "processor temperature";
+    "mcu_temperature" Vehicle "processor temperature", "", says "autopilot hot", "LAND", needs "processor temperature";
     "The autopilot's processor was too hot."; "Check cooling and placement.";
-    "autopilot_reboot" Vehicle "autopilot restart", "", needs "heartbeat";
+    "autopilot_reboot" Vehicle "autopilot restart", "", says "autopilot restarted", "LAND NOW", needs "heartbeat";
     "The autopilot restarted."; "In flight: do not fly until the supply and the firmware are checked.";
-    "autopilot_state" Vehicle "autopilot failsafe", "", needs "state of the autopilot";
+    "autopilot_state" Vehicle "autopilot failsafe", "", says "autopilot in failsafe", "TAKE OVER", needs "state of the autopilot";
     "The autopilot declared a failsafe or an emergency."; "Read its messages of that time; mend the cause they name.";
-    "processor_alert" Said "autopilot's alert: processor", "", needs "texts, events or health flags of the autopilot";
+    "processor_alert" Said "autopilot's alert: processor", "", says "autopilot warns: processor", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that its processor or firmware had a problem.";
     "Keep its log and tell the firmware's makers; lower logging and stream rates.";
-    "logging_alert" Said "autopilot's alert: its log", "", needs "texts, events or health flags of the autopilot";
+    "logging_alert" Said "autopilot's alert: its log", "", says "autopilot does not log", "CHECK CARD", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it could not write its own log."; "Check the autopilot's card.";
-    "fence_alert" Said "autopilot's alert: geofence", "", needs "texts, events or health flags of the autopilot";
+    "fence_alert" Said "autopilot's alert: geofence", "", says "geofence breached", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the geofence was breached."; "Check the fence and the flight at that time.";
-    "failsafe_alert" Said "autopilot's alert: failsafe", "", needs "texts, events or health flags of the autopilot";
+    "failsafe_alert" Said "autopilot's alert: failsafe", "", says "autopilot's failsafe acts", "TAKE OVER", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a failsafe acted."; "Read its messages of that time; mend the cause they name.";
-    "autopilot_alert" Said "autopilot's alert", "", needs "texts, events or health flags of the autopilot";
+    "autopilot_alert" Said "autopilot's alert", "", says "autopilot: severe message", "READ IT", needs "texts, events or health flags of the autopilot";
     "The autopilot gave a severe message that no table here knows."; "Read its messages of that time.";
 
-    "roll" Vehicle "roll angle", "", needs "attitude";
+    "roll" Vehicle "roll angle", "", says "banks too far", "LEVEL OUT", needs "attitude";
     "The vehicle banked further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
-    "pitch" Vehicle "pitch angle", "", needs "attitude";
+    "pitch" Vehicle "pitch angle", "", says "pitches too far", "LEVEL OUT", needs "attitude";
     "The vehicle pitched further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
 
-    "attitude_alert" Said "autopilot's alert: attitude", "", needs "texts, events or health flags of the autopilot";
+    "attitude_alert" Said "autopilot's alert: attitude", "", says "autopilot warns: attitude", "TAKE OVER", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it had lost control of attitude or height.";
     "Do not fly until motors, propellers and sensors are checked.";
 
-    "recording" Recorder "recording", "", needs "monitor's own recorder";
+    "recording" Recorder "recording", "", says "not recording", "CHECK CARD", needs "monitor's own recorder";
     "The monitor did not record."; "Check its card.";
-    "record_queue" Recorder "recorder's queue", "", needs "monitor's own recorder";
+    "record_queue" Recorder "recorder's queue", "", says "card slow", "CHANGE CARD", needs "monitor's own recorder";
     "The card was too slow for a while."; "Take a faster card.";
-    "record_lost" Recorder "frames lost by the recorder", "", needs "monitor's own recorder";
+    "record_lost" Recorder "frames lost by the recorder", "", says "log frames lost", "", needs "monitor's own recorder";
     "The recorder lost frames."; "Take a faster card.";
-    "card_stall" Recorder "card stall", "", needs "monitor's own recorder";
+    "card_stall" Recorder "card stall", "", says "card waits", "CHANGE CARD", needs "monitor's own recorder";
     "The card kept the recorder waiting."; "Take a faster card.";
-    "card_errors" Recorder "card errors", "", needs "monitor's own recorder";
+    "card_errors" Recorder "card errors", "", says "card refuses writes", "", needs "monitor's own recorder";
     "The card refused blocks."; "Copy its logs, then replace it.";
-    "card_room" Recorder "room on the card", "", needs "monitor's own recorder";
+    "card_room" Recorder "room on the card", "", says "other files fill card", "CLEAR CARD", needs "monitor's own recorder";
     "Other files take the card's room."; "Copy them elsewhere, then remove them.";
-    "card_due" Stored "card life", "", needs "card registered with the monitor on board";
+    "card_due" Stored "card life", "", says "card life used", "REPLACE IT", needs "card registered with the monitor on board";
     "The card has reached the end of its life."; "Copy its logs, replace it, and tell the monitor.";
 
-    "free_fall" Vehicle "free fall", "", needs "acceleration of a vehicle on rotors";
+    "free_fall" Vehicle "free fall", "", says "falling", "KEEP CLEAR", needs "acceleration of a vehicle on rotors";
     "Nothing carried the vehicle though its throttle asked for thrust.";
     "Inspect the vehicle; look for lost power, ESCs or propellers in the seconds before.";
-    "impact" Vehicle "impact", "", needs "acceleration";
+    "impact" Vehicle "impact", "", says "impact", "DISARM", needs "acceleration";
     "The vehicle hit the ground or something else."; "Do not fly until the whole vehicle is inspected.";
-    "tumbling" Vehicle "tumbling", "", needs "body rates";
+    "tumbling" Vehicle "tumbling", "", says "tumbling", "KEEP CLEAR", needs "body rates";
     "The vehicle turned over and over: it was out of control.";
     "Do not fly until motors, propellers and sensors are checked.";
-    "disarmed_in_air" Vehicle "disarmed in the air", "", needs "arming";
+    "disarmed_in_air" Vehicle "disarmed in the air", "", says "disarmed in the air", "KEEP CLEAR", needs "arming";
     "The vehicle was disarmed in the air, and fell."; "Look for who or what disarmed it; inspect the vehicle.";
-    "sinking" Vehicle "sinking", "", needs "climb rate of a vehicle on rotors";
+    "sinking" Vehicle "sinking", "", says "sinking fast", "ADD THRUST", needs "climb rate of a vehicle on rotors";
     "The vehicle sank fast without being told to."; "Look for lost thrust, an empty battery or a wrong height.";
-    "overturned" Vehicle "overturned", "", needs "attitude of a vehicle on rotors";
+    "overturned" Vehicle "overturned", "", says "overturned", "DISARM", needs "attitude of a vehicle on rotors";
     "The vehicle turned over, or lay over, while its motors ran.";
     "Inspect the vehicle; check motor order, propellers and calibration.";
-    "crash_alert" Said "autopilot's alert: crash", "", needs "texts, events or health flags of the autopilot";
+    "crash_alert" Said "autopilot's alert: crash", "", says "autopilot reports a crash", "DISARM", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it crashed, released its parachute or ended the flight.";
     "Do not fly until the whole vehicle is inspected.";
 }
@@ -334,24 +403,38 @@ mod tests {
     #[test]
     fn every_check_has_its_words_in_the_order_of_the_tables() {
         let checks: Vec<&str> = checks().map(|check| check.name).collect();
-        let words: Vec<&str> = VOCABULARY.iter().map(|words| words.check).collect();
+        let words: Vec<&str> = VOCABULARY.iter().map(|words| words.said.check).collect();
         assert_eq!(words, checks);
     }
 
     #[test]
     fn words_are_sentences_and_parts_are_named_where_there_are_several() {
         for words in VOCABULARY {
+            let Said { check, name, part, .. } = words.said;
             for sentence in [words.meaning, words.action] {
                 let first = sentence.chars().next().is_some_and(char::is_uppercase);
-                assert!(
-                    first && sentence.ends_with('.') && sentence.len() <= 100,
-                    "{}: {sentence}",
-                    words.check
-                );
+                assert!(first && sentence.ends_with('.') && sentence.len() <= 100, "{check}: {sentence}");
             }
-            let several = crate::health::instances(words.check) > 1;
-            assert_eq!(several, !words.part.is_empty(), "{}", words.check);
-            assert!(!words.name.is_empty() && !words.needs.is_empty(), "{}", words.check);
+            let several = crate::health::instances(check) > 1;
+            assert_eq!(several, !part.is_empty(), "{check}");
+            assert!(name.starts_with(part), "{check}: the number of the part goes after its word");
+            assert!(!name.is_empty() && !words.needs.is_empty(), "{check}");
+        }
+    }
+
+    #[test]
+    fn an_alarm_names_its_part_and_is_one_checks_alone_and_what_is_critical_has_advice() {
+        // The same fault on another autopilot's scale, and after another time.
+        let twins = ["vibration_px4", "cell_dev_lasting"];
+        for (index, Words { said, .. }) in VOCABULARY.iter().enumerate() {
+            let Said { check, part, alarm, advice, .. } = *said;
+            assert!(!alarm.is_empty() && alarm.is_ascii() && advice.is_ascii(), "{check}");
+            assert_eq!(alarm.contains('#'), !part.is_empty(), "{check}: {alarm}");
+            assert!(alarm.matches('#').count() <= 1, "{check}: {alarm}");
+            let is_critical = crate::health::check_named(check).is_some_and(|check| check.critical.is_some());
+            assert_eq!(is_critical, !advice.is_empty(), "{check}: {advice}");
+            let other = VOCABULARY[..index].iter().find(|other| other.said.alarm == alarm);
+            assert_eq!(other.is_some(), twins.contains(&check), "{check}: {alarm}");
         }
     }
 }

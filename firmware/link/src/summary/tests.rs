@@ -87,18 +87,52 @@ const ALL: &[(u32, usize, u64)] = &[
 ];
 
 #[test]
-fn a_finding_reads_as_a_sentence_and_fits() {
-    assert_eq!(text(&finding(Level::Warning)).as_str(), "HUMS: battery low #1 14.90 % (limit 15)");
-    let flag = |check| text(&Finding { check, unit: "", value: 1.0, limit: 0.5, ..finding(Level::Warning) });
-    assert_eq!(flag("gnss_alert").as_str(), "HUMS: GPS alert");
-    assert_eq!(flag("esc_failure").as_str(), "HUMS: ESC failure #1");
+fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
+    let told = |finding: Finding| text(&finding).as_str().to_owned();
+    assert_eq!(told(finding(Level::Warning)), "HUMS: battery 1 low: 14.9 %");
+    assert_eq!(
+        told(Finding { value: 6.8, ..finding(Level::Critical) }),
+        "HUMS: battery 1 low: 6.8 %, LAND NOW"
+    );
+    assert_eq!(told(finding(Level::Ok)), "HUMS: ok: battery 1 remaining");
+    assert_eq!(told(finding(Level::Stale)), "HUMS: no data: battery 1 remaining");
+    let flag = |check| told(Finding { check, instance: 2, unit: "", value: 1.0, ..finding(Level::Warning) });
+    assert_eq!(flag("gnss_alert"), "HUMS: autopilot warns: GPS");
+    assert_eq!(flag("esc_failure"), "HUMS: ESC 3 failed");
+    let motor = Finding { check: "motor_imbalance", instance: 2, value: 44.07, ..finding(Level::Critical) };
+    assert_eq!(told(motor), "HUMS: motor 3 speed differs: 44.1 %, LAND");
+    assert_eq!(told(Finding { check: "of_later", ..motor }), "HUMS: of_later");
+}
+
+#[test]
+fn no_text_is_cut_whatever_part_and_level() {
     for check in health::checks() {
-        for level in Level::ALL {
-            let finding = Finding { check: check.name, unit: check.unit, value: -1234.5, ..finding(level) };
+        let advice = health::said(check.name).map_or("", |said| said.advice);
+        for (level, feeds) in
+            Level::ALL.into_iter().flat_map(|level| [(level, Feeds::Vehicle), (level, Feeds::Avionics)])
+        {
+            let feeds = if check.subsystem == Subsystem::Power { feeds } else { Feeds::Unsaid };
+            let finding = Finding {
+                check: check.name,
+                instance: check.instances - 1,
+                unit: check.unit,
+                value: -234.5,
+                feeds,
+                ..finding(level)
+            };
             let told = text(&finding);
-            let plain = check.is_flag || matches!(level, Level::Ok | Level::Stale);
-            let has_end = plain || told.as_str().ends_with(')');
-            assert!(has_end && told.as_str().len() <= 50, "{}", told.as_str());
+            let told = told.as_str();
+            let quantity = quantity(finding.value, check.unit);
+            let has_value = !check.is_flag && feeds != Feeds::Avionics;
+            let end = match level {
+                Level::Critical => advice,
+                Level::Warning if has_value => quantity.as_str(),
+                _ => "",
+            };
+            assert!(told.len() <= TEXT_BYTES_MAX && told.ends_with(end), "{told}");
+            let whole = health::said(check.name).map(|said| said.name_of(finding.instance).to_string());
+            let is_good = matches!(level, Level::Ok | Level::Stale);
+            assert!(!is_good || told.ends_with(&whole.unwrap()), "{told}");
         }
     }
 }
@@ -109,23 +143,13 @@ fn a_battery_that_does_not_keep_the_vehicle_up_is_called_what_it_is() {
         let finding = Finding { instance: 1, feeds, ..finding(level) };
         text(&finding).as_str().to_owned()
     };
-    assert_eq!(told(Feeds::Payload, Level::Critical), "HUMS: payload battery low #2 14.90 %");
-    assert_eq!(told(Feeds::Avionics, Level::Warning), "HUMS: avionics battery low #2 14.90 %");
-    assert_eq!(told(Feeds::Payload, Level::Ok), "HUMS: ok again: payload battery low #2");
-    for check in health::checks().filter(|check| check.subsystem == Subsystem::Power && check.instances > 1) {
-        for level in Level::ALL {
-            let finding = Finding {
-                check: check.name,
-                unit: check.unit,
-                value: -1234.5,
-                feeds: Feeds::Avionics,
-                ..finding(level)
-            };
-            let told = text(&finding);
-            let whole = told.as_str().ends_with(check.unit) || told.as_str().ends_with("#1");
-            assert!(whole && told.as_str().len() <= 50, "{}", told.as_str());
-        }
-    }
+    assert_eq!(told(Feeds::Payload, Level::Warning), "HUMS: battery 2 (payload) low: 14.9 %");
+    let warned = told(Feeds::Payload, Level::Warning);
+    assert_eq!(told(Feeds::Payload, Level::Critical), warned, "nobody lands because of a camera's battery");
+    let long =
+        Finding { check: "cell_deviation", unit: "V", feeds: Feeds::Avionics, ..finding(Level::Critical) };
+    assert_eq!(text(&long).as_str(), "HUMS: battery 1 (avionics) cells uneven, LAND");
+    assert_eq!(told(Feeds::Avionics, Level::Ok), "HUMS: ok: battery 2 remaining");
 }
 
 #[test]
@@ -205,10 +229,12 @@ fn told(findings: &[(u64, u8, Level, Level, &'static str)]) -> Vec<(u64, u8)> {
     let mut told = Vec::new();
     for now_s in 0..120 {
         let now = Instant::from_millis(now_s * 1_000);
-        // The number after the `#` of a STATUSTEXT.
+        // The number after the word of a STATUSTEXT.
         let mut out = |bytes: &[u8]| {
-            let number = bytes.windows(2).find(|two| two[0] == b'#' && two[1].is_ascii_digit());
-            if let (Some([_, digit]), Some(253)) = (number, bytes.get(7)) {
+            let word = b"battery ";
+            let place = bytes.windows(word.len()).position(|found| found == word);
+            let digit = place.and_then(|place| bytes.get(place + word.len()));
+            if let (Some(digit), Some(253)) = (digit, bytes.get(7)) {
                 told.push((now_s, digit - b'1'));
             }
         };

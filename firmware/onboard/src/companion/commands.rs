@@ -13,6 +13,7 @@
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::health::{self, Level};
+use hums_core::observation::Feeds;
 use hums_core::params::TABLE;
 use hums_core::time::Instant;
 use hums_link::messages;
@@ -179,9 +180,9 @@ fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn)
 }
 
 /// The first thing that stands against a flight.
-fn preflight(monitor: &Monitor) -> Option<&'static str> {
+fn preflight(monitor: &Monitor) -> Option<(&'static str, u8)> {
     let bad = |level| matches!(level, Level::Warning | Level::Critical);
-    monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, ..)| check.name)
+    monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, part, _)| (check.name, part))
 }
 
 /// An answer as a message.
@@ -199,12 +200,14 @@ pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Pa
         Reply::Protocol => messages::protocol_version(),
         Reply::Heartbeat => summary::heartbeat(monitor),
         Reply::Preflight => match preflight(monitor) {
-            Some(check) => {
-                let words = health::words(check);
-                messages::status_text(
-                    Severity::Warning,
-                    Text::new(format_args!("HUMS: not ready: {words}")).as_str(),
-                )
+            Some((check, part)) => {
+                let text = match health::said(check) {
+                    Some(said) => {
+                        Text::new(format_args!("HUMS: not ready: {}", said.alarm_of(part, Feeds::Unsaid)))
+                    }
+                    None => Text::new(format_args!("HUMS: not ready: {check}")),
+                };
+                messages::status_text(Severity::Warning, text.as_str())
             }
             None => messages::status_text(Severity::Info, "HUMS: ready"),
         },

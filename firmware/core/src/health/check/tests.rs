@@ -4,7 +4,6 @@ use super::*;
 
 const CHECK: Check = Check {
     name: "tilt",
-    words: "tilt",
     subsystem: Subsystem::Attitude,
     unit: "deg",
     side: Side::Above,
