@@ -18,7 +18,10 @@ use crate::made;
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::plural::count;
-use crate::source::{self, Timing};
+use crate::source::booted::Booted;
+use crate::source::checksums::Checksums;
+use crate::source::own::JOINED;
+use crate::source::{self, Source, Timing};
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
@@ -33,7 +36,10 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     }
     let mut inputs = Inputs::none().replacing(args.replace);
     inputs.add_endpoint(&args.input);
-    let mut source = source::open(&args.input, Timing { line_rate: None })?;
+    let source = source::open(&args.input, Timing { line_rate: None })?;
+    // Raw bytes have the times that the autopilot tells, as in `check`.
+    let mut source: Box<dyn Source> =
+        if source.has_records() { source } else { Box::new(Booted::new(source)) };
     let context = || cannot_write(&args.output);
     let read = || format!("{}: cannot be read", args.input);
     // What waits for its first byte, as a pipe may for ever, leaves nothing behind.
@@ -60,9 +66,14 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
             None => source.next().with_context(read)?,
         };
         let Some(chunk) = next else { break };
+        if source.begins_another() && first.is_empty() {
+            packer.joint(chunk.at_us).with_context(context)?;
+        }
         packer.chunk(chunk.at_us, &chunk.bytes, source.has_records()).with_context(context)?;
+        packer.damaged(last_us, chunk.at_us, source.damages()).with_context(context)?;
         last_us = chunk.at_us;
     }
+    packer.damaged(last_us, last_us, source.damages()).with_context(context)?;
     let (done, mut file) = packer.finish(last_us).with_context(context)?;
     if done.frames == 0 {
         bail!("{}: has no MAVLink frame, so nothing was written; hums check says what a file is", args.input);
@@ -84,7 +95,10 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         let bytes = count(done.bytes_not_frames, "byte");
         note!("of no frame, and only counted: {bytes} of the recording");
     }
-    Ok(Outcome::Done)
+    if let Some(words) = &done.wrong_checksums {
+        note!("{}: {words}", args.input);
+    }
+    Ok(Outcome::lossy(source.damages() > 0 || done.wrong_checksums.is_some()))
 }
 
 /// So many bytes of frames make the session's number: few, because a recording that has grown is the same one.
@@ -98,13 +112,15 @@ fn session_of(hash: Sha256) -> u32 {
 }
 
 /// What packing did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 struct Done {
     frames: u64,
     /// What the frames take as a tlog.
     recording_bytes: u64,
     log_bytes: u64,
     bytes_not_frames: u64,
+    /// Frames of a tlog whose checksum does not fit, as a sentence.
+    wrong_checksums: Option<String>,
 }
 
 /// Finished sectors, until they are written out.
@@ -129,12 +145,24 @@ struct Packer<W> {
     /// The session's number.
     session: u32,
     log_bytes: u64,
+    checksums: Checksums,
+    /// Places of the recording that are damaged, until now.
+    damages: u64,
 }
 
 impl<W: Write> Packer<W> {
     fn new(file: W, session: u32) -> Self {
         let (writer, framer) = (Box::new(Writer::new()), Framer::new());
-        Self { file, writer, framer, finished: Finished::default(), session, log_bytes: 0 }
+        Self {
+            file,
+            writer,
+            framer,
+            finished: Finished::default(),
+            session,
+            log_bytes: 0,
+            checksums: Checksums::default(),
+            damages: 0,
+        }
     }
 
     fn start(&mut self, utc_us: Option<u64>) -> Result<()> {
@@ -154,9 +182,13 @@ impl<W: Write> Packer<W> {
 
     /// Bytes that came together; a record of a tlog is a frame by itself, with silence around it.
     fn chunk(&mut self, at_us: u64, bytes: &[u8], is_record: bool) -> Result<()> {
-        let Self { framer, writer, finished, .. } = self;
+        let Self { framer, writer, finished, checksums, .. } = self;
+        if is_record {
+            checksums.begin(Instant::from_micros(at_us), 0, bytes);
+        }
         let mut result = Ok(());
         let mut take = |frame: hums_link::Frame<'_>| {
+            checksums.frame(&frame);
             let verified = frame.check() == Check::Verified;
             let taken = writer.frame(Instant::from_micros(at_us), frame.bytes(), verified, finished);
             result = std::mem::replace(&mut result, Ok(())).and(taken);
@@ -164,9 +196,27 @@ impl<W: Write> Packer<W> {
         framer.push(bytes, &mut take);
         if is_record {
             framer.idle(&mut take);
+            checksums.end();
         }
         result.map_err(|full: Full| anyhow::anyhow!("the log writer refused a frame: {full}"))?;
         self.write_out()
+    }
+
+    /// Another recording was joined on: what is packed says so.
+    fn joint(&mut self, at_us: u64) -> Result<()> {
+        let at = Instant::from_micros(at_us);
+        self.framer.idle(&mut |_: hums_link::Frame<'_>| {});
+        self.record(at, &Record::Note(Note { severity: 6, text: JOINED }))
+    }
+
+    /// So many places of the recording are damaged by now: what is new since the chunk before is a loss of what is packed.
+    fn damaged(&mut self, before_us: u64, at_us: u64, damages: u64) -> Result<()> {
+        let count = damages - std::mem::replace(&mut self.damages, damages).min(damages);
+        if count == 0 {
+            return Ok(());
+        }
+        let (from, to) = (Instant::from_micros(before_us), Instant::from_micros(at_us));
+        self.record(to, &Record::Loss(Loss { what: Lost::Other, count, from, to }))
     }
 
     fn finish(mut self, last_us: u64) -> Result<(Done, W)> {
@@ -181,6 +231,11 @@ impl<W: Write> Packer<W> {
             };
             self.record(Instant::from_micros(last_us), &Record::Loss(loss))?;
         }
+        let wrong_checksums = self.checksums.gap();
+        if let Some(gap) = &wrong_checksums {
+            let (from, to) = (gap.from.unwrap_or(Instant::ZERO), Instant::from_micros(last_us));
+            self.record(to, &Record::Loss(Loss { what: Lost::Other, count: 1, from, to }))?;
+        }
         self.writer.finish(&mut self.finished);
         self.write_out()?;
         let counters = self.writer.counters();
@@ -189,6 +244,7 @@ impl<W: Write> Packer<W> {
             recording_bytes: counters.frame_bytes + 8 * counters.frames,
             log_bytes: self.log_bytes,
             bytes_not_frames: counts.bytes_not_frames,
+            wrong_checksums: wrong_checksums.map(|gap| gap.words),
         };
         Ok((done, self.file))
     }

@@ -9,7 +9,7 @@ const MOTION_AGE: Span = Span::from_secs(3);
 const SPEED_MAX_MPS: f32 = 1_000.0;
 
 /// Height above home; above the local origin where there is no global position.
-pub(crate) fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+pub fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let global = vehicle.global.within(now, MOTION_AGE).map(|global| global.relative_altitude.0);
     let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.position[2].0);
     global.or_else(local).filter(|height_m| height_m.is_finite())
@@ -36,7 +36,7 @@ pub(crate) fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 }
 
 /// Speed upwards from the best source that is fresh, in m/s.
-pub(crate) fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+pub fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let global = vehicle.global.within(now, MOTION_AGE).map(|global| -global.velocity[2].0);
     let local = || vehicle.local.within(now, MOTION_AGE).map(|local| -local.velocity[2].0);
     let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.climb).map(|climb| climb.0);

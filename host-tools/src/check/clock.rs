@@ -57,6 +57,11 @@ impl Clock {
         self.reached
     }
 
+    /// The recording's time at the end of the latest gap.
+    pub(super) const fn gap_end(&self) -> Instant {
+        self.gap_end
+    }
+
     /// By how much the monitor's time is behind the recording's: the sum of the gaps until now.
     pub(super) const fn behind(&self) -> Span {
         self.behind

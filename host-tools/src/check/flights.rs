@@ -31,6 +31,8 @@ pub(super) struct Flights {
     open: bool,
     /// The flight that ends next ends by a mishap.
     crashed: bool,
+    /// The recording was silent in it, and the vehicle has not been seen to fly since.
+    unseen: bool,
     silence: Option<Silence>,
     /// The monitor's time of the last step.
     stepped_at: Option<Instant>,
@@ -97,7 +99,7 @@ impl Flights {
         {
             (flight.to, flight.air) = (silence.to, silence.air);
         }
-        (self.open, self.silence) = (false, None);
+        (self.open, self.unseen, self.silence) = (false, false, None);
     }
 
     /// Which of the flights goes on.
@@ -109,7 +111,7 @@ impl Flights {
     pub(super) fn landing(&mut self) {
         let crashed = std::mem::take(&mut self.crashed);
         if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
-            flight.landed = !crashed;
+            flight.landed = !crashed && !self.unseen;
         }
         self.close();
     }
@@ -119,6 +121,11 @@ impl Flights {
         for flight in &mut self.list {
             flight.disarmed_at_m = None;
         }
+    }
+
+    /// The recording was silent: until the vehicle is seen to fly on, nobody knows that it landed.
+    pub(super) fn silent(&mut self, is_unseen: bool) {
+        self.unseen = self.open && is_unseen;
     }
 
     /// A mishap began or ended.

@@ -34,6 +34,7 @@ struct LogJson<'a> {
     armed_s: f64,
     flight_s: f64,
     flights: Vec<FlightJson>,
+    ends_in_air: Option<EndsInAirJson>,
     clock_restarts: u64,
     problems: Vec<ProblemJson<'a>>,
     findings_count: u64,
@@ -65,6 +66,14 @@ struct FlightJson {
     air_s: f64,
     landed: bool,
     disarmed_at_m: Option<f32>,
+}
+
+#[derive(Serialize)]
+struct EndsInAirJson {
+    time_s: f64,
+    height_m: Option<f32>,
+    climb_mps: Option<f32>,
+    speed_mps: Option<f32>,
 }
 
 #[derive(Serialize)]
@@ -147,6 +156,12 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         armed_s: seconds(judged.armed),
         flight_s: seconds(flown(judged)),
         flights: judged.flights.iter().map(flight).collect(),
+        ends_in_air: judged.ends_in_air.map(|end| EndsInAirJson {
+            time_s: end.at.as_secs_f64(),
+            height_m: end.height_m,
+            climb_mps: end.climb_mps,
+            speed_mps: end.speed_mps,
+        }),
         clock_restarts: judged.restarts,
         problems: judged.problems.iter().map(|problem| self::problem(problem, utc(problem.at))).collect(),
         findings_count: judged.findings_count,

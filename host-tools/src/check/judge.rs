@@ -12,7 +12,8 @@ use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
-use hums_core::observation::{Observation, Source, SystemStatus};
+use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
+use hums_core::observation::{Observation, Source, SystemStatus, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
@@ -23,15 +24,24 @@ use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
 use super::flights::Flights;
-use super::judged::{Judged, JudgedBy};
+use super::judged::{EndsInAir, Judged, JudgedBy};
 use super::problem::{LISTED_MAX, Problems};
 use crate::source::epochs::Epochs;
-use crate::source::item::{About, Event, Fact, Gap, Item, Text};
+use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::told::{Finding, Told};
 
 /// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
 const SILENCE_MAX: Span = Span::from_secs(75);
+
+/// So long a recording says nothing of a vehicle that is armed, and it is told: three heartbeats of a link, ...
+const SILENT: Span = Span::from_secs(3);
+/// ... and of a log that the autopilot writes itself, whose slowest topics come once a second.
+const NOT_WRITTEN: Span = Span::from_secs(2);
+/// Silence of a vehicle that is armed on the ground hides a flight where it is longer.
+const HIDES_FLIGHT: Span = Span::from_secs(10);
+/// What flies on is seen to fly so long after the silence: longer than a landing needs to be seen.
+const SEEN: Span = Span::from_secs(3);
 
 /// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
@@ -67,6 +77,22 @@ impl Limits {
     }
 }
 
+/// When the vehicle was heard last, and whether it was in the air then.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    at: Instant,
+    airborne: bool,
+}
+
+/// A silence of which is not known yet what it hides.
+#[derive(Clone, Copy, Debug)]
+struct Silence {
+    to: Instant,
+    airborne: bool,
+    /// Which of the gaps it is.
+    gap: usize,
+}
+
 /// Judges a recording, item by item.
 pub struct Judge {
     monitor: Box<Monitor>,
@@ -79,6 +105,8 @@ pub struct Judge {
     clock: Clock,
     first: Option<Instant>,
     last: Instant,
+    last_heard: Option<Last>,
+    silence: Option<Silence>,
     coverage: Coverage,
     /// What the monitor here found, and what the one on board did.
     here: Problems,
@@ -107,6 +135,8 @@ impl Judge {
             clock: Clock::default(),
             first: None,
             last: Instant::ZERO,
+            last_heard: None,
+            silence: None,
             coverage: Coverage::new(),
             here: Problems::default(),
             board: Problems::default(),
@@ -139,6 +169,9 @@ impl Judge {
         self.epochs.take(at, &item);
         match item {
             Item::Observation(source, observation) => {
+                if self.is_vehicle(source) {
+                    self.hear(at);
+                }
                 self.advance(at);
                 match observation {
                     Observation::SystemStatus(status) => self.sensors(source, status),
@@ -184,6 +217,65 @@ impl Judge {
             | Item::Frame(_)
             | Item::Mode(_)
             | Item::Row(_) => {}
+        }
+    }
+
+    /// The vehicle is heard, perhaps after a silence that the recording does not tell itself. (A log of ours is heard on the
+    /// autopilot's wire, whose silence is a check of its own, unless it was packed on a PC.)
+    fn hear(&mut self, at: Instant) {
+        let (armed, airborne) = (self.monitor.vehicle().armed(), self.monitor.flight().airborne());
+        let before = self.last_heard.replace(Last { at, airborne });
+        let is_told = match self.format {
+            Format::DataFlash => true,
+            Format::Hums => self.checked_on_board,
+            Format::Ulog | Format::Tlog | Format::Raw => false,
+        };
+        let Some(Last { at: last, airborne }) = before.filter(|_| !is_told && self.wire.is_none()) else {
+            return;
+        };
+        let from = last.max(self.clock.gap_end());
+        let length = at.since(from);
+        let is_own = self.format == Format::Ulog;
+        if !(armed || airborne) || length < if is_own { NOT_WRITTEN } else { SILENT } {
+            return;
+        }
+        let seconds = length.as_secs_f32();
+        let how = if airborne { "in the air" } else { "while armed" };
+        let words = format!(
+            "the recording says nothing of the vehicle for {seconds:.1} s {how}: what happened then is not known"
+        );
+        let (to, cause) = (Some(at), Why::Lost);
+        let gap = Gap { from: Some(from), to, cause, place: None, bytes: 0, words };
+        if is_own {
+            // The logger wrote nothing: that is no silence of the vehicle.
+            self.gap(&gap);
+        } else {
+            let place = self.list(&gap);
+            self.doubt(place, at, airborne, length);
+        }
+    }
+
+    /// What a silence until then hides, which is this one of the gaps, is seen later.
+    fn doubt(&mut self, gap: Option<usize>, to: Instant, airborne: bool, length: Span) {
+        self.settle();
+        let hides =
+            airborne || (length >= HIDES_FLIGHT && self.monitor.vehicle().kind() != VehicleKind::Surface);
+        if let Some(gap) = gap.filter(|_| hides) {
+            self.flights.silent(true);
+            self.silence = Some(Silence { to, airborne, gap });
+        }
+    }
+
+    /// Whether the vehicle flies on after a silence: if not, nobody knows how its flight ended, and that the recording does not
+    /// have it counts as damage.
+    fn settle(&mut self) {
+        let Some(Silence { airborne, gap, .. }) = self.silence.take() else { return };
+        if airborne && self.monitor.flight().airborne() {
+            self.flights.silent(false);
+        } else if let Some(gap) = self.gaps.get_mut(gap).filter(|gap| !gap.cause.is_damage()) {
+            self.losses = self.losses.saturating_sub(u64::from(gap.cause == Why::Lost));
+            self.damages += 1;
+            gap.cause = Why::Silent;
         }
     }
 
@@ -245,6 +337,8 @@ impl Judge {
         if self.first.is_some() {
             self.advance(self.last);
         }
+        self.settle();
+        self.last_heard = None;
         self.flights.end_of_recording(&self.monitor);
         self.clock.skip_to(at + SETTLE);
     }
@@ -287,17 +381,28 @@ impl Judge {
             && self.first.is_some()
         {
             self.advance(from);
+            let (airborne, length) = (self.monitor.flight().airborne(), to.since(from));
             if to.since(from) >= SETTLE {
                 // What came last before it counts: a landing, a disarming.
                 self.tick(from);
             }
             self.clock.pause(from, to);
+            let place = self.list(gap);
+            if gap.cause == Why::Lost && airborne && length >= NOT_WRITTEN {
+                self.doubt(place, to, airborne, length);
+            }
+            return;
         }
+        self.list(gap);
+    }
+
+    /// Counts a gap; its place in the list, if that has room.
+    fn list(&mut self, gap: &Gap) -> Option<usize> {
         self.damages += u64::from(gap.cause.is_damage());
-        self.losses += u64::from(gap.cause == crate::source::item::Cause::Lost);
-        if self.gaps.len() < LISTED_MAX {
-            self.gaps.push(gap.clone());
-        }
+        self.losses += u64::from(gap.cause == Why::Lost);
+        let place = Some(self.gaps.len()).filter(|place| *place < LISTED_MAX)?;
+        self.gaps.push(gap.clone());
+        Some(place)
     }
 
     /// Steps the monitor up to a time.
@@ -315,6 +420,9 @@ impl Judge {
     }
 
     fn tick(&mut self, now: Instant) {
+        if self.silence.is_some_and(|silence| now >= silence.to + SEEN) {
+            self.settle();
+        }
         let steps = self.clock.monitor(now);
         let (link, recorder) = (self.link(steps), RecorderStatus::default());
         let Self { monitor, here, format, wire, clock, details, .. } = self;
@@ -365,11 +473,30 @@ impl Judge {
         }
     }
 
+    /// How the vehicle was when the recording ended in the air.
+    fn ends_in_air(&mut self) -> Option<EndsInAir> {
+        self.flights.going_on().filter(|_| self.monitor.flight().airborne())?;
+        let steps = self.clock.monitor(self.last);
+        let vehicle = self.monitor.vehicle();
+        Some(EndsInAir {
+            at: self.last,
+            height_m: height_m(steps, vehicle),
+            climb_mps: climb_mps(steps, vehicle),
+            speed_mps: ground_speed_mps(steps, vehicle),
+        })
+    }
+
     /// The recording has ended.
     pub fn end(mut self) -> Judged {
         if self.first.is_some() {
             self.advance(self.last);
+            if self.flights.going_on().is_some() {
+                // What came last counts: a landing, a disarming.
+                self.tick(self.last);
+            }
         }
+        self.settle();
+        let ends_in_air = self.ends_in_air();
         self.distrust_disarming();
         if self.monitor.vehicle().source.is_none()
             && let Some(earlier) = self.earlier.take()
@@ -412,6 +539,7 @@ impl Judge {
             span: self.first.map(|first| (first, last)),
             armed,
             flights,
+            ends_in_air,
             findings_count: problems.findings_count,
             findings: std::mem::take(&mut problems.findings),
             problems: problems.worst_first(),

@@ -25,6 +25,19 @@ pub enum JudgedBy {
     Here,
 }
 
+/// The vehicle as it was heard last, where the recording ends in the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndsInAir {
+    /// When.
+    pub at: Instant,
+    /// Height above home, or above the local origin, m.
+    pub height_m: Option<f32>,
+    /// Climb rate, m/s; negative where it sank.
+    pub climb_mps: Option<f32>,
+    /// Speed over ground, m/s.
+    pub speed_mps: Option<f32>,
+}
+
 /// What came of a recording.
 #[derive(Clone, Debug)]
 pub struct Judged {
@@ -42,6 +55,8 @@ pub struct Judged {
     pub armed: Span,
     /// Flights, in order.
     pub flights: Vec<Flight>,
+    /// The last of them goes on at the recording's end.
+    pub ends_in_air: Option<EndsInAir>,
     /// Changes of level, in order, up to [`super::problem::LISTED_MAX`].
     pub findings: Vec<Finding>,
     /// How many there are.

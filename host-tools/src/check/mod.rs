@@ -28,7 +28,7 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::progress;
 use crate::run::params;
-use crate::source::find::{find, sessions_of};
+use crate::source::find::{Found, find, sessions_of};
 use crate::source::recording::Place;
 use checked::Checked;
 use judge::{Heard, Limits};
@@ -37,7 +37,7 @@ use text::Table;
 /// Runs `hums check`.
 pub fn run(args: &cli::Check) -> Result<Outcome> {
     let limits = Limits::new(&params::read(args.params.as_deref())?);
-    let found = find(&args.inputs, args.salvage)?;
+    let (found, mut failed) = logs(args)?;
     for remark in &found.remarks {
         note!("{remark}");
     }
@@ -46,7 +46,7 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1;
-    let (bar, mut table, mut failed) = (progress::logs(found.places.len()), Table::default(), 0_usize);
+    let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
     let mut followed = Followed::new(sessions_of(&found.places));
     let mut done = |Told { name, checked }: Told| match checked {
         Ok(checked) => {
@@ -93,11 +93,32 @@ pub fn run(args: &cli::Check) -> Result<Outcome> {
     if many && !args.json {
         output::line(&table.text(failed))?;
     }
-    match (failed, many) {
+    match (failed, args.inputs.as_slice()) {
         (0, _) => Ok(outcome),
-        (_, false) => bail!("{}: could not be read", found.places.first().map_or("", |place| &place.title)),
-        (failed, true) => bail!("{failed} of {} logs could not be read", found.places.len()),
+        (_, [input]) if !many => bail!("{}: could not be read", input.display()),
+        (failed, inputs) => {
+            bail!("{failed} of {} logs could not be read", inputs.len().max(found.places.len()))
+        }
     }
+}
+
+/// The logs that are meant. With `--json` an input that is no log at all has an object too, and the others are judged: so many are none.
+fn logs(args: &cli::Check) -> Result<(Found, usize)> {
+    let error = match find(&args.inputs, args.salvage) {
+        Ok(found) => return Ok((found, 0)),
+        Err(error) => error,
+    };
+    if !args.json {
+        return Err(error);
+    }
+    let mut good = Vec::new();
+    for input in &args.inputs {
+        match find(std::slice::from_ref(input), args.salvage) {
+            Ok(_) => good.push(input.clone()),
+            Err(error) => output::json_line(&json::error(&input.display().to_string(), &error))?,
+        }
+    }
+    Ok((find(&good, args.salvage)?, args.inputs.len() - good.len()))
 }
 
 /// A recording that was judged, or why it was not.

@@ -9,7 +9,7 @@ use hums_core::health::{Level, Side, Subsystem, vocabulary};
 use hums_core::time::{Instant, Span};
 
 use super::checked::Checked;
-use super::judged::{Judged, JudgedBy};
+use super::judged::{EndsInAir, Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
@@ -36,6 +36,9 @@ pub fn screen(checked: &Checked) -> String {
     problems(&mut text, judged);
     not_judged(&mut text, judged);
     damage(&mut text, judged);
+    if let Some(end) = &judged.ends_in_air {
+        let _ = writeln!(text, "  the end  {:>9}  {}", moment(end.at), ends_in_air(end));
+    }
     for remark in &judged.remarks {
         let _ = writeln!(text, "  besides  {remark}");
     }
@@ -60,8 +63,11 @@ pub fn line(checked: &Checked) -> String {
         }
     }
     let found = names.join(", ");
-    let what: Vec<&str> =
-        [found.as_str(), state(checked).words()].into_iter().filter(|words| !words.is_empty()).collect();
+    let ends = if judged.ends_in_air.is_some() { "ends in the air" } else { "" };
+    let what: Vec<&str> = [found.as_str(), ends, state(checked).words()]
+        .into_iter()
+        .filter(|words| !words.is_empty())
+        .collect();
     let air = clock(flown(judged));
     format!("{level:<8}  {air:>8}  {}  {}", word(&checked.name), what.join("; ")).trim_end().to_owned()
 }
@@ -75,6 +81,8 @@ enum State {
     /// the same as damage inside of it.
     Cut,
     Damaged,
+    /// The recorder says itself, or it is seen, that it did not write all.
+    Lossy,
     /// A log of ours without damage, of which nothing proves that it is whole.
     NotProved,
 }
@@ -85,6 +93,7 @@ impl State {
             Self::Whole => "",
             Self::Cut => "cut at its end",
             Self::Damaged => "part of it is missing or damaged",
+            Self::Lossy => "part of it was not recorded",
             Self::NotProved => "not proved to be whole",
         }
     }
@@ -94,8 +103,9 @@ fn state(checked: &Checked) -> State {
     let judged = &checked.judged;
     let mut damages = judged.gaps.iter().filter(|gap| gap.cause.is_damage());
     match judged.damages {
-        0 if checked.unproved().is_empty() => State::Whole,
-        0 => State::NotProved,
+        0 if !checked.unproved().is_empty() => State::NotProved,
+        0 if judged.losses > 0 => State::Lossy,
+        0 => State::Whole,
         _ if damages.all(|gap| gap.cause == Cause::Cut) => State::Cut,
         _ => State::Damaged,
     }
@@ -103,12 +113,15 @@ fn state(checked: &Checked) -> State {
 
 /// What the verdict is not about: the end of its line.
 fn but(checked: &Checked) -> String {
-    match state(checked) {
+    let ends = if checked.judged.ends_in_air.is_some() { "; the log ends in the air" } else { "" };
+    let what = match state(checked) {
         State::Whole => String::new(),
         State::Cut => "; the log is cut at its end".to_owned(),
         State::Damaged => "; part of the log is missing or damaged, and was not judged".to_owned(),
+        State::Lossy => "; part of the time was not recorded".to_owned(),
         State::NotProved => "; the log is not proved to be whole".to_owned(),
-    }
+    };
+    format!("{ends}{what}")
 }
 
 /// Many logs, added up.
@@ -476,6 +489,7 @@ fn damage(text: &mut String, judged: &Judged) {
         let what = match gap.cause {
             Cause::NoTimes => "no times",
             Cause::Cut => "cut",
+            Cause::Silent => "silent",
             cause if cause.is_damage() => "damaged",
             _ => "lost",
         };
@@ -487,6 +501,19 @@ fn damage(text: &mut String, judged: &Judged) {
     if more > 0 {
         let _ = writeln!(text, "  and {more} more such places (--json)");
     }
+}
+
+/// How the recording ends, as a sentence.
+fn ends_in_air(end: &EndsInAir) -> String {
+    let mut known = Vec::new();
+    known.extend(end.height_m.map(|height_m| format!("{height_m:.1} m above home")));
+    known.extend(end.climb_mps.map(|climb_mps| {
+        let way = if climb_mps < 0.0 { "sinking" } else { "climbing" };
+        format!("{way} at {:.1} m/s", climb_mps.abs())
+    }));
+    known.extend(end.speed_mps.map(|speed_mps| format!("{speed_mps:.1} m/s over ground")));
+    let known = if known.is_empty() { String::new() } else { format!(": {}", known.join(", ")) };
+    format!("the recording ends in the air{known}; what became of the vehicle is not in it")
 }
 
 /// A time in the recording, to a tenth of a second: `4:20.8`.

@@ -93,6 +93,11 @@ impl Arrivals {
         self.bytes
     }
 
+    /// The recording is damaged, as far as it has come. (Of raw bytes nobody knows: a line may be noisy.)
+    pub fn is_damaged(&self) -> bool {
+        self.source.has_records() && self.source.damages() > 0
+    }
+
     /// What was strange in the input.
     pub fn remark(&self) -> Option<String> {
         self.source.remark().map(|remark| format!("{}: {remark}", self.name))

@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 use std::io::Read;
 
+use super::pace::SLOWER;
 use super::timeline::STEP_BACK_US_MAX;
 use super::tlog::records::Records;
 use crate::mavlink::frame;
@@ -100,12 +101,11 @@ impl Joints {
             return None;
         }
         let (mut ahead, mut first_ms, mut seen_ms, mut last_us) = (Vec::new(), None, 0, time_us);
-        let mut falls = false;
+        let mut returns = None;
         after.each_after(&mut |recorded_us, bytes| {
             // It is set again.
-            falls |=
-                recorded_us.saturating_add(STEP_BACK_US_MAX) < std::mem::replace(&mut last_us, recorded_us);
-            if falls {
+            if recorded_us.saturating_add(STEP_BACK_US_MAX) < std::mem::replace(&mut last_us, recorded_us) {
+                returns = Some(recorded_us);
                 return false;
             }
             if let frame::Peek::Frame(frame) = frame::peek(bytes)
@@ -118,11 +118,25 @@ impl Joints {
             }
             seen_ms < ASKED_MS
         });
+        // Soon it is back where it was, before the autopilot told its time: nothing passed but what it is ahead by then.
+        let returned_us = returns.and_then(|us| i64::try_from(i128::from(us) - i128::from(before_us)).ok());
+        if first_ms.is_none()
+            && jump_us >= HELD_BACK_US
+            && let Some(returned_us) = returned_us
+            && (-(STEP_BACK_US_MAX as i64)..HELD_BACK_US).contains(&returned_us)
+        {
+            return Some(0);
+        }
         let passed_ms = i64::from(first_ms?) - i64::from(before_ms);
+        let goes_on = (-DISORDER_MS..=TOLD_MS).contains(&passed_ms);
+        let ran_us = last_us.saturating_sub(time_us);
+        if goes_on && seen_ms >= ASKED_MS && ran_us.saturating_mul(SLOWER) < u64::from(seen_ms) * 1_000 {
+            // It does not run after the jump: by how much it is ahead says nothing.
+            return Some(u64::try_from(passed_ms * 1_000).unwrap_or(0));
+        }
         let known = self.ahead.iter().filter(|(of, _)| *of == system).map(|(_, ahead)| *ahead);
         let set_us = least(ahead)?.checked_sub(least(known.collect())?)?;
         let is_set = set_us < -(STEP_BACK_US_MAX as i64) || set_us > HELD_BACK_US || is_regained(set_us);
-        let goes_on = (-DISORDER_MS..=TOLD_MS).contains(&passed_ms);
         let passed_us = jump_us.saturating_sub(set_us);
         let fits = (-DISORDER_MS * 1_000..=TOLD_MS * 1_000).contains(&passed_us);
         (is_set && goes_on && fits).then(|| u64::try_from(passed_us).unwrap_or(0))

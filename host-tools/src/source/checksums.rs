@@ -10,7 +10,7 @@ use crate::plural::count;
 /// Which records' frames have a checksum that does not fit. Of an id that is not known, or is known by another definition, nobody
 /// can say.
 #[derive(Debug, Default)]
-pub(super) struct Checksums {
+pub struct Checksums {
     /// Of the record at hand, whether the message is known; `None` once its frame has come.
     waits: Option<bool>,
     /// Where the record at hand is.
@@ -25,19 +25,19 @@ pub(super) struct Checksums {
 
 impl Checksums {
     /// A record with these bytes of a frame.
-    pub(super) fn begin(&mut self, at: Instant, place: u64, bytes: &[u8]) {
+    pub fn begin(&mut self, at: Instant, place: u64, bytes: &[u8]) {
         let Peek::Frame(frame) = peek(bytes) else { return };
         (self.waits, self.at, self.place) = (Some(frame.message().is_some()), at, place);
     }
 
     /// A frame that is one.
-    pub(super) fn frame(&mut self, frame: &hums_link::Frame<'_>) {
+    pub fn frame(&mut self, frame: &hums_link::Frame<'_>) {
         self.waits = None;
         self.unchecked += u64::from(frame.check() == Check::Unverified);
     }
 
     /// The record is over.
-    pub(super) fn end(&mut self) {
+    pub fn end(&mut self) {
         match self.waits.take() {
             Some(true) => {
                 self.damaged += 1;
@@ -49,14 +49,14 @@ impl Checksums {
     }
 
     /// Those that are damaged.
-    pub(super) fn gap(&self) -> Option<Gap> {
+    pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words = format!("{} with a wrong checksum, which are not read", count(self.damaged, "frame"));
         Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
     }
 
     /// Those that nobody can check, as a sentence.
-    pub(super) fn words(&self) -> Option<String> {
+    pub fn words(&self) -> Option<String> {
         (self.unchecked > 0).then(|| {
             let frames = count(self.unchecked, "frame");
             format!("{frames} of messages that this program has no definition of: whether they are damaged is not known")

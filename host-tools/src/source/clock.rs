@@ -225,6 +225,11 @@ impl Clock {
         self.begun
     }
 
+    /// So much more passed than the recorded times tell.
+    pub fn pass(&mut self, us: u64) {
+        self.timeline.pass(us);
+    }
+
     /// The latest time.
     pub fn now(&self) -> Instant {
         self.timeline.now()

@@ -223,7 +223,7 @@ impl Gap {
     pub fn to_own(&self) -> hums_blackbox::Gap {
         let cause = match self.cause {
             Cause::Damaged | Cause::Cut | Cause::NoTimes => hums_blackbox::Cause::Damaged,
-            Cause::Lost => hums_blackbox::Cause::Missing,
+            Cause::Lost | Cause::Silent => hums_blackbox::Cause::Missing,
             Cause::NotKept => hums_blackbox::Cause::Disarmed,
         };
         hums_blackbox::Gap {
@@ -248,14 +248,16 @@ pub enum Cause {
     Lost,
     /// The recorder left it out on purpose.
     NotKept,
-    /// No message of the recording has a time: nothing in it can be put in order with the rest.
+    /// Nothing was recorded for a while in the air, and the vehicle was not seen to fly on: how the flight ended is not known.
+    Silent,
+    /// No message of the recording, or of a part of it, has a time: nothing in it can be put in order with the rest.
     NoTimes,
 }
 
 impl Cause {
     /// Whether the recording has less than it should: exit code 3.
     pub const fn is_damage(self) -> bool {
-        matches!(self, Self::Damaged | Self::Cut | Self::NoTimes)
+        matches!(self, Self::Damaged | Self::Cut | Self::Silent | Self::NoTimes)
     }
 
     /// In a word, for tables and JSON.
@@ -265,6 +267,7 @@ impl Cause {
             Self::Cut => "cut",
             Self::Lost => "lost",
             Self::NotKept => "not_kept",
+            Self::Silent => "silent",
             Self::NoTimes => "no_times",
         }
     }

@@ -4,15 +4,16 @@ use anyhow::Result;
 use hums_core::time::Instant;
 use hums_link::framer::Framer;
 
-use super::boot::boot_ms;
+use super::blocks::Blocks;
+use super::booted::BootTimes;
 use super::checksums::Checksums;
 use super::input::Input;
 use super::item::{About, Cause, Fact, Gap, Item, MessageCount, Reader, Summary, Take, Want};
+use super::pace::Pace;
 use super::paced::Paced;
 use super::raw::Raw;
 use super::said::Said;
 use super::stream::Source as _;
-use super::timeline::Timeline;
 use super::tlog::records::{Record, Records, TIME_BYTES};
 use super::tlog::times::{Begins, Times};
 use crate::names::message_name;
@@ -129,74 +130,6 @@ impl Reader for TlogReader {
     }
 }
 
-/// An autopilot that was powered on again in a recording tells its time by then; one whose time fell and that runs for longer is in
-/// another recording.
-const STARTS_MS: u32 = 10_000;
-/// Bytes of the same value in a row, 0x00 or 0xff, that no frame and no line makes (a payload is 255 bytes at most): a block of a file that was
-/// never written.
-const BLOCK_BYTES: u64 = 512;
-
-/// Finds blocks that were never written.
-#[derive(Default)]
-struct Blocks {
-    value: u8,
-    length: u64,
-    bytes: u64,
-    /// Where the first of them begins.
-    first: Option<u64>,
-    place: u64,
-}
-
-impl Blocks {
-    fn take(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.place += 1;
-            if byte != self.value || (byte != 0 && byte != 0xff) {
-                (self.value, self.length) = (byte, 0);
-            }
-            self.length += 1;
-            if matches!(byte, 0 | 0xff) && self.length >= BLOCK_BYTES {
-                let new = if self.length == BLOCK_BYTES { BLOCK_BYTES } else { 1 };
-                self.first.get_or_insert(self.place - BLOCK_BYTES);
-                self.bytes += new;
-            }
-        }
-    }
-}
-
-/// The time of frames without recorded times: what the autopilot's own messages tell of the time since its boot, and until it
-/// tells any, what a line takes for the bytes.
-#[derive(Default)]
-struct BootTimes {
-    /// Whose times count: the first system whose autopilot tells one.
-    system: Option<u8>,
-    timeline: Option<Timeline>,
-    /// The line's time at the first of them.
-    base: Instant,
-}
-
-impl BootTimes {
-    /// The time of a frame, and what begins with it.
-    fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, Option<Begins>) {
-        let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
-        if let Some(boot_ms) = told {
-            let boot_us = u64::from(boot_ms) * 1_000;
-            if self.timeline.is_none() {
-                (self.system, self.base) = (Some(frame.system()), line);
-            }
-            let timeline = self.timeline.get_or_insert_with(|| Timeline::from_first(boot_us));
-            let moment = timeline.at(boot_us);
-            let begins = if boot_ms > STARTS_MS { Begins::Recording } else { Begins::Clock };
-            return (self.after_base(moment.at), moment.restarted.then_some(begins));
-        }
-        (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), None)
-    }
-
-    fn after_base(&self, at: Instant) -> Instant {
-        Instant::from_micros(self.base.as_micros().saturating_add(at.as_micros()))
-    }
-}
-
 /// The raw bytes of a port, in the time that the autopilot's messages tell, or that a line at this rate takes for them.
 pub struct RawReader {
     bytes: Paced<Raw<Input>>,
@@ -215,6 +148,7 @@ impl Reader for RawReader {
         let mut now = Instant::ZERO;
         let mut line = Instant::ZERO;
         let (mut times, mut blocks) = (BootTimes::default(), Blocks::default());
+        let (mut pace, mut bytes) = (Pace::default(), 0);
         let mut each = |line, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
             counts.add(frame.id(), frame.bytes().len());
             let (at, begins) = times.at(line, &frame);
@@ -223,25 +157,33 @@ impl Reader for RawReader {
                 Some(Begins::Recording) => {
                     said.end(take)?;
                     said = Said::default();
+                    pace.begin_another();
                     take(at, Item::Joint)?;
                 }
-                Some(Begins::Clock) => take(at, Item::Restart)?,
+                Some(Begins::Clock) => {
+                    pace.fell(at);
+                    take(at, Item::Restart)?;
+                }
                 None => {}
             }
+            pace.at(at, bytes, frame.bytes().len() as u64);
+            bytes += frame.bytes().len() as u64;
             said.frame(at, &frame, want, take)
         };
         while let Some(chunk) = self.bytes.next()? {
             line = Instant::from_micros(chunk.at_us);
-            blocks.take(&chunk.bytes);
             push(&mut framer, &chunk.bytes, false, &mut |frame| each(line, frame, take))?;
+            blocks.take(&chunk.bytes, framer.counts().frames);
         }
         let (held, frames) = (framer.held(), framer.counts().frames);
         push(&mut framer, &[], true, &mut |frame| each(line, frame, take))?;
         said.end(take)?;
-        if let Some(place) = blocks.first {
-            let words = format!("of nothing but 0x00 or 0xff: {}", count(blocks.bytes, "byte"));
-            let bytes = usize::try_from(blocks.bytes).unwrap_or(usize::MAX);
-            take(now, Item::Gap(&gap(now, Cause::Damaged, place, bytes, words)))?;
+        if let Some(gap) = pace.gap() {
+            take(now, Item::Gap(&gap))?;
+        }
+        blocks.end();
+        for gap in blocks.gaps(now) {
+            take(now, Item::Gap(&gap))?;
         }
         let is_cut = held > 0 && framer.counts().frames == frames;
         let cut = if is_cut { held } else { 0 };
@@ -250,7 +192,7 @@ impl Reader for RawReader {
             let words = format!("a frame that the end cuts off: {}", count(held, "byte"));
             take(now, Item::Gap(&gap(now, Cause::Cut, place, held, words)))?;
         }
-        let noise = framer.counts().bytes_not_frames.saturating_sub(blocks.bytes + cut as u64);
+        let noise = framer.counts().bytes_not_frames.saturating_sub(blocks.bytes() + cut as u64);
         if noise > 0 {
             // Noise on the line and damage of the file look alike here.
             let words = format!("of no frame, noise on the line: {}", count(noise, "byte"));

@@ -15,14 +15,16 @@
 //! | source | arrival times |
 //! |---|---|
 //! | a tlog (file or `-`) | the recorded ones, counted from the first |
-//! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud |
+//! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud; [`booted`] has those that the autopilot tells |
 //! | UDP, TCP, serial | the clock's |
 //!
 //! Times are microseconds since the first byte and never fall: see [`tlog::times`] for what happens to clocks that jumped.
 //! Everything streams: memory does not grow with the input.
 
+pub mod blocks;
 mod boot;
-mod checksums;
+pub mod booted;
+pub mod checksums;
 pub mod clock;
 pub mod dataflash;
 pub mod doubt;
@@ -35,6 +37,7 @@ pub mod live;
 pub mod mavlink;
 pub mod noise;
 pub mod own;
+pub mod pace;
 pub mod paced;
 pub mod raw;
 pub mod recording;

@@ -37,6 +37,18 @@ impl<S: Source> Source for Noisy<S> {
         self.inner.utc_start_us()
     }
 
+    fn has_records(&self) -> bool {
+        self.inner.has_records()
+    }
+
+    fn begins_another(&self) -> bool {
+        self.inner.begins_another()
+    }
+
+    fn damages(&self) -> u64 {
+        self.inner.damages()
+    }
+
     fn remark(&self) -> Option<String> {
         self.inner.remark()
     }
@@ -53,6 +65,14 @@ impl Source for Box<dyn Source> {
 
     fn has_records(&self) -> bool {
         (**self).has_records()
+    }
+
+    fn begins_another(&self) -> bool {
+        (**self).begins_another()
+    }
+
+    fn damages(&self) -> u64 {
+        (**self).damages()
     }
 
     fn remark(&self) -> Option<String> {

@@ -1,7 +1,8 @@
 //! Logs of HUMS as the one stream. Groups are decoded side by side ([`crate::logs::reader`]) and handed on in order.
 
 use anyhow::Result;
-use hums_blackbox::{Cause as OwnCause, Entry, Gap as OwnGap};
+use hums_blackbox::record::Note;
+use hums_blackbox::{Cause as OwnCause, Entry, Gap as OwnGap, Record};
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use hums_link::{Check, Frame, observe};
@@ -14,6 +15,9 @@ use crate::ending::Ending;
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, epoch, read};
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
+
+/// The note in a packed log behind which another recording goes on: the input was joined of several.
+pub const JOINED: &str = "another recording begins here: the input was joined of several";
 
 /// A session of a log of ours.
 pub struct OwnReader {
@@ -70,6 +74,8 @@ enum Kept {
     Frame(Check, usize),
     Observation(Source, Box<Observation>),
     Told(Told),
+    /// Another recording begins, in a packed log.
+    Joint,
 }
 
 impl Collect for Collected {
@@ -85,6 +91,9 @@ impl Collect for Collected {
                 } else if let (true, Some((source, observation))) = (self.observations, observe(&frame)) {
                     self.entries.push((at, Kept::Observation(source, Box::new(observation))));
                 }
+            }
+            Entry::Record { at, record: Record::Note(Note { text: JOINED, .. }) } => {
+                self.entries.push((at, Kept::Joint));
             }
             Entry::Record { at, record } => {
                 self.entries.extend(Told::of(&record).map(|told| (at, Kept::Told(told))));
@@ -130,6 +139,10 @@ impl Deliver<Collected> for Hand<'_, '_> {
                     (self.take)(*at, Item::Observation(*source, observation))?;
                 }
                 Kept::Told(told) => (self.take)(*at, Item::Record(told))?,
+                Kept::Joint => {
+                    std::mem::take(&mut self.said).end(self.take)?;
+                    (self.take)(*at, Item::Joint)?;
+                }
             }
         }
         Ok(())

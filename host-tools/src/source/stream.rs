@@ -26,6 +26,16 @@ pub trait Source: Send {
         false
     }
 
+    /// Whether another recording begins with the chunk that was handed on last: it was joined on.
+    fn begins_another(&self) -> bool {
+        false
+    }
+
+    /// How many places of the input are damaged, as far as it has been read; all of them are known after its end.
+    fn damages(&self) -> u64 {
+        0
+    }
+
     /// A sentence about what was strange in the input, once it has been read.
     fn remark(&self) -> Option<String> {
         None

@@ -55,6 +55,13 @@ impl Timeline {
         Moment { at: Instant::from_micros(at), restarted: true }
     }
 
+    /// So much more passed than the recorded times tell.
+    pub fn pass(&mut self, us: u64) {
+        if let Some((_, reached)) = &mut self.last {
+            *reached = reached.saturating_add(us);
+        }
+    }
+
     /// The next recorded time, in microseconds.
     pub fn at(&mut self, recorded_us: u64) -> Moment {
         let Some((before, reached)) = self.last else {

@@ -8,7 +8,7 @@ pub mod times;
 use std::io::{self, Read};
 
 use self::records::{Record, Records, TIME_BYTES};
-use self::times::Times;
+use self::times::{Begins, Times};
 use super::stream::{Chunk, Source};
 use crate::plural::count;
 
@@ -20,6 +20,10 @@ pub struct Tlog<R> {
     noise_bytes: u64,
     jumps: u64,
     utc_start_us: Option<u64>,
+    /// Another recording began with the latest record.
+    begins: bool,
+    damages: u64,
+    ended: bool,
 }
 
 impl<R: Read> Tlog<R> {
@@ -34,22 +38,39 @@ impl<R: Read> Tlog<R> {
     }
 
     fn of(records: Records<R>) -> Self {
-        Self { records, times: Times::default(), place: 0, noise_bytes: 0, jumps: 0, utc_start_us: None }
+        Self {
+            records,
+            times: Times::default(),
+            place: 0,
+            noise_bytes: 0,
+            jumps: 0,
+            utc_start_us: None,
+            begins: false,
+            damages: 0,
+            ended: false,
+        }
     }
 }
 
 impl<R: Read + Send> Source for Tlog<R> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         Ok(match self.records.next_record()? {
-            None => None,
+            None => {
+                if !std::mem::replace(&mut self.ended, true) {
+                    self.damages += self.times.gaps().count() as u64;
+                }
+                None
+            }
             Some(Record::Frame { time_us, bytes }) => {
                 let told = self.times.take(time_us, &bytes, self.place, &self.records);
                 self.place += (TIME_BYTES + bytes.len()) as u64;
+                self.begins = told.begins == Some(Begins::Recording);
                 self.jumps += u64::from(told.begins.is_some());
                 self.utc_start_us = self.utc_start_us.or(told.epoch_us);
                 Some(Chunk { at_us: self.times.now().as_micros(), bytes })
             }
             Some(Record::Noise(bytes)) => {
+                self.damages += 1;
                 self.noise_bytes += bytes.len() as u64;
                 self.place += bytes.len() as u64;
                 Some(Chunk { at_us: self.times.now().as_micros(), bytes })
@@ -63,6 +84,14 @@ impl<R: Read + Send> Source for Tlog<R> {
 
     fn has_records(&self) -> bool {
         true
+    }
+
+    fn begins_another(&self) -> bool {
+        self.begins
+    }
+
+    fn damages(&self) -> u64 {
+        self.damages
     }
 
     fn remark(&self) -> Option<String> {

@@ -612,7 +612,7 @@ fn one_wrong_time_changes_no_other_time_of_what_is_packed() {
         with_times(&log, |index, us| if index == 999 { us ^ 1 << 36 } else { us }),
     )
     .expect("written");
-    let pack = run(dir.path(), "pack wrong.tlog -o wrong.hum", 0);
+    let pack = run(dir.path(), "pack wrong.tlog -o wrong.hum", 3);
     let told = String::from_utf8_lossy(&pack.stderr).into_owned();
     assert!(told.contains("1 message with a wrong time"), "{told}");
     run(dir.path(), "pack faults.tlog -o faults.hum", 0);
@@ -660,4 +660,53 @@ fn a_problem_has_the_time_of_day_of_its_own_part_of_the_recording() {
         at[..18].to_owned()
     };
     assert_eq!(of_cells(&both), of_cells(&alone));
+}
+
+#[test]
+fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() {
+    let dir = tempfile::tempdir().expect("directory");
+    let tlog = fs::read(px4()).expect("a recording");
+    let write = |name: &str, bytes: &[u8]| fs::write(dir.path().join(name), bytes).expect("written");
+    write("flight.raw", &frames_of(&px4()).concat());
+    let middle = tlog.len() / 2;
+    write("damaged.tlog", &[&tlog[..middle], &[7; 100], &tlog[middle + 300..]].concat());
+    // The same vehicle, a day earlier.
+    write("joined.tlog", &[tlog.clone(), with_times(&tlog, |_, us| us - 86_400_000_000)].concat());
+    for (name, code) in [("flight.raw", 0), ("damaged.tlog", 3), ("joined.tlog", 0)] {
+        run(dir.path(), &format!("pack {name} -o {name}.hum"), code);
+        let of = |input: &str| {
+            let checked = json(&attempt(dir.path(), &format!("check --json {input}")));
+            let problems: Vec<String> = checked["problems"]
+                .as_array()
+                .expect("problems")
+                .iter()
+                .map(|problem| problem["check"].as_str().unwrap_or_default().to_owned())
+                .collect();
+            let joints = checked["clock_restarts"].as_u64();
+            (checked["flight_s"].as_f64().expect("seconds"), problems, joints)
+        };
+        let (plain, packed) = (of(name), of(&format!("{name}.hum")));
+        assert!((plain.0 - packed.0).abs() < 0.3, "{name}: {plain:?} {packed:?}");
+        assert_eq!((&plain.1, plain.2), (&packed.1, packed.2), "{name}");
+    }
+    run(dir.path(), "check damaged.tlog.hum", 3);
+    run(dir.path(), "sim --input damaged.tlog --sd card.img", 3);
+    // A frame whose checksum does not fit is damage of a tlog too.
+    let first = frames_of(&px4())[0].len();
+    let mut wrong = tlog.clone();
+    wrong[8 + first - 1] ^= 1;
+    write("wrong.tlog", &wrong);
+    let told = run(dir.path(), "pack wrong.tlog -o wrong.hum", 3);
+    let told = String::from_utf8_lossy(&told.stderr).into_owned();
+    assert!(told.contains("1 frame with a wrong checksum"), "{told}");
+}
+
+#[test]
+fn a_file_that_is_no_log_has_an_object_too() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("zeros"), vec![0; 100_000]).expect("written");
+    let checked = json(&run(dir.path(), "check --json zeros", 1));
+    assert!(checked["error"].as_str().is_some_and(|error| error.contains("zeros")), "{checked}");
+    let both = text(&run(dir.path(), "check --json zeros PX4", 1));
+    assert_eq!(both.lines().count(), 2, "{both}");
 }

@@ -85,7 +85,8 @@ fn what_is_written_beside_a_recording_may_fail_and_the_recording_goes_on() {
 fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     let dir = tempfile::tempdir().expect("directory");
     let (old, part) = (dir.path().join("old.hum"), dir.path().join(".old.hum.hums-part"));
-    fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..4000]).expect("written");
+    let few: usize = frames_of(&px4())[..60].iter().map(|frame| 8 + frame.len()).sum();
+    fs::write(dir.path().join("few.tlog"), &fs::read(px4()).expect("a recording")[..few]).expect("written");
     run(dir.path(), "pack few.tlog -o old.hum", 0);
     let before = fs::read(&old).expect("there");
     let mut program = Command::new(env!("CARGO_BIN_EXE_hums"))

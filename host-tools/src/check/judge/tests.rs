@@ -9,7 +9,7 @@ use hums_core::units::{Fraction, Rpm, Volts};
 
 use super::*;
 use crate::check::flights::Flight;
-use crate::source::item::{Cause as Why, hand_said};
+use crate::source::item::hand_said;
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
@@ -597,4 +597,56 @@ fn what_the_board_found_is_named_too() {
         (judged.by, judged.problems[0].details.clone()),
         (JudgedBy::Board, vec!["Battery 1 is low".to_owned()])
     );
+}
+
+/// What a silence of so many seconds in the air, after which the vehicle is so, makes of a recording: flights that landed,
+/// causes of gaps, damages.
+fn silent_in_air(
+    format: Format,
+    silence_ms: u64,
+    armed: bool,
+    landed: LandedState,
+) -> (Vec<bool>, Vec<Why>, u64) {
+    let mut judge = Judge::new(&Limits::default(), format);
+    half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+    half_seconds(&mut judge, 5_000, 40_000, true, LandedState::InAir);
+    let again = 39_500 + silence_ms;
+    half_seconds(&mut judge, again, again + 20_000, armed, landed);
+    let judged = judge.end();
+    let landed = judged.flights.iter().map(|flight| flight.landed).collect();
+    (landed, judged.gaps.iter().map(|gap| gap.cause).collect(), judged.damages)
+}
+
+#[test]
+fn silence_in_the_air_is_told_and_hides_no_crash() {
+    for format in [Format::Tlog, Format::Raw, Format::Ulog] {
+        let of = |silence_ms, armed, landed| silent_in_air(format, silence_ms, armed, landed);
+        assert_eq!(of(1_000, false, LandedState::OnGround), (vec![true], vec![], 0));
+        for silence_ms in [4_000, 6_000, 20_000] {
+            let flies_on = of(silence_ms, true, LandedState::InAir);
+            assert_eq!(flies_on, (vec![false], vec![Why::Lost], 0), "{format:?} {silence_ms}");
+            for armed in [false, true] {
+                let ends = of(silence_ms, armed, LandedState::OnGround);
+                assert_eq!(ends, (vec![false], vec![Why::Silent], 1), "{format:?} {silence_ms} {armed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_recording_that_ends_in_the_air_says_so_and_what_comes_last_is_a_landing() {
+    let ends = |last: Option<LandedState>| {
+        let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
+        half_seconds(&mut judge, 0, 5_000, true, LandedState::OnGround);
+        half_seconds(&mut judge, 5_000, 40_020, true, LandedState::InAir);
+        let at = Instant::from_millis(40_020);
+        if let Some(landed) = last {
+            judge.item(at, Item::Observation(AUTOPILOT, &Observation::Landed(landed, VtolState::Unknown)));
+            judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(false)));
+        }
+        let judged = judge.end();
+        (judged.ends_in_air.is_some(), judged.flights.last().map(|flight| flight.landed))
+    };
+    assert_eq!(ends(None), (true, Some(false)));
+    assert_eq!(ends(Some(LandedState::OnGround)), (false, Some(true)));
 }

@@ -81,7 +81,8 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");
     }
-    Ok(report.print(run.json, run.gs == Some(Endpoint::Standard))?.and(beside))
+    let outcome = report.print(run.json, run.gs == Some(Endpoint::Standard))?;
+    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged())))
 }
 
 /// What the ports had, and what of it the card has.

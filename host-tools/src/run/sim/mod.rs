@@ -89,7 +89,8 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");
     }
-    Ok(report.print(run.json, run.gs == Some(Endpoint::Standard))?.and(beside))
+    let outcome = report.print(run.json, run.gs == Some(Endpoint::Standard))?;
+    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged())))
 }
 
 fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {

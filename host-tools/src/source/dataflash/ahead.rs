@@ -17,6 +17,10 @@ pub(super) const AHEAD_BYTES: usize = 256 * 1_024;
 const ERASED_BYTES: usize = 4 * 1_024;
 /// Fields of a line that are looked at.
 const VALUES_MAX: usize = 32;
+/// Messages behind a pause that are looked at for arming: all of what a logger begins with, ...
+const MESSAGES_MAX: usize = 2_048;
+/// ... within this of the first.
+const ARMS_US: u64 = 1_000_000;
 /// Definitions that are looked at.
 const DEFINED_MAX: usize = 256;
 
@@ -32,6 +36,28 @@ pub(super) struct Ahead<'a> {
 }
 
 impl Ahead<'_> {
+    /// Whether arming comes next, in a message or in those after it, before any disarming: the vehicle was disarmed until now.
+    /// (Copters of before 2016 log no disarming where they are told to log only while armed.)
+    pub(super) fn arms(self, message: &Message<'_>, formats: &Formats) -> bool {
+        if let Some(arms) = arming(message) {
+            return arms;
+        }
+        let bytes = self.bytes.get(..AHEAD_BYTES).unwrap_or(self.bytes);
+        let until = message.time_us().map_or(u64::MAX, |us| us.saturating_add(ARMS_US));
+        let (mut found, mut looked) = (None, 0);
+        let mut take = |message: &Message<'_>| {
+            found = arming(message);
+            looked += 1;
+            found.is_none() && looked < MESSAGES_MAX && message.time_us().is_none_or(|us| us <= until)
+        };
+        if self.is_text {
+            of_lines(bytes, self.is_end, formats, &mut take);
+        } else {
+            of_bytes(bytes, formats, &mut take);
+        }
+        found == Some(true)
+    }
+
     /// The first few times that messages tell there and that are asked for.
     pub(super) fn stamps(self, formats: &Formats, week: Week, asks: &dyn Fn(Stamp) -> bool) -> clock::Ahead {
         let bytes = self.bytes.get(..AHEAD_BYTES).unwrap_or(self.bytes);
@@ -48,6 +74,17 @@ impl Ahead<'_> {
             is_end |= begins || bytes.len() - read >= ERASED_BYTES;
         }
         clock::Ahead { is_end: is_end && stamps.len() < ASKED, stamps }
+    }
+}
+
+/// Whether a message tells of arming or disarming: `EV` 10 and 11, and `ARM`.
+fn arming(message: &Message<'_>) -> Option<bool> {
+    let format = message.format();
+    let told = |field: &str| message.unsigned(format.field(field)?);
+    match (format.name.as_str(), told("Id"), told("ArmState")) {
+        ("EV", Some(10), _) | ("ARM", _, Some(1)) => Some(true),
+        ("EV", Some(11), _) | ("ARM", _, Some(0)) => Some(false),
+        _ => None,
     }
 }
 

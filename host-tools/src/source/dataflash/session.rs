@@ -14,6 +14,7 @@ use super::epoch::Epoch;
 use super::format::{Defined, Format, Formats, Lengths, Role};
 use super::message::{Body, Message};
 use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
+use super::stamp::receiver_us;
 use super::table::{self, Tables};
 use crate::plural::count;
 use crate::source::clock::Wrong;
@@ -21,6 +22,7 @@ use crate::source::item::{
     About, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Want, hand_said,
 };
+use crate::source::pace::Pace;
 
 /// The autopilot: every log is of one.
 const SOURCE: Source = Source { system: 1, component: 1 };
@@ -174,6 +176,9 @@ pub(super) struct Session<'w> {
     /// known.
     later: Option<Standing>,
     wrong: Wrong,
+    pace: Pace,
+    /// Bytes of messages since the time of one was looked at.
+    unpaced: u64,
     /// A message that has a time has come since the log at hand began.
     timed: bool,
     joints: u32,
@@ -201,6 +206,8 @@ impl<'w> Session<'w> {
             rows_refused: false,
             later: None,
             wrong: Wrong::default(),
+            pace: Pace::default(),
+            unpaced: 0,
             timed: false,
             joints: 0,
         }
@@ -226,7 +233,8 @@ impl<'w> Session<'w> {
         self.needed.fill(None);
         self.epoch = Epoch::default();
         self.firmware = banner.unwrap_or_default();
-        (self.later, self.timed) = (None, false);
+        (self.later, self.timed, self.unpaced) = (None, false, 0);
+        self.pace.begin_another();
         self.joints += 1;
         self.clock.begin_another(begins_us);
         take(self.clock.now(), Item::Joint)?;
@@ -270,6 +278,7 @@ impl<'w> Session<'w> {
         take: &mut Take<'_>,
     ) -> Result<()> {
         let index = usize::from(kind);
+        self.unpaced += bytes;
         if let Some((count, all)) = self.counts.get_mut(index) {
             *count += 1;
             *all += bytes;
@@ -360,20 +369,30 @@ impl<'w> Session<'w> {
         ahead: Ahead<'_>,
         take: &mut Take<'_>,
     ) -> Result<()> {
-        let Self { want, formats, state, clock, handlers, epoch, firmware, later, wrong, .. } = self;
+        let Self {
+            want, formats, state, clock, handlers, epoch, firmware, later, wrong, pace, unpaced, ..
+        } = self;
         let Some(format) = formats.get(kind) else { return Ok(()) };
         let message = Message::new(format, body);
         let when = clock.at(&message, ahead, formats);
+        let bytes = std::mem::take(unpaced);
+        if formats.has_boot_clock && clock.has_begun() {
+            pace.at(when.at, place, bytes);
+            if let Some(week_us) = receiver_us(&message) {
+                pace.witness(when.at, week_us);
+            }
+        }
         if when.own == Own::Wrong {
             wrong.add(when.at, place);
         }
         if when.restarted {
+            pace.fell(when.at);
             take(when.at, Item::Restart)?;
             state.restart();
             *epoch = Epoch::default();
         }
         if let Some(from) = clock.silence() {
-            let (cause, words) = if state.is_armed() {
+            let (cause, words) = if state.is_armed() && !ahead.arms(&message, formats) {
                 (Cause::Lost, "nothing was written, though the vehicle was armed")
             } else {
                 (Cause::NotKept, "nothing was written")
@@ -473,7 +492,7 @@ impl<'w> Session<'w> {
 
     /// What was read.
     pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
-        if let Some(gap) = self.wrong.gap() {
+        for gap in self.wrong.gap().into_iter().chain(self.pace.gap()) {
             take(self.clock.now(), Item::Gap(&gap))?;
         }
         let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();

@@ -45,3 +45,13 @@ pub(super) fn week_us(message: &Message<'_>, formats: &Formats) -> Option<u64> {
     let ms = message.unsigned(format.field("TimeMS").or_else(|| format.field("Time"))?)?;
     Some(ms.saturating_mul(1_000))
 }
+
+/// The time of the week that a receiver tells, microseconds.
+pub(super) fn receiver_us(message: &Message<'_>) -> Option<u64> {
+    let format = message.format();
+    if format.name != "GPS" {
+        return None;
+    }
+    let ms = message.unsigned(format.field("GMS").or_else(|| format.field("TimeMS"))?)?;
+    (ms > 0).then(|| ms.saturating_mul(1_000))
+}

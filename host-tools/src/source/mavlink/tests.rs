@@ -263,19 +263,73 @@ fn another_raw_recording_that_was_joined_on_is_told_from_a_restart() {
     assert_eq!(told_raw([attitudes(60..100), attitudes(3..40)].concat()), ["restart"]);
 }
 
-#[test]
-fn times_that_stand_still_or_are_no_microseconds_are_none() {
-    let seconds = |recorded: fn(u64) -> u64| {
-        let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
-        let record = |second: u64| {
-            let packet = Packet::new(30).u32(0, second as u32 * 1_000);
-            [&recorded(second).to_be_bytes()[..], encoder.frame(&mut buffer, &packet)].concat()
-        };
-        let bytes: Vec<u8> = (60..260).flat_map(record).collect();
-        told_of(bytes).0
+/// Attitudes of an autopilot that has been on for 60 to 260 s, ten a second, at times that are made of the seconds that passed.
+fn ten_a_second(recorded: impl Fn(f64) -> u64) -> Vec<u8> {
+    let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+    let record = |tenth: u64| {
+        let packet = Packet::new(30).u32(0, tenth as u32 * 100);
+        let time = recorded((tenth - 600) as f64 / 10.0).to_be_bytes();
+        [&time[..], encoder.frame(&mut buffer, &packet)].concat()
     };
-    assert_eq!(seconds(|second| 1_700_000_000_000_000 + second * 1_000_000), []);
-    assert_eq!(seconds(|_| 0), [(Cause::NoTimes, None)]);
-    assert_eq!(seconds(|_| 1_700_000_000_000_000), [(Cause::NoTimes, None)]);
-    assert_eq!(seconds(|second| 1_700_000_000_000 + second * 1_000), [(Cause::NoTimes, None)]);
+    (600..2_600).flat_map(record).collect()
+}
+
+#[test]
+fn where_the_recorded_times_stand_still_the_autopilots_count_and_it_is_damage() {
+    const BEGAN: u64 = 1_700_000_000 * SECOND;
+    let sound = |passed_s: f64| BEGAN + (passed_s * 1e6) as u64;
+    let of = |recorded: &dyn Fn(f64) -> u64| {
+        let (gaps, restarts, tenths) = told_of(ten_a_second(recorded));
+        (gaps.into_iter().map(|(cause, _)| cause).collect::<Vec<_>>(), restarts, tenths)
+    };
+    assert_eq!(of(&sound), (vec![], 0, 1_999));
+    let is_mended = |(causes, restarts, tenths): (Vec<Cause>, usize, u64)| {
+        causes == [Cause::Damaged] && restarts <= 2 && (1_960..=2_010).contains(&tenths)
+    };
+    // From the beginning, and from some place on: they stop, are zero, are milliseconds.
+    for from_s in [0.0, 20.0, 100.0, 180.0] {
+        let stops = of(&|passed_s| sound(passed_s.min(from_s)));
+        assert!(is_mended(stops.clone()), "{from_s}: {stops:?}");
+        let zero = of(&|passed_s| if passed_s < from_s { sound(passed_s) } else { 0 });
+        assert!(is_mended(zero.clone()), "{from_s}: {zero:?}");
+        let milliseconds =
+            of(&|passed_s| if passed_s < from_s { sound(passed_s) } else { sound(passed_s) / 1_000 });
+        assert!(is_mended(milliseconds.clone()), "{from_s}: {milliseconds:?}");
+    }
+    // They stand still for half a minute and go on right.
+    let stretch = of(&|passed_s| sound(if (50.0..80.0).contains(&passed_s) { 50.0 } else { passed_s }));
+    assert!(is_mended(stretch.clone()), "{stretch:?}");
+    // A link that holds back five seconds again and again is sound.
+    let held = of(&|passed_s| sound((passed_s / 5.0).ceil() * 5.0));
+    assert_eq!((held.0, held.1), (vec![], 0));
+    // A simulator at twenty times the speed is sound too.
+    assert_eq!(of(&|passed_s| sound(passed_s / 20.0)), (vec![], 0, 99));
+}
+
+#[test]
+fn a_clock_that_runs_backwards_is_damage() {
+    let backwards = ten_a_second(|passed_s| (1_700_000_000 - passed_s as u64) * SECOND);
+    assert!(told_of(backwards).0.iter().any(|(cause, _)| *cause == Cause::NoTimes));
+}
+
+#[test]
+fn nine_times_that_are_hours_ahead_move_no_other_time() {
+    let sound = ten_a_second(|passed_s| 1_700_000_000 * SECOND + (passed_s * 1e6) as u64);
+    // All records are of one length.
+    let (before, after) = sound.split_at(sound.len() / 2);
+    let time = u64::from_be_bytes(after[..8].try_into().expect("a time"));
+    // None of them tells the autopilot's time.
+    let ahead: Vec<u8> = (0..9)
+        .flat_map(|record| {
+            [&(time + 10_800 * SECOND + record * 1_000).to_be_bytes()[..], &HEARTBEAT].concat()
+        })
+        .collect();
+    let (gaps, _, tenths) = told_of([before, &ahead, after].concat());
+    assert!((1_990..2_020).contains(&tenths), "{gaps:?} {tenths}");
+}
+
+#[test]
+fn times_that_stand_still_without_an_autopilots_are_none() {
+    let (gaps, ..) = told(&[1_000; 200]);
+    assert_eq!(gaps, [(Cause::NoTimes, None)]);
 }

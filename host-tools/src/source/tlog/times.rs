@@ -13,6 +13,7 @@ use crate::source::boot::{JOINT_US, Joints, boot_ms_of};
 use crate::source::clock::{Ahead, Clock, Reading, Rules, Stamp, Wrong};
 use crate::source::doubt::Ends;
 use crate::source::item::{Cause, Gap};
+use crate::source::pace::{Pace, SLOWER};
 
 /// Microseconds since 1970, by the clock of a ground station, which may be set; a link may be silent for seconds until its last
 /// frames come, and for longer after its first.
@@ -22,13 +23,77 @@ const RULES: Rules = Rules {
     ends: Ends { steady_us: 10_000_000, seldom_us: 60_000_000 },
 };
 
-/// Times that stand still are none after so many records, ...
+/// Times that stand still from the first to the last record are none where there are so many.
 const STILL_RECORDS: u64 = 100;
-/// ... and those that go on this many times slower than the autopilot's own, after so long: milliseconds as microseconds.
-const SLOWER: u64 = 100;
-const TOLD_MS: u64 = 10_000;
-/// An autopilot's times further apart than this are of two power-ons, or of two recordings.
-const APART_MS: u32 = 60_000;
+/// By so much the autopilot's clock is ahead until the recorder's does not run: a link that holds frames back makes them late, never early.
+const EARLY_US: i64 = 2_000_000;
+/// An autopilot's times further apart than this are of two power-ons, or of two recordings; microseconds.
+const APART_US: i64 = 60_000_000;
+/// Messages of an autopilot are out of order by so much at most, microseconds.
+const DISORDER_US: i64 = 1_000_000;
+
+/// The recorder's clock beside the autopilot's. A frame is never heard before it is sent: where the recorder's clock stands, or goes on
+/// a hundred times slower (milliseconds as microseconds), what passed is what the autopilot tells.
+#[derive(Clone, Copy, Debug, Default)]
+struct Beside {
+    /// Whose: the first system whose autopilot tells its time, that time, and the recording's.
+    last: Option<(u8, i64, i64)>,
+    /// By how much the recording's time is ahead of the autopilot's, at least.
+    ahead_us: i64,
+    /// The recorder's clock does not run.
+    stands: bool,
+    /// How much passed by the autopilot's clock alone, and where that began.
+    passed_us: u64,
+    began: Option<(Instant, u64)>,
+}
+
+impl Beside {
+    /// By how much more the time went on than the recorder's clock, where it does not run.
+    fn told(&mut self, system: u8, boot_ms: u32, now: Instant, place: u64) -> u64 {
+        let (boot_us, now_us) =
+            (i64::from(boot_ms) * 1_000, i64::try_from(now.as_micros()).unwrap_or(i64::MAX));
+        let ahead_us = now_us.saturating_sub(boot_us);
+        let Some((of, boot_before, now_before)) = self.last else {
+            (self.last, self.ahead_us) = (Some((system, boot_us, now_us)), ahead_us);
+            return 0;
+        };
+        let passed_us = boot_us - boot_before;
+        if of != system || (-DISORDER_US..=0).contains(&passed_us) {
+            return 0;
+        }
+        self.last = Some((system, boot_us, now_us));
+        if !(0..=APART_US).contains(&passed_us) {
+            (self.ahead_us, self.stands) = (ahead_us, false);
+            return 0;
+        }
+        if now_us.saturating_sub(now_before).saturating_mul(SLOWER as i64) >= passed_us {
+            self.ahead_us = if self.stands { ahead_us } else { self.ahead_us.min(ahead_us) };
+            self.stands = false;
+            return 0;
+        }
+        let early_us = self.ahead_us.saturating_sub(ahead_us);
+        self.stands |= early_us >= EARLY_US;
+        if !self.stands || early_us <= 0 {
+            return 0;
+        }
+        self.began.get_or_insert((now, place));
+        self.last = Some((system, boot_us, now_us.saturating_add(early_us)));
+        let early_us = early_us.unsigned_abs();
+        self.passed_us = self.passed_us.saturating_add(early_us);
+        early_us
+    }
+
+    /// What is wrong with the recorder's clock.
+    fn gap(&self) -> Option<Gap> {
+        let (at, place) = self.began?;
+        let words = format!(
+            "the recorded times stand still, or go on {SLOWER} times slower than the autopilot's, from here on for {} s: there its \
+             clock counts",
+            self.passed_us.div_ceil(1_000_000)
+        );
+        Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
+    }
+}
 
 /// What begins with a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,9 +121,8 @@ pub struct Times {
     wrong: Wrong,
     now: Instant,
     records: u64,
-    /// The time of an autopilot since its power-on, and how much of it went by.
-    boot: Option<(u8, u32)>,
-    told_ms: u64,
+    beside: Beside,
+    pace: Pace,
 }
 
 impl Default for Times {
@@ -70,8 +134,8 @@ impl Default for Times {
             wrong,
             now: Instant::ZERO,
             records: 0,
-            boot: None,
-            told_ms: 0,
+            beside: Beside::default(),
+            pace: Pace::default(),
         }
     }
 }
@@ -90,11 +154,13 @@ impl Times {
             && frame.check() == Check::Good
         {
             self.joints.told(Some(time_us).filter(|_| !is_wrong), frame.system, boot_ms);
-            let passed_ms = self.boot.filter(|(system, _)| *system == frame.system);
-            let passed_ms = passed_ms.and_then(|(_, before_ms)| boot_ms.checked_sub(before_ms));
-            self.told_ms += u64::from(passed_ms.filter(|passed_ms| *passed_ms < APART_MS).unwrap_or(0));
-            self.boot = Some((frame.system, boot_ms));
+            let early_us = self.beside.told(frame.system, boot_ms, self.now, place);
+            if early_us > 0 {
+                self.clock.pass(early_us);
+                self.now = self.clock.now();
+            }
         }
+        self.pace.at(self.now, place, bytes.len() as u64);
         told
     }
 
@@ -107,8 +173,9 @@ impl Times {
             let (times, is_end) = after.times_after();
             Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
         };
-        let joints = &self.joints;
-        let passed = || joints.elapsed_us(before?, time_us, after);
+        let (joints, stands) = (&self.joints, self.beside.stands);
+        // Where it stood, what passed has been counted.
+        let passed = || if stands { Some(1) } else { joints.elapsed_us(before?, time_us, after) };
         let Reading::Sound(moment) = self.clock.take_beside(stamp(time_us), ahead, passed) else {
             self.wrong.add(self.now, place);
             return (Told::default(), true);
@@ -120,9 +187,16 @@ impl Times {
         });
         let passed_us = moment.at.since(reached).as_micros();
         match before.filter(|_| moment.restarted) {
-            _ if is_joint => self.joints.forget(),
+            _ if is_joint => {
+                self.joints.forget();
+                self.pace.begin_another();
+                self.beside = Beside { last: None, stands: false, ..self.beside };
+            }
             Some(before) => self.joints.set(before, time_us, passed_us),
             None => {}
+        }
+        if moment.restarted && !is_joint {
+            self.pace.fell(moment.at);
         }
         let begins = match (is_joint, moment.restarted) {
             (true, _) => Some(Begins::Recording),
@@ -137,23 +211,20 @@ impl Times {
 
     /// What is wrong with the times, once all were taken: damage.
     pub fn gaps(&self) -> impl Iterator<Item = Gap> {
-        self.wrong.gap().into_iter().chain(self.no_times())
+        self.wrong
+            .gap()
+            .into_iter()
+            .chain(self.beside.gap())
+            .chain(self.no_times().or_else(|| self.pace.gap()))
     }
 
     /// The recorded times are none.
     fn no_times(&self) -> Option<Gap> {
-        let passed_ms = self.now.as_millis();
-        let words = if self.now == Instant::ZERO && self.records >= STILL_RECORDS {
-            format!("{} have the same time: nothing in the log can be judged", count(self.records, "record"))
-        } else if self.told_ms >= TOLD_MS && passed_ms < self.told_ms / SLOWER {
-            format!(
-                "the recorded times are no microseconds: {passed_ms} ms went by on them, and {} s on the autopilot's clock; \
-                 nothing in the log can be judged",
-                self.told_ms / 1_000
-            )
-        } else {
+        if self.now != Instant::ZERO || self.records < STILL_RECORDS {
             return None;
-        };
+        }
+        let words =
+            format!("{} have the same time: nothing in the log can be judged", count(self.records, "record"));
         Some(Gap { from: None, to: None, cause: Cause::NoTimes, place: None, bytes: 0, words })
     }
 }

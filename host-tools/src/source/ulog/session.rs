@@ -23,6 +23,7 @@ use crate::source::item::{
     About, Cause, Column, Event, Fact, Gap, Item, Kind, Mode, Parameter, Row, Rows, Summary, Table, Take,
     Text, Value, Want, hand_said,
 };
+use crate::source::pace::Pace;
 
 /// An event that is older than this when it comes tells of what was before the log.
 const OLD_US: u64 = 1_000_000;
@@ -121,6 +122,7 @@ struct Session<'a, 'b> {
     /// The words that were told last: a topic and a logged string may have the same.
     last_words: String,
     wrong: Wrong,
+    pace: Pace,
 }
 
 /// Information that is more than rows.
@@ -152,6 +154,7 @@ impl<'a, 'b> Session<'a, 'b> {
             strays: (0, 0),
             last_words: String::new(),
             wrong: Wrong::default(),
+            pace: Pace::default(),
         }
     }
 
@@ -194,7 +197,7 @@ impl<'a, 'b> Session<'a, 'b> {
                 format!("no appended data at {place}, which the header names: the file ends before it");
             self.gap(Cause::Cut, Some(place), 0, words)?;
         }
-        if let Some(gap) = self.wrong.gap() {
+        for gap in self.wrong.gap().into_iter().chain(self.pace.gap()) {
             self.tell(Item::Gap(&gap))?;
         }
         self.tell_facts()?;
@@ -331,6 +334,7 @@ impl<'a, 'b> Session<'a, 'b> {
             None => false,
         };
         let recorded = recorded.filter(|_| !is_wrong);
+        self.pace.at(self.clock.now(), place, bytes as u64);
         let (now, latest) = (self.clock.now(), self.recorded());
         let Some(subscription) = self.subscriptions.get_mut(id) else { return Ok(()) };
         if let Some(table) = &subscription.table {
@@ -366,7 +370,10 @@ impl<'a, 'b> Session<'a, 'b> {
         let subscriptions = &self.subscriptions;
         let ahead = |asks: &dyn Fn(Stamp) -> bool| times::ahead(subscriptions, after, asks);
         match self.clock.take(stamp, ahead) {
-            Reading::Sound(moment) if moment.restarted => (self.take)(moment.at, Item::Restart)?,
+            Reading::Sound(moment) if moment.restarted => {
+                self.pace.fell(moment.at);
+                (self.take)(moment.at, Item::Restart)?;
+            }
             Reading::Sound(_) | Reading::Old => {}
             Reading::Wrong { known } => {
                 let topic = stamp.series.checked_sub(1).and_then(|id| self.subscriptions.name(id));
@@ -486,6 +493,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.last_words.clear();
         self.told_facts = false;
         self.base = place;
+        self.pace.begin_another();
         self.begin(place, time_us, &times::first(after), false);
         self.tell(Item::Joint)
     }

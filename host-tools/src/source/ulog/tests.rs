@@ -397,3 +397,20 @@ fn what_looks_like_a_message_at_every_byte_is_searched_in_time() {
         assert_eq!(read.of("row position").len(), 20, "{pattern:?}");
     }
 }
+
+#[test]
+fn a_clock_that_does_not_run_from_some_place_on_is_told() {
+    let of = |time: &dyn Fn(u64) -> u64| {
+        let mut writer = Writer::new(SECOND).format(POSITION).subscribe(0, 0, "position");
+        for tick in 0..20_000 {
+            writer = writer.data(0, time(tick), &position(0.0, 0));
+        }
+        read(&writer.bytes).gaps.iter().any(|gap| gap.cause == Cause::NoTimes)
+    };
+    let sound = |tick: u64| 2 * SECOND + tick * 1_000;
+    assert!(!of(&sound));
+    assert!(of(&|tick| sound(tick.min(4_000))), "it stands");
+    assert!(of(&|tick| if tick < 4_000 { sound(tick) } else { 0 }), "zeros");
+    assert!(of(&|tick| if tick < 4_000 { sound(tick) } else { u64::MAX }), "ones");
+    assert!(of(&|tick| if tick < 4_000 { sound(tick) } else { sound(tick) / 1_000 }), "milliseconds");
+}

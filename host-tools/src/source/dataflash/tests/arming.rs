@@ -6,6 +6,7 @@ use hums_core::observation::{LandedState, Observation};
 
 use super::writer::Writer;
 use super::{Seen, seen};
+use crate::source::item::Cause;
 
 /// Changes of the heartbeats' arming: seconds, armed.
 fn changes(seen: &Seen) -> Vec<(u64, bool)> {
@@ -61,7 +62,10 @@ fn a_second_arming_after_a_pause_means_that_it_was_disarmed_in_between() {
     // Nobody logged the disarming.
     event(&mut log, 200, 10);
     log.attitudes(200..210);
-    assert_eq!(changes(&seen(&log.bytes)), [(1, false), (2, true), (200, false), (202, true)]);
+    let seen = seen(&log.bytes);
+    assert_eq!(changes(&seen), [(1, false), (2, true), (200, false), (202, true)]);
+    let causes: Vec<Cause> = seen.gaps.iter().map(|gap| gap.0).collect();
+    assert_eq!(causes, [Cause::NotKept], "nothing was lost");
 }
 
 #[test]

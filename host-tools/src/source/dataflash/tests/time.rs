@@ -173,3 +173,36 @@ fn columns_without_names_are_damage_where_messages_of_them_come() {
     let words = "FMT names 2 of the 3 columns of IMU: those without a name are not read";
     assert_eq!(gaps, [(Cause::Damaged, words.to_owned())]);
 }
+
+#[test]
+fn a_clock_that_does_not_run_from_some_place_on_is_told() {
+    // 32,000 attitudes of 17 bytes: four minutes of them.
+    let of = |time: &dyn Fn(u64) -> u64| {
+        let mut log = begun();
+        for tick in 0..32_000_u64 {
+            log.raw(150, &[&time(tick).to_le_bytes(), &[0; 6]]);
+        }
+        told(&log.bytes).0.iter().any(|(cause, _)| *cause == Cause::NoTimes)
+    };
+    let sound = |tick: u64| 1_000_000 + tick * 8_000;
+    assert!(!of(&sound));
+    assert!(of(&|tick| sound(tick.min(16_000))), "it stands");
+    assert!(of(&|_| 1_000_000), "from the beginning");
+    assert!(of(&|tick| if tick < 16_000 { sound(tick) } else { 0 }), "zeros");
+    assert!(of(&|tick| if tick < 16_000 { sound(tick) } else { u64::MAX }), "ones");
+    assert!(of(&|tick| sound(32_000 - tick)), "backwards");
+}
+
+#[test]
+fn milliseconds_are_told_by_the_receivers_time() {
+    let of = |divisor: u64| {
+        let mut log = begun();
+        log.format(154, "GPS", "QBIHBB", "TimeUS,Status,GMS,GWk,NSats,I");
+        for tick in 0..200_u64 {
+            let (us, ms) = ((1_000_000 + tick * 200_000) / divisor, 300_000 + tick as u32 * 200);
+            log.raw(154, &[&us.to_le_bytes(), &[3], &ms.to_le_bytes(), &2_300_u16.to_le_bytes(), &[9, 0]]);
+        }
+        told(&log.bytes).0.iter().any(|(cause, _)| *cause == Cause::NoTimes)
+    };
+    assert_eq!((of(1), of(50), of(1_000)), (false, false, true));
+}

@@ -1,0 +1,168 @@
+//! Raw MAVLink in the time that its autopilot tells: the same for whoever takes frames ([`BootTimes`]) and for whoever takes
+//! bytes ([`Booted`]).
+
+use std::io;
+
+use hums_core::time::Instant;
+use hums_link::Framer;
+
+use super::blocks::Blocks;
+use super::boot::boot_ms;
+use super::stream::{Chunk, Source};
+use super::timeline::Timeline;
+use super::tlog::times::Begins;
+
+/// An autopilot that was powered on again in a recording tells its time by then; one whose time fell and that runs for longer is in
+/// another recording.
+const STARTS_MS: u32 = 10_000;
+
+/// The time of frames without recorded times: what the autopilot's own messages tell of the time since its boot, and until it
+/// tells any, what a line takes for the bytes.
+#[derive(Debug, Default)]
+pub struct BootTimes {
+    /// Whose times count: the first system whose autopilot tells one.
+    system: Option<u8>,
+    timeline: Option<Timeline>,
+    /// The line's time at the first of them.
+    base: Instant,
+}
+
+impl BootTimes {
+    /// The time of a frame, and what begins with it.
+    pub fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, Option<Begins>) {
+        let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
+        if let Some(boot_ms) = told {
+            let boot_us = u64::from(boot_ms) * 1_000;
+            if self.timeline.is_none() {
+                (self.system, self.base) = (Some(frame.system()), line);
+            }
+            let timeline = self.timeline.get_or_insert_with(|| Timeline::from_first(boot_us));
+            let moment = timeline.at(boot_us);
+            let begins = if boot_ms > STARTS_MS { Begins::Recording } else { Begins::Clock };
+            return (self.after_base(moment.at), moment.restarted.then_some(begins));
+        }
+        (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), None)
+    }
+
+    /// Whether an autopilot has told its time.
+    const fn is_known(&self) -> bool {
+        self.timeline.is_some()
+    }
+
+    fn after_base(&self, at: Instant) -> Instant {
+        Instant::from_micros(self.base.as_micros().saturating_add(at.as_micros()))
+    }
+}
+
+/// The fastest port: bytes between two times of the autopilot come no faster.
+const PORT_BAUD: u64 = 921_600;
+
+/// Raw bytes as a source: whole frames at the times of [`BootTimes`], and between two of them as on the fastest port.
+pub struct Booted<S> {
+    line: S,
+    framer: Framer,
+    times: BootTimes,
+    /// Bytes that have not been handed on: of a frame that is not whole yet.
+    waiting: Vec<u8>,
+    at_us: u64,
+    /// Another recording began with the latest chunk.
+    begins: bool,
+    blocks: Blocks,
+    /// The end cuts off a frame.
+    is_cut: bool,
+}
+
+impl<S: Source> Booted<S> {
+    /// Takes the bytes of `line`, with times of a line.
+    pub fn new(line: S) -> Self {
+        Self {
+            line,
+            framer: Framer::new(),
+            times: BootTimes::default(),
+            waiting: Vec::new(),
+            at_us: 0,
+            begins: false,
+            blocks: Blocks::default(),
+            is_cut: false,
+        }
+    }
+
+    /// Hands on bytes that were there at this time, by the autopilot's clock or by the line's.
+    fn chunk(&mut self, told_us: u64, bytes: Vec<u8>) -> Chunk {
+        let baud = if self.times.is_known() { PORT_BAUD } else { u64::MAX };
+        let line_us = (bytes.len() as u64).saturating_mul(10_000_000) / baud;
+        self.at_us = told_us.max(self.at_us.saturating_add(line_us));
+        Chunk { at_us: self.at_us, bytes }
+    }
+}
+
+impl<S: Source> Source for Booted<S> {
+    fn next(&mut self) -> io::Result<Option<Chunk>> {
+        self.begins = false;
+        while let Some(Chunk { at_us, bytes }) = self.line.next()? {
+            let Self { framer, times, begins, waiting, .. } = self;
+            let line = Instant::from_micros(at_us);
+            let mut told_us = if times.is_known() { 0 } else { at_us };
+            framer.push(&bytes, &mut |frame: hums_link::Frame<'_>| {
+                let (at, began) = times.at(line, &frame);
+                told_us = at.as_micros();
+                *begins |= began == Some(Begins::Recording);
+            });
+            self.blocks.take(&bytes, framer.counts().frames);
+            waiting.extend(bytes);
+            let whole = waiting.len().saturating_sub(framer.held());
+            if whole > 0 {
+                let whole = waiting.drain(..whole).collect();
+                return Ok(Some(self.chunk(told_us, whole)));
+            }
+        }
+        let (held, frames) = (self.framer.held(), self.framer.counts().frames);
+        self.framer.idle(&mut |_: hums_link::Frame<'_>| {});
+        self.is_cut |= held > 0 && self.framer.counts().frames == frames;
+        self.blocks.end();
+        let rest = std::mem::take(&mut self.waiting);
+        Ok((!rest.is_empty()).then(|| self.chunk(0, rest)))
+    }
+
+    fn begins_another(&self) -> bool {
+        self.begins
+    }
+
+    fn damages(&self) -> u64 {
+        u64::from(self.blocks.bytes() > 0) + u64::from(self.is_cut)
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.line.remark()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+    use hums_link::packet::Packet;
+
+    use super::super::paced::Paced;
+    use super::super::raw::Raw;
+    use super::*;
+
+    #[test]
+    fn no_frame_is_cut_in_two_and_each_comes_when_the_autopilot_says() {
+        let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
+        let packet = |second: u32| Packet::new(30).u32(0, 60_000 + second * 1_000).f32(24, 1.5);
+        let frames: Vec<Vec<u8>> =
+            (0..50).map(|second| encoder.frame(&mut buffer, &packet(second)).to_vec()).collect();
+        let raw = [frames.concat(), vec![0xfd, 20, 0]].concat();
+        let mut source = Booted::new(Paced::new(Raw::new(&raw[..]), 115_200));
+        let mut chunks = Vec::new();
+        while let Some(chunk) = source.next().expect("memory") {
+            chunks.push(chunk);
+        }
+        assert_eq!(chunks.pop().map(|rest| rest.bytes), Some(vec![0xfd, 20, 0]));
+        assert_eq!(chunks.iter().map(|chunk| chunk.bytes.clone()).collect::<Vec<_>>(), frames);
+        let first_us = chunks[0].at_us;
+        let seconds: Vec<u64> = chunks.iter().map(|chunk| (chunk.at_us - first_us) / 1_000_000).collect();
+        assert_eq!(seconds, (0..50).collect::<Vec<u64>>());
+        assert_eq!(source.damages(), 1);
+    }
+}

@@ -1,0 +1,160 @@
+//! Whether a recording's clock runs, asked all along and by one rule for all formats.
+//!
+//! A clock that stops, is zero from some place on, or tells milliseconds as microseconds, makes a recording of which hours
+//! seem to be a moment: no check has time to see anything, and nothing would seem wrong. Three things tell it:
+//!
+//! | what | against what |
+//! |---|---|
+//! | how many bytes were recorded within the time | no logger and no link writes 4 MiB a second for long |
+//! | another clock in the messages (UTC of a receiver) | a recording's clock that is a hundred times slower is none |
+//! | how often the clock fell in a row | one that falls eight times with less than five seconds between runs backwards |
+
+use hums_core::time::{Instant, Span};
+
+use super::item::{Cause, Gap};
+
+/// Bytes a second that nothing records: the fastest logs, of all inertial samples on an autopilot's card, have a quarter of it.
+const BYTES_PER_S: u64 = 4 * 1024 * 1024;
+/// Bytes that may come at once: what a logger writes when it begins (parameters, a mission), or had to hold back. The most in 80 public
+/// logs of `ArduPilot` is 84 KB, definitions included.
+const BURST_BYTES: u64 = 192 * 1024;
+/// A clock that is so many times slower than another one is none. (Simulators run at some tens of times at most.)
+pub const SLOWER: u64 = 100;
+/// After so much of the other clock it is told.
+const WITNESSED: Span = Span::from_secs(10);
+/// The other clock itself was set where it jumps by more.
+const APART: Span = Span::from_secs(60);
+/// A clock that falls so often, ...
+const FALLS: u32 = 8;
+/// ... with less than this between, runs backwards.
+const BETWEEN: Span = Span::from_secs(5);
+
+/// Follows a recording's clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pace {
+    /// The latest time.
+    last: Option<Instant>,
+    /// Where the latest message stands.
+    place: u64,
+    /// Bytes for which there was no time yet, and where they begin.
+    level: u64,
+    since: Option<(Instant, u64)>,
+    /// The recording's time and the other clock's, when the first of them was not yet too slow.
+    witness: Option<(Instant, u64)>,
+    /// When the clock fell last, and how often in a row.
+    fell: Option<(Instant, u32)>,
+    /// When and where it was first that the clock does not run.
+    stands: Option<(Instant, u64)>,
+}
+
+impl Pace {
+    /// A message that stands here was recorded at this time, and so many bytes of messages since the last call.
+    pub fn at(&mut self, now: Instant, place: u64, bytes: u64) {
+        self.place = place;
+        let Some(before) = self.last.replace(now) else { return };
+        let passed = now.since(before).as_micros();
+        let room = passed.saturating_mul(BYTES_PER_S) / 1_000_000;
+        self.level = self.level.saturating_add(bytes).saturating_sub(room);
+        if self.level == 0 {
+            self.since = None;
+            return;
+        }
+        let since = *self.since.get_or_insert((now, place));
+        if self.level > BURST_BYTES {
+            self.stands.get_or_insert(since);
+        }
+    }
+
+    /// Another clock tells this time, microseconds of any beginning.
+    pub fn witness(&mut self, now: Instant, us: u64) {
+        let Some((then, told)) = self.witness else {
+            self.witness = Some((now, us));
+            return;
+        };
+        // Two receivers differ by a little.
+        if us < told && told - us < 1_000_000 {
+            return;
+        }
+        let passed = Span::from_micros(us.saturating_sub(told));
+        let is_slow = now.since(then).as_micros().saturating_mul(SLOWER) < passed.as_micros();
+        if us < told || !is_slow {
+            self.witness = Some((now, us));
+        } else if passed > APART {
+            // It was set.
+            self.witness = Some((now, us));
+        } else if passed >= WITNESSED {
+            self.stands.get_or_insert((then, self.place));
+        }
+    }
+
+    /// The clock fell, or was set, and it is this time now.
+    pub fn fell(&mut self, now: Instant) {
+        let in_a_row =
+            self.fell.filter(|(before, _)| now.since(*before) < BETWEEN).map_or(0, |(_, count)| count);
+        self.fell = Some((now, in_a_row + 1));
+        if in_a_row + 1 >= FALLS {
+            self.stands.get_or_insert((now, self.place));
+        }
+    }
+
+    /// Another recording begins.
+    pub fn begin_another(&mut self) {
+        *self = Self { stands: self.stands, ..Self::default() };
+    }
+
+    /// What is wrong with the clock, once all has been read.
+    pub fn gap(&self) -> Option<Gap> {
+        let (at, place) = self.stands?;
+        let words = "the recorded times stand still, fall again and again, or go on far too slowly, from here on: what is \
+                     recorded there cannot be judged";
+        let (from, place) = (Some(at), Some(place));
+        Some(Gap { from, to: None, cause: Cause::NoTimes, place, bytes: 0, words: words.to_owned() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(us: u64) -> Instant {
+        Instant::from_micros(us)
+    }
+
+    /// A clock that goes on by so many microseconds with every 100 bytes, from some time on.
+    fn is_told(step_us: u64, bytes: u64) -> bool {
+        let mut pace = Pace::default();
+        (0..bytes / 100).for_each(|message| pace.at(at(message * step_us), message * 100, 100));
+        pace.gap().is_some()
+    }
+
+    #[test]
+    fn a_clock_that_stands_or_creeps_is_told_and_a_burst_or_a_fast_log_is_not() {
+        assert!(is_told(0, 300_000), "stands");
+        assert!(is_told(1, 300_000), "creeps");
+        assert!(!is_told(0, 100_000), "a burst");
+        assert!(!is_told(50, 10_000_000), "2 MB/s");
+        let mut pace = Pace::default();
+        for second in 0..100 {
+            // Held back for a second each.
+            (0..1_000).for_each(|_| pace.at(at(second * 1_000_000), 0, 100));
+        }
+        assert!(pace.gap().is_none());
+    }
+
+    #[test]
+    fn another_clock_tells_one_that_is_too_slow_and_one_that_falls_again_and_again_runs_backwards() {
+        let slow = |times: u64| {
+            let mut pace = Pace::default();
+            (0..200_u64)
+                .for_each(|tick| pace.witness(at(tick * 200_000 / times), 7_000_000 + tick * 200_000));
+            pace.gap().is_some()
+        };
+        assert_eq!((slow(1), slow(50), slow(1_000)), (false, false, true));
+        let falls = |every_s: u64| {
+            let mut pace = Pace::default();
+            (1..20_u64).for_each(|fall| pace.fell(at(fall * every_s * 1_000_000)));
+            pace.gap().is_some()
+        };
+        assert_eq!((falls(1), falls(10)), (true, false));
+    }
+}
