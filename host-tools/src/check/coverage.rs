@@ -8,6 +8,7 @@ use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
 
 use super::judged::JudgedBy;
+use super::problem::Problem;
 
 /// Checks of a receiver that the monitor leaves alone until the receiver has had a fix.
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
@@ -108,6 +109,8 @@ pub(super) struct Recording<'a> {
     pub(super) arming: Option<&'a str>,
     /// It was in the air.
     pub(super) flew: bool,
+    /// What was found.
+    pub(super) problems: &'a [Problem],
 }
 
 enum Verdict {
@@ -132,8 +135,11 @@ impl Recording<'_> {
             };
         }
         match words.scope {
-            // Its silence says nothing, good or bad.
-            Scope::Said if !seen.level => return Verdict::NotMeant,
+            // The autopilot's silence says nothing, good or bad.
+            Scope::Said if self.problems.iter().any(|problem| problem.check == check.name) => {
+                return Verdict::Judged;
+            }
+            Scope::Said => return Verdict::NotMeant,
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
             Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
             _ if autopilot.is_none() => return not("no heartbeat of an autopilot"),
@@ -227,6 +233,7 @@ mod tests {
                 armed: Span::from_secs(60),
                 arming: None,
                 flew: true,
+                problems: &[],
             };
             let (_, not_judged) = Coverage::new().lists(&recording);
             not_judged.into_iter().find(|(check, _)| *check == "gps_satellites").map(|(_, why)| why)

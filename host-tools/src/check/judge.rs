@@ -512,6 +512,15 @@ impl Judge {
             // Nobody knows where it was heard: a packed recording may be that of a ground station.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
         }
+        let last = self.last;
+        let mut problems = match by {
+            JudgedBy::Board => self.board,
+            JudgedBy::Here => self.here,
+        };
+        let behind = if by == JudgedBy::Board { Span::ZERO } else { self.clock.behind() };
+        problems.end(last, behind);
+        let (findings, findings_count) = (std::mem::take(&mut problems.findings), problems.findings_count);
+        let worst_first = problems.worst_first();
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
             monitor: &self.monitor,
@@ -520,17 +529,11 @@ impl Judge {
             armed,
             arming: self.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty()),
             flew: !flights.is_empty(),
+            problems: &worst_first,
         });
-        let last = self.last;
-        let mut problems = match by {
-            JudgedBy::Board => self.board,
-            JudgedBy::Here => self.here,
-        };
         let unchecked = self.facts.remove(&About::Unchecked);
         let remarks =
             joined(&self.joints).into_iter().chain(self.details.remarks()).chain(unchecked).collect();
-        let behind = if by == JudgedBy::Board { Span::ZERO } else { self.clock.behind() };
-        problems.end(last, behind);
         Judged {
             by,
             monitor: self.monitor,
@@ -540,9 +543,9 @@ impl Judge {
             armed,
             flights,
             ends_in_air,
-            findings_count: problems.findings_count,
-            findings: std::mem::take(&mut problems.findings),
-            problems: problems.worst_first(),
+            findings_count,
+            findings,
+            problems: worst_first,
             judged,
             not_judged,
             remarks,

@@ -566,6 +566,9 @@ fn a_finding_names_the_text_or_the_event_that_raised_it_whatever_the_words_of_it
         let names: Vec<_> = judged.problems.iter().flat_map(|problem| &problem.details).collect();
         assert_eq!(names, Vec::from_iter(named), "{:?}", judged.problems);
         assert_eq!(judged.problems.len(), usize::from(named.is_some()), "{:?}", judged.problems);
+        // What it did not say is no check that was judged.
+        let alerts = judged.judged.iter().filter(|check| check.ends_with("_alert"));
+        assert_eq!(alerts.copied().collect::<Vec<_>>(), Vec::from_iter(named.map(|_| "battery_alert")));
     }
     // What nobody calls an alert is none, however severe.
     let silent = Text { source: AUTOPILOT, severity: 0, words: "Battery failsafe", alert: None };
