@@ -46,6 +46,10 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let number = value.clamp(0.0, 255.0) as u8;
     match name.as_str() {
         "FRAME_CLASS" => facts.frame_class = Some(number),
+        // Where nothing names the firmware.
+        "SYSID_SW_TYPE" if facts.craft == Craft::Unknown => {
+            facts.craft = Craft::of_software(number).unwrap_or_default();
+        }
         "Q_ENABLE" => facts.quadplane = number > 0,
         "Q_MAV_TYPE" => facts.quadplane_type = number,
         "LOG_DISARMED" => facts.logs_disarmed = Some(value != 0.0),

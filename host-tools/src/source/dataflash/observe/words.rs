@@ -40,6 +40,18 @@ impl Craft {
         })
     }
 
+    /// By the parameter `SYSID_SW_TYPE`, which versions of before 2019 have (`k_software_type`).
+    pub(super) const fn of_software(number: u8) -> Option<Self> {
+        Some(match number {
+            0 => Self::Plane,
+            4 => Self::Tracker,
+            10 => Self::Copter,
+            20 => Self::Rover,
+            40 => Self::Sub,
+            _ => return None,
+        })
+    }
+
     /// By the number of the build in VER (`APM_BUILD_*`).
     pub(super) const fn of_build(number: u8) -> Option<Self> {
         Some(match number {

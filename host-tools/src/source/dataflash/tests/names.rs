@@ -77,3 +77,22 @@ fn a_height_is_above_the_home_that_the_log_tells_where_nothing_else_does() {
     assert_eq!(heights(1), [30.0, 40.0], "above home");
     assert_eq!(heights(0), [0.0, 10.0], "the estimator's origin is not home: above the first fix");
 }
+
+#[test]
+fn a_log_that_names_no_firmware_tells_its_vehicle_by_a_parameter() {
+    let types = |software: f32| {
+        let mut log = Writer::new();
+        log.format(162, "PARM", "QNf", "TimeUS,Name,Value");
+        let mut name = [0; 16];
+        name[..13].copy_from_slice(b"SYSID_SW_TYPE");
+        log.raw(162, &[&1_000_000_u64.to_le_bytes(), &name, &software.to_le_bytes()]);
+        log.attitudes(1..3);
+        let mut types = seen(&log.bytes).find(|observation| match observation {
+            Observation::Heartbeat(heartbeat) => Some(heartbeat.type_number),
+            _ => None,
+        });
+        types.dedup();
+        types
+    };
+    assert_eq!((types(10.0), types(0.0), types(20.0), types(99.0)), (vec![2], vec![1], vec![10], vec![0]));
+}
