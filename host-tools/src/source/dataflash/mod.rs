@@ -111,6 +111,7 @@ const NAMES_MAX: usize = 4_096;
 const CONTEXT: &str = "the log cannot be read on";
 /// A text log begins with a banner, or the menu of an old console, which is no damage of a log that it was joined to.
 const BANNER_BYTES_MAX: u64 = 4_096;
+const ODD_LINE: &str = "a line with bytes that are no text";
 const CUT_LINE: &str = "a line that the beginning of another log cuts off";
 
 fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
@@ -203,6 +204,9 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
         };
         if let Some(Skipped { place, bytes, words, .. }) = skipped.take() {
             session.gap(Cause::Damaged, Some(place), bytes, words, take)?;
+        }
+        if line.is_odd() {
+            session.gap(Cause::Damaged, Some(line.place), 0, ODD_LINE.to_owned(), take)?;
         }
         if let Some(words) = kinds.surplus(&line, kind, session.formats()) {
             session.gap(Cause::Damaged, Some(line.place), 0, words, take)?;

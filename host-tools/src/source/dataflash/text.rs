@@ -26,6 +26,14 @@ pub(super) struct Line<'a> {
     pub(super) is_end: bool,
 }
 
+impl Line<'_> {
+    /// Whether it holds bytes that no text log has: what is no UTF-8, and characters of control.
+    pub(super) fn is_odd(&self) -> bool {
+        let is_text = |byte: u8| byte == b'\t' || !byte.is_ascii_control();
+        matches!(self.words, Cow::Owned(_)) || !self.words.bytes().all(is_text)
+    }
+}
+
 /// A reader of lines.
 pub(super) struct Lines<R>(Buffer<R>);
 
@@ -94,6 +102,14 @@ mod tests {
         }
         let expected = [("FMT, 1", 0, true), ("", 7, true), ("MSG, a, b", 8, true), ("ATT, 3", 18, false)];
         assert_eq!(seen, expected.map(|(words, place, whole)| (words.to_owned(), place, whole)));
+    }
+
+    #[test]
+    fn a_line_with_bytes_that_are_no_text_is_odd() {
+        let is_odd = |line: &[u8]| Lines::new(line).next().expect("memory").expect("a line").is_odd();
+        assert!(!is_odd("ATT, 1, 2\t\u{e9}\r\n".as_bytes()));
+        assert!(is_odd(b"ATT, 1\xff\xff, 2\n"));
+        assert!(is_odd(b"ATT, 1\0, 2\n"));
     }
 
     #[test]
