@@ -84,7 +84,7 @@ pub(super) const TOPICS: &[Topic] = &[
         take: |px4, said| {
             let rates = [said.fields.finite(0), said.fields.finite(1)];
             px4.motion.rates_wanted = match rates {
-                [Some(roll), Some(pitch)] => Some([roll, pitch].map(RadiansPerSecond)),
+                [Some(roll), Some(pitch)] => Some((said.recorded_us, [roll, pitch].map(RadiansPerSecond))),
                 _ => None,
             };
         },
@@ -333,6 +333,9 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
     }));
 }
 
+/// The rates that are wanted go with an attitude that is wanted within this: in some modes nobody wants an attitude, in others no rates.
+const RATES_AGE_US: u64 = 500_000;
+
 fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
     let angles = || {
         let [roll, pitch] = [said.fields.finite(1)?, said.fields.finite(2)?].map(Radians);
@@ -340,7 +343,9 @@ fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
     };
     let wanted = said.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
     if let Some(wanted) = wanted {
-        px4.observe(Observation::Wanted(Wanted { rates: px4.motion.rates_wanted, ..wanted }));
+        let fresh = |(us, _): &(u64, _)| said.recorded_us.abs_diff(*us) <= RATES_AGE_US;
+        let rates = px4.motion.rates_wanted.filter(fresh).map(|(_, rates)| rates);
+        px4.observe(Observation::Wanted(Wanted { rates, ..wanted }));
     }
 }
 

@@ -139,8 +139,8 @@ pub(super) struct Status {
 pub(super) struct Motion {
     pub(super) combined: bool,
     pub(super) rate: Option<[f32; 3]>,
-    /// The body rates that are wanted, about roll and pitch.
-    pub(super) rates_wanted: Option<[RadiansPerSecond; 2]>,
+    /// The body rates that are wanted, about roll and pitch, and when, microseconds.
+    pub(super) rates_wanted: Option<(u64, [RadiansPerSecond; 2])>,
     /// What each compass measured last, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; 3],
     pub(super) local: Option<Local>,

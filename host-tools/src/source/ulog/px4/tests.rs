@@ -209,11 +209,13 @@ fn the_wanted_rates_go_with_the_wanted_attitude() {
         .subscribe(1, 0, "vehicle_rates_setpoint");
     let log = log.data(1, 2 * SECOND, &floats(&[0.5, -0.25, 0.0]));
     let log = log.data(0, 2 * SECOND, &floats(&[1.0, 0.0, 0.0, 0.0]));
+    let log = log.data(0, 3 * SECOND, &floats(&[1.0, 0.0, 0.0, 0.0]));
     let wanted = observations(&read(&log.bytes), "Wanted(");
     assert!(
         wanted[0].contains("rates: Some([RadiansPerSecond(0.5), RadiansPerSecond(-0.25)])"),
         "{wanted:?}"
     );
+    assert!(wanted[1].contains("rates: None"), "they are old: {wanted:?}");
 }
 
 #[test]
