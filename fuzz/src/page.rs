@@ -5,12 +5,12 @@ use std::path::Path;
 
 use hums::endpoint::Endpoint;
 use hums::files::Amount;
-use hums::live::history::Cursor;
 use hums::live::recording::{self, Heard};
 use hums::live::show::{self, Around, SourceJson};
 use hums::live::told::Limits;
 use hums::live::world::{Histories, World};
 use hums::logs;
+use hums::page::history::Cursor;
 use hums::report::replay::Replay;
 use hums::report::{page, trend};
 use hums::source::recording::Place;
@@ -91,7 +91,7 @@ fn report(path: &Path) {
     let found = logs::find(&[path.to_owned()], false).expect("it is a log");
     let overview = Overview::of(&found.logs[0]).expect("a file that can be read");
     let place = Place::log("log".to_owned(), found.logs[0].clone());
-    let replay = Replay::of(&place).expect("a file that can be read");
+    let replay = Replay::of(&place, &overview).expect("a file that can be read");
     let html = page::html(
         &overview,
         &replay,

@@ -30,6 +30,7 @@ pub mod names;
 pub mod outcome;
 pub mod output;
 pub mod pack;
+pub mod page;
 pub mod plural;
 pub mod printable;
 pub mod progress;

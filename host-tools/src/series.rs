@@ -7,7 +7,6 @@ use std::collections::btree_map::Entry;
 use std::ops::RangeInclusive;
 
 use hums_core::time::Instant;
-use serde::Serialize;
 
 /// Intervals at most: as many as a large screen has columns.
 const INTERVALS_MAX: usize = 2048;
@@ -82,27 +81,6 @@ impl<P> Default for Store<P> {
     }
 }
 
-/// A series as the page takes it.
-#[derive(Debug, Serialize)]
-pub struct SeriesJson {
-    /// What it is called.
-    pub label: String,
-    /// Which line of its plot: lines of one number have one colour in all plots.
-    pub line: u8,
-    /// Steps from interval to interval, the first from 0.
-    steps: Vec<u16>,
-    /// The values of each interval in their order; a whole number of pairs.
-    values: Vec<f64>,
-}
-
-/// The row of intervals as the page takes it.
-#[derive(Debug, Serialize)]
-pub struct GridJson {
-    start_s: f64,
-    interval_s: f64,
-    intervals: usize,
-}
-
 impl<P: Copy + Ord> Store<P> {
     /// Takes a value; what is not finite is none.
     pub fn push(&mut self, at: Instant, line: Line<P>, value: f32) {
@@ -166,35 +144,9 @@ impl<P: Copy + Ord> Store<P> {
         })
     }
 
-    /// The row of intervals.
-    pub fn grid(&self) -> GridJson {
-        let last = self.series.values().filter_map(|series| series.values.keys().next_back()).max();
-        GridJson {
-            start_s: self.grid.start_ms.unwrap_or(0) as f64 / 1e3,
-            interval_s: self.grid.interval_ms as f64 / 1e3,
-            intervals: last.map_or(0, |last| usize::from(*last) + 1),
-        }
-    }
-
-    /// The series of a plot, with this many decimals.
-    pub fn plot(&self, plot: P, decimals: u8, label: impl Fn(u8) -> String) -> Vec<SeriesJson> {
-        let of_plot = self.series.range((plot, 0)..=(plot, u8::MAX));
-        of_plot.map(|((_, line), series)| series.json(*line, label(*line), decimals)).collect()
-    }
-}
-
-impl Series {
-    fn json(&self, line: u8, label: String, decimals: u8) -> SeriesJson {
-        let scale = 10_f64.powi(i32::from(decimals));
-        let rounded = |value: f32| (f64::from(value) * scale).round() / scale;
-        let (mut steps, mut values, mut before) = (Vec::new(), Vec::new(), 0);
-        for (&interval, extremes) in &self.values {
-            steps.push(interval - before);
-            before = interval;
-            let (low, high) = (rounded(extremes.low), rounded(extremes.high));
-            values.extend(if extremes.rises { [low, high] } else { [high, low] });
-        }
-        SeriesJson { label, line, steps, values }
+    /// All lines that have a value, in their order.
+    pub fn lines(&self) -> impl Iterator<Item = Line<P>> {
+        self.series.keys().copied()
     }
 }
 
@@ -204,6 +156,10 @@ mod tests {
 
     const HEIGHT: &str = "height";
     const KEY: Line<&str> = (HEIGHT, 0);
+
+    fn whole(store: &Store<&str>) -> Part {
+        store.part(0..=u16::MAX).next().expect("a series").1
+    }
 
     #[test]
     fn extremes_outlive_every_doubling() {
@@ -216,15 +172,15 @@ mod tests {
             };
             store.push(Instant::from_millis(second * 1000), KEY, value);
         }
-        let grid = store.grid();
-        assert!((1000..=2048).contains(&grid.intervals), "{grid:?}");
-        let series = &store.plot(HEIGHT, 1, |_| String::new())[0];
-        assert_eq!(series.steps.len(), grid.intervals);
-        let place = |wanted: f64| {
-            series.values.iter().position(|value| (value - wanted).abs() < 0.01).expect("kept") / 2
+        let (_, interval_ms) = store.spacing_ms().expect("a value");
+        let (numbers, values) = whole(&store);
+        assert!((1000..=2048).contains(&numbers.len()), "{interval_ms}");
+        assert!(numbers.iter().copied().eq(0..numbers.len() as u16));
+        let place = |wanted: f32| {
+            values.iter().position(|value| (value - wanted).abs() < 0.01).expect("kept") as u64 / 2
         };
-        let at = |second: f64| (second / grid.interval_s) as usize;
-        assert_eq!((place(99.0), place(-99.0)), (at(777.0), at(55_555.0)));
+        let at = |second: u64| second * 1000 / interval_ms;
+        assert_eq!((place(99.0), place(-99.0)), (at(777), at(55_555)));
     }
 
     #[test]
@@ -236,7 +192,7 @@ mod tests {
             for value in values {
                 store.push(Instant::ZERO, KEY, value);
             }
-            assert_eq!(store.plot(HEIGHT, 1, |_| String::new())[0].values, kept);
+            assert_eq!(whole(&store).1, kept);
         }
     }
 
@@ -247,9 +203,9 @@ mod tests {
         store.push(Instant::from_micros(u64::MAX), KEY, 2.0);
         store.push(Instant::ZERO, KEY, f32::NAN);
         store.push(Instant::ZERO, KEY, 3.0);
-        let series = &store.plot(HEIGHT, 1, |_| String::new())[0];
-        assert!(series.steps.iter().all(|step| usize::from(*step) < INTERVALS_MAX));
-        assert_eq!(series.values.len(), 2 * series.steps.len());
+        let (numbers, values) = whole(&store);
+        assert!(numbers.iter().all(|number| usize::from(*number) < INTERVALS_MAX));
+        assert_eq!(values.len(), 2 * numbers.len());
     }
 
     #[test]
@@ -260,16 +216,14 @@ mod tests {
                 store.push(Instant::from_millis(interval * INTERVAL_MS), (HEIGHT, line), interval as f32);
             }
         }
-        let series = store.plot(HEIGHT, 1, |_| String::new());
+        let series: Vec<_> = store.part(0..=u16::MAX).map(|(_, part)| part).collect();
         assert_eq!(series.len(), SERIES_MAX);
-        let filled: usize = series.iter().map(|series| series.steps.len()).sum();
+        let filled: usize = series.iter().map(|(numbers, _)| numbers.len()).sum();
         assert!((FILLED_MAX / 2..=FILLED_MAX).contains(&filled), "{filled}");
         assert_eq!(filled, store.filled);
-        let last = INTERVALS_MAX as f64 - 1.0;
+        let last = INTERVALS_MAX as f32 - 1.0;
         assert!(
-            series
-                .iter()
-                .all(|series| series.values.first() == Some(&0.0) && series.values.last() == Some(&last))
+            series.iter().all(|(_, values)| values.first() == Some(&0.0) && values.last() == Some(&last))
         );
     }
 }

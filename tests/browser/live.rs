@@ -69,16 +69,16 @@ const PANELS: [Panel; 24] = [
     ("pressure", "SCALED_PRESSURE", 1.0, |f| of(f, "press_abs")),
     ("temperature", "SCALED_PRESSURE", 0.1, |f| of(f, "temperature") / 100.0),
     ("esc_rpm:2", "ESC_TELEMETRY_1_TO_4", 1.0, |f| f["rpm"][2].as_f64().unwrap()),
-    ("esc_amperes:1", "ESC_TELEMETRY_1_TO_4", 0.1, |f| f["current"][1].as_f64().unwrap() / 100.0),
-    ("esc_volts:0", "ESC_TELEMETRY_1_TO_4", 0.01, |f| f["voltage"][0].as_f64().unwrap() / 100.0),
+    ("MotorAmperes:1", "ESC_TELEMETRY_1_TO_4", 0.1, |f| f["current"][1].as_f64().unwrap() / 100.0),
+    ("MotorVolts:0", "ESC_TELEMETRY_1_TO_4", 0.01, |f| f["voltage"][0].as_f64().unwrap() / 100.0),
     ("airspeed", "VFR_HUD", 0.1, |f| of(f, "airspeed")),
     ("groundspeed", "VFR_HUD", 0.1, |f| of(f, "groundspeed")),
     ("heading", "VFR_HUD", 1.0, |f| of(f, "heading")),
     ("throttle", "VFR_HUD", 1.0, |f| of(f, "throttle")),
     ("climb", "VFR_HUD", 0.1, |f| of(f, "climb")),
     ("velocity_module", "LOCAL_POSITION_NED", 0.1, |f| of(f, "vx").hypot(of(f, "vy")).hypot(of(f, "vz"))),
-    ("velocity:0", "LOCAL_POSITION_NED", 0.01, |f| of(f, "vx")),
-    ("velocity:2", "LOCAL_POSITION_NED", 0.01, |f| of(f, "vz")),
+    ("Velocity:0", "LOCAL_POSITION_NED", 0.01, |f| of(f, "vx")),
+    ("Velocity:2", "LOCAL_POSITION_NED", 0.01, |f| of(f, "vz")),
     ("altitude", "GPS_RAW_INT", 0.1, |f| of(f, "alt") / 1e3),
     ("latitude", "GPS_RAW_INT", 1e-7, |f| of(f, "lat") / 1e7),
     ("longitude", "GPS_RAW_INT", 1e-7, |f| of(f, "lon") / 1e7),
@@ -485,6 +485,46 @@ fn a_packet_changes_the_page_within_a_tenth_of_a_second() {
         latencies[latencies.len() - 1]
     );
     assert!(median_ms < 100.0, "{latencies:?}");
+}
+
+#[test]
+fn a_link_is_paused_and_rewound_while_it_goes_on() {
+    let port = free_port();
+    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "light", 1440, 900);
+    std::thread::scope(|scope| {
+        // A tenth of a degree every fiftieth of a second.
+        scope.spawn(|| {
+            let seeds = &Manifest::own().seeds;
+            let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+            for number in 0..700_u16 {
+                let mut attitude = vec![0; 28];
+                attitude[4..8].copy_from_slice(&(f32::from(number) / 10.0).to_radians().to_le_bytes());
+                for (id, payload) in [(0, vec![4, 0, 0, 0, 2, 3, 0x51, 4, 3]), (30, attitude)] {
+                    let frame = build_v2(number as u8, id, &payload, seeds[&id]);
+                    socket.send_to(&frame, ("127.0.0.1", port)).unwrap();
+                }
+                std::thread::sleep(Duration::from_millis(20));
+            }
+        });
+        let now = |page: &mut LivePage| page.read()["now"].as_f64().unwrap();
+        page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+        let start_s = now(&mut page);
+        page.wait(&format!("return document.documentElement.dataset.now > {start_s} + 3"), 20);
+        page.press(&[" "]);
+        page.wait("return document.getElementById('notice').textContent.startsWith('Paused')", 5);
+        let (paused_s, roll) = (now(&mut page), shown(&page.read(), "roll"));
+        std::thread::sleep(Duration::from_millis(800));
+        assert_eq!((now(&mut page), shown(&page.read(), "roll")), (paused_s, roll), "it stands still");
+        page.press(&["HOME"]);
+        page.wait(&format!("return document.documentElement.dataset.now < {paused_s} - 1"), 5);
+        assert!(shown(&page.read(), "roll") < roll, "what stood there then");
+        page.press(&["END"]);
+        page.wait(&format!("return document.documentElement.dataset.now > {paused_s} + 0.8"), 5);
+        assert!(shown(&page.read(), "roll") > roll, "nothing was lost meanwhile");
+    });
+    assert_sound(&mut page);
 }
 
 #[test]

@@ -5,10 +5,14 @@ usage: browser.py CHROMIUM CHROMEDRIVER PAGE [SCREENSHOT]        prints JSON
   console       what the browser complained about
   requests      addresses that the page asked for, but for itself
   title, text   what stands there
-  findings      level and check of each row of the table
+  findings      time, level, check and words of each finding in the list
   tiles         label and value
   plots         for each plot: id, lines, the pixels of each line's colour, and what its lines say where the mouse points
                 at 30, 50 and 70 % of it, with the time there
+  cursor        the time under the cursor, at the last of these
+  modes         names of the flight modes, in order
+  limits        of warning and critical, by plot
+  why           what findings mean, and what to do
   map           the part of the map's pixels that is drawn on
   width         of the page and of the window, at the width of a phone
 """
@@ -55,6 +59,17 @@ return [log.start_s, log.end_s];
 """
 
 
+# The names of the flight modes, one after the other.
+MODES = """
+return JSON.parse(document.getElementById("data").textContent).flight.modes[1].map(([, name]) => name);
+"""
+# The limits of warning and critical by plot.
+LIMITS = """
+const { plots } = JSON.parse(document.getElementById("data").textContent).flight;
+return Object.fromEntries(plots.filter(({ limits }) => limits).map(({ id, limits }) => [id, limits]));
+"""
+
+
 def point(driver, plot, part, time_range):
     """Moves the mouse over a plot and reads its lines' values."""
     over = plot.find_element("css selector", ".u-over")
@@ -93,9 +108,11 @@ def look(driver, page, screenshot):
     time_range = driver.execute_script(RANGE)
     all_of = lambda selector: driver.find_elements("css selector", selector)
     shown = {"title": driver.title, "text": driver.find_element("tag name", "body").text}
-    shown["findings"] = [[cell.text for cell in row.find_elements("tag name", "td")] for row in all_of("tr.finding")]
+    content = lambda row, part: row.find_element("css selector", part).get_attribute("textContent")
+    shown["findings"] = [[content(row, "time"), content(row, ".badge"), row.get_attribute("data-check"), content(row, ".words")]
+                         for row in all_of(".notes .finding")]
     shown["gaps"] = [row.text for row in all_of("tr.gap")]
-    shown["texts"] = [row.find_elements("tag name", "td")[2].text for row in all_of("tr.text")]
+    shown["texts"] = [content(row, ".words") for row in all_of(".notes .text")]
     shown["tiles"] = {tile.find_element("tag name", "small").text: tile.find_element("tag name", "b").text
                       for tile in all_of(".tile")}
     shown["plots"] = {}
@@ -108,12 +125,16 @@ def look(driver, page, screenshot):
                 LINE_PIXELS, canvas, plot.find_elements("css selector", ".keys i")),
             "points": [point(driver, plot, part, time_range) for part in (0.3, 0.5, 0.7)],
         }
+    shown["cursor"] = driver.find_element("css selector", ".cursor-time").text
+    shown["modes"] = driver.execute_script(MODES)
+    shown["limits"] = driver.execute_script(LIMITS)
+    shown["why"] = [row.get_attribute("textContent") for row in all_of(".notes .why")]
     shown["map"] = [driver.execute_script(DRAWN, canvas) for canvas in all_of("#map")]
     shown["timeline"] = driver.execute_script(DRAWN, driver.find_element("id", "timeline"))
-    if all_of("tr.finding"):
+    if all_of(".notes .finding"):
         # A click on a finding looks closer; the button goes back.
-        driver.execute_script("arguments[0].click()", all_of("tr.finding")[0])
-        back = driver.find_element("css selector", "nav button")
+        driver.execute_script("arguments[0].click()", all_of(".notes .finding")[0])
+        back = driver.find_element("css selector", ".back")
         WebDriverWait(driver, 10).until(lambda _: back.is_displayed())
         driver.execute_script("arguments[0].click()", back)
         WebDriverWait(driver, 10).until(lambda _: not back.is_displayed())

@@ -164,6 +164,11 @@ impl Judge {
         self.flights.going_on()
     }
 
+    /// The limits that hold now.
+    pub fn params(&self) -> &Params {
+        self.monitor.params()
+    }
+
     /// Takes the next item.
     pub fn item(&mut self, at: Instant, item: Item<'_>) {
         self.epochs.take(at, &item);

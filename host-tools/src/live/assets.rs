@@ -1,57 +1,22 @@
-//! The page's files, inside the program.
+//! The files of the live page.
 
-const HTML: &str = "text/html; charset=utf-8";
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const STYLE: &str = "text/css; charset=utf-8";
-const IMAGE: &str = "image/svg+xml";
+use std::borrow::Cow;
+use std::sync::OnceLock;
 
-macro_rules! assets {
-    ($($name:literal $kind:ident;)*) => {
-        const ASSETS: &[(&str, &str, &str)] = &[
-            $(($name, $kind, include_str!(concat!("assets/", $name))),)*
-            // What the report's page is made of too; uPlot 1.6.32, MIT (`src/assets/uPlot.LICENSE`).
-            ("elements.js", SCRIPT, include_str!("../assets/elements.js")),
-            ("text.js", SCRIPT, include_str!("../assets/text.js")),
-            ("lines.js", SCRIPT, include_str!("../assets/lines.js")),
-            ("uPlot.iife.min.js", SCRIPT, include_str!("../assets/uPlot.iife.min.js")),
-            ("uPlot.min.css", STYLE, include_str!("../assets/uPlot.min.css")),
-        ];
-    };
-}
-
-assets! {
-    "index.html" HTML;
-    "icon.svg" IMAGE;
-    "page.css" STYLE;
-    "instruments.css" STYLE;
-    "main.js" SCRIPT;
-    "dom.js" SCRIPT;
-    "shown.js" SCRIPT;
-    "badge.js" SCRIPT;
-    "link.js" SCRIPT;
-    "store.js" SCRIPT;
-    "colours.js" SCRIPT;
-    "gauge.js" SCRIPT;
-    "bar.js" SCRIPT;
-    "horizon.js" SCRIPT;
-    "compass.js" SCRIPT;
-    "plot.js" SCRIPT;
-    "spark.js" SCRIPT;
-    "map.js" SCRIPT;
-    "general.js" SCRIPT;
-    "esc.js" SCRIPT;
-    "movement.js" SCRIPT;
-    "health.js" SCRIPT;
-    "condition.js" SCRIPT;
-    "notes.js" SCRIPT;
-    "player.js" SCRIPT;
-    "sound.js" SCRIPT;
-    "keys.js" SCRIPT;
-}
+use crate::page::program::{STYLE, UPLOT, program};
 
 /// A file's type and text.
-pub fn find(name: &str) -> Option<(&'static str, &'static str)> {
-    ASSETS.iter().find(|(known, ..)| *known == name).map(|(_, kind, text)| (*kind, *text))
+pub fn find(name: &str) -> Option<(&'static str, Cow<'static, str>)> {
+    const SCRIPT: &str = "text/javascript; charset=utf-8";
+    static PROGRAM: OnceLock<String> = OnceLock::new();
+    Some(match name {
+        "index.html" => ("text/html; charset=utf-8", include_str!("../page/assets/live.html").into()),
+        "icon.svg" => ("image/svg+xml", include_str!("../page/assets/icon.svg").into()),
+        "page.css" => ("text/css; charset=utf-8", STYLE.concat().into()),
+        "uPlot.js" => (SCRIPT, UPLOT.into()),
+        "page.js" => (SCRIPT, PROGRAM.get_or_init(|| program("live")).as_str().into()),
+        _ => return None,
+    })
 }
 
 #[cfg(test)]
@@ -59,37 +24,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_runs_under_its_own_policy() {
+    fn the_page_runs_under_its_own_policy_and_whatever_it_asks_for_is_there() {
         let (_, page) = find("index.html").expect("it is there");
         assert!(!page.contains("<script>") && !page.contains("style=") && !page.contains(" on"));
-        for (name, kind, text) in ASSETS.iter().filter(|(name, ..)| !name.starts_with("uPlot")) {
-            for markup in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("] {
-                assert!(!text.contains(markup), "{name}: {markup}");
-            }
-            assert!(
-                *kind != SCRIPT || !text.contains("http://") || *name == "elements.js",
-                "{name} names an address"
-            );
-        }
-    }
-
-    #[test]
-    fn whatever_the_page_asks_for_is_there() {
-        for (name, kind, text) in ASSETS {
-            for line in text.lines().filter(|line| *kind == SCRIPT && line.starts_with("import ")) {
-                let (names, from) = line.split_once(" from \"./").expect("an import is one line");
-                let from = from.trim_end_matches("\";");
-                let (_, exporter) = find(from).unwrap_or_else(|| panic!("{name} asks for {from}"));
-                let names = names.trim_start_matches("import {").trim_end_matches('}').split(',');
-                for wanted in names.filter_map(|name| name.split_whitespace().next()) {
-                    let exports = format!("export const {wanted} ");
-                    assert!(exporter.contains(&exports), "{name}: {from} has no {wanted}");
-                }
-            }
-        }
-        let (_, page) = find("index.html").expect("it is there");
-        for (name, ..) in ASSETS.iter().filter(|(_, kind, _)| *kind == STYLE) {
-            assert!(page.contains(name), "nobody asks for {name}");
+        let asked: Vec<&str> = page
+            .split(['"', '>'])
+            .filter(|word| [".js", ".css", ".svg"].iter().any(|end| word.ends_with(end)))
+            .collect();
+        assert_eq!(asked.len(), 4, "{asked:?}");
+        for name in asked {
+            assert!(find(name).is_some(), "{name}");
         }
     }
 }

@@ -3,15 +3,23 @@
 //! A HUMS on board of the vehicle hears every frame; where one speaks, its level counts, and the reason is what these
 //! checks see of the same. Its recorder is its own to judge.
 
-use hums_core::health::{self, EXPECTED, Level, Subsystem, When};
+use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When};
 use hums_core::time::{Instant, Span};
+use hums_link::summary;
 use serde::Serialize;
 
 use super::craft::Craft;
-use super::note::words;
 
 /// As long as a heartbeat may be missed.
 const SILENT: Span = Span::from_secs(5);
+
+/// What a finding of a HUMS begins with on the radio.
+const OURS: &str = "HUMS: ";
+
+/// A finding in words.
+fn words(finding: &Finding) -> String {
+    summary::text(finding).as_str().trim_start_matches(OURS).to_owned()
+}
 
 /// One subsystem.
 #[derive(Debug, Serialize)]

@@ -1,6 +1,6 @@
 //! One vehicle: the same monitor that flies on board, on the frames that reach this PC, and what else is told of it.
 //!
-//! Small, and all of it can be copied: playback keeps copies to go back to. What grows is in [`super::history`].
+//! Small, and all of it can be copied: playback keeps copies to go back to. What grows is in [`crate::page::history`].
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::health::{Finding, Level, Subsystem};
-use hums_core::observation::{Observation, Source};
+use hums_core::observation::{Autopilot, Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::time::{Instant, Span};
@@ -16,12 +16,12 @@ use hums_link::sequence::Sequences;
 use hums_link::{Check, Frame, observe};
 
 use super::companion::Companion;
-use super::history::History;
 use super::latest::Latest;
-use super::note::Note;
-use super::plots::Plot;
-use crate::decode::reference::Reference;
+use crate::decode::reference::{Quantity, Reference};
 use crate::mavlink::ids::STATUSTEXT;
+use crate::page::history::History;
+use crate::page::note::Note;
+use crate::source::parameter;
 use crate::statustext::{Text, Texts};
 
 /// By then a HUMS on board has told of itself.
@@ -30,8 +30,8 @@ const SETTLE: Span = Span::from_secs(5);
 const SILENT: Span = Span::from_secs(1);
 /// The check of that.
 const ESC_SILENT: &str = "esc_silent";
-/// How often the link's figures are kept for their plot.
-const LINK_EVERY: Span = Span::from_secs(1);
+/// How often the limits are looked at.
+const LIMITS_EVERY: Span = Span::from_secs(1);
 
 /// What is known of a vehicle.
 #[derive(Clone, Debug)]
@@ -60,7 +60,9 @@ pub struct Craft {
     texts: Texts,
     sequences: Sequences,
     began: Instant,
-    link_at: Instant,
+    limits_at: Option<Instant>,
+    /// A barometer tells of itself: what an inertial sensor's message tells of the air is another one's.
+    barometer: bool,
     /// Of which parts it is known what they ran before this session.
     lives: [bool; COMPONENTS_MAX],
 }
@@ -82,7 +84,8 @@ impl Craft {
             texts: Texts::default(),
             sequences: Sequences::new(),
             began: at,
-            link_at: at,
+            limits_at: None,
+            barometer: false,
             lives: [false; COMPONENTS_MAX],
         }
     }
@@ -122,6 +125,16 @@ impl Craft {
         if let Some((source, observation)) = observe(frame) {
             self.observe(at, source, &observation, history);
         }
+        if let Some(history) = history {
+            history.frame(at, frame, self.monitor.vehicle().source);
+            if let Some((name, value)) = parameter(frame, self.autopilot()) {
+                history.parameter(at, &name, value);
+            }
+        }
+    }
+
+    fn autopilot(&self) -> Autopilot {
+        self.monitor.vehicle().heartbeat.get().map_or(Autopilot::Other, |heartbeat| heartbeat.autopilot)
     }
 
     /// Takes what it said in words.
@@ -142,8 +155,11 @@ impl Craft {
             return;
         }
         self.heard = at;
+        self.barometer |= matches!(observation, Observation::Air(_));
+        let other = self.barometer && matches!(observation, Observation::ImuAndAir(..));
         for (_, quantities) in self.reference.told_by(observation) {
-            for quantity in quantities {
+            let of_air = |quantity: &Quantity| matches!(quantity, Quantity::Temperature | Quantity::Pressure);
+            for quantity in quantities.into_iter().filter(|quantity| !(other && of_air(quantity))) {
                 if let Some(value) = self.reference.value(at, quantity) {
                     self.latest.set(at, quantity, value);
                 }
@@ -219,10 +235,10 @@ impl Craft {
         // Nobody takes these here, and they are made anew.
         while self.monitor.take_snapshot(now).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
-        if now.since(self.link_at) >= LINK_EVERY {
-            self.link_at = now;
-            if let (Some(history), Some(loss)) = (history, self.loss) {
-                history.push(now, (Plot::Loss, 0), loss * 100.0);
+        if self.limits_at.is_none_or(|at| now.since(at) >= LIMITS_EVERY) {
+            self.limits_at = Some(now);
+            if let Some(history) = history {
+                history.judged_by(self.monitor.params());
             }
         }
     }

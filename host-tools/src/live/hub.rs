@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use hums_core::time::Instant;
 use tokio::sync::watch;
 
-use super::history::{Cursor, Part};
 use super::world::Histories;
+use crate::page::history::{Cursor, Part};
 
 /// Commands of all pages that wait; more are refused, which a second key press repeats.
 const COMMANDS_MAX: usize = 64;

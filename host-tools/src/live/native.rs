@@ -24,6 +24,8 @@ pub enum Entry {
     Observation(Source, Box<Observation>),
     /// What it said in words.
     Text(Text),
+    /// A parameter and its value.
+    Parameter(String, f64),
     /// The log has nothing from here to there.
     Gap(Instant, Instant),
 }
@@ -34,6 +36,7 @@ impl Entry {
         match *item {
             Item::Observation(source, observation) => Some(Self::Observation(source, Box::new(*observation))),
             Item::Text(text) => Some(Self::Text(Text::whole(at, text.source, text.severity, text.words))),
+            Item::Parameter(parameter) => Some(Self::Parameter(parameter.name.to_owned(), parameter.value)),
             Item::Gap(gap) => gap.from.zip(gap.to).map(|(from, to)| Self::Gap(from, to)),
             _ => None,
         }

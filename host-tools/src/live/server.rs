@@ -20,10 +20,10 @@ use tokio::net::TcpListener;
 
 use super::assets;
 use super::guard::Guard;
-use super::harmless;
-use super::history::Cursor;
 use super::hub::{Command, Hub, Published};
 use crate::interrupt;
+use crate::page::history::Cursor;
+use crate::page::json;
 
 /// Pages at once.
 const PAGES_MAX: usize = 16;
@@ -243,7 +243,7 @@ impl Page {
                 self.cursor = Cursor::default();
             }
             let part = hub.since(*system, &mut self.cursor, published.now);
-            messages.extend(part.map(|part| harmless::json(&part)));
+            messages.extend(part.map(|part| json::json(&part)));
             messages.push(state.clone());
         }
         messages.retain(|message| !message.is_empty());

@@ -1,9 +1,9 @@
 //! What is known now as the text that pages take.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use hums_core::component::COMPONENTS_MAX;
-use hums_core::params::Param;
 use hums_core::time::Instant;
 use hums_core::usage::UsageCounter;
 use serde::Serialize;
@@ -11,10 +11,11 @@ use serde::Serialize;
 use super::board;
 use super::companion::CompanionJson;
 use super::craft::Craft;
-use super::harmless;
 use super::values::{Motors, Values};
 use super::world::World;
 use crate::names::{autopilot_name, type_name};
+use crate::page::json::json;
+use crate::page::modes;
 
 /// Where the bytes come from, and what they are doing.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -81,7 +82,7 @@ pub fn head(world: &World, now: Instant, around: &Around<'_>) -> String {
         overall: board::overall(craft, now),
         heard_ms: now.since(craft.heard).as_millis(),
     });
-    harmless::json(&Head {
+    json(&Head {
         t: "head",
         source: around.source,
         now_s: now.as_secs_f64(),
@@ -110,6 +111,7 @@ struct State<'a> {
     armed: bool,
     airborne: bool,
     phase: &'static str,
+    mode: Cow<'static, str>,
     overall: &'static str,
     heard_ms: u64,
     px4: bool,
@@ -121,7 +123,6 @@ struct State<'a> {
     components: Vec<ComponentJson>,
     link: LinkJson,
     companion: Option<CompanionJson>,
-    limits: BTreeMap<&'static str, [f32; 2]>,
 }
 
 #[derive(Serialize)]
@@ -152,7 +153,7 @@ fn state(system: u8, craft: &Craft, now: Instant) -> String {
     let px4 = heartbeat.autopilot == hums_core::observation::Autopilot::Px4;
     let identity = vehicle.identity.get().filter(|identity| identity.firmware != 0);
     let [major, minor, patch, _] = identity.map_or(0, |identity| identity.firmware).to_be_bytes();
-    harmless::json(&State {
+    json(&State {
         t: "state",
         vehicle: system,
         now_s: now.as_secs_f64(),
@@ -161,6 +162,7 @@ fn state(system: u8, craft: &Craft, now: Instant) -> String {
         armed: heartbeat.armed,
         airborne: craft.monitor.flight().airborne(),
         phase: craft.phase(now).name(),
+        mode: modes::name(&heartbeat),
         overall: board::overall(craft, now),
         heard_ms: now.since(craft.heard).as_millis(),
         px4,
@@ -180,7 +182,6 @@ fn state(system: u8, craft: &Craft, now: Instant) -> String {
             reboots: vehicle.reboots,
         },
         companion: craft.companion.json(now),
-        limits: limits(craft, px4),
     })
 }
 
@@ -212,16 +213,4 @@ fn components(craft: &Craft) -> Vec<ComponentJson> {
         })
     };
     (0..COMPONENTS_MAX).filter_map(json).collect()
-}
-
-/// Where the gauges change their colour: the limits of warning and of critical.
-fn limits(craft: &Craft, px4: bool) -> BTreeMap<&'static str, [f32; 2]> {
-    let of = |warning, critical| [craft.monitor.params().get(warning), craft.monitor.params().get(critical)];
-    let vibration =
-        if px4 { of(Param::VibePx4Warn, Param::VibePx4Crit) } else { of(Param::VibeWarn, Param::VibeCrit) };
-    BTreeMap::from([
-        ("battery_percent", of(Param::BatRemWarn, Param::BatRemCrit)),
-        ("cell_volts", of(Param::CellVoltWarn, Param::CellVoltCrit)),
-        ("vibration", vibration),
-    ])
 }

@@ -10,10 +10,10 @@ use hums_core::time::{Instant, Span};
 use hums_link::{Check, Frame, observe};
 
 use super::craft::Craft;
-use super::history::History;
 use super::native::Entry;
 use super::told::{Limits, Told, parameter, place_of};
 use crate::check::SETTLE;
+use crate::page::history::History;
 
 /// Vehicles that are told apart; later ones are counted.
 pub const VEHICLES_MAX: usize = 8;
@@ -129,6 +129,7 @@ impl World {
         let system = match entry {
             Entry::Observation(source, _) => source.system,
             Entry::Text(text) => text.source.system,
+            Entry::Parameter(name, value) => return self.told_parameter(at, name, *value, histories),
             Entry::Gap(from, to) => return self.pass(*from, *to, histories),
         };
         self.advance(at, histories.as_deref_mut());
@@ -144,7 +145,16 @@ impl World {
         match entry {
             Entry::Observation(source, observation) => craft.observe(at, *source, observation, &mut history),
             Entry::Text(text) => craft.text(text.clone(), &mut history),
-            Entry::Gap(..) => {}
+            Entry::Parameter(..) | Entry::Gap(..) => {}
+        }
+    }
+
+    /// A parameter of an autopilot's own log, which is of one vehicle.
+    fn told_parameter(&self, at: Instant, name: &str, value: f64, histories: Option<&mut Histories>) {
+        // The vehicle of such a log is system 1; its parameters stand before it is heard.
+        let system = self.crafts.keys().next().copied().unwrap_or(1);
+        if let Some(histories) = histories {
+            histories.entry(system).or_default().parameter(at, name, value);
         }
     }
 

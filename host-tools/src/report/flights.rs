@@ -1,16 +1,11 @@
-//! Flights, as [`crate::check`] finds them, with how high and fast they were; and phases, by the rules of the firmware.
+//! Flights, as [`crate::check`] finds them, with how high and fast they were.
 
 use hums_core::motion::ground_speed_mps;
-use hums_core::time::{Instant, Span};
+use hums_core::time::Instant;
 use serde::Serialize;
 
 use crate::check::flights::Flight as Judged;
 use crate::decode::reference::{Quantity, Reference};
-
-/// Kept one by one at most.
-const PHASES_MAX: usize = 2_000;
-/// A phase that lasts less is part of the one before.
-const PHASE_MIN: Span = Span::from_secs(2);
 
 /// One flight: from take-off to landing, or to the end of the log.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -26,14 +21,6 @@ pub struct Flight {
     speed_max_m_s: f32,
     percent_from: Option<f32>,
     percent_to: Option<f32>,
-}
-
-/// A time in one phase.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct PhaseSpan {
-    phase: &'static str,
-    from_s: f64,
-    to_s: f64,
 }
 
 /// How high and fast the vehicle was in each flight, and what it took of the battery.
@@ -82,41 +69,6 @@ impl Extents {
             }
         };
         judged.iter().enumerate().map(flight).collect()
-    }
-}
-
-/// The phases of a log.
-#[derive(Debug, Default)]
-pub struct Phases(Vec<PhaseSpan>);
-
-impl Phases {
-    /// In order.
-    pub fn all(&self) -> &[PhaseSpan] {
-        &self.0
-    }
-
-    /// The phase goes on, or another begins; one too short to matter is taken back.
-    pub fn extend(&mut self, at: Instant, reference: &Reference) {
-        let phase = reference.flight().phase(at, reference.vehicle()).name();
-        let at_s = at.as_secs_f64();
-        let full = self.0.len() >= PHASES_MAX;
-        if let Some(last) = self.0.last_mut() {
-            last.to_s = last.to_s.max(at_s);
-            if last.phase == phase || full {
-                return;
-            }
-            let short = at_s - last.from_s < f64::from(PHASE_MIN.as_secs_f32());
-            if short && self.0.len() > 1 {
-                self.0.pop();
-                if let Some(before) = self.0.last_mut() {
-                    before.to_s = at_s;
-                    if before.phase == phase {
-                        return;
-                    }
-                }
-            }
-        }
-        self.0.push(PhaseSpan { phase, from_s: at_s, to_s: at_s });
     }
 }
 

@@ -1,20 +1,16 @@
 //! `hums report`: one page for each session, whole in itself: no network, no file beside it.
 //!
-//! [`replay`] reads the log in order: [`samples`] keeps what the vehicle told, so that a page of hours stays below a few
-//! megabytes, [`flights`] finds flights and phases with the firmware's own rules, [`frames`] counts; [`trend`] compares
-//! with the sessions before on the same card; [`page`] puts the numbers, as JSON, beside the program that draws them
-//! (`program`, from the modules in `assets/`), which [`plots`] tells what to draw.
+//! [`replay`] reads the log in order: what the vehicle told becomes a history as `hums live` has it ([`crate::page`]),
+//! bounded, so that a page of hours stays below a few megabytes; [`flights`] finds flights with the firmware's own rules; [`trend`] compares with
+//! the sessions before on the same card; [`page`] puts all of it, as JSON, beside the program that draws it.
 //!
 //! Nothing that a vehicle sent becomes markup: text goes into the page as data, and only as text onto it. The page's
 //! own policy lets no other script run and loads nothing.
 
+pub mod counters;
 pub mod flights;
-pub mod frames;
 pub mod page;
-pub mod plots;
-mod program;
 pub mod replay;
-pub mod samples;
 pub mod trend;
 
 use std::io::Write as _;
@@ -138,7 +134,7 @@ fn make(
     let contents = &overview.contents;
     let gaps = overview.ending.summary.gaps;
     let amount = Amount { entries: contents.frames() + contents.records, gaps };
-    let html = page::html(overview, &replay::Replay::of(place)?, trend, of, amount)?;
+    let html = page::html(overview, &replay::Replay::of(place, overview)?, trend, of, amount)?;
     write(path, &html, inputs, of, amount)?;
     let bytes = count(html.len() as u64, "byte");
     output::line(&format!("{}: session {}, {bytes}", shown(path), word(&place.name)))

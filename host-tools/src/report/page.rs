@@ -1,29 +1,25 @@
 //! The page: one HTML file with its style, its program and its data inside.
 
-use std::fmt::Write as _;
-
 use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use hums_blackbox::record::Stats;
+use hums_core::time::Instant;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use super::flights::{Flight, PhaseSpan};
-use super::plots::{About, Plot, about};
-use super::program::program;
-use super::replay::{Point, Replay, Said};
+use super::counters::{self, Counters};
+use super::flights::Flight;
+use super::replay::Replay;
 use super::trend::Trend;
 use crate::files::Amount;
 use crate::info::json::LogJson;
-use crate::series::{GridJson, SeriesJson};
+use crate::page::history::{Cursor, Part};
+use crate::page::json::embedded;
+use crate::page::program::{STYLE, UPLOT, program};
 use crate::summary::Overview;
 
-const TEMPLATE: &str = include_str!("assets/page.html");
-const STYLE: &str = include_str!("assets/page.css");
-/// uPlot 1.6.32, MIT (`src/assets/uPlot.LICENSE`).
-const UPLOT: &str = include_str!("../assets/uPlot.iife.min.js");
-const UPLOT_STYLE: &str = include_str!("../assets/uPlot.min.css");
+const TEMPLATE: &str = include_str!("../page/assets/report.html");
 
 /// What the page's program draws.
 #[derive(Serialize)]
@@ -31,27 +27,13 @@ struct Data<'a> {
     version: &'static str,
     log: LogJson,
     epoch_us: Option<u64>,
-    grid: GridJson,
-    plots: Vec<PlotJson>,
+    /// All of the flight.
+    flight: Option<Part>,
     flights: &'a [Flight],
-    phases: &'a [PhaseSpan],
-    track: Vec<Point>,
-    texts: &'a [Said],
     texts_count: u64,
+    counters: Counters,
     stats: Option<StatsJson>,
     trend: &'a Trend,
-}
-
-#[derive(Serialize)]
-struct PlotJson {
-    id: String,
-    group: &'static str,
-    title: String,
-    unit: &'static str,
-    decimals: u8,
-    /// Counts that only rise: drawn as steps.
-    stepped: bool,
-    series: Vec<SeriesJson>,
 }
 
 #[derive(Serialize)]
@@ -105,17 +87,14 @@ pub fn html(
         version: env!("CARGO_PKG_VERSION"),
         log: LogJson::new(log),
         epoch_us: log.contents.epoch_us,
-        grid: replay.samples.store.grid(),
-        plots: plots(replay),
+        flight: replay.history.since(0, &mut Cursor::default(), Instant::from_micros(u64::MAX)),
         flights: &replay.flights,
-        phases: replay.phases.all(),
-        track: replay.track(),
-        texts: &replay.texts,
         texts_count: replay.texts_count,
+        counters: counters::of(&log.contents.usage, &log.contents.lifetime),
         stats: log.contents.stats.as_ref().map(StatsJson::from),
         trend,
     };
-    let program = program();
+    let program = program("report");
     let programs = [UPLOT, program.as_str()];
     // Only these two programs may run, whatever else may ever get onto the page.
     let hashes: Vec<String> = programs
@@ -127,77 +106,35 @@ pub fn html(
         ("{{scripts}}", hashes.join(" ").as_str()),
         ("{{log}}", of.unwrap_or("unknown")),
         ("{{amount}}", amount.to_string().as_str()),
-        ("{{style}}", [UPLOT_STYLE, STYLE].concat().as_str()),
+        ("{{style}}", STYLE.concat().as_str()),
         ("{{uplot}}", UPLOT),
         ("{{program}}", program.as_str()),
         // Last, so that nothing in it is taken for a mark.
-        ("{{data}}", harmless(&serde_json::to_string(&data)?).as_str()),
+        ("{{data}}", embedded(&data).as_str()),
     ] {
         page = page.replacen(mark, text, 1);
     }
     Ok(page)
 }
 
-/// JSON that ends no script element and begins none: `<`, `>` and `&` stand in strings only, where an escape is the
-/// same; the two line separators are no JavaScript.
-fn harmless(json: &str) -> String {
-    let mut out = String::with_capacity(json.len());
-    for c in json.chars() {
-        match c {
-            // Writing to a `String` cannot fail.
-            '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => drop(write!(out, "\\u{:04x}", c as u32)),
-            _ => out.push(c),
-        }
-    }
-    out
-}
-
-fn plots(replay: &Replay) -> Vec<PlotJson> {
-    let json = |(plot, group, title, unit, decimals, label): About| PlotJson {
-        id: format!("{plot:?}"),
-        group,
-        title: title.to_owned(),
-        unit,
-        decimals,
-        stepped: matches!(plot, Plot::Clips | Plot::EscErrors | Plot::Satellites),
-        series: replay.samples.store.plot(plot, decimals, label),
-    };
-    about(replay.autopilot).into_iter().map(json).filter(|plot| !plot.series.is_empty()).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use hums_core::observation::Autopilot;
-
     use super::*;
 
     #[test]
-    fn data_ends_no_element() {
-        let hostile = "</script><script>alert(1)</script><!-- & \u{2028}";
-        let json = serde_json::to_string(hostile).expect("JSON");
-        let inside = harmless(&json);
-        assert!(!inside.contains(['<', '>', '&', '\u{2028}']), "{inside}");
-        assert_eq!(serde_json::from_str::<String>(&inside).expect("JSON"), hostile);
-    }
-
-    #[test]
     fn each_mark_of_the_template_stands_once() {
-        let program = program();
+        let program = program("report");
         for mark in
             ["{{scripts}}", "{{log}}", "{{amount}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"]
         {
             assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
-            assert!(!UPLOT.contains(mark) && !program.contains(mark) && !STYLE.contains(mark), "{mark}");
+            assert!(
+                !UPLOT.contains(mark) && !program.contains(mark) && !STYLE.concat().contains(mark),
+                "{mark}"
+            );
         }
         for text in [UPLOT, program.as_str()] {
             assert!(!text.contains("</script"), "a program would end early");
         }
-    }
-
-    #[test]
-    fn every_plot_has_its_place() {
-        let about = about(Autopilot::Px4);
-        assert!(about.windows(2).all(|pair| pair[0].0 < pair[1].0), "in order and none twice");
-        assert_eq!(about.len(), Plot::Load as usize + 1);
     }
 }

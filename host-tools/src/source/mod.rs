@@ -49,6 +49,7 @@ pub mod tlog;
 pub mod told;
 pub mod ulog;
 
+pub use said::parameter;
 pub use stream::{Chunk, Source};
 
 use std::fs::File;

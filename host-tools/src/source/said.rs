@@ -48,7 +48,11 @@ impl Said {
         match frame.id() {
             STATUSTEXT => self.text(at, frame, alert, take)?,
             EVENT => event(at, frame, alert, take)?,
-            PARAM_VALUE if frame.component() != COMPONENT => parameter(at, frame, self.autopilot, take)?,
+            PARAM_VALUE => {
+                if let Some((name, value)) = parameter(frame, self.autopilot) {
+                    take(at, Item::Parameter(Parameter { name: &name, value }))?;
+                }
+            }
             _ => {}
         }
         let Some((source, observation)) = observed else { return Ok(()) };
@@ -107,18 +111,19 @@ fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut Take<'
     if severity < 8 { take(at, Item::Event(event)) } else { Ok(()) }
 }
 
-/// `PARAM_VALUE`. An integer is the bits of the float at PX4, and a number like any other at ArduPilot
-/// (MAVLink parameter protocol: byte-wise and cast encoding).
-fn parameter(at: Instant, frame: &Frame<'_>, autopilot: Autopilot, take: &mut Take<'_>) -> Result<()> {
+/// A parameter that an autopilot tells of itself, and its value; `None` for any other frame. An integer is the bits of the float
+/// at PX4, and a number like any other at ArduPilot (MAVLink parameter protocol: byte-wise and cast encoding).
+pub fn parameter(frame: &Frame<'_>, autopilot: Autopilot) -> Option<(String, f64)> {
     const INT32: u8 = 6;
-    let mut payload = [0; 25];
-    payload.iter_mut().zip(frame.payload()).for_each(|(to, from)| *to = *from);
+    if frame.id() != PARAM_VALUE || frame.component() == COMPONENT || frame.check() != Check::Verified {
+        return None;
+    }
+    let payload: [u8; 25] = Fields(frame.payload()).bytes(0);
     let fields = Fields(&payload);
-    let Some(name) = fields.text(8, 16) else { return Ok(()) };
-    let value = fields.f32(0);
-    let bits = autopilot == Autopilot::Px4 && payload[24] == INT32;
+    let (name, value) = (fields.text(8, 16)?, fields.f32(0));
+    let bits = autopilot == Autopilot::Px4 && fields.u8(24) == INT32;
     let value = if bits { f64::from(value.to_bits().cast_signed()) } else { f64::from(value) };
-    take(at, Item::Parameter(Parameter { name, value }))
+    Some((name.to_owned(), value))
 }
 
 #[cfg(test)]

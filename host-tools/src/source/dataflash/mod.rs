@@ -33,6 +33,7 @@ use self::binary::{Binary, Damage, Piece};
 use self::format::{BEGINNING, FMT_TYPE, HEADER_BYTES};
 use self::message::Body;
 pub(super) use self::observe::is_firmware;
+pub(crate) use self::observe::mode_name;
 use self::session::{First, Session};
 use self::text::{Line, Lines};
 use super::input::Input;

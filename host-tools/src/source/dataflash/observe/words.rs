@@ -100,6 +100,21 @@ impl Craft {
     }
 }
 
+/// The name of a mode, by its number and the `MAV_TYPE` of the vehicle (`HEARTBEAT`).
+pub(crate) fn mode_name(vehicle: u8, number: u32) -> Option<&'static str> {
+    let craft = match vehicle {
+        // Quadrotor, coaxial, helicopter, hexarotor, octorotor, tricopter, dodecarotor, decarotor.
+        2..=4 | 13..=15 | 29 | 35 => Craft::Copter,
+        // Fixed wing, VTOLs.
+        1 | 19..=25 => Craft::Plane,
+        // Ground rover, surface boat.
+        10 | 11 => Craft::Rover,
+        12 => Craft::Sub,
+        _ => return None,
+    };
+    craft.mode_name(number)
+}
+
 /// Whether these words are the name and the version of a firmware of `ArduPilot`, as it says them when it starts.
 pub(in crate::source) fn is_firmware(words: &str) -> bool {
     Craft::of_firmware(words).is_some()

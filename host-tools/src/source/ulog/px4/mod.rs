@@ -18,6 +18,8 @@ mod tests;
 
 use hums_core::time::Instant;
 
+pub(crate) use self::system::mode_name;
+
 pub(super) use state::{Px4, Said, Told, Topic};
 
 /// How often what MAVLink repeats is repeated.

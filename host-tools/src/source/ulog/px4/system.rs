@@ -435,6 +435,14 @@ fn log_message(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
+/// The name of a mode as `HEARTBEAT.custom_mode` has it: the main mode in the third byte, the sub mode in the fourth. What was
+/// told of before v1.13, a failure or a state that is none of the pilot's, has the number of another mode.
+pub(crate) fn mode_name(mode: u32) -> Option<&'static str> {
+    let [_, _, main, sub] = mode.to_le_bytes();
+    let flown = MODES.iter().filter(|(nav, ..)| !matches!(nav, 8 | 9 | 11..=13));
+    flown.rev().find(|(_, of, part, _)| (*of, *part) == (main, sub)).map(|&(.., name)| name)
+}
+
 fn rpm(px4: &mut Px4, said: &Said<'_>) {
     let Some(rpm) = said.fields.finite(0).or_else(|| said.fields.finite(1)) else { return };
     let sensor = SpeedSensor { index: said.instance, rpm: Rpm(rpm) };

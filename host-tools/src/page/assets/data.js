@@ -1,0 +1,19 @@
+// The whole flight, as hums wrote it into the page.
+
+import { flight } from "./flight.js";
+
+export const data = JSON.parse(document.getElementById("data").textContent);
+export const log = data.log;
+
+if (data.flight) flight.take(data.flight);
+flight.epoch_ms = data.epoch_us == null ? null : data.epoch_us / 1000;
+// Seconds since the monitor's power-on.
+flight.start = log.start_s ?? 0;
+flight.end = Math.max(log.end_s ?? 0, flight.start + 1);
+flight.gaps = log.gaps.map((gap) => [gap.from_s ?? flight.start, gap.to_s ?? flight.end]);
+flight.flights = data.flights;
+
+const vehicle = log.vehicle;
+export const name = vehicle
+  ? `${vehicle.autopilot}${vehicle.firmware ? " " + vehicle.firmware : ""} ${vehicle.type}`
+  : "Vehicle unknown";

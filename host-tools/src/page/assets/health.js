@@ -1,0 +1,123 @@
+// The health board, usage and what is due, recorder and link.
+
+import { badge } from "./badge.js";
+import { say, attribute, toggle, panel } from "./dom.js";
+import { el } from "./elements.js";
+import { fixed, whole, clock, age } from "./text.js";
+
+const SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude", "recorder", "mishap"];
+
+export const board = () => {
+  const rows = SUBSYSTEMS.map((name) => {
+    const level = badge(), reason = el("span", { class: "reason" }), by = el("small");
+    const node = el("li", { "data-subsystem": name }, el("b", {}, name), level.node, el("div", {}, by, reason));
+    return { node, level, reason, by };
+  });
+  const box = panel("board", "Health", el("ul", { class: "board" }, rows.map((row) => row.node)));
+  return {
+    node: box.node,
+    update({ board: parts }) {
+      parts.forEach((part, i) => {
+        const row = rows[i];
+        row.level.set(part.level, part.calm ?? part.level);
+        say(row.reason, part.reason);
+        say(row.by, part.by === "on board" ? "on board" : "");
+        attribute(row.node, "class", part.level);
+      });
+    },
+  };
+};
+
+const DUE = { green: ["ok", "good"], yellow: ["warning", "soon"], red: ["critical", "due"] };
+const USAGE = [
+  ["flight_time_s", "In the air", clock, ""], ["flights", "Flights", whole, ""], ["armed_time_s", "Armed", clock, ""],
+  ["distance_m", "Distance", whole, "m"], ["height_max_m", "Greatest height", (v) => fixed(v, 1), "m"],
+  ["speed_max_m_s", "Greatest speed", (v) => fixed(v, 1), "m/s"], ["charge_ah", "Charge taken", (v) => fixed(v, 2), "Ah"],
+  ["energy_wh", "Energy taken", (v) => fixed(v, 1), "Wh"], ["voltage_min_v", "Lowest voltage", (v) => fixed(v, 2), "V"],
+  ["current_max_a", "Highest current", (v) => fixed(v, 1), "A"], ["hard_landings", "Hard landings", whole, ""],
+  ["load_factor_max_g", "Load factor", (v) => fixed(v, 2), "g"],
+];
+
+export const usage = () => {
+  const rows = USAGE.map(([name, label, format, unit]) => {
+    const number = el("b", { "data-value": `usage:${name}` });
+    return { name, format, number, node: el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, number, unit ? ` ${unit}` : "")) };
+  });
+  const due = el("ul", { class: "due" });
+  const none = el("p", { class: "dim small" },
+    "No part is described. A log tells its own, a box on the link does when it is asked for its parameters, or a file does: ",
+    el("span", { class: "word" }, "--params"), ".");
+  const box = panel("usage", "Usage of this session", [el("dl", { class: "facts two" }, rows.map((row) => row.node)), el("h4", {}, "Due"), due, none]);
+  let parts = [];
+  return {
+    node: box.node,
+    update({ usage: counters, components }) {
+      for (const row of rows) {
+        row.node.hidden = counters[row.name] == null;
+        say(row.number, row.format(counters[row.name]));
+      }
+      none.hidden = components.length > 0;
+      if (parts.length !== components.length) {
+        parts = components.map(() => {
+          const level = badge(), name = el("b"), text = el("span", { class: "reason" });
+          return { level, name, text, node: el("li", {}, name, level.node, text) };
+        });
+        due.replaceChildren(...parts.map((part) => part.node));
+      }
+      components.forEach((component, i) => {
+        const { level, name, text } = parts[i], used = component.used_percent;
+        say(name, `${component.kind}${component.number ? " " + component.number : ""}${component.name ? " " + component.name : ""}`);
+        // What it ran before is not known on every link: then it may be due without our knowing.
+        const partial = !component.life && component.status === "green" && used != null;
+        const [known, word] = DUE[component.status];
+        level.set(partial ? "stale" : known, partial ? "life unknown" : word);
+        const since = component.life ? "" : " in this session", part = used == null ? "no limit" : fixed(used, 0) + " % used";
+        say(text, `${part}, ${fixed(component.flight_h, 2)} h, ${whole(component.flights)} flights${since}`);
+      });
+    },
+  };
+};
+
+export const link = () => {
+  const pairs = (names) => {
+    const numbers = names.map(([id]) => el("b", { "data-value": id }));
+    return [numbers, el("dl", { class: "facts" }, names.map(([, label], i) => el("div", { class: "fact" }, el("dt", {}, label), el("dd", {}, numbers[i]))))];
+  };
+  const [numbers, list] = pairs([
+    ["link:rate", "Frames"], ["link:loss", "Lost, last 10 s"], ["link:missing", "Missing in all"],
+    ["link:heard", "Autopilot heard"], ["link:reboots", "Autopilot reboots"],
+  ]);
+  const recorder = badge(), told = el("span", { class: "reason" });
+  const [points, database] = pairs([["influx:written", "Points written"], ["influx:waiting", "Waiting"]]);
+  const trouble = el("p", { class: "small" });
+  const stored = el("div", { hidden: true }, el("h4", {}, "Database"), database, trouble);
+  const box = panel("link", "Recorder and link", [el("p", { class: "recorder" }, el("b", {}, "Recorder"), recorder.node, told), list, stored]);
+  return {
+    node: box.node,
+    update(state, head) {
+      const { link: figures, companion } = state;
+      if (!companion) { recorder.set("stale", "not heard"); say(told, "no HUMS speaks on this link"); }
+      else if (companion.gone) { recorder.set("stale", "gone"); say(told, `last heard ${age(companion.heard_ms)} ago`); }
+      else {
+        recorder.set(companion.recorder ?? "stale", companion.recorder == null ? "not told" : companion.recorder === "ok" ? "recording" : companion.recorder);
+        const counted = [companion.flight_s == null ? "" : `${clock(companion.flight_s)} in the air`,
+          companion.flights == null ? "" : companion.flights === 1 ? "1 flight" : `${whole(companion.flights)} flights`].filter(Boolean);
+        say(told, counted.length ? `on board: ${counted.join(", ")}` : "");
+      }
+      say(numbers[0], `${fixed(head.frames_s, 0)} /s, ${whole(figures.frames)} in all`);
+      say(numbers[1], figures.loss_percent == null ? "not known yet" : `${fixed(figures.loss_percent, 1)} %`);
+      say(numbers[2], whole(figures.missing));
+      say(numbers[3], state.heard_ms < 1500 ? "now" : `${age(state.heard_ms)} ago`);
+      say(numbers[4], whole(figures.reboots));
+      stored.hidden = !head.influx;
+      if (head.influx) {
+        say(points[0], whole(head.influx.written));
+        const spilled = head.influx.spilled_bytes > 1e6 ? ` (${fixed(head.influx.spilled_bytes / 1e6, 1)} MB on disk)` : "";
+        say(points[1], whole(head.influx.waiting) + spilled);
+        const lost = head.influx.lost + head.influx.rejected;
+        say(trouble, [lost ? `${whole(lost)} points lost or refused.` : "", head.influx.trouble].filter(Boolean).join(" "));
+        toggle(trouble, "critical", lost > 0);
+      }
+    },
+  };
+};

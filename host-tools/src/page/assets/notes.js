@@ -1,0 +1,67 @@
+// Findings, what the vehicle says, and what happened.
+
+import { badge } from "./badge.js";
+import { panel, toggle } from "./dom.js";
+import { el } from "./elements.js";
+import { flight } from "./flight.js";
+import { clock, plural, short } from "./text.js";
+import { utc } from "./view.js";
+
+const quantity = (value, unit) => `${short(value)} ${unit}`.trim();
+// What a check measured, and against what.
+const measured = ({ value, state, limit, unit, previous }) => [
+  state ?? (value == null ? "" : quantity(value, unit)), limit == null ? "" : `limit ${quantity(limit, unit)}`, `was ${previous}`,
+].filter(Boolean).join(", ");
+
+// `rows` are on the page at most, the newest first or last. A click on one goes there.
+export const notes = ({ go, newestFirst, rows = Infinity }) => {
+  const list = el("ol", { class: "notes", role: "log", "aria-live": newestFirst ? "polite" : "off", "aria-relevant": "additions" });
+  const empty = el("p", { class: "dim empty" }, "Nothing yet: every change of a check's level stands here.");
+  const more = el("p", { class: "dim", hidden: true });
+  let only = false, shown = null, count = 0;
+  const filter = el("button", { type: "button", "aria-pressed": "false", onclick: () => show(!only) }, "findings only");
+  const show = (on) => {
+    only = on;
+    filter.setAttribute("aria-pressed", String(only));
+    toggle(list, "only", only);
+  };
+  const box = panel("notes", "Findings and messages", [list, empty, more], { class: "tall" });
+  box.node.firstChild.append(filter);
+  const row = (note) => {
+    const level = badge(), { found } = note;
+    // What is only said is no level of anything.
+    const plain = note.kind === "event" || (note.kind === "text" && note.level === "ok");
+    level.set(plain ? "event" : note.level, note.kind === "event" ? "event" : plain ? "says" : note.level);
+    const from = note.from === "here" ? note.subsystem : note.from;
+    return el("li", { class: `${note.kind} ${note.level}`, tabindex: 0, "data-at": note.at_s, "data-check": found?.check },
+      el("time", { title: utc(note.at_s) && `${utc(note.at_s)} UTC` }, clock(note.at_s - flight.start)), level.node, el("span", { class: "words" }, note.words),
+      el("small", {}, [from, found && measured(found)].filter(Boolean).join(" \u00b7 ")),
+      found?.because ? el("p", { class: "why" }, `Because of: ${found.because}`) : null,
+      found?.meaning ? el("p", { class: "why" }, found.meaning, " ", el("b", {}, found.action)) : null);
+  };
+  const chosen = (event) => {
+    const at = event.target.closest("li")?.dataset.at;
+    if (at) go(Number(at));
+  };
+  list.addEventListener("click", chosen);
+  list.addEventListener("keydown", (event) => event.key === "Enter" && chosen(event));
+  return {
+    node: box.node,
+    // After a part of the flight: everything anew, or what is new.
+    update(anew = false) {
+      if (anew || flight.notes !== shown || flight.notes.length < count) {
+        list.replaceChildren();
+        count = 0;
+        shown = flight.notes;
+      }
+      const fresh = flight.notes.slice(Math.max(count, flight.notes.length - rows)).map(row);
+      if (newestFirst) list.prepend(...fresh.reverse()); else list.append(...fresh);
+      while (list.children.length > rows) list.lastChild.remove();
+      count = flight.notes.length;
+      empty.hidden = count > 0;
+      more.hidden = !flight.notesGone;
+      more.textContent = `${plural(flight.notesGone, "earlier one is", "earlier ones are")} not listed.`;
+    },
+    only: show,
+  };
+};

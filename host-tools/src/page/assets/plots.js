@@ -1,0 +1,27 @@
+// All plots of the flight, by group, in the order that hums gives them.
+
+import { el } from "./elements.js";
+import { flight } from "./flight.js";
+import { chart } from "./plot.js";
+
+// `place` gives a group's section; what is shown elsewhere is left out.
+export const plots = (place, elsewhere = []) => {
+  const groups = new Map(), made = new Map();
+  return {
+    // A plot is there as soon as it has a line.
+    update() {
+      for (const { id, group } of flight.plots.values()) {
+        if (made.has(id) || elsewhere.includes(id) || !flight.lines(id).length) continue;
+        if (!groups.has(group)) {
+          groups.set(group, el("div", { class: "plots" }));
+          place(group).append(groups.get(group));
+        }
+        const one = chart(id), order = [...flight.plots.keys()];
+        made.set(id, one);
+        const next = [...groups.get(group).children].find((node) => order.indexOf(node.id.slice("plot-".length)) > order.indexOf(id));
+        groups.get(group).insertBefore(one.node, next ?? null);
+      }
+      for (const [id, one] of made) one.node.hidden = !flight.plots.has(id);
+    },
+  };
+};

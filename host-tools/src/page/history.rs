@@ -1,0 +1,363 @@
+//! A flight as the page has it, bounded: series for the plots, the track, phases, modes, parameters, and what was said and
+//! found.
+//!
+//! It only grows at its end, so a page that has seen it up to some point asks for what came since ([`Cursor`]); however
+//! slow the page is, nothing queues for it. Where older parts changed (intervals were joined, the track was thinned) the page
+//! takes everything anew. A report is one part that is the whole.
+//!
+//! Of a recording that is played it is made whole at the start; a page is then shown what is not later than the moment played.
+
+use std::borrow::Cow;
+use std::collections::VecDeque;
+
+use hums_core::observation::{Autopilot, Observation, Source};
+use hums_core::params::Params;
+use hums_core::time::{Instant, Span};
+use hums_link::{Check, Frame};
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
+
+use super::frames::{Frames, Sign};
+use super::modes;
+use super::note::Note;
+use super::parameters::{ParameterJson, Parameters};
+use super::plots::{self, Line, Plot};
+use super::samples::Samples;
+use super::spans::{Rest, Seen, Spans};
+use crate::decode::reference::Reference;
+use crate::mavlink::ids::RC_CHANNELS;
+use crate::series;
+use crate::track::Point;
+
+/// Notes kept at most; older ones go.
+const NOTES_MAX: usize = 2_000;
+/// A phase that lasts less is part of the one before.
+const PHASE_MIN: Span = Span::from_secs(2);
+
+/// Everything that is kept.
+#[derive(Clone, Debug, Default)]
+pub struct History {
+    samples: Samples,
+    frames: Frames,
+    notes: VecDeque<(Instant, Note)>,
+    /// Notes that went, so that the others keep their numbers.
+    notes_gone: u64,
+    phases: Spans,
+    modes: Spans,
+    parameters: Parameters,
+    autopilot: Autopilot,
+    params: Option<Box<Params>>,
+    /// Counts the changes of what plots are called and of their limits.
+    words: u64,
+}
+
+/// How much of a history a page has.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cursor {
+    thinned: u64,
+    /// The row of intervals.
+    spacing_ms: Option<(u64, u64)>,
+    /// The interval from which on it may miss something; `None` before the first part.
+    interval: Option<u16>,
+    /// Lines and their words.
+    described: (usize, u64),
+    notes: u64,
+    places: usize,
+    phases: Seen,
+    modes: Seen,
+    until: Option<Instant>,
+}
+
+/// The part of a history that a page does not have yet.
+#[derive(Debug, Serialize)]
+pub struct Part {
+    t: &'static str,
+    vehicle: u8,
+    /// Forget what you have of it.
+    reset: bool,
+    start_s: f64,
+    step_s: f64,
+    /// All plots, where there is a new one or one is called otherwise.
+    plots: Option<Vec<PlotJson>>,
+    series: Series,
+    notes: Vec<Note>,
+    /// Notes that there was no room for: the oldest ones.
+    notes_gone: u64,
+    /// Seconds, degrees north, degrees east, height in metres.
+    track: Vec<(f64, f64, f64, Option<f32>)>,
+    phases: Option<Rest>,
+    modes: Option<Rest>,
+    parameters: Vec<ParameterJson>,
+    parameters_left_out: u64,
+}
+
+/// A plot in words, as [`plots`] has them.
+#[derive(Debug, Serialize)]
+pub struct PlotJson {
+    id: String,
+    group: &'static str,
+    title: &'static str,
+    unit: &'static str,
+    decimals: u8,
+    limits: Option<[f32; 2]>,
+    /// Numbers and names. Lines of one number have one colour in all plots.
+    lines: Vec<(u8, String)>,
+}
+
+/// Each line's new intervals: `"Altitude:0": [numbers, values]`; numbers count from the one before, the first from 0.
+#[derive(Debug)]
+struct Series(Vec<(Line, u8, series::Part)>);
+
+impl Serialize for Series {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for ((plot, line), decimals, (numbers, values)) in &self.0 {
+            let mut before = 0;
+            let step = |number: &u16| number.wrapping_sub(std::mem::replace(&mut before, *number));
+            let steps: Vec<u16> = numbers.iter().map(step).collect();
+            let scale = 10_f64.powi(i32::from(*decimals));
+            let values: Vec<f64> =
+                values.iter().map(|value| (f64::from(*value) * scale).round() / scale).collect();
+            map.serialize_entry(&format!("{plot:?}:{line}"), &(steps, values))?;
+        }
+        map.end()
+    }
+}
+
+impl History {
+    /// Keeps something said or found.
+    pub fn note(&mut self, at: Instant, note: Note) {
+        if self.notes.len() >= NOTES_MAX {
+            self.notes.pop_front();
+            self.notes_gone += 1;
+        }
+        self.notes.push_back((at, note));
+    }
+
+    /// What stands on a time line: times and levels of findings, warning and worse.
+    pub fn marks(&self) -> Vec<(f64, &'static str)> {
+        let marks = self.notes.iter().filter(|(_, note)| {
+            note.kind == "event" || (note.kind == "finding" && matches!(note.level, "warning" | "critical"))
+        });
+        marks.map(|(_, note)| (note.at_s, if note.kind == "event" { "event" } else { note.level })).collect()
+    }
+
+    /// Takes a frame of the vehicle's system: counts it, and what of it is no observation.
+    pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, vehicle: Option<Source>) {
+        if frame.check() != Check::Verified {
+            return;
+        }
+        let sign = Sign { at, source: frame.source(), sequence: frame.sequence() };
+        self.frames.take(&sign, vehicle, &mut self.samples.store);
+        if frame.id() == RC_CHANNELS && vehicle == Some(frame.source()) {
+            self.samples.sticks(at, frame.payload());
+        }
+    }
+
+    /// What follows a gap of the recording follows no frame before it.
+    pub fn gap(&mut self) {
+        self.frames.gap();
+    }
+
+    /// Takes what an observation told; `reference` has taken it before.
+    pub fn sample(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
+        if let Observation::Heartbeat(heartbeat) = observation {
+            self.words += u64::from(heartbeat.autopilot != self.autopilot);
+            self.autopilot = heartbeat.autopilot;
+            self.modes.extend(at, modes::name(heartbeat), Span::ZERO);
+        }
+        let phase = reference.flight().phase(at, reference.vehicle()).name();
+        self.phases.extend(at, Cow::Borrowed(phase), PHASE_MIN);
+        self.samples.take(at, reference, observation);
+    }
+
+    /// Takes a parameter of the autopilot.
+    pub fn parameter(&mut self, at: Instant, name: &str, value: f64) {
+        self.parameters.take(at, name, value);
+    }
+
+    /// Takes the limits that hold.
+    pub fn judged_by(&mut self, params: &Params) {
+        if self.params.as_deref() != Some(params) {
+            self.params = Some(Box::new(*params));
+            self.words += 1;
+        }
+    }
+
+    /// Where it was.
+    pub fn track(&self) -> &[Point] {
+        self.samples.track.points()
+    }
+
+    /// What a page that has this much does not have yet of the time up to `until`; moves the cursor there. `None` where
+    /// there is nothing new.
+    pub fn since(&self, vehicle: u8, cursor: &mut Cursor, until: Instant) -> Option<Part> {
+        let Samples { store, track, thinned, .. } = &self.samples;
+        let spacing_ms = store.spacing_ms();
+        let same = (cursor.thinned, cursor.spacing_ms) == (*thinned, spacing_ms);
+        let reset = cursor.interval.is_none() || !same;
+        if reset {
+            *cursor = Cursor { thinned: *thinned, spacing_ms, ..Cursor::default() };
+        }
+        let (start_ms, step_ms) = spacing_ms.unwrap_or((until.as_millis(), 1));
+        let newest = until.as_millis().saturating_sub(start_ms) / step_ms.max(1);
+        let newest = u16::try_from(newest).unwrap_or(u16::MAX - 1);
+        let from = cursor.interval.unwrap_or(0);
+        let decimals = |plot: Plot| plots::about(plot, self.autopilot).decimals;
+        let parts = store.part(from..=newest).map(|(line, part)| (line, decimals(line.0), part));
+        let series: Vec<_> = parts.collect();
+        // The newest interval may still change.
+        cursor.interval = Some(newest.max(from));
+
+        let described = (store.lines().count(), self.words);
+        let plots = (reset || cursor.described != described).then(|| self.plots());
+        cursor.described = described;
+
+        let known = self.notes.partition_point(|(at, _)| *at <= until);
+        let skip = usize::try_from(cursor.notes.saturating_sub(self.notes_gone)).unwrap_or(usize::MAX);
+        let notes: Vec<_> = self.notes.iter().take(known).skip(skip).map(|(_, note)| note.clone()).collect();
+        cursor.notes = self.notes_gone + known as u64;
+
+        let points = track.points();
+        let places = points.partition_point(|place| place.at <= until);
+        let new = points.get(cursor.places..places).unwrap_or_default();
+        let track: Vec<_> = new.iter().map(told).collect();
+        cursor.places = places;
+
+        let (phases, modes) =
+            (self.phases.since(&mut cursor.phases, until), self.modes.since(&mut cursor.modes, until));
+        let parameters = self.parameters.since(cursor.until, until);
+        cursor.until = Some(until);
+
+        let something = reset
+            || plots.is_some()
+            || !(series.is_empty() && notes.is_empty() && track.is_empty() && parameters.is_empty())
+            || phases.is_some()
+            || modes.is_some();
+        something.then(|| Part {
+            t: "history",
+            vehicle,
+            reset,
+            start_s: start_ms as f64 / 1e3,
+            step_s: step_ms as f64 / 1e3,
+            plots,
+            series: Series(series),
+            notes,
+            notes_gone: self.notes_gone,
+            track,
+            phases,
+            modes,
+            parameters,
+            parameters_left_out: self.parameters.left_out(),
+        })
+    }
+
+    /// All plots that have a line.
+    fn plots(&self) -> Vec<PlotJson> {
+        let mut all: Vec<(Plot, PlotJson)> = Vec::new();
+        for (plot, line) in self.samples.store.lines() {
+            let about = plots::about(plot, self.autopilot);
+            let named = (line, (about.name)(line));
+            if let Some((_, json)) = all.last_mut().filter(|(last, _)| *last == plot) {
+                json.lines.push(named);
+                continue;
+            }
+            let params = self.params.as_deref();
+            let limits = params.and_then(|params| plots::limits(plot, self.autopilot, params));
+            let plots::About { group, title, unit, decimals, .. } = about;
+            let id = format!("{plot:?}");
+            all.push((plot, PlotJson { id, group, title, unit, decimals, limits, lines: vec![named] }));
+        }
+        all.into_iter().map(|(_, json)| json).collect()
+    }
+}
+
+fn told(place: &Point) -> (f64, f64, f64, Option<f32>) {
+    let height_m = place.height_m.filter(|height_m| height_m.is_finite());
+    (place.at.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use hums_core::observation::Hud;
+    use hums_core::units::MetresPerSecond;
+
+    fn seconds(second: u64) -> Instant {
+        Instant::from_millis(second * 1000)
+    }
+
+    fn note(at: Instant) -> Note {
+        Note {
+            at_s: at.as_secs_f64(),
+            kind: "finding",
+            level: "warning",
+            from: "here".to_owned(),
+            subsystem: "power",
+            words: String::new(),
+            found: None,
+        }
+    }
+
+    /// The vehicle tells of its air speed, and of nothing else.
+    fn tell(history: &mut History, second: u64) {
+        let hud = Hud { airspeed: Some(MetresPerSecond(1.0)), ..Hud::default() };
+        history.sample(seconds(second), &Reference::new(), &Observation::Hud(hud));
+    }
+
+    /// All values that the parts of a history told, the newest of each interval.
+    fn follow(cursor: &mut Cursor, history: &History, until: Instant) -> (bool, usize, usize) {
+        let Some(part) = history.since(1, cursor, until) else { return (false, 0, 0) };
+        let values = part.series.0.iter().map(|(_, _, (numbers, _))| numbers.len()).sum();
+        (part.reset, values, part.notes.len())
+    }
+
+    #[test]
+    fn a_page_gets_each_thing_once_and_only_the_open_interval_again() {
+        let (mut history, mut cursor) = (History::default(), Cursor::default());
+        for second in 0..10 {
+            tell(&mut history, second);
+            history.note(seconds(second), note(seconds(second)));
+        }
+        assert_eq!(follow(&mut cursor, &history, seconds(9)), (true, 10, 10));
+        assert_eq!(follow(&mut cursor, &history, seconds(9)), (false, 1, 0), "the newest interval is open");
+        tell(&mut history, 10);
+        history.note(seconds(10), note(seconds(10)));
+        assert_eq!(follow(&mut cursor, &history, seconds(10)), (false, 2, 1));
+    }
+
+    #[test]
+    fn numbers_count_from_the_one_before_and_values_are_as_fine_as_their_plot() {
+        let series =
+            Series(vec![((Plot::Speed, 2), 2, (vec![3, 4, 9], vec![1.234_5, 2.0, 0.1, 0.1, -3.0, 5.0]))]);
+        let json = serde_json::to_string(&series).expect("JSON");
+        assert_eq!(json, r#"{"Speed:2":[[3,1,5],[1.23,2.0,0.1,0.1,-3.0,5.0]]}"#);
+    }
+
+    #[test]
+    fn a_page_of_a_recording_sees_no_future() {
+        let (mut history, mut cursor) = (History::default(), Cursor::default());
+        for second in 0..100 {
+            tell(&mut history, second);
+            history.note(seconds(second), note(seconds(second)));
+        }
+        assert_eq!(follow(&mut cursor, &history, seconds(40)), (true, 41, 41));
+        assert_eq!(follow(&mut cursor, &history, seconds(42)).2, 2);
+    }
+
+    #[test]
+    fn joined_intervals_and_dropped_notes_are_told_as_a_new_beginning_and_never_twice() {
+        let (mut history, mut cursor) = (History::default(), Cursor::default());
+        tell(&mut history, 0);
+        follow(&mut cursor, &history, seconds(0));
+        tell(&mut history, 10_000);
+        assert!(follow(&mut cursor, &history, seconds(10_000)).0, "the intervals are longer now");
+        for second in 0..3_000 {
+            history.note(seconds(10_000 + second), note(seconds(second)));
+        }
+        let told = follow(&mut cursor, &history, seconds(13_000));
+        assert_eq!((told.0, told.2), (false, NOTES_MAX));
+        assert_eq!(follow(&mut cursor, &history, seconds(13_000)).2, 0);
+    }
+}

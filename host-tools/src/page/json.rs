@@ -1,0 +1,52 @@
+//! JSON for the pages, in which no text can change how the text around it reads.
+//!
+//! A vehicle's texts may hold Unicode's bidirectional controls: U+202E shows what follows from right to left, so that
+//! `evil` looks like `live`. In JSON they can stand only inside of strings; there they are replaced by their name, as
+//! `<U+202E>`. The record keeps them as they came.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use crate::printable::{redirects, rewritten};
+
+/// A value as JSON that may stand in a `script` element: it ends none and begins none. `<`, `>` and `&` stand in strings only,
+/// where an escape is the same; the two line separators are no JavaScript.
+pub fn embedded(value: &impl Serialize) -> String {
+    rewritten(
+        &json(value),
+        |c| matches!(c, '<' | '>' | '&' | '\u{2028}' | '\u{2029}'),
+        |out, c| {
+            // Writing to a `String` cannot fail.
+            let _ = write!(out, "\\u{:04x}", u32::from(c));
+        },
+    )
+    .into_owned()
+}
+
+/// A value as JSON; empty where it has no form in JSON, which no type of the pages lacks.
+pub fn json(value: &impl Serialize) -> String {
+    let text = serde_json::to_string(value).unwrap_or_default();
+    // Writing to a `String` cannot fail.
+    rewritten(&text, redirects, |out, c| {
+        let _ = write!(out, "<U+{:04X}>", u32::from(c));
+    })
+    .into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn controls_of_the_writing_direction_are_named_and_all_else_stays() {
+        assert_eq!(json(&"rtl\u{202e}evil\u{2069}\u{61c}"), "\"rtl<U+202E>evil<U+2069><U+061C>\"");
+        let hostile = "</script><script>alert(1)</script><!-- &";
+        let inside = embedded(&hostile);
+        assert!(!inside.contains(['<', '>', '&']), "{inside}");
+        assert_eq!(serde_json::from_str::<String>(&inside).expect("JSON"), hostile);
+        for plain in ["Grüße \u{5d0}\u{644} <b> \\ 👩‍✈️", ""] {
+            assert_eq!(json(&plain), serde_json::to_string(plain).expect("text"));
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What stands in the list of a page: findings, texts, events.
+
+use hums_core::happening::Happening;
+use hums_core::health::{Finding, vocabulary};
+use hums_core::time::Instant;
+use hums_link::encode::COMPONENT;
+use serde::Serialize;
+
+use crate::states;
+use crate::statustext::Text;
+use crate::summary::FindingLine;
+
+/// What a finding of a HUMS begins with.
+const OURS: &str = "HUMS: ";
+
+/// Something that was found, said, or happened.
+#[derive(Clone, Debug, Serialize)]
+pub struct Note {
+    /// Seconds since the first byte.
+    pub at_s: f64,
+    /// `finding`, `text` or `event`.
+    pub kind: &'static str,
+    /// A level's name; of a text, by its severity.
+    pub level: &'static str,
+    /// Who says it: `here` (these checks), `on board` (a HUMS on the vehicle), `autopilot`, `component 42`.
+    pub from: String,
+    /// The subsystem, for findings.
+    pub subsystem: &'static str,
+    /// In words: text of the world, never markup.
+    pub words: String,
+    /// More of a finding of a check.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub found: Option<Found>,
+}
+
+/// What a check found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Found {
+    /// The check's stable name.
+    pub check: String,
+    /// The level before.
+    pub previous: &'static str,
+    /// What decided; `null` where the input stopped.
+    pub value: Option<f32>,
+    /// The state that the value is, where it is no quantity.
+    pub state: Option<&'static str>,
+    /// What it crossed.
+    pub limit: Option<f32>,
+    /// The unit of both.
+    pub unit: String,
+    /// What is so, as a sentence.
+    pub meaning: &'static str,
+    /// What to do, as a sentence.
+    pub action: &'static str,
+    /// What explains it: the name of another check; empty where nothing does.
+    pub because: &'static str,
+}
+
+impl Note {
+    /// A finding of a check.
+    pub fn found(finding: &FindingLine) -> Self {
+        let known = vocabulary(&finding.check);
+        let mut words = known.map_or_else(|| finding.check.replace('_', " "), |known| known.name.to_owned());
+        if known.is_some_and(|known| !known.part.is_empty()) || finding.instance > 0 {
+            let part = known.map_or("", |known| known.part);
+            let space = if part.is_empty() { "" } else { " " };
+            words = format!("{words}, {part}{space}{}", u16::from(finding.instance) + 1);
+        }
+        let is_worry = matches!(finding.level, "warning" | "critical");
+        let state = states::name(&finding.check, finding.value);
+        let finite = |value: f32| value.is_finite().then_some(value);
+        Self {
+            at_s: finding.at.as_secs_f64(),
+            kind: "finding",
+            level: finding.level,
+            from: "here".to_owned(),
+            subsystem: finding.subsystem,
+            words,
+            found: Some(Found {
+                check: finding.check.clone(),
+                previous: finding.previous,
+                value: finite(finding.value),
+                state,
+                // The limit of a state is a number between two of them.
+                limit: finite(finding.limit).filter(|_| state.is_none()),
+                unit: finding.unit.clone(),
+                meaning: known.filter(|_| is_worry).map_or("", |known| known.meaning),
+                action: known.filter(|_| is_worry).map_or("", |known| known.action),
+                because: "",
+            }),
+        }
+    }
+
+    /// A finding of the checks here.
+    pub fn finding(finding: &Finding) -> Self {
+        let mut note = Self::found(&FindingLine {
+            at: finding.at,
+            subsystem: finding.subsystem.name(),
+            check: finding.check.to_owned(),
+            instance: finding.instance,
+            level: finding.level.name(),
+            previous: finding.previous.name(),
+            value: finding.value,
+            limit: finding.limit,
+            unit: finding.unit.to_owned(),
+        });
+        if let Some(found) = &mut note.found {
+            found.because = vocabulary(finding.because).map_or(finding.because, |known| known.name);
+        }
+        note
+    }
+
+    /// What a component said; a HUMS on board says findings.
+    pub fn text(text: Text) -> Self {
+        let ours = text.source.component == COMPONENT && text.words.starts_with(OURS);
+        let from = match text.source.component {
+            COMPONENT if ours => "on board".to_owned(),
+            1 => "autopilot".to_owned(),
+            other => format!("component {other}"),
+        };
+        let level = text.level();
+        let words = if ours { text.words.trim_start_matches(OURS).to_owned() } else { text.words };
+        let kind = if ours { "finding" } else { "text" };
+        Self { at_s: text.at.as_secs_f64(), kind, level, from, subsystem: "", words, found: None }
+    }
+
+    /// What a pilot wants to see on the time line; `None` for all else that happens.
+    pub fn event(now: Instant, happening: Happening) -> Option<Self> {
+        let words = match happening {
+            Happening::Armed => "armed",
+            Happening::Disarmed => "disarmed",
+            Happening::TakeOff => "take-off",
+            Happening::Landing => "landing",
+            Happening::AutopilotReboot => "the autopilot has rebooted",
+            _ => return None,
+        };
+        Some(Self {
+            at_s: now.as_secs_f64(),
+            kind: "event",
+            level: "ok",
+            from: "here".to_owned(),
+            subsystem: "",
+            words: words.to_owned(),
+            found: None,
+        })
+    }
+}

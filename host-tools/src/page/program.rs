@@ -1,0 +1,202 @@
+//! The page's program: one script of many modules, because a page that is whole in itself has no files to import from.
+//!
+//! The files in `assets/` are ECMAScript modules, with two habits that make putting them together simple: an `import` is one
+//! line, and what is exported is a `const` where it is defined. Each becomes a function that is called once and gives what
+//! it exports; an import takes from that. `live` and `report` are the two that nobody imports: each with all that it needs is
+//! one program.
+
+use std::fmt::Write as _;
+
+macro_rules! modules {
+    ($($name:literal)*) => {
+        const MODULES: &[(&str, &str)] = &[$(($name, include_str!(concat!("assets/", $name, ".js"))),)*];
+    };
+}
+
+modules! {
+    // Any page.
+    "badge" "canvas" "colours" "dom" "elements" "flight" "layout" "map" "notes" "parameters" "plot" "plots" "text" "timeline" "view"
+    // The whole one.
+    "data" "recorder" "report" "summary" "trend" "usage"
+    // The one that grows.
+    "bar" "compass" "condition" "esc" "gauge" "general" "health" "horizon" "keys" "link" "live" "movement" "player" "sound" "spark"
+}
+
+/// uPlot 1.6.32, MIT (`assets/uPlot.LICENSE`).
+pub const UPLOT: &str = include_str!("assets/uPlot.iife.min.js");
+/// The style sheets, to be put together.
+pub const STYLE: [&str; 2] = [include_str!("assets/uPlot.min.css"), include_str!("assets/page.css")];
+
+/// The program that begins with a module.
+pub fn program(entry: &str) -> String {
+    let mut program = String::from("\"use strict\";\n(() => {\n");
+    for name in needed(entry) {
+        push_module(&mut program, name, text(name));
+    }
+    program.push_str("})();\n");
+    program
+}
+
+/// The modules that a module needs and itself, each after those that it imports from.
+fn needed(entry: &str) -> Vec<&str> {
+    let mut order = Vec::new();
+    add(entry, &mut order, &mut Vec::new());
+    order
+}
+
+fn add<'a>(name: &'a str, order: &mut Vec<&'a str>, open: &mut Vec<&'a str>) {
+    if order.contains(&name) || open.contains(&name) {
+        return;
+    }
+    open.push(name);
+    for (_, from) in text(name).lines().filter_map(import) {
+        add(from, order, open);
+    }
+    open.pop();
+    order.push(name);
+}
+
+fn text(name: &str) -> &'static str {
+    MODULES.iter().find(|(known, _)| *known == name).map_or("", |(_, text)| text)
+}
+
+fn push_module(out: &mut String, name: &str, text: &str) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "const module_{name} = (() => {{");
+    let mut exports = Vec::new();
+    for line in text.lines() {
+        if let Some((names, from)) = import(line) {
+            let _ = writeln!(out, "const {{{names}}} = module_{from};");
+        } else if let Some(name) = export(line) {
+            exports.push(name);
+            out.push_str(line.trim_start_matches("export "));
+            out.push('\n');
+        } else {
+            out.push_str(line);
+            out.push('\n');
+        }
+    }
+    let _ = writeln!(out, "return {{ {} }};\n}})();", exports.join(", "));
+}
+
+/// What a line imports, and from which module.
+fn import(line: &str) -> Option<(&str, &str)> {
+    let (names, from) = line.strip_prefix("import {")?.split_once("} from \"./")?;
+    Some((names, from.strip_suffix(".js\";")?))
+}
+
+/// What a line exports.
+fn export(line: &str) -> Option<&str> {
+    line.strip_prefix("export const ")?.split([' ', '=']).next()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// Columns of a line, at most.
+    const COLUMNS_MAX: usize = 160;
+
+    fn words(text: &str) -> impl Iterator<Item = &str> {
+        text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-' || c == '$'))
+    }
+
+    #[test]
+    fn each_import_is_of_something_that_is_exported_and_is_used_and_no_module_is_in_a_circle() {
+        for (name, text) in MODULES {
+            let order = needed(name);
+            for line in text.lines().filter(|line| line.starts_with("import")) {
+                let (names, from) = import(line).expect("an import is one line");
+                assert!(needed(from).iter().all(|other| other != name), "{name} and {from} need each other");
+                assert!(order.contains(&from), "{name}: there is no {from}");
+                let exports: Vec<&str> = super::text(from).lines().filter_map(export).collect();
+                for wanted in names.split(',').map(str::trim) {
+                    assert!(exports.contains(&wanted), "{name}: {from} has no {wanted}");
+                    let body = text.lines().filter(|line| !line.starts_with("import"));
+                    let uses = body.flat_map(words).any(|word| word == wanted);
+                    assert!(uses, "{name}: {wanted} is not used");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_module_is_needed_and_what_it_exports_too() {
+        let used: BTreeSet<&str> = ["live", "report"].into_iter().flat_map(needed).collect();
+        for (name, text) in MODULES {
+            assert!(used.contains(name), "nobody needs {name}");
+            for line in text.lines().filter(|line| line.starts_with("export")) {
+                let exported = export(line).expect("an export is a const");
+                let of_it = |(names, from): (&str, &str)| {
+                    from == *name && names.split(',').any(|wanted| wanted.trim() == exported)
+                };
+                let is_wanted = MODULES.iter().any(|(_, text)| text.lines().filter_map(import).any(of_it));
+                assert!(is_wanted, "{name}: nobody wants {exported}");
+            }
+        }
+    }
+
+    #[test]
+    fn scripts_and_style_are_written_as_the_rest_is() {
+        for (name, text) in MODULES.iter().copied().chain([("page.css", STYLE[1])]) {
+            for (number, line) in (1..).zip(text.lines()) {
+                let long = line.chars().count() > COLUMNS_MAX;
+                assert!(!long && line == line.trim_end() && !line.contains('\t'), "{name}:{number}: {line}");
+                let odd = (line.len() - line.trim_start().len()) % 2 == 1;
+                assert!(!odd, "{name}:{number}: steps of two: {line}");
+            }
+            assert!(text.ends_with('\n') && !text.contains("\n\n\n"), "{name}");
+        }
+        for (name, text) in MODULES {
+            assert!(text.starts_with("// "), "{name} says what it is for");
+            assert!(!text.contains("var ") || *name == "colours", "{name}: const or let");
+        }
+    }
+
+    #[test]
+    fn the_style_sheet_has_no_class_that_nothing_has_and_lacks_no_colour() {
+        let pages = [include_str!("assets/live.html"), include_str!("assets/report.html")];
+        let texts = MODULES.iter().map(|(_, text)| *text).chain(pages);
+        let code: BTreeSet<&str> = texts.flat_map(words).collect();
+        let style = STYLE[1];
+        let defined: BTreeSet<&str> =
+            words(style).filter(|word| style.contains(&format!("{word}:"))).collect();
+        for used in style.split("var(").skip(1).filter_map(|rest| rest.split(')').next()) {
+            assert!(defined.contains(used), "{used} is not defined");
+        }
+        let selectors =
+            style.split('}').filter_map(|rule| rule.rsplit_once('{')).map(|(selector, _)| selector);
+        for class in selectors.flat_map(|selector| selector.split('.').skip(1)) {
+            let class = class.split(|c: char| !(c.is_alphanumeric() || c == '-')).next().unwrap_or_default();
+            let named = code.contains(class) || class.starts_with("u-") || class == "uplot";
+            // A level's colour on a frame: `is-${level}`.
+            assert!(named || class.starts_with("is-"), "nothing is .{class}");
+        }
+    }
+
+    #[test]
+    fn a_module_gives_what_it_exports_and_takes_what_it_imports() {
+        let mut out = String::new();
+        push_module(
+            &mut out,
+            "b",
+            "import { x, y } from \"./a.js\";\nexport const z = x + y;\nconst own = 1;\n",
+        );
+        let wanted = "const module_b = (() => {\nconst { x, y } = module_a;\nconst z = x + y;\nconst own = 1;\n\
+                      return { z };\n})();\n";
+        assert_eq!(out, wanted);
+    }
+
+    #[test]
+    fn nothing_that_a_vehicle_sent_becomes_markup_and_nothing_is_loaded() {
+        for program in ["live", "report"].map(program) {
+            for markup in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("] {
+                assert!(!program.contains(markup), "{markup}");
+            }
+            // The one address is a name: that of SVG's elements.
+            assert_eq!(program.matches("http").count(), 1);
+        }
+    }
+}

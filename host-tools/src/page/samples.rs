@@ -1,0 +1,243 @@
+//! What the vehicle told, as points of series and of the track.
+
+use hums_core::observation::{Air, Esc, Imu, MOTORS_MAX, Observation};
+use hums_core::time::Instant;
+use hums_core::units::Position;
+use hums_link::packet::Fields;
+
+use super::plots::{Line, Plot};
+use crate::decode::reference::Reference;
+use crate::series::Store;
+use crate::track::Track;
+
+/// Series and track.
+#[derive(Clone, Debug, Default)]
+pub struct Samples {
+    /// The series.
+    pub store: Store<Plot>,
+    /// Where it was.
+    pub track: Track,
+    /// How often every second place of it went, because it is bounded.
+    pub thinned: u64,
+    /// A barometer tells of itself: what an inertial sensor's message tells of the air is another one's.
+    barometer: bool,
+}
+
+impl Samples {
+    /// Takes what an observation told.
+    pub fn take(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
+        self.motion(at, reference, observation);
+        self.power(at, reference, observation);
+        self.condition(at, observation);
+        self.radio(at, observation);
+    }
+
+    /// Attitude, height, speed, place.
+    fn motion(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
+        let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
+        match observation {
+            Observation::GlobalPosition(global) => {
+                push(Plot::Height, 0, Some(global.relative_altitude.0));
+                push(Plot::Vertical, 0, Some(-global.velocity[2].0));
+                let [north, east, down] = global.velocity.map(|speed| speed.0);
+                push(Plot::Speed, 0, Some(north.hypot(east)));
+                if reference.vehicle().local.get().is_none() {
+                    (0..)
+                        .zip([north, east, down])
+                        .for_each(|(axis, speed)| push(Plot::Velocity, axis, Some(speed)));
+                }
+                if reference.vehicle().gnss[0].get().is_none() {
+                    push(Plot::Altitude, 0, Some(global.altitude.0));
+                }
+                if let Some(position) = global.position {
+                    self.place(at, position, Some(global.relative_altitude.0));
+                }
+            }
+            Observation::LocalPosition(local) => {
+                let [north, east, down] = local.velocity.map(|speed| speed.0);
+                (0..)
+                    .zip([north, east, down])
+                    .for_each(|(axis, speed)| push(Plot::Velocity, axis, Some(speed)));
+                if reference.vehicle().global.get().is_none() {
+                    push(Plot::Height, 0, Some(-local.position[2].0));
+                    push(Plot::Vertical, 0, Some(-down));
+                    push(Plot::Speed, 0, Some(north.hypot(east)));
+                }
+            }
+            Observation::Hud(hud) => push(Plot::Speed, 1, hud.airspeed.map(|speed| speed.0)),
+            Observation::Gnss(gnss) => {
+                let receiver = gnss.instance;
+                push(Plot::Satellites, receiver, gnss.satellites.map(f32::from));
+                push(Plot::Fix, receiver, Some(f32::from(gnss.fix)));
+                push(Plot::Hdop, receiver, gnss.hdop);
+                push(Plot::Accuracy, receiver, gnss.accuracy.map(|accuracy| accuracy.0));
+                if receiver == 0 {
+                    push(Plot::Altitude, 0, gnss.altitude.map(|metres| metres.0));
+                    push(Plot::Speed, 2, gnss.speed.map(|speed| speed.0));
+                }
+                let alone = receiver == 0 && reference.vehicle().global.get().is_none();
+                if let Some(position) = gnss.position.filter(|_| alone) {
+                    self.place(at, position, None);
+                }
+            }
+            Observation::Attitude(attitude) => {
+                push(Plot::Attitude, 0, Some(attitude.roll.0.to_degrees()));
+                push(Plot::Attitude, 1, Some(attitude.pitch.0.to_degrees()));
+            }
+            Observation::Wanted(wanted) => {
+                push(Plot::Attitude, 2, Some(wanted.roll.0.to_degrees()));
+                push(Plot::Attitude, 3, Some(wanted.pitch.0.to_degrees()));
+            }
+            _ => {}
+        }
+    }
+
+    /// Batteries, motors, the autopilot's load.
+    fn power(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
+        let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
+        match observation {
+            Observation::Battery(battery) => {
+                let place = battery.id.min(3);
+                push(Plot::PackVolts, place, battery.voltage.map(|volts| volts.0));
+                push(Plot::PackAmperes, place, battery.current.map(|amperes| amperes.0));
+                push(Plot::PackPercent, place, battery.remaining.map(|part| part.0 * 100.0));
+                push(Plot::Temperature, 4 + place, battery.temperature.map(|celsius| celsius.0));
+                if place == 0 {
+                    for (cell, volts) in battery.cells.iter().enumerate() {
+                        push(Plot::CellVolts, cell as u8, volts.map(|volts| volts.0));
+                    }
+                }
+            }
+            Observation::SystemStatus(system) => {
+                push(Plot::Load, 0, system.load.map(|part| part.0 * 100.0));
+                if reference.vehicle().batteries[0].get().is_none() {
+                    push(Plot::PackVolts, 0, system.voltage.map(|volts| volts.0));
+                    push(Plot::PackAmperes, 0, system.current.map(|amperes| amperes.0));
+                    push(Plot::PackPercent, 0, system.remaining.map(|part| part.0 * 100.0));
+                }
+            }
+            Observation::Outputs(outputs) => {
+                // More ports than two nobody has; a line is a byte.
+                let first = outputs.port.min(15) * MOTORS_MAX as u8;
+                for (line, pulse) in (first..).zip(outputs.pulses) {
+                    push(Plot::Outputs, line, (pulse > 0).then_some(f32::from(pulse)));
+                }
+            }
+            Observation::Escs(group) => {
+                for (place, esc) in group.escs.iter().enumerate() {
+                    if let Some(esc) = esc {
+                        self.motor(at, group.first.saturating_add(place as u8), esc);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Vibration, estimator, temperatures, engine.
+    fn condition(&mut self, at: Instant, observation: &Observation) {
+        let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
+        match observation {
+            Observation::Vibration(vibration) => {
+                for axis in 0..3_u8 {
+                    push(Plot::Vibration, axis, vibration.levels[usize::from(axis)]);
+                    push(Plot::Clips, axis, Some(vibration.clips[usize::from(axis)] as f32));
+                }
+            }
+            Observation::Estimator(estimator) => {
+                push(Plot::Estimator, 0, estimator.velocity);
+                push(Plot::Estimator, 1, estimator.position_horizontal);
+                push(Plot::Estimator, 2, estimator.position_vertical);
+                push(Plot::Estimator, 3, estimator.compass);
+            }
+            Observation::Air(air) if air.instance == 0 => {
+                self.barometer = true;
+                self.air(at, air);
+            }
+            Observation::Imu(imu) if imu.instance == 0 => self.imu(at, imu),
+            Observation::ImuAndAir(imu, air) if imu.instance == 0 => {
+                self.imu(at, imu);
+                if !self.barometer {
+                    self.air(at, air);
+                }
+            }
+            Observation::Processor(processor) => {
+                push(Plot::Temperature, 2, processor.temperature.map(|celsius| celsius.0));
+            }
+            Observation::Engine(engine) => {
+                push(Plot::EngineRpm, 0, engine.rpm.map(|rpm| rpm.0));
+                push(Plot::EngineLoad, 0, engine.load.map(|part| part.0 * 100.0));
+                push(Plot::EngineFuelFlow, 0, engine.fuel_flow);
+                push(Plot::EngineCelsius, 0, engine.cylinder_head.map(|celsius| celsius.0));
+            }
+            Observation::SpeedSensors(sensors) => {
+                for sensor in sensors.iter().flatten() {
+                    push(Plot::SpeedSensors, sensor.index, Some(sensor.rpm.0));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Signals.
+    fn radio(&mut self, at: Instant, observation: &Observation) {
+        let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
+        match observation {
+            Observation::RadioControl(rc) => push(Plot::Link, 0, rc.rssi.map(f32::from)),
+            Observation::TelemetryRadio(radio) => {
+                push(Plot::Link, 1, radio.rssi.map(f32::from));
+                push(Plot::Link, 2, radio.remote_rssi.map(f32::from));
+                push(Plot::Link, 3, radio.noise.map(f32::from));
+                push(Plot::Link, 4, radio.remote_noise.map(f32::from));
+            }
+            _ => {}
+        }
+    }
+
+    fn motor(&mut self, at: Instant, motor: u8, esc: &Esc) {
+        let values = [
+            (Plot::MotorRpm, esc.rpm.map(|rpm| rpm.0)),
+            (Plot::MotorVolts, esc.voltage.map(|volts| volts.0)),
+            (Plot::MotorAmperes, esc.current.map(|amperes| amperes.0)),
+            (Plot::MotorCelsius, esc.temperature.map(|celsius| celsius.0)),
+            (Plot::EscErrors, esc.errors.map(|errors| errors as f32)),
+        ];
+        for (plot, value) in values {
+            self.put(at, (plot, motor), value);
+        }
+    }
+
+    fn imu(&mut self, at: Instant, imu: &Imu) {
+        let force = imu.acceleration.map(|axes| axes.map(|axis| axis.0));
+        self.put(at, (Plot::Acceleration, 0), force.map(|[x, y, z]| (x * x + y * y + z * z).sqrt()));
+        self.put(at, (Plot::Temperature, 1), imu.temperature.map(|celsius| celsius.0));
+    }
+
+    fn air(&mut self, at: Instant, air: &Air) {
+        self.put(at, (Plot::Temperature, 0), air.temperature.map(|celsius| celsius.0));
+        self.put(at, (Plot::Pressure, 0), air.pressure.map(|pressure| pressure.0));
+    }
+
+    /// What the sticks ask for: the channels of `RC_CHANNELS` that are there.
+    pub fn sticks(&mut self, at: Instant, payload: &[u8]) {
+        const CHANNELS: u8 = 8;
+        let fields = Fields(payload);
+        let count = fields.u8(40).min(CHANNELS);
+        for line in 0..count {
+            let pulse = fields.u16(4 + 2 * usize::from(line));
+            // 0 and UINT16_MAX: not used.
+            let known = pulse != 0 && pulse != u16::MAX;
+            self.put(at, (Plot::Sticks, line), known.then_some(f32::from(pulse)));
+        }
+    }
+
+    fn put(&mut self, at: Instant, line: Line, value: Option<f32>) {
+        if let Some(value) = value {
+            self.store.push(at, line, value);
+        }
+    }
+
+    fn place(&mut self, at: Instant, position: Position, height_m: Option<f32>) {
+        self.thinned += u64::from(self.track.push(at, position, height_m));
+    }
+}

@@ -1,0 +1,83 @@
+//! What a vehicle was in, one after the other: phases of flight, modes. Each goes on until the next one begins.
+
+use std::borrow::Cow;
+
+use hums_core::time::{Instant, Span};
+
+/// Kept at most; what follows counts to the last one.
+const SPANS_MAX: usize = 2_000;
+
+/// Beginnings, in order.
+#[derive(Clone, Debug, Default)]
+pub struct Spans {
+    begun: Vec<(Instant, Cow<'static, str>)>,
+    revision: u64,
+}
+
+/// How much of it a page has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Seen {
+    revision: u64,
+    count: usize,
+}
+
+/// What a page lacks: the number of those that it has and that stay, and those that follow: seconds and name.
+pub type Rest = (usize, Vec<(f64, Cow<'static, str>)>);
+
+impl Spans {
+    /// It is in this one now. One that lasted less than `shortest` is taken back, and is part of the one before.
+    pub fn extend(&mut self, at: Instant, name: Cow<'static, str>, shortest: Span) {
+        if let Some((begun, last)) = self.begun.last() {
+            if *last == name || self.begun.len() >= SPANS_MAX {
+                return;
+            }
+            if at.since(*begun) < shortest && self.begun.len() > 1 {
+                self.begun.pop();
+            }
+        }
+        self.revision += 1;
+        if self.begun.last().is_none_or(|(_, last)| *last != name) {
+            self.begun.push((at, name));
+        }
+    }
+
+    /// What a page that has this much lacks of the time up to `until`; `None` where that is nothing.
+    pub fn since(&self, seen: &mut Seen, until: Instant) -> Option<Rest> {
+        let count = self.begun.partition_point(|(at, _)| *at <= until);
+        let now = Seen { revision: self.revision, count };
+        if *seen == now {
+            return None;
+        }
+        // Only the last one is ever taken back.
+        let stay = seen.count.min(count).saturating_sub(1);
+        *seen = now;
+        let rest = self.begun.get(stay..count).unwrap_or_default();
+        Some((stay, rest.iter().map(|(at, name)| (at.as_secs_f64(), name.clone())).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seconds(second: u64) -> Instant {
+        Instant::from_millis(second * 1000)
+    }
+
+    #[test]
+    fn a_page_that_follows_has_what_a_page_has_that_comes_late_and_short_ones_are_taken_back() {
+        let (mut spans, mut seen, mut page) = (Spans::default(), Seen::default(), Vec::new());
+        for (second, name) in [(0, "a"), (10, "b"), (11, "a"), (20, "c"), (21, "d"), (22, "e"), (40, "b")] {
+            spans.extend(seconds(second), name.into(), Span::from_secs(2));
+            if let Some((stay, rest)) = spans.since(&mut seen, seconds(second)) {
+                page.truncate(stay);
+                page.extend(rest);
+            }
+        }
+        let (_, whole) = spans.since(&mut Seen::default(), seconds(100)).expect("all of it");
+        assert_eq!(page, whole);
+        let names: Vec<_> = whole.iter().map(|(at_s, name)| (*at_s as u64, &**name)).collect();
+        assert_eq!(names, [(0, "a"), (22, "e"), (40, "b")]);
+        assert!(spans.since(&mut Seen::default(), seconds(30)).expect("a part").1.len() == 2, "no future");
+    }
+}

@@ -1,0 +1,184 @@
+//! The usage counters as the page takes them: with titles and units, motors and ranges apart.
+
+use std::collections::BTreeMap;
+
+use hums_core::baseline::Quantity;
+use hums_core::usage::{CounterName, UsageCounter, counter_name as meaning};
+use serde::Serialize;
+
+use crate::names::counter_name;
+
+/// All counters of a session.
+#[derive(Debug, Default, Serialize)]
+pub struct Counters {
+    plain: Vec<Plain>,
+    motors: Vec<Motor>,
+    ranges: Vec<Ranges>,
+}
+
+/// One of the vehicle.
+#[derive(Debug, Serialize)]
+struct Plain {
+    title: String,
+    unit: &'static str,
+    decimals: u8,
+    session: f64,
+    life: Option<f64>,
+}
+
+/// A motor: seconds and turns.
+#[derive(Debug, Default, Serialize)]
+struct Motor {
+    /// From 0.
+    number: u8,
+    run_time_s: Option<f64>,
+    revolutions: Option<f64>,
+    life_run_time_s: Option<f64>,
+    life_revolutions: Option<f64>,
+}
+
+/// Where a quantity stood for how long.
+#[derive(Debug, Serialize)]
+struct Ranges {
+    title: &'static str,
+    unit: &'static str,
+    /// From, to (`null` where there is no end), seconds.
+    bands: Vec<(Option<f32>, Option<f32>, f64)>,
+}
+
+/// Title, unit and decimals of a counter of the vehicle.
+const fn about(counter: UsageCounter) -> (&'static str, &'static str, u8) {
+    use UsageCounter as U;
+    match counter {
+        U::Powered => ("Powered", "s", 0),
+        U::Armed => ("Armed", "s", 0),
+        U::Flight => ("In the air", "s", 0),
+        U::Flights => ("Flights", "", 0),
+        U::Landings => ("Landings", "", 0),
+        U::Distance => ("Distance over ground", "m", 0),
+        U::HeightMax => ("Greatest height", "m", 1),
+        U::SpeedMax => ("Greatest ground speed", "m/s", 2),
+        U::LoadFactorMax => ("Greatest load factor", "g", 2),
+        U::Charge => ("Charge taken", "Ah", 3),
+        U::Energy => ("Energy taken", "Wh", 2),
+        U::CurrentMax => ("Highest current", "A", 2),
+        U::VoltageMin => ("Lowest battery voltage", "V", 2),
+        U::VibrationMax => ("Highest vibration", "m/s\u{b2}", 2),
+        U::AutopilotReboots => ("Reboots of the autopilot", "", 0),
+        U::HardLandings => ("Hard landings", "", 0),
+        U::TouchdownMax => ("Fastest touchdown", "m/s", 2),
+        U::BatteryCycles => ("Battery cycles", "", 2),
+        U::Ground => ("On the ground", "s", 0),
+        U::TakeOff => ("Taking off", "s", 0),
+        U::Hover => ("Hovering", "s", 0),
+        U::Climb => ("Climbing", "s", 0),
+        U::Cruise => ("Cruising", "s", 0),
+        U::Descent => ("Descending", "s", 0),
+        U::Landing => ("Landing", "s", 0),
+        U::LoadCycles0 => ("Load cycles from 0.25 g", "", 1),
+        U::LoadCycles1 => ("Load cycles from 0.5 g", "", 1),
+        U::LoadCycles2 => ("Load cycles from 1 g", "", 1),
+        U::LoadCycles3 => ("Load cycles from 1.5 g", "", 1),
+        U::LoadCycles4 => ("Load cycles from 2 g", "", 1),
+        U::LoadCycles5 => ("Load cycles from 3 g", "", 1),
+        U::LoadCycles6 => ("Load cycles from 4 g", "", 1),
+        U::Mishaps => ("Flights that a mishap ended", "", 0),
+    }
+}
+
+fn of_vehicle(name: &str) -> (String, &'static str, u8) {
+    let known = UsageCounter::ALL.iter().find(|counter| counter.name() == name);
+    let (title, unit, decimals) = known.map_or((name, "", 2), |counter| about(*counter));
+    (title.to_owned(), unit, decimals)
+}
+
+fn of_baseline(quantity: Quantity) -> (String, &'static str, u8) {
+    match quantity {
+        Quantity::Vibration => ("Usual vibration".to_owned(), "m/s\u{b2}", 2),
+        Quantity::HoverThrottle => ("Usual hover throttle".to_owned(), "", 3),
+        Quantity::Resistance(battery) => {
+            (format!("Usual resistance of battery {}", u16::from(battery) + 1), "\u{3a9}", 4)
+        }
+        Quantity::MotorSpeed(motor) => {
+            (format!("Usual difference of motor {}", u16::from(motor) + 1), "%", 1)
+        }
+    }
+}
+
+/// By what the counters mean; those that this program does not know have their names.
+pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Counters {
+    let mut all = Counters::default();
+    for number in 0..=u8::MAX {
+        let name = counter_name(number);
+        let Some(&value) = session.get(&name) else { continue };
+        let lived = life.get(&name).copied();
+        let (title, unit, decimals) = match meaning(number) {
+            Some(CounterName::Vehicle(name)) => of_vehicle(name),
+            Some(CounterName::Baseline(quantity)) => of_baseline(quantity),
+            Some(CounterName::Motor(what, motor)) => {
+                all.motor(what == "run_time_s", motor, value, lived);
+                continue;
+            }
+            Some(CounterName::Exposure(quantity, from, to)) => {
+                let unit = match quantity.unit() {
+                    "degc" => "\u{b0}C",
+                    "m_s2" => "m/s\u{b2}",
+                    "a" => "A",
+                    other => other,
+                };
+                let ends = [from, to].map(|end| end.is_finite().then_some(end));
+                all.range(quantity.name(), unit, (ends[0], ends[1], value));
+                continue;
+            }
+            None => (name, "", 2),
+        };
+        all.plain.push(Plain { title, unit, decimals, session: value, life: lived });
+    }
+    all.motors.sort_by_key(|motor| motor.number);
+    all
+}
+
+impl Counters {
+    fn motor(&mut self, is_time: bool, number: u8, value: f64, life: Option<f64>) {
+        let known = self.motors.iter().position(|motor| motor.number == number);
+        let place = known.unwrap_or_else(|| {
+            self.motors.push(Motor { number, ..Motor::default() });
+            self.motors.len() - 1
+        });
+        if let Some(motor) = self.motors.get_mut(place) {
+            if is_time {
+                (motor.run_time_s, motor.life_run_time_s) = (Some(value), life);
+            } else {
+                (motor.revolutions, motor.life_revolutions) = (Some(value), life);
+            }
+        }
+    }
+
+    fn range(&mut self, title: &'static str, unit: &'static str, band: (Option<f32>, Option<f32>, f64)) {
+        match self.ranges.last_mut().filter(|ranges| ranges.title == title) {
+            Some(ranges) => ranges.bands.push(band),
+            None => self.ranges.push(Ranges { title, unit, bands: vec![band] }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_counter_has_its_place_and_its_unit() {
+        let session: BTreeMap<String, f64> =
+            (0..=u8::MAX).map(|number| (counter_name(number), f64::from(number))).collect();
+        let all = of(&session, &BTreeMap::from([("motor2_run_time_s".to_owned(), 5.0)]));
+        assert_eq!((all.motors.len(), all.ranges.len()), (12, 5));
+        assert_eq!((all.motors[2].run_time_s, all.motors[2].life_run_time_s), (Some(102.0), Some(5.0)));
+        let first = &all.ranges[0].bands[0];
+        assert!(first.0.is_none() && first.1.is_some(), "{first:?}");
+        let shown =
+            all.plain.len() + 2 * 12 + all.ranges.iter().map(|ranges| ranges.bands.len()).sum::<usize>();
+        assert_eq!(shown, session.len());
+        let charge = all.plain.iter().find(|plain| plain.title == "Charge taken").expect("it is");
+        assert_eq!(charge.unit, "Ah");
+    }
+}
