@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use hums_tests::chip::frames;
 use hums_tests::flights::own;
 use hums_tests::program::{Machine, Recording};
 use hums_tests::store::Stored;
@@ -11,7 +12,15 @@ use hums_tests::store::Stored;
 fn short(dir: &Path) -> PathBuf {
     const BYTES: usize = 150_000;
     let path = dir.join("short.tlog");
-    fs::write(&path, &fs::read(own("px4_hil_quad_low.tlog")).unwrap()[..BYTES]).unwrap();
+    let whole = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
+    let mut cut = Vec::new();
+    for (time_us, frame) in frames(&whole) {
+        cut.extend([&time_us.to_be_bytes()[..], frame].concat());
+        if cut.len() >= BYTES {
+            break;
+        }
+    }
+    fs::write(&path, cut).unwrap();
     path
 }
 

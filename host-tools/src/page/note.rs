@@ -60,12 +60,10 @@ impl Note {
     /// A finding of a check.
     pub fn found(finding: &FindingLine) -> Self {
         let known = vocabulary(&finding.check);
-        let mut words = known.map_or_else(|| finding.check.replace('_', " "), |known| known.name.to_owned());
-        if known.is_some_and(|known| !known.part.is_empty()) || finding.instance > 0 {
-            let part = known.map_or("", |known| known.part);
-            let space = if part.is_empty() { "" } else { " " };
-            words = format!("{words}, {part}{space}{}", u16::from(finding.instance) + 1);
-        }
+        let words = match known {
+            Some(known) => known.said.name_of(finding.instance).to_string(),
+            None => finding.check.replace('_', " "),
+        };
         let is_worry = matches!(finding.level, "warning" | "critical");
         let state = states::name(&finding.check, finding.value);
         let finite = |value: f32| value.is_finite().then_some(value);
@@ -105,7 +103,7 @@ impl Note {
             unit: finding.unit.to_owned(),
         });
         if let Some(found) = &mut note.found {
-            found.because = vocabulary(finding.because).map_or(finding.because, |known| known.name);
+            found.because = vocabulary(finding.because).map_or(finding.because, |known| known.said.name);
         }
         note
     }
