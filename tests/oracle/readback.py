@@ -7,8 +7,8 @@ OUT is the folder of one log, decoded as csv, jsonl, influx and parquet. The rea
 and InfluxDB (INFLUXD is the program), which takes every point of the line protocol and is asked for them again.
 A number may differ from pymavlink's by nothing at all: each format prints what reads back as the same number. Times are
 compared with those before the frames of a tlog: seconds since the first one, to the millisecond, and UTC, which is the
-first one's and these seconds. A raw recording has no times: its bytes come as on a line at 115,200 baud, up to 32 of them
-at once, and no UTC is known.
+first one's and these seconds. A raw recording has no times: its frames come when the autopilot's messages tell, to a tenth of a
+second, and before the first of these as on a line at 115,200 baud, up to 32 bytes at once. No UTC is known.
 """
 
 import collections
@@ -36,8 +36,10 @@ csv.field_size_limit(1 << 24)
 
 
 SECOND_US, DAY_US = 1_000_000, 86_400_000_000
-# Bytes a second of a raw recording, and how much later than its last byte a frame may come.
+# Bytes a second of a raw recording, and how much later than its last byte a frame may come; how much later than the autopilot's
+# latest time, once it tells one, and with which messages: SYSTEM_TIME, ATTITUDE, GLOBAL_POSITION_INT.
 RAW_BYTES_S, RAW_LATE_US = 11_520, 32 * SECOND_US // 11_520
+TOLD_LATE_US, TELLING, AUTOPILOT = 100_000, (2, 30, 33), 1
 EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
 
 
@@ -49,10 +51,21 @@ class Arrival:
         self.first = self.last = None
         self.at = 0
         self.late = 0
+        # Of a raw recording: whose time counts, its first time, and when that came.
+        self.teller = None
 
-    def byte(self, place):
-        """Of a raw recording: so many bytes came."""
-        self.at, self.late = place * SECOND_US // RAW_BYTES_S, RAW_LATE_US
+    def byte(self, place, message):
+        """Of a raw recording: so many bytes came, the last of them of this message."""
+        system = message.get_srcSystem()
+        tells = message.get_msgId() in TELLING and message.get_srcComponent() == AUTOPILOT
+        if self.teller is None:
+            self.at, self.late = place * SECOND_US // RAW_BYTES_S, RAW_LATE_US
+            if tells:
+                self.teller = system, message.time_boot_ms, self.at
+        elif tells and system == self.teller[0]:
+            _, first_ms, base = self.teller
+            self.at = max(self.at, base + (message.time_boot_ms - first_ms) * 1000)
+            self.late = TOLD_LATE_US
 
     def entry(self, time_us):
         if self.first is None:
@@ -85,7 +98,7 @@ def messages_of(data, dialect, arrival):
                 message = None
             if message is not None and message.get_msgId() == message_id:
                 if not tlog:
-                    arrival.byte(at + length)
+                    arrival.byte(at + length, message)
                 yield message
                 at += skip + length
                 continue

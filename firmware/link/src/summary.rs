@@ -393,6 +393,8 @@ fn urgency(finding: &Finding) -> u8 {
 
 /// A finding in words a pilot understands: what is wrong with which part, the value, and what to do where it is critical, for
 /// instance `HUMS: battery 1 low: 6.8 %, LAND NOW`. What is good again is called by what is watched, not by what was wrong.
+// Not in its callers: the deepest of them needs the stack.
+#[inline(never)]
 pub fn text(finding: &Finding) -> Text {
     let Finding { check, instance, level, value, feeds, .. } = *finding;
     let Some(said) = health::said(check) else { return Text::new(format_args!("HUMS: {check}")) };

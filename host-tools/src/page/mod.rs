@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A flight is a [`history::History`]: series with names, units and limits ([`plots`]), track, findings and texts
-//! ([`note`]), phases and flight modes ([`spans`], [`modes`]), parameters ([`parameters`]). A page gets it in parts: over a
+//! ([`mod@note`]), phases and flight modes ([`spans`], [`modes`]), parameters ([`parameters`]). A page gets it in parts: over a
 //! socket as it grows, or one part that is the whole, inside the report. The same modules in `assets/` draw both; [`program`]
 //! makes one script of those that an entry needs, and there is one style sheet.
 //!

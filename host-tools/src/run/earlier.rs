@@ -1,7 +1,8 @@
 //! The sessions that are on a card before a run. A card without room makes the recorder overwrite the oldest of them: right
-//! on a vehicle, and a surprise on a PC. So a run does not begin on a full card unless it is told to, and what was
-//! overwritten is said by session.
+//! on a vehicle, and a surprise on a PC. So a run does not begin on a card that may become full in it unless it is told to, and what
+//! was overwritten is said by session.
 
+use std::fs;
 use std::path::Path;
 
 use anyhow::Result;
@@ -9,6 +10,7 @@ use hums_core::params::ParamSpec;
 use hums_recorder::recorder::SEGMENT_BYTES_MAX;
 
 use crate::cli;
+use crate::endpoint::Endpoint;
 use crate::logs::sessions::first_session;
 use crate::logs::{self, Log, Room, segment_name};
 use crate::outcome::usage;
@@ -45,17 +47,16 @@ pub struct EarlierSessions {
 }
 
 impl EarlierSessions {
-    /// Looks at a card. A usage error where a session would have to be overwritten for the run to begin.
+    /// Looks at a card. A usage error where the run may have to overwrite a session.
     pub fn of(run: &cli::Run, params: &[(&ParamSpec, f32)]) -> Result<Self> {
         let logs = logs::on_card(&run.sd);
         let sessions: Vec<Session> = logs.iter().map(Session::of).collect();
         let by_arming = params.iter().any(|(spec, value)| spec.name == BY_ARMING && *value > 0.0);
-        // What a store holds is known once it runs; what is overwritten then is said in the end.
-        let is_known = !by_arming && run.store.is_none() && !run.overwrite_oldest;
-        if let Some(oldest) = oldest(&logs).filter(|_| is_known && !has_room(&run.sd)) {
+        let oldest = oldest(&logs).filter(|_| !by_arming && !run.overwrite_oldest);
+        if let Some(oldest) = oldest.filter(|_| !has_room(run)) {
             return Err(usage(format!(
-                "{}: the card is full, and the run would overwrite its oldest session ({}); name another image, or say \
-                 --overwrite-oldest",
+                "{}: the card is full or may become so, and the run would overwrite its oldest session ({}); name another \
+                 image, or say --overwrite-oldest",
                 run.sd.display(),
                 oldest.name
             )));
@@ -94,10 +95,19 @@ fn oldest(logs: &[Log]) -> Option<&Log> {
     logs.iter().find(|log| log.files.iter().any(is_segment))
 }
 
-/// Whether a card has room for a segment. One that cannot be read has no session to lose.
-fn has_room(card: &Path) -> bool {
-    logs::room(card)
-        .is_none_or(|Room { free, all }| free >= (all / SEGMENTS_MIN).min(u64::from(SEGMENT_BYTES_MAX)))
+/// Whether a card has room for what a run may write: as much as it reads, and a segment that is begun at each of its starts. A card
+/// that cannot be read has no session to lose; what writing errors use up is not known before.
+fn has_room(run: &cli::Run) -> bool {
+    let read = match &run.input {
+        Endpoint::File(path) => fs::metadata(path).map_or(0, |file| file.len()),
+        _ => 0,
+    };
+    let starts = 1 + run.faults.reboot_at_us.len() + run.faults.card_out.len();
+    logs::room(&run.sd).is_none_or(|Room { free, all }| {
+        let segment = (all / SEGMENTS_MIN).min(u64::from(SEGMENT_BYTES_MAX));
+        let begun = segment.saturating_mul(starts as u64);
+        free >= begun.saturating_add(read.saturating_sub(segment))
+    })
 }
 
 #[cfg(test)]

@@ -116,6 +116,15 @@ fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goe
     };
     let before = sessions("info card.img --json");
     assert_eq!(before[0], "00001");
+    // A store changes nothing of it, and each start needs a file of its own.
+    let stored = attempt(dir.path(), &format!("{sim} --store store.bin"));
+    assert_eq!(stored.status.code(), Some(2), "{}", String::from_utf8_lossy(&stored.stderr));
+    assert_eq!(sessions("info card.img --json"), before);
+    let other = "sim --input short.raw --sd other.img --json";
+    run(dir.path(), &format!("{other} --card-size 34"), 0);
+    let starts = " --reboot-at 0.1".repeat(19);
+    assert_eq!(attempt(dir.path(), &format!("{other}{starts}")).status.code(), Some(2));
+    assert_eq!(sessions("info other.img --json"), ["00001"]);
 
     let ended = run(dir.path(), &format!("{sim} --overwrite-oldest"), 0);
     let told = String::from_utf8_lossy(&ended.stderr).into_owned();

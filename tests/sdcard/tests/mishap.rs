@@ -58,7 +58,7 @@ fn a_mishap_is_on_the_card_within_200_ms_and_told_with_its_place() {
     assert_eq!(event.map(|(_, text)| text.as_str()), Some("mishap at 47.397742,8.545594 30 m"));
     assert_eq!(found.marks, [Resting::Mishap]);
     rig.run_to(told.as_millis() + 1_000);
-    rig.assert_told("mishap: tumbling", 0);
+    rig.assert_told("HUMS: tumbling: ", 0);
     for _ in 0..60 {
         say(&mut rig, 15.0, IN_AIR);
     }

@@ -107,26 +107,31 @@ impl Health {
                     continue;
                 }
                 let change = if latched { state.hold(&before, change) } else { state.release(change) };
-                let feeds = || power::feeds(check, inputs, instance);
-                let Some(change) = change else {
-                    if let (Some(level @ (Level::Warning | Level::Critical)), Some(reading)) =
-                        (state.level(), reading)
-                    {
-                        exceedances.note(place, instance, check.side, reading.value);
-                        if slot == looked_at && state.was_explained() && self.outlives(slot, check, level) {
-                            let limit = check.limit(level, inputs.params);
-                            let change = Change { level, previous: level, value: reading.value, limit };
-                            findings(&check.finding(instance, inputs.now, change, feeds()));
-                        }
+                let is_change = change.is_some();
+                let told = if let Some(change) = change {
+                    let because = self.because(check, change.level);
+                    if let Some(state) = self.states.get_mut(slot) {
+                        state.explain(!because.is_empty());
                     }
-                    continue;
+                    Some((change, because))
+                } else if let (Some(level @ (Level::Warning | Level::Critical)), Some(reading)) =
+                    (state.level(), reading)
+                {
+                    exceedances.note(place, instance, check.side, reading.value);
+                    let is_alone =
+                        slot == looked_at && state.was_explained() && self.outlives(slot, check, level);
+                    let limit = check.limit(level, inputs.params);
+                    is_alone.then_some((Change { level, previous: level, value: reading.value, limit }, ""))
+                } else {
+                    None
                 };
-                let because = self.because(check, change.level);
-                if let Some(state) = self.states.get_mut(slot) {
-                    state.explain(!because.is_empty());
+                let Some((change, because)) = told else { continue };
+                let feeds = power::feeds(check, inputs, instance);
+                let finding = Finding { because, ..check.finding(instance, inputs.now, change, feeds) };
+                if is_change {
+                    exceedances.change(place, check.side, &finding);
                 }
-                let finding = Finding { because, ..check.finding(instance, inputs.now, change, feeds()) };
-                exceedances.change(place, check.side, &finding);
+                // In one place: the compiler puts what is done with it here, with its stack.
                 findings(&finding);
             }
         }

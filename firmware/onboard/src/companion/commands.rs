@@ -185,6 +185,15 @@ fn preflight(monitor: &Monitor) -> Option<(&'static str, u8)> {
     monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, part, _)| (check.name, part))
 }
 
+/// What stands against a flight. Not in its caller, whose callers need the stack.
+#[inline(never)]
+fn not_ready(check: &str, part: u8) -> Text {
+    match health::said(check) {
+        Some(said) => Text::new(format_args!("HUMS: not ready: {}", said.alarm_of(part, Feeds::Unsaid))),
+        None => Text::new(format_args!("HUMS: not ready: {check}")),
+    }
+}
+
 /// An answer as a message.
 pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Packet {
     match reply {
@@ -200,15 +209,7 @@ pub(crate) fn packet(reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Pa
         Reply::Protocol => messages::protocol_version(),
         Reply::Heartbeat => summary::heartbeat(monitor),
         Reply::Preflight => match preflight(monitor) {
-            Some((check, part)) => {
-                let text = match health::said(check) {
-                    Some(said) => {
-                        Text::new(format_args!("HUMS: not ready: {}", said.alarm_of(part, Feeds::Unsaid)))
-                    }
-                    None => Text::new(format_args!("HUMS: not ready: {check}")),
-                };
-                messages::status_text(Severity::Warning, text.as_str())
-            }
+            Some((check, part)) => messages::status_text(Severity::Warning, not_ready(check, part).as_str()),
             None => messages::status_text(Severity::Info, "HUMS: ready"),
         },
         Reply::Keyed(true) => messages::status_text(Severity::Notice, "HUMS: signing key set"),
