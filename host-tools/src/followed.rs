@@ -288,6 +288,10 @@ impl<T: Logged> Followed<T> {
         if let Some(there) = elsewhere {
             next.before = SessionBefore::Elsewhere { number: before.number, there };
         }
+        // A later log of a power-on has the boot record of its start, which was before the logs between them.
+        if next.summary.keep.is_some_and(|keep| keep.from > 0) {
+            return;
+        }
         // The start looked at each file from the newest on until it found a sector.
         for log in held.into_iter().filter(|log| log.summary.session.is_none()) {
             let (other, empty) = place(&log.name);
@@ -350,6 +354,32 @@ mod tests {
         done.extend(followed.finish());
         assert_eq!(done[0].strange(), Vec::<String>::new());
         assert_eq!(done[1].before, SessionBefore::There);
+    }
+
+    #[test]
+    fn a_file_that_was_emptied_since_the_start_is_told() {
+        let is_told = |from| {
+            let mut logs = ["00002", "00003", "00004"].map(|name| Ending {
+                name: name.to_owned(),
+                files: vec![format!("{name}_00.HUM")],
+                ..Ending::default()
+            });
+            let [one, empty, next] = &mut logs;
+            (one.summary.session, one.summary.last_number) = (Some(7), Some(8));
+            empty.summary.strange =
+                vec![Strange { file: 0, hollow: true, older: false, others: None, shift: None }];
+            next.summary.session = Some(9);
+            next.summary.keep = Some(Keep { from, ..Keep::default() });
+            let before =
+                Before { found: Found::Frames, number: 2, session: 7, sectors: 9, ..Before::default() };
+            next.summary.marks.before = Some(before);
+            let mut followed = Followed::new(Sessions::default());
+            let mut done: Vec<_> = logs.into_iter().flat_map(|log| followed.push(log)).collect();
+            done.extend(followed.finish());
+            !done[1].is_proved()
+        };
+        assert!(!is_told(0), "the start found it empty");
+        assert!(is_told(429), "the start was before it was written");
     }
 
     #[test]
