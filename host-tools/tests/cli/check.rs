@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use super::support::{attempt, flight, frames_of, json, px4, recorded, run, text};
+use super::support::{attempt, flight, frames_of, json, px4, recorded, records, run, text};
 
 /// Checks that tell of the place on a link, which a recording of another place cannot.
 const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
@@ -555,22 +555,6 @@ fn a_failsafe_and_a_crash_are_found_by_their_names() {
     assert_eq!((state["level"].as_str(), state["times"].as_u64()), (Some("critical"), Some(2)));
     let screen = text(&super::support::attempt(dir.path(), "check crash.bin"));
     assert!(screen.contains("autopilot failsafe: emergency: vibration failsafe, crash check"), "{screen}");
-}
-
-/// The records of a tlog: their times and their frames.
-fn records(mut rest: &[u8]) -> Vec<(u64, &[u8])> {
-    const TIME_BYTES: usize = 8;
-    let mut records = Vec::new();
-    while let Some((time, frame)) =
-        rest.split_first_chunk::<TIME_BYTES>().filter(|(_, frame)| frame.len() > 2)
-    {
-        // MAVLink 2 and 1: header, payload, checksum; a signature where the header says so.
-        let (head, signature) = if frame[0] == 0xFD { (12, 13 * usize::from(frame[2] & 1)) } else { (8, 0) };
-        let (frame, after) = frame.split_at((head + usize::from(frame[1]) + signature).min(frame.len()));
-        records.push((u64::from_be_bytes(*time), frame));
-        rest = after;
-    }
-    records
 }
 
 /// A tlog with other times: of each record's number and its own.

@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::support::{
-    all_named, attempt, contents, flight, frames_of, furnished, named, px4, run, stamps, text,
+    all_named, attempt, contents, end_of, flight, frames_of, furnished, named, px4, run, stamps, text,
 };
 
 /// Two cards, each with the first session of a vehicle of its own.
 fn two_cards() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     for (name, recording) in [("c1", "px4_hil_quad_low.tlog"), ("c2", "ap_quad_guided.tlog")] {
-        let recording = flight(recording);
+        let recording = end_of(recording, dir.path());
         let code = attempt(dir.path(), &format!("sim --input {} --sd {name}.img", recording.display()));
         assert!(code.status.success(), "{name}");
     }
@@ -45,7 +45,10 @@ fn two_cards_decoded_into_one_folder_stay_apart() {
         for (card, recording) in [("c1", "px4_hil_quad_low.tlog"), ("c2", "ap_quad_guided.tlog")] {
             let alone = dir.path().join(card);
             let name = named(&alone, "00001");
-            assert_eq!(frames_of(&folder.join(format!("{name}.tlog"))), frames_of(&flight(recording)));
+            assert_eq!(
+                frames_of(&folder.join(format!("{name}.tlog"))),
+                frames_of(&dir.path().join(recording))
+            );
             assert_eq!(
                 contents(&folder.join(&name)),
                 contents(&alone.join(&name)),

@@ -20,6 +20,33 @@ pub(crate) fn px4() -> PathBuf {
     flight("px4_hil_quad_low.tlog")
 }
 
+/// The records of a tlog: their times and their frames.
+pub(crate) fn records(mut rest: &[u8]) -> Vec<(u64, &[u8])> {
+    const TIME_BYTES: usize = 8;
+    let mut records = Vec::new();
+    while let Some((time, frame)) =
+        rest.split_first_chunk::<TIME_BYTES>().filter(|(_, frame)| frame.len() > 2)
+    {
+        // MAVLink 2 and 1: header, payload, checksum; a signature where the header says so.
+        let (head, signature) = if frame[0] == 0xFD { (12, 13 * usize::from(frame[2] & 1)) } else { (8, 0) };
+        let (frame, after) = frame.split_at((head + usize::from(frame[1]) + signature).min(frame.len()));
+        records.push((u64::from_be_bytes(*time), frame));
+        rest = after;
+    }
+    records
+}
+
+/// The last fifth of a recording, in a file of this folder: for tests that need another flight and not a long one.
+pub(crate) fn end_of(name: &str, folder: &Path) -> PathBuf {
+    let log = fs::read(flight(name)).expect("a recording");
+    let records = records(&log);
+    let end = &records[records.len() / 5 * 4..];
+    let path = folder.join(name);
+    let bytes: Vec<u8> = end.iter().flat_map(|(us, frame)| [&us.to_be_bytes()[..], frame].concat()).collect();
+    fs::write(&path, bytes).expect("written");
+    path
+}
+
 /// The program; nothing may take a minute.
 pub(crate) fn hums() -> Command {
     let mut command = Command::cargo_bin("hums").expect("the program");
