@@ -10,7 +10,7 @@ pub fn inputs() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     let entries = entries();
     let log = page::log(&entries);
     let with = |first: u8, bytes: &[u8]| [&[first], bytes].concat();
-    let stream = log.get(15 + 22..SECTOR_BYTES).unwrap_or_default();
+    let stream = log.get(19 + 26..SECTOR_BYTES).unwrap_or_default();
     let mut newer = log.clone();
     newer[0] = 0x49;
     vec![

@@ -5,7 +5,10 @@ use hums_blackbox::{BODY_BYTES, Entry, GROUP_SECTORS, GroupDecoder, Header, SECT
 use hums_blackbox::{SectorSink, Writer};
 
 /// Bytes of a group's first body before its coded stream.
-const PREAMBLE_BYTES: usize = 22;
+const PREAMBLE_BYTES: usize = 26;
+
+/// Where a sector's body begins.
+const BODY_AT: usize = 19;
 
 /// The longest entry: a record.
 const ENTRY_BYTES_MAX: usize = 512;
@@ -27,7 +30,7 @@ fn preamble() -> [u8; PREAMBLE_BYTES] {
     let (mut writer, mut first) = (Box::new(Writer::new()), First(None));
     writer.finish(&mut first);
     let sector = first.0.expect("an empty log has one sector");
-    sector.bytes()[15..].first_chunk().copied().expect("a sector is longer")
+    sector.bytes()[BODY_AT..].first_chunk().copied().expect("a sector is longer")
 }
 
 /// Sectors with this stream, each of which says that it completes `entries`.
@@ -39,11 +42,11 @@ pub fn sectors(stream: &[u8], entries: u16) -> Vec<[u8; SECTOR_BYTES]> {
 
 fn sector(number: u8, body: &[u8], entries: u16) -> [u8; SECTOR_BYTES] {
     let mut bytes = [0; SECTOR_BYTES];
-    bytes[..3].copy_from_slice(&[0x48, 0xb1, number]);
+    bytes[..3].copy_from_slice(&[0x48, 0xb2, number]);
     bytes[3..5].copy_from_slice(&(body.len() as u16).to_le_bytes());
     bytes[5..7].copy_from_slice(&entries.to_le_bytes());
     bytes[11] = number;
-    bytes[15..15 + body.len()].copy_from_slice(body);
+    bytes[BODY_AT..BODY_AT + body.len()].copy_from_slice(body);
     let mut sector = Sector::from_bytes(bytes);
     sector.seal(7);
     *sector.bytes()

@@ -45,6 +45,8 @@ struct Latest {
     end: u32,
     /// Frames of the power-on up to its end, modulo 2^32.
     frames_end: Option<u32>,
+    /// The check of its entries, where it ends with a whole sector.
+    check_end: Option<u32>,
     last: Option<Instant>,
 }
 
@@ -141,7 +143,9 @@ impl<T: Logged> Followed<T> {
             None => self.begins(next, number),
         };
         // Where logs are out of order, those that follow are held against what goes further.
-        let latest = Latest { number, end, frames_end: next.summary.frames_end, last: next.summary.last };
+        let summary = &next.summary;
+        let check_end = summary.check_end.filter(|_| !summary.ends_partial);
+        let latest = Latest { number, end, frames_end: summary.frames_end, check_end, last: summary.last };
         let latest = earlier.filter(|earlier| earlier.end > end).unwrap_or(latest);
         self.latest.insert(key, Latest { number, ..latest });
     }
@@ -191,6 +195,13 @@ impl<T: Logged> Followed<T> {
         // The sector in progress is in the next log again.
         let has_all = frames.is_some_and(|(here, there)| there.wrapping_sub(here) < 1 << 31);
         let goes_on = first == earlier.end && has_all;
+        let checks = next.summary.check_before.zip(earlier.check_end);
+        if goes_on && checks.is_some_and(|(here, there)| here != there) {
+            if let Some(log) = self.before(next) {
+                log.proof = Proof::Differs;
+            }
+            return;
+        }
         if let Some(log) = self.before(next).filter(|log| !log.proof.is_whole()) {
             let waited = log.summary.keep.is_some() && log.summary.marks.moved.is_none();
             if goes_on || first > earlier.end && waited {
@@ -412,7 +423,7 @@ mod tests {
         let mut sector = Sector::from_bytes([0; 512]);
         sector.seal(7);
         let mut bytes = *sector.bytes();
-        bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+        bytes[..2].copy_from_slice(&[0x48, 0xb2]);
         let mut sector = Sector::from_bytes(bytes);
         sector.seal(7);
         fs::write(dir.path().join("00004_00.HUM"), sector.bytes()).expect("room");

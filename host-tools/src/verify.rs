@@ -260,7 +260,7 @@ impl LogJson {
 }
 
 /// What the log says of its end and of its place.
-fn ends(log: &Overview) -> [Check; 6] {
+fn ends(log: &Overview) -> [Check; 7] {
     let ending = &log.ending;
     let summary = &ending.summary;
     let blocks = &summary.blocks;
@@ -293,6 +293,7 @@ fn ends(log: &Overview) -> [Check; 6] {
     [
         check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, twice),
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
+        check("chain", summary.groups, summary.unchained, String::new()),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
         check("end", 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
         check("session before", before_checked, before_failed, before),
@@ -338,9 +339,13 @@ fn kept_words(log: &Overview) -> String {
 }
 
 fn newer(log: &Overview) -> String {
-    let other = log.ending.summary.blocks.other_version;
-    if other > 0 {
-        return format!("{other} sectors are of a newer format version: take a newer hums");
+    let blocks = &log.ending.summary.blocks;
+    if blocks.newer_version > 0 {
+        let newer = count(blocks.newer_version, "sector");
+        return format!("{newer} of a newer format version, or sealed: take a newer hums");
+    }
+    if blocks.older_version > 0 {
+        return format!("{} of an older format version", count(blocks.older_version, "sector"));
     }
     if log.needs_newer_program() { "some need a newer hums".to_owned() } else { String::new() }
 }

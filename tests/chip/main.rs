@@ -11,6 +11,8 @@ mod flights;
 #[cfg(feature = "chip")]
 mod images;
 #[cfg(feature = "chip")]
+mod memory;
+#[cfg(feature = "chip")]
 mod persistence;
 #[cfg(feature = "chip")]
 mod power;

@@ -11,7 +11,7 @@
 use heapless::Deque;
 
 use crate::parity::Parity;
-use crate::sector::{Header, NotASector, SECTOR_BYTES, Sector};
+use crate::sector::{Header, NotASector, SECTOR_BYTES, Sector, VERSION};
 
 /// Sectors of the largest page that a card may put in the wrong place: 16 KiB.
 pub const PAGE_SECTORS: usize = 32;
@@ -48,8 +48,10 @@ pub struct BlockCounts {
     pub erased: u64,
     /// Anything else, for instance sectors of another format version.
     pub foreign: u64,
-    /// Sound sectors of a format version that this build does not read, also counted as foreign.
-    pub other_version: u64,
+    /// Sound sectors of an older format version, which this build does not read, also counted as foreign.
+    pub older_version: u64,
+    /// The same of a newer one, or sealed ones.
+    pub newer_version: u64,
 }
 
 impl BlockCounts {
@@ -69,7 +71,8 @@ impl BlockCounts {
             empty: self.empty - before.empty,
             erased: self.erased - before.erased,
             foreign: self.foreign - before.foreign,
-            other_version: self.other_version - before.other_version,
+            older_version: self.older_version - before.older_version,
+            newer_version: self.newer_version - before.newer_version,
         }
     }
 }
@@ -362,9 +365,13 @@ impl Assembler {
                 self.counts.foreign += 1;
                 self.bad_blocks = self.bad_blocks.saturating_add(1);
             }
-            NotASector::OtherVersion(_) => {
+            NotASector::OtherVersion(version) if version < VERSION => {
                 self.counts.foreign += 1;
-                self.counts.other_version += 1;
+                self.counts.older_version += 1;
+            }
+            NotASector::OtherVersion(_) | NotASector::Sealed => {
+                self.counts.foreign += 1;
+                self.counts.newer_version += 1;
             }
             NotASector::Damaged => {
                 if is_own {

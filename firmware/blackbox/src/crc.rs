@@ -34,6 +34,11 @@ impl Crc32c {
         Self(u32::MAX)
     }
 
+    /// Goes on where this was the value.
+    pub(crate) const fn going_on(value: u32) -> Self {
+        Self(!value)
+    }
+
     pub(crate) fn add(&mut self, bytes: &[u8]) {
         let [last, third, second, first] = &TABLES;
         let (words, rest) = bytes.as_chunks();

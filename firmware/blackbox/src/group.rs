@@ -2,7 +2,8 @@
 
 use hums_core::time::Instant;
 
-use crate::codec::{Decoded, Frame, Kind, Model, Recall, SLOTS};
+use crate::chain;
+use crate::codec::{self, Decoded, Frame, Kind, Model, Recall, SLOTS};
 use crate::coder::{Decoder, LOOKAHEAD, Reading};
 use crate::layouts::Layouts;
 use crate::limits::ENTRY_BYTES_MAX;
@@ -58,6 +59,8 @@ pub enum GroupError {
     UnknownLayouts(u32),
     /// Its sectors are sound, but what is in them is not what a writer makes.
     Corrupt,
+    /// The entries that the last sector completes are not those that came: the recorder's memory had changed.
+    Altered,
 }
 
 impl core::fmt::Display for GroupError {
@@ -68,6 +71,7 @@ impl core::fmt::Display for GroupError {
                 write!(f, "written with the message layouts {hash:08x}, which this program does not know")
             }
             Self::Corrupt => f.write_str("the sectors are sound, but their content is not"),
+            Self::Altered => f.write_str("the entries are not those that came"),
         }
     }
 }
@@ -87,6 +91,10 @@ pub struct GroupDecoder {
     last: Option<Header>,
     /// Entries that the sectors taken complete and that were not given out yet.
     due: u32,
+    /// The check of the session's entries up to the last one given out; `None` where one was not given out whole.
+    chain: Option<u32>,
+    /// The last one is not in it yet.
+    is_unchecked: bool,
     frames: u32,
     preamble: Preamble,
     /// The table of the group before, and its hash.
@@ -116,6 +124,8 @@ impl GroupDecoder {
             filled: 0,
             last: None,
             due: 0,
+            chain: None,
+            is_unchecked: false,
             frames: 0,
             preamble: Preamble::default(),
             layouts: None,
@@ -148,6 +158,7 @@ impl GroupDecoder {
         self.frames = 0;
         let body = sector.body().get(..header.body_bytes).unwrap_or_default();
         self.preamble = Preamble::read(body).ok_or(GroupError::Corrupt)?;
+        (self.chain, self.is_unchecked) = (body.get(..PREAMBLE_BYTES).map(chain::begun), false);
         let hash = self.preamble.layouts;
         // Nearly all groups have the table of the one before, and to make its hash takes as long as a sector.
         let layouts = match self.layouts {
@@ -177,7 +188,7 @@ impl GroupDecoder {
     }
 
     /// The next entry that the sectors taken so far complete; `None`: more sectors, please. After an error the group
-    /// is over.
+    /// is over. After [`GroupError::Altered`] those that the last sector completes may be wrong, which were given out before.
     pub fn next_entry(&mut self) -> Option<Result<Entry<'_>, GroupError>> {
         match self.advance()? {
             Ok(()) => Some(Ok(self.entry())),
@@ -186,7 +197,7 @@ impl GroupDecoder {
     }
 
     /// The same for those who only count: spares putting frames together and making their checksums, which is an eighth
-    /// of the work.
+    /// of the work. A group of which an entry was given out so is not held against its check from there on.
     pub fn next_outline(&mut self) -> Option<Result<Outline<'_>, GroupError>> {
         if let Err(error) = self.advance()? {
             return Some(Err(error));
@@ -201,8 +212,18 @@ impl GroupDecoder {
 
     /// Decodes the next entry, for `entry` to give out.
     pub(crate) fn advance(&mut self) -> Option<Result<(), GroupError>> {
-        if self.due == 0 || self.last.is_none() {
-            return None;
+        let last = self.last?;
+        if core::mem::take(&mut self.is_unchecked) {
+            // It was not given out whole.
+            self.chain = None;
+        }
+        if self.due == 0 {
+            let is_right = self.chain.is_none_or(|chain| chain == last.check);
+            if is_right {
+                return None;
+            }
+            self.last = None;
+            return Some(Err(GroupError::Altered));
         }
         self.due -= 1;
         let input = self.input.get(..self.filled).unwrap_or_default();
@@ -212,6 +233,7 @@ impl GroupDecoder {
             Ok((decoded, apart)) if self.decoder.position() <= input.len() + LOOKAHEAD => {
                 self.frames += u32::from(decoded.kind != Kind::Record);
                 (self.decoded, self.apart) = (decoded, apart);
+                self.is_unchecked = true;
                 Some(Ok(()))
             }
             _ => {
@@ -228,6 +250,12 @@ impl GroupDecoder {
         }
         let at = Instant::from_millis(self.decoded.at_ms);
         let bytes = self.entry.get(..self.decoded.len).unwrap_or_default();
+        if core::mem::take(&mut self.is_unchecked)
+            && let Some(chain) = &mut self.chain
+        {
+            let Decoded { kind, at_ms, .. } = self.decoded;
+            *chain = chain::after(*chain, chain::value_of(&codec::Entry { kind, at_ms, bytes }));
+        }
         match self.decoded.kind {
             Kind::Frame { verified } => Entry::Frame { at, bytes, verified },
             Kind::Record => Entry::Record { at, record: Record::read(bytes) },

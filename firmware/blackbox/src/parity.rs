@@ -282,6 +282,7 @@ mod tests {
             body_bytes: crate::BODY_BYTES - (number % 5) as usize,
             frames: number as u16,
             records: (number % 3) as u8,
+            check: number.wrapping_mul(0x9e37_79b1),
         };
         let mut sector = Sector::from_bytes(bytes);
         sector.set_header(&header);

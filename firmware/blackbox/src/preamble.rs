@@ -5,11 +5,12 @@
 //!   4  u48: time of the first entry, milliseconds since power-on
 //!  10  u32: frames of the session before this group
 //!  14  u64: UTC at power-on, microseconds since 1970; 0 where it is not known yet
+//!  22  u32: check of the session's entries before this group
 //! ```
 
 use crate::bytes::Fields;
 
-pub(crate) const PREAMBLE_BYTES: usize = 22;
+pub(crate) const PREAMBLE_BYTES: usize = 26;
 
 /// What a group says of itself before its first entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,6 +23,8 @@ pub struct Preamble {
     pub frames_before: u32,
     /// UTC at power-on, microseconds since 1970, where it was known.
     pub epoch_micros: Option<u64>,
+    /// The check of all entries of the session before this group, which the last sector before it has.
+    pub chain: u32,
 }
 
 impl Preamble {
@@ -30,7 +33,8 @@ impl Preamble {
         out[..4].copy_from_slice(&self.layouts.to_le_bytes());
         out[4..10].copy_from_slice(&self.start_ms.to_le_bytes()[..6]);
         out[10..14].copy_from_slice(&self.frames_before.to_le_bytes());
-        out[14..].copy_from_slice(&self.epoch_micros.unwrap_or(0).to_le_bytes());
+        out[14..22].copy_from_slice(&self.epoch_micros.unwrap_or(0).to_le_bytes());
+        out[22..].copy_from_slice(&self.chain.to_le_bytes());
         out
     }
 
@@ -47,6 +51,7 @@ impl Preamble {
             start_ms: u64::from_le_bytes(start),
             frames_before,
             epoch_micros: (epoch != 0).then_some(epoch),
+            chain: fields.u32(),
         })
     }
 }

@@ -5,7 +5,7 @@
 //! reader.end(); while let Some(item) = reader.next() { … }      // the last item is `End`
 //! ```
 //! What cannot be read is an item too: a `Gap` with its times and its cause. After a gap reading goes on at the next
-//! group's start, never before, so no wrong frame is given out.
+//! group's start, never before. A gap with [`Cause::Altered`] says that up to a sector's entries before it may be wrong.
 
 use hums_core::time::Instant;
 
@@ -55,6 +55,8 @@ pub enum Cause {
     UnknownLayouts(u32),
     /// Sound sectors whose content is not what a writer makes.
     Corrupt,
+    /// Sound sectors whose entries are not those that came: the recorder's memory had changed.
+    Altered,
     /// The vehicle was disarmed and is recorded by arming: sectors were not kept, on purpose, and a record says so.
     Disarmed,
 }
@@ -67,6 +69,7 @@ impl Cause {
             Self::Damaged => "damaged",
             Self::UnknownLayouts(_) => "unknown_layouts",
             Self::Corrupt => "corrupt",
+            Self::Altered => "altered",
             Self::Disarmed => "disarmed",
         }
     }
@@ -334,5 +337,6 @@ const fn cause_of(error: GroupError) -> Cause {
         GroupError::OutOfOrder => Cause::Missing,
         GroupError::UnknownLayouts(hash) => Cause::UnknownLayouts(hash),
         GroupError::Corrupt => Cause::Corrupt,
+        GroupError::Altered => Cause::Altered,
     }
 }

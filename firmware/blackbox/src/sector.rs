@@ -3,13 +3,14 @@
 //!
 //! ```text
 //!   0  magic 0x48 'H'
-//!   1  0xB0 | format version (1)
+//!   1  0xB0 | format version (2)
 //!   2  bits 0..=5: sectors since the first of the group; bit 6: partial; bit 7: closed
 //!   3  u16: bits 0..=8: bytes of the body in use; bits 9..=15: records completed
 //!   5  u16: frames completed
 //!   7  u32: session
 //!  11  u32: number, counted from 0 in the session
-//!  15  body, 493 bytes
+//!  15  u32: check of the session's entries that are complete with this sector ([`crate::chain`])
+//!  19  body, 489 bytes
 //! 508  u32: CRC-32C of bytes 0..508
 //! ```
 //! Integers are little endian. *Completed* counts the entries that can be decoded once this sector and those before
@@ -29,11 +30,15 @@ pub const GROUP_SECTORS: usize = 64;
 pub const BODY_BYTES: usize = CRC_AT - BODY_AT;
 
 /// The format's version.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
-pub(crate) const BODY_AT: usize = 15;
+pub(crate) const BODY_AT: usize = 19;
 const CRC_AT: usize = SECTOR_BYTES - 4;
 const MAGIC: u8 = b'H';
+/// With the format version: what byte 1 is.
+const PLAIN: u8 = 0xb0;
+/// The same of a sector that is sealed by means that this format does not have yet.
+const SEALED: u8 = 0xa0;
 const PARTIAL: u8 = 0x40;
 const CLOSED: u8 = 0x80;
 const SINCE_FIRST: u8 = 0x3f;
@@ -76,7 +81,7 @@ impl Sector {
     /// From what parity gives of a lost sector.
     pub(crate) fn made_again(bytes: &[u8; SECTOR_BYTES], session: u32, number: u32) -> Self {
         let mut sector = Self { bytes: *bytes };
-        (sector.bytes[0], sector.bytes[1]) = (MAGIC, 0xb0 | VERSION);
+        (sector.bytes[0], sector.bytes[1]) = (MAGIC, PLAIN | VERSION);
         sector.bytes[11..15].copy_from_slice(&number.to_le_bytes());
         sector.seal(session);
         sector
@@ -142,12 +147,13 @@ impl Sector {
         let body_bytes = (header.body_bytes).min(BODY_BYTES);
         let lengths = body_bytes as u16 | u16::from(header.records.min(RECORDS_MAX)) << 9;
         self.bytes[0] = MAGIC;
-        self.bytes[1] = 0xb0 | VERSION;
+        self.bytes[1] = PLAIN | VERSION;
         self.bytes[2] = flags | (header.since_first & SINCE_FIRST);
         self.bytes[3..5].copy_from_slice(&lengths.to_le_bytes());
         self.bytes[5..7].copy_from_slice(&header.frames.to_le_bytes());
         self.bytes[7..11].copy_from_slice(&header.session.to_le_bytes());
         self.bytes[11..15].copy_from_slice(&header.number.to_le_bytes());
+        self.bytes[15..19].copy_from_slice(&header.check.to_le_bytes());
         self.body_mut()[body_bytes..].fill(0);
     }
 
@@ -177,6 +183,8 @@ pub struct Header {
     pub frames: u16,
     /// Records completed in it, at most 127.
     pub records: u8,
+    /// Over all entries of the session that are complete with it, as they came.
+    pub check: u32,
 }
 
 /// Why a block is no sector of this format.
@@ -190,6 +198,8 @@ pub enum NotASector {
     Foreign,
     /// It begins as a sector of another format version does, and its check is right.
     OtherVersion(u8),
+    /// It is sealed (encrypted or signed), and its check is right: a newer reader is needed.
+    Sealed,
     /// It begins as a sector does, but the check (or a length in it) is wrong: torn or damaged.
     Damaged,
 }
@@ -198,7 +208,11 @@ impl Header {
     /// Checks a block and reads its header.
     pub fn read(block: &[u8; SECTOR_BYTES]) -> Result<Self, NotASector> {
         let sector = Sector { bytes: *block };
-        if block[0] != MAGIC || block[1] & 0xf0 != 0xb0 {
+        let is_sound = || crc32c(&block[..CRC_AT]) == sector.u32_at(CRC_AT);
+        if block[0] == MAGIC && block[1] & 0xf0 == SEALED && is_sound() {
+            return Err(NotASector::Sealed);
+        }
+        if block[0] != MAGIC || block[1] & 0xf0 != PLAIN {
             let all = |value: u8| block.iter().all(|&byte| byte == value);
             return Err(match block[0] {
                 0 if all(0) => NotASector::Empty,
@@ -206,7 +220,7 @@ impl Header {
                 _ => NotASector::Foreign,
             });
         }
-        if crc32c(&block[..CRC_AT]) != sector.u32_at(CRC_AT) {
+        if !is_sound() {
             return Err(NotASector::Damaged);
         }
         if block[1] & 0x0f != VERSION {
@@ -226,6 +240,7 @@ impl Header {
             body_bytes,
             frames: sector.frames(),
             records: (lengths >> 9) as u8,
+            check: sector.u32_at(15),
         })
     }
 
@@ -256,9 +271,10 @@ mod tests {
             since_first: 63,
             partial: true,
             closed: false,
-            body_bytes: 493,
+            body_bytes: BODY_BYTES,
             frames: 65_535,
             records: 127,
+            check: 0xfedc_ba98,
         };
         let mut sector = Sector::zeroed();
         sector.body_mut().fill(0xa5);
@@ -291,9 +307,13 @@ mod tests {
         assert_eq!(Header::read(&[0xff; SECTOR_BYTES]), Err(NotASector::Erased));
         assert_eq!(Header::read(&[7; SECTOR_BYTES]), Err(NotASector::Foreign));
         let (_, mut sector) = sample();
-        sector.bytes[1] = 0xb2;
+        sector.bytes[1] = 0xb1;
         assert_eq!(Header::read(sector.bytes()), Err(NotASector::Damaged));
         sector.seal(1);
-        assert_eq!(Header::read(sector.bytes()), Err(NotASector::OtherVersion(2)));
+        assert_eq!(Header::read(sector.bytes()), Err(NotASector::OtherVersion(1)));
+        sector.bytes[1] = 0xa2;
+        assert_eq!(Header::read(sector.bytes()), Err(NotASector::Foreign));
+        sector.seal(1);
+        assert_eq!(Header::read(sector.bytes()), Err(NotASector::Sealed));
     }
 }

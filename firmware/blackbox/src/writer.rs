@@ -9,6 +9,7 @@ use hums_core::time::Instant;
 use hums_dialect::wire::FRAME_BYTES_MAX;
 
 use crate::bytes::copy_few;
+use crate::chain;
 use crate::codec::{CODED_BYTES_MAX, Entry, Frame, Kind, Model, Out};
 use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
 use crate::layouts::{self, Layouts};
@@ -79,6 +80,10 @@ pub struct Writer {
     header: Header,
     /// Entries that ended too close to the end of the sector before: the next one completes them.
     ended: Ended,
+    /// Over all entries of the session.
+    chain: u32,
+    /// What it was at the end of the group before.
+    chain_before: u32,
     in_group: bool,
     changed: bool,
     layouts: Option<u32>,
@@ -118,8 +123,11 @@ impl Writer {
                 body_bytes: 0,
                 frames: 0,
                 records: 0,
+                check: 0,
             },
             ended: Ended { frames: 0, records: 0 },
+            chain: 0,
+            chain_before: 0,
             in_group: false,
             changed: false,
             layouts: None,
@@ -130,7 +138,8 @@ impl Writer {
     }
 
     /// Adds a frame as it was received. `verified`: its checksum was found to be that of our definition; it is not
-    /// checked again, and of a frame for which that is not so the log would have the checksum that is right.
+    /// checked again. A frame for which that is not so (the memory changed on its way here) would be read with the checksum
+    /// that is right, and not as it came: a reader finds that, and gives it up.
     pub fn frame(
         &mut self,
         at: Instant,
@@ -223,18 +232,20 @@ impl Writer {
         }
         self.last_ms = self.last_ms.max(self.millis(at));
         let entry = Entry { kind, at_ms: self.last_ms, bytes };
+        // Before the codec has seen it.
+        let value = chain::value_of(&entry);
         if !self.in_group {
             self.begin_group(entry.at_ms);
-        } else if self.append(&entry, false, sink) {
+        } else if self.append(&entry, value, false, sink) {
             return Ok(());
         } else {
             self.end_group(false, sink);
             self.begin_group(entry.at_ms);
         }
-        if !self.append(&entry, false, sink) {
+        if !self.append(&entry, value, false, sink) {
             // The model makes it longer than it is: its bytes as they are always fit.
             self.begin_group(entry.at_ms);
-            self.append(&entry, true, sink);
+            self.append(&entry, value, true, sink);
         }
         Ok(())
     }
@@ -247,15 +258,16 @@ impl Writer {
         }
     }
 
-    /// Encodes an entry and adds its bytes; `false` (the model is then spoilt, the stream is not) where the group
+    /// Encodes an entry of this value in the chain and adds its bytes; `false` (the model is then spoilt, the stream is not) where the group
     /// has no room for it or its code is too long.
-    fn append(&mut self, entry: &Entry<'_>, plain: bool, sink: &mut impl SectorSink) -> bool {
+    fn append(&mut self, entry: &Entry<'_>, value: u32, plain: bool, sink: &mut impl SectorSink) -> bool {
         let Some(len) = self.encode(entry, plain) else { return false };
         let mut done = self.add(0, len);
         while done < len {
             self.next_sector(sink);
             done = self.add(done, len);
         }
+        self.chain = chain::after(self.chain, value);
         self.count(entry.kind);
         self.changed = true;
         // A partial copy needs room to end the stream; a sector that is too full for that is closed early.
@@ -312,6 +324,9 @@ impl Writer {
             (Kind::Record, true) => self.header.records = self.header.records.saturating_add(1),
             (Kind::Record, false) => self.ended.records = self.ended.records.saturating_add(1),
         }
+        if complete {
+            self.header.check = self.chain;
+        }
     }
 
     fn begin_group(&mut self, at_ms: u64) {
@@ -320,9 +335,12 @@ impl Writer {
             start_ms: at_ms,
             frames_before: self.counters.frames as u32,
             epoch_micros: self.epoch_micros,
-        };
-        self.header.since_first = 0;
-        self.sector.body_mut()[..PREAMBLE_BYTES].copy_from_slice(&preamble.store());
+            chain: self.chain_before,
+        }
+        .store();
+        self.chain = chain::begun(&preamble);
+        (self.header.since_first, self.header.check) = (0, self.chain);
+        self.sector.body_mut()[..PREAMBLE_BYTES].copy_from_slice(&preamble);
         self.header.body_bytes = PREAMBLE_BYTES;
         self.model.reset(at_ms, Layouts::Current);
         self.coder = Encoder::new();
@@ -344,6 +362,7 @@ impl Writer {
         self.header = header;
         self.sector = sector;
         self.ended = Ended::default();
+        self.chain_before = self.chain;
         self.next_sector(sink);
         self.header.closed = false;
         self.in_group = false;
@@ -361,6 +380,7 @@ impl Writer {
         header.body_bytes = (at + len).min(BODY_BYTES);
         header.frames = header.frames.saturating_add(self.ended.frames);
         header.records = header.records.saturating_add(self.ended.records);
+        header.check = self.chain;
         sector.set_header(header);
     }
 
@@ -374,6 +394,7 @@ impl Writer {
         self.header.body_bytes = 0;
         self.header.frames = self.ended.frames;
         self.header.records = self.ended.records;
+        self.header.check = self.chain;
         self.changed = self.ended.frames != 0 || self.ended.records != 0;
         self.ended = Ended::default();
     }

@@ -1,8 +1,13 @@
 //! The container, from outside: what is written reads back, whatever happens to the sectors in between.
 
+use std::collections::HashSet;
+
 use hums_blackbox::record::{Mark, Note, Resting};
-use hums_blackbox::{ENTRY_SECTORS_MAX, Full, Item, LogReader, Record, Sector, SectorSink, Summary, Writer};
+use hums_blackbox::{
+    Cause, ENTRY_SECTORS_MAX, Full, Item, LogReader, Record, Sector, SectorSink, Summary, Writer,
+};
 use hums_core::time::Instant;
+use hums_dialect::crc;
 use proptest::prelude::*;
 
 const SESSION: u32 = 0xfeed_0001;
@@ -411,4 +416,86 @@ proptest! {
         let log = read(&blocks);
         prop_assert!(log.frames.len() < 1_000_000);
     }
+}
+
+/// Heartbeats in three groups, and how many sectors each has; `change` changes each frame before the writer gets it.
+fn three_groups(change: impl Fn(usize, &mut Vec<u8>)) -> (Vec<Sector>, Vec<Frame>) {
+    let (mut writer, mut queue, mut frames) = (Box::new(Writer::new()), queue(), Vec::new());
+    for index in 0..1_500_u64 {
+        let noise = index.wrapping_mul(0x9e37_79b9_7f4a_7c15).to_be_bytes();
+        let mut frame = [&[0xfe, 9, index as u8, 1, 1, 0], &noise[..], &[3]].concat();
+        let sum = crc::step(crc::update(crc::START, &frame[1..]), 50);
+        frame.extend_from_slice(&sum.to_le_bytes());
+        frames.push((10 * index, frame.clone(), true));
+        change(index as usize, &mut frame);
+        writer.frame(Instant::from_millis(10 * index), &frame, true, &mut queue).expect("room");
+        if index == 499 || index == 999 {
+            assert!(writer.restart(&mut queue));
+        }
+    }
+    assert!(writer.finish(&mut queue));
+    queue.sectors.iter_mut().for_each(|sector| sector.seal(SESSION));
+    (queue.sectors, frames)
+}
+
+/// Frames that are given out though they never came, and the most that a sector completes.
+fn strangers(log: &Log, frames: &[Frame], sectors: &[Sector]) -> (usize, usize) {
+    let most = sectors.iter().map(|sector| usize::from(sector.frames())).max().unwrap_or(0);
+    let came: HashSet<&Frame> = frames.iter().collect();
+    (log.frames.iter().filter(|frame| !came.contains(frame)).count(), most)
+}
+
+#[test]
+fn a_frame_that_changed_after_its_checksum_was_looked_at_is_told() {
+    let (sectors, frames) = three_groups(|index, frame| {
+        if index == 700 {
+            frame[9] ^= 4;
+        }
+    });
+    let log = read(&bytes(&sectors));
+    let [gap] = log.gaps[..] else { panic!("{:?}", log.gaps) };
+    assert_eq!(gap.cause, Cause::Altered);
+    let from = gap.from.expect("frames before it").as_millis() as usize / 10;
+    let (strangers, most) = strangers(&log, &frames, &sectors);
+    assert!(strangers == 1 && (700..700 + most).contains(&from), "{strangers} wrong, {from}");
+    assert_eq!((&log.frames[..700], &log.frames[from + 1..]), (&frames[..700], &frames[1_000..]));
+    assert_eq!(gap.frames, Some(999 - from as u32));
+}
+
+#[test]
+fn a_sector_that_changed_before_it_got_its_checksum_is_told() {
+    let (sectors, frames) = three_groups(|_, _| {});
+    let second = 1 + sectors[1..].iter().position(Sector::starts_group).expect("three groups");
+    for at in (0..7).chain(11..19).chain((19..508).step_by(5)) {
+        for (victim, bit) in [(second, at % 8), (second + 3, (at + 3) % 8)] {
+            let mut changed = sectors.clone();
+            let mut bytes_of = *changed[victim].bytes();
+            bytes_of[at] ^= 1 << bit;
+            changed[victim] = Sector::from_bytes(bytes_of);
+            changed[victim].seal(SESSION);
+            let log = read(&bytes(&changed));
+            let (strangers, most) = strangers(&log, &frames, &sectors);
+            let is_whole = log.frames == frames;
+            assert!(is_whole || !log.gaps.is_empty(), "byte {at}: {} frames, untold", log.frames.len());
+            assert!(strangers <= most, "byte {at}: {strangers} wrong, of {most} in a sector");
+            assert!(
+                log.frames.len() + 501 > frames.len() || log.frames.ends_with(&frames[1_000..]),
+                "byte {at}"
+            );
+        }
+    }
+}
+
+#[test]
+fn each_group_goes_on_from_the_check_that_the_sector_before_it_has() {
+    let (sectors, _) = three_groups(|_, _| {});
+    let mut check = 0;
+    for sector in &sectors {
+        let header = hums_blackbox::Header::read(sector.bytes()).expect("a sector");
+        if let Some(preamble) = sector.preamble() {
+            assert_eq!(preamble.chain, check);
+        }
+        check = header.check;
+    }
+    assert!(sectors.iter().filter(|sector| sector.starts_group()).count() == 3 && check != 0);
 }

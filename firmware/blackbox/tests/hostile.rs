@@ -46,7 +46,7 @@ impl Random {
 }
 
 fn golden() -> Vec<u8> {
-    std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/mixed-1.log")).expect("the golden file")
+    std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/mixed-2.log")).expect("the golden file")
 }
 
 /// The coded stream of the golden file's first group.
@@ -55,9 +55,9 @@ fn stream() -> Vec<u8> {
     let blocks = log.as_chunks::<SECTOR_BYTES>().0.iter().take(GROUP_SECTORS);
     let bodies = blocks.flat_map(|block| {
         let len = usize::from(u16::from_le_bytes([block[3], block[4]]) & 0x1ff);
-        block[15..15 + len].to_vec()
+        block[19..19 + len].to_vec()
     });
-    bodies.skip(22).collect()
+    bodies.skip(26).collect()
 }
 
 #[test]

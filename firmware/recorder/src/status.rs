@@ -101,6 +101,7 @@ pub struct CardStatus {
     before_session: AtomicU32,
     before_sectors: AtomicU32,
     before_frames: AtomicU32,
+    before_check: AtomicU32,
 }
 
 /// A reading of [`CardStatus`].
@@ -167,6 +168,7 @@ impl CardStatus {
             before_session: AtomicU32::new(0),
             before_sectors: AtomicU32::new(0),
             before_frames: AtomicU32::new(0),
+            before_check: AtomicU32::new(0),
         }
     }
 
@@ -287,6 +289,7 @@ impl CardStatus {
         self.before_session.store(before.session, Ordering::Relaxed);
         self.before_sectors.store(before.sectors, Ordering::Relaxed);
         self.before_frames.store(before.frames, Ordering::Relaxed);
+        self.before_check.store(before.check, Ordering::Relaxed);
         self.before_news.store(true, Ordering::Release);
     }
 
@@ -299,6 +302,7 @@ impl CardStatus {
             session: self.before_session.load(Ordering::Relaxed),
             sectors: self.before_sectors.load(Ordering::Relaxed),
             frames: self.before_frames.load(Ordering::Relaxed),
+            check: self.before_check.load(Ordering::Relaxed),
         })
     }
 

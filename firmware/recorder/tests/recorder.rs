@@ -443,14 +443,22 @@ fn the_next_start_finds_where_the_session_before_ended() {
             continue;
         }
         let session = stored(&device)[0].2.session;
-        let expected =
-            Before { found: Found::Frames, number: 1, session, sectors: written.len() as u32, frames };
+        let check = check_of(written.last().expect("it is not empty"));
+        let sectors = written.len() as u32;
+        let expected = Before { found: Found::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
         // A start whose power goes before its first sector: the same is found behind its empty segment.
         assert!(Recorder::new(device.clone(), &CardStatus::new(), held(), 9).ready(Instant::ZERO));
         let again = found_at_next_start(&device);
         assert_eq!((again.session, again.sectors), (session, written.len() as u32));
     }
+}
+
+/// The check that a sector has, which the writer did not seal.
+fn check_of(sector: &Sector) -> u32 {
+    let mut sector = *sector;
+    sector.seal(1);
+    Header::read(sector.bytes()).expect("a sector").check
 }
 
 #[test]
@@ -531,10 +539,10 @@ fn the_end_is_found_wherever_power_goes_while_a_vehicle_waits() {
             let found = found_at_next_start(&card);
             let frames = frames + if newest.partial { u32::from(newest.frames) } else { 0 };
             let number = newest.number;
-            let ends = (found.found, found.session, found.sectors, found.frames);
+            let ends = (found.found, found.session, found.sectors, found.frames, found.check);
             assert_eq!(
                 ends,
-                (Found::Frames, session, number + 1, frames),
+                (Found::Frames, session, number + 1, frames, newest.check),
                 "{older_sessions}, sector {number}"
             );
             // The same write, torn.

@@ -38,6 +38,7 @@ pub fn rows(record: &Record<'_>) -> Vec<Row> {
                 ("before_session", count(boot.before.session)),
                 ("before_sectors", count(boot.before.sectors)),
                 ("before_frames", count(boot.before.frames)),
+                ("before_check", count(boot.before.check)),
             ],
         ),
         Record::Vehicle(vehicle) => one(

@@ -89,6 +89,7 @@ pub struct BlocksJson {
     /// They begin as a sector and fail the check of one, and are not of this session as far as can be told.
     unsound: u64,
     foreign: u64,
+    older_format: u64,
     newer_format: u64,
 }
 
@@ -107,7 +108,8 @@ impl BlocksJson {
             erased: counts.erased,
             unsound: counts.unsound,
             foreign: counts.foreign,
-            newer_format: counts.other_version,
+            older_format: counts.older_version,
+            newer_format: counts.newer_version,
         }
     }
 }

@@ -117,6 +117,12 @@ impl Ending {
                 count(summary.times_fell, "group")
             ));
         }
+        if summary.unchained > 0 {
+            all.push(format!(
+                "{} not where the sectors before end: they are of another recording",
+                are(summary.unchained, "group")
+            ));
+        }
         if summary.marks.wrong > 0 {
             all.push(format!(
                 "{} of another number of frames than were read",

@@ -22,6 +22,8 @@ pub enum Proof {
     /// Nothing: it has no end mark, or the vehicle was armed or took off after the last one.
     #[default]
     None,
+    /// The next start, or the next log of the same power-on, found as many sectors and frames, and they were others.
+    Differs,
     /// There was more than is there now: so many sectors, and frames where they were counted.
     Short {
         /// Sectors that are missing; 0 where the last one is there in an older copy, which has fewer frames.
@@ -57,6 +59,9 @@ impl Proof {
             if next.sectors > sectors || frames.is_some_and(|missing| missing > 0) {
                 return Self::Short { sectors: next.sectors - sectors, frames, by: Teller::NextStart };
             }
+            if frames == Some(0) && summary.check_end.is_some_and(|check| check != next.check) {
+                return Self::Differs;
+            }
         }
         if summary.closed {
             return Self::Closed;
@@ -87,6 +92,7 @@ impl Proof {
             Self::NextLog => "next_log",
             Self::Mark(..) => "mark",
             Self::None => "none",
+            Self::Differs => "differs",
             Self::Short { .. } => "short",
         }
     }
@@ -132,6 +138,9 @@ impl Proof {
                     "not proved to its end: it has no landing, no disarming and no orderly end".to_owned()
                 }
             },
+            Self::Differs => "what came after it on the card went on from other entries than these: it is another log, or a \
+                              part of one"
+                .to_owned(),
             Self::Short { sectors, frames, by } => {
                 let sectors = Some(sectors).filter(|sectors| *sectors > 0).map(|some| count(some, "sector"));
                 let frames = frames.map(|some| count(some, "frame"));

@@ -286,6 +286,7 @@ fn words(cause: Cause) -> &'static str {
             "written with message layouts that this program does not know; take a newer hums"
         }
         Cause::Corrupt => "sectors hold what no recorder writes",
+        Cause::Altered => "the recorder's memory had changed: what it wrote is not what came",
         Cause::Disarmed => "not recorded: disarmed",
     }
 }

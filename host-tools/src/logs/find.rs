@@ -89,10 +89,7 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
         Content::Log => found.log(whole_file(path)?),
         Content::Image => image(path, salvage, found)?,
         Content::Empty => bail!("{}: is empty", path.display()),
-        Content::Newer(version) => bail!(
-            "{}: is a log of format version {version}, which this program is too old for; take a newer hums",
-            path.display()
-        ),
+        Content::Unread(unread) => bail!("{}: {unread}", path.display()),
         Content::Mavlink => bail!(
             "{}: is a recording of MAVLink, not a log of HUMS; `hums pack` makes it one, `hums sim` records it",
             path.display()
@@ -166,7 +163,7 @@ mod tests {
         let path = |name: &str| dir.path().join(name);
         for name in ["00003_01.HUM", "00003_00.HUM", "00004_00.HUM", "other.hum"] {
             let mut bytes = [0; 512];
-            bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+            bytes[..2].copy_from_slice(&[0x48, 0xb2]);
             let mut sector = Sector::from_bytes(bytes);
             sector.seal(7);
             fs::write(path(name), sector.bytes()).expect("room");

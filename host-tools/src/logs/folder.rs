@@ -118,9 +118,7 @@ impl Entries {
         let shown = path.display();
         match (look(&path), segment_name(&path)) {
             (Err(error), _) => found.leave_out(format!("{error:#}")),
-            (Ok(Content::Newer(version)), _) => {
-                found.leave_out(format!("{shown}: format version {version} is newer than this program"));
-            }
+            (Ok(Content::Unread(unread)), _) => found.leave_out(format!("{shown}: {unread}")),
             // Whatever is in it: that it holds nothing of ours is told with its log.
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use hums_blackbox::{Header, NotASector};
+use hums_blackbox::{Header, NotASector, VERSION};
 
 use super::places::BLOCK_BYTES;
 use crate::archive;
@@ -21,14 +21,45 @@ pub enum Content {
     Log,
     /// A card: a partition table, or blocks to be looked through.
     Image,
-    /// A log of a newer format version.
-    Newer(u8),
+    /// A log of a format that this program does not read.
+    Unread(Unread),
     /// A ground station's log or raw MAVLink: to be recorded first.
     Mavlink,
     /// Nothing in it.
     Empty,
     /// Anything else.
     Other,
+}
+
+/// Why a log is not read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unread {
+    /// It is of this older version.
+    Older(u8),
+    /// It is of this newer version.
+    Newer(u8),
+    /// Its sectors are sealed.
+    Sealed,
+}
+
+impl std::fmt::Display for Unread {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Older(version) => {
+                write!(
+                    f,
+                    "is a log of format version {version}, which is older than what this program reads ({VERSION})"
+                )
+            }
+            Self::Newer(version) => write!(
+                f,
+                "is a log of format version {version}, which this program is too old for; take a newer hums"
+            ),
+            Self::Sealed => {
+                f.write_str("is a sealed log, which this program is too old for; take a newer hums")
+            }
+        }
+    }
 }
 
 /// What a file is.
@@ -46,7 +77,7 @@ pub fn look(path: &Path) -> Result<Content> {
     if start.is_empty() {
         return Ok(Content::Empty);
     }
-    let mut newer = None;
+    let mut unread = None;
     let mut log_blocks = 0_usize;
     let mut other_blocks = 0_usize;
     for block in start.chunks(BLOCK_BYTES) {
@@ -54,7 +85,11 @@ pub fn look(path: &Path) -> Result<Content> {
         whole.iter_mut().zip(block).for_each(|(to, from)| *to = *from);
         match Header::read(&whole) {
             Ok(_) => log_blocks += 1,
-            Err(NotASector::OtherVersion(version)) => newer = Some(version),
+            Err(NotASector::OtherVersion(version)) if version < VERSION => {
+                unread = Some(Unread::Older(version));
+            }
+            Err(NotASector::OtherVersion(version)) => unread = Some(Unread::Newer(version)),
+            Err(NotASector::Sealed) => unread = Some(Unread::Sealed),
             Err(NotASector::Empty | NotASector::Erased | NotASector::Damaged) => {}
             Err(NotASector::Foreign) => other_blocks += 1,
         }
@@ -66,10 +101,10 @@ pub fn look(path: &Path) -> Result<Content> {
     let signed = start.get(510..512) == Some(&[0x55, 0xaa]);
     let large = start.len() == LOOK_BLOCKS * BLOCK_BYTES;
     let frame_at = |at: usize| start.get(at..).is_some_and(|rest| matches!(peek(rest), Peek::Frame(_)));
-    Ok(match (log_blocks, newer) {
+    Ok(match (log_blocks, unread) {
         _ if signed && other_blocks > 0 => Content::Image,
         (1.., _) => Content::Log,
-        (0, Some(version)) => Content::Newer(version),
+        (0, Some(unread)) => Content::Unread(unread),
         _ if frame_at(0) || frame_at(8) => Content::Mavlink,
         // Large, and known to be something else.
         _ if start.starts_with(&archive::GZIP) || archive::hint(&start).is_some() => Content::Other,

@@ -98,6 +98,12 @@ pub struct Summary {
     pub keep: Option<Keep>,
     /// Frames of the session up to its end, modulo 2^32.
     pub frames_end: Option<u32>,
+    /// The check of the session's entries before its first group.
+    pub check_before: Option<u32>,
+    /// The same up to its end, as its last sector has it.
+    pub check_end: Option<u32>,
+    /// Groups that go on from other entries than the sectors before them end with.
+    pub unchained: u64,
     /// What lies behind the last sector.
     pub behind: BlockCounts,
     /// How many blocks up to the end of its files are no sectors of any log.
@@ -153,12 +159,13 @@ pub fn read<C: Collect>(
         workers,
         ahead_max,
         next,
-        |group| decode_here(group, new()),
+        |group| decode_here(group, &new),
         |decoded| stitch.take(decoded, &new, deliver),
     )?;
     stitch.end(groups.damaged_at_end(), deliver)?;
     let mut summary = stitch.summary;
     summary.frames_end = stitch.expected;
+    summary.check_end = stitch.check;
     summary.ends_partial = stitch.cut;
     summary.behind = groups.behind();
     summary.foreign_at_end = groups.foreign_at_end();
@@ -173,12 +180,21 @@ pub fn read<C: Collect>(
 }
 
 /// Decodes with this thread's decoder, which is large and made once; one that waits for its turn is another one's.
-fn decode_here<C: Collect>(group: Group, mut collected: C) -> Decoded<C> {
+///
+/// What a sector completes may be wrong where it does not decode, or is not what came, and is found only then: such a group is decoded
+/// once more, up to the sector before.
+fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     thread_local!(static DECODER: Cell<Option<Box<GroupDecoder>>> = const { Cell::new(None) });
-    let mut decoded = Decoded::of(&group);
     let decoder = DECODER.take().unwrap_or_else(|| Box::new(GroupDecoder::new()));
-    let mut rest = Rest { decoder, group, at: 0 };
-    let whole = decoded.go_on(&mut rest, &mut collected);
+    let mut rest = Rest { decoder, end: group.len(), group, at: 0 };
+    let (mut decoded, mut collected) = (Decoded::of(&rest.group), new());
+    let mut whole = decoded.go_on(&mut rest, &mut collected);
+    if let Some(error @ (GroupError::Corrupt | GroupError::Altered)) = decoded.error {
+        (rest.end, rest.at) = (rest.at.saturating_sub(1), 0);
+        (decoded, collected) = (Decoded::of(&rest.group), new());
+        whole = decoded.go_on(&mut rest, &mut collected);
+        decoded.error = Some(error);
+    }
     decoded.collected = Some(collected);
     if whole {
         DECODER.set(Some(rest.decoder));
@@ -194,6 +210,8 @@ struct Rest {
     group: Group,
     /// Sectors of it that the decoder got.
     at: usize,
+    /// Sectors of it that it is to get.
+    end: usize,
 }
 
 /// A group, decoded as far as it was.
@@ -210,6 +228,9 @@ struct Decoded<C> {
     frames_said: u32,
     /// How it began: its first time and the count of frames before it; `None` where nothing of it can be decoded.
     begun: Option<(Instant, u32)>,
+    /// The check of the session's entries before it, where it begins, and up to its last sector.
+    check_before: Option<u32>,
+    check_end: Option<u32>,
     frames: u32,
     last: Option<Instant>,
     error: Option<GroupError>,
@@ -237,6 +258,8 @@ impl<C: Collect> Decoded<C> {
             number: first.map_or(0, |step| step.header.number),
             frames_said: group.iter().map(|step| u32::from(step.header.frames)).sum(),
             begun: None,
+            check_before: None,
+            check_end: last.map(|step| step.header.check),
             frames: 0,
             last: None,
             error: None,
@@ -251,19 +274,22 @@ impl<C: Collect> Decoded<C> {
 
     /// Decodes to the group's end, or until what was collected is enough for a part. Whether it was the end.
     fn go_on(&mut self, rest: &mut Rest, collected: &mut C) -> bool {
-        let Rest { decoder, group, at } = rest;
+        let Rest { decoder, group, at, end } = rest;
         let counts = collected.only_counts();
         loop {
             while let Some(outline) = next(decoder, counts) {
                 match outline {
                     Ok(outline) => self.entry(outline, collected),
-                    Err(why) => self.error = self.error.or(Some(why)),
+                    Err(why) => {
+                        self.error = self.error.or(Some(why));
+                        return true;
+                    }
                 }
                 if collected.held_bytes() >= PART_BYTES {
                     return false;
                 }
             }
-            let Some(step) = group.get(*at) else { return true };
+            let Some(step) = group.get(*at).filter(|_| at < end) else { return true };
             *at += 1;
             if let Err(why) = decoder.push(&step.header, &step.sector) {
                 self.error = self.error.or(Some(why));
@@ -272,6 +298,7 @@ impl<C: Collect> Decoded<C> {
             let preamble = decoder.preamble();
             self.begun.get_or_insert((Instant::from_millis(preamble.start_ms), preamble.frames_before));
             self.epoch_us = self.epoch_us.or(preamble.epoch_micros);
+            self.check_before.get_or_insert(preamble.chain);
         }
     }
 
@@ -317,6 +344,8 @@ struct Stitch {
     open: Option<Gap>,
     /// Frames of the session up to here, modulo 2^32, while the count is unbroken.
     expected: Option<u32>,
+    /// The check that the last sector has.
+    check: Option<u32>,
     /// The number of the sector that would follow.
     next_number: u32,
     cut: bool,
@@ -368,6 +397,12 @@ impl Stitch {
                 if missing != Some(0) {
                     self.gap(Cause::Missing);
                 }
+                // The session's first group goes on from none.
+                let before = self.check.or((group.number == 0).then_some(0));
+                if let (None, Some(before), Some(begun)) = (&self.open, before, group.check_before) {
+                    self.summary.unchained += u64::from(before != begun);
+                }
+                self.summary.check_before = self.summary.check_before.or(group.check_before);
                 if let Some(mut gap) = self.open.take() {
                     (gap.to, gap.frames) = (Some(start), missing);
                     self.close(gap, deliver)?;
@@ -392,6 +427,7 @@ impl Stitch {
                 }
             }
         }
+        self.check = group.check_end;
         // Only now the group is decoded to its end.
         self.summary.marks.add(&group.marks);
         self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
@@ -469,6 +505,7 @@ fn cause_of(error: GroupError) -> Cause {
         GroupError::OutOfOrder => Cause::Missing,
         GroupError::UnknownLayouts(hash) => Cause::UnknownLayouts(hash),
         GroupError::Corrupt => Cause::Corrupt,
+        GroupError::Altered => Cause::Altered,
     }
 }
 

@@ -201,7 +201,7 @@ pub fn sessions_of(places: &[Place]) -> Sessions {
 /// Whether a file is a log of ours or a card's image.
 fn is_own(path: &Path) -> Result<bool> {
     Ok(match logs::find::look(path)? {
-        Content::Log | Content::Newer(_) => true,
+        Content::Log | Content::Unread(_) => true,
         // A large file of anything may be a card without a partition table: what is known to be something is none.
         Content::Image => !is_recording(path),
         Content::Mavlink | Content::Empty | Content::Other => false,
@@ -341,7 +341,7 @@ mod tests {
         let write = |count: u32| {
             for session in 0..count {
                 let mut bytes = [0; SECTOR_BYTES];
-                bytes[..2].copy_from_slice(&[0x48, 0xb1]);
+                bytes[..2].copy_from_slice(&[0x48, 0xb2]);
                 let mut sector = Sector::from_bytes(bytes);
                 sector.seal(session);
                 fs::write(dir.path().join(format!("{session}.hum")), sector.bytes()).expect("room");

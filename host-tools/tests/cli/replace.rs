@@ -150,7 +150,7 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording_with_any_flag() {
     // What a port sent, and a log off the card: originals of the kinds that the commands make.
     fs::write(at("gs"), frames_of(&px4())[..50].concat()).expect("written");
     let image = fs::read(at("card.img")).expect("an image");
-    let first = image.chunks(512).position(|block| block.starts_with(&[0x48, 0xb1])).expect("a sector") * 512;
+    let first = image.chunks(512).position(|block| block.starts_with(&[0x48, 0xb2])).expect("a sector") * 512;
     fs::write(at("00001_00.HUM"), &image[first..first + (1 << 20)]).expect("written");
     fs::write(at("flight.ulg"), b"ULog\x01\x12\x35\x01 and so on").expect("written");
     let (before, whole) = (stamps(dir.path()), contents(dir.path()));

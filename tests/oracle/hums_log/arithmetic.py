@@ -31,8 +31,9 @@ def bits_of(value):
     return struct.unpack("<I", struct.pack("<f", value))[0]
 
 
-def crc32c(data):
-    crc = M32
+def crc32c(data, before=0):
+    """Of what gave `before` and this after it."""
+    crc = before ^ M32
     for byte in data:
         crc = CRC32C[(crc ^ byte) & 0xFF] ^ (crc >> 8)
     return crc ^ M32

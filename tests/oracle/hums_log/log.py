@@ -8,7 +8,7 @@ from group import Group
 from tables import read_layouts, read_links
 
 
-DATA, SUMS = b"\x48\xb1", [b"\x48\xc1", b"\x48\xd1"]
+DATA, SUMS = b"\x48\xb2", [b"\x48\xc2", b"\x48\xd2"]
 POWERS = [1]
 while len(POWERS) < 255:
     POWERS.append(gf_product(POWERS[-1], 2))
@@ -19,7 +19,8 @@ class Sector:
         flags, self.used, self.frames, self.session, self.number = struct.unpack_from("<BHHII", block, 2)
         self.since, self.partial, self.closed = flags & 63, bool(flags & 64), bool(flags & 128)
         self.used, self.records = self.used & 511, self.used >> 9
-        self.body = block[15:15 + self.used]
+        self.check = int.from_bytes(block[15:19], "little")
+        self.body = block[19:19 + self.used]
         self.rank = (not self.partial, self.frames + self.records)
 
 
@@ -95,23 +96,38 @@ def groups_of(sectors):
         yield group
 
 
+def checked(decoder, group, chain, complain):
+    """The entries of a group, sector by sector, up to one whose entries are not those that came."""
+    for sector in group:
+        entries = list(decoder.decode(sector.frames + sector.records))
+        for ms, what, content, verified in entries:
+            kind = 2 if what == "record" else int(verified)
+            entry = crc32c(struct.pack("<QBH", ms, kind, len(content)) + content)
+            chain = crc32c(entry.to_bytes(4, "little"), chain)
+        if chain != sector.check:
+            complain(f"sector {sector.number}: its entries are not those that came")
+            return
+        yield from entries
+
+
 def read(data, complain):
     """The entries of a log: (ms since power-on, UTC at power-on in microseconds, what, bytes, verified)."""
-    layouts, links, entries, next_frame, epoch = {}, read_links(), [], None, 0
+    layouts, links, entries, next_frame, chain, epoch = {}, read_links(), [], None, None, 0
     for group in groups_of(sectors_of(data)):
-        head = group[0].body[:22]
+        head = group[0].body[:26]
         digest, start_ms = int.from_bytes(head[:4], "little"), int.from_bytes(head[4:10], "little")
-        before, utc = struct.unpack_from("<IQ", head, 10)
+        before, utc, chain_before = struct.unpack_from("<IQI", head, 10)
         epoch = utc or epoch
         if next_frame is not None and next_frame != before:
             complain(f"gap before {start_ms} ms: {before - next_frame & M32} frames are missing")
+        elif chain is not None and chain != chain_before:
+            complain(f"the group at {start_ms} ms does not go on from the sector before it")
         if digest not in layouts:
             layouts[digest] = read_layouts(digest)
-        stream = b"".join(sector.body for sector in group)[22:]
-        frames = sum(sector.frames for sector in group)
-        count = frames + sum(sector.records for sector in group)
-        next_frame = before + frames & M32
-        for entry in Group(stream, start_ms, layouts[digest], links).decode(count):
+        stream = b"".join(sector.body for sector in group)[26:]
+        next_frame, chain = before, group[-1].check
+        for entry in checked(Group(stream, start_ms, layouts[digest], links), group, crc32c(head), complain):
+            next_frame = next_frame + (entry[1] == "frame") & M32
             if entry[1] == "record" and entry[2][:1] == b"\4":
                 boot_us, utc_us = struct.unpack_from("<QQ", entry[2], 4)
                 epoch = utc_us - boot_us

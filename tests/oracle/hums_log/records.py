@@ -29,7 +29,7 @@ STATISTICS = ["frames_in", "frames_logged", "frames_lost", "bytes_in", "bytes_no
 RECORDS = {
     1: ("HUMS_BOOT", {"version": "text", "git": "text", "board": "text", "reset": "I", "reset_name": "text", "uid": 12,
                       "boots": "I", "before_number": "I", "before_session": "I", "before_sectors": "I",
-                      "before_frames": "I", "before": FOUND}),
+                      "before_frames": "I", "before_check": "I", "before": FOUND}),
     2: ("HUMS_VEHICLE", {"system": "B", "component": "B", "autopilot": "B", "type": "B", "firmware": "I", "uid": "Q"}),
     3: ("HUMS_PARAM", {"name": "text", "value": "d", "changed": "?", "by_system": "B", "by_component": "B"}),
     4: ("HUMS_CLOCK", {"boot[s]": "time", "utc[us]": "Q", "source": SOURCES}),

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use anyhow::{Context as _, Result, ensure};
 use hums::logs::{Log, on_card};
-use hums_blackbox::Header;
+use hums_blackbox::{Header, Sector};
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};
@@ -33,13 +33,18 @@ pub(super) const LABELS: Labels = Labels {
         "of them noticed",
         "frames lost",
         "frames given out, all of them right",
+        "single bits in memory, before a sector got its checksum",
+        "of them noticed",
+        "of them without an effect on what is read",
+        "frames lost by one of them at most",
+        "frames given out after them, all of them right",
         "damaged pages and ends",
         "of them noticed: `verify` does not call it good",
         "of them read as the other session, and told",
         "of them told: whole up to the end mark that is named, and no further",
         "of them told: nothing is missing, and what was made again from parity is said",
         "missed, or told wrong",
-        "frames given out after them, all of them right",
+        "frames given out after these, all of them right",
     ],
     columns: &["damage", "how often", "noticed", "told", "missed", "most frames lost"],
 };
@@ -54,9 +59,13 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
 fn bits(options: &Options, figures: &mut Figures) -> Result<()> {
     let share = options.runs(10_000, 200).div_ceil(OWN.len() as u64);
     let outcomes = OWN.into_par_iter().enumerate().with_max_len(1).map(|(index, flight)| {
-        Subject::record(flight)?.damage_often(share, options.seed.wrapping_add(index as u64)).context(flight)
+        let subject = Subject::record(flight)?;
+        let seed = options.seed.wrapping_add(index as u64);
+        let on_card = subject.damage_often(share, false, seed).context(flight)?;
+        let in_memory = subject.damage_often(share, true, seed.wrapping_add(1_000)).context(flight)?;
+        Ok((on_card, in_memory))
     });
-    let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
+    let (outcomes, in_memory): (Vec<_>, Vec<_>) = outcomes.collect::<Result<Vec<_>>>()?.into_iter().unzip();
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
     let (errors, noticed) = (sum(|one| one.single + one.bursts), sum(|one| one.noticed));
     figures.fact("errors in bits", errors);
@@ -65,6 +74,13 @@ fn bits(options: &Options, figures: &mut Figures) -> Result<()> {
     figures.fact("of them noticed", noticed);
     figures.fact("frames lost", outcomes.iter().map(|one| one.lost_max).max().unwrap_or(0));
     figures.fact("frames given out, all of them right", sum(|one| one.frames));
+    let sum = |of: fn(&Outcome) -> u64| in_memory.iter().map(of).sum::<u64>();
+    figures.fact("single bits in memory, before a sector got its checksum", sum(|one| one.single));
+    figures.fact("of them noticed", sum(|one| one.noticed));
+    figures.fact("of them without an effect on what is read", sum(|one| one.harmless));
+    let lost_max = in_memory.iter().map(|one| one.lost_max).max().unwrap_or(0);
+    figures.fact("frames lost by one of them at most", lost_max);
+    figures.fact("frames given out after them, all of them right", sum(|one| one.frames));
     ensure!(noticed == errors, "{} of {errors} errors in bits were not noticed", errors - noticed);
     Ok(())
 }
@@ -94,7 +110,7 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
     figures
         .fact("of them told: nothing is missing, and what was made again from parity is said", all.repaired);
     figures.fact("missed, or told wrong", all.missed);
-    figures.fact("frames given out after them, all of them right", all.frames);
+    figures.fact("frames given out after these, all of them right", all.frames);
     let misses: Vec<_> = outcomes.iter().flat_map(|one| &one.misses).take(10).map(String::as_str).collect();
     ensure!(all.missed == 0, "{}\nthe first ones:\n{}", figures.text(), misses.join("\n"));
     ensure!(all.noticed + all.told == all.damages, "they do not add up:\n{}", figures.text());
@@ -104,6 +120,8 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
 #[derive(Default)]
 struct Outcome {
     noticed: u64,
+    /// Not noticed, and all frames came out.
+    harmless: u64,
     single: u64,
     bursts: u64,
     lost_max: u64,
@@ -145,13 +163,17 @@ impl Subject {
         Ok(Self { card, log, blocks, whole })
     }
 
-    fn damage_often(self, count: u64, seed: u64) -> Result<Outcome> {
+    /// On the card; or, `in_memory`, before the sectors that are touched got their checksums.
+    fn damage_often(&self, count: u64, in_memory: bool, seed: u64) -> Result<Outcome> {
         let mut random = Random::new(seed);
         let mut outcome = Outcome::default();
         for index in 0..count {
             let bit = random.below(self.blocks.len() as u64 * 8 * BLOCK as u64);
-            let length = if index % 2 == 0 { 1 } else { 2 + random.below(BURST_BITS_MAX - 1) };
+            let length = if in_memory || index % 2 == 0 { 1 } else { 2 + random.below(BURST_BITS_MAX - 1) };
             let before = self.flip(bit, length, &mut random)?;
+            if in_memory {
+                before.iter().try_for_each(|(block, _)| self.seal(*block))?;
+            }
             let damaged = Record::of(&self.log)?;
             let touched: BTreeSet<_> = before.iter().map(|(block, _)| block).collect();
             let groups: BTreeSet<_> = self
@@ -193,6 +215,13 @@ impl Subject {
         Ok(before)
     }
 
+    /// Gives a sector the checksum of what it has.
+    fn seal(&self, block: u32) -> Result<()> {
+        let mut sector = Sector::from_bytes(self.card.read_block(block)?);
+        sector.seal(self.whole.summary.session.context("no session")?);
+        self.card.write_block(block, sector.bytes())
+    }
+
     fn judge(&self, damaged: &Record, touched: &BTreeSet<usize>, outcome: &mut Outcome) -> Result<()> {
         let blocks = &damaged.summary.blocks;
         let is_noticed =
@@ -207,6 +236,7 @@ impl Subject {
             }
         }
         ensure!(given.peek().is_none(), "a frame came out that never went in: {:?}", given.peek());
+        outcome.harmless += u64::from(!is_noticed && missing.is_empty());
         let group = |index: &usize| self.whole.groups.partition_point(|first| first <= index);
         let groups: BTreeSet<_> = missing.iter().map(group).collect();
         ensure!(

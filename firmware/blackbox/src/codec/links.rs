@@ -1,7 +1,7 @@
 //! The same quantity in several messages: a velocity comes in centimetres per second in one message and as a float in
 //! another. Messages publish such quantities into registers; floats are then also predicted from their register.
 //!
-//! The table is part of format version 1. It names fields by message id and byte offset; where a layout has something
+//! The table is part of format version 2. It names fields by message id and byte offset; where a layout has something
 //! else there, the prediction is bad, but writer and reader still agree.
 
 /// Quantities kept.

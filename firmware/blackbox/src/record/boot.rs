@@ -57,6 +57,8 @@ pub struct Before {
     pub sectors: u32,
     /// Its frames, modulo 2^32.
     pub frames: u32,
+    /// The check of all its entries, as its last sector has it: known where its frames are.
+    pub check: u32,
 }
 
 impl Before {
@@ -89,9 +91,9 @@ pub struct Boot<'a> {
 
 impl<'a> Boot<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        let Before { found, number, session, sectors, frames } = self.before;
+        let Before { found, number, session, sectors, frames, check } = self.before;
         sink.head(1).u32(self.reset).u32(self.boots);
-        sink.u32(number).u32(session).u32(sectors).u32(frames);
+        sink.u32(number).u32(session).u32(sectors).u32(frames).u32(check);
         sink.name(self.version).name(self.git).name(self.board).name(self.reset_name).bytes(&self.uid);
         sink.u8(found as u8);
     }
@@ -110,6 +112,7 @@ impl<'a> Boot<'a> {
                 session: fields.u32(),
                 sectors: fields.u32(),
                 frames: fields.u32(),
+                check: fields.u32(),
                 found: Found::from_number(fields.u8()),
             },
         }

@@ -36,7 +36,7 @@ impl Resting {
 /// An end mark. The sector that holds it is given to the card at once. A log that is read without a gap up to a mark
 /// holds all that was recorded until then; what comes after the last mark has an end that nothing proves.
 ///
-/// A chain value over the sectors before it can be appended to the record, as to any other.
+/// The sector that completes it has the check of all entries of the session up to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark {
     /// Why it was written.

@@ -33,7 +33,7 @@ use stored::{Fields, Sink};
 pub(crate) use stored::{HEAD_BYTES, Shape};
 
 // The longest records: a boot and a fault.
-const _: () = assert!(HEAD_BYTES + 6 * 4 + 4 * (1 + NAME_BYTES_MAX) + 13 <= RECORD_BYTES_MAX);
+const _: () = assert!(HEAD_BYTES + 7 * 4 + 4 * (1 + NAME_BYTES_MAX) + 13 <= RECORD_BYTES_MAX);
 const _: () =
     assert!(HEAD_BYTES + 12 * 4 + 1 + 2 * (1 + NAME_BYTES_MAX) + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
 
@@ -192,7 +192,14 @@ mod tests {
             reset_name: "pin",
             uid: *b"123456789012",
             boots: 99,
-            before: Before { found: Found::Frames, number: 7, session: 0xfeed, sectors: 99, frames: 12_345 },
+            before: Before {
+                found: Found::Frames,
+                number: 7,
+                session: 0xfeed,
+                sectors: 99,
+                frames: 12_345,
+                check: 0xfedc_ba98,
+            },
         }));
         reads_back(Record::Mark(Mark { why: Resting::Landed, sector: 70_000, frames: u32::MAX }));
         reads_back(Record::Vehicle(Vehicle {

@@ -88,13 +88,14 @@ fn end_of<D: CardDevice>(
             _ => end = middle,
         }
     }
-    let frames = reader.frames(base, last, &header)?;
+    let end = reader.end(base, last, &header)?;
     Ok(Some(Before {
-        found: if frames.is_some() { Found::Frames } else { Found::Sectors },
+        found: if end.is_some() { Found::Frames } else { Found::Sectors },
         number: name.session,
         session,
         sectors: header.number.wrapping_add(1),
-        frames: frames.unwrap_or(0),
+        frames: end.map_or(0, |(frames, _)| frames),
+        check: end.map_or(0, |(_, check)| check),
     }))
 }
 
@@ -140,8 +141,14 @@ impl<D: CardDevice> Reader<'_, '_, D> {
         Ok(None)
     }
 
-    /// Frames of the session up to its last sector; `None` where a sector of the last group is missing.
-    fn frames(&mut self, base: u32, last: u32, header: &Header) -> Result<Option<u32>, CardError<D::Error>> {
+    /// Frames of the session up to its last sector, and the check that this one has; `None` where a sector of the last group is
+    /// missing.
+    fn end(
+        &mut self,
+        base: u32,
+        last: u32,
+        header: &Header,
+    ) -> Result<Option<(u32, u32)>, CardError<D::Error>> {
         let first = header.group().wrapping_sub(base);
         if first > last || last - first > GROUP_SECTORS as u32 {
             return Ok(None);
@@ -155,7 +162,7 @@ impl<D: CardDevice> Reader<'_, '_, D> {
             };
             if next.number == sector.number {
                 // Of several copies the whole sector counts, though a copy may have more: it ends within an entry.
-                let is_fuller = !next.partial || next.frames > sector.frames;
+                let is_fuller = !next.partial || next.entries() > sector.entries();
                 if sector.partial && is_fuller {
                     sector = next;
                 }
@@ -166,6 +173,7 @@ impl<D: CardDevice> Reader<'_, '_, D> {
                 return Ok(None);
             }
         }
-        Ok((sector.number == header.number).then_some(frames.wrapping_add(u32::from(sector.frames))))
+        let frames = frames.wrapping_add(u32::from(sector.frames));
+        Ok((sector.number == header.number).then_some((frames, sector.check)))
     }
 }

@@ -1,0 +1,37 @@
+//! The check over a session's entries as they came: what a reader makes anew of the entries that it decoded.
+//!
+//! Each entry gives a CRC-32C of its time, kind, length and bytes, which knows nothing of the codec: so a recorder whose memory has
+//! changed cannot write a wrong frame that passes for a right one. The values are chained, from the session's first entry to its
+//! last: each group begins with the value before it, each sector has the one after the last entry that it completes. So the value
+//! in a session's last sector stands for all of it.
+
+use crate::codec::{Entry, Kind};
+use crate::crc::{Crc32c, crc32c};
+
+/// The value of one entry as it came.
+pub(crate) fn value_of(entry: &Entry<'_>) -> u32 {
+    let kind = match entry.kind {
+        Kind::Frame { verified } => u8::from(verified),
+        Kind::Record => 2,
+    };
+    let mut head = [0; 11];
+    head[..8].copy_from_slice(&entry.at_ms.to_le_bytes());
+    head[8] = kind;
+    head[9..].copy_from_slice(&(entry.bytes.len() as u16).to_le_bytes());
+    let mut crc = Crc32c::new();
+    crc.add(&head);
+    crc.add(entry.bytes);
+    crc.value()
+}
+
+/// The chained value after a group's preamble, which holds the one before the group.
+pub(crate) fn begun(preamble: &[u8]) -> u32 {
+    crc32c(preamble)
+}
+
+/// The chained value after an entry of this value.
+pub(crate) fn after(chain: u32, entry: u32) -> u32 {
+    let mut crc = Crc32c::going_on(chain);
+    crc.add(&entry.to_le_bytes());
+    crc.value()
+}

@@ -1,0 +1,116 @@
+//! Memory that changes by itself: what was not recorded as it came is given up and told, and recording goes on.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use hums::logs::on_card;
+use hums::logs::reader::{Collect, Deliver, read};
+use hums_blackbox::record::Record;
+use hums_blackbox::{Entry, Gap};
+use hums_tests::chip;
+use hums_tests::chip::record::{Compared, compare};
+use hums_tests::damage::Random;
+use stm32f405_model::machine::Board;
+use stm32f405_model::time::{MS, Ps, SECOND};
+
+use crate::bench;
+
+/// What became of it all.
+#[derive(Debug, Default)]
+struct Read {
+    frames: Vec<Vec<u8>>,
+    notes: BTreeMap<String, usize>,
+    /// By cause.
+    gaps: BTreeMap<&'static str, usize>,
+}
+
+/// A group's entries.
+#[derive(Default)]
+struct Group(Read);
+
+impl Collect for Group {
+    fn entry(&mut self, entry: &Entry<'_>) {
+        match entry {
+            Entry::Frame { bytes, .. } => self.0.frames.push(bytes.to_vec()),
+            Entry::Record { record: Record::Note(note), .. } => {
+                *self.0.notes.entry(note.text.to_owned()).or_default() += 1;
+            }
+            Entry::Record { .. } => {}
+        }
+    }
+
+    fn held_bytes(&self) -> usize {
+        0
+    }
+}
+
+impl Deliver<Group> for Read {
+    fn gap(&mut self, gap: &Gap) -> Result<()> {
+        *self.gaps.entry(gap.cause.name()).or_default() += 1;
+        Ok(())
+    }
+
+    fn group(&mut self, Group(read): Group) -> Result<()> {
+        self.frames.extend(read.frames);
+        for (text, count) in read.notes {
+            *self.notes.entry(text).or_default() += count;
+        }
+        Ok(())
+    }
+}
+
+/// Flips so many bits, one at a time, in the memory that this name stands for, at full line rate, and reads what was recorded.
+fn flipped(part: &str, flips: u64, apart: Ps, seed: u64) -> (Compared, Read, usize) {
+    let mut rig = bench().settled(Board { seed, ..Board::default() }).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    let symbol = rig.machine.image().find(part).expect("a static variable of the image's");
+    let (address, bytes) = (symbol.address, symbol.bytes);
+    let mut random = Random::new(seed);
+    for _ in 0..flips {
+        let now = rig.machine.now();
+        rig.run(now + apart / 2 + random.below(apart), true).unwrap();
+        let (at, bit) = (random.below(u64::from(bytes)) as u32, random.below(8));
+        rig.machine.poke(address + at, |byte| byte ^ 1 << bit);
+    }
+    let now = rig.machine.now();
+    rig.run(now + SECOND, true).unwrap();
+    rig.run(now + 4 * SECOND, false).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let card = dir.path().join("card.img");
+    chip::save(&rig.medium, &card).unwrap();
+    let mut found = Read::default();
+    for log in on_card(&card) {
+        read(&log, Group::default, &mut found, |_| {}).unwrap();
+    }
+    let sent: Vec<Vec<u8>> = rig.sent.iter().map(|(_, frame)| frame.clone()).collect();
+    let compared = compare(&sent, found.frames.iter().map(Vec::as_slice));
+    // The first two are power's.
+    (compared, found, rig.machine.resets.len() - 2)
+}
+
+#[test]
+fn flips_in_the_codecs_memory_give_no_wrong_frame() {
+    let (compared, read, resets) = flipped("WRITER", 6, 700 * MS, 5);
+    println!("{compared:?}, gaps {:?}, notes {:?}, {resets} resets", read.gaps, read.notes);
+    assert_eq!(compared.wrong, 0);
+    let told: usize = read.gaps.values().sum();
+    assert!(told > 0, "no flip had an effect: this has tried nothing");
+    assert!(compared.right > 1_500, "{compared:?}");
+}
+
+#[test]
+#[ignore = "10,000 flips on the model of the chip (cargo xtask prove chip)"]
+fn ten_thousand_flips_give_no_wrong_frame() {
+    for (part, seed) in [("WRITER", 1), ("QUEUES", 2)]
+        .into_iter()
+        .flat_map(|(part, first)| (0..50).map(move |round| (part, first + 10 * round)))
+    {
+        let (compared, read, resets) = flipped(part, 100, 400 * MS, seed);
+        println!(
+            "{part} {seed}: {compared:?}, gaps {:?}, notes {:?}, {resets} resets",
+            read.gaps, read.notes
+        );
+        assert_eq!(compared.wrong, 0, "{part}, seed {seed}");
+    }
+}
