@@ -107,7 +107,9 @@ impl<T: Logged> Followed<T> {
         let is_first = is_whole || ending.summary.keep.is_some_and(|keep| keep.from == 0);
         let waited = numbers_waited(ending, 0, Instant::ZERO);
         let is_next = number <= waited.saturating_add(1);
-        if before.found == Found::Nothing && is_first && !is_next && !self.sessions.has_older(card, number) {
+        // A log that begins later came with its vehicle from another card, and may have lost what it found on this one.
+        let is_here = is_whole || !self.sessions.has_older(card, number);
+        if before.found == Found::Nothing && is_first && !is_next && is_here {
             return Some(Misnamed::First);
         }
         if !before.has_end() || before.session == session {
@@ -202,7 +204,8 @@ impl<T: Logged> Followed<T> {
             }
             return;
         }
-        if let Some(log) = self.before(next).filter(|log| !log.proof.is_whole()) {
+        let is_short = |log: &Ending| matches!(log.proof, Proof::Short { by: Teller::Parity, .. });
+        if let Some(log) = self.before(next).filter(|log| !log.proof.is_whole() && !is_short(log)) {
             let waited = log.summary.keep.is_some() && log.summary.marks.moved.is_none();
             if goes_on || first > earlier.end && waited {
                 log.proof = Proof::NextLog;
@@ -260,7 +263,8 @@ impl<T: Logged> Followed<T> {
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(Logged::ending).collect();
         // The start looked at the log's last file, which was to be written anew and held another session's sectors.
         let named = (card, Some(before.number));
-        if let Some(log) = held.iter_mut().find(|log| place(&log.name) == named)
+        if self.sessions.may_be_oldest(card, before.session)
+            && let Some(log) = held.iter_mut().find(|log| place(&log.name) == named)
             && log.confirm_begun_anew(before.session)
         {
             next.before = SessionBefore::There;
@@ -283,6 +287,14 @@ impl<T: Logged> Followed<T> {
                 && log.summary.keep.is_some()
         };
         let is_earlier = held.iter().any(|log| is_earlier(log));
+        // Numbers go up, so where a lower one is there, this one was not written over. What began on another card may have
+        // lost what it found on this one.
+        let began_here = next.summary.first_number == Some(0) || next.summary.keep.is_some();
+        let is_looked_at =
+            is_looked_at || began_here && self.sessions.has_older(card, before.number.saturating_add(1));
+        let read = self.latest.get(&(card.to_owned(), before.session));
+        let is_earlier =
+            is_earlier || read.is_some_and(|read| read.number < before.number && read.end < before.sectors);
         let elsewhere = numbers.first().copied().filter(|_| !numbers.contains(&before.number) && !is_earlier);
         match held.iter_mut().rev().find(|log| log.summary.session == Some(before.session)) {
             Some(log) => {
@@ -447,7 +459,8 @@ mod tests {
         assert_eq!(misnamed("00002", 70, Some(0), nothing, 0, true), Some(Misnamed::First));
         assert_eq!(misnamed("00001", 0, None, nothing, 0, true), None);
         assert_eq!(misnamed("00002", 70, Some(60), nothing, 0, true), None);
-        assert_eq!(misnamed("00005", 0, None, nothing, 0, false), None, "another card was in the box");
+        assert_eq!(misnamed("00005", 0, None, nothing, 0, false), Some(Misnamed::First), "another card's");
+        assert_eq!(misnamed("00005", 70, Some(70), nothing, 0, false), None, "another card was in the box");
         // The session before is not there: two files without a sector may have been.
         assert_eq!(misnamed("00007", 0, None, frames, 4, true), None);
         assert_eq!(misnamed("00008", 0, None, frames, 4, true), Some(Misnamed::Ahead { before: 4 }));

@@ -290,7 +290,9 @@ fn ends(log: &Overview) -> [Check; 7] {
     let twice = if blocks.misplaced > 0 { twice } else { String::new() };
     let strange = ending.strange();
     let holds = ending.proof.holds() && !newer && ending.noise().is_none();
+    let parity = &summary.parity;
     [
+        check("parity", parity.columns, parity.contradicted, ending.contradicted().unwrap_or_default()),
         check("sector places", blocks.sectors + blocks.misplaced, blocks.misplaced, twice),
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("chain", summary.groups, summary.unchained, String::new()),

@@ -111,12 +111,24 @@ impl Parity {
     }
 }
 
-/// Finds the sectors of one column that are lost, from its sums and from those that are there.
+/// Holds the sums of one column against its sectors, and finds those that are lost.
 #[derive(Clone, Debug)]
 pub struct Column {
     session: u32,
-    /// What is left of each sum that is there, and the last number that it covers.
-    sums: [Option<(u32, [u8; SECTOR_BYTES])>; 2],
+    sums: [Option<Held>; 2],
+}
+
+/// A sum that is there.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    /// The last number that it covers.
+    last: u32,
+    /// As it is on the card.
+    block: [u8; SECTOR_BYTES],
+    /// The sum of the sectors that were taken, of which the latest one counts once.
+    taken: [u8; SECTOR_BYTES],
+    /// Rows from that one to the last one; none before the first.
+    rows: Option<u32>,
 }
 
 impl Column {
@@ -125,29 +137,50 @@ impl Column {
         Self { session, sums: [None, None] }
     }
 
-    /// Takes a parity sector of the column, which [`Parity::read`] has checked. That which covers more counts.
+    /// Takes a parity sector of the column, which [`Parity::read`] has checked, before any sector. That which covers more counts.
     pub fn sum(&mut self, parity: &Parity, block: &[u8; SECTOR_BYTES]) {
         let [p, q] = &mut self.sums;
         let held = if parity.sum == Sum::P { p } else { q };
-        if held.as_ref().is_none_or(|(last, _)| *last < parity.last) {
-            *held = Some((parity.last, *block));
+        if held.as_ref().is_none_or(|held| held.last < parity.last) {
+            *held = Some(Held { last: parity.last, block: *block, taken: [0; SECTOR_BYTES], rows: None });
         }
     }
 
     /// The last number that any sum covers.
     pub fn last(&self) -> Option<u32> {
-        self.sums.iter().flatten().map(|(last, _)| *last).max()
+        self.sums.iter().flatten().map(|held| held.last).max()
     }
 
-    /// Takes a sector of the column that is there: what is left of the sums is of those that are not.
+    /// Takes a sector of the column that is there: what is left of the sums is of those that are not. In the order of their
+    /// numbers this is fastest.
     pub fn sector(&mut self, number: u32, bytes: &[u8; SECTOR_BYTES]) {
         for (sum, held) in Sum::ALL.into_iter().zip(&mut self.sums) {
-            if let Some((last, rest)) = held
-                && let Some(weight) = weight(sum, *last, number)
-            {
-                add(rest, bytes, weight);
+            if let Some(held) = held {
+                held.take(sum, number, bytes);
             }
         }
+    }
+
+    /// Whether the sums agree with the sectors that were taken and with each other, as far as that can be told; `lost` are the numbers of
+    /// those that are not there, ascending, three at least where there are more. A sum that covers none of them is that of
+    /// the others, and one sector that both cover alone is the same by either.
+    pub fn agrees(&self, lost: &[u32]) -> bool {
+        let of = |index: usize| {
+            let (sum, last, rest) = self.held(index)?;
+            let mut covered = lost.iter().filter(|number| **number <= last);
+            Some((sum, last, rest, covered.next().copied(), covered.next().is_none()))
+        };
+        let both = [of(0), of(1)];
+        let is_left = both.iter().flatten().any(|(_, _, rest, first, _)| first.is_none() && !is_zero(rest));
+        let is_other = match both {
+            [Some((_, _, p, Some(one), true)), Some((sum, last, q, Some(_), true))] => {
+                let mut both = q;
+                add(&mut both, &p, weight(sum, last, one).unwrap_or(0));
+                !is_zero(&both)
+            }
+            _ => false,
+        };
+        !is_left && !is_other
     }
 
     /// The sectors of these numbers, which are all of the column that are lost, as far as they can be made again.
@@ -182,9 +215,12 @@ impl Column {
         found
     }
 
+    /// What is left of a sum once the sectors that were taken are taken off.
     fn held(&self, index: usize) -> Option<(Sum, u32, [u8; SECTOR_BYTES])> {
-        let (last, rest) = self.sums.get(index)?.as_ref()?;
-        Some((*Sum::ALL.get(index)?, *last, *rest))
+        let (held, sum) = (self.sums.get(index)?.as_ref()?, *Sum::ALL.get(index)?);
+        let mut rest = held.block;
+        add(&mut rest, &held.taken, power(sum, held.rows.unwrap_or(0)));
+        Some((sum, held.last, rest))
     }
 
     /// The only lost one that a sum covers and that was not found: its place among the lost ones, and its number.
@@ -209,24 +245,61 @@ impl Column {
     }
 }
 
+impl Held {
+    /// Takes a sector, if it is covered.
+    fn take(&mut self, sum: Sum, number: u32, bytes: &[u8; SECTOR_BYTES]) {
+        let Some(left) = rows(self.last, number) else { return };
+        let before = self.rows.map_or(0, |rows| rows.saturating_sub(left));
+        if sum == Sum::Q {
+            (0..before % ORDER).for_each(|_| double(&mut self.taken));
+        }
+        let rows = self.rows.map_or(left, |rows| rows.min(left));
+        add(&mut self.taken, bytes, power(sum, left - rows));
+        self.rows = Some(rows);
+    }
+}
+
+/// Rows from a sector to the last one that is covered; `None` where it is not covered.
+const fn rows(last: u32, number: u32) -> Option<u32> {
+    match last.checked_sub(number) {
+        Some(numbers) => Some(numbers / COLUMNS as u32),
+        None => None,
+    }
+}
+
 /// What a sector of this number counts in a sum whose last one has the number `last`; `None` where it is not covered.
 fn weight(sum: Sum, last: u32, number: u32) -> Option<u8> {
-    let rows = last.checked_sub(number)? / COLUMNS as u32;
-    Some(match sum {
-        Sum::P => 1,
-        Sum::Q => (0..rows % 255).fold(1, |weight, _| product(weight, 2)),
-    })
+    rows(last, number).map(|rows| power(sum, rows))
 }
+
+/// What a sector counts so many rows before the last one.
+fn power(sum: Sum, rows: u32) -> u8 {
+    match sum {
+        Sum::P => 1,
+        Sum::Q => (0..rows % ORDER).fold(1, |weight, _| product(weight, 2)),
+    }
+}
+
+/// Powers of two that there are in GF(256).
+const ORDER: u32 = 255;
 
 /// What is summed up of a sector: all that its place and its session do not tell.
 const PARTS: [core::ops::Range<usize>; 2] = [2..7, 15..CRC_AT];
 
 fn add(to: &mut [u8; SECTOR_BYTES], from: &[u8; SECTOR_BYTES], weight: u8) {
     for part in PARTS {
-        for (to, from) in to[part.clone()].iter_mut().zip(&from[part]) {
-            *to ^= if weight == 1 { *from } else { product(weight, *from) };
+        let pairs = to[part.clone()].iter_mut().zip(&from[part]);
+        if weight == 1 {
+            pairs.for_each(|(to, from)| *to ^= *from);
+        } else {
+            pairs.for_each(|(to, from)| *to ^= product(weight, *from));
         }
     }
+}
+
+/// Whether nothing is left of a sum.
+fn is_zero(rest: &[u8; SECTOR_BYTES]) -> bool {
+    PARTS.into_iter().all(|part| rest[part].iter().all(|byte| *byte == 0))
 }
 
 /// Everything times two, four bytes at a time.
@@ -356,6 +429,45 @@ mod tests {
         assert_eq!(column(&[p], 0, 10, &[16]), [None, None]);
         p[20] ^= 1;
         assert_eq!(Parity::read(&p), None);
+    }
+
+    #[test]
+    fn sums_are_held_against_the_sectors_and_against_each_other() {
+        let (first, rows) = (3, 20);
+        let numbers = || (0..rows).map(|row| first + 8 * row);
+        let sums = sums(first, rows, None);
+        // One bit is other in what is named, with a check that fits; so many sectors are lost.
+        let agrees = |sum: Option<usize>, wrong: Option<u32>, lost: &[u32], used: &[usize]| {
+            let mut column = Column::new(SESSION);
+            for index in used {
+                let mut block = sums[*index];
+                block[400] ^= u8::from(sum == Some(*index)) << 5;
+                Sum::ALL[*index].seal(&mut block, SESSION, first + 8 * (rows - 1));
+                column.sum(&Parity::read(&block).expect("it is sound"), &block);
+            }
+            for number in numbers().filter(|number| !lost.contains(number)) {
+                let mut bytes = *sector(number).bytes();
+                bytes[4] ^= u8::from(wrong == Some(number));
+                column.sector(number, &bytes);
+            }
+            column.agrees(lost)
+        };
+        let (one, two) = (first + 8 * 7, first + 8 * 12);
+        for lost in [&[][..], &[one], &[one, two], &[one, two, two + 8]] {
+            assert!(agrees(None, None, lost, &[0, 1]) && agrees(None, None, lost, &[1]), "{lost:?}");
+            let is_told = lost.len() < 2;
+            for sum in [0, 1] {
+                assert_eq!(!agrees(Some(sum), None, lost, &[0, 1]), is_told, "{lost:?}");
+            }
+            assert_eq!(!agrees(None, Some(first), lost, &[0, 1]), is_told, "{lost:?}");
+            // One sum alone says the same as the sectors only where all of them are there.
+            assert_eq!(!agrees(None, Some(first), lost, &[0]), lost.is_empty(), "{lost:?}");
+        }
+        // In any order.
+        let mut column = Column::new(SESSION);
+        sums.iter().for_each(|block| column.sum(&Parity::read(block).expect("it is sound"), block));
+        numbers().rev().for_each(|number| column.sector(number, sector(number).bytes()));
+        assert!(column.agrees(&[]));
     }
 
     #[test]

@@ -44,6 +44,21 @@ impl Files<'_> {
         })
     }
 
+    /// That sectors disagree with their parity, which was made of them when they were on the card.
+    pub(super) fn contradicted(&self) -> Option<String> {
+        let parity = &self.summary.parity;
+        let (file, first, last) = parity.first?;
+        let file = self.names.get(file).map_or("a file", String::as_str);
+        let more = match parity.contradicted.saturating_sub(1) {
+            0 => String::new(),
+            more => format!(", and so it is with {more} more of their columns"),
+        };
+        Some(format!(
+            "every eighth sector from {first} to {last} of {file} and the parity of these disagree: the file was altered after it \
+             was recorded, and nothing was made again from that parity{more}"
+        ))
+    }
+
     /// Files that hold what is not the log's, and files that are missing before its first one.
     pub(super) fn strange(&self) -> Vec<String> {
         let told: Vec<_> = self.summary.strange.iter().filter(|strange| !self.is_usual(strange)).collect();

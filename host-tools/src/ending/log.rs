@@ -132,6 +132,7 @@ impl Ending {
         if !self.proof.holds() && summary.session.is_some() {
             all.push(self.words());
         }
+        all.extend(self.contradicted());
         all.extend(self.noise());
         all.extend(self.strange());
         all.extend(self.file().newer());
@@ -161,6 +162,11 @@ impl Ending {
     /// Blocks behind the last sector that are no sectors, where nothing proves that the log ends before them.
     pub fn noise(&self) -> Option<String> {
         self.file().noise()
+    }
+
+    /// That sectors disagree with their parity.
+    pub fn contradicted(&self) -> Option<String> {
+        self.file().contradicted()
     }
 
     /// What of its files is not the log's, and what of its name.

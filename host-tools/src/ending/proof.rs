@@ -42,6 +42,8 @@ pub enum Teller {
     NextStart,
     /// The next log of the same power-on, which was recorded by arming.
     NextLog,
+    /// Its own parity, which covers sectors once they are on the card.
+    Parity,
 }
 
 impl Proof {
@@ -49,6 +51,8 @@ impl Proof {
     pub fn of(summary: &Summary, next: Option<&Before>) -> Self {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
+        let whole = sectors.saturating_sub(u32::from(summary.ends_partial));
+        let covered = summary.parity.last.map_or(0, |last| last.saturating_add(1).saturating_sub(whole));
         if let Some(next) = next
             && next.sectors >= sectors
         {
@@ -57,11 +61,15 @@ impl Proof {
             let frames = frames.filter(|missing| *missing < 1 << 31);
             // The sector in progress is written again and again: an older copy of it has fewer frames.
             if next.sectors > sectors || frames.is_some_and(|missing| missing > 0) {
-                return Self::Short { sectors: next.sectors - sectors, frames, by: Teller::NextStart };
+                let by = Teller::NextStart;
+                return Self::Short { sectors: (next.sectors - sectors).max(covered), frames, by };
             }
             if frames == Some(0) && summary.check_end.is_some_and(|check| check != next.check) {
                 return Self::Differs;
             }
+        }
+        if covered > 0 {
+            return Self::Short { sectors: covered, frames: None, by: Teller::Parity };
         }
         if summary.closed {
             return Self::Closed;
@@ -147,6 +155,7 @@ impl Proof {
                 let by = match by {
                     Teller::NextStart => "the next start found them",
                     Teller::NextLog => "the next log of the same power-on begins after them",
+                    Teller::Parity => "its parity tells of them",
                 };
                 match (sectors, frames) {
                     (Some(sectors), Some(frames)) => format!("{sectors} missing at its end, {frames}: {by}"),

@@ -118,7 +118,7 @@ fn ending(text: &mut String, log: &Overview) {
     for words in ending.aside().or(anew).into_iter().chain(ending.power_on.wrong()) {
         let _ = writeln!(text, "  place    {words}");
     }
-    for strange in ending.noise().into_iter().chain(ending.strange()) {
+    for strange in ending.contradicted().into_iter().chain(ending.noise()).chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }
     if summary.blocks.repaired > 0 {

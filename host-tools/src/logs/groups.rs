@@ -8,7 +8,7 @@ use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Header, Step};
 use super::board::{Board, HEADING_GROUPS, heading};
 use super::joined::Joints;
 use super::places::{BLOCK_BYTES, Blocks, Log};
-use super::repair::Repairs;
+use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
 
 /// Sectors that belong together, in order: a group, or a part of one whose beginning is missing.
@@ -79,6 +79,8 @@ pub struct Groups<'a> {
     repairs: Option<(Option<usize>, Repairs)>,
     /// Sectors that were made again.
     repaired: u64,
+    /// What the parity of the files so far tells.
+    evidence: Evidence,
 }
 
 impl<'a> Groups<'a> {
@@ -102,6 +104,7 @@ impl<'a> Groups<'a> {
             joints: log.session.is_none().then(Joints::default),
             repairs: log.session.is_none().then(Default::default),
             repaired: 0,
+            evidence: Evidence::default(),
         }
     }
 
@@ -199,6 +202,7 @@ impl<'a> Groups<'a> {
         let Some((of, repairs)) = &mut self.repairs else { return Ok(Some(block)) };
         if of.replace(file) != Some(file) {
             *repairs = Repairs::of(self.blocks.log(), file, self.assembler.session())?;
+            self.evidence.add(&repairs.evidence);
         }
         let made = repairs.at(at).filter(|made| **made != block);
         self.repaired += u64::from(made.is_some());
@@ -251,6 +255,11 @@ impl<'a> Groups<'a> {
         let (counts, shifts) =
             (self.assembler.counts(), self.strangers.as_ref().map_or(0, Strangers::shifts));
         BlockCounts { misplaced: counts.misplaced + shifts, repaired: self.repaired, ..counts }
+    }
+
+    /// What parity tells, once all is read.
+    pub const fn evidence(&self) -> Evidence {
+        self.evidence
     }
 
     /// What lies behind the last sector.

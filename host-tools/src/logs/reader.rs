@@ -18,6 +18,7 @@ use super::in_order::{in_order, workers};
 use super::late::{Late, late};
 pub use super::marks::Marks;
 use super::places::Log;
+pub use super::repair::Evidence;
 use super::strangers::Strange;
 use crate::plural::count;
 
@@ -110,6 +111,8 @@ pub struct Summary {
     pub foreign_at_end: u64,
     /// The latest power-on of another session whose sectors lie among this one's or behind it, microseconds since 1970.
     pub other_epoch_us: Option<u64>,
+    /// What its parity tells.
+    pub parity: Evidence,
     /// What of its files is not the log's.
     pub strange: Vec<Strange>,
     /// Files that are missing before its first one, where nothing proves that they were left out on purpose.
@@ -172,6 +175,7 @@ pub fn read<C: Collect>(
     summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();
+    summary.parity = groups.evidence();
     let first = summary.first_number.unwrap_or(0);
     summary.strange = groups.strange(first, late.is_some_and(|late| late.from == first));
     summary.joined = groups.joined();
@@ -189,8 +193,17 @@ fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     let mut rest = Rest { decoder, end: group.len(), group, at: 0 };
     let (mut decoded, mut collected) = (Decoded::of(&rest.group), new());
     let mut whole = decoded.go_on(&mut rest, &mut collected);
-    if let Some(error @ (GroupError::Corrupt | GroupError::Altered)) = decoded.error {
-        (rest.end, rest.at) = (rest.at.saturating_sub(1), 0);
+    let mut failed = decoded.unsound(&rest);
+    if !whole && failed.is_none() {
+        // Nothing of a sector is handed on before it is known to be sound.
+        let mut probe = Decoded::of(&rest.group);
+        let (decoder, group) = (Box::new(GroupDecoder::new()), rest.group.clone());
+        let mut again = Rest { decoder, end: group.len(), group, at: 0 };
+        probe.go_on(&mut again, &mut Uncollected);
+        failed = probe.unsound(&again);
+    }
+    if let Some((error, sectors)) = failed {
+        (rest.end, rest.at) = (sectors, 0);
         (decoded, collected) = (Decoded::of(&rest.group), new());
         whole = decoded.go_on(&mut rest, &mut collected);
         decoded.error = Some(error);
@@ -202,6 +215,21 @@ fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
         decoded.rest = Some(rest);
     }
     decoded
+}
+
+/// Keeps nothing.
+struct Uncollected;
+
+impl Collect for Uncollected {
+    fn entry(&mut self, _entry: &Entry<'_>) {}
+
+    fn held_bytes(&self) -> usize {
+        0
+    }
+
+    fn only_counts(&self) -> bool {
+        true
+    }
 }
 
 /// A group that is not decoded to its end.
@@ -300,6 +328,12 @@ impl<C: Collect> Decoded<C> {
             self.epoch_us = self.epoch_us.or(preamble.epoch_micros);
             self.check_before.get_or_insert(preamble.chain);
         }
+    }
+
+    /// Why something of it is not what came, and how many of its sectors are.
+    fn unsound(&self, rest: &Rest) -> Option<(GroupError, usize)> {
+        let error = self.error.filter(|error| matches!(error, GroupError::Corrupt | GroupError::Altered))?;
+        Some((error, rest.at.saturating_sub(1)))
     }
 
     fn entry(&mut self, outline: Outline<'_>, collected: &mut C) {
@@ -443,7 +477,7 @@ impl Stitch {
         self.gathered && group.keep.is_some_and(|keep| keep.from <= self.next_number)
     }
 
-    /// Nothing of a group could be decoded.
+    /// Nothing of a group is given out.
     fn skip<C>(&mut self, group: &Decoded<C>) {
         let gap = self.gap(group.error.map_or(Cause::Missing, cause_of));
         gap.sectors_skipped = gap.sectors_skipped.saturating_add(group.sectors);

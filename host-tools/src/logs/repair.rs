@@ -1,4 +1,6 @@
-//! Sectors that a card has lost, made again from parity before anything else looks at a log.
+//! Sectors that a card has lost, made again from parity before anything else looks at a log; and what parity tells of those that are
+//! there. The recorder covers a sector once it is on the card: so every sector up to the last one that is covered was there, and what
+//! the sums do not agree with was altered since.
 //!
 //! The sector with the number `n` lies at block `n - base` of its file, so whoever knows the file's base knows what is lost:
 //! every place that holds another sector, or none. The base is the one that most sound sectors of the file agree on, unless
@@ -21,43 +23,81 @@ const LOST_MAX: usize = 2;
 /// whole.
 const FILE_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 
-/// What was made again of one file, by its block.
+/// What the parity of a log's files tells of its sectors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Evidence {
+    /// The last sector that any of it covers: all up to there were written.
+    pub last: Option<u32>,
+    /// Columns of sectors that were held against it.
+    pub columns: u64,
+    /// Those that disagree with it.
+    pub contradicted: u64,
+    /// The first of these: which of the log's files, the number of its first sector and of its last one.
+    pub first: Option<(usize, u32, u32)>,
+}
+
+impl Evidence {
+    /// Adds that of a further file.
+    pub fn add(&mut self, next: &Self) {
+        self.last = self.last.max(next.last);
+        self.columns += next.columns;
+        self.contradicted += next.contradicted;
+        self.first = self.first.or(next.first);
+    }
+}
+
+/// What was made again of one file, by its block, and what its parity tells of it.
 #[derive(Debug, Default)]
-pub(super) struct Repairs(BTreeMap<u64, [u8; BLOCK_BYTES]>);
+pub(super) struct Repairs {
+    made: BTreeMap<u64, [u8; BLOCK_BYTES]>,
+    pub(super) evidence: Evidence,
+}
 
 impl Repairs {
     /// Of this file of a log; its session is the one given, or that of its first sound sector.
-    pub(super) fn of(log: &Log, file: usize, session: Option<u32>) -> Result<Self> {
-        let Some(piece) = log.pieces.get(file) else { return Ok(Self::default()) };
+    pub(super) fn of(log: &Log, index: usize, session: Option<u32>) -> Result<Self> {
+        let Some(piece) = log.pieces.get(index) else { return Ok(Self::default()) };
         let file = Log { pieces: vec![piece.clone()], ..log.clone() };
         if file.bytes() > FILE_BYTES_MAX {
             return Ok(Self::default());
         }
         let Some(found) = Found::of(&file, session)? else { return Ok(Self::default()) };
-        let mut columns = found.columns();
-        if columns.is_empty() {
-            return Ok(Self::default());
-        }
+        let last = found.parity.iter().map(|(one, _)| one.last).max();
+        let mut all = Self { evidence: Evidence { last, ..Evidence::default() }, ..Self::default() };
+        let Some(base) = found.base else { return Ok(all) };
+        let mut columns = found.columns(base);
         let mut blocks = file.blocks();
         let mut at = 0;
-        while let Some(block) = blocks.next_block()? {
-            if let Some(number) = found.in_place(at)
+        while !columns.is_empty()
+            && let Some(block) = blocks.next_block()?
+        {
+            if let Some(number) = found.in_place(base, at)
                 && let Some((column, _)) = columns.get_mut(&column_of(at))
             {
                 column.sector(number, &block);
             }
             at += 1;
         }
-        let made = columns.into_values().flat_map(|(column, lost)| {
-            let made = column.solve(&lost).into_iter().flatten();
-            made.map(|sector| (u64::from(sector.number().wrapping_sub(found.base)), *sector.bytes()))
-        });
-        Ok(Self(made.collect()))
+        for ((stretch, first), (column, lost)) in columns {
+            all.evidence.columns += 1;
+            // Which of them is wrong nobody knows: none is taken.
+            if !column.agrees(&lost) {
+                let first =
+                    base.saturating_add(stretch.saturating_mul(STRETCH_SECTORS)).saturating_add(first);
+                all.evidence.contradicted += 1;
+                all.evidence.first.get_or_insert((index, first, column.last().unwrap_or(first)));
+                continue;
+            }
+            for sector in column.solve(&lost).into_iter().flatten() {
+                all.made.insert(u64::from(sector.number().wrapping_sub(base)), *sector.bytes());
+            }
+        }
+        Ok(all)
     }
 
     /// What is to be read in this block instead of what is there.
     pub(super) fn at(&self, block: u64) -> Option<&[u8; BLOCK_BYTES]> {
-        self.0.get(&block)
+        self.made.get(&block)
     }
 }
 
@@ -69,14 +109,15 @@ const fn column_of(at: u32) -> (u32, u32) {
 /// What a file holds.
 struct Found {
     session: u32,
-    base: u32,
+    /// The number of the file's first sector; none where it has no sector of the session.
+    base: Option<u32>,
     /// The number of the whole sector of the session in each block, where there is one.
     numbers: Vec<Option<u32>>,
     parity: Vec<(Parity, [u8; BLOCK_BYTES])>,
 }
 
 impl Found {
-    /// `None` where there is nothing to be made again from.
+    /// `None` where there is no parity of the session.
     fn of(file: &Log, session: Option<u32>) -> Result<Option<Self>> {
         let (mut session, mut numbers, mut parity) = (session, Vec::new(), Vec::new());
         let (mut bases, mut begins) = (BTreeMap::<u32, u32>::new(), None);
@@ -110,23 +151,23 @@ impl Found {
                 && others.all(|(at, number)| number.wrapping_sub(at) == *begins || number < *begins)
         };
         let base = begins.filter(anew).or(base);
-        let (Some(session), Some(base)) = (session, base) else { return Ok(None) };
+        let Some(session) = session else { return Ok(None) };
         parity.retain(|(one, _)| one.session == session);
         Ok((!parity.is_empty()).then_some(Self { session, base, numbers, parity }))
     }
 
     /// The number of the sector in this block, if it is the one that belongs there.
-    fn in_place(&self, at: u32) -> Option<u32> {
+    fn in_place(&self, base: u32, at: u32) -> Option<u32> {
         let number = self.numbers.get(at as usize).copied().flatten();
-        number.filter(|number| *number == self.base.wrapping_add(at))
+        number.filter(|number| *number == base.wrapping_add(at))
     }
 
-    /// The columns that have lost sectors, and can be made whole: with the numbers of those.
-    fn columns(&self) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
+    /// The columns that have parity and have lost no more sectors than can be made again: with the numbers of those.
+    fn columns(&self, base: u32) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
         let mut columns = BTreeMap::new();
         for (one, block) in &self.parity {
             // What the file held before covers what was before it, or lies far off.
-            let last = one.last.checked_sub(self.base);
+            let last = one.last.checked_sub(base);
             let Some(last) = last.filter(|last| (*last as usize) < self.numbers.len()) else { continue };
             let empty = || (Column::new(self.session), Vec::new());
             let (column, _) = columns.entry(column_of(last)).or_insert_with(empty);
@@ -134,12 +175,12 @@ impl Found {
         }
         for ((stretch, first), (column, lost)) in &mut columns {
             let first = stretch.saturating_mul(STRETCH_SECTORS).saturating_add(*first);
-            let last = column.last().map_or(0, |last| last.wrapping_sub(self.base));
+            let last = column.last().map_or(0, |last| last.wrapping_sub(base));
             let rows = (first..=last).step_by(COLUMNS);
-            let gone = rows.filter(|at| self.in_place(*at).is_none());
-            lost.extend(gone.map(|at| self.base.wrapping_add(at)).take(LOST_MAX + 1));
+            let gone = rows.filter(|at| self.in_place(base, *at).is_none());
+            lost.extend(gone.map(|at| base.wrapping_add(at)).take(LOST_MAX + 1));
         }
-        columns.retain(|_, (_, lost)| (1..=LOST_MAX).contains(&lost.len()));
+        columns.retain(|_, (_, lost)| lost.len() <= LOST_MAX);
         columns
     }
 }

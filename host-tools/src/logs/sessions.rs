@@ -100,6 +100,13 @@ impl Sessions {
         self.numbers.get(card).is_some_and(|numbers| numbers.range(..number).next().is_some())
     }
 
+    /// Whether what a card's oldest file held may be of this session: it has no log on the card, or the one of the lowest number.
+    pub fn may_be_oldest(&self, card: &str, session: u32) -> bool {
+        let lowest = self.numbers.get(card).and_then(|numbers| numbers.first());
+        let own = self.of_session(card, session).iter().map(|(number, _)| number).min();
+        own.is_none() || own == lowest
+    }
+
     /// The lower number under which the log of this name is there too.
     pub fn copy_of(&self, name: &str, session: u32) -> Option<u32> {
         let (card, number) = place(name);

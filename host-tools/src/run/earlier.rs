@@ -96,8 +96,11 @@ fn oldest(logs: &[Log]) -> Option<&Log> {
 }
 
 /// Whether a card has room for what a run may write: as much as it reads, and a segment that is begun at each of its starts. A card
-/// that cannot be read has no session to lose; what writing errors use up is not known before.
+/// that cannot be read has no session to lose. Writing errors may use up any room: segments are left early.
 fn has_room(run: &cli::Run) -> bool {
+    if run.faults.write_error.is_some_and(|probability| probability > 0.0) {
+        return false;
+    }
     let read = match &run.input {
         Endpoint::File(path) => fs::metadata(path).map_or(0, |file| file.len()),
         _ => 0,

@@ -11,6 +11,8 @@ use crate::archive;
 
 /// How much of a file tells what it is.
 pub(super) const LOOK_BYTES: usize = 64 * 1024;
+/// In so many bytes of noise a frame is found by chance once in a hundred times: more than one for each of these is MAVLink.
+const BY_CHANCE_BYTES: usize = LOOK_BYTES / 2;
 /// What is read besides logs of ours, for messages: the end of a sentence.
 pub(super) const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
                      each also as .gz";
@@ -108,12 +110,13 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     // Before DataFlash's weaker signs. In 64 KiB of anything else a frame of version 1 whose checksum holds is rare, and
     // happens.
     let (kind, frames) = sniff_bytes(start);
+    let is_mavlink = frames > start.len() / BY_CHANCE_BYTES;
     if dataflash::is_headless(start, frames) {
         return Some(Detected::DataFlash(dataflash::Form::Binary));
     }
     match kind {
-        Kind::Tlog if frames > 0 => Some(Detected::Tlog),
-        Kind::Raw if frames > 0 => Some(Detected::Raw),
+        Kind::Tlog if is_mavlink => Some(Detected::Tlog),
+        Kind::Raw if is_mavlink => Some(Detected::Raw),
         _ => dataflash::detect(start).map(Detected::DataFlash),
     }
 }
@@ -156,5 +159,10 @@ mod tests {
             assert_eq!(format_of(&start), Some(Format::DataFlash));
         }
         assert_eq!(format_of(&HEARTBEAT.repeat(3)), Some(Format::Raw));
+        // In noise one is none.
+        for (frames, expected) in [(1, None), (2, None), (3, Some(Format::Raw))] {
+            let noise = vec![0x55; LOOK_BYTES - frames * HEARTBEAT.len()];
+            assert_eq!(format_of(&[noise, HEARTBEAT.repeat(frames)].concat()), expected);
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
+use hums_blackbox::parity::{Parity, Sum};
 use hums_blackbox::{Header, Sector};
 use tempfile::TempDir;
 
@@ -327,6 +328,58 @@ fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
             .any(|line| line.contains("FAILED  group decoding") || line.contains("FAILED  frames missing"));
         assert!(told, "sector {at}: {said}");
     }
+}
+
+/// Parity covers sectors once they are on the card, and is made of them: it tells of an end that is gone, and of what was altered with a check
+/// that fits.
+#[test]
+fn what_parity_contradicts_is_told_by_every_command() {
+    let dir = copied(1, "");
+    let path = dir.path().join("copied/00001_00.HUM");
+    // The parity of the first stretch ends the file.
+    let image = fs::read(dir.path().join("card.img")).expect("an image");
+    let all = image.as_chunks::<BLOCK>().0;
+    let begin = all.iter().position(|block| Header::read(block).is_ok()).expect("a sector");
+    let end = all.iter().rposition(|block| Parity::read(block).is_some()).expect("parity") + 1;
+    let whole = image[begin * BLOCK..end * BLOCK].to_vec();
+    let blocks = || whole.as_chunks::<BLOCK>().0.iter();
+    let header = |block: &[u8; BLOCK]| Header::read(block).ok();
+    let closed =
+        blocks().position(|block| header(block).is_some_and(|header| header.closed)).expect("it is closed");
+    // A page of 16 KiB at the end, of which each column has lost four.
+    let mut erased = whole.clone();
+    erased[(closed - 31) * BLOCK..(closed + 1) * BLOCK].fill(0xff);
+    fs::write(&path, erased).expect("written");
+    all_say(dir.path(), "copied", 3, &["32 sectors missing at its end: its parity tells of them"]);
+    let verified = |bytes: &[u8]| {
+        fs::write(&path, bytes).expect("written");
+        let said = text(&attempt(dir.path(), "verify copied"));
+        (said.contains("FAILED  parity "), said.contains("1 sector was lost or damaged, and was made again"))
+    };
+    assert_eq!(verified(&whole), (false, false));
+    // A sector that is altered.
+    let sealed = |block: &mut [u8; BLOCK]| {
+        let mut sector = Sector::from_bytes(*block);
+        sector.seal(sector.session());
+        *block = *sector.bytes();
+    };
+    let mut altered = whole.clone();
+    let block = altered.as_chunks_mut::<BLOCK>().0.get_mut(20).expect("a block");
+    block[480] ^= 0x20;
+    sealed(block);
+    assert_eq!(verified(&altered), (true, false));
+    let words = "every eighth sector from 4 to ";
+    all_say(dir.path(), "copied", 3, &[words, "00001_00.HUM and the parity of these disagree"]);
+    // A sector that is lost, and one of the two from which it would be made again.
+    let mut parity = blocks().enumerate().filter_map(|(at, block)| Some((at, Parity::read(block)?)));
+    let (at, one) = parity.find(|(_, one)| one.sum == Sum::P && one.last % 8 == 4).expect("parity of it");
+    let mut lost = whole.clone();
+    lost[20 * BLOCK..21 * BLOCK].fill(0);
+    assert_eq!(verified(&lost), (false, true));
+    let block = lost.as_chunks_mut::<BLOCK>().0.get_mut(at).expect("a block");
+    block[480] ^= 0x20;
+    Sum::P.seal(block, one.session, one.last);
+    assert_eq!(verified(&lost), (true, false));
 }
 
 #[test]

@@ -94,7 +94,7 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
         .with_max_len(1)
         .map(|((flight, closed), boots)| pages::Subject::record(flight, closed, boots).context(flight));
     let subjects = subjects.collect::<Result<Vec<_>>>()?;
-    let share = options.runs(10_800, 288).div_ceil(subjects.len() as u64);
+    let share = options.runs(12_960, 288).div_ceil(subjects.len() as u64);
     let outcomes = subjects.par_iter().enumerate().with_max_len(1).map(|(index, subject)| {
         let other = &subjects[(index + 2) % subjects.len()];
         subject.damage_often(other, share, options.seed.wrapping_add(index as u64))

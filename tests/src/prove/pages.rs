@@ -2,7 +2,8 @@
 //!
 //! A log is recorded once. Then its file is cut, pages of it are erased, zeroed, copied, exchanged or replaced by what an
 //! older session left there, or it goes on with the second half of another log, or with all of one; what is left is read and verified, and
-//! compared with the whole log. What parity makes again is *told* as that. *Noticed* is what `hums verify` does not call good. A cut behind an end mark cannot be
+//! compared with the whole log. Besides, a sector is altered, or one is lost and a parity sector of it is altered, with checks that fit.
+//! What parity makes again is *told* as that. *Noticed* is what `hums verify` does not call good. A cut behind an end mark cannot be
 //! told from power that went there: that is *told* if `verify` says up to which mark the log is whole, and all of it is.
 
 use std::collections::BTreeSet;
@@ -16,8 +17,8 @@ use hums::logs::fat::Extent;
 use hums::logs::{Log, Piece, on_card};
 use hums::summary::Overview;
 use hums::verify::{Verdict, verdict};
-use hums_blackbox::parity::{COLUMNS, Parity};
-use hums_blackbox::{Header, PAGE_SECTORS};
+use hums_blackbox::parity::{COLUMNS, Parity, STRETCH_SECTORS};
+use hums_blackbox::{BODY_BYTES, Header, PAGE_SECTORS, Sector};
 use tempfile::TempDir;
 
 use super::card::{BLOCK, Card};
@@ -53,11 +54,15 @@ pub(super) enum Kind {
     Swapped,
     /// One page is what another session left there.
     Stale,
+    /// A byte of a sector is another one, and its check fits.
+    Altered,
+    /// A sector is lost, and a byte of one of the two from which it would be made again is another one, and its check fits.
+    ParityAltered,
 }
 
 impl Kind {
     /// All of them.
-    pub(super) const ALL: [Self; 10] = [
+    pub(super) const ALL: [Self; 12] = [
         Self::Cut,
         Self::CutAtSector,
         Self::Erased,
@@ -68,6 +73,8 @@ impl Kind {
         Self::Inserted,
         Self::Swapped,
         Self::Stale,
+        Self::Altered,
+        Self::ParityAltered,
     ];
 
     pub(super) const fn name(self) -> &'static str {
@@ -82,6 +89,8 @@ impl Kind {
             Self::Inserted => "a page there twice",
             Self::Swapped => "two pages exchanged",
             Self::Stale => "a page of another session",
+            Self::Altered => "a sector altered, and its check too",
+            Self::ParityAltered => "a sector lost, and parity of it altered, and its check too",
         }
     }
 }
@@ -324,6 +333,12 @@ impl Subject {
                 touched.extend(one..end);
                 format!("sectors {one} to {end} are another session's")
             }
+            Kind::Altered | Kind::ParityAltered => {
+                let (lost, what) = self.alter(kind, &mut bytes, random).unwrap_or_default();
+                fill(&mut bytes, lost.clone(), value);
+                touched.extend(lost);
+                what
+            }
         };
         Damage { kind, what, bytes, touched }
     }
@@ -334,6 +349,43 @@ impl Subject {
         bytes.truncate((self.sectors + space) * BLOCK);
         bytes.extend(&other.bytes);
         format!("{} sectors behind {} and {space} blocks of zeros", other.sectors, self.sectors)
+    }
+
+    /// Alters a sector, or a parity sector: the sector that it covers and that is to be lost, and where. Nothing contradicts it where there
+    /// is no parity.
+    fn alter(
+        &self,
+        kind: Kind,
+        bytes: &mut [u8],
+        random: &mut Random,
+    ) -> Option<(std::ops::Range<usize>, String)> {
+        let parity = self.sectors + SPACE_BLOCKS;
+        let (first, end) =
+            if kind == Kind::Altered { (0, self.sectors) } else { (parity, bytes.len() / BLOCK) };
+        let at = first + random.below(self.has_parity.then_some(end - first)? as u64) as usize;
+        let covers = Parity::read(&block_at(bytes, at));
+        let byte = BLOCK - 4 - BODY_BYTES + random.below(BODY_BYTES as u64) as usize;
+        bytes[at * BLOCK + byte] ^= 1 << random.below(8);
+        let mut block = block_at(bytes, at);
+        let told = match covers {
+            Some(one) => {
+                one.sum.seal(&mut block, one.session, one.last);
+                let rows = one.last % STRETCH_SECTORS / COLUMNS as u32;
+                let lost = one.last as usize - COLUMNS * random.below(u64::from(rows) + 1) as usize;
+                (
+                    lost..lost + 1,
+                    format!("sector {lost}, and byte {byte} of {:?} up to {}", one.sum, one.last),
+                )
+            }
+            None => {
+                let mut sector = Sector::from_bytes(block);
+                sector.seal(sector.session());
+                block = *sector.bytes();
+                (0..0, format!("byte {byte} of sector {at}"))
+            }
+        };
+        bytes[at * BLOCK..(at + 1) * BLOCK].copy_from_slice(&block);
+        Some(told)
     }
 
     /// Whether what is left is told as it is.
@@ -357,6 +409,12 @@ impl Subject {
             tally.noticed += 1;
             return Ok(());
         }
+        if damage.kind == Kind::Altered {
+            // What comes out of it may be anything.
+            ensure!(verdict == Verdict::NotProved, "{verdict:?} is said: {}", overview.ending.words());
+            tally.noticed += 1;
+            return Ok(());
+        }
         let missing = self.missing(&read.frames)?;
         tally.lost_max = tally.lost_max.max(missing.len() as u64);
         let touched: BTreeSet<_> = damage.touched.iter().map(|sector| self.group_of[*sector]).collect();
@@ -370,8 +428,12 @@ impl Subject {
         } else if damage.is_one_page() && self.has_parity {
             anyhow::bail!("{} frames are missing, of one page of 4 KiB at most", missing.len());
         }
+        let is_lost = !missing.is_empty() && matches!(damage.kind, Kind::Erased | Kind::ErasedToTheEnd);
         match (verdict, overview.ending.proof) {
             (Verdict::NotProved, _) => tally.noticed += 1,
+            _ if self.has_parity && is_lost => {
+                anyhow::bail!("{verdict:?} is said, and its parity tells of more")
+            }
             (Verdict::Holds, _) if missing.is_empty() && repaired > 0 => tally.told += 1,
             (Verdict::ToMark, Proof::Mark(at, _)) => {
                 let to = at.as_millis();
@@ -398,6 +460,10 @@ impl Subject {
         ensure!(given.peek().is_none(), "a frame came out that never went in: {:?}", given.peek());
         Ok(missing)
     }
+}
+
+fn block_at(bytes: &[u8], at: usize) -> [u8; BLOCK] {
+    bytes.as_chunks().0[at]
 }
 
 fn fill(bytes: &mut [u8], sectors: std::ops::Range<usize>, value: u8) {
