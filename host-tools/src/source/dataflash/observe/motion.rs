@@ -12,7 +12,7 @@ use hums_core::units::{
 
 use super::handler::{Given, Handler};
 use super::say::{Out, Say};
-use super::state::State;
+use super::state::{Rates, State};
 use super::words::Craft;
 
 /// Bits of `MAV_SYS_STATUS_SENSOR`.
@@ -27,6 +27,8 @@ const FIX_2D: u8 = 2;
 const FIX_3D: u8 = 3;
 /// What belongs together in one of MAVLink's messages was logged within this.
 const TOGETHER: Span = Span::from_secs(2);
+/// Rates go with an attitude within this.
+const RATES_AGE: Span = Span::from_millis(500);
 
 const MOTION: Handler =
     Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
@@ -36,6 +38,12 @@ pub(super) const HANDLERS: &[Handler] = &[
         names: &[("ATT", 0)],
         columns: &[&["Roll"], &["Pitch"], &["Yaw"], &["DesRoll"], &["DesPitch"]],
         take: attitude,
+        ..MOTION
+    },
+    Handler {
+        names: &[("RATE", 0)],
+        columns: &[&["RDes"], &["PDes"], &["R"], &["P"], &["Y"]],
+        take: rates,
         ..MOTION
     },
     Handler {
@@ -172,15 +180,25 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     // 0 to 360 degrees in the log, -180 to 180 in ATTITUDE.
     let yaw = (yaw + 180.0).rem_euclid(360.0) - 180.0;
     let [roll, pitch, yaw] = [roll, pitch, yaw].map(|degrees| Radians(degrees.to_radians()));
-    // Rates are in IMU.
-    let rates = None;
+    let known = state.rates.within(given.at, RATES_AGE);
     if let Some([roll, pitch]) = given.singles(3)
         && [roll, pitch].into_iter().all(|degrees: f32| degrees.abs() <= TURN_DEG)
     {
         let [roll, pitch] = [roll, pitch].map(|degrees| Radians(degrees.to_radians()));
-        out.observe(&Observation::Wanted(Wanted { roll, pitch, rates: None }));
+        out.observe(&Observation::Wanted(Wanted { roll, pitch, rates: known.map(|known| known.wanted) }));
     }
+    let rates = known.map(|known| known.flown);
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
+}
+
+/// The body's rates and those that are wanted, of one moment: degrees a second, until 3.3 hundredths of them (`Log_Write_Rate` of
+/// `ArduCopter`). Where no version is told, nobody knows which.
+fn rates(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    let Some(unit_deg) = state.facts.rate_unit_deg() else { return };
+    let Some(rates) = given.singles::<5>(0) else { return };
+    let [wanted_roll, wanted_pitch, flown @ ..] =
+        rates.map(|rate| RadiansPerSecond((rate * unit_deg).to_radians()));
+    state.rates.set(given.at, Rates { wanted: [wanted_roll, wanted_pitch], flown });
 }
 
 fn boot_ms(given: &Given<'_>) -> Option<u32> {

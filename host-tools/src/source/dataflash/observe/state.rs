@@ -5,11 +5,12 @@ use hums_core::observation::{
     Autopilot, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus, VehicleKind, VtolState,
 };
 use hums_core::time::{Instant, Span};
-use hums_core::units::{Amperes, Fraction, Gauss, Metres, Volts};
+use hums_core::units::{Amperes, Fraction, Gauss, Metres, RadiansPerSecond, Volts};
 
 use super::arming::{Arming, Word};
 use super::say::{Out, Say};
 use super::words::{self, Craft, name_and_version};
+use crate::source::dataflash::format::Format;
 
 /// How often the autopilot's state is said, which the log tells by its changes only: `HEARTBEAT` and `SYS_STATUS` come
 /// at 1 Hz or faster.
@@ -41,6 +42,15 @@ impl<T: Copy> Dated<T> {
     }
 }
 
+/// Body rates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rates {
+    /// About roll and pitch, as the autopilot wants them.
+    pub(super) wanted: [RadiansPerSecond; 2],
+    /// About roll, pitch and yaw, as they are.
+    pub(super) flown: [RadiansPerSecond; 3],
+}
+
 /// Where messages tell arming.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ToldArming {
@@ -61,6 +71,8 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) craft: Craft,
     /// `FRAME_CLASS`
     pub(super) frame_class: Option<u8>,
+    /// Motors that `MOT` is defined with, in versions without `FRAME_CLASS`.
+    pub(super) motors: Option<u8>,
     /// `Q_ENABLE` or `Q_AVAILABLE`: a plane that hovers.
     pub(super) quadplane: bool,
     /// `Q_MAV_TYPE`
@@ -81,6 +93,15 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) told_arming: ToldArming,
 }
 
+impl Facts {
+    /// The unit of `RATE`, degrees a second; `None` where the version is not known.
+    pub(super) fn rate_unit_deg(&self) -> Option<f32> {
+        /// Versions are bytes from the top down.
+        const DEGREES_SINCE: u32 = 0x0304_0000;
+        (self.version > 0).then_some(if self.version < DEGREES_SINCE { 0.01 } else { 1.0 })
+    }
+}
+
 /// What a log has told so far.
 #[derive(Debug, Default)]
 pub(in crate::source::dataflash) struct State {
@@ -98,6 +119,7 @@ pub(in crate::source::dataflash) struct State {
     pub(super) remaining: Dated<f32>,
     /// Sensors that say that they are not healthy: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
     pub(super) unhealthy: [u32; INSTANCES],
+    pub(super) rates: Dated<Rates>,
     /// Accuracy by receiver.
     pub(super) accuracy: [Dated<Metres>; INSTANCES],
     /// What each compass measured last, until an inertial sensor's observation takes it along.
@@ -177,6 +199,14 @@ impl State {
             (known, _) => known,
         };
         Facts { told_arming, ..self.facts }
+    }
+
+    /// Takes a definition: `ArduCopter` until 3.1 was built for each frame, and logs the motors of that frame.
+    pub(in crate::source::dataflash) fn define(&mut self, format: &Format) {
+        if format.name == "MOT" {
+            let motors = format.fields.iter().filter(|field| field.name.starts_with("Mot")).count();
+            self.facts.motors = u8::try_from(motors).ok();
+        }
     }
 
     /// What firmware wrote it.
@@ -370,10 +400,12 @@ impl State {
 
     /// What flies, with its `MAV_TYPE`; `None` for what is no vehicle.
     fn kind(&self) -> Option<(VehicleKind, u8)> {
-        let Facts { craft, frame_class, quadplane, quadplane_type, .. } = self.facts;
+        let Facts { craft, frame_class, motors, quadplane, quadplane_type, .. } = self.facts;
         Some(match craft {
             Craft::Unknown => (VehicleKind::Other, 0),
-            Craft::Copter => (VehicleKind::Rotorcraft, copter_type(frame_class.unwrap_or(1))),
+            Craft::Copter => {
+                (VehicleKind::Rotorcraft, frame_class.map_or_else(|| type_with(motors), copter_type))
+            }
             Craft::Heli => (VehicleKind::Rotorcraft, 4),
             Craft::Plane if quadplane && quadplane_type > 1 => (VehicleKind::Vtol, quadplane_type),
             // `MAV_TYPE_VTOL_FIXEDROTOR`
@@ -414,6 +446,16 @@ impl State {
     pub(super) fn cells_of(&self, now: Instant, id: u8) -> [Option<Volts>; CELLS_MAX] {
         let known = self.cells.get(usize::from(id)).and_then(|cells| cells.within(now, Span::from_secs(3)));
         known.unwrap_or(Battery::default().cells)
+    }
+}
+
+/// `MAV_TYPE` of a copter with so many motors; most have four.
+const fn type_with(motors: Option<u8>) -> u8 {
+    match motors {
+        Some(3) => 15,
+        Some(6) => 13,
+        Some(8) => 14,
+        _ => 2,
     }
 }
 

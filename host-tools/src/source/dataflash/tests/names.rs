@@ -1,5 +1,7 @@
 //! Which messages serve, and what the rest is for.
 
+use std::fmt::Write as _;
+
 use hums_core::observation::Observation;
 
 use super::seen;
@@ -95,4 +97,61 @@ fn a_log_that_names_no_firmware_tells_its_vehicle_by_a_parameter() {
         types
     };
     assert_eq!((types(10.0), types(0.0), types(20.0), types(99.0)), (vec![2], vec![1], vec![10], vec![0]));
+}
+
+#[test]
+fn body_rates_and_those_that_are_wanted_are_in_degrees_since_3_4_and_in_hundredths_before_and_grow_old() {
+    let rates = |firmware: &str, rate: f32| {
+        let mut log = format!(
+            "{firmware}\n\
+             FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+             FMT, 150, 23, ATT, Qccccc, TimeUS,DesRoll,Roll,DesPitch,Pitch,Yaw\n\
+             FMT, 151, 63, RATE, Qfffffffff, TimeUS,RDes,R,ROut,PDes,P,POut,YDes,Y,YOut\n"
+        );
+        let _ = writeln!(log, "RATE, 1000000, {}, {rate}, 0.1, 0, {rate}, 0.1, 0, 0, 0", 2.0 * rate);
+        for time_us in [1_100_000, 1_600_000] {
+            let _ = writeln!(log, "ATT, {time_us}, 1.0, 1.0, 2.0, 2.0, 3.0");
+        }
+        let degrees = |rate: hums_core::units::RadiansPerSecond| rate.0.to_degrees().round();
+        let seen = seen(log.as_bytes());
+        let wanted = seen.find(|observation| match observation {
+            Observation::Wanted(wanted) => Some(wanted.rates.map(|rates| rates.map(degrees))),
+            _ => None,
+        });
+        let flown = seen.find(|observation| match observation {
+            Observation::Attitude(attitude) => Some(attitude.rates.map(|rates| rates.map(degrees))),
+            _ => None,
+        });
+        (wanted, flown)
+    };
+    let known = (vec![Some([20.0, 0.0]), None], vec![Some([10.0, 10.0, 0.0]), None]);
+    assert_eq!(rates("ArduCopter V4.6.3 (3fc7011a)", 10.0), known);
+    assert_eq!(rates("ArduCopter V3.3.3 (acf2e10c)", 1_000.0), known);
+    let unknown = (vec![None; 2], vec![None; 2]);
+    assert_eq!(rates("ArduCopter", 10.0), unknown, "nobody knows the unit");
+}
+
+#[test]
+fn a_copter_without_a_frame_class_has_the_motors_that_are_defined() {
+    let types = |motors: usize, frame_class: &str| {
+        let names: Vec<String> = (1..=motors).map(|motor| format!("Mot{motor}")).collect();
+        let log = format!(
+            "ArduCopter V3.1.5 (3c57e771)\n\
+             FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+             FMT, 129, 23, PARM, Nf, Name,Value\n\
+             FMT, 150, 17, ATT, Iccccc, TimeMS,DesRoll,Roll,DesPitch,Pitch,Yaw\n\
+             FMT, 151, {}, MOT, {}, {}\n\
+             {frame_class}\
+             ATT, 1000, 1.0, 1.0, 2.0, 2.0, 3.0\n",
+            3 + 2 * motors,
+            "h".repeat(motors),
+            names.join(",")
+        );
+        seen(log.as_bytes()).find(|observation| match observation {
+            Observation::Heartbeat(heartbeat) => Some(heartbeat.type_number),
+            _ => None,
+        })
+    };
+    assert_eq!([4, 6, 8].map(|motors| types(motors, "")), [[2], [13], [14]]);
+    assert_eq!(types(4, "PARM, FRAME_CLASS, 2\n"), [13], "the parameter says it better");
 }
