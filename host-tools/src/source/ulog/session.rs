@@ -34,6 +34,8 @@ const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + times::AHEAD_BYTES;
 const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
 /// The incompatible flag that is known: data was appended.
 const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];
+/// Offsets of appended data that wait at most: the header has three.
+const APPENDED_MAX: usize = 3;
 /// Topics that PX4 keeps on its card, with the time of the boot at which they were made.
 const KEPT_OVER_BOOTS: [&str; 1] = ["mission"];
 /// Words of one piece of information at most.
@@ -259,10 +261,12 @@ impl<'a, 'b> Session<'a, 'b> {
         }
         for offset in appended.into_iter().filter(|&offset| offset != 0) {
             let offset = offset.saturating_add(self.base);
-            if offset > place && self.appended.last().is_none_or(|&last| offset > last) {
+            let leads_on = offset > place && self.appended.last().is_none_or(|&last| offset > last);
+            if leads_on && self.appended.len() < APPENDED_MAX {
                 self.appended.push(offset);
             } else {
-                let words = format!("an offset of appended data that leads back, to {offset}");
+                let why = if leads_on { "is one too many" } else { "leads back" };
+                let words = format!("an offset of appended data that {why}, to {offset}");
                 self.gap(Cause::Damaged, Some(place), 0, words)?;
             }
         }
