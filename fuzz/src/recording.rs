@@ -42,7 +42,7 @@ fn stream(path: &Path, length: usize) {
 fn items(path: &Path, length: usize) {
     let Ok(recording) = Place::file(path).open() else { return };
     let mut count = 0;
-    let want = Want { frames: true, observations: true, rows: Rows::All };
+    let want = Want { frames: true, observations: true, rows: Rows::All, ..Want::default() };
     let _ = recording.read(want, &mut |_, _| {
         count += 1;
         assert!(count <= ITEMS_PER_BYTE * length + 64, "no end");

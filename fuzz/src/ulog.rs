@@ -19,7 +19,7 @@ pub fn check(data: &[u8]) {
     let bytes = if data.starts_with(&HEADER[..7]) { data.to_vec() } else { [&HEADER[..], data].concat() };
     let mut last = Instant::ZERO;
     let mut tables = BTreeMap::new();
-    let want = Want { frames: false, observations: true, rows: Rows::All };
+    let want = Want { observations: true, rows: Rows::All, ..Want::default() };
     let _ = Ulog::new(bytes.as_slice()).read(want, &mut |at, item| {
         assert!(at >= last, "time falls from {last:?} to {at:?}");
         last = at;

@@ -25,7 +25,7 @@ fn every_field_of_a_px4_log_is_what_pyulog_reads() {
 fn write(log: &Path, folder: &Path) {
     let mut tables: BTreeMap<String, (Vec<String>, BufWriter<File>)> = BTreeMap::new();
     let (mut parameters, mut texts, mut dropouts) = (BTreeMap::new(), Vec::new(), Vec::new());
-    let want = Want { frames: false, observations: false, rows: Rows::All };
+    let want = Want { rows: Rows::All, ..Want::default() };
     let take = &mut |_, item: Item<'_>| {
         match item {
             Item::Row(row) => {

@@ -53,11 +53,11 @@ const AUTOPILOT: u8 = 1;
 const TOLD_APART_MAX: usize = 32;
 
 impl Details {
-    /// Another recording begins.
-    pub(super) fn begin_another(&mut self) {
+    /// Another recording begins; of the one before, this system was judged.
+    pub(super) fn begin_another(&mut self, judged: Option<u8>) {
         /// Sentences that are kept.
         const KEPT_MAX: usize = 8;
-        let mut earlier = self.of_parts();
+        let mut earlier = self.of_parts(judged);
         earlier.truncate(KEPT_MAX);
         let others = self.all_autopilots();
         *self = Self { earlier, others, ..Self::default() };
@@ -131,14 +131,17 @@ impl Details {
     }
 
     /// Says that the recording is of more than one vehicle: files that were joined, or a ground station of several.
-    fn vehicles(&self) -> Option<String> {
-        (self.autopilots.len() > 1).then(|| {
-            format!(
-                "more than one vehicle is in it: {}; one system id is judged, as if it were one vehicle: give each \
-                 vehicle's recording by itself",
-                named(&self.autopilots)
-            )
-        })
+    fn vehicles(&self, judged: Option<u8>) -> Option<String> {
+        let first = self.autopilots.first()?;
+        let how = match judged.filter(|_| self.autopilots.iter().any(|heard| heard.system != first.system)) {
+            Some(system) => format!("system {system} is judged: --system ID judges one of them alone"),
+            None => {
+                "one system id is judged, as if it were one vehicle: give each vehicle's recording by itself"
+                    .to_owned()
+            }
+        };
+        (self.autopilots.len() > 1)
+            .then(|| format!("more than one vehicle is in it: {}; {how}", named(&self.autopilots)))
     }
 
     /// Says that the recordings that were joined are of different vehicles.
@@ -159,13 +162,13 @@ impl Details {
         }
     }
 
-    /// What else there is to say of the vehicles, and what there is more of than the monitor has room for.
-    pub(super) fn remarks(&self) -> Vec<String> {
-        self.of_parts().into_iter().chain(self.vehicles_of_parts()).collect()
+    /// What else there is to say of the vehicles, of which this system is judged, and what there is more of than the monitor has room for.
+    pub(super) fn remarks(&self, judged: Option<u8>) -> Vec<String> {
+        self.of_parts(judged).into_iter().chain(self.vehicles_of_parts()).collect()
     }
 
     /// The same of each recording of a file.
-    fn of_parts(&self) -> Vec<String> {
+    fn of_parts(&self, judged: Option<u8>) -> Vec<String> {
         let beyond = self.batteries.get(BATTERIES_MAX..).unwrap_or_default();
         let words = |(component, id): &(u8, u8)| {
             let number = u16::from(*id) + 1;
@@ -173,7 +176,7 @@ impl Details {
             format!("battery {number}{of} is not judged: the monitor follows {BATTERIES_MAX} batteries")
         };
         let mut remarks = self.earlier.clone();
-        let new = self.vehicles().into_iter().chain(beyond.iter().map(words));
+        let new = self.vehicles(judged).into_iter().chain(beyond.iter().map(words));
         new.for_each(|new| {
             if !remarks.contains(&new) {
                 remarks.push(new);
@@ -252,6 +255,29 @@ mod tests {
         for id in [0, 1, 2, 3, 1, 8, 8] {
             details.battery(Source { system: 1, component: 1 }, id);
         }
-        assert_eq!(details.remarks(), ["battery 9 is not judged: the monitor follows 4 batteries"]);
+        assert_eq!(details.remarks(None), ["battery 9 is not judged: the monitor follows 4 batteries"]);
+    }
+
+    #[test]
+    fn of_two_vehicles_the_one_that_is_judged_is_named_and_how_the_other_is_asked_for() {
+        let mut details = Details::default();
+        for system in [1, 1, 7] {
+            details.heartbeat(Source { system, component: 1 }, &heartbeat());
+        }
+        let words = "more than one vehicle is in it: system 1 (ArduPilot), system 7 (ArduPilot); system 7 is judged: \
+                     --system ID judges one of them alone";
+        assert_eq!(details.remarks(Some(7)), [words]);
+    }
+
+    fn heartbeat() -> Heartbeat {
+        Heartbeat {
+            autopilot: hums_core::observation::Autopilot::ArduPilot,
+            autopilot_number: 3,
+            kind: hums_core::observation::VehicleKind::Rotorcraft,
+            type_number: 2,
+            armed: false,
+            state: 3,
+            mode: 0,
+        }
     }
 }

@@ -284,6 +284,11 @@ impl Judge {
         }
     }
 
+    /// The system id that is judged.
+    fn system(&self) -> Option<u8> {
+        self.monitor.vehicle().source.map(|source| source.system)
+    }
+
     fn is_vehicle(&self, source: Source) -> bool {
         self.monitor.vehicle().source == Some(source)
     }
@@ -358,7 +363,7 @@ impl Judge {
         }
         self.distrust_disarming();
         self.facts.clear();
-        self.details.begin_another();
+        self.details.begin_another(self.system());
         self.restarts += 1;
         if self.joints.len() < LISTED_MAX {
             self.joints.push(at);
@@ -509,6 +514,7 @@ impl Judge {
             self.monitor = earlier;
         }
         self.peaks(self.last);
+        let of_vehicles = self.details.remarks(self.system());
         let flights = self.flights.end(&self.monitor);
         let armed = armed(&self.monitor);
         let given = !self.limits.given.is_empty();
@@ -537,8 +543,7 @@ impl Judge {
             problems: &worst_first,
         });
         let unchecked = self.facts.remove(&About::Unchecked);
-        let remarks =
-            joined(&self.joints).into_iter().chain(self.details.remarks()).chain(unchecked).collect();
+        let remarks = joined(&self.joints).into_iter().chain(of_vehicles).chain(unchecked).collect();
         Judged {
             by,
             monitor: self.monitor,

@@ -38,6 +38,7 @@ use text::Table;
 pub fn run(args: &cli::Check) -> Result<Outcome> {
     let limits = Limits::new(&params::read(args.params.as_deref())?);
     let (found, mut failed) = logs(args)?;
+    let found = found.of_system(args.system)?;
     for remark in &found.remarks {
         note!("{remark}");
     }

@@ -27,6 +27,9 @@ pub struct Check {
     /// Limits other than the defaults: a parameter file, as a ground station writes it
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
+    /// Of several vehicles in a recording only this one, by its system id
+    #[arg(long, value_name = "ID")]
+    pub system: Option<u8>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,

@@ -83,6 +83,9 @@ pub struct Info {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR")]
     pub inputs: Vec<PathBuf>,
+    /// Of several vehicles in a recording only this one, by its system id
+    #[arg(long, value_name = "ID")]
+    pub system: Option<u8>,
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,
@@ -135,6 +138,9 @@ pub struct Report {
     /// Only this session, by the name that `hums info` gives
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
+    /// Of several vehicles in a recording only this one, by its system id
+    #[arg(long, value_name = "ID")]
+    pub system: Option<u8>,
     /// Replace a page that is there already and has other content, where it is one of the same log
     #[arg(long)]
     pub replace: bool,

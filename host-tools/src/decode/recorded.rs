@@ -87,7 +87,12 @@ pub fn read<'a>(place: &Place, context: &'a Context, writers: &mut Writers<'a>) 
         [] => rows,
         names => Rows::Named(names),
     };
-    let want = Want { frames: format.is_of_link(), observations: formats.influx || formats.thesis, rows };
+    let want = Want {
+        frames: format.is_of_link(),
+        observations: formats.influx || formats.thesis,
+        rows,
+        ..Want::default()
+    };
     let mut part = Part::new(context);
     let mut summary = Summary::default();
     recording.read(want, &mut |at, item| {

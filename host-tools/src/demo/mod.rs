@@ -56,8 +56,13 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     };
     let read = decode::run(&arguments)?;
     place.note_tables()?;
-    let page_of =
-        cli::Report { inputs: vec![card.clone()], output: page.clone(), session: None, replace: false };
+    let page_of = cli::Report {
+        inputs: vec![card.clone()],
+        output: page.clone(),
+        session: None,
+        system: None,
+        replace: false,
+    };
     report::run(&page_of)?;
     place.note(&[(earlier::REPORT, &page)])?;
     line("")?;

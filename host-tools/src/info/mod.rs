@@ -19,7 +19,7 @@ use text::{image_text, text};
 
 /// Runs `hums info`.
 pub fn run(args: &cli::Info) -> Result<Outcome> {
-    let found = find(&args.inputs, args.salvage)?;
+    let found = find(&args.inputs, args.salvage)?.of_system(args.system)?;
     for remark in &found.remarks {
         note!("{remark}");
     }

@@ -44,7 +44,8 @@ impl Entry {
 }
 
 /// What is read of such a log.
-pub const WANT: Want<'_> = Want { frames: false, observations: true, rows: crate::source::item::Rows::None };
+pub const WANT: Want<'_> =
+    Want { frames: false, observations: true, rows: crate::source::item::Rows::None, system: None };
 
 type Batch = Vec<(Instant, Entry)>;
 

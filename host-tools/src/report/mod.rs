@@ -39,7 +39,7 @@ use crate::summary::Overview;
 /// Runs `hums report`.
 pub fn run(args: &cli::Report) -> Result<Outcome> {
     let (given, remarks) = without_made(&args.inputs);
-    let found = find(&given, false)?;
+    let found = find(&given, false)?.of_system(args.system)?;
     for remark in remarks.iter().chain(&found.remarks) {
         note!("{remark}");
     }

@@ -92,6 +92,18 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
+    /// Of several vehicles in each recording only that with this system id.
+    pub fn of_system(mut self, system: Option<u8>) -> Result<Self> {
+        if let Some(own) = self.places.iter().find(|place| system.is_some() && place.own().is_some()) {
+            return Err(usage(format!(
+                "--system is for a recording of several vehicles; {} is a log of HUMS, which is of the one that was judged on board",
+                own.title
+            )));
+        }
+        self.places.iter_mut().for_each(|place| place.system = system);
+        Ok(self)
+    }
+
     /// Every file that any of it is in.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         let pieces = self.places.iter().filter_map(Place::own).flat_map(|log| &log.pieces);

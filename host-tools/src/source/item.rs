@@ -283,6 +283,17 @@ pub struct Want<'a> {
     pub observations: bool,
     /// [`Item::Row`]: of which tables.
     pub rows: Rows<'a>,
+    /// Of several vehicles in a recording of a link only that with this system id: what the autopilots of others say is left out.
+    pub system: Option<u8>,
+}
+
+impl Want<'_> {
+    /// Whether what this source says is left out: it is another vehicle's autopilot.
+    pub fn leaves_out(&self, source: Source) -> bool {
+        /// `MAV_COMP_ID_AUTOPILOT1`
+        const AUTOPILOT: u8 = 1;
+        source.component == AUTOPILOT && self.system.is_some_and(|system| system != source.system)
+    }
 }
 
 /// Which rows are wanted.

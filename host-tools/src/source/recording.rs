@@ -27,6 +27,8 @@ pub struct Place {
     pub title: String,
     /// A name for files made of it, unique within one call: the file's own, or a session's as `hums info` gives it.
     pub name: String,
+    /// Of several vehicles in it only that with this system id is read ([`Want::system`]).
+    pub system: Option<u8>,
     source: From,
 }
 
@@ -41,7 +43,12 @@ enum From {
 impl Place {
     /// Standard input.
     pub fn standard() -> Self {
-        Self { title: "standard input".to_owned(), name: "standard_input".to_owned(), source: From::Standard }
+        Self {
+            title: "standard input".to_owned(),
+            name: "standard_input".to_owned(),
+            system: None,
+            source: From::Standard,
+        }
     }
 
     /// A file that is no log of ours.
@@ -50,13 +57,14 @@ impl Place {
         Self {
             title: path.display().to_string(),
             name: name.into_owned(),
+            system: None,
             source: From::File(path.to_owned()),
         }
     }
 
     /// A session of a log of ours.
     pub fn log(title: String, log: Log) -> Self {
-        Self { title, name: log.name.clone(), source: From::Log(Box::new(log)) }
+        Self { title, name: log.name.clone(), system: None, source: From::Log(Box::new(log)) }
     }
 
     /// The log of ours that it is, if it is one.
@@ -91,20 +99,22 @@ impl Place {
 
     /// Opens it.
     pub fn open(&self) -> Result<Recording> {
-        match &self.source {
-            From::Standard => Recording::new(Input::new(io::stdin())?, &self.title),
-            From::File(path) => Recording::new(Input::open(path)?, &self.title),
+        let recording = match &self.source {
+            From::Standard => Recording::new(Input::new(io::stdin())?, &self.title)?,
+            From::File(path) => Recording::new(Input::open(path)?, &self.title)?,
             From::Log(log) => {
                 let reader = OwnReader::new(log.as_ref().clone());
                 let progress = reader.progress();
-                Ok(Recording {
+                Recording {
                     format: Format::Hums,
                     progress,
                     name: self.title.clone(),
+                    system: None,
                     reader: Box::new(reader),
-                })
+                }
             }
-        }
+        };
+        Ok(Recording { system: self.system, ..recording })
     }
 }
 
@@ -115,6 +125,7 @@ pub struct Recording {
     /// How far it has been read.
     pub progress: Progress,
     name: String,
+    system: Option<u8>,
     reader: Box<dyn Reader>,
 }
 
@@ -139,11 +150,12 @@ impl Recording {
             Detected::DataFlash(form) => dataflash::open(input, form).with_context(|| name.to_owned())?,
             Detected::Ulog => ulog::open(input).with_context(|| name.to_owned())?,
         };
-        Ok(Self { format: format.format(), progress, name: name.to_owned(), reader })
+        Ok(Self { format: format.format(), progress, name: name.to_owned(), system: None, reader })
     }
 
     /// Reads it from its beginning to its end, or until `take` says [`Stop`].
     pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+        let want = Want { system: self.system, ..want };
         let (mut last, mut is_takers) = (Instant::ZERO, false);
         let mut follow = |at: Instant, item: Item<'_>| {
             last = last.max(at);

@@ -34,6 +34,9 @@ impl Said {
         want: Want<'_>,
         take: &mut Take<'_>,
     ) -> Result<()> {
+        if want.leaves_out(frame.source()) {
+            return Ok(());
+        }
         if want.frames {
             take(at, Item::Frame(frame))?;
         }

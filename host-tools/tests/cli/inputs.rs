@@ -27,9 +27,8 @@ fn role(arg: &Arg) -> Role {
         "bucket" | "card_out" | "card_size" | "cut_after_writes" | "cut_store_after" | "dashboard"
         | "format" | "from" | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token"
         | "message" | "name" | "names" | "noise" | "org" | "provoke" | "reboot_at_us" | "seed"
-        | "session" | "speed" | "spool_limit" | "stall" | "to" | "token" | "value" | "write_error" => {
-            Role::Other
-        }
+        | "session" | "speed" | "spool_limit" | "stall" | "system" | "to" | "token" | "value"
+        | "write_error" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }

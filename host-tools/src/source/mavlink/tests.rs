@@ -333,3 +333,33 @@ fn times_that_stand_still_without_an_autopilots_are_none() {
     let (gaps, ..) = told(&[1_000; 200]);
     assert_eq!(gaps, [(Cause::NoTimes, None)]);
 }
+
+#[test]
+fn of_several_vehicles_one_is_read_where_it_is_asked_for_and_who_is_no_autopilot_is_always_heard() {
+    let heard = |system: Option<u8>| {
+        let mut bytes = Vec::new();
+        for tenth in 0..20 {
+            for (system, component) in [(1, 1), (2, 1), (255, 190)] {
+                let (mut encoder, mut buffer) = (Encoder::of(system, component), [0; FRAME_BYTES_MAX]);
+                let packet = Packet::new(30).u32(0, tenth * 100).f32(4, 0.1);
+                bytes.extend((1_700_000_000 * SECOND + u64::from(tenth) * SECOND / 10).to_be_bytes());
+                bytes.extend(encoder.frame(&mut buffer, &packet));
+            }
+        }
+        let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
+        let mut heard = [0; 256];
+        let want = Want { frames: true, observations: true, system, ..Want::default() };
+        let read = reader.read(want, &mut |_, item| {
+            match item {
+                Item::Frame(frame) => heard[usize::from(frame.system())] += 1,
+                Item::Observation(source, _) => heard[usize::from(source.system)] += 1,
+                _ => {}
+            }
+            Ok(())
+        });
+        assert!(read.is_ok());
+        [heard[1], heard[2], heard[255]]
+    };
+    assert_eq!(heard(None), [40, 40, 40]);
+    assert_eq!(heard(Some(2)), [0, 40, 40]);
+}

@@ -107,7 +107,7 @@ pub(super) fn read(bytes: &[u8]) -> Read {
 pub(super) fn try_read(bytes: &[u8]) -> anyhow::Result<Read> {
     let mut read = Read::default();
     let mut last = Instant::ZERO;
-    let want = Want { frames: false, observations: true, rows: Rows::All };
+    let want = Want { observations: true, rows: Rows::All, ..Want::default() };
     let summary = Ulog::new(bytes).read(want, &mut |at, item| {
         assert!(at >= last, "time falls from {last:?} to {at:?}");
         last = at;
