@@ -300,6 +300,12 @@ impl State {
         self.level.is_none() && self.held.is_none() && !self.seen.is_set()
     }
 
+    /// Whether it is good, and nothing says otherwise.
+    fn is_calm(&self) -> bool {
+        let counts = self.bad.is_set() || self.very_bad.is_set() || self.samples != Samples::NONE;
+        self.level == Some(Level::Ok) && self.better.is_set() && !counts
+    }
+
     /// One step: at least every 50 ms.
     pub fn step(
         &mut self,
@@ -400,6 +406,10 @@ impl State {
             Side::Above => value > limit - margin,
             Side::Below => value < limit + margin,
         };
+        // Good as it was for long: a step changes nothing.
+        if self.is_calm() && !beyond(warn, 0.0) && !beyond(critical, 0.0) {
+            return None;
+        }
         let very_bad = self.samples.count(Samples::VERY_BAD, beyond(critical, 0.0), measured)
             & self.very_bad.run(beyond(critical, 0.0), now, check.debounce_critical);
         // Without a warning limit there is no warning on the way to critical.

@@ -78,7 +78,7 @@ impl Health {
         let quiet = inputs.mishap.is_going() && !over;
         let looked_at = usize::from(self.looked_at);
         self.looked_at = ((looked_at + 1) % STATES) as u8;
-        let mut slots = 0..STATES;
+        let mut first = 0;
         for (place, check) in (0..).zip(TABLES.iter().copied().flatten()) {
             let quiet = quiet && check.when != When::Always;
             let applies = match check.when {
@@ -88,9 +88,15 @@ impl Health {
                 When::Armed => inputs.vehicle.armed(),
                 When::InFlight => inputs.flight.airborne(),
             };
-            for (instance, slot) in (0..check.instances).zip(&mut slots) {
+            let slots = first..first + usize::from(check.instances);
+            first = slots.end;
+            // Most have nothing to say and never had: a step would change nothing.
+            let is_idle = |states: &[State]| states.iter().all(State::is_new);
+            if !applies && self.states.get(slots.clone()).is_none_or(is_idle) {
+                continue;
+            }
+            for (instance, slot) in (0..check.instances).zip(slots) {
                 let Some(state) = self.states.get_mut(slot) else { return };
-                // Most have nothing to say and never had: a step would change nothing.
                 let is_new = state.is_new();
                 if is_new && !applies {
                     continue;
