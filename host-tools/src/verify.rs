@@ -260,7 +260,7 @@ impl LogJson {
 }
 
 /// What the log says of its end and of its place.
-fn ends(log: &Overview) -> [Check; 7] {
+fn ends(log: &Overview) -> [Check; 8] {
     let ending = &log.ending;
     let summary = &ending.summary;
     let blocks = &summary.blocks;

@@ -334,8 +334,7 @@ impl Subject {
                 format!("sectors {one} to {end} are another session's")
             }
             Kind::Altered | Kind::ParityAltered => {
-                let (lost, what) = self.alter(kind, &mut bytes, random).unwrap_or_default();
-                fill(&mut bytes, lost.clone(), value);
+                let (lost, what) = self.alter(kind, &mut bytes, value, random).unwrap_or_default();
                 touched.extend(lost);
                 what
             }
@@ -357,6 +356,7 @@ impl Subject {
         &self,
         kind: Kind,
         bytes: &mut [u8],
+        value: u8,
         random: &mut Random,
     ) -> Option<(std::ops::Range<usize>, String)> {
         let parity = self.sectors + SPACE_BLOCKS;
@@ -367,22 +367,17 @@ impl Subject {
         let byte = BLOCK - 4 - BODY_BYTES + random.below(BODY_BYTES as u64) as usize;
         bytes[at * BLOCK + byte] ^= 1 << random.below(8);
         let mut block = block_at(bytes, at);
-        let told = match covers {
-            Some(one) => {
-                one.sum.seal(&mut block, one.session, one.last);
-                let rows = one.last % STRETCH_SECTORS / COLUMNS as u32;
-                let lost = one.last as usize - COLUMNS * random.below(u64::from(rows) + 1) as usize;
-                (
-                    lost..lost + 1,
-                    format!("sector {lost}, and byte {byte} of {:?} up to {}", one.sum, one.last),
-                )
-            }
-            None => {
-                let mut sector = Sector::from_bytes(block);
-                sector.seal(sector.session());
-                block = *sector.bytes();
-                (0..0, format!("byte {byte} of sector {at}"))
-            }
+        let told = if let Some(one) = covers {
+            one.sum.seal(&mut block, one.session, one.last);
+            let rows = one.last % STRETCH_SECTORS / COLUMNS as u32;
+            let lost = one.last as usize - COLUMNS * random.below(u64::from(rows) + 1) as usize;
+            fill(bytes, lost..lost + 1, value);
+            (lost..lost + 1, format!("sector {lost}, and byte {byte} of {:?} up to {}", one.sum, one.last))
+        } else {
+            let mut sector = Sector::from_bytes(block);
+            sector.seal(sector.session());
+            block = *sector.bytes();
+            (0..0, format!("byte {byte} of sector {at}"))
         };
         bytes[at * BLOCK..(at + 1) * BLOCK].copy_from_slice(&block);
         Some(told)
