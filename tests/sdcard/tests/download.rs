@@ -193,7 +193,12 @@ fn a_burst_that_is_under_way_when_its_file_makes_room_ends_with_an_error() {
         let data = payload[12..12 + usize::from(payload[4])].to_vec();
         (payload[3], payload[5], payload[6] != 0, offset, data)
     }));
-    assert_eq!(answers.last().map(|answer| (answer.0, answer.1)), Some((NAK, BURST)), "{answers:?}");
+    assert_eq!(
+        answers.last().map(|answer| (answer.0, answer.1)),
+        Some((NAK, BURST)),
+        "{} answers",
+        answers.len()
+    );
     for (_, _, _, offset, data) in answers.iter().filter(|answer| answer.0 == ACK) {
         assert_eq!(data, &whole[*offset as usize..][..data.len()], "at {offset}");
     }

@@ -72,16 +72,16 @@ impl Library {
         Self { job: None, ticket: 0, asked: false, erases: false, places: Places::new(), open: None }
     }
 
-    /// For somebody else's question.
+    /// For a question, also for somebody else's: the answer to the one before is waited for no longer.
     pub(crate) const fn next_ticket(&mut self) -> u16 {
         self.ticket = self.ticket.wrapping_add(1);
+        self.asked = false;
         self.ticket
     }
 
     fn begin(&mut self, asker: Asker, kind: Kind) {
         self.job = Some(Job { asker, kind });
-        self.ticket = self.ticket.wrapping_add(1);
-        self.asked = false;
+        self.next_ticket();
     }
 
     /// Takes a question; `false` when it is none about logs.
@@ -119,7 +119,6 @@ impl Library {
         if self.erases {
             let ticket = self.next_ticket();
             self.erases = !ways.queues.shelf.want(Want { ticket, which: Which::At(0), what: What::Erase });
-            self.asked = false;
         }
         for _ in 0..LOOKS_MAX {
             let Some(mut job) = self.job else {
