@@ -38,6 +38,8 @@ const KIND: Kind = Kind {
 pub(super) struct Place<'a> {
     dir: &'a Path,
     inputs: &'a Inputs,
+    /// What an earlier demo made and is still there, with its hash.
+    earlier: BTreeMap<String, String>,
     /// What lies in the decoded folder and stays there.
     others: BTreeSet<PathBuf>,
     /// What this demo has made so far, with its hash.
@@ -45,25 +47,34 @@ pub(super) struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    /// Removes what an earlier demo made. Nothing is removed where anything is in the way.
-    pub(super) fn clear(dir: &'a Path, inputs: &'a Inputs) -> Result<Self> {
-        let made = made(dir)?;
-        check(dir, &made)?;
+    /// Looks at what is there, and removes nothing. An error where anything is in the way.
+    pub(super) fn look(dir: &'a Path, inputs: &'a Inputs) -> Result<Self> {
+        let earlier = made(dir)?;
+        check(dir, &earlier, inputs)?;
+        Ok(Self { dir, inputs, earlier, others: BTreeSet::new(), made: BTreeMap::new() })
+    }
+
+    /// Removes what an earlier demo made. Nothing is removed where anything is in the way by now.
+    pub(super) fn clear(&mut self) -> Result<()> {
+        let earlier = std::mem::take(&mut self.earlier);
+        check(self.dir, &earlier, self.inputs)?;
         let mut folders = BTreeSet::new();
-        for name in made.keys() {
-            let path = dir.join(name);
+        for name in earlier.keys() {
+            let path = self.dir.join(name);
             if path.exists() {
-                Output::remove(&path, inputs)?;
+                Output::remove(&path, self.inputs)?;
             }
-            folders.extend(path.ancestors().skip(1).take_while(|folder| *folder != dir).map(Path::to_owned));
+            let inner = path.ancestors().skip(1).take_while(|folder| *folder != self.dir);
+            folders.extend(inner.map(Path::to_owned));
         }
         // The inner ones first.
         folders.iter().rev().for_each(|folder| remove_if_empty(folder));
-        let mark = dir.join(MARK);
+        let mark = self.dir.join(MARK);
         if mark.exists() {
-            Output::remove(&mark, inputs)?;
+            Output::remove(&mark, self.inputs)?;
         }
-        Ok(Self { dir, inputs, others: files(&dir.join(DECODED))?, made: BTreeMap::new() })
+        self.others = files(&self.dir.join(DECODED))?;
+        Ok(())
     }
 
     /// Writes down that this demo made the tables.
@@ -108,7 +119,7 @@ fn made(dir: &Path) -> Result<BTreeMap<String, String>> {
 }
 
 /// Whether all that is in the way is what an earlier demo made, unchanged.
-fn check(dir: &Path, made: &BTreeMap<String, String>) -> Result<()> {
+fn check(dir: &Path, made: &BTreeMap<String, String>, inputs: &Inputs) -> Result<()> {
     let refuse = |path: &Path, why: &str| -> Result<()> {
         bail!(
             "{}: {why}; nothing was removed: move it away, or name another directory with --dir",
@@ -125,6 +136,7 @@ fn check(dir: &Path, made: &BTreeMap<String, String>) -> Result<()> {
     for (name, was) in made {
         let path = dir.join(name);
         let Ok(about) = fs::symlink_metadata(&path) else { continue };
+        inputs.refuse(&path)?;
         if !about.is_file() || hash(&path)? != *was {
             return refuse(&path, "was changed since the demo made it");
         }

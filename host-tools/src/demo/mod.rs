@@ -7,7 +7,7 @@ use std::io::IsTerminal as _;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
@@ -34,12 +34,20 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
             .map(|name| args.dir.join(name));
     let mut inputs = Inputs::none();
     inputs.add_endpoint(&flight);
-    // Each demo begins with an empty card.
-    let mut place = earlier::Place::clear(&args.dir, &inputs)?;
+    let mut place = earlier::Place::look(&args.dir, &inputs)?;
     line(&format!("1. {flight} goes in at the autopilot UART"))?;
+    // Each demo begins with an empty card.
     let parts = [InPlacePart::begin(&card)?, InPlacePart::begin(&gs)?];
     let [card_part, gs_part] = parts.each_ref().map(InPlacePart::path);
-    let recorded = record(&flight, card_part, gs_part)?;
+    let recorded = match record_frames(&flight, card_part, gs_part) {
+        Ok(recorded) => recorded,
+        Err(error) => {
+            parts.iter().for_each(InPlacePart::discard);
+            return Err(error);
+        }
+    };
+    // What an earlier demo made goes once this one has something to put there.
+    place.clear()?;
     place.note(&[(earlier::CARD, card_part), (earlier::GROUND_STATION, gs_part)])?;
     parts.into_iter().try_for_each(InPlacePart::finish)?;
     line("")?;
@@ -137,6 +145,17 @@ fn flight(args: &cli::Demo) -> Result<Endpoint> {
             "hums demo shows a flight of the source tree, and this is outside of it; name a recording with --input",
         )),
     }
+}
+
+/// An error where nothing of the vehicle was recorded.
+fn record_frames(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
+    let recorded = record(flight, card, gs)?;
+    for log in &logs::find(&[card.to_owned()], false)?.logs {
+        if Overview::of(log)?.ending.summary.frames > 0 {
+            return Ok(recorded);
+        }
+    }
+    bail!("{flight}: no MAVLink frame is in it; hums check says what a file is")
 }
 
 /// By the firmware on the model of its chip; where there is no image, by the same pipeline on this PC.

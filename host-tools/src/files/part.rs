@@ -89,6 +89,11 @@ impl InPlacePart {
         &self.part
     }
 
+    /// Removes it, if it was begun.
+    pub fn discard(&self) {
+        let _ = std::fs::remove_file(&self.part);
+    }
+
     /// It is whole.
     pub fn finish(self) -> Result<()> {
         rename_new(&self.part, &self.target).with_context(|| cannot_write(&self.target))

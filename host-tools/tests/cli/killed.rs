@@ -267,6 +267,19 @@ fn a_demo_removes_what_a_demo_made_and_nothing_else() {
         fs::remove_file(path).expect("removed");
     }
     assert!(contents(dir.path()) == made, "a demo is the same again");
+    // What cannot be recorded takes nothing away, nor does what would be an input of its own.
+    fs::write(at("notes.txt"), "no recording").expect("written");
+    let tlog = tables.with_extension("tlog").display().to_string();
+    for (input, code) in [("nosuch.tlog", 1), ("notes.txt", 1), ("decoded", 1), (&tlog, 2)] {
+        let before = contents(dir.path());
+        let mut words = hums();
+        words.current_dir(dir.path()).env("HUMS_FIRMWARE", "none");
+        words.args(["demo", "--input", input, "--dir", ".", "--dashboard", "never"]);
+        let ended = words.output().expect("it runs");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(code), "{input}: {said}");
+        assert!(contents(dir.path()) == before, "{input}: {said}");
+    }
     // What was changed, or put among the tables, ends it before anything is removed.
     for (path, why) in [
         (tables.join("mine.csv"), "is among the demo's tables"),
