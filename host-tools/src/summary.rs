@@ -172,6 +172,10 @@ pub struct Contents {
     pub gaps: Vec<Gap>,
     /// Of each of them where it is in the file and what was found there, in a recording that is no log of ours.
     pub gap_words: Vec<(Option<u64>, String)>,
+    /// Why nothing is known of the vehicle, where this program judged the recording and heard none.
+    pub unheard: Option<String>,
+    /// What else there is to say of the vehicles in it, as sentences.
+    pub remarks: Vec<String>,
     /// Entries that are no frame at all.
     pub not_frames: u64,
     /// Frames that were verified on board, whose checksum fails here.

@@ -1,6 +1,8 @@
 //! What a check of several things was of: which failsafe, which sensor. The monitor counts and compares; names are for
 //! people.
 
+use std::collections::BTreeSet;
+
 use hums_core::alert::HOLDS;
 use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::health::{Level, checks};
@@ -24,8 +26,10 @@ pub(super) struct Details {
     sensors: u32,
     /// What the autopilot said last of each cause, and when.
     said: [Option<(Instant, String)>; Cause::COUNT],
-    /// Batteries in the order in which they came: component and id.
+    /// Batteries that are followed, in the order in which they came: component and id.
     batteries: Vec<(u8, u8)>,
+    /// Those beyond them, up to [`BEYOND_MAX`].
+    beyond: BTreeSet<(u8, u8)>,
     /// Autopilots in the order in which they came.
     autopilots: Vec<Heard>,
     /// What was said of recordings that another one was joined to.
@@ -49,8 +53,10 @@ const NO_AUTOPILOT: u8 = 8;
 /// `MAV_COMP_ID_AUTOPILOT1`
 const AUTOPILOT: u8 = 1;
 
-/// Batteries that are told apart: `ArduPilot` has 16.
+/// Autopilots that are told apart.
 const TOLD_APART_MAX: usize = 32;
+/// Batteries beyond those that are followed which are told apart: `ArduPilot` has 16.
+const BEYOND_MAX: usize = 1_024;
 
 impl Details {
     /// Another recording begins; of the one before, this system was judged.
@@ -157,8 +163,13 @@ impl Details {
     /// A battery tells of itself.
     pub(super) fn battery(&mut self, source: Source, id: u8) {
         let battery = (source.component, id);
-        if self.batteries.len() < TOLD_APART_MAX && !self.batteries.contains(&battery) {
+        if self.batteries.contains(&battery) {
+            return;
+        }
+        if self.batteries.len() < BATTERIES_MAX {
             self.batteries.push(battery);
+        } else if self.beyond.len() < BEYOND_MAX {
+            self.beyond.insert(battery);
         }
     }
 
@@ -169,14 +180,8 @@ impl Details {
 
     /// The same of each recording of a file.
     fn of_parts(&self, judged: Option<u8>) -> Vec<String> {
-        let beyond = self.batteries.get(BATTERIES_MAX..).unwrap_or_default();
-        let words = |(component, id): &(u8, u8)| {
-            let number = u16::from(*id) + 1;
-            let of = if *component == 1 { String::new() } else { format!(" of component {component}") };
-            format!("battery {number}{of} is not judged: the monitor follows {BATTERIES_MAX} batteries")
-        };
         let mut remarks = self.earlier.clone();
-        let new = self.vehicles(judged).into_iter().chain(beyond.iter().map(words));
+        let new = self.vehicles(judged).into_iter().chain(not_followed(&self.beyond));
         new.for_each(|new| {
             if !remarks.contains(&new) {
                 remarks.push(new);
@@ -213,6 +218,33 @@ impl Details {
             _ => self.tell_alert(check, problems),
         }
     }
+}
+
+/// That these batteries are not judged, as one sentence: `batteries 5 to 256 are not judged`.
+fn not_followed(beyond: &BTreeSet<(u8, u8)>) -> Option<String> {
+    /// Ranges that are named.
+    const NAMED_MAX: usize = 8;
+    let mut ranges: Vec<(u8, u16, u16)> = Vec::new();
+    for (component, id) in beyond {
+        let number = u16::from(*id) + 1;
+        match ranges.last_mut() {
+            Some((of, _, last)) if of == component && *last + 1 == number => *last = number,
+            _ => ranges.push((*component, number, number)),
+        }
+    }
+    let words = |&(component, first, last): &(u8, u16, u16)| {
+        let of = if component == 1 { String::new() } else { format!(" of component {component}") };
+        if first == last { format!("{first}{of}") } else { format!("{first} to {last}{of}") }
+    };
+    let named: Vec<String> = ranges.iter().take(NAMED_MAX).map(words).collect();
+    let more = if ranges.len() > NAMED_MAX { " and others" } else { "" };
+    let (one, are) = if beyond.len() == 1 { ("battery", "is") } else { ("batteries", "are") };
+    (!beyond.is_empty()).then(|| {
+        format!(
+            "{one} {}{more} {are} not judged: the monitor follows {BATTERIES_MAX} batteries",
+            named.join(", ")
+        )
+    })
 }
 
 /// Autopilots as words.
@@ -256,6 +288,10 @@ mod tests {
             details.battery(Source { system: 1, component: 1 }, id);
         }
         assert_eq!(details.remarks(None), ["battery 9 is not judged: the monitor follows 4 batteries"]);
+        (0..=255).for_each(|id| details.battery(Source { system: 1, component: 1 }, id));
+        details.battery(Source { system: 1, component: 180 }, 0);
+        let words = "batteries 5 to 256, 1 of component 180 are not judged: the monitor follows 4 batteries";
+        assert_eq!(details.remarks(None), [words]);
     }
 
     #[test]

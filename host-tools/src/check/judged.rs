@@ -85,6 +85,18 @@ impl Judged {
         self.monitor.vehicle()
     }
 
+    /// Why nothing is known of the vehicle, as words in its place; `None` where an autopilot was heard.
+    pub fn unheard(&self) -> Option<String> {
+        match (self.vehicle().source, self.vehicle().heartbeat.get()) {
+            (None, _) => Some("none was heard".to_owned()),
+            (Some(source), None) => Some(format!(
+                "system {}, of which no heartbeat was heard while it was the vehicle",
+                source.system
+            )),
+            (Some(_), Some(_)) => None,
+        }
+    }
+
     /// Whether so few checks had something to judge that nothing found is no good news: fewer than one in ten.
     pub fn is_little(&self) -> bool {
         self.judged.len() * 10 < self.judged.len() + self.not_judged.len()
@@ -104,7 +116,7 @@ impl Judged {
     pub fn worst(&self) -> Option<Level> {
         match self.problems.first() {
             Some(problem) => Some(problem.level),
-            None if self.vehicle().source.is_none() => None,
+            None if self.unheard().is_some() => None,
             None => Some(Level::Ok),
         }
     }

@@ -113,7 +113,9 @@ fn count(contents: &mut Contents, format: Format, summary: Summary) {
 
 /// What the monitor here makes of a recording.
 fn fill(contents: &mut Contents, judged: Judged) {
-    let Judged { monitor, findings, findings_count, span, .. } = judged;
+    contents.unheard = judged.unheard();
+    let Judged { monitor, findings, findings_count, span, remarks, .. } = judged;
+    contents.remarks = remarks;
     contents.vehicle = vehicle(&monitor);
     contents.checked_here = contents.vehicle.is_some();
     if !contents.checked_here {

@@ -2,6 +2,7 @@
 //!
 //! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -14,13 +15,15 @@ use super::problem::{Problem, side};
 use crate::names::{autopilot_name, type_name};
 use crate::plural::count;
 use crate::printable::word;
-use crate::source::item::{About, Cause};
+use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
 use crate::states;
 use crate::utc::iso8601;
 
 /// Problems that are shown with their words; the rest gets a line.
 const SHOWN_MAX: usize = 6;
+/// No sensor has such a number, in whatever unit: it is damaged, and shown as that.
+const IMPOSSIBLE: f32 = 1e9;
 /// Reasons and places that are shown; `--json` has them all.
 const LINES_MAX: usize = 8;
 
@@ -214,7 +217,7 @@ fn vehicle(judged: &Judged) -> String {
             .facts
             .get(&About::Firmware)
             .map(|firmware| format!("{firmware}, of which nothing was heard"));
-        return firmware.unwrap_or_else(|| "none was heard".to_owned());
+        return firmware.or_else(|| judged.unheard()).unwrap_or_default();
     };
     let told = judged.facts.get(&About::Firmware).cloned();
     let firmware = told.unwrap_or_else(|| {
@@ -304,6 +307,9 @@ fn verdict(judged: &Judged) -> String {
     match judged.worst() {
         None if judged.gaps.iter().any(|gap| gap.cause == Cause::NoTimes) => {
             "unknown: the log has no times, and nothing was judged".to_owned()
+        }
+        None if judged.vehicle().source.is_some() => {
+            "unknown: no heartbeat of the vehicle was heard, and nothing was judged".to_owned()
         }
         None => "unknown: no autopilot was heard, and nothing was judged".to_owned(),
         Some(Level::Critical) if warnings > 0 => format!(
@@ -432,8 +438,10 @@ fn sentence(group: &[&Problem]) -> String {
     let state = states::name(&first.check, first.value);
     if let Some(state) = state {
         let _ = write!(text, ": {state}");
-    } else if first.value.is_finite() {
+    } else if first.value.is_finite() && possible(&first.value) {
         let _ = write!(text, ": {}{unit}", short(first.value));
+    } else if first.value.is_finite() {
+        let _ = write!(text, ": {}{unit}, which no sensor can have", short(first.value));
     }
     if !first.details.is_empty() {
         let _ = write!(text, ": {}", first.details.join(", "));
@@ -468,7 +476,7 @@ fn not_judged(text: &mut String, judged: &Judged) {
             None => reasons.push((why, vec![check])),
         }
     }
-    if reasons.is_empty() || judged.vehicle().source.is_none() {
+    if reasons.is_empty() || judged.unheard().is_some() {
         return;
     }
     let all = judged.judged.len() + judged.not_judged.len();
@@ -484,8 +492,11 @@ fn not_judged(text: &mut String, judged: &Judged) {
 }
 
 fn damage(text: &mut String, judged: &Judged) {
-    let shown = judged.gaps.iter().filter(|gap| gap.cause != Cause::NotKept);
-    for gap in shown.clone().take(LINES_MAX) {
+    let mut shown: Vec<&Gap> = judged.gaps.iter().filter(|gap| gap.cause != Cause::NotKept).collect();
+    if shown.len() > LINES_MAX {
+        shown.sort_by_key(|gap| how_bad(gap));
+    }
+    for gap in shown.into_iter().take(LINES_MAX) {
         let what = match gap.cause {
             Cause::NoTimes => "no times",
             Cause::Cut => "cut",
@@ -503,15 +514,22 @@ fn damage(text: &mut String, judged: &Judged) {
     }
 }
 
+/// What sorts the worst places first: damage before losses; what is counted over the whole recording (it has no bytes: frames with a wrong
+/// checksum, wrong times, a clock that does not run) before single places, and of these the longest.
+fn how_bad(gap: &Gap) -> (bool, bool, Reverse<u64>, Reverse<Span>) {
+    let lasts = gap.from.zip(gap.to).map_or(Span::ZERO, |(from, to)| to.since(from));
+    (!gap.cause.is_damage(), gap.bytes > 0, Reverse(gap.bytes), Reverse(lasts))
+}
+
 /// How the recording ends, as a sentence.
 fn ends_in_air(end: &EndsInAir) -> String {
     let mut known = Vec::new();
-    known.extend(end.height_m.map(|height_m| format!("{height_m:.1} m above home")));
-    known.extend(end.climb_mps.map(|climb_mps| {
+    known.extend(end.height_m.filter(possible).map(|height_m| format!("{height_m:.1} m above home")));
+    known.extend(end.climb_mps.filter(possible).map(|climb_mps| {
         let way = if climb_mps < 0.0 { "sinking" } else { "climbing" };
         format!("{way} at {:.1} m/s", climb_mps.abs())
     }));
-    known.extend(end.speed_mps.map(|speed_mps| format!("{speed_mps:.1} m/s over ground")));
+    known.extend(end.speed_mps.filter(possible).map(|speed_mps| format!("{speed_mps:.1} m/s over ground")));
     let known = if known.is_empty() { String::new() } else { format!(": {}", known.join(", ")) };
     format!("the recording ends in the air{known}; what became of the vehicle is not in it")
 }
@@ -535,8 +553,16 @@ fn clock(span: Span) -> String {
 
 /// With as many digits as a limit has.
 fn short(value: f32) -> String {
+    if value.abs() >= IMPOSSIBLE {
+        return format!("{value:.0e}");
+    }
     let text = format!("{value:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A number that a sensor can have.
+fn possible(value: &f32) -> bool {
+    value.abs() < IMPOSSIBLE
 }
 
 #[cfg(test)]
@@ -569,6 +595,37 @@ mod tests {
         assert!(motors.contains("motors 1, 2, 3 balance: 31 "), "{motors}");
         let cells = shown("cell_voltage", [3.5, 3.2, 3.4]);
         assert!(cells.contains(": 3.2 "), "{cells}");
+    }
+
+    #[test]
+    fn a_number_that_no_sensor_can_have_is_not_shown_as_one() {
+        assert_eq!(
+            (short(3e38), short(-2.6e9), short(999_999.0)),
+            ("3e38".into(), "-3e9".into(), "999999".into())
+        );
+        let (height_m, climb_mps) = (Some(-3e38), Some(1.0));
+        let end = EndsInAir { at: Instant::ZERO, height_m, climb_mps, speed_mps: Some(f32::INFINITY) };
+        let words =
+            "the recording ends in the air: climbing at 1.0 m/s; what became of the vehicle is not in it";
+        assert_eq!(ends_in_air(&end), words);
+    }
+
+    #[test]
+    fn of_many_places_the_worst_come_first() {
+        let gap = |cause, bytes, lasts| Gap {
+            from: Some(Instant::ZERO),
+            to: Some(Instant::from_millis(lasts)),
+            cause,
+            place: None,
+            bytes,
+            words: String::new(),
+        };
+        let (count, large, small) =
+            (gap(Cause::Damaged, 0, 0), gap(Cause::Damaged, 900, 0), gap(Cause::Cut, 20, 0));
+        let (long, short) = (gap(Cause::Lost, 0, 9), gap(Cause::Lost, 0, 1));
+        let mut all = [&short, &small, &long, &large, &count];
+        all.sort_by_key(|gap| how_bad(gap));
+        assert_eq!(all, [&count, &large, &small, &long, &short]);
     }
 
     #[test]

@@ -65,6 +65,7 @@ fn heading(text: &mut String, log: &Overview) {
             let _ = writeln!(text, "  from     {:>10.3} s  {}", first.as_secs_f64(), utc(first));
             let _ = writeln!(text, "  to       {:>10.3} s  {}", last.as_secs_f64(), utc(last));
         }
+        _ if messages(log) > 0 => {}
         _ => text.push_str("  nothing in it can be read\n"),
     }
     if log.format.is_none() {
@@ -75,6 +76,8 @@ fn heading(text: &mut String, log: &Overview) {
         let uid = vehicle.uid.map_or_else(String::new, |uid| format!(", uid {uid}"));
         let (autopilot, kind) = (vehicle.autopilot, vehicle.r#type);
         let _ = writeln!(text, "  vehicle  system {}, {autopilot}{firmware}, {kind}{uid}", vehicle.system);
+    } else if let Some(unheard) = &contents.unheard {
+        let _ = writeln!(text, "  vehicle  {unheard}");
     }
     if let Some(boot) = &contents.boot {
         let _ = writeln!(
@@ -85,8 +88,10 @@ fn heading(text: &mut String, log: &Overview) {
     }
     let (frames, records) = (contents.frames(), contents.records);
     if log.format.is_some() {
-        let messages = frames + contents.named.iter().map(|message| message.count).sum::<u64>();
-        let _ = writeln!(text, "  messages {messages} in {} bytes", log.bytes_on_card);
+        for remark in &contents.remarks {
+            let _ = writeln!(text, "  besides  {remark}");
+        }
+        let _ = writeln!(text, "  messages {} in {} bytes", messages(log), log.bytes_on_card);
         return;
     }
     let _ = write!(text, "  frames   {frames} in {} bytes, {records} records", log.log_bytes());
@@ -94,6 +99,12 @@ fn heading(text: &mut String, log: &Overview) {
         let _ = write!(text, "; as a tlog {} bytes: {:.2} times smaller", contents.tlog_bytes(), log.ratio());
     }
     text.push('\n');
+}
+
+/// Messages of a recording that is no log of ours.
+fn messages(log: &Overview) -> u64 {
+    let named = log.contents.named.iter().map(|message| message.count).sum::<u64>();
+    if log.format.is_some() { log.contents.frames() + named } else { 0 }
 }
 
 /// How it ends, and what lies behind that.
@@ -182,8 +193,11 @@ fn sentence(finding: &FindingLine) -> String {
     sentence
 }
 
-/// To three decimals, and no more than it needs.
+/// To three decimals, and no more than it needs; what is too large for any sensor or counter is not written out.
 fn short(value: f64) -> String {
+    if value.abs() >= 1e15 {
+        return format!("{value:.0e}");
+    }
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
@@ -309,9 +323,9 @@ fn messages_text(text: &mut String, log: &Overview) {
     let seconds = duration_s(log);
     text.push_str("  messages                                   frames     per s      bytes\n");
     let mut line = |name: &str, frames: u64, bytes: u64| {
-        let rate = if seconds > 0.0 { frames as f64 / seconds } else { 0.0 };
+        let rate = if seconds > 0.0 { format!("{:.2}", frames as f64 / seconds) } else { String::new() };
         let name = word(name);
-        let _ = writeln!(text, "    {name:<36} {frames:>10} {rate:>9.2} {bytes:>10}");
+        let _ = writeln!(text, "    {name:<36} {frames:>10} {rate:>9} {bytes:>10}");
     };
     for (&(id, verified), count) in &contents.messages {
         line(&Contents::message_name(id, verified), count.frames, count.bytes);

@@ -19,6 +19,8 @@ use crate::plural::count;
 const STEADY_US: u64 = 500_000;
 /// ... so many in a row.
 const STEADY_MIN: u8 = 32;
+/// A clock stands where so many messages of a series tell no later time than the one before each, and no other message goes on.
+const STILL_MIN: u8 = 100;
 /// So many times have to be there, most of them before a log's own beginning, until that one is wrong.
 pub const BEGINNING_ASKED: usize = 64;
 /// Series that are followed; what is beyond them counts as one that comes seldom.
@@ -95,6 +97,9 @@ struct Series {
     last_us: Option<u64>,
     /// How many came in a row without a pause.
     steady: u8,
+    /// How many came in a row that told no later time than the one before, while the recording's time was this one.
+    still: u8,
+    still_at: Option<u64>,
     /// One has counted.
     known: bool,
 }
@@ -191,7 +196,11 @@ impl Clock {
         if stamp.series >= self.series.len() && stamp.series < SERIES_MAX {
             self.series.resize(stamp.series + 1, Series::default());
         }
+        let now = self.timeline.recorded_us();
         let series = self.series.get_mut(stamp.series)?;
+        let stands = series.still_at == now && series.last_us.is_some_and(|last| stamp.us <= last);
+        series.still = if stands { series.still.saturating_add(1) } else { 1 };
+        series.still_at = now;
         let goes_on = series.last_us.is_some_and(|last| stamp.us.saturating_sub(last) <= STEADY_US);
         series.steady = if goes_on { series.steady.saturating_add(1) } else { 0 };
         series.last_us = Some(stamp.us);
@@ -208,6 +217,11 @@ impl Clock {
         let last_us = self.series(stamp.series).last_us;
         stamp.us.saturating_add(STEP_BACK_US_MAX) < now
             && last_us.is_none_or(|last| stamp.us.saturating_add(DISORDER_US) >= last)
+    }
+
+    /// Whether the clock stands still, or runs backwards, as messages of this series tell it.
+    pub fn stands(&self, series: usize) -> bool {
+        self.series(series).still >= STILL_MIN
     }
 
     /// Whether messages of a series came again and again until now.

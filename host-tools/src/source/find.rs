@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::format::{KNOWN, detect, hint, is_recording, start_of};
-use super::recording::Place;
+use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
+use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, is_part};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::sessions::Sessions;
@@ -99,6 +99,12 @@ impl Found {
                 "--system is for a recording of several vehicles; {} is a log of HUMS, which is of the one that was judged on board",
                 own.title
             )));
+        }
+        let files = self.places.iter().filter(|_| system.is_some()).filter_map(Place::path);
+        for path in files {
+            if format_of(&start_of(path)).is_some_and(|format| !format.is_of_link()) {
+                return Err(of_one_vehicle(&path.display().to_string()));
+            }
         }
         self.places.iter_mut().for_each(|place| place.system = system);
         Ok(self)

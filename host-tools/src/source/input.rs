@@ -4,14 +4,14 @@
 //! soon end the input; [`Progress::damage`] then says where and why.
 
 use std::fs::File;
-use std::io::{self, BufReader, Cursor, Read};
+use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::{Context as _, Result};
-use flate2::bufread::MultiGzDecoder;
+use flate2::bufread::GzDecoder;
 
 use super::stream::read_some;
 use crate::archive::GZIP;
@@ -95,7 +95,7 @@ impl Input {
         let compressed = start == GZIP;
         let whole = Cursor::new(start).chain(counted);
         let inner: Box<dyn Read + Send> = if compressed {
-            Box::new(MultiGzDecoder::new(BufReader::with_capacity(BUFFER_BYTES, whole)))
+            Box::new(Members(Some(GzDecoder::new(BufReader::with_capacity(BUFFER_BYTES, whole)))))
         } else {
             Box::new(whole)
         };
@@ -154,6 +154,35 @@ fn read_start(input: &mut impl Read, bytes: usize) -> io::Result<Vec<u8>> {
     Ok(start)
 }
 
+/// The members of a gzip file, one after the other. Zeros behind one are padding, as of a tape or a block device: `gzip` passes over
+/// them too.
+struct Members<R>(Option<GzDecoder<R>>);
+
+impl<R: BufRead> Read for Members<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if buffer.is_empty() {
+            return Ok(0);
+        }
+        while let Some(member) = &mut self.0 {
+            let got = member.read(buffer)?;
+            if got > 0 {
+                return Ok(got);
+            }
+            let is_end = loop {
+                let rest = member.get_mut().fill_buf()?;
+                let zeros = rest.iter().take_while(|&&byte| byte == 0).count();
+                if zeros == 0 {
+                    break rest.is_empty();
+                }
+                member.get_mut().consume(zeros);
+            };
+            let rest = self.0.take().filter(|_| !is_end);
+            self.0 = rest.map(|member| GzDecoder::new(member.into_inner()));
+        }
+        Ok(0)
+    }
+}
+
 /// Counts what is taken.
 struct Counted<R> {
     inner: R,
@@ -201,6 +230,9 @@ mod tests {
         let plain = sample();
         assert_eq!(read(plain.clone()), (plain.clone(), None));
         assert_eq!(read(packed(&plain)), (plain.clone(), None));
+        let padded = [packed(&plain), vec![0; 100_000]].concat();
+        assert_eq!(read(padded.clone()), (plain.clone(), None), "padding");
+        assert!(read([padded, vec![1]].concat()).1.is_some(), "what is behind it");
         let two = [packed(&plain), packed(b"more")].concat();
         assert_eq!(read(two), ([&plain[..], b"more"].concat(), None), "members follow each other");
         assert_eq!(read(Vec::new()), (Vec::new(), None));

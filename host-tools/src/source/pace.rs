@@ -1,16 +1,18 @@
 //! Whether a recording's clock runs, asked all along and by one rule for all formats.
 //!
 //! A clock that stops, is zero from some place on, or tells milliseconds as microseconds, makes a recording of which hours
-//! seem to be a moment: no check has time to see anything, and nothing would seem wrong. Three things tell it:
+//! seem to be a moment: no check has time to see anything, and nothing would seem wrong. Four things tell it:
 //!
 //! | what | against what |
 //! |---|---|
 //! | how many bytes were recorded within the time | no logger and no link writes 4 MiB a second for long |
 //! | another clock in the messages (UTC of a receiver) | a recording's clock that is a hundred times slower is none |
+//! | messages of one kind that tell no later time, a hundred in a row | a kind is told again when time has passed |
 //! | how often the clock fell in a row | one that falls eight times with less than five seconds between runs backwards |
 
 use hums_core::time::{Instant, Span};
 
+use super::clock::Wrong;
 use super::item::{Cause, Gap};
 
 /// Bytes a second that nothing records: the fastest logs, of all inertial samples on an autopilot's card, have a quarter of it.
@@ -32,7 +34,8 @@ const BETWEEN: Span = Span::from_secs(5);
 /// Follows a recording's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pace {
-    /// The latest time.
+    /// The first and the latest time.
+    first: Option<Instant>,
     last: Option<Instant>,
     /// Where the latest message stands.
     place: u64,
@@ -51,6 +54,7 @@ impl Pace {
     /// A message that stands here was recorded at this time, and so many bytes of messages since the last call.
     pub fn at(&mut self, now: Instant, place: u64, bytes: u64) {
         self.place = place;
+        self.first.get_or_insert(now);
         let Some(before) = self.last.replace(now) else { return };
         let passed = now.since(before).as_micros();
         let room = passed.saturating_mul(BYTES_PER_S) / 1_000_000;
@@ -97,9 +101,21 @@ impl Pace {
         }
     }
 
+    /// The clock stands still ([`super::clock::Clock::stands`]) at this message.
+    pub fn stood(&mut self, now: Instant, place: u64) {
+        self.stands.get_or_insert((now, place));
+    }
+
     /// Another recording begins.
     pub fn begin_another(&mut self) {
-        *self = Self { stands: self.stands, ..Self::default() };
+        *self = Self { first: self.first, stands: self.stands, ..Self::default() };
+    }
+
+    /// What is wrong with the recorded times, once all has been read: single ones, and the clock. Where the clock never ran, nobody
+    /// knows which of the times are wrong.
+    pub fn gaps(&self, wrong: &Wrong) -> impl Iterator<Item = Gap> + use<> {
+        let never_ran = self.stands.is_some() && self.first == self.last;
+        wrong.gap().filter(|_| !never_ran).into_iter().chain(self.gap())
     }
 
     /// What is wrong with the clock, once all has been read.

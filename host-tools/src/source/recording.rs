@@ -14,6 +14,7 @@ use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::{dataflash, ulog};
 use crate::logs::Log;
+use crate::outcome::usage;
 
 pub use super::format::{Format, format_of};
 
@@ -114,8 +115,18 @@ impl Place {
                 }
             }
         };
+        if self.system.is_some() && !recording.format.is_of_link() {
+            return Err(of_one_vehicle(&self.title));
+        }
         Ok(Recording { system: self.system, ..recording })
     }
+}
+
+/// Why there is no choice of a vehicle in an autopilot's own log.
+pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
+    usage(format!(
+        "--system is for a recording of several vehicles; {title} is an autopilot's own log, which is of one"
+    ))
 }
 
 /// A recording, open at its beginning.
@@ -138,6 +149,9 @@ impl Recording {
             bail!("{name}: {what}");
         }
         let Some(format) = detect(&start) else {
+            if let Some(words) = input.progress().damage().filter(|_| start.is_empty()) {
+                bail!("{name}: {words}");
+            }
             if start.is_empty() {
                 bail!("{name}: is empty");
             }
@@ -194,6 +208,16 @@ pub(super) mod tests {
         fmt.resize(89, 0);
         let message = |time: u64| [&[0xa3, 0x95, 150][..], &time.to_le_bytes(), &[1, 0]].concat();
         (fmt, (0..200_u64).flat_map(|second| message(second * 1_000_000)).collect())
+    }
+
+    #[test]
+    fn a_gzip_file_that_is_cut_in_its_header_is_not_called_empty() {
+        let header = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
+        for bytes in [&header[..], &header[..5]] {
+            let input = Input::new(Cursor::new(bytes.to_vec())).expect("memory");
+            let words = Recording::new(input, "cut.gz").err().map(|error| error.to_string());
+            assert!(words.as_ref().is_some_and(|words| words.contains("ends too soon")), "{words:?}");
+        }
     }
 
     #[test]

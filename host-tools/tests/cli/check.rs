@@ -260,6 +260,8 @@ fn a_recording_of_two_vehicles_is_told_as_that() {
     let screen = text(&attempt(dir.path(), "check both.tlog"));
     assert!(screen.contains(words) && screen.contains("), system 1 (ArduPilot"), "{screen}");
     assert!(json(&attempt(dir.path(), "check --json both.tlog"))["remarks"][0].as_str().is_some());
+    let info = text(&attempt(dir.path(), "info both.tlog"));
+    assert!(info.contains(words), "{info}");
     // Two recordings of one command are two logs.
     fs::write(dir.path().join("one.tlog"), &both[0]).expect("written");
     fs::write(dir.path().join("two.tlog"), &both[1]).expect("written");
@@ -505,6 +507,8 @@ fn what_a_logger_itself_lost_is_said_and_is_no_damage_to_any_command() {
     let info = text(&run(dir.path(), "info drop.ulg", 0));
     assert!(info.contains("1 that the recorder itself lost"), "{info}");
     run(dir.path(), "report drop.ulg -o page.html", 0);
+    // It is of one vehicle.
+    run(dir.path(), "check --system 1 drop.ulg", 2);
     let output = run(dir.path(), "decode drop.ulg -o out --format csv", 0);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("lost something 1 time"), "{told}");

@@ -44,6 +44,8 @@ pub(super) struct When {
     pub(super) boot_us: Option<u64>,
     /// What its own time is worth.
     pub(super) own: Own,
+    /// The clock stands still, as messages of this type tell it.
+    pub(super) stands: bool,
 }
 
 /// What a message's own time is worth.
@@ -108,12 +110,13 @@ impl Clock {
         let reading = self.times.take(stamp, |asks| ahead.stamps(formats, week, asks));
         let Reading::Sound(moment) = reading else { return self.as_before(boot_us, Own::Wrong) };
         self.silence = Some(before).filter(|before| !moment.restarted && moment.at.since(*before) > SILENCE);
-        When { at: moment.at, restarted: moment.restarted, boot_us, own: Own::Sound }
+        let stands = self.times.stands(stamp.series);
+        When { at: moment.at, restarted: moment.restarted, boot_us, own: Own::Sound, stands }
     }
 
     /// Written with the message before it.
     fn as_before(&self, boot_us: Option<u64>, own: Own) -> When {
-        When { at: self.now(), restarted: false, boot_us, own }
+        When { at: self.now(), restarted: false, boot_us, own, stands: false }
     }
 
     /// How times of the week are told.

@@ -383,6 +383,10 @@ impl<'w> Session<'w> {
             if let Some(week_us) = receiver_us(&message) {
                 pace.witness(when.at, week_us);
             }
+            // Parameters come all at once; what is measured does not.
+            if when.stands && handlers.of(format).is_some_and(|resolved| !resolved.handler.is_said) {
+                pace.stood(when.at, place);
+            }
         }
         if when.own == Own::Wrong {
             wrong.add(when.at, place);
@@ -494,7 +498,7 @@ impl<'w> Session<'w> {
 
     /// What was read.
     pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
-        for gap in self.wrong.gap().into_iter().chain(self.pace.gap()) {
+        for gap in self.pace.gaps(&self.wrong) {
             take(self.clock.now(), Item::Gap(&gap))?;
         }
         let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();

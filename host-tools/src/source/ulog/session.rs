@@ -124,6 +124,8 @@ struct Session<'a, 'b> {
     /// The words that were told last: a topic and a logged string may have the same.
     last_words: String,
     wrong: Wrong,
+    /// Bytes that may be looked at for further jumps of the time.
+    asked_left: usize,
     pace: Pace,
 }
 
@@ -156,6 +158,7 @@ impl<'a, 'b> Session<'a, 'b> {
             strays: (0, 0),
             last_words: String::new(),
             wrong: Wrong::default(),
+            asked_left: times::ASKED_BYTES,
             pace: Pace::default(),
         }
     }
@@ -199,7 +202,7 @@ impl<'a, 'b> Session<'a, 'b> {
                 format!("no appended data at {place}, which the header names: the file ends before it");
             self.gap(Cause::Cut, Some(place), 0, words)?;
         }
-        for gap in self.wrong.gap().into_iter().chain(self.pace.gap()) {
+        for gap in self.pace.gaps(&self.wrong) {
             self.tell(Item::Gap(&gap))?;
         }
         self.tell_facts()?;
@@ -339,6 +342,9 @@ impl<'a, 'b> Session<'a, 'b> {
         };
         let recorded = recorded.filter(|_| !is_wrong);
         self.pace.at(self.clock.now(), place, bytes as u64);
+        if stamp.is_some_and(|stamp| !is_wrong && self.clock.stands(stamp.series)) {
+            self.pace.stood(self.clock.now(), place);
+        }
         let (now, latest) = (self.clock.now(), self.recorded());
         let Some(subscription) = self.subscriptions.get_mut(id) else { return Ok(()) };
         if let Some(table) = &subscription.table {
@@ -371,8 +377,8 @@ impl<'a, 'b> Session<'a, 'b> {
     /// Takes the time of the message at hand: whether it is wrong. Wrong ones are counted, except those of a topic that
     /// PX4 keeps over a boot, until it tells the time of this one.
     fn time(&mut self, stamp: Stamp, place: u64, after: &[u8]) -> Result<bool> {
-        let subscriptions = &self.subscriptions;
-        let ahead = |asks: &dyn Fn(Stamp) -> bool| times::ahead(subscriptions, after, asks);
+        let (subscriptions, left) = (&self.subscriptions, &mut self.asked_left);
+        let ahead = |asks: &dyn Fn(Stamp) -> bool| times::ahead(subscriptions, after, left, asks);
         match self.clock.take(stamp, ahead) {
             Reading::Sound(moment) if moment.restarted => {
                 self.pace.fell(moment.at);

@@ -2,6 +2,8 @@
 
 use super::message::MESSAGE_BYTES_MAX;
 use super::testing::{Writer, read, try_read};
+use super::times;
+use super::topics::Subscriptions;
 use crate::source::item::Cause;
 
 const SECOND: u64 = 1_000_000;
@@ -413,4 +415,30 @@ fn a_clock_that_does_not_run_from_some_place_on_is_told() {
     assert!(of(&|tick| if tick < 4_000 { sound(tick) } else { 0 }), "zeros");
     assert!(of(&|tick| if tick < 4_000 { sound(tick) } else { u64::MAX }), "ones");
     assert!(of(&|tick| if tick < 4_000 { sound(tick) } else { sound(tick) / 1_000 }), "milliseconds");
+}
+
+#[test]
+fn what_is_looked_at_for_jumps_of_the_time_has_an_end() {
+    let log = [0x08, 0, b'S', 0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12].repeat(20);
+    let (subscriptions, mut left) = (Subscriptions::default(), 150);
+    let mut ahead = || (times::ahead(&subscriptions, &log, &mut left, &|_| true).is_end, left);
+    assert_eq!(ahead(), (true, 0), "a log of 220 bytes");
+    assert_eq!(ahead(), (false, 0), "nobody looks any more");
+}
+
+#[test]
+fn a_clock_that_stands_or_runs_backwards_is_told_in_a_log_of_any_size() {
+    let gaps = |time: &dyn Fn(u64) -> u64| {
+        let mut writer = Writer::new(SECOND).format(POSITION).subscribe(0, 0, "position");
+        for number in 0..400 {
+            writer = writer.data(0, time(number), &position(0.0, 0));
+        }
+        read(&writer.bytes).gaps.iter().map(|gap| gap.cause).collect::<Vec<_>>()
+    };
+    assert_eq!(gaps(&|_| 2 * SECOND), [Cause::NoTimes]);
+    assert_eq!(gaps(&|number| 900 * SECOND - number * 100_000), [Cause::NoTimes]);
+    assert_eq!(gaps(&|number| 2 * SECOND + number.min(250) * 10_000), [Cause::NoTimes]);
+    // Set back by less than a second, which is no jump.
+    let set = |number: u64| 2 * SECOND + number * 2_500 - if number < 100 { 0 } else { 900_000 };
+    assert_eq!(gaps(&set), []);
 }

@@ -18,6 +18,8 @@ const FIRST_BYTES: usize = 512 * 1024;
 pub(super) const AHEAD_BYTES: usize = 256 * 1024;
 /// No message for so long: what follows is erased memory, not part of the log. Longer than any message.
 const NOTHING_BYTES: usize = 2 * MESSAGE_BYTES_MAX;
+/// Bytes that are looked at for all jumps of a file together: each of a hostile one could ask for all that there may be.
+pub(super) const ASKED_BYTES: usize = 64 * 1024 * 1024;
 /// Messages after one that are looked at for their times.
 const MESSAGES_MAX: usize = 1_024;
 /// The series of texts; a topic's is its number and one.
@@ -34,8 +36,16 @@ pub(super) const fn of_text(us: u64) -> Stamp {
 }
 
 /// The next times that are asked for; what is damaged between them is passed over. A topic with the time zero tells none.
-/// (There are [`AHEAD_BYTES`] and the longest message, or `after` is all that there is.)
-pub(super) fn ahead(subscriptions: &Subscriptions, after: &[u8], asks: &dyn Fn(Stamp) -> bool) -> Ahead {
+/// (There are [`AHEAD_BYTES`] and the longest message, or `after` is all that there is.) So many bytes may be `left` to look at.
+pub(super) fn ahead(
+    subscriptions: &Subscriptions,
+    after: &[u8],
+    left: &mut usize,
+    asks: &dyn Fn(Stamp) -> bool,
+) -> Ahead {
+    if *left == 0 {
+        return Ahead::default();
+    }
     let fits = |id: u16, bytes: usize| subscriptions.fits(id, bytes);
     let parser = Parser { fits: &fits };
     let is_all = after.len() < AHEAD_BYTES;
@@ -56,10 +66,14 @@ pub(super) fn ahead(subscriptions: &Subscriptions, after: &[u8], asks: &dyn Fn(S
             }
             _ => match parser.find(rest, 1, is_all) {
                 Ok(skipped) => at += skipped,
-                Err(_) => break,
+                Err(none) => {
+                    *left = left.saturating_sub(none);
+                    break;
+                }
             },
         }
     }
+    *left = left.saturating_sub(at);
     let nothing = after.len() - last >= NOTHING_BYTES;
     Ahead { is_end: stamps.len() < ASKED && messages < MESSAGES_MAX && (is_all || nothing), stamps }
 }

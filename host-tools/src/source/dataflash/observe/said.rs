@@ -82,7 +82,7 @@ fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let Some(words) = given.text(0).filter(|words| !words.is_empty()) else { return };
     if let Some(craft) = Craft::of_firmware(&words) {
         firmware(state, craft, &words, out);
-        if let Some(version) = version_of(&words).filter(|_| state.facts.version == 0) {
+        if let Some(version) = version_of(&words).filter(|_| !state.identified) {
             identify(state, version, out);
         }
     } else if let Some(frame) = words.strip_prefix("Frame: ") {
@@ -107,7 +107,7 @@ fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
 }
 
 fn identify(state: &mut State, firmware: u32, out: &mut Out<'_>) {
-    state.facts.version = firmware;
+    (state.facts.version, state.identified) = (firmware, true);
     out.observe(&Observation::Identity(AutopilotIdentity { firmware, uid: 0 }));
 }
 

@@ -107,6 +107,8 @@ impl Facts {
 pub(in crate::source::dataflash) struct State {
     /// What the vehicle is.
     pub(super) facts: Facts,
+    /// Its version was handed on.
+    pub(super) identified: bool,
     /// Motors may turn, as far as that is known.
     pub(super) arming: Arming,
     pub(super) landed: LandedState,

@@ -525,3 +525,18 @@ fn a_log_is_detected_by_what_stands_in_it() {
     assert_eq!(detect(b"ArduCopter V3.1\r\n\nFMT, 128, 89, FMT"), Some(Form::Text));
     assert_eq!(detect(b"\x00\x00"), None);
 }
+
+#[test]
+fn the_version_that_a_message_tells_is_handed_on_where_no_ver_does() {
+    let mut log = Writer::new();
+    log.format(160, "MSG", "QZ", "TimeUS,Message");
+    log.message(1.0, "ArduCopter V4.5.1 (abcdef12)");
+    log.attitudes(1..9);
+    log.message(9.0, "ArduCopter V4.5.1 (abcdef12)");
+    let seen = seen(&log.bytes);
+    let told = seen.observations.iter().filter_map(|(_, observation)| match observation {
+        Observation::Identity(identity) => Some(identity.firmware >> 8),
+        _ => None,
+    });
+    assert_eq!(told.collect::<Vec<_>>(), [0x0004_0501]);
+}

@@ -206,3 +206,23 @@ fn milliseconds_are_told_by_the_receivers_time() {
     };
     assert_eq!((of(1), of(50), of(1_000)), (false, false, true));
 }
+
+#[test]
+fn a_clock_that_stands_is_told_in_a_log_of_any_size() {
+    for (us, count, stands) in
+        [(0, 150, true), (2_000_000, 150, true), (u64::MAX, 150, true), (2_000_000, 90, false)]
+    {
+        let mut log = begun();
+        log.format(160, "MSG", "QZ", "TimeUS,Message");
+        (0..2).for_each(|_| log.message(1.0, "Ready"));
+        (0..count).for_each(|_: u32| log.raw(150, &[&u64::to_le_bytes(us), &[0; 6]]));
+        let causes: Vec<Cause> = told(&log.bytes).0.into_iter().map(|(cause, _)| cause).collect();
+        assert_eq!(causes, vec![Cause::NoTimes; usize::from(stands)], "{us}");
+    }
+    let mut log = begun();
+    log.format(161, "PARM", "QNf", "TimeUS,Name,Value");
+    tenths(&mut log, 10..20);
+    (0..300).for_each(|_| log.raw(161, &[&1_900_000_u64.to_le_bytes(), &[b'A'; 16], &[0; 4]]));
+    tenths(&mut log, 20..30);
+    assert_eq!(told(&log.bytes).0, [], "parameters come all at once");
+}
