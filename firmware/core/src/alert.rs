@@ -53,7 +53,7 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
 /// What the estimator's flags say (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`), where it had attitude and position before, and a
 /// receiver a fix. Bits that both have: 0 attitude, 3 and 4 position. PX4: 10 GPS glitch, 11 accelerometer error. ArduPilot: 15 GPS
 /// glitching, which it also sets where there is no GPS: indoors it flies by beacons, optical flow or vision.
-fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
+pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
     const PX4_GLITCH: u32 = 1 << 10;
     const PX4_ACCELEROMETER: u32 = 1 << 11;
     const ARDUPILOT_GLITCH: u32 = 1 << 15;

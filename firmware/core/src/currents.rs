@@ -10,13 +10,16 @@
 //!
 //! Where half of the motors that lift, or more, stand nearly still and the vehicle does not spin, its autopilot drives them there:
 //! a VTOL that turns against the wind stops its motors of one sense of rotation. A vehicle that lost two of four spins.
+//!
+//! A motor that turns at half of the others' speed or more, and slower than they do, is no lost one: its command was cut, as in hard
+//! braking, and it takes next to nothing until it has slowed down. One that is dead stands; one without its propeller turns faster.
 
 use core::ops::Range;
 
 use crate::latest::Reading;
 use crate::observation::{MOTORS_MAX, VehicleKind};
 use crate::time::{Instant, Span};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Motor, Vehicle};
 
 /// Currents that are older decide nothing.
 const FRESH: Span = Span::from_secs(2);
@@ -27,6 +30,8 @@ const THROTTLE_MIN: f32 = 0.2;
 /// From this part of the mean of the others a motor takes its share; below [`IDLE_PART`] it stands nearly still.
 const SHARE_PART: f32 = 0.3;
 const IDLE_PART: f32 = 0.1;
+/// A motor that turns so fast, as a part of the mean of the others, slows down because it was told to.
+const SLOWS_PART: Range<f32> = 0.5..0.9;
 /// 60 degrees a second: what lost two motors of four spins faster within a moment.
 const SPINS_RAD_S: f32 = 1.05;
 
@@ -82,12 +87,28 @@ impl Currents {
         }
         let own_a = current_a(now, vehicle, usize::from(motor))?;
         let part = Total::of(now, vehicle, lifting).part(now, vehicle, own_a)?;
-        if part < SHARE_PART && self.is_driven_so(now, vehicle) {
+        if part < SHARE_PART
+            && (self.slows_down(now, vehicle, usize::from(motor)) || self.is_driven_so(now, vehicle))
+        {
             return None;
         }
         // Measured when this motor told it: a value that is held is one sample.
         let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
         Some(Reading { at, value: part * 100.0 })
+    }
+
+    /// Whether a motor turns slower than the others that lift, and not much slower.
+    fn slows_down(&self, now: Instant, vehicle: &Vehicle, motor: usize) -> bool {
+        let lifting = self.lifts & !self.pushes;
+        let rpm = |motor: usize| {
+            let motor = vehicle.motors.get(motor).filter(|motor| is_fresh(now, motor))?;
+            motor.esc.rpm.map(|rpm| libm::fabsf(rpm.0)).filter(|rpm| rpm.is_finite())
+        };
+        let Some(own) = rpm(motor) else { return false };
+        let others = (0..MOTORS_MAX).filter(|other| *other != motor && lifting & (1 << other) != 0);
+        let (sum, count) =
+            others.filter_map(rpm).fold((0.0, 0_u8), |(sum, count), rpm| (sum + rpm, count + 1));
+        SLOWS_PART.contains(&(own * f32::from(count) / sum))
     }
 
     /// Whether half of the motors that lift stand nearly still and the vehicle does not spin.
@@ -108,8 +129,12 @@ impl Currents {
 /// What a motor takes, in amperes. Noise around zero may be negative.
 fn current_a(now: Instant, vehicle: &Vehicle, motor: usize) -> Option<f32> {
     let motor = vehicle.motors.get(motor)?;
-    let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= FRESH);
+    let fresh = is_fresh(now, motor);
     motor.esc.current.map(|current| current.0.max(0.0)).filter(|current| fresh && current.is_finite())
+}
+
+fn is_fresh(now: Instant, motor: &Motor) -> bool {
+    motor.moved_at.is_some_and(|at| now.since(at) <= FRESH)
 }
 
 /// What several motors take together.

@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | free fall | specific force below 0.3 g for `MIS_FALL_TIME`, and the throttle asks for thrust | on rotors |
 //! | impact | a shock above `MIS_IMPACT`, and the speed breaks off harder than legs take it or the vehicle lies on its side; then it is still | everywhere |
+//! | | a shock, and within 4 s it is overturned | on rotors |
 //! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
 //! | disarmed in the air | disarmed above `MIS_DISARM_H` or while it sinks; then it falls, sinks or goes on moving | everywhere |
@@ -255,6 +256,11 @@ impl Mishap {
                 }
                 self.doubt = None;
                 self.place = place;
+                // What turned over right after a shock hit something first.
+                if let Some(shock) = self.shock.filter(|_| kind == Kind::Overturned) {
+                    self.touch_mps = self.touch_mps.max(shock.sink_mps);
+                    self.see(now, Kind::Impact, shock.load_g);
+                }
                 Some(Change::Began(kind))
             }
             (State::Quiet, Some(kind)) => {

@@ -36,7 +36,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("esc_errors", "ESC_INFO: error count, a minute; wraps are no errors"),
     (
         "motor_loss",
-        "ESC_STATUS, ESC_TELEMETRY: current in percent of the mean of the others that lift, on rotors, throttle above 20 %; not where half of them stand nearly still and nothing spins: the autopilot stops them to turn",
+        "ESC_STATUS, ESC_TELEMETRY: current in percent of the mean of the others that lift, on rotors, throttle above 20 %; not where half of them stand nearly still and nothing spins: the autopilot stops them to turn; nor a motor that turns at 50 to 90 % of the others' speed, whose command was cut",
     ),
     (
         "motor_imbalance",

@@ -93,6 +93,24 @@ fn motors_that_idle_on_the_ground_are_not_compared() {
     assert_eq!(flies(&stands, &[2_200.0, 2_050.0, 2_900.0, 800.0], 0.0), []);
 }
 
+#[test]
+fn a_motor_whose_command_was_cut_is_not_lost_and_one_that_stands_or_has_no_propeller_is() {
+    let loses = |rpm: f32| {
+        told(|now_ms| {
+            // Hard braking: half a second and more without current, every 20 s.
+            let cut = now_ms >= 20_000 && now_ms % 20_000 < 1_500;
+            let mut escs = escs_of(&[5.0, if cut { 0.0 } else { 5.0 }, 5.0, 5.0]);
+            let speeds = [5_000.0, if cut { rpm } else { 5_000.0 }, 5_000.0, 5_000.0].map(Rpm);
+            escs.iter_mut().zip(speeds).for_each(|(esc, speed)| esc.rpm = Some(speed));
+            (Quad::healthy(), escs, 0.0)
+        })
+    };
+    assert_eq!(loses(3_900.0), []);
+    for rpm in [0.0, 1_500.0, 6_500.0] {
+        assert!(loses(rpm).contains(&("motor_loss", 1)), "{rpm}");
+    }
+}
+
 /// A quadplane in the air from 2 s on, and what it flies on.
 fn quadplane(now_ms: u64, vtol: VtolState) -> Quad {
     let landed = Some(if now_ms < 2_000 { LandedState::OnGround } else { LandedState::InAir });

@@ -3,10 +3,10 @@
 
 use std::collections::BTreeSet;
 
-use hums_core::alert::HOLDS;
+use hums_core::alert::{HOLDS, of_estimator};
 use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::health::{Level, checks};
-use hums_core::observation::{AutopilotIdentity, Heartbeat, Source, SystemStatus};
+use hums_core::observation::{AutopilotIdentity, Estimator, Heartbeat, Source, SystemStatus};
 use hums_core::params::{Param, Params};
 use hums_core::time::Instant;
 use hums_core::vehicle::BATTERIES_MAX;
@@ -24,6 +24,8 @@ pub(super) const FAILSAFE: &str = "autopilot_state";
 pub(super) struct Details {
     failsafes: String,
     sensors: u32,
+    /// What the estimator's flags doubt.
+    doubted: Option<Causes>,
     /// What the autopilot said last of each cause, and when.
     said: [Option<(Instant, String)>; Cause::COUNT],
     /// Batteries that are followed, in the order in which they came: component and id.
@@ -96,6 +98,12 @@ impl Details {
         let is_new = status.unhealthy.filter(|unhealthy| *unhealthy != self.sensors);
         self.sensors = is_new.unwrap_or(self.sensors);
         is_new.is_some()
+    }
+
+    /// The estimator says by its flags what it doubts.
+    pub(super) fn estimator(&mut self, estimator: &Estimator) -> bool {
+        let doubted = Some(of_estimator(estimator, true, true));
+        core::mem::replace(&mut self.doubted, doubted) != doubted
     }
 
     /// It says in words that something is wrong, or (`false`) no longer is.
@@ -197,6 +205,14 @@ impl Details {
         for bit in (0..u32::BITS).map(|bit| 1 << bit).filter(of) {
             states::sensors(bit).for_each(|name| problems.detail(check, name));
         }
+        let flag = match cause {
+            Cause::Gnss => "a glitch, by the estimator's flags",
+            Cause::Accelerometer => "in error, by the estimator's flags",
+            _ => "",
+        };
+        if !flag.is_empty() && self.doubted.is_some_and(|doubted| doubted.has(cause)) {
+            problems.detail(check, flag);
+        }
         let said = self.said.get(cause as usize).and_then(Option::as_ref);
         if let Some((at, words)) = said
             && problems.open_since(check).is_some_and(|since| since.since(*at) <= HOLDS)
@@ -279,6 +295,8 @@ pub(super) fn emergency(at: Instant, params: &Params) -> Vec<Finding> {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::observation::EstimatorScale;
+
     use super::*;
 
     #[test]
@@ -303,6 +321,33 @@ mod tests {
         let words = "more than one vehicle is in it: system 1 (ArduPilot), system 7 (ArduPilot); system 7 is judged: \
                      --system ID judges one of them alone";
         assert_eq!(details.remarks(Some(7)), [words]);
+    }
+
+    #[test]
+    fn an_alert_that_the_estimator_raised_by_a_flag_says_so() {
+        let (mut details, mut problems) = (Details::default(), Problems::default());
+        let check = Cause::Gnss.check();
+        let finding = Finding {
+            at: Instant::ZERO,
+            subsystem: hums_core::health::Subsystem::Navigation,
+            check: check.to_owned(),
+            instance: 0,
+            level: Level::Warning,
+            previous: Level::Ok,
+            value: 1.0,
+            limit: 0.5,
+            unit: String::new(),
+        };
+        problems.take(&finding, hums_core::time::Span::ZERO);
+        // Attitude and position; with PX4's glitch bit.
+        let estimator = |flags| Estimator { scale: EstimatorScale::TestRatio, flags, ..Estimator::default() };
+        assert!(details.estimator(&estimator(0b1_1001)));
+        details.tell(check, &mut problems);
+        assert!(details.estimator(&estimator(0b1_1001 | 1 << 10)));
+        assert!(!details.estimator(&estimator(0b1_1001 | 1 << 10)), "no news");
+        details.tell(check, &mut problems);
+        let found = problems.worst_first();
+        assert_eq!(found[0].details, ["a glitch, by the estimator's flags"]);
     }
 
     fn heartbeat() -> Heartbeat {

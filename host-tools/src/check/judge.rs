@@ -13,7 +13,7 @@ use hums_core::happening::Happening;
 use hums_core::health::{Scope, vocabulary};
 use hums_core::monitor::TICK;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
-use hums_core::observation::{Observation, Source, SystemStatus, VehicleKind};
+use hums_core::observation::{Estimator, Observation, Source, SystemStatus, VehicleKind};
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::{Instant, Span};
@@ -180,6 +180,7 @@ impl Judge {
                 self.advance(at);
                 match observation {
                     Observation::SystemStatus(status) => self.sensors(source, status),
+                    Observation::Estimator(estimator) => self.doubts(source, estimator),
                     Observation::Battery(battery) => self.details.battery(source, battery.id),
                     Observation::Heartbeat(heartbeat) => self.details.heartbeat(source, heartbeat),
                     Observation::Identity(identity) => self.details.identity(source, identity),
@@ -299,6 +300,14 @@ impl Judge {
             for cause in Cause::ALL {
                 self.tell(cause.check());
             }
+        }
+    }
+
+    /// The estimator says what it doubts.
+    fn doubts(&mut self, source: Source, estimator: &Estimator) {
+        if self.is_vehicle(source) && self.details.estimator(estimator) {
+            self.tell(Cause::Gnss.check());
+            self.tell(Cause::Accelerometer.check());
         }
     }
 

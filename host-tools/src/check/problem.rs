@@ -12,6 +12,9 @@ pub const LISTED_MAX: usize = 10_000;
 /// Parts that are followed at most: there are 140 of them, and a log may name what it likes.
 const FOLLOWED_MAX: usize = 1_000;
 
+/// A cause may be seen so much later than what it explains: figures are smoothed over 4 s, and limits are passed for 3 s and more.
+const SEEN_LATE: Span = Span::from_secs(10);
+
 /// Names of what a check was of: there are 32 sensors.
 const DETAILS_MAX: usize = 32;
 
@@ -158,20 +161,24 @@ impl Problems {
         }
     }
 
-    /// Looks for what explains what is wrong now: also what came later, since the consequence may be seen first.
+    /// Looks for what explains what is wrong now: also what came a little later, since the consequence may be seen first.
     fn explain(&mut self) {
-        let alarms: Vec<(String, Level)> = self
+        let alarms: Vec<(Instant, String, Level)> = self
             .open
             .values()
-            .filter(|followed| followed.since.is_some())
-            .map(|followed| (followed.problem.check.clone(), followed.level))
+            .filter_map(|followed| Some((followed.since?.0, followed.problem.check.clone(), followed.level)))
             .collect();
-        for followed in
-            self.open.values_mut().filter(|followed| followed.since.is_some() && followed.unexplained)
-        {
-            let alarms = alarms.iter().map(|(check, level)| (check.as_str(), *level));
+        for followed in self.open.values_mut().filter(|followed| followed.unexplained) {
+            let Some((since, _)) = followed.since else { continue };
+            let alarms = alarms
+                .iter()
+                .filter(|(cause_since, ..)| cause_since.since(since) <= SEEN_LATE)
+                .map(|(_, check, level)| (check.as_str(), *level));
             if let Some(cause) = because(&followed.problem.check, followed.level, alarms) {
-                followed.problem.because = Some(cause.to_owned());
+                // Of several times the one counts that had its worst level first.
+                if followed.problem.because.is_none() || followed.problem.at >= since {
+                    followed.problem.because = Some(cause.to_owned());
+                }
                 followed.unexplained = false;
             }
         }
@@ -313,6 +320,46 @@ mod tests {
         let explained = |cause: Option<&str>| ("ekf_variance".to_owned(), cause.map(str::to_owned));
         assert_eq!(because(None), [gps.clone(), explained(Some("gps_fix"))]);
         assert_eq!(because(Some(30)), [gps, explained(None)]);
+    }
+
+    #[test]
+    fn what_began_long_before_is_no_consequence() {
+        let because = |cause_at_s: u64| {
+            let mut problems = Problems::default();
+            for (check, at_s) in [("vibration", 10), ("sinking", cause_at_s)] {
+                let subsystem = if check == "sinking" { Subsystem::Mishap } else { Subsystem::Structure };
+                let check = check.to_owned();
+                let finding = Finding { subsystem, check, ..change(at_s, Level::Critical, 9.0) };
+                problems.take(&finding, Span::ZERO);
+            }
+            problems.end(Instant::from_millis(90_000), Span::ZERO);
+            let found = problems.worst_first();
+            found.iter().find(|one| one.check == "vibration").and_then(|one| one.because.clone())
+        };
+        assert_eq!(because(8), Some("sinking".to_owned()));
+        assert_eq!(because(15), Some("sinking".to_owned()), "seen late");
+        assert_eq!(because(72), None);
+    }
+
+    #[test]
+    fn what_was_wrong_several_times_stands_with_the_cause_of_the_first_one() {
+        let mut problems = Problems::default();
+        for (check, at_s, level) in [
+            ("ekf_variance", 10, Level::Warning),
+            ("gps_fix", 11, Level::Warning),
+            ("ekf_variance", 15, Level::Ok),
+            ("gps_fix", 16, Level::Ok),
+            ("sinking", 50, Level::Critical),
+            ("ekf_variance", 51, Level::Warning),
+        ] {
+            let subsystem = if check == "sinking" { Subsystem::Mishap } else { Subsystem::Navigation };
+            let check = check.to_owned();
+            problems.take(&Finding { subsystem, check, ..change(at_s, level, 1.0) }, Span::ZERO);
+        }
+        problems.end(Instant::from_millis(90_000), Span::ZERO);
+        let found = problems.worst_first();
+        let effect = found.iter().find(|one| one.check == "ekf_variance").expect("it was wrong");
+        assert_eq!((effect.times, effect.because.as_deref()), (2, Some("gps_fix")));
     }
 
     #[test]

@@ -44,8 +44,8 @@ const BATTERY: &[&str] =
     &["cell_voltage", "batt_remaining", "batt_fault", "batt_state", "battery_alert", "cell_deviation"];
 const LINKS: &[&str] = &["rc_alert", "gcs_alert", "heartbeat"];
 const ESTIMATOR: &[&str] = &["ekf_variance", "ekf_failsafe", "ekf_test_ratio", "ekf_climb", "ekf_alert"];
-/// What the autopilot does because of anything.
-const ACTS: &[&str] = &["failsafe_alert", "autopilot_state", "autopilot_alert"];
+/// What the autopilot does because of anything. A text that no table knows (`autopilot_alert`) may be of anything else, as of a kill switch.
+const ACTS: &[&str] = &["failsafe_alert", "autopilot_state"];
 
 /// What explains, and what it explains: the nearest to the cause first.
 const ROWS: &[(&[&str], &[&str])] = &[
@@ -170,6 +170,8 @@ mod tests {
         assert_eq!(why("accel_mismatch", Level::Warning), Some("vibration"));
         assert_eq!(why("accel_mismatch", Level::Critical), None, "worse than what would explain it");
         assert_eq!(why("cell_voltage", Level::Critical), None);
+        assert_eq!(why("failsafe_alert", Level::Critical), Some("gps_fix"));
+        assert_eq!(why("autopilot_alert", Level::Warning), None, "nobody knows what it says");
         assert_eq!(why("cell_voltage", Level::Stale), Some("heartbeat"));
         assert_eq!(why("ekf_failsafe", Level::Ok), None);
     }

@@ -238,7 +238,7 @@ vocabulary! {
     "ekf_failsafe" ArduPilot "estimator, two sensors", "", says "EKF failing", "LAND, MANUAL", needs "estimator variances";
     "The estimator did not trust two of compass, velocity and position: it could lose its position.";
     "Do not fly until compass and GNSS are checked.";
-    "ekf_compass" ArduPilot "estimator variance of the compass", "", says "EKF doubts compass", "", needs "estimator variances";
+    "ekf_compass" ArduPilot "estimator variance of the compass", "", says "EKF doubts compass", "", needs "estimator variance of the compass";
     "The estimator did not trust the compass."; "Check the compass, its calibration and currents or magnets near it.";
     "ekf_test_ratio" Px4 "estimator test ratio", "", says "EKF rejects a sensor", "LAND", needs "estimator test ratios";
     "The estimator rejected, or nearly rejected, a sensor."; "Look at compass, GNSS and vibration at that time.";
@@ -303,7 +303,7 @@ vocabulary! {
     "The autopilot said that an airspeed sensor had failed or could not be trusted.";
     "Check the pitot tube for water and dirt, its hoses and its calibration.";
     "gnss_alert" Said "autopilot's alert: GPS", "", says "autopilot warns: GPS", "FLY MANUALLY", needs "texts, events or health flags of the autopilot";
-    "The autopilot said that GPS was lost, jammed, spoofed or not to be trusted.";
+    "The autopilot said that GPS was lost or not to be trusted: a glitch, jamming or spoofing.";
     "Check the antenna's view, wiring and sources of interference.";
     "ranging_alert" Said "autopilot's alert: rangefinder", "", says "autopilot warns: rangefinder", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a rangefinder, optical flow, vision or proximity sensor had failed.";

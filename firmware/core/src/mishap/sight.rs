@@ -143,7 +143,9 @@ impl Mishap {
                 sink_mps: self.sink.greatest(),
                 stopped: false,
             });
-            self.shock = Some(Shock { load_g: shock.load_g.max(load_g), ..shock });
+            // The greatest of several: what hits something bounces.
+            let greatest_g = self.shock.map_or(load_g, |before| before.load_g.max(load_g));
+            self.shock = Some(Shock { load_g: greatest_g, ..shock });
             let pulled_out = !on_rotors(at, vehicle) && load_g <= PULL_OUT_G;
             if matches!(self.state, State::Going(_)) && !pulled_out {
                 self.see(at, Kind::Impact, load_g);

@@ -18,6 +18,32 @@ fn a_quad_that_lies_on_its_back_has_crashed_whatever_its_estimator_says() {
     assert_eq!(outcome.flights(), (1, 0, 1), "{:?}", outcome.changes);
 }
 
+/// Turns over between two bounces; its rotors are turned as fast as a second later.
+fn turns_over(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    if (1_000..3_000).contains(&ms) {
+        (quad.roll, motion.rates) = (2.5, [3.0, 0.5, 0.0]);
+    }
+}
+
+#[test]
+fn what_turns_over_after_a_shock_hit_something_first_with_its_greatest_shock() {
+    for of in ROTORS {
+        assert_eq!(fly(&hovering(of), turns_over).told(), ["overturned"], "{of:?}");
+        let outcome = fly(&hovering(of), |ms, quad, motion| {
+            turns_over(ms, quad, motion);
+            motion.load_g = match ms {
+                0..100 => 11.0,
+                1_400..1_500 => 4.0,
+                _ => 1.0,
+            };
+        });
+        let told = |check: &str| outcome.findings.iter().find(|finding| finding.check == check).copied();
+        let (impact, over) = (told("impact").expect("hit"), told("overturned").expect("over"));
+        assert!((impact.value - 11.0).abs() < 0.1, "{of:?}: {impact:?}");
+        assert_eq!(impact.at, over.at, "{of:?}");
+    }
+}
+
 #[test]
 fn a_wreck_that_is_carried_home_armed_flies_no_more() {
     for of in ROTORS {
