@@ -106,7 +106,7 @@ impl<T: Logged> Followed<T> {
         let is_whole = ending.summary.first_number == Some(0);
         let is_first = is_whole || ending.summary.keep.is_some_and(|keep| keep.from == 0);
         let waited = numbers_waited(ending, 0, Instant::ZERO);
-        let is_next = number <= waited.saturating_add(1);
+        let is_next = (1..=waited.saturating_add(1)).contains(&number);
         // A log that begins later came with its vehicle from another card, and may have lost what it found on this one.
         let is_here = is_whole || !self.sessions.has_older(card, number);
         if before.found == Found::Nothing && is_first && !is_next && is_here {
@@ -122,9 +122,12 @@ impl<T: Logged> Followed<T> {
         // older than this one, and then the one before is not there either.
         let is_there = self.sessions.numbers(card, before.session).contains(&before.number);
         let is_absent = is_first && is_there && self.sessions.absent(card, before.number, number) > waited;
+        // The start would have found what was recorded between the two: it is of a clone of the card.
+        let is_of_clone =
+            is_whole && is_there && self.sessions.has_other(card, before.number, number, session);
         // Files without a sector lie between the two at most.
         let is_far = is_whole && number - before.number > LOOKED_AT_MAX;
-        (is_absent || is_far).then_some(Misnamed::Ahead { before: before.number })
+        (is_absent || is_far || is_of_clone).then_some(Misnamed::Ahead { before: before.number })
     }
 
     /// How a log follows the one before it of the same power-on.
@@ -458,6 +461,11 @@ mod tests {
         assert_eq!(misnamed("00002", 0, None, nothing, 0, true), Some(Misnamed::First));
         assert_eq!(misnamed("00002", 70, Some(0), nothing, 0, true), Some(Misnamed::First));
         assert_eq!(misnamed("00001", 0, None, nothing, 0, true), None);
+        assert_eq!(
+            misnamed("00000", 0, None, nothing, 0, true),
+            Some(Misnamed::First),
+            "numbers begin with 1"
+        );
         assert_eq!(misnamed("00002", 70, Some(60), nothing, 0, true), None);
         assert_eq!(misnamed("00005", 0, None, nothing, 0, false), Some(Misnamed::First), "another card's");
         assert_eq!(misnamed("00005", 70, Some(70), nothing, 0, false), None, "another card was in the box");
@@ -468,6 +476,18 @@ mod tests {
         assert_eq!(misnamed("00006", 70, Some(0), frames, 4, false), Some(Misnamed::Ahead { before: 4 }));
         assert_eq!(misnamed("00005", 70, Some(0), frames, 4, false), None);
         assert_eq!(misnamed("00006", 70, Some(60), frames, 4, false), None);
+        // Another session was recorded between them: on the card of which this one's was a copy.
+        sector.seal(8);
+        fs::write(dir.path().join("00005_00.HUM"), sector.bytes()).expect("room");
+        let more = find(&[dir.path().to_owned()], false).expect("a folder");
+        let sessions = Sessions::of(more.logs.iter().map(|log| (log.name.as_str(), log)));
+        let mut log = Ending { name: format!("{card}/00006"), ..Ending::default() };
+        (log.summary.session, log.summary.first_number) = (Some(9), Some(0));
+        for (number, expected) in [(4, Some(Misnamed::Ahead { before: 4 })), (5, None)] {
+            let session = number + 3;
+            log.summary.marks.before = Some(Before { found: frames, number, session, ..Before::default() });
+            assert_eq!(Followed::<Ending>::new(sessions.clone()).misnamed(&log), expected);
+        }
         // Who waits takes a number more for each hundred files, which have 128 sectors or last for 5 s.
         assert_eq!(misnamed("00002", 12_800, Some(0), nothing, 0, true), None);
         assert_eq!(misnamed("00002", 12_799, Some(0), nothing, 0, true), Some(Misnamed::First));
