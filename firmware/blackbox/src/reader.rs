@@ -213,7 +213,7 @@ impl LogReader {
             match self.decoder.advance() {
                 Some(Ok(())) => return Some(self.item()),
                 Some(Err(error)) => {
-                    self.open(cause_of(error));
+                    self.open(error.into());
                 }
                 None => {}
             }
@@ -279,7 +279,7 @@ impl LogReader {
     }
 
     fn skipped(&mut self, header: &Header, error: GroupError) {
-        let gap = self.open(cause_of(error));
+        let gap = self.open(error.into());
         gap.sectors_skipped = gap.sectors_skipped.saturating_add(1);
         gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(u32::from(header.frames)));
     }
@@ -332,11 +332,13 @@ impl LogReader {
     }
 }
 
-const fn cause_of(error: GroupError) -> Cause {
-    match error {
-        GroupError::OutOfOrder => Cause::Missing,
-        GroupError::UnknownLayouts(hash) => Cause::UnknownLayouts(hash),
-        GroupError::Corrupt => Cause::Corrupt,
-        GroupError::Altered => Cause::Altered,
+impl From<GroupError> for Cause {
+    fn from(error: GroupError) -> Self {
+        match error {
+            GroupError::OutOfOrder => Self::Missing,
+            GroupError::UnknownLayouts(hash) => Self::UnknownLayouts(hash),
+            GroupError::Corrupt => Self::Corrupt,
+            GroupError::Altered => Self::Altered,
+        }
     }
 }

@@ -13,6 +13,7 @@ use hums_core::vehicle::BATTERIES_MAX;
 
 use super::problem::Problems;
 use crate::names::autopilot_name;
+use crate::source::item::AUTOPILOT;
 use crate::source::told::Finding;
 use crate::states;
 
@@ -52,8 +53,6 @@ struct Heard {
 
 /// `MAV_AUTOPILOT_INVALID`: what sends it is no autopilot.
 const NO_AUTOPILOT: u8 = 8;
-/// `MAV_COMP_ID_AUTOPILOT1`
-const AUTOPILOT: u8 = 1;
 
 /// Autopilots that are told apart.
 const TOLD_APART_MAX: usize = 32;
@@ -297,6 +296,7 @@ pub(super) fn emergency(at: Instant, params: &Params) -> Vec<Finding> {
 mod tests {
     use hums_core::observation::EstimatorScale;
 
+    use super::super::problem::tests::change;
     use super::*;
 
     #[test]
@@ -327,17 +327,8 @@ mod tests {
     fn an_alert_that_the_estimator_raised_by_a_flag_says_so() {
         let (mut details, mut problems) = (Details::default(), Problems::default());
         let check = Cause::Gnss.check();
-        let finding = Finding {
-            at: Instant::ZERO,
-            subsystem: hums_core::health::Subsystem::Navigation,
-            check: check.to_owned(),
-            instance: 0,
-            level: Level::Warning,
-            previous: Level::Ok,
-            value: 1.0,
-            limit: 0.5,
-            unit: String::new(),
-        };
+        let subsystem = hums_core::health::Subsystem::Navigation;
+        let finding = Finding { subsystem, check: check.to_owned(), ..change(0, Level::Warning, 1.0) };
         problems.take(&finding, hums_core::time::Span::ZERO);
         // Attitude and position; with PX4's glitch bit.
         let estimator = |flags| Estimator { scale: EstimatorScale::TestRatio, flags, ..Estimator::default() };

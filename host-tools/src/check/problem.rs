@@ -253,10 +253,11 @@ fn lasted((from, before): Since, at: Instant, gaps: Span) -> Span {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn change(at_s: u64, level: Level, value: f32) -> Finding {
+    /// The change of a battery's cell voltage to a level.
+    pub(in crate::check) fn change(at_s: u64, level: Level, value: f32) -> Finding {
         Finding {
             at: Instant::from_millis(at_s * 1000),
             subsystem: Subsystem::Power,

@@ -455,7 +455,7 @@ impl Stitch {
                 // All entries that its sectors say they complete were decoded, and not so many of each kind: a header is wrong.
                 let is_other = group.frames != group.frames_said;
                 if let Some(error) = group.error.or(is_other.then_some(GroupError::Corrupt)) {
-                    let gap = self.gap(cause_of(error));
+                    let gap = self.gap(error.into());
                     gap.frames = Some(group.frames_said.saturating_sub(group.frames));
                     gap.sectors_skipped += 1;
                 }
@@ -479,7 +479,7 @@ impl Stitch {
 
     /// Nothing of a group is given out.
     fn skip<C>(&mut self, group: &Decoded<C>) {
-        let gap = self.gap(group.error.map_or(Cause::Missing, cause_of));
+        let gap = self.gap(group.error.map_or(Cause::Missing, Cause::from));
         gap.sectors_skipped = gap.sectors_skipped.saturating_add(group.sectors);
         gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(group.frames_said));
     }
@@ -532,15 +532,6 @@ fn hand_on<C: Collect>(
         deliver.group(collected)?;
     }
     Ok(())
-}
-
-fn cause_of(error: GroupError) -> Cause {
-    match error {
-        GroupError::OutOfOrder => Cause::Missing,
-        GroupError::UnknownLayouts(hash) => Cause::UnknownLayouts(hash),
-        GroupError::Corrupt => Cause::Corrupt,
-        GroupError::Altered => Cause::Altered,
-    }
 }
 
 /// UTC at power-on, microseconds since 1970, where the log knows it anywhere: what it learned last counts for all.

@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 use std::io::Read;
 
+use super::item::AUTOPILOT;
 use super::pace::SLOWER;
 use super::timeline::STEP_BACK_US_MAX;
 use super::tlog::records::Records;
@@ -18,8 +19,6 @@ pub(super) const JOINT_US: u64 = 3_600_000_000;
 const TOLD_MS: i64 = 60_000;
 /// Messages are out of order by so much at most.
 const DISORDER_MS: i64 = 1_000;
-/// `MAV_COMP_ID_AUTOPILOT1`
-const AUTOPILOT: u8 = 1;
 
 /// `time_boot_ms` of an autopilot's `SYSTEM_TIME`, `ATTITUDE` and `GLOBAL_POSITION_INT`; zeros at the end of a payload are not sent.
 pub(super) fn boot_ms(frame: &hums_link::Frame<'_>) -> Option<u32> {

@@ -21,6 +21,9 @@ use hums_link::Frame;
 use super::told::Told;
 use crate::ending::Ending;
 
+/// The component that an autopilot is: `MAV_COMP_ID_AUTOPILOT1`.
+pub const AUTOPILOT: u8 = 1;
+
 /// What a recording holds.
 #[derive(Clone, Copy, Debug)]
 pub enum Item<'a> {
@@ -290,8 +293,6 @@ pub struct Want<'a> {
 impl Want<'_> {
     /// Whether what this source says is left out: it is another vehicle's autopilot.
     pub fn leaves_out(&self, source: Source) -> bool {
-        /// `MAV_COMP_ID_AUTOPILOT1`
-        const AUTOPILOT: u8 = 1;
         source.component == AUTOPILOT && self.system.is_some_and(|system| system != source.system)
     }
 }

@@ -10,12 +10,9 @@ use hums_link::packet::Fields;
 use hums_link::{Check, Frame, observe};
 
 use super::dataflash::is_firmware;
-use super::item::{About, Event, Fact, Item, Mode, Parameter, Take, Text, Want};
+use super::item::{AUTOPILOT, About, Event, Fact, Item, Mode, Parameter, Take, Text, Want};
 use crate::mavlink::ids::{EVENT, PARAM_VALUE, STATUSTEXT};
 use crate::statustext::{self, Texts};
-
-/// `MAV_COMP_ID_AUTOPILOT1`
-const AUTOPILOT: u8 = 1;
 
 /// Turns frames into items, in their order.
 #[derive(Debug, Default)]
