@@ -16,12 +16,22 @@ pub const NO_CARD_RETRY: Span = Span::from_millis(100);
 /// What one call did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Service {
-    /// Something was written, or formatted: call again at once.
+    /// Something was written, formatted or looked through: call again at once.
     Wrote,
     /// Nothing waits: call again when something does.
     Idle,
     /// There is no card to write to: call again in a while (the card is looked for once a second).
     NoCard,
+}
+
+impl Service {
+    /// What follows from what the recorder did.
+    const fn after(written: Written) -> Self {
+        match written {
+            Written::Done | Written::Searching => Self::Wrote,
+            Written::Later => Self::NoCard,
+        }
+    }
 }
 
 /// The recorder with its queue's other side.
@@ -48,16 +58,14 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         }
         if self.recorder.waiting() == 0 {
             // So that the card's state is known, and a session open, before there is anything to write.
-            if !self.recorder.ready(now) {
-                return Service::NoCard;
+            let ready = self.recorder.ready(now);
+            if ready == Written::Done {
+                self.recorder.idle();
+                return Service::Idle;
             }
-            self.recorder.idle();
-            return Service::Idle;
+            return Service::after(ready);
         }
-        match self.recorder.write(now) {
-            Written::Done => Service::Wrote,
-            Written::Later => Service::NoCard,
-        }
+        Service::after(self.recorder.write(now))
     }
 
     /// Answers one question about the logs on the card, if there is one; whether there was. To be called only when

@@ -11,6 +11,7 @@ use crate::chain::Chain;
 use crate::gate::{Gate, GateError, HeldBlocks};
 use crate::layout::{Layout, LayoutError};
 use crate::name::{EXTENSION, LogName};
+use crate::recorder::SEGMENT_BYTES_MAX;
 use crate::room::Room;
 use crate::status::{CardStatus, FatClock};
 
@@ -79,7 +80,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
             Err(why) => return Err((device, CardError::Foreign(why))),
         };
         let clock = FatClock(status);
-        let manager = VolumeManager::new_with_limits(Gate::new(device, layout, held), clock, 1);
+        let manager = VolumeManager::new_with_limits(Gate::new(device, layout, held, 0), clock, 1);
         match Self::open_root(&manager) {
             Ok((volume, root)) => Ok(Self {
                 manager: Some(manager),
@@ -125,13 +126,14 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(manager)
     }
 
-    /// Opens the volume anew, because the library remembers blocks that were changed or dropped behind its back.
-    fn reopen(&mut self) -> Result<(), CardError<D::Error>> {
+    /// Opens the volume anew, because the library remembers blocks that were changed or dropped behind its back. From cluster
+    /// `free_from` on are free ones; 0: as the card says.
+    fn reopen(&mut self, free_from: u32) -> Result<(), CardError<D::Error>> {
         self.open = None;
         let manager = self.manager.take().ok_or(CardError::Damaged)?;
         let device = manager.free().0.into_device();
-        let manager =
-            VolumeManager::new_with_limits(Gate::new(device, self.layout, self.held), self.clock, 1);
+        let gate = Gate::new(device, self.layout, self.held, free_from);
+        let manager = VolumeManager::new_with_limits(gate, self.clock, 1);
         let opened = Self::open_root(&manager);
         self.manager = Some(manager);
         (self.volume, self.root) = opened?;
@@ -152,11 +154,6 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Whether [`CardError::Full`] means that only a part of the card was searched: to try again searches more of it.
-    pub(crate) const fn may_have_room(&self) -> bool {
-        self.room.may_have_more()
-    }
-
     /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
@@ -172,7 +169,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
             gate.abort();
             Ok(())
         });
-        self.reopen()?;
+        self.reopen(0)?;
         made?;
         committed?;
         self.open(name)
@@ -181,13 +178,14 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     fn allocate(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
         let clusters = bytes.div_ceil(cluster_bytes).max(1);
+        // A card that logs fill is not searched.
+        if self.layout.clusters.saturating_sub(self.log_clusters()?) < clusters {
+            return Err(CardError::Full);
+        }
         let mut room = self.room;
         let found = self.manager()?.device(|gate| room.find(gate, clusters));
         self.room = room;
-        if found? {
-            // The library may remember a block of the FAT as it was.
-            self.reopen()?;
-        }
+        self.reopen(found?)?;
         let manager = self.manager()?;
         manager.device(|gate| gate.begin());
         let file = manager.open_file_in_dir(self.root, short_name(name)?, Mode::ReadWriteCreate)?;
@@ -242,7 +240,7 @@ impl<'a, D: BlockDevice> Card<'a, D> {
             change(entry);
             gate.write(&block, old.block)
         });
-        self.reopen()?;
+        self.reopen(0)?;
         Ok(changed?)
     }
 
@@ -346,11 +344,18 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         let counted = self.manager()?.device(|gate| room.count(gate));
         self.room = room;
         let Some(free) = counted? else { return Ok(None) };
-        let mut log_clusters = 0;
-        let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
-        self.logs(|entry| log_clusters += entry.bytes.div_ceil(cluster_bytes))?;
-        let room = u64::from(free) + u64::from(log_clusters);
+        let room = u64::from(free) + u64::from(self.log_clusters()?);
         Ok(Some((room * 1000 / u64::from(self.layout.clusters)).min(1000) as u32))
+    }
+
+    /// So many clusters at least the logs have. None has more than a segment can have, whatever its entry says.
+    fn log_clusters(&self) -> Result<u32, CardError<D::Error>> {
+        let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
+        let mut clusters = 0_u32;
+        self.logs(|entry| {
+            clusters = clusters.saturating_add(entry.bytes.min(SEGMENT_BYTES_MAX).div_ceil(cluster_bytes));
+        })?;
+        Ok(clusters)
     }
 }
 

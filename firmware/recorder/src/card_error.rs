@@ -18,6 +18,8 @@ pub enum CardError<E> {
     Damaged,
     /// No free clusters.
     Full,
+    /// Free clusters are still looked for: to try again looks further.
+    Searching,
     /// There is no such segment.
     NotFound,
     /// No segment is open.
@@ -33,6 +35,7 @@ impl<E: fmt::Debug> fmt::Display for CardError<E> {
                 write!(f, "the card's file system is damaged")
             }
             Self::Full => write!(f, "the card is full and holds no log to overwrite"),
+            Self::Searching => write!(f, "room on the card is still looked for"),
             Self::NotFound => write!(f, "there is no such log"),
             Self::NotOpen => write!(f, "no log is open"),
         }

@@ -75,6 +75,9 @@ struct Held {
     kind: Kind,
 }
 
+/// What the information sector has at which place (Microsoft, FAT32 File System Specification 1.03, "`FSInfo` Sector Structure").
+const INFO_SIGNATURES: [(usize, u32); 3] = [(0, 0x4161_5252), (484, 0x6141_7272), (508, 0xAA55_0000)];
+
 /// Blocks of log that are written with one command at most: the gain of more is small, and they take RAM.
 pub(crate) const BATCH_BLOCKS: usize = 8;
 
@@ -109,14 +112,16 @@ pub(crate) struct Gate<'a, D: BlockDevice> {
     transaction: Cell<bool>,
     discard: Cell<bool>,
     reads_left: Cell<u32>,
+    /// From which cluster on the library is to look for free ones; 0: as the information sector says.
+    free_from: u32,
     held: &'a HeldBlocks,
     /// What failed first in a transaction.
     failure: Cell<Option<D::Error>>,
 }
 
 impl<'a, D: BlockDevice> Gate<'a, D> {
-    /// A gate for a card whose layout was checked.
-    pub(crate) fn new(device: D, layout: Layout, held: &'a HeldBlocks) -> Self {
+    /// A gate for a card whose layout was checked. From cluster `free_from` on are free ones; 0: nobody has looked.
+    pub(crate) fn new(device: D, layout: Layout, held: &'a HeldBlocks, free_from: u32) -> Self {
         // What another gate left there is about another mount.
         held.metadata.borrow_mut().clear();
         Self {
@@ -125,6 +130,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             transaction: Cell::new(false),
             discard: Cell::new(false),
             reads_left: Cell::new(0),
+            free_from,
             held,
             failure: Cell::new(None),
         }
@@ -237,6 +243,9 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             self.for_bad_entries(block, at, |entry| entry.copy_from_slice(&0x0FFF_FFF7_u32.to_le_bytes()));
         } else if at == self.layout.info {
             self.correct_info(block);
+            if self.free_from > 0 {
+                block[492..496].copy_from_slice(&self.free_from.to_le_bytes());
+            }
         }
         Ok(())
     }
@@ -256,7 +265,11 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         }
     }
 
+    /// The information sector has hints only: a card on which it is damaged is as good as any.
     fn correct_info(&self, block: &mut Block) {
+        for (at, signature) in INFO_SIGNATURES {
+            block[at..at + 4].copy_from_slice(&signature.to_le_bytes());
+        }
         block[488..492].copy_from_slice(&u32::MAX.to_le_bytes());
         let hint = u32::from_le_bytes([block[492], block[493], block[494], block[495]]);
         if !(2..self.layout.clusters + 2).contains(&hint) {

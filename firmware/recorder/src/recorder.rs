@@ -47,6 +47,8 @@ const WRITE_TRIES: u32 = 8;
 pub enum Written {
     /// It is on the card.
     Done,
+    /// Room on the card is still looked for: keep it and call again at once.
+    Searching,
     /// There is no card to write it to now: keep it and try again later.
     Later,
 }
@@ -83,31 +85,34 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// Looks for a card if there is none, at most once a second. Whether a session is open now.
-    pub fn ready(&mut self, now: Instant) -> bool {
+    /// Looks for a card if there is none, at most once a second, and opens a session on it. [`Written::Done`]: one is open now.
+    pub fn ready(&mut self, now: Instant) -> Written {
         self.slot.begin_service();
-        if self.slot.is_mounted() {
-            return true;
-        }
-        if self.finished || now < self.retry_at {
-            return false;
-        }
-        self.retry_at = now + RETRY;
-        match self.slot.mount(self.status, self.held) {
-            Ok(true) => {}
-            Ok(false) => return false,
-            Err(error) => {
-                self.tell(&error);
-                return false;
+        if !self.slot.is_mounted() {
+            if self.finished || now < self.retry_at {
+                return Written::Later;
             }
+            self.retry_at = now + RETRY;
+            match self.slot.mount(self.status, self.held) {
+                Ok(true) => {}
+                Ok(false) => return Written::Later,
+                Err(error) => {
+                    self.tell(&error);
+                    return Written::Later;
+                }
+            }
+            (self.segments.is_open, self.room_known) = (false, false);
+            self.status.set_room_permille(None);
         }
-        self.room_known = false;
-        self.status.set_room_permille(None);
+        if self.segments.is_open {
+            return Written::Done;
+        }
         match self.begin(now) {
-            Ok(()) => true,
+            Ok(()) => Written::Done,
+            Err(CardError::Searching) => Written::Searching,
             Err(error) => {
                 self.give_up(now, &error);
-                false
+                Written::Later
             }
         }
     }
@@ -136,8 +141,9 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Writes sectors that were taken: the oldest, and with the same command those after it that belong right behind
     /// it. With none taken there is nothing to do, which is [`Written::Done`].
     pub fn write(&mut self, now: Instant) -> Written {
-        if !self.ready(now) {
-            return Written::Later;
+        match self.ready(now) {
+            Written::Done => {}
+            not => return not,
         }
         let Some(first) = self.sector(0) else { return Written::Done };
         self.await_group &= !first.starts_group();
@@ -156,6 +162,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
                     self.count_retries();
                     return Written::Done;
                 }
+                Err(CardError::Searching) => return Written::Searching,
                 Err(error) => {
                     self.count_retries();
                     if !matches!(error, CardError::Full) {
@@ -176,6 +183,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.count_retries();
         match moved {
             Ok(()) => Written::Done,
+            Err(CardError::Searching) => Written::Searching,
             Err(error) => {
                 self.lose(now, &error);
                 Written::Later
@@ -220,13 +228,13 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// The name of the segment in work.
     pub fn log_name(&self) -> Option<LogName> {
-        self.segments.log.filter(|_| self.slot.is_mounted()).map(|log| log.name)
+        self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open).map(|log| log.name)
     }
 
     /// The session that seals the sectors of the segment in work: what its block 0 holds until the first of them is
     /// written there is left over from an earlier session.
     pub fn log_session(&self) -> Option<u32> {
-        self.segments.log.filter(|_| self.slot.is_mounted()).map(|log| log.session)
+        self.segments.log.filter(|_| self.slot.is_mounted() && self.segments.is_open).map(|log| log.session)
     }
 
     /// The card, for serving stored logs; `None` while there is none.

@@ -7,8 +7,8 @@ use crate::chain::ENTRIES;
 use crate::claims::chain_again;
 use crate::gate::{Gate, GateError};
 
-/// FAT blocks that are looked through for one new segment beside its own: 64 ms of a usual card. All of a large card's FAT takes
-/// seconds, and frames wait meanwhile.
+/// FAT blocks that are looked through at a time, beside a segment's own: 64 ms of a usual card. All of a large card's FAT takes
+/// seconds, and no one service of the card may take so long.
 const SEARCH_BLOCKS: u32 = 128;
 /// FAT blocks, beside a segment's own, of which lost chains of logs are looked for with one walk over the directory.
 const CLAIM_BLOCKS: u32 = 8;
@@ -18,9 +18,11 @@ const CLAIM_BLOCKS: u32 = 8;
 pub(crate) struct Room {
     /// The FAT block to look at next; `None`: where the information sector says.
     next: Option<u32>,
-    /// FAT blocks looked through since some were found, and what free clusters they told of.
+    /// FAT blocks looked through since enough were found, and what free clusters they told of.
     searched: u32,
     found: u32,
+    /// From which cluster on these are.
+    first: u32,
     /// So many clusters, and so no more than that, were not there in all of the FAT: nothing but another computer
     /// makes clusters free.
     too_many: u32,
@@ -32,12 +34,7 @@ pub(crate) struct Room {
 
 impl Room {
     pub(crate) const fn new() -> Self {
-        Self { next: None, searched: 0, found: 0, too_many: u32::MAX, counted: 0, clusters: 0 }
-    }
-
-    /// Whether only a part of the FAT was searched: to try again searches more of it.
-    pub(crate) const fn may_have_more(&self) -> bool {
-        self.searched > 0
+        Self { next: None, searched: 0, found: 0, first: 0, too_many: u32::MAX, counted: 0, clusters: 0 }
     }
 
     /// Counts the free clusters of one more block of the FAT; how many there are once all of it is counted.
@@ -53,14 +50,18 @@ impl Room {
         Ok(None)
     }
 
-    /// Fails with [`CardError::Full`] unless that many clusters were found free. Asked before a segment is made, so
-    /// that one that does not fit leaves no half of a chain behind. Whether the FAT was changed meanwhile: what logs claim
-    /// of it is chained again before anything of it counts as free.
+    /// From which cluster on that many are free. Asked before a segment is made, so that one that does not fit leaves no half
+    /// of a chain behind. What logs claim of these is chained again before anything of it counts as free.
+    ///
+    /// # Errors
+    ///
+    /// [`CardError::Searching`] where a part of the FAT was looked through and the next call looks further;
+    /// [`CardError::Full`] where all of it was.
     pub(crate) fn find<D: BlockDevice>(
         &mut self,
         gate: &Gate<'_, D>,
         wanted: u32,
-    ) -> Result<bool, CardError<D::Error>> {
+    ) -> Result<u32, CardError<D::Error>> {
         if wanted >= self.too_many {
             return Err(CardError::Full);
         }
@@ -69,33 +70,36 @@ impl Room {
             Some(next) => next,
             None => hint(gate)? / ENTRIES,
         };
-        let (mut changed, mut looked_to) = (false, 0);
+        let mut looked_to = 0;
         for _ in 0..SEARCH_BLOCKS + wanted / ENTRIES {
             next %= fat_blocks;
             let mut free = free_in_block(gate, next)?;
             if free > 0 && (next >= looked_to || next == 0) {
                 let blocks = (CLAIM_BLOCKS + wanted / ENTRIES).min(fat_blocks - next);
                 if chain_again(gate, next, blocks)? {
-                    changed = true;
                     free = free_in_block(gate, next)?;
                 }
                 looked_to = next + blocks;
             }
+            if self.found == 0 {
+                self.first = (next * ENTRIES).max(2);
+            }
             self.found += free;
             if self.found >= wanted {
+                let first = self.first;
                 // This block may have some left for the next segment. What is counted changes under the count.
                 *self = Self { next: Some(next), too_many: self.too_many, ..Self::new() };
-                return Ok(changed);
+                return Ok(first);
             }
             next += 1;
             self.next = Some(next);
             self.searched += 1;
             if self.searched >= fat_blocks {
                 (self.searched, self.found, self.too_many) = (0, 0, wanted);
-                break;
+                return Err(CardError::Full);
             }
         }
-        Err(CardError::Full)
+        Err(CardError::Searching)
     }
 }
 

@@ -48,7 +48,12 @@ fn sectors(count: u32) -> Vec<Sector> {
 /// Gives a sector to the recorder and lets it write.
 fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sector) -> Written {
     assert!(recorder.waiting() > 0 || recorder.take(sector));
-    recorder.write(now)
+    loop {
+        match recorder.write(now) {
+            Written::Searching => {}
+            written => return written,
+        }
+    }
 }
 
 /// The sectors of one session that a card holds: (number, place) in the order of segments and blocks.
@@ -190,6 +195,48 @@ fn a_card_without_room_or_logs_is_told_full() {
     let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
     assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Later);
     assert_eq!(status.read().state, CardState::Full);
+}
+
+#[test]
+fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let record = |session: u32| {
+        let status = CardStatus::new();
+        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
+        recorder.finish();
+        status.read().segments_overwritten
+    };
+    // Six segments of 2.5 MiB are 240 blocks of the FAT, more than are looked through at once.
+    for session in 1..=6 {
+        assert_eq!(record(session), 0);
+    }
+    for hint in [2_u32, 3, 1000, 2500, u32::MAX] {
+        device.blocks.borrow_mut().get_mut(&2049).expect("the information sector")[492..496]
+            .copy_from_slice(&hint.to_le_bytes());
+        let before = device.reads.get();
+        assert_eq!(record(hint), 0, "hint {hint}");
+        // All of the FAT is 640 blocks, and each is looked at once or twice.
+        assert!(device.reads.get() - before < 2_000, "{} blocks read", device.reads.get() - before);
+    }
+    let mut names: Vec<_> = stored(&device).into_iter().map(|(name, ..)| name.session).collect();
+    names.dedup();
+    assert_eq!(names, (1..=11).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_card_whose_information_sector_is_damaged_records_and_has_a_whole_one_again() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let whole = device.blocks.borrow()[&2049];
+    device.blocks.borrow_mut().insert(2049, [0x5A; 512]);
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
+    let now = device.blocks.borrow()[&2049];
+    for place in [0..4, 484..488, 508..512] {
+        assert_eq!(now[place.clone()], whole[place]);
+    }
+    assert!(stored(&device).len() == 1, "what was recorded is read");
 }
 
 #[test]
@@ -448,7 +495,10 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let expected = Before { found: Found::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
         // A start whose power goes before its first sector: the same is found behind its empty segment.
-        assert!(Recorder::new(device.clone(), &CardStatus::new(), held(), 9).ready(Instant::ZERO));
+        assert_eq!(
+            Recorder::new(device.clone(), &CardStatus::new(), held(), 9).ready(Instant::ZERO),
+            Written::Done
+        );
         let again = found_at_next_start(&device);
         assert_eq!((again.session, again.sectors), (session, written.len() as u32));
     }
@@ -600,7 +650,7 @@ fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {
     drop(recorder);
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
-    assert!(recorder.ready(Instant::ZERO));
+    assert_eq!(recorder.ready(Instant::ZERO), Written::Done);
     recorder.idle();
     assert_eq!(status.take_before(), None, "there is no sector yet");
     assert_eq!(put(&mut recorder, Instant::ZERO, &all[0]), Written::Done);

@@ -37,6 +37,8 @@ pub(super) struct Segments<'a> {
     /// Any number that differs from one power-on to the next.
     entropy: u32,
     pub(super) log: Option<Log>,
+    /// The card in the slot has a segment of it.
+    pub(super) is_open: bool,
     /// The segments of a disarmed vehicle.
     pub(super) ring: Ring,
     /// The newest segment that was on the card before the session, until it was looked at.
@@ -45,7 +47,7 @@ pub(super) struct Segments<'a> {
 
 impl<'a> Segments<'a> {
     pub(super) const fn new(status: &'a CardStatus, entropy: u32) -> Self {
-        Self { status, entropy, log: None, ring: Ring::new(), earlier: None }
+        Self { status, entropy, log: None, is_open: false, ring: Ring::new(), earlier: None }
     }
 
     /// A number for a card that is formatted now.
@@ -78,11 +80,13 @@ impl<'a> Segments<'a> {
         };
         let before = self.log.replace(log);
         self.ring.clear();
-        if Some(log.name) == newest {
-            self.next(now, card)?;
-        } else {
-            self.open(now, log.name, card)?;
+        let opened =
+            if Some(log.name) == newest { self.next(now, card) } else { self.open(now, log.name, card) };
+        if let Err(error) = opened {
+            self.log = before;
+            return Err(error);
         }
+        self.is_open = true;
         if before.is_some() {
             self.status.want_group();
         }
@@ -173,22 +177,16 @@ impl<'a> Segments<'a> {
     ) -> Result<bool, CardError<D::Error>> {
         let bytes_max = if self.ring.is_on() { ring::SEGMENT_BYTES } else { SEGMENT_BYTES_MAX };
         let bytes = (card.layout().data_bytes() / SEGMENTS_MIN).min(u64::from(bytes_max)) as u32;
-        loop {
-            match card.create(name, bytes) {
-                Ok(()) => return Ok(false),
-                Err(CardError::Full) => {}
-                Err(error) => return Err(error),
-            }
-            if let Some(oldest) = survey(card, name)?.oldest {
-                self.look_before(card);
-                self.ring.forget(oldest.name);
-                card.recycle(&oldest, name)?;
-                return Ok(true);
-            }
-            if !card.may_have_room() {
-                return Err(CardError::Full);
-            }
+        match card.create(name, bytes) {
+            Ok(()) => return Ok(false),
+            Err(CardError::Full) => {}
+            Err(error) => return Err(error),
         }
+        let oldest = survey(card, name)?.oldest.ok_or(CardError::Full)?;
+        self.look_before(card);
+        self.ring.forget(oldest.name);
+        card.recycle(&oldest, name)?;
+        Ok(true)
     }
 }
 

@@ -18,14 +18,14 @@ pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
         CardError::Foreign(LayoutError::NotFat32(_) | LayoutError::Device(_)) => CardState::Foreign,
         CardError::Foreign(LayoutError::BadVolume(_)) | CardError::Damaged => CardState::Damaged,
         CardError::Full => CardState::Full,
-        CardError::NotFound | CardError::NotOpen => CardState::Failing,
+        CardError::NotFound | CardError::NotOpen | CardError::Searching => CardState::Failing,
     }
 }
 
 /// Whether a sector that met this error may still be written to this card now, to a new segment if need be.
 pub(super) fn may_work_elsewhere<D: CardDevice>(error: &CardError<D::Error>) -> bool {
     match error {
-        CardError::Full => false,
+        CardError::Full | CardError::Searching => false,
         CardError::Device(error) => D::trouble(error) == Trouble::Refusing,
         _ => true,
     }
