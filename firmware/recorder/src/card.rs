@@ -178,8 +178,8 @@ impl<'a, D: BlockDevice> Card<'a, D> {
     fn allocate(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {
         let cluster_bytes = self.layout.cluster_blocks * Block::LEN_U32;
         let clusters = bytes.div_ceil(cluster_bytes).max(1);
-        // A card that logs fill is not searched.
-        if self.layout.clusters.saturating_sub(self.log_clusters()?) < clusters {
+        // A card that logs and the directory fill is not searched.
+        if self.layout.clusters.saturating_sub(self.log_clusters()?).saturating_sub(1) < clusters {
             return Err(CardError::Full);
         }
         let mut room = self.room;

@@ -699,3 +699,18 @@ fn found_at_next_start(device: &MemCard) -> Before {
     device.blocks.replace(whole);
     status.take_before().expect("it was looked for")
 }
+
+#[test]
+fn a_card_that_logs_fill_is_not_searched() {
+    let device = MemCard::formatted(34 * MIB_BLOCKS);
+    for session in 0..18 {
+        let status = CardStatus::new();
+        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        let before = device.reads.get();
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
+        assert_eq!(status.read().segments_overwritten, u32::from(session >= 15));
+        // Its FAT has 540 blocks.
+        assert!(device.reads.get() - before < 300, "{} blocks read", device.reads.get() - before);
+        recorder.finish();
+    }
+}
