@@ -151,11 +151,13 @@ fn the_noise_flag_damages_as_much_as_it_says_and_all_of_it_is_counted() {
 }
 
 #[test]
-fn pure_noise_is_counted_and_is_no_flight() {
+fn noise_behind_a_frame_is_counted_and_is_no_flight() {
     let mut random = Random::new(11);
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("noise.raw");
-    let noise = random.bytes(3_000_000);
+    let clean = Clean::read("px4_hil_quad_low.tlog");
+    // Without one it is no recording.
+    let noise = [&clean.stream[clean.frames[0].clone()], &random.bytes(3_000_000)].concat();
     fs::write(&file, &noise).unwrap();
     let recording = Recording::make(Machine::Sim, &file, &[]);
     assert_eq!(recording.number("bytes_in"), noise.len() as u64);

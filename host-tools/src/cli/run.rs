@@ -17,14 +17,14 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
   hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
 
-Raw bytes carry no times: they come as on a line at 115,200 baud. --sd is kept: a second run adds a session to it; a file
-that is no card is refused. Where --gs or --tap fails the recording goes on (exit code 3).
+Raw bytes carry no times: they come as on a line at 115,200 baud. A file without a MAVLink frame is refused before anything
+is written. --sd is kept: a second run adds a session to it; a file that is no card is refused. Where --gs or --tap fails the recording goes on (exit code 3).
 A file of --gs or --tap must be new, or empty.";
 
 /// What `sim` and `emulate` share.
 #[derive(Args, Clone, Debug)]
 pub struct Run {
-    /// Where the autopilot's bytes come from: a file (tlog or raw MAVLink), `-`, udpin:, udpout:, tcp: or serial:
+    /// Where the autopilot's bytes come from: a file (tlog or raw MAVLink, also as .gz), `-`, udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub input: Endpoint,
     /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing

@@ -7,7 +7,7 @@ use std::io::IsTerminal as _;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 
 use crate::cli::{self, Dashboard, FaultFlags, Format};
 use crate::endpoint::Endpoint;
@@ -39,7 +39,7 @@ pub fn run(args: &cli::Demo) -> Result<Outcome> {
     // Each demo begins with an empty card.
     let parts = [InPlacePart::begin(&card)?, InPlacePart::begin(&gs)?];
     let [card_part, gs_part] = parts.each_ref().map(InPlacePart::path);
-    let recorded = match record_frames(&flight, card_part, gs_part) {
+    let recorded = match record(&flight, card_part, gs_part) {
         Ok(recorded) => recorded,
         Err(error) => {
             parts.iter().for_each(InPlacePart::discard);
@@ -135,6 +135,11 @@ fn shown(path: &Path) -> String {
 
 fn flight(args: &cli::Demo) -> Result<Endpoint> {
     if let Some(input) = &args.input {
+        if input.is_live() {
+            return Err(usage(format!(
+                "{input}: hums demo takes a recording; hums sim records what comes live"
+            )));
+        }
         return Ok(input.clone());
     }
     let flight: Option<PathBuf> =
@@ -145,17 +150,6 @@ fn flight(args: &cli::Demo) -> Result<Endpoint> {
             "hums demo shows a flight of the source tree, and this is outside of it; name a recording with --input",
         )),
     }
-}
-
-/// An error where nothing of the vehicle was recorded.
-fn record_frames(flight: &Endpoint, card: &Path, gs: &Path) -> Result<Outcome> {
-    let recorded = record(flight, card, gs)?;
-    for log in &logs::find(&[card.to_owned()], false)?.logs {
-        if Overview::of(log)?.ending.summary.frames > 0 {
-            return Ok(recorded);
-        }
-    }
-    bail!("{flight}: no MAVLink frame is in it; hums check says what a file is")
 }
 
 /// By the firmware on the model of its chip; where there is no image, by the same pipeline on this PC.

@@ -1,12 +1,15 @@
 //! What arrives at the autopilot UART, and when: the source, noise and all, cut into pieces that every machine takes.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
+use hums_link::{Check, Frame, Framer};
 
 use crate::cli::Run;
+use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output};
 use crate::made;
 use crate::outcome::Outcome;
@@ -16,10 +19,14 @@ use crate::source::{self, Chunk, Source, Timing};
 
 /// The most bytes that arrive at once: as much as the board's ring holds.
 pub const CHUNK_BYTES_MAX: usize = 2048;
+/// In so many bytes of standard input, which cannot be read twice, the first frame must be.
+const FIRST_BYTES_MAX: usize = 16 << 20;
 
 /// The stream of arrivals.
 pub struct Arrivals {
     source: Noisy<Box<dyn Source>>,
+    /// What was read of standard input to find its first frame.
+    first: VecDeque<Chunk>,
     name: String,
     waiting: VecDeque<Chunk>,
     tap: Beside,
@@ -30,7 +37,8 @@ pub struct Arrivals {
 
 impl Arrivals {
     /// As the command line says it; `tap` gets a copy of the bytes, and is none of the inputs. `prepare` is what else must be ready: done after a
-    /// stored input was found good, so that a slip leaves nothing behind, and before a live one, which waits for nobody.
+    /// stored input was found to have a MAVLink frame, so that a slip leaves nothing behind, and before a live one, which waits for
+    /// nobody.
     pub fn open<T>(
         run: &Run,
         tap: Option<(&Path, &Inputs)>,
@@ -45,9 +53,25 @@ impl Arrivals {
     }
 
     fn new(run: &Run, tap: Option<(&Path, &Inputs)>) -> Result<Self> {
-        let (source, autopilot) = source::open_both(&run.input, Timing { line_rate: run.faults.line_rate })?;
+        let timing = Timing { line_rate: run.faults.line_rate };
+        if let Endpoint::File(_) = run.input {
+            // Read again from its beginning below: any amount may come before the first frame.
+            until_frame(&mut *source::open(&run.input, timing)?, &run.input, |_| true)?;
+        }
+        let (source, autopilot) = source::open_both(&run.input, timing)?;
+        let mut source = Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed);
+        let mut first = VecDeque::new();
+        if run.input == Endpoint::Standard {
+            let mut bytes = 0;
+            until_frame(&mut source, &run.input, |chunk| {
+                bytes += chunk.bytes.len();
+                first.push_back(chunk);
+                bytes < FIRST_BYTES_MAX
+            })?;
+        }
         Ok(Self {
-            source: Noisy::new(source, run.faults.noise.unwrap_or(0.0), run.faults.seed),
+            source,
+            first,
             name: run.input.to_string(),
             waiting: VecDeque::new(),
             tap: tap.map_or_else(|| Ok(Beside::nowhere()), |(path, inputs)| tap_of(path, inputs))?,
@@ -62,7 +86,11 @@ impl Arrivals {
             return Ok(Some(chunk));
         }
         let context = || format!("{}: cannot be read", self.name);
-        let Some(chunk) = self.source.next().with_context(context)? else { return Ok(None) };
+        let next = match self.first.pop_front() {
+            Some(chunk) => Some(chunk),
+            None => self.source.next().with_context(context)?,
+        };
+        let Some(chunk) = next else { return Ok(None) };
         self.bytes += chunk.bytes.len() as u64;
         self.tap.write_all(&chunk.bytes)?;
         if chunk.bytes.len() <= CHUNK_BYTES_MAX {
@@ -95,13 +123,37 @@ impl Arrivals {
 
     /// The recording is damaged, as far as it has come. (Of raw bytes nobody knows: a line may be noisy.)
     pub fn is_damaged(&self) -> bool {
-        self.source.has_records() && self.source.damages() > 0
+        self.source.damages() > 0
     }
 
     /// What was strange in the input.
     pub fn remark(&self) -> Option<String> {
         self.source.remark().map(|remark| format!("{}: {remark}", self.name))
     }
+}
+
+/// Reads to the first frame whose checksum holds, while `go_on` says so of what was read. An error where there is none.
+fn until_frame(
+    source: &mut dyn Source,
+    input: &Endpoint,
+    mut go_on: impl FnMut(Chunk) -> bool,
+) -> Result<()> {
+    let (mut framer, found) = (Framer::new(), Cell::new(false));
+    let mut look = |frame: Frame<'_>| found.set(found.get() || frame.check() == Check::Verified);
+    while let Some(chunk) = source.next().with_context(|| format!("{input}: cannot be read"))? {
+        framer.push(&chunk.bytes, &mut look);
+        if source.has_records() {
+            framer.idle(&mut look);
+        }
+        if !go_on(chunk) || found.get() {
+            break;
+        }
+    }
+    framer.idle(&mut look);
+    if found.get() {
+        return Ok(());
+    }
+    bail!("{input}: has no MAVLink frame, so nothing was written; hums check says what a file is")
 }
 
 /// A file for a copy of the bytes, which is none of the inputs.

@@ -2,7 +2,6 @@
 //! on a vehicle, and a surprise on a PC. So a run does not begin on a card that may become full in it unless it is told to, and what
 //! was overwritten is said by session.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::Result;
@@ -14,6 +13,7 @@ use crate::endpoint::Endpoint;
 use crate::logs::sessions::first_session;
 use crate::logs::{self, Log, Room, segment_name};
 use crate::outcome::usage;
+use crate::source::input::Input;
 
 /// The recorder makes a segment as long as this part of a card at most, so that a small card holds several.
 const SEGMENTS_MIN: u64 = 16;
@@ -102,7 +102,7 @@ fn has_room(run: &cli::Run) -> bool {
         return false;
     }
     let read = match &run.input {
-        Endpoint::File(path) => fs::metadata(path).map_or(0, |file| file.len()),
+        Endpoint::File(path) => Input::bytes_of(path),
         _ => 0,
     };
     let starts = 1 + run.faults.reboot_at_us.len() + run.faults.card_out.len();

@@ -24,6 +24,7 @@ use crate::card::image;
 use crate::card::{Faults, SimCard};
 use crate::cli::{Run, Speed};
 use crate::endpoint::Endpoint;
+use crate::files::FileId;
 use crate::interrupt;
 use crate::outcome::usage;
 use crate::source::Chunk;
@@ -127,6 +128,29 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
         note!("{}: {words}", path.display());
     }
     Ok(file)
+}
+
+/// The files that a run updates in place, and which ones these were when it began.
+struct InPlace<'a>(Vec<(&'a Path, Option<FileId>)>);
+
+impl<'a> InPlace<'a> {
+    fn of(run: &'a Run) -> Self {
+        let paths = std::iter::once(run.sd.as_path()).chain(run.store.as_deref());
+        Self(paths.map(|path| (path, FileId::of(path).ok())).collect())
+    }
+
+    /// Those that somebody has removed or replaced since, which is said: what the run wrote to them is gone.
+    fn gone(&self) -> Vec<&'a Path> {
+        let is_gone = |(path, id): &&(&Path, Option<FileId>)| FileId::of(path).ok() != *id;
+        let gone: Vec<&Path> = self.0.iter().filter(is_gone).map(|(path, _)| *path).collect();
+        for path in &gone {
+            note!(
+                "{}: was removed or replaced during the run; what was written to it is lost",
+                path.display()
+            );
+        }
+        gone
+    }
 }
 
 /// Two kinds of output cannot share standard output.

@@ -60,8 +60,13 @@ pub(super) fn check(path: &Path) -> Result<()> {
 
 /// What the file holds, and the file for writing.
 fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
-    if path.metadata().is_ok_and(|about| !about.is_file()) {
-        bail!("--store {}: is no file; name one", path.display());
+    if let Ok(about) = path.metadata() {
+        if !about.is_file() {
+            bail!("--store {}: is no file; name one", path.display());
+        }
+        if about.permissions().readonly() {
+            bail!("--store {}: is read-only; make it writable or name another file", path.display());
+        }
     }
     let context = || format!("--store {}: cannot be opened for reading and writing", path.display());
     let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);

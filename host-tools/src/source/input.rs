@@ -102,6 +102,15 @@ impl Input {
         Ok(Self { inner, progress, compressed })
     }
 
+    /// The bytes that the file at `path` gives: unpacked, where it is compressed. Those are counted, as far as they can be read.
+    pub fn bytes_of(path: &Path) -> u64 {
+        match Self::open(path) {
+            Ok(mut input) if input.compressed => io::copy(&mut input, &mut io::sink()).unwrap_or(u64::MAX),
+            Ok(input) => input.progress.total().unwrap_or(0),
+            Err(_) => 0,
+        }
+    }
+
     /// How far it has been read.
     pub fn progress(&self) -> Progress {
         self.progress.clone()

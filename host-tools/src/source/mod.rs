@@ -18,7 +18,7 @@
 //! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud; [`booted`] has those that the autopilot tells |
 //! | UDP, TCP, serial | the clock's |
 //!
-//! Times are microseconds since the first byte and never fall: see [`tlog::times`] for what happens to clocks that jumped.
+//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall: see [`tlog::times`] for what happens to clocks that jumped.
 //! Everything streams: memory does not grow with the input.
 
 pub mod blocks;
@@ -39,6 +39,7 @@ pub mod noise;
 pub mod own;
 pub mod pace;
 pub mod paced;
+mod packed;
 pub mod raw;
 pub mod recording;
 mod said;
@@ -52,8 +53,7 @@ pub mod ulog;
 pub use said::parameter;
 pub use stream::{Chunk, Source};
 
-use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -62,6 +62,7 @@ use crate::endpoint::Endpoint;
 use crate::files::is_seekable;
 use crate::logs::{self, Content};
 use crate::outcome::usage;
+use input::Input;
 
 pub use recording::RAW_BAUD;
 
@@ -92,7 +93,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
         }
         return Ok(live::open(endpoint)?.0);
     }
-    let input: Box<dyn Read + Send> = match endpoint {
+    let input = match endpoint {
         Endpoint::File(path) => {
             let context = || format!("{}: cannot be opened", path.display());
             let about = path.metadata().with_context(context)?;
@@ -108,21 +109,33 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
                 );
             }
             refuse_our_own(path)?;
-            Box::new(File::open(path).with_context(context)?)
+            Input::open(path)?
         }
-        _ => Box::new(io::stdin()),
+        _ => Input::new(io::stdin()).with_context(|| format!("{endpoint}"))?,
     };
+    let progress = input.progress();
     let (kind, input) = sniff::sniff(input).with_context(|| format!("{endpoint}"))?;
+    let start = input.get_ref().0.get_ref();
+    if let Some(what) = format::hint(start) {
+        bail!("{endpoint}: {what}");
+    }
+    if let Some(format) = format::format_of(start).filter(|format| !format.is_of_link()) {
+        bail!("{endpoint}: is {}, in which there is no MAVLink; hums check reads it", format.with_article());
+    }
     let is_file = matches!(endpoint, Endpoint::File(_));
-    Ok(match (kind, timing.line_rate) {
-        (sniff::Kind::Empty, _) => bail!("{endpoint}: is empty: not one byte would arrive"),
+    let source: Box<dyn Source> = match (kind, timing.line_rate) {
+        (sniff::Kind::Empty, _) => match progress.damage() {
+            Some(words) => bail!("{endpoint}: {words}"),
+            None => bail!("{endpoint}: is empty: not one byte would arrive"),
+        },
         (sniff::Kind::Tlog, None) if is_file => Box::new(tlog::Tlog::ahead(input)),
         (sniff::Kind::Tlog, None) => Box::new(tlog::Tlog::new(input)),
         (sniff::Kind::Tlog, Some(baud)) => Box::new(paced::Paced::new(tlog::Tlog::new(input), baud)),
         (sniff::Kind::Raw, baud) => {
             Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
         }
-    })
+    };
+    Ok(Box::new(packed::Packed::new(source, progress)))
 }
 
 /// What HUMS itself has recorded is full of frames, but not as they came.

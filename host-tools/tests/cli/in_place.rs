@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use crate::support::{px4, recorded, run, text, until};
+use crate::support::{contents, flight, hums, json, px4, recorded, run, text, until};
 
 #[test]
 fn two_runs_do_not_use_one_card_or_one_store() {
@@ -30,6 +30,107 @@ fn two_runs_do_not_use_one_card_or_one_store() {
     assert_eq!(first.wait().expect("it is ours").code(), Some(3));
     run(dir.path(), "sim --input PX4 --sd card.img --store store", 0);
     run(dir.path(), "verify card.img", 0);
+}
+
+#[test]
+fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_is_one() {
+    let dir = tempfile::tempdir().expect("directory");
+    let write = |name: &str, bytes: &[u8]| fs::write(dir.path().join(name), bytes).expect("written");
+    let packed = |bytes: &[u8]| {
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(bytes).expect("packed");
+        gzip.finish().expect("packed")
+    };
+    let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
+    let raw = &recording[..20_000];
+    write("plain.raw", raw);
+    write("same.raw.gz", &packed(raw));
+    write("cut.raw.gz", &packed(raw)[..9_000]);
+    let frames = |name: &str, code: i32| {
+        let ended =
+            run(dir.path(), &format!("sim --input {name} --sd {name}.img --card-size 34 --json"), code);
+        json(&ended)["frames_in"].as_u64().expect("a count")
+    };
+    let all = frames("plain.raw", 0);
+    assert_eq!(frames("same.raw.gz", 0), all);
+    assert!((1..all).contains(&frames("cut.raw.gz", 3)), "a part of it");
+    run(dir.path(), "sim --input plain.raw --sd plain.raw.img --store store", 0);
+
+    let text = "no frame in here\n".repeat(500);
+    write("text", text.as_bytes());
+    write("text.gz", &packed(text.as_bytes()));
+    write("log.bin", &[&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", &[0; 75]].concat());
+    write("twice.gz", &packed(&packed(raw)));
+    let before = contents(dir.path());
+    for (input, why) in [
+        ("text", "has no MAVLink frame, so nothing was written"),
+        ("text.gz", "has no MAVLink frame"),
+        ("log.bin", "is an ArduPilot log (DataFlash), in which there is no MAVLink"),
+        ("twice.gz", "is compressed twice"),
+        ("-", "has no MAVLink frame"),
+    ] {
+        for to in ["plain.raw.img --store store --overwrite-oldest", "new.img --store new --tap tap --gs gs"]
+        {
+            let mut command = hums();
+            let line = format!("sim --input {input} --sd {to}");
+            let ended =
+                command.current_dir(dir.path()).args(line.split(' ')).write_stdin(text.as_str()).output();
+            let ended = ended.expect("it runs");
+            let said = String::from_utf8_lossy(&ended.stderr);
+            assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
+            assert!(said.contains(why), "{line}: {said}");
+        }
+    }
+    assert!(contents(dir.path()) == before, "something was written");
+}
+
+#[test]
+fn an_image_that_is_removed_while_it_is_recorded_on_is_told() {
+    let dir = recorded();
+    let first = Command::new(env!("CARGO_BIN_EXE_hums"))
+        .args(["sim", "--input", "-", "--sd", "card.img", "--gs", "gs"])
+        .current_dir(dir.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    let mut first = first.expect("it runs");
+    let mut input = first.stdin.take().expect("it is piped");
+    input
+        .write_all(&fs::read(flight("ap_quad_signed.raw")).expect("a recording")[..20_000])
+        .expect("it reads");
+    until("it records", || dir.path().join(".gs.hums-part").exists());
+    fs::rename(dir.path().join("card.img"), dir.path().join("moved.img")).expect("moved");
+    drop(input);
+    let ended = first.wait_with_output().expect("it is ours");
+    let (told, said) = (text(&ended), String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(ended.status.code(), Some(3), "{said}");
+    assert!(said.contains("card.img: was removed or replaced during the run"), "{said}");
+    assert!(told.contains(" in, 0 logged, "), "{told}");
+}
+
+#[test]
+fn a_store_or_a_spool_that_is_read_only_is_refused_as_an_image_is() {
+    let dir = recorded();
+    run(dir.path(), "sim --input PX4 --sd new.img --store store", 0);
+    fs::write(dir.path().join("spool"), b"").expect("written");
+    for name in ["card.img", "store", "spool"] {
+        let path = dir.path().join(name);
+        let mut permissions = path.metadata().expect("there").permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(path, permissions).expect("ours");
+    }
+    let before = contents(dir.path());
+    for line in [
+        "sim --input PX4 --sd card.img",
+        "sim --input PX4 --sd new.img --store store",
+        "live --input PX4 --influx http://127.0.0.1:9 --spool spool --listen 127.0.0.1:0",
+    ] {
+        let said = run(dir.path(), line, 1);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(said.contains(": is read-only; make it writable or name another"), "{line}: {said}");
+    }
+    assert!(contents(dir.path()) == before, "something was written");
 }
 
 #[test]

@@ -83,6 +83,9 @@ impl Spool {
     /// points for another database.
     pub fn open(path: &Path, limit: u64, database: &Database) -> Result<Option<Self>> {
         let context = || format!("{}: cannot be used for points that wait", path.display());
+        if path.metadata().is_ok_and(|about| about.permissions().readonly()) {
+            bail!("{}: is read-only; make it writable or name another file", path.display());
+        }
         let mut options = OpenOptions::new();
         let file = options.read(true).write(true).create(true).truncate(false).open(path);
         let file = file.with_context(context)?;

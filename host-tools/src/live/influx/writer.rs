@@ -128,22 +128,34 @@ fn write(agent: &Agent, target: &Target, lines: &[u8]) -> Answer {
         Err(error) => return Answer::Away(error.to_string()),
     };
     let status = response.status().as_u16();
-    if (200..300).contains(&status) {
-        return Answer::Taken;
-    }
     let body = response.body_mut().with_config().limit(ANSWER_BYTES_MAX).read_to_string();
     answer(status, &body.unwrap_or_default())
 }
 
-/// What an answer that is no success means.
+/// What an answer means. A database that has all points says 204, and nothing else. What it says of points that it refuses is an
+/// object of JSON; the same status in other words is another server's, or one that wants https.
 fn answer(status: u16, body: &str) -> Answer {
     let words: String = body.chars().take(WORDS_MAX).collect();
-    let why = format!("the database answers {status}: {}", words.trim());
+    let words = words.trim();
+    let why = format!("the database answers {status}: {words}");
     match status {
+        204 => Answer::Taken,
         404 => Answer::Missing(why),
-        400 | 413 | 422 => Answer::Refused(why, dropped(body)),
+        201 | 400 | 413 | 422 if is_refusal(body) => Answer::Refused(why, dropped(body)),
+        200..300 | 400 | 413 | 422 => Answer::Away(format!(
+            "a server answers {status}, not as a database does: is the address right, and does it want https (which needs a \
+             proxy on this PC)? {words}"
+        )),
         _ => Answer::Away(why),
     }
+}
+
+/// Whether an answer is a database's, about points: `InfluxDB` 1.x and 3 and Telegraf's listener have an `error`, `InfluxDB` 2,
+/// `QuestDB` and Telegraf's listener of version 2 a `code` and a `message`. (`VictoriaMetrics` passes over bad lines itself.)
+fn is_refusal(body: &str) -> bool {
+    let Ok(serde_json::Value::Object(answer)) = serde_json::from_str(body) else { return false };
+    let has = |name| answer.get(name).is_some_and(serde_json::Value::is_string);
+    has("error") || has("code") && has("message")
 }
 
 /// How many points were dropped where the rest was written: "partial write: ... dropped=3". 0 stands there where lines
@@ -170,6 +182,42 @@ fn create(agent: &Agent, target: &Target) {
 mod tests {
     use super::*;
 
+    /// What `InfluxDB` 2 says of a batch with a bad line.
+    const UNREADABLE: &str = "{\"code\":\"invalid\",\"message\":\"unable to parse 'BAD': missing fields\"}";
+
+    #[test]
+    fn what_no_database_says_leaves_the_points_waiting() {
+        for (status, body) in [
+            // Go's, and so of InfluxDB, VictoriaMetrics and Caddy; nginx's; any web server's.
+            (400, "Client sent an HTTP request to an HTTPS server.\n"),
+            (
+                400,
+                "<html><head><title>400 The plain HTTP request was sent to HTTPS port</title></head></html>",
+            ),
+            (200, "<html>Welcome to your router</html>"),
+            (200, "{\"results\":[]}"),
+            (202, ""),
+            (413, "<html>413 Request Entity Too Large</html>"),
+            (400, "{\"message\":\"Bad Request\"}"),
+        ] {
+            let Answer::Away(why) = answer(status, body) else { panic!("{status} {body}") };
+            assert!(why.contains("https") && why.contains(&status.to_string()), "{why}");
+        }
+        assert!(matches!(answer(401, "{\"code\":\"unauthorized\",\"message\":\"\"}"), Answer::Away(_)));
+        assert!(matches!(answer(204, ""), Answer::Taken));
+        for body in [
+            // InfluxDB 1.x, 2 and 3, Telegraf's two listeners, QuestDB.
+            "{\"error\":\"unable to parse 'x': missing fields\"}\n",
+            UNREADABLE,
+            "{\"error\":\"partial write of line protocol occurred\",\"data\":[{\"error_message\":\"x\",\"line_number\":1}]}",
+            "{\"error\":\"http: bad request\"}",
+            "{\"code\":\"internal error\",\"message\":\"x\",\"op\":\"\",\"err\":\"x\",\"line\":\"0\"}",
+            "{\"code\":\"invalid\",\"message\":\"failed to parse line protocol\",\"line\":2,\"errorId\":\"x-0\"}",
+        ] {
+            assert!(matches!(answer(400, body), Answer::Refused(_, None)), "{body}");
+        }
+    }
+
     /// A batch of so many lines, of which some are bad.
     fn batch(lines: u64, bad: &[u64]) -> Batch {
         let line =
@@ -185,7 +233,7 @@ mod tests {
             let text = std::str::from_utf8(lines).expect("text");
             assert!(text.ends_with('\n'), "whole lines");
             if text.contains("BAD") {
-                return Some(answer(400, "unable to parse"));
+                return Some(answer(400, UNREADABLE));
             }
             has.extend(text.lines().map(str::to_owned));
             Some(Answer::Taken)
@@ -223,9 +271,13 @@ mod tests {
         let partial = "{\"error\":\"partial write: field type conflict: input field \\\"v\\\" dropped=3\"}";
         for (status, body, expected) in [
             (400, partial, Some(3)),
-            (422, "failure writing points to database: partial write: ... dropped=12", Some(12)),
+            (
+                422,
+                "{\"code\":\"unprocessable entity\",\"message\":\"failure writing points to database: partial write: ... dropped=12\"}",
+                Some(12),
+            ),
             (400, "{\"error\":\"partial write: unable to parse 'x': missing fields dropped=0\"}", None),
-            (400, "unable to parse 'x': dropped=3", None),
+            (400, "{\"error\":\"unable to parse 'x': dropped=3\"}", None),
         ] {
             let Answer::Refused(_, dropped) = answer(status, body) else { panic!("{status} refuses") };
             assert_eq!(dropped, expected, "{body}");
@@ -244,7 +296,7 @@ mod tests {
         let mut requests = 0;
         let delivered = in_halves(&batch(100, &[7]), |_| {
             requests += 1;
-            (requests < 3).then(|| answer(400, "unable to parse"))
+            (requests < 3).then(|| answer(400, UNREADABLE))
         });
         assert_eq!(delivered, None);
     }

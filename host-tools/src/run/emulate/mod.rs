@@ -15,7 +15,8 @@ use stm32f405_model::image::Image;
 use super::earlier::EarlierSessions;
 use super::report::{OnCard, Report};
 use super::{
-    arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card, salt, store,
+    InPlace, arrivals::Arrivals, check_standard_output, drive, ground, pace, params, paths, prepare_card,
+    salt, store,
 };
 use crate::card::image::is_card;
 use crate::cli;
@@ -42,6 +43,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(run.store.as_deref(), &params)?))
     })?;
+    let in_place = InPlace::of(run);
     flash.prepare()?;
     let earlier = EarlierSessions::of(run, &params)?;
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
@@ -69,6 +71,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
     }
+    let gone = in_place.gone();
     let mut report = Report::default();
     let (frames, on_card) = report.read_card(&run.sd, &earlier)?;
     tell(&mut report, &board.traffic(), frames, &on_card);
@@ -82,7 +85,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
         note!("{remark}");
     }
     let outcome = report.print(run.json, run.gs == Some(Endpoint::Standard))?;
-    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged())))
+    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged() || !gone.is_empty())))
 }
 
 /// What the ports had, and what of it the card has.

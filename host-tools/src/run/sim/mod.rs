@@ -27,7 +27,7 @@ use super::earlier::EarlierSessions;
 use super::ground::{self, Ground};
 use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
-use super::{check_standard_output, drive, pace, params, paths, prepare_card, salt};
+use super::{InPlace, check_standard_output, drive, pace, params, paths, prepare_card, salt};
 use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
@@ -49,6 +49,7 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(run.store.as_deref(), &params)?))
     })?;
+    let in_place = InPlace::of(run);
     if let Some(step) = run.faults.cut_store_after {
         flash.cut_after(step, run.faults.seed);
     }
@@ -85,12 +86,16 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     if let Some(remark) = arrivals.remark() {
         note!("{remark}");
     }
-    let report = world.settle(&run.sd, &earlier)?;
+    let mut report = world.settle(&run.sd, &earlier)?;
+    let gone = in_place.gone();
+    if gone.contains(&run.sd.as_path()) {
+        (report.frames_logged, report.frames_lost) = (0, report.frames_in);
+    }
     if let Some(remark) = report.remark(&run.input) {
         note!("{remark}");
     }
     let outcome = report.print(run.json, run.gs == Some(Endpoint::Standard))?;
-    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged())))
+    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged() || !gone.is_empty())))
 }
 
 fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {

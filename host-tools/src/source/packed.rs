@@ -1,0 +1,46 @@
+//! A recording as `.gz`: what is wrong with its compressed bytes is damage of the recording.
+
+use std::io;
+
+use super::input::Progress;
+use super::stream::{Chunk, Source};
+
+/// The source whose bytes come of an input that may be compressed.
+pub(super) struct Packed<S> {
+    inner: S,
+    progress: Progress,
+}
+
+impl<S: Source> Packed<S> {
+    /// The bytes of `inner`, which reads the input that `progress` tells of.
+    pub(super) fn new(inner: S, progress: Progress) -> Self {
+        Self { inner, progress }
+    }
+}
+
+impl<S: Source> Source for Packed<S> {
+    fn next(&mut self) -> io::Result<Option<Chunk>> {
+        self.inner.next()
+    }
+
+    fn utc_start_us(&self) -> Option<u64> {
+        self.inner.utc_start_us()
+    }
+
+    fn has_records(&self) -> bool {
+        self.inner.has_records()
+    }
+
+    fn begins_another(&self) -> bool {
+        self.inner.begins_another()
+    }
+
+    fn damages(&self) -> u64 {
+        self.inner.damages() + u64::from(self.progress.damage().is_some())
+    }
+
+    fn remark(&self) -> Option<String> {
+        let said: Vec<String> = self.inner.remark().into_iter().chain(self.progress.damage()).collect();
+        (!said.is_empty()).then(|| said.join("; "))
+    }
+}
