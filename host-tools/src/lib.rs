@@ -24,7 +24,6 @@ pub mod interrupt;
 pub mod live;
 pub mod logs;
 pub mod loss;
-pub mod made;
 pub mod mavlink;
 pub mod names;
 pub mod outcome;

@@ -71,62 +71,34 @@ impl StdError for ReaderGone {}
 #[derive(Debug)]
 pub struct Differs {
     path: PathBuf,
-    why: Reason,
-}
-
-/// Why a file was not replaced.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Reason {
-    /// Nobody said `--replace`.
-    NotSaid,
-    /// It may be an original, or was made of another input.
-    Original,
-    /// It has more in it than what would take its place.
-    Less {
-        /// What is there, in words.
-        there: String,
-        /// What would take its place.
-        new: String,
-    },
+    /// Whether the command has a flag `--replace`.
+    may_replace: bool,
 }
 
 impl Differs {
     /// Nobody said `--replace`.
     pub fn new(path: &Path) -> Self {
-        Self { path: path.to_owned(), why: Reason::NotSaid }
+        Self { path: path.to_owned(), may_replace: true }
     }
 
-    /// It may be an original, or was made of another input.
-    pub fn original(path: &Path) -> Self {
-        Self { path: path.to_owned(), why: Reason::Original }
-    }
-
-    /// What is there was made of the same log, of more of it, or of a better copy: both in words.
-    pub fn less(path: &Path, there: String, new: String) -> Self {
-        Self { path: path.to_owned(), why: Reason::Less { there, new } }
+    /// The command never replaces anything.
+    pub fn at_all(path: &Path) -> Self {
+        Self { path: path.to_owned(), may_replace: false }
     }
 }
 
 impl fmt::Display for Differs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let path = self.path.display();
-        match &self.why {
-            Reason::NotSaid => write!(
-                f,
-                "{path}: is there already with other content, and was not replaced; name another output, move it away, \
-                 or say --replace"
-            ),
-            Reason::Original => write!(
-                f,
-                "{path}: is there already with other content, and nothing tells that hums made it of the same input: it \
-                 may be an original, and --replace does not replace it; name another output, or move it away"
-            ),
-            Reason::Less { there, new } => write!(
-                f,
-                "{path}: is there already with more in it ({there}; this would be {new}), and --replace does not \
-                 make it less; name another output, or delete it by hand"
-            ),
-        }
+        let (way, last) = if self.may_replace {
+            (", move it away", ", or say --replace, which keeps it under another name")
+        } else {
+            ("", ", or move it away")
+        };
+        write!(
+            f,
+            "{}: is there already with other content, and was not replaced; name another output{way}{last}",
+            self.path.display()
+        )
     }
 }
 

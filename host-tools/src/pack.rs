@@ -14,7 +14,6 @@ use sha2::{Digest as _, Sha256};
 use crate::cli;
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write};
-use crate::made;
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::plural::count;
@@ -22,6 +21,9 @@ use crate::source::booted::Booted;
 use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
 use crate::source::{self, Source, Timing};
+
+/// The note that a packed log begins with.
+const NOTE: &str = "packed on a PC by hums pack";
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
@@ -55,8 +57,7 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     let utc_us = source.utc_start_us();
     hash.update(utc_us.unwrap_or(0).to_le_bytes());
     let session = session_of(hash);
-    let of = format!("s{session:08x}");
-    let file = Output::create(&args.output, &inputs, &made::LOG, Some(&of))?;
+    let file = Output::create(&args.output, &inputs)?;
     let mut packer = Packer::new(file, session);
     packer.start(utc_us).with_context(context)?;
     let mut last_us = 0;
@@ -166,7 +167,7 @@ impl<W: Write> Packer<W> {
     }
 
     fn start(&mut self, utc_us: Option<u64>) -> Result<()> {
-        let note = Record::Note(Note { severity: 6, text: made::PACKED });
+        let note = Record::Note(Note { severity: 6, text: NOTE });
         self.record(Instant::ZERO, &note)?;
         if let Some(utc_micros) = utc_us {
             let clock = Clock { boot: Instant::ZERO, utc_micros, source: FROM_RECORDING };

@@ -10,7 +10,6 @@ use anyhow::{Context as _, Result};
 use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, check_standard_output_is_open, settle};
-use crate::made;
 use crate::outcome::Outcome;
 use crate::output::Stdout;
 
@@ -149,7 +148,7 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
     let heard = Heard::nobody();
     match endpoint {
         Endpoint::File(path) => {
-            let file = Output::create(path, inputs, &made::RAW, None)?;
+            let file = Output::create(path, inputs)?;
             Ok(Ground { writer: Beside::file(FLAG, file), heard })
         }
         Endpoint::Standard => {

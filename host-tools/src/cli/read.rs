@@ -20,8 +20,8 @@ it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl,
 OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
 No input is ever written over. What is there already is left as it is: if it is the same as what would be written, all is
-well; if not, the command fails. With --replace it is replaced, when all of the new one is there, if hums made it of
-the same log, all of it, and it does not become less.
+well; if not, the command fails. With --replace the new one takes its name, once all of it is there, and what was there
+is kept in the folder hums-kept beside it.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
 /// `hums decode`
@@ -49,7 +49,7 @@ pub struct Decode {
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
-    /// Replace an output that is there already and has other content, where hums made it of the same log
+    /// Keep an output that is there already and has other content in the folder hums-kept, and give its name to the new one
     #[arg(long)]
     pub replace: bool,
 }
@@ -141,7 +141,7 @@ pub struct Report {
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Replace a page that is there already and has other content, where it is one of the same log
+    /// Keep a page that is there already and has other content in the folder hums-kept, and give its name to the new one
     #[arg(long)]
     pub replace: bool,
 }
@@ -160,7 +160,7 @@ pub struct Pack {
     /// The log file to write
     #[arg(short, long, value_name = "LOG")]
     pub output: PathBuf,
-    /// Replace a log that is there already and has other content, where it was packed of the same recording
+    /// Keep a log that is there already and has other content in the folder hums-kept, and give its name to the new one
     #[arg(long)]
     pub replace: bool,
 }

@@ -67,8 +67,6 @@ pub struct Context {
     pub tags: Tags,
     /// What the log was known by, for the stamp of its folders.
     pub stamp: String,
-    /// The same as its files' names have it: `s1a2b3c4d`.
-    pub of: Option<String>,
     /// What must not be written over.
     pub inputs: Inputs,
     /// What this program found, where the recorder ran no checks.

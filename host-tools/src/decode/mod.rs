@@ -287,7 +287,7 @@ impl Task<'_> {
         }
         let not_checked = writers.checked(summary.last)?;
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
-        let written = writers.finish(summary.gaps)?;
+        let written = writers.finish()?;
         let mut outcome = Outcome::Done;
         let ending =
             log.own().map(|own| Ending { name: log.name.clone(), ..Ending::of(own, summary.clone()) });
@@ -320,7 +320,6 @@ impl Task<'_> {
             selection: self.selection.clone(),
             inputs: self.inputs.clone(),
             stamp: work.traits.stamp(),
-            of: work.traits.identity(work.log),
             ..Context::default()
         };
         let Some(log) = work.log.own() else {

@@ -32,7 +32,7 @@ use rayon::prelude::*;
 use super::batches::{Batches, FrameColumns, Rows, frame_schema};
 use super::cells::CellColumns;
 use super::table::Table;
-use crate::files::{Amount, Folder, FolderFile, cannot_write};
+use crate::files::{Folder, FolderFile, cannot_write};
 
 /// What is held at most: some 55 MiB with all that reading takes.
 const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
@@ -171,7 +171,7 @@ impl ParquetTables {
     }
 
     /// Writes what is still held, and each file's end: the folder gets its name. Gives it and how many tables there are.
-    pub fn finish(mut self, amount: Amount) -> Result<(PathBuf, usize)> {
+    pub fn finish(mut self) -> Result<(PathBuf, usize)> {
         let count = self.tables.len();
         let (folder, properties) = (&self.folder, &self.properties);
         let mut tables: Vec<TableFile> = std::mem::take(&mut self.tables).into_values().collect();
@@ -183,7 +183,6 @@ impl ParquetTables {
             })?;
         }
         let path = self.folder.path().to_owned();
-        self.folder.set_amount(amount);
         self.folder.finish()?;
         Ok((path, count))
     }
@@ -329,7 +328,7 @@ mod tests {
                 }
                 tables.put(batches).expect("put");
             }
-            assert_eq!(tables.finish(Amount::default()).expect("finish").1, 2);
+            assert_eq!(tables.finish().expect("finish").1, 2);
             let mut seconds = Vec::new();
             let files = (1..).map(|part| path.join(file_name(Table::Message(30), part)));
             let files: Vec<PathBuf> = files.take_while(|path| path.exists()).collect();

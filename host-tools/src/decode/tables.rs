@@ -8,7 +8,7 @@ use anyhow::Result;
 use super::table::Table;
 use super::text::{columns, push_csv_text};
 use super::unknown::UnknownLines;
-use crate::files::{Amount, Folder, FolderFile, buffered, settle};
+use crate::files::{Folder, FolderFile, buffered, settle};
 
 /// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
 const OPEN_MAX: usize = 256;
@@ -106,11 +106,10 @@ impl Tables {
     }
 
     /// All lines are there: the folder gets its name.
-    pub fn finish(mut self, amount: Amount) -> Result<()> {
+    pub fn finish(mut self) -> Result<()> {
         for (table, mut file) in std::mem::take(&mut self.open) {
             settle(file.flush(), &self.folder.path().join(table.name()))?;
         }
-        self.folder.set_amount(amount);
         self.folder.finish()
     }
 }

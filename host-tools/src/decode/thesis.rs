@@ -17,7 +17,7 @@ use hums_core::time::{Instant, Span};
 
 use super::reference::{MOTORS, Quantity, Reference};
 use super::selection::Selection;
-use crate::files::{Amount, Folder, FolderFile, buffered, settle};
+use crate::files::{Folder, FolderFile, buffered, settle};
 use crate::mavlink::values::Scalar;
 use crate::source::epochs::Epochs;
 
@@ -133,11 +133,10 @@ impl Thesis {
     }
 
     /// All rows are there: the folder gets its name. Gives it and the number of rows.
-    pub fn finish(mut self, amount: Amount) -> Result<(PathBuf, u64)> {
+    pub fn finish(mut self) -> Result<(PathBuf, u64)> {
         self.tables.iter_mut().try_for_each(|(file, path)| settle(file.flush(), path))?;
         drop(self.tables);
         let path = self.folder.path().to_owned();
-        self.folder.set_amount(amount);
         self.folder.finish()?;
         Ok((path, self.rows))
     }

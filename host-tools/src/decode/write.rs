@@ -17,31 +17,23 @@ use super::record::gap_row;
 use super::reference::Reference;
 use super::tables::{Tables, UNKNOWN_TABLES_MAX};
 use super::thesis::Thesis;
-use crate::files::{Amount, Folder, Kind, Origin, Output, appended, make_parent, settle};
+use crate::files::{Folder, Output, appended, make_parent, settle};
 use crate::logs::reader::Deliver;
-use crate::made;
 use crate::plural::count;
-
-/// A table of gaps beside a tlog.
-const GAPS: Kind = Kind {
-    words: "a table of gaps of hums decode",
-    is: |start| start.strip_prefix(gaps_header().as_bytes()).is_some_and(|rest| rest.starts_with(b"\n")),
-    origin: Origin::Ours,
-};
 
 /// A single file, open.
 struct Single(Output);
 
 impl Single {
-    fn open(destination: &Destination, extension: &str, context: &Context, kind: &Kind) -> Result<Self> {
+    fn open(destination: &Destination, extension: &str, context: &Context) -> Result<Self> {
         let path = destination.path(extension);
-        Self::file(path.as_deref().unwrap_or(Path::new("-")), context, kind)
+        Self::file(path.as_deref().unwrap_or(Path::new("-")), context)
     }
 
-    fn file(path: &Path, context: &Context, kind: &Kind) -> Result<Self> {
+    fn file(path: &Path, context: &Context) -> Result<Self> {
         context.inputs.refuse(path)?;
         make_parent(path)?;
-        Ok(Self(Output::create(path, &context.inputs, kind, context.of.as_deref())?))
+        Ok(Self(Output::create(path, &context.inputs)?))
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
@@ -102,8 +94,6 @@ pub struct Writers<'a> {
     gaps_left_out: u64,
     frames: u64,
     records: u64,
-    /// Of these, what was read: no gaps, and nothing that this program found.
-    entries: u64,
     /// JSON's.
     objects: u64,
     on_board: OnBoard,
@@ -143,15 +133,15 @@ impl<'a> Writers<'a> {
     /// Opens what is sure to be written; tables are opened when they get their first row.
     pub fn new(context: &'a Context, destination: Destination, parquet: Option<PathBuf>) -> Result<Self> {
         let (formats, inputs) = (context.formats, &context.inputs);
-        let open = |wanted: bool, extension, kind| {
-            wanted.then(|| Single::open(&destination, extension, context, kind)).transpose()
+        let open = |wanted: bool, extension| {
+            wanted.then(|| Single::open(&destination, extension, context)).transpose()
         };
-        let tlog = open(formats.tlog, "tlog", &made::TLOG)?;
+        let tlog = open(formats.tlog, "tlog")?;
         if let Some(path) = tlog.as_ref().and_then(Single::gaps_path) {
-            Output::check_place(&path, inputs, &GAPS)?;
+            inputs.refuse(&path)?;
         }
-        let jsonl = open(formats.jsonl, "jsonl", &made::JSONL)?;
-        let influx = open(formats.influx, "lp", &made::LINES)?.map(|file| Influx {
+        let jsonl = open(formats.jsonl, "jsonl")?;
+        let influx = open(formats.influx, "lp")?.map(|file| Influx {
             file,
             messages: Clock::default(),
             quantities: Clock::default(),
@@ -185,7 +175,6 @@ impl<'a> Writers<'a> {
             gaps_left_out: 0,
             frames: 0,
             records: 0,
-            entries: 0,
             objects: 0,
             on_board: OnBoard::default(),
             rows_left_out: 0,
@@ -261,7 +250,7 @@ impl<'a> Writers<'a> {
         let first = self.gaps.is_none();
         let file = match &mut self.gaps {
             Some(file) => file,
-            none => none.insert(Single::file(&path, self.context, &GAPS)?),
+            none => none.insert(Single::file(&path, self.context)?),
         };
         let mut line = Vec::new();
         if first {
@@ -283,9 +272,8 @@ impl<'a> Writers<'a> {
         self.frames == 0 && self.records == 0
     }
 
-    /// All of the log is there, with so many gaps that are damage: the files get their names. Says what was written.
-    pub fn finish(mut self, gaps: u64) -> Result<Written> {
-        let amount = Amount { entries: self.entries, gaps };
+    /// All of the log is there: the files get their names. Says what was written.
+    pub fn finish(mut self) -> Result<Written> {
         let mut lines = Vec::new();
         let frames = count(self.frames, "frame");
         let rows = if self.frames == 0 {
@@ -296,10 +284,11 @@ impl<'a> Writers<'a> {
         // None gets its name where another one of them is not what is there.
         let influx = self.influx.as_mut().map(|influx| &mut influx.file);
         for file in [&mut self.tlog, &mut self.jsonl, &mut self.gaps].into_iter().flatten().chain(influx) {
-            file.0.set_amount(amount);
             file.0.end()?;
         }
-        self.check_earlier_gaps()?;
+        // Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
+        let stale = self.tlog.as_ref().filter(|_| self.gaps.is_none()).and_then(Single::gaps_path);
+        stale.as_deref().map_or(Ok(()), |path| Output::check_none(path, &self.context.inputs))?;
         let objects = count(self.objects, "object");
         let mut singles = vec![(self.tlog.take(), frames), (self.jsonl.take(), objects)];
         if let Some(Influx { file, count: points, .. }) = self.influx.take() {
@@ -310,13 +299,14 @@ impl<'a> Writers<'a> {
                 lines.push(format!("{}: {what}", file.finish()?.display()));
             }
         }
+        stale.map_or(Ok(()), |path| Output::keep(&path, &self.context.inputs))?;
         if let Some(file) = self.gaps.take() {
             lines.push(format!("{}: gaps", file.finish()?.display()));
         }
         if let (Some(csv), Some(dir)) = (self.csv.take(), self.destination.tables()) {
             let tables = count(csv.count() as u64, "table");
             let shared = csv.has_shared();
-            csv.finish(amount)?;
+            csv.finish()?;
             lines.push(format!("{}: {tables}, {rows}", dir.display()));
             if shared {
                 lines.push(format!(
@@ -326,24 +316,14 @@ impl<'a> Writers<'a> {
             }
         }
         if let Some(thesis) = self.thesis.take() {
-            let (dir, seconds) = thesis.finish(amount)?;
+            let (dir, seconds) = thesis.finish()?;
             lines.push(format!("{}: {}", dir.display(), count(seconds, "second")));
         }
         if let Some(parquet) = self.parquet.take() {
-            let (dir, tables) = parquet.finish(amount)?;
+            let (dir, tables) = parquet.finish()?;
             lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
         }
         Ok(Written { lines, rows_left_out: self.rows_left_out, gaps_left_out: self.gaps_left_out })
-    }
-
-    /// Gaps of an earlier decoding beside a tlog that has none now would be taken for its own.
-    fn check_earlier_gaps(&self) -> Result<()> {
-        let Some(path) = self.tlog.as_ref().and_then(Single::gaps_path) else { return Ok(()) };
-        if self.gaps.is_some() || !path.exists() {
-            return Ok(());
-        }
-        Output::check_new(&path, &self.context.inputs, &GAPS)?;
-        Output::remove(&path, &self.context.inputs)
     }
 }
 
@@ -379,7 +359,6 @@ impl<'a> Deliver<Collected<'a>> for Writers<'a> {
     }
 
     fn group(&mut self, collected: Collected<'a>) -> Result<()> {
-        self.entries += collected.frames + collected.records;
         self.put(collected)
     }
 }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::files::{Inputs, Kind, Origin, Output, digest, remove_if_empty, settle};
+use crate::files::{Inputs, Output, digest, remove_if_empty, settle};
 use crate::hex::hex;
 
 /// The file that says what a demo made.
@@ -27,13 +27,6 @@ pub(super) const GROUND_STATION: &str = "ground-station.bin";
 pub(super) const REPORT: &str = "report.html";
 pub(super) const DECODED: &str = "decoded";
 
-/// The mark: a demo replaces it.
-const KIND: Kind = Kind {
-    words: "the mark of a demo",
-    is: |start| start.starts_with(HEAD.as_bytes()),
-    origin: Origin::Ours,
-};
-
 /// A demo's folder.
 pub(super) struct Place<'a> {
     dir: &'a Path,
@@ -42,8 +35,8 @@ pub(super) struct Place<'a> {
     earlier: BTreeMap<String, String>,
     /// What lies in the decoded folder and stays there.
     others: BTreeSet<PathBuf>,
-    /// What this demo has made so far, with its hash.
-    made: BTreeMap<String, String>,
+    /// The mark so far.
+    mark: String,
 }
 
 impl<'a> Place<'a> {
@@ -51,7 +44,7 @@ impl<'a> Place<'a> {
     pub(super) fn look(dir: &'a Path, inputs: &'a Inputs) -> Result<Self> {
         let earlier = made(dir)?;
         check(dir, &earlier, inputs)?;
-        Ok(Self { dir, inputs, earlier, others: BTreeSet::new(), made: BTreeMap::new() })
+        Ok(Self { dir, inputs, earlier, others: BTreeSet::new(), mark: HEAD.to_owned() })
     }
 
     /// Removes what an earlier demo made. Nothing is removed where anything is in the way by now.
@@ -90,15 +83,12 @@ impl<'a> Place<'a> {
     /// Writes down that this demo makes these files, and where they are now: before they have their names.
     pub(super) fn note(&mut self, files: &[(&str, &Path)]) -> Result<()> {
         for (name, path) in files {
-            self.made.insert((*name).to_owned(), hash(path)?);
+            let hash = hash(path)?;
+            self.mark.extend([&hash, " ", name, "\n"]);
         }
-        let mut mark =
-            Output::create(&self.dir.join(MARK), &self.inputs.clone().replacing(true), &KIND, None)?;
-        let mut text = HEAD.to_owned();
-        for (name, hash) in &self.made {
-            text = text + hash + " " + name + "\n";
-        }
-        settle(mark.write_all(text.as_bytes()), mark.path())?;
+        // What it said before is its beginning.
+        let mut mark = Output::create(&self.dir.join(MARK), &self.inputs.clone().replacing(true))?;
+        settle(mark.write_all(self.mark.as_bytes()), mark.path())?;
         mark.finish()
     }
 }
@@ -111,10 +101,12 @@ fn made(dir: &Path) -> Result<BTreeMap<String, String>> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
         Err(error) => return Err(error).with_context(|| format!("{}: cannot be read", mark.display())),
     };
-    let lines = text.strip_prefix(HEAD).unwrap_or_default().lines();
+    let Some(text) = text.strip_prefix(HEAD) else {
+        bail!("{}: is no mark of a demo; move it away, or name another directory with --dir", mark.display())
+    };
     let is_inside =
         |name: &str| Path::new(name).components().all(|part| matches!(part, std::path::Component::Normal(_)));
-    let entries = lines.filter_map(|line| line.split_once(' ')).filter(|(_, name)| is_inside(name));
+    let entries = text.lines().filter_map(|line| line.split_once(' ')).filter(|(_, name)| is_inside(name));
     Ok(entries.map(|(hash, name)| (name.to_owned(), hash.to_owned())).collect())
 }
 

@@ -2,8 +2,8 @@
 //! when all of it is there, so that there are the old tables, the new ones, or none, and never some of both.
 //!
 //! Its [stamp](super::stamp) says what it was made of and which files are ours. A folder that is there is compared with
-//! what would be written, file by file; only with `--replace` is it replaced, and only where nothing lies in it but
-//! what its stamp names.
+//! what would be written, file by file; with `--replace` it is [kept](super::aside) as a whole, and the new one takes its
+//! name.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -14,16 +14,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::amount::{Amount, Content};
+use super::aside::replace;
 use super::inputs::Inputs;
-use super::part::{free_part, lock, lock_folder_of, sync_folder_of};
+use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
 use super::paths::{cannot_write, make_parent, settle, target_of};
-use super::stamp::{STAMP, Stamp, foreign};
-use super::there::There;
+use super::stamp::{STAMP, Stamp};
+use super::there::{Likeness, There, likeness};
 use crate::outcome::Differs;
 
-/// What a folder may hold that is not ended.
-const EXTENSIONS: [&str; 2] = ["csv", "parquet"];
 /// Files that are synced at once: each waits for the disk, and nearly all of it together.
 const SYNCS_AT_ONCE: usize = 8;
 
@@ -33,8 +31,6 @@ pub struct Folder {
     /// As the user named it.
     path: PathBuf,
     made_of: String,
-    /// How much of it is in the files.
-    amount: Option<Amount>,
     /// The files so far, and how many bytes each has.
     files: Mutex<BTreeMap<String, Arc<AtomicU64>>>,
     to: To,
@@ -53,7 +49,7 @@ struct Part {
     path: PathBuf,
     /// Without links.
     target: PathBuf,
-    /// Whether it takes the place of another one.
+    /// Whether it takes the place of another one, which is kept.
     replaces: bool,
     /// The stamp's file, which holds the lock.
     stamp: Option<File>,
@@ -79,16 +75,14 @@ impl Folder {
         make_parent(path)?;
         let target = target_of(path)?;
         let _beginning = lock_folder_of(&target);
-        restore(&target)?;
-        let to = if Self::is_free(path) {
-            To::Part(Part::begin(path, target, false)?)
-        } else if may_be_replaced(path, inputs)? {
-            To::Part(Part::begin(path, target, true)?)
-        } else {
-            To::There
-        };
+        let is_free = Self::is_free(path);
+        if !is_free {
+            check(path)?;
+        }
+        let replaces = inputs.may_replace(path);
+        let to = if is_free || replaces { To::Part(Part::begin(path, target, replaces)?) } else { To::There };
         let (path, made_of) = (path.to_owned(), made_of.to_owned());
-        Ok(Self { path, made_of, amount: None, files: Mutex::default(), to })
+        Ok(Self { path, made_of, files: Mutex::default(), to })
     }
 
     /// Whether nothing is there, or an empty folder.
@@ -108,11 +102,6 @@ impl Folder {
     /// The folder's path, as the user named it.
     pub fn path(&self) -> &Path {
         &self.path
-    }
-
-    /// How much of its log is in it, before it gets its name: it takes the place of no folder that has more.
-    pub fn set_amount(&mut self, amount: Amount) {
-        self.amount = Some(amount);
     }
 
     /// A new file in it.
@@ -153,15 +142,25 @@ impl Folder {
     }
 
     /// All files are there and closed: the folder takes its name.
-    pub fn finish(self) -> Result<()> {
-        let files = self.files.into_inner().unwrap_or_else(PoisonError::into_inner);
-        match self.to {
+    pub fn finish(mut self) -> Result<()> {
+        let files = std::mem::take(self.files.get_mut().unwrap_or_else(PoisonError::into_inner));
+        match &mut self.to {
             To::There => is_all_there(&self.path, &files),
-            To::Part(mut part) => {
-                let (made_of, amount) = (self.made_of, self.amount);
-                let stamp = Stamp { made_of, amount, files: files.into_keys().collect() };
-                part.finish(&self.path, &stamp)
+            To::Part(part) => {
+                let made_of = std::mem::take(&mut self.made_of);
+                let stamp = Stamp { made_of, files: files.into_keys().collect() };
+                let placed = part.finish(&self.path, &stamp);
+                part.drop_unplaced(&stamp.files);
+                placed
             }
+        }
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if let To::Part(part) = &mut self.to {
+            part.drop_unplaced(self.files.get_mut().unwrap_or_else(PoisonError::into_inner).keys());
         }
     }
 }
@@ -182,12 +181,18 @@ impl Part {
     fn begin(path: &Path, target: PathBuf, replaces: bool) -> Result<Self> {
         let part = free_part(&target, path)?;
         fs::create_dir(&part).with_context(|| cannot_write(path))?;
-        let mut part = Self { path: part, target, replaces, stamp: None };
-        let stamp = File::options().write(true).create_new(true).open(part.path.join(STAMP));
-        let stamp = stamp.with_context(|| cannot_write(path))?;
-        lock(&stamp, path)?;
-        part.stamp = Some(stamp);
-        Ok(part)
+        let stamp = File::options().write(true).create_new(true).open(part.join(STAMP));
+        let stamp = stamp.with_context(|| cannot_write(path)).and_then(|stamp| {
+            lock(&stamp, path)?;
+            Ok(stamp)
+        });
+        match stamp {
+            Ok(stamp) => Ok(Self { path: part, target, replaces, stamp: Some(stamp) }),
+            Err(error) => {
+                remove_made(&part, []);
+                Err(error)
+            }
+        }
     }
 
     fn finish(&mut self, path: &Path, stamp: &Stamp) -> Result<()> {
@@ -195,36 +200,58 @@ impl Part {
             settle(stamp.write(file), path)?;
         }
         sync_all(&self.path).with_context(|| cannot_write(path))?;
-        // Again: somebody may have put something there meanwhile.
-        if self.replaces {
-            check_ours(path)?;
-            let content = |folder: &Path, stamp: &Stamp| {
-                let length = |name| fs::metadata(folder.join(name)).map_or(0, |about| about.len());
-                Content { amount: stamp.amount, bytes: stamp.files.iter().map(length).sum() }
-            };
-            let there = content(path, &Stamp::of(path).unwrap_or_default());
-            content(&self.path, stamp).check_replaces(there, path)?;
-        } else if !Folder::is_free(path) {
-            return Err(Differs::new(path).into());
-        }
         // An open file keeps Windows from renaming its folder.
         self.stamp = None;
         let _ending = lock_folder_of(&self.target);
-        put_in_place(&self.path, &self.target, exchange).with_context(|| cannot_write(path))?;
+        // Again: somebody may have put something there meanwhile.
+        let placed = if Folder::is_free(&self.target) {
+            // No system renames over an empty folder and over nothing else.
+            let _ = fs::remove_dir(&self.target);
+            rename_new(&self.path, &self.target)
+        } else if !self.replaces {
+            return Err(Differs::new(path).into());
+        } else if is_equal(&self.target, &self.path, stamp).unwrap_or(false) {
+            return Ok(());
+        } else {
+            replace(&self.path, &self.target)
+        };
+        settle(placed, path)?;
         sync_folder_of(&self.target);
         self.path = PathBuf::new();
         Ok(())
     }
-}
 
-impl Drop for Part {
-    fn drop(&mut self) {
-        if !self.path.as_os_str().is_empty() {
+    /// Removes what this run has made of it, where it has not become the folder.
+    fn drop_unplaced<'a>(&mut self, files: impl IntoIterator<Item = &'a String>) {
+        let path = std::mem::take(&mut self.path);
+        if !path.as_os_str().is_empty() {
             let _ending = lock_folder_of(&self.target);
-            // Where it cannot be removed, it is in nobody's way.
-            let _ = remove_part(&self.path);
+            self.stamp = None;
+            remove_made(&path, files);
         }
     }
+}
+
+/// Removes these files of a part, its stamp and itself. What somebody else put there stays, and what cannot be removed is in
+/// nobody's way.
+fn remove_made<'a>(part: &Path, files: impl IntoIterator<Item = &'a String>) {
+    for name in files.into_iter().map(String::as_str).chain([STAMP]) {
+        let _ = fs::remove_file(part.join(name));
+    }
+    let _ = fs::remove_dir(part);
+}
+
+/// Whether the tables in the folder that is `there` are those of the `new` one, and all of them.
+fn is_equal(there: &Path, new: &Path, stamp: &Stamp) -> io::Result<bool> {
+    if Stamp::of(there).is_none_or(|there| there.files != stamp.files) {
+        return Ok(false);
+    }
+    for name in &stamp.files {
+        if likeness(&there.join(name), &new.join(name))? != Likeness::Equal {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 impl Write for FolderFile {
@@ -245,8 +272,8 @@ impl Write for FolderFile {
     }
 }
 
-/// Whether what is there may be replaced; otherwise it may be compared. An error where it is neither.
-fn may_be_replaced(path: &Path, inputs: &Inputs) -> Result<bool> {
+/// Refuses what is no folder of tables.
+fn check(path: &Path) -> Result<()> {
     let shown = path.display();
     if path.is_file() {
         bail!("{shown}: is a file, and a directory is needed there; name another output");
@@ -254,98 +281,7 @@ fn may_be_replaced(path: &Path, inputs: &Inputs) -> Result<bool> {
     if Stamp::of(path).is_none() {
         bail!("{shown}: is there already and was not made by this command; name another output with -o");
     }
-    if !inputs.may_replace(path) {
-        return Ok(false);
-    }
-    check_ours(path)?;
-    Ok(true)
-}
-
-/// Refuses a folder with files in it that we did not make.
-fn check_ours(path: &Path) -> Result<()> {
-    let stamp = Stamp::of(path).unwrap_or_default();
-    match foreign(path, |name| stamp.has(name)).with_context(|| cannot_write(path))? {
-        Some(name) => bail!(
-            "{}: has {name}, which hums did not make, and is not replaced; move that file, or name another output \
-             with -o",
-            path.display()
-        ),
-        None => Ok(()),
-    }
-}
-
-/// Removes a folder that has our files only.
-fn remove_ours(folder: &Path) -> io::Result<()> {
-    let stamp = Stamp::of(folder).unwrap_or_default();
-    remove(folder, |name| stamp.has(name))
-}
-
-/// Removes what this run has made and not ended: its stamp may name no file yet.
-fn remove_part(folder: &Path) -> io::Result<()> {
-    let stamp = Stamp::of(folder).filter(|stamp| !stamp.files.is_empty());
-    let is_table = |name: &str| EXTENSIONS.iter().any(|extension| name.ends_with(&format!(".{extension}")));
-    remove(folder, |name| stamp.as_ref().map_or(name == STAMP || is_table(name), |stamp| stamp.has(name)))
-}
-
-/// Removes a folder in which all is ours.
-fn remove(folder: &Path, is_ours: impl Fn(&str) -> bool) -> io::Result<()> {
-    if let Some(name) = foreign(folder, is_ours)? {
-        return Err(io::Error::other(format!("{name} in it was not made by hums")));
-    }
-    for entry in fs::read_dir(folder)? {
-        fs::remove_file(entry?.path())?;
-    }
-    fs::remove_dir(folder)
-}
-
-/// Where the old folder is for the moment in which two renames put the new one in its place.
-pub(super) fn old_of(target: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(target.file_name().unwrap_or_default());
-    name.push(".hums-old");
-    target.with_file_name(name)
-}
-
-/// A run that was killed between two renames has left the old folder under another name.
-fn restore(target: &Path) -> Result<()> {
-    let old = old_of(target);
-    if !old.is_dir() {
-        return Ok(());
-    }
-    if target.exists() { remove_ours(&old) } else { fs::rename(&old, target) }
-        .with_context(|| cannot_write(&old))
-}
-
-/// The part becomes the target, and what was there goes: in one step where `exchange` can, otherwise by two renames.
-pub(super) fn put_in_place(
-    part: &Path,
-    target: &Path,
-    exchange: impl Fn(&Path, &Path) -> bool,
-) -> io::Result<()> {
-    if Folder::is_free(target) {
-        // Windows does not rename over an empty folder.
-        let _ = fs::remove_dir(target);
-        return fs::rename(part, target);
-    }
-    if exchange(part, target) {
-        return remove_ours(part);
-    }
-    let old = old_of(target);
-    fs::rename(target, &old)?;
-    fs::rename(part, target)?;
-    remove_ours(&old)
-}
-
-/// Swaps two folders in one step, where the system can do that.
-#[cfg(target_os = "linux")]
-fn exchange(one: &Path, other: &Path) -> bool {
-    use rustix::fs::{CWD, RenameFlags, renameat_with};
-    renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).is_ok()
-}
-
-#[cfg(not(target_os = "linux"))]
-fn exchange(_: &Path, _: &Path) -> bool {
-    false
+    Ok(())
 }
 
 /// Brings all files of a folder to the disk.

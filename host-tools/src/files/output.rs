@@ -1,20 +1,19 @@
 //! One output file.
 
-use std::fs::{self, File, Metadata, Permissions};
+use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::amount::{Amount, Content};
+use super::aside::{kept_as, replace, set_aside};
 use super::identity::{
     check_standard_output, check_standard_output_is_open, descriptor, is_standard_output,
     means_standard_output, refuse_overwriting,
 };
 use super::inputs::Inputs;
-use super::kind::{Found, Kind, Origin};
 use super::part::{free_part, lock, lock_folder_of, rename_new, sync_folder_of};
-use super::paths::{aside_of, begun_of, cannot_write, settle, target_of};
+use super::paths::{begun_of, cannot_write, settle, target_of};
 use super::there::{Likeness, There, likeness};
 use crate::outcome::{Differs, usage};
 use crate::output::Stdout;
@@ -25,9 +24,10 @@ const BUFFER_BYTES: usize = 16 * 1024;
 /// A file that is written. It has its name from [`Output::finish`] on; until then, and after a kill, a full disk or an
 /// error, there is the old file of this name or none.
 ///
-/// A file that is there and has a byte in it is never replaced by other content, unless the user says so: what is
-/// written is compared with it, and the first byte that differs is an error ([`Differs`]). What is no regular file (a
-/// FIFO, `/dev/null`) and what somebody opened for us (`-`, `/dev/stdout`, `/dev/fd/3`) is written as it is.
+/// A file that is there and has a byte in it stays: what is written is compared with it, and the first byte that differs is
+/// an error ([`Differs`]). Where the user says `--replace`, the new one takes its name, and it is kept, unless it is the
+/// beginning of the new one. What is no regular file (a FIFO, `/dev/null`) and what somebody opened for us (`-`,
+/// `/dev/stdout`, `/dev/fd/3`) is written as it is.
 ///
 /// What is made of a live source cannot be made again: it has its name from the beginning, and each write is in the file at
 /// once. So what came before a kill is there, and every command sees it.
@@ -54,39 +54,43 @@ struct Part {
     path: PathBuf,
     /// Without links: a link to the file stays a link.
     target: PathBuf,
-    /// Of the file that it replaces; none where it replaces nothing.
-    permissions: Option<Permissions>,
-    /// It may replace a file that is its own beginning: nothing of that is lost.
-    replaces_beginning: bool,
-    /// What is in the file that it replaces; none where that may become less.
-    there: Option<Content>,
-    /// How much is in it.
-    amount: Option<Amount>,
+    /// What becomes of another file that has this name in the end.
+    taken: Taken,
     /// An earlier run may have begun it: it stays when it is dropped.
     resumed: bool,
 }
 
+/// What becomes of a file with other content under an output's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Taken {
+    /// It stays, and the output is refused.
+    Stays,
+    /// The same, unless it is the beginning of the output: nothing of that is lost.
+    Completed,
+    /// It is kept under another name.
+    Kept,
+}
+
 /// What an output may find at its place.
 enum Place {
-    /// Nothing, or a file that it may replace.
+    /// Nothing, an empty file, or a file that may be replaced.
     Free(Part),
-    /// A file with something in it.
+    /// A file with something in it, which stays.
     Taken,
     /// No regular file.
     Stream,
 }
 
 impl Output {
-    /// Begins a file, which is none of the inputs. Its folder must be there. `kind` is what the command makes, `of` the log
-    /// that it makes it of, where that has a name.
-    pub fn create(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Self> {
+    /// Begins a file, which is none of the inputs. Its folder must be there.
+    pub fn create(path: &Path, inputs: &Inputs) -> Result<Self> {
         if means_standard_output(path) {
             return Self::standard(path, inputs);
         }
-        match Part::of(path, inputs, kind, of)? {
+        match Part::of(path, inputs)? {
             Place::Free(_) if inputs.is_live() => Self::record(path),
             Place::Free(part) => Self::begin(path, part),
-            Place::Taken if inputs.is_live() => Err(Differs::new(path).into()),
+            Place::Taken if inputs.is_live() => Err(Differs::at_all(path).into()),
             Place::Taken => {
                 let there =
                     There::open(path, 0).with_context(|| format!("{}: cannot be read", path.display()));
@@ -98,40 +102,38 @@ impl Output {
 
     /// Refuses a file that is there with something in it: for what a run makes beside changing something else, where
     /// comparing would come too late.
-    pub fn check_new(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<()> {
+    pub fn check_new(path: &Path, inputs: &Inputs) -> Result<()> {
         if means_standard_output(path) {
             return inputs.refuse_standard_output();
         }
-        match Part::of(path, inputs, kind, None)? {
-            Place::Taken if matches!(kind.origin, Origin::Unknown) => Err(Differs::original(path).into()),
-            Place::Taken => Err(Differs::new(path).into()),
-            Place::Free(part) if part.replaces_beginning => Err(Differs::original(path).into()),
+        match Part::of(path, inputs)? {
+            Place::Taken => Err(Differs::at_all(path).into()),
             Place::Free(_) | Place::Stream => Ok(()),
         }
     }
 
-    /// Refuses a place where anything but such a file lies, or nothing: for what is written only later, and only perhaps.
-    pub fn check_place(path: &Path, inputs: &Inputs, kind: &Kind) -> Result<()> {
-        inputs.refuse(path)?;
-        let about = match fs::metadata(path) {
-            Ok(about) => about,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            Err(error) => return Err(error).with_context(|| cannot_write(path)),
-        };
-        check(path, &about)?;
-        let is_kind = || -> io::Result<bool> { Ok(!matches!(kind.found(path, None)?, Found::Other)) };
-        if about.is_file() && (about.len() == 0 || is_kind().with_context(|| cannot_write(path))?) {
-            return Ok(());
+    /// Refuses a file with something in it where a run makes none, and an earlier one would be taken for its own; with
+    /// `--replace` it may be [kept](Self::keep).
+    pub fn check_none(path: &Path, inputs: &Inputs) -> Result<()> {
+        match Part::of(path, inputs)? {
+            Place::Taken => Err(Differs::new(path).into()),
+            Place::Free(_) | Place::Stream => Ok(()),
         }
-        bail!(
-            "{}: is there already, and is not {}, which goes there; move it away, or name another output",
-            path.display(),
-            kind.words
-        )
+    }
+
+    /// Keeps such a file under another name.
+    pub fn keep(path: &Path, inputs: &Inputs) -> Result<()> {
+        let Place::Free(part) = Part::of(path, inputs)? else { return Ok(()) };
+        let _ending = lock_folder_of(&part.target);
+        if fs::metadata(&part.target).is_ok_and(|about| about.len() > 0) {
+            let aside = settle(set_aside(&part.target, &part.target), path)?;
+            note!("{}: {}", path.display(), kept_as(&aside));
+        }
+        Ok(())
     }
 
     /// Goes on with what an earlier run has left of a file, and says how many bytes that is. Dropped before its end it
-    /// stays for the next one. In the end it replaces a file that is its beginning, and no other. Only for regular files.
+    /// stays for the next one. In the end it completes a file that is its beginning, and replaces no other. Only for regular files.
     pub fn resume(path: &Path) -> Result<(Self, u64)> {
         let target = target_of(path)?;
         if let Ok(about) = fs::metadata(path) {
@@ -140,15 +142,7 @@ impl Output {
                 bail!("{}: is no regular file, and what was begun cannot go on in it", path.display());
             }
         }
-        let part = Part {
-            path: begun_of(&target)?,
-            target,
-            permissions: None,
-            replaces_beginning: true,
-            there: None,
-            amount: None,
-            resumed: true,
-        };
+        let part = Part { path: begun_of(&target)?, target, taken: Taken::Completed, resumed: true };
         if fs::symlink_metadata(&part.path).is_ok_and(|about| !about.is_file()) {
             bail!("{}: is no file of ours, and stands where one is begun; move it away", part.path.display());
         }
@@ -157,17 +151,10 @@ impl Output {
         Ok((Self::at_once(file, path, Some(part)), bytes))
     }
 
-    /// Begins anew what [`Output::resume`] gave. What an earlier run has left stays under the name that is given back.
+    /// Begins anew what [`Output::resume`] gave. What an earlier run has left is kept under the path that is given back.
     pub fn set_aside(&mut self) -> Result<PathBuf> {
         let Some(part) = self.part.take() else { bail!("{}", cannot_write(&self.path)) };
-        let mut number = 1;
-        let aside = loop {
-            let aside = aside_of(&part.target, number)?;
-            match rename_new(&part.path, &aside) {
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
-                renamed => break settle(renamed, &self.path).map(|()| aside)?,
-            }
-        };
+        let aside = settle(set_aside(&part.path, &part.target), &self.path)?;
         let file = open_to_go_on(&part.path, &self.path)?;
         *self = Self::at_once(file, &self.path, Some(part));
         Ok(aside)
@@ -192,7 +179,7 @@ impl Output {
     fn record(path: &Path) -> Result<Self> {
         let file = open_to_go_on(path, path)?;
         if file.metadata().with_context(|| cannot_write(path))?.len() > 0 {
-            return Err(Differs::new(path).into());
+            return Err(Differs::at_all(path).into());
         }
         Ok(Self::at_once(file, path, None))
     }
@@ -234,13 +221,6 @@ impl Output {
     /// Where the bytes are until the file is whole.
     pub fn part(&self) -> &Path {
         self.part.as_ref().map_or(&self.path, |part| &part.path)
-    }
-
-    /// How much of its log is in it, before it gets its name: it takes the place of no file that has more.
-    pub fn set_amount(&mut self, amount: Amount) {
-        if let Some(part) = &mut self.part {
-            part.amount = Some(amount);
-        }
     }
 
     /// Whether it goes into a pipe or a device, or into what somebody opened for us: nothing has a place beside it.
@@ -332,73 +312,52 @@ impl Drop for Output {
 
 impl Part {
     /// The part of a file that is to be written.
-    fn of(path: &Path, inputs: &Inputs, kind: &Kind, of: Option<&str>) -> Result<Place> {
+    fn of(path: &Path, inputs: &Inputs) -> Result<Place> {
         inputs.refuse(path)?;
         let target = target_of(path)?;
-        let part = |target: PathBuf, permissions, replaces_beginning, there| -> Result<Place> {
-            let (path, amount, resumed) = (PathBuf::new(), None, false);
-            Ok(Place::Free(Self { path, target, permissions, replaces_beginning, there, amount, resumed }))
+        let replaces = inputs.may_replace(path);
+        let part = |or| {
+            let taken = if replaces { Taken::Kept } else { or };
+            Ok(Place::Free(Self { path: PathBuf::new(), target, taken, resumed: false }))
         };
-        let mut there = None;
         let about = match fs::metadata(path) {
             Ok(about) => about,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(target, None, false, None),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return part(Taken::Stays),
             Err(error) => return Err(error).with_context(|| cannot_write(path)),
         };
         check(path, &about)?;
         if !about.is_file() || descriptor(path).is_some() {
             return Ok(Place::Stream);
         }
-        if about.len() > 0 {
-            if !inputs.may_replace(path) {
-                return Ok(Place::Taken);
-            }
-            // By what a link leads to: the link may have another file's name.
-            match check_kind(path, &target, kind, of)? {
-                Found::Same(amount) => there = Some(Content { amount, bytes: about.len() }),
-                Found::Kind | Found::Other => return part(target, None, true, None),
-            }
-            // A table beside a file is shorter where that has become whole.
-            there = there.filter(|_| !matches!(kind.origin, Origin::Ours));
+        if about.len() > 0 && !replaces {
+            return Ok(Place::Taken);
         }
         if about.permissions().readonly() {
             bail!("{}: is read-only; make it writable or name another output", path.display());
         }
-        part(target, Some(about.permissions()), false, there)
+        part(Taken::Completed)
     }
 
     /// Gives it its name.
     fn place(&self, file: &File) -> io::Result<()> {
-        if let Some(permissions) = &self.permissions {
-            if let Some(there) = self.there {
-                // Somebody may have written to it meanwhile.
-                let there = Content { bytes: fs::metadata(&self.target)?.len(), ..there };
-                let new = Content { amount: self.amount, bytes: file.metadata()?.len() };
-                if let Err(less) = new.check_replaces(there, &self.target) {
-                    return match likeness(&self.target, &self.path)? {
-                        Likeness::Equal => fs::remove_file(&self.path),
-                        Likeness::Beginning | Likeness::Other => Err(io::Error::other(less)),
-                    };
-                }
-            }
-            file.set_permissions(permissions.clone())?;
-            return fs::rename(&self.path, &self.target);
-        }
+        let _ending = lock_folder_of(&self.target);
         match rename_new(&self.path, &self.target) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             done => return done,
         }
-        // Somebody has put something there meanwhile; or an earlier run has, what is gone on with.
+        // What the user means to replace or to complete, or what somebody has put there meanwhile.
         let permissions = fs::metadata(&self.target)?.permissions();
         match likeness(&self.target, &self.path)? {
             Likeness::Equal => fs::remove_file(&self.path),
-            Likeness::Beginning if self.replaces_beginning => {
+            Likeness::Beginning if self.taken >= Taken::Completed => {
                 file.set_permissions(permissions)?;
                 fs::rename(&self.path, &self.target)
             }
-            _ if self.replaces_beginning && !self.resumed => {
-                Err(io::Error::other(Differs::original(&self.target)))
+            _ if self.taken == Taken::Kept => {
+                file.set_permissions(permissions)?;
+                replace(&self.path, &self.target)
             }
+            _ if self.resumed => Err(io::Error::other(Differs::at_all(&self.target))),
             _ => Err(io::Error::other(Differs::new(&self.target))),
         }
     }
@@ -421,19 +380,6 @@ fn check(path: &Path, about: &Metadata) -> Result<()> {
         return Err(usage(format!("{shown}: is a disk or a card, and hums writes files only; name a file")));
     }
     Ok(())
-}
-
-/// What is replaced is of the kind that the command makes: a slip of the finger is not enough to lose a card's image.
-fn check_kind(path: &Path, target: &Path, kind: &Kind, of: Option<&str>) -> Result<Found> {
-    let found = kind.found(target, of).with_context(|| format!("{}: cannot be read", path.display()))?;
-    if !matches!(found, Found::Other) {
-        return Ok(found);
-    }
-    bail!(
-        "{}: is there already, and is not {}, so --replace does not replace it; name another output, or move it away",
-        path.display(),
-        kind.words
-    )
 }
 
 #[cfg(unix)]

@@ -9,13 +9,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::paths::{PART, PARTS_MAX, cannot_write, part_of, target_of};
+use super::paths::{PARTS_MAX, cannot_write, part_of, target_of};
 use super::stamp::STAMP;
-
-/// Whether a name is that of a file or a folder that is not whole: readers pass it over.
-pub fn is_part(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(PART))
-}
 
 /// Takes the lock, which its owner keeps for as long as the file is open; whoever writes already is told of.
 pub(super) fn lock(file: &File, target: &Path) -> Result<()> {

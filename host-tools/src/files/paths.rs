@@ -14,6 +14,20 @@ use crate::outcome::usage;
 
 /// How the name of a file or a folder ends that is not whole yet.
 pub const PART: &str = ".hums-part";
+/// The folder of what was replaced.
+pub(super) const KEPT: &str = "hums-kept";
+
+/// Why readers of a folder pass over what has this name, as the end of a sentence: it is not whole, or was replaced.
+pub fn why_unread(path: &Path) -> Option<&'static str> {
+    let name = path.file_name()?.to_string_lossy();
+    if name.ends_with(PART) {
+        return Some(
+            "has the name of what a run of hums has not ended, and is passed over; to read it, rename it",
+        );
+    }
+    (name == KEPT)
+        .then_some("keeps what --replace has replaced, and is passed over; to read it, name what is in it")
+}
 
 /// Names of a part that are tried.
 pub(super) const PARTS_MAX: u32 = 100;
@@ -28,11 +42,6 @@ pub(super) fn part_of(target: &Path, number: u32) -> Result<PathBuf> {
 /// What `hums pull` has begun of a target, beside it: to be gone on with, so no other command takes it for its own.
 pub(super) fn begun_of(target: &Path) -> Result<PathBuf> {
     beside(target, ".pull", 1)
-}
-
-/// What was begun of another log of the same name, beside it: the `number`-th name, from 1 on.
-pub(super) fn aside_of(target: &Path, number: u32) -> Result<PathBuf> {
-    beside(target, ".pull-other", number)
 }
 
 /// The path that is written where this one is named: without links, so that a link stays one. What a link in `/proc` says
@@ -122,7 +131,7 @@ pub fn cannot_write(path: &Path) -> String {
 }
 
 /// An error in terms of the file.
-pub fn settle(result: io::Result<()>, path: &Path) -> Result<()> {
+pub fn settle<T>(result: io::Result<T>, path: &Path) -> Result<T> {
     result.with_context(|| cannot_write(path))
 }
 

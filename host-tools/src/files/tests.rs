@@ -2,7 +2,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use super::folder::{old_of, put_in_place};
+use super::aside::{replace, set_aside};
 use super::*;
 
 /// A directory with a file `old` of this content.
@@ -19,40 +19,93 @@ fn names(dir: &Path) -> Vec<String> {
     names
 }
 
-/// What this module's files are taken for.
-const ANY: Kind = Kind { words: "text", is: |start| start.is_ascii(), origin: Origin::Ours };
-
 fn create(path: &Path) -> anyhow::Result<Output> {
-    Output::create(path, &Inputs::none(), &ANY, None)
+    Output::create(path, &Inputs::none())
 }
 
 /// Writes it whole; the error's words where that fails.
 fn write(path: &Path, inputs: &Inputs, text: &str) -> Result<(), String> {
     let write = || -> anyhow::Result<()> {
-        let mut output = Output::create(path, inputs, &ANY, None)?;
+        let mut output = Output::create(path, inputs)?;
         settle(output.write_all(text.as_bytes()), path)?;
         output.finish()
     };
     write().map_err(|error| format!("{error:#}"))
 }
 
+/// What an earlier replacement has kept.
+fn kept(dir: &Path, number: u32, name: &str) -> String {
+    let path = dir.join("hums-kept").join(number.to_string()).join(name);
+    fs::read_to_string(path).expect("it is kept")
+}
+
 #[test]
-fn a_file_is_the_old_one_until_the_new_one_is_whole() {
+fn a_file_is_the_old_one_until_the_new_one_is_whole_and_then_it_is_kept() {
     let dir = furnished();
     let path = dir.path().join("old");
     let replacing = Inputs::none().replacing(true);
-    let mut output = Output::create(&path, &replacing, &ANY, None).expect("created");
+    let mut output = Output::create(&path, &replacing).expect("created");
     output.write_all(&vec![b'x'; 100_000]).expect("written");
     assert_eq!(fs::read(&path).expect("there"), b"what was there");
     drop(output);
     assert_eq!(names(dir.path()), ["old"], "what was dropped before its end leaves nothing");
     assert_eq!(fs::read(&path).expect("there"), b"what was there");
-    write(&path, &replacing, "new").expect("whole");
-    assert_eq!((names(dir.path()), fs::read(&path).expect("there")), (vec!["old".into()], b"new".to_vec()));
+    // The same, and more of the same: nothing is lost, and nothing is kept.
+    for text in ["what was there", "what was there, and more"] {
+        write(&path, &replacing, text).expect("whole");
+        assert_eq!(
+            (names(dir.path()), fs::read_to_string(&path).expect("there")),
+            (vec!["old".into()], text.into())
+        );
+    }
+    for (number, text) in [(1, "new"), (2, "newer"), (3, "what was there")] {
+        let before = fs::read_to_string(&path).expect("there");
+        write(&path, &replacing, if number == 2 { "ne" } else { text }).expect("whole");
+        assert_eq!(
+            (names(dir.path()), kept(dir.path(), number, "old")),
+            (vec!["hums-kept".into(), "old".into()], before)
+        );
+    }
+    // What is put there while it is written, too, and what lies under the kept name already stays.
+    let (new, mine) = (dir.path().join("new"), dir.path().join("hums-kept/3/new"));
+    fs::write(&mine, "mine").expect("written");
+    let mut output = Output::create(&new, &replacing).expect("created");
+    output.write_all(b"ours").expect("written");
+    fs::write(&new, "theirs").expect("written");
+    output.finish().expect("whole");
+    assert_eq!(fs::read(&mine).expect("there"), b"mine");
+    assert_eq!(
+        (kept(dir.path(), 4, "new"), fs::read(&new).expect("there")),
+        ("theirs".into(), b"ours".to_vec())
+    );
 }
 
 #[test]
-fn a_file_with_other_content_is_replaced_only_where_the_user_says_so_and_it_is_of_its_kind() {
+fn a_replacement_that_fails_or_is_killed_loses_nothing() {
+    let dir = furnished();
+    let (path, part) = (dir.path().join("old"), dir.path().join("part"));
+    replace(&part, &path).expect_err("there is no part");
+    assert_eq!(
+        (names(dir.path()), fs::read(&path).expect("there")),
+        (vec!["old".into()], b"what was there".to_vec())
+    );
+    // Where nothing can be kept, nothing is replaced.
+    fs::write(dir.path().join("hums-kept"), "a file").expect("written");
+    write(&path, &Inputs::none().replacing(true), "new").expect_err("there is no place for the old one");
+    assert_eq!(names(dir.path()), ["hums-kept", "old"]);
+    assert_eq!(fs::read(&path).expect("there"), b"what was there");
+    fs::remove_file(dir.path().join("hums-kept")).expect("removed");
+    // Killed between the two renames.
+    set_aside(&path, &path).expect("kept");
+    write(&path, &Inputs::none(), "new").expect("whole");
+    assert_eq!(
+        (kept(dir.path(), 1, "old"), fs::read(&path).expect("there")),
+        ("what was there".into(), b"new".to_vec())
+    );
+}
+
+#[test]
+fn a_file_with_other_content_is_replaced_only_where_the_user_says_so() {
     let dir = furnished();
     let path = dir.path().join("old");
     write(&path, &Inputs::none(), "what was there").expect("the same");
@@ -72,16 +125,16 @@ fn a_file_with_other_content_is_replaced_only_where_the_user_says_so_and_it_is_o
     // An empty file is none.
     fs::write(dir.path().join("empty"), "").expect("written");
     write(&dir.path().join("empty"), &Inputs::none(), "new").expect("whole");
-    fs::write(&path, [0xff; 10]).expect("written");
-    let refused = write(&path, &Inputs::none().replacing(true), "new").expect_err("of another kind");
-    assert!(refused.contains("is not text, so --replace does not replace it"), "{refused}");
     // An input that the command makes again is not replaced, whatever the flags.
     fs::write(&path, "text").expect("written");
     let mut inputs = Inputs::of([&path]).replacing(true);
     inputs.compare_only(&path);
     write(&path, &inputs, "text").expect("the same");
     write(&path, &inputs, "another").expect_err("it is an input");
-    assert_eq!(fs::read(&path).expect("there"), b"text");
+    assert_eq!(
+        (names(dir.path()), fs::read(&path).expect("there")),
+        (vec!["empty".into(), "old".into()], b"text".to_vec())
+    );
 }
 
 #[test]
@@ -142,10 +195,10 @@ fn what_comes_live_has_its_name_and_is_in_the_file_at_once() {
     let path = dir.path().join("tap");
     let mut inputs = Inputs::none();
     inputs.add_endpoint(&"tcp:127.0.0.1:9".parse().expect("an endpoint"));
-    let mut tap = Output::create(&path, &inputs, &ANY, None).expect("created");
+    let mut tap = Output::create(&path, &inputs).expect("created");
     tap.write_all(b"came").expect("written");
     assert_eq!(fs::read(&path).expect("there"), b"came");
-    let second = Output::create(&path, &inputs, &ANY, None).map(|_| ()).expect_err("it is there");
+    let second = Output::create(&path, &inputs).map(|_| ()).expect_err("it is there");
     assert!(format!("{second:#}").contains("is there already"), "{second:#}");
     drop(tap);
     assert_eq!(
@@ -181,11 +234,10 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
     let (mut output, _) = Output::resume(&path).expect("goes on");
     output.set_aside().expect("begun anew");
     output.write_all(b"onetwothree").expect("written");
-    let aside = dir.path().join(".log.pull-other.hums-part");
-    assert_eq!(fs::read(&aside).expect("there"), b"of another log");
+    assert_eq!(kept(dir.path(), 1, "log"), "of another log");
     output.finish().expect("whole");
-    assert_eq!(fs::read(&aside).expect("there"), b"of another log");
-    fs::remove_file(&aside).expect("there");
+    assert_eq!(kept(dir.path(), 1, "log"), "of another log");
+    fs::remove_dir_all(dir.path().join("hums-kept")).expect("there");
     let (mut output, _) = Output::resume(&path).expect("created");
     output.write_all(b"another, and longer").expect("written");
     output.finish().expect_err("what is there is no beginning of it");
@@ -202,16 +254,25 @@ fn what_was_begun_goes_on_and_can_begin_anew() {
 
 #[test]
 #[cfg(unix)]
-fn a_link_stays_a_link_and_permissions_stay() {
+fn a_link_stays_a_link_and_permissions_stay_and_what_it_leads_to_is_kept_where_it_lay() {
     use std::os::unix::fs::{PermissionsExt as _, symlink};
     let dir = furnished();
     let old = dir.path().join("old");
     fs::set_permissions(&old, fs::Permissions::from_mode(0o640)).expect("set");
-    symlink("old", dir.path().join("link")).expect("a link");
-    write(&dir.path().join("link"), &Inputs::none(), "new").expect_err("a link to what is there");
-    write(&dir.path().join("link"), &Inputs::none().replacing(true), "new").expect("whole");
-    assert!(dir.path().join("link").is_symlink());
-    assert_eq!(fs::read(&old).expect("there"), b"new");
+    let link = dir.path().join("folder/link");
+    fs::create_dir(dir.path().join("folder")).expect("made");
+    symlink("../old", &link).expect("a link");
+    write(&link, &Inputs::none(), "new").expect_err("a link to what is there");
+    write(&link, &Inputs::none().replacing(true), "new").expect("whole");
+    assert!(link.is_symlink());
+    assert_eq!(
+        (names(dir.path()), names(&dir.path().join("folder"))),
+        (vec!["folder".into(), "hums-kept".into(), "old".into()], vec!["link".into()])
+    );
+    assert_eq!(
+        (kept(dir.path(), 1, "old"), fs::read(&old).expect("there")),
+        ("what was there".into(), b"new".to_vec())
+    );
     assert_eq!(fs::metadata(&old).expect("there").permissions().mode() & 0o777, 0o640);
 }
 
@@ -229,7 +290,7 @@ fn an_output_that_is_an_input_is_refused_in_every_spelling() {
     let inputs = Inputs::of([at("link"), at("nothing yet")]);
     for name in ["old", "link", "link of a link", "hard", "./old", "folder/../old", "dangling", "nothing yet"]
     {
-        let refused = Output::create(&at(name), &inputs, &ANY, None).expect_err(name).to_string();
+        let refused = Output::create(&at(name), &inputs).expect_err(name).to_string();
         assert!(refused.contains("is an input of this command"), "{name}: {refused}");
     }
     assert_eq!(fs::read(at("old")).expect("there"), b"what was there");
@@ -326,7 +387,7 @@ fn table(path: &Path) -> String {
 }
 
 #[test]
-fn a_folder_with_other_tables_is_replaced_only_where_the_user_says_so() {
+fn a_folder_with_other_tables_is_replaced_only_where_the_user_says_so_and_kept_with_all_that_is_in_it() {
     let dir = furnished();
     let path = dir.path().join("session");
     let replacing = Inputs::none().replacing(true);
@@ -345,57 +406,68 @@ fn a_folder_with_other_tables_is_replaced_only_where_the_user_says_so() {
     let dropped = Folder::create(&path, &replacing, "of a recording").expect("begun");
     dropped.file("T.csv").expect("a file").write_all(b"half").expect("written");
     drop(dropped);
+    make(&path, &replacing, "first").expect("the same");
     assert_eq!((table(&path), names(dir.path())), ("first".to_owned(), vec!["old".into(), "session".into()]));
     assert_eq!(fs::read(path.join(".hums")).expect("a stamp"), before);
-    make(&path, &replacing, "second").expect("replaced");
-    assert_eq!(
-        (table(&path), names(dir.path())),
-        ("second".to_owned(), vec!["old".into(), "session".into()])
-    );
+    // What the user has put there is no table of ours: the folder is the same, and is kept with it.
+    fs::write(path.join("mine.csv"), "mine").expect("written");
+    made(&path, "first");
+    for (number, text) in [(1, "second"), (2, "third")] {
+        let was = table(&path);
+        make(&path, &replacing, text).expect("replaced");
+        assert_eq!(
+            (table(&path), names(dir.path())),
+            (text.to_owned(), vec!["hums-kept".into(), "old".into(), "session".into()])
+        );
+        assert_eq!(kept(dir.path(), number, "session/T.csv"), was);
+    }
+    assert_eq!(kept(dir.path(), 1, "session/mine.csv"), "mine");
+    assert_eq!(names(&path), [".hums", "T.csv"]);
     fs::create_dir(dir.path().join("mine")).expect("made");
     made(&dir.path().join("mine"), "an empty folder is free");
-}
-
-#[test]
-fn what_is_not_named_in_the_stamp_of_a_folder_is_never_removed() {
-    let dir = furnished();
-    let path = dir.path().join("session");
-    let replacing = Inputs::none().replacing(true);
-    made(&path, "first");
-    for name in ["mine.csv", "mine.parquet", "notes.txt"] {
-        fs::write(path.join(name), "mine").expect("written");
-        let refused = make(&path, &replacing, "second").expect_err(name);
-        assert!(refused.contains(&format!("has {name}, which hums did not make")), "{refused}");
-        made(&path, "first");
-        fs::remove_file(path.join(name)).expect("it is still there");
+    // A table that was changed is another one; a stamp that names nothing, or is cut off, too.
+    for changed in ["T.csv", ".hums"] {
+        fs::File::options()
+            .append(true)
+            .open(path.join(changed))
+            .and_then(|mut file| file.write_all(b"mine"))
+            .expect("written");
+        make(&path, &Inputs::none(), "third").expect_err(changed);
+        make(&path, &replacing, "third").expect("replaced");
+        assert_eq!(names(&path), [".hums", "T.csv"]);
     }
-    // A stamp that names nothing, or is cut off, is no leave.
-    for stamp in ["of a recording\n", "of a recording\nfiles 1\nT.csv", "of a recording\nfiles 2\nT.csv\n"] {
-        fs::write(path.join(".hums"), stamp).expect("written");
-        make(&path, &replacing, "second").expect_err(stamp);
-    }
+    assert!(
+        kept(dir.path(), 3, "session/T.csv").ends_with("mine")
+            && kept(dir.path(), 4, "session/.hums").ends_with("mine")
+    );
     fs::remove_file(path.join(".hums")).expect("removed");
     let refused = make(&path, &replacing, "second").expect_err("nobody knows whose it is");
     assert!(refused.contains("was not made by this command"), "{refused}");
-    assert_eq!(table(&path), "first");
+    assert_eq!(table(&path), "third");
 }
 
 #[test]
-fn where_folders_cannot_be_swapped_two_renames_do_and_a_kill_between_them_loses_nothing() {
+fn what_somebody_else_puts_into_a_part_or_at_a_folders_place_stays() {
     let dir = furnished();
-    let (path, other) = (dir.path().join("session"), dir.path().join("other"));
-    made(&path, "old");
-    made(&other, "new");
-    put_in_place(&other, &path, |_, _| false).expect("renamed");
-    assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
-    // Killed after the first rename.
-    fs::rename(&path, old_of(&path)).expect("renamed");
-    drop(Folder::create(&path, &Inputs::none(), "of a recording").expect("begun"));
-    assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
-    // Killed before the old one was removed.
-    made(&old_of(&path), "old");
-    drop(Folder::create(&path, &Inputs::none(), "of a recording").expect("begun"));
-    assert_eq!((table(&path), names(dir.path())), ("new".to_owned(), vec!["old".into(), "session".into()]));
+    let path = dir.path().join("session");
+    let begun = Folder::create(&path, &Inputs::none(), "of a recording").expect("begun");
+    begun.file("T.csv").expect("a file").write_all(b"half").expect("written");
+    fs::write(dir.path().join(".session.hums-part/mine.csv"), "mine").expect("written");
+    drop(begun);
+    assert_eq!(names(&dir.path().join(".session.hums-part")), ["mine.csv"]);
+    fs::remove_dir_all(dir.path().join(".session.hums-part")).expect("removed");
+    // Without a word of the user's, and with one.
+    for replaces in [false, true] {
+        let begun =
+            Folder::create(&path, &Inputs::none().replacing(replaces), "of a recording").expect("begun");
+        fs::create_dir(&path).expect("made");
+        fs::write(path.join("theirs"), "theirs").expect("written");
+        assert_eq!(begun.finish().is_ok(), replaces);
+        let there = if replaces { dir.path().join("hums-kept/1/session") } else { path.clone() };
+        assert_eq!(fs::read(there.join("theirs")).expect("there"), b"theirs");
+        fs::remove_dir_all(&path).expect("removed");
+    }
+    assert_eq!(names(dir.path()), ["hums-kept", "old"]);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
 use super::places::{Log, segment_name};
-use crate::files::is_seekable;
+use crate::files::{is_seekable, why_unread};
 
 /// Finds all logs in `inputs`; with `salvage` by looking at every block of an image, whatever its file system says. An
 /// error where one of them has none.
@@ -33,6 +33,11 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
         let passed_over = found.logs_more + found.repeats;
         check_seekable(input, &about)?;
+        // As the shell names it with all others.
+        if let Some(why) = why_unread(input).filter(|_| about.is_dir() && inputs.len() > 1) {
+            found.remark(format!("{}: {why}", input.display()));
+            continue;
+        }
         if about.is_dir() {
             directory(input, salvage, &mut found)?;
         } else if found.is_known(input) {

@@ -13,7 +13,7 @@ use super::card::{image, is_card, whole_file};
 use super::found::{Found, LOGS_MAX};
 use super::look::{Content, look};
 use super::places::{Log, segment_name};
-use crate::files::is_part;
+use crate::files::why_unread;
 
 /// Folders deeper than this are not walked.
 const DEPTH_MAX: usize = 16;
@@ -96,11 +96,8 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
     for entry in fs::read_dir(dir).with_context(context)? {
         let entry = entry.with_context(context)?;
         let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
-        if is_part(&path) {
-            found.pass_over(format!(
-                "{}: has the name of what a run of hums has not ended, and is passed over; to read it, rename it",
-                path.display()
-            ));
+        if let Some(why) = why_unread(&path) {
+            found.pass_over(format!("{}: {why}", path.display()));
         } else if kind.is_dir() && entries.folders.len() < WAITING_MAX {
             entries.folders.push(path);
         } else if kind.is_file() {

@@ -22,12 +22,11 @@ use anyhow::{Result, bail};
 use crate::check;
 use crate::cli;
 use crate::decode::naming::{Named, Names, Traits, without_made};
-use crate::files::{Amount, Inputs, Output, appended, make_parent, says_directory, settle};
+use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{Followed, HELD_MAX};
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
-use crate::made;
 use crate::outcome::{Kept, Outcome, usage};
 use crate::output;
 use crate::plural::count;
@@ -80,9 +79,8 @@ pub fn run(args: &cli::Report) -> Result<Outcome> {
                     note!("{}: is a copy of {of}, whose page is written once", place.name);
                 }
                 Named::As(name, _) => {
-                    let (path, of) = (wanted.path(&name), traits.identity(place));
                     let trend = trend::of(&this, &before);
-                    kept.pass(make(place, &overview, &trend, &path, of.as_deref(), &inputs))?;
+                    kept.pass(make(place, &overview, &trend, &wanted.path(&name), &inputs))?;
                 }
             }
         }
@@ -128,24 +126,19 @@ fn make(
     overview: &Overview,
     trend: &trend::Trend,
     path: &Path,
-    of: Option<&str>,
     inputs: &Inputs,
 ) -> Result<()> {
-    let contents = &overview.contents;
-    let gaps = overview.ending.summary.gaps;
-    let amount = Amount { entries: contents.frames() + contents.records, gaps };
-    let html = page::html(overview, &replay::Replay::of(place, overview)?, trend, of, amount)?;
-    write(path, &html, inputs, of, amount)?;
+    let html = page::html(overview, &replay::Replay::of(place, overview)?, trend)?;
+    write(path, &html, inputs)?;
     let bytes = count(html.len() as u64, "byte");
     output::line(&format!("{}: session {}, {bytes}", shown(path), word(&place.name)))
 }
 
-fn write(path: &Path, html: &str, inputs: &Inputs, of: Option<&str>, amount: Amount) -> Result<()> {
+fn write(path: &Path, html: &str, inputs: &Inputs) -> Result<()> {
     inputs.refuse(path)?;
     make_parent(path)?;
-    let mut file = Output::create(path, inputs, &made::PAGE, of)?;
+    let mut file = Output::create(path, inputs)?;
     settle(file.write_all(html.as_bytes()), path)?;
-    file.set_amount(amount);
     file.finish()
 }
 

@@ -12,7 +12,6 @@ use super::counters::{self, Counters};
 use super::flights::Flight;
 use super::replay::Replay;
 use super::trend::Trend;
-use crate::files::Amount;
 use crate::info::json::LogJson;
 use crate::page::history::{Cursor, Part};
 use crate::page::json::embedded;
@@ -75,14 +74,8 @@ impl From<&Stats> for StatsJson {
     }
 }
 
-/// A session's page; `of` is what its name ends with: `s1a2b3c4d`. `amount` is what of its log is on it.
-pub fn html(
-    log: &Overview,
-    replay: &Replay,
-    trend: &Trend,
-    of: Option<&str>,
-    amount: Amount,
-) -> Result<String> {
+/// A session's page.
+pub fn html(log: &Overview, replay: &Replay, trend: &Trend) -> Result<String> {
     let data = Data {
         version: env!("CARGO_PKG_VERSION"),
         log: LogJson::new(log),
@@ -104,8 +97,6 @@ pub fn html(
     let mut page = TEMPLATE.to_owned();
     for (mark, text) in [
         ("{{scripts}}", hashes.join(" ").as_str()),
-        ("{{log}}", of.unwrap_or("unknown")),
-        ("{{amount}}", amount.to_string().as_str()),
         ("{{style}}", STYLE.concat().as_str()),
         ("{{uplot}}", UPLOT),
         ("{{program}}", program.as_str()),
@@ -124,9 +115,7 @@ mod tests {
     #[test]
     fn each_mark_of_the_template_stands_once() {
         let program = program("report");
-        for mark in
-            ["{{scripts}}", "{{log}}", "{{amount}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"]
-        {
+        for mark in ["{{scripts}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"] {
             assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
             assert!(
                 !UPLOT.contains(mark) && !program.contains(mark) && !STYLE.concat().contains(mark),

@@ -11,7 +11,6 @@ use hums_link::{Check, Frame, Framer};
 use crate::cli::Run;
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output};
-use crate::made;
 use crate::outcome::Outcome;
 use crate::sink::{Beside, nowhere};
 use crate::source::noise::Noisy;
@@ -158,5 +157,5 @@ fn until_frame(
 
 /// A file for a copy of the bytes, which is none of the inputs.
 fn tap_of(path: &Path, inputs: &Inputs) -> Result<Beside> {
-    Ok(Beside::file("--tap", Output::create(path, inputs, &made::RAW, None)?))
+    Ok(Beside::file("--tap", Output::create(path, inputs)?))
 }

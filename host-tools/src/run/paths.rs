@@ -7,7 +7,6 @@ use anyhow::Result;
 use crate::cli::Run;
 use crate::endpoint::Endpoint;
 use crate::files::{FileId, Inputs, Output, means_standard_output};
-use crate::made;
 use crate::outcome::usage;
 
 /// What of a run must not be written over: its inputs, and the card and the store, which are updated in place. Refuses
@@ -29,7 +28,7 @@ pub(super) fn inputs(run: &Run, tap: Option<&Path>, firmware: Option<&Path>) -> 
     }
     for output in gs.into_iter().chain(tap) {
         // A run also changes the card, so that it is too late to compare while it goes on.
-        Output::check_new(output, &inputs, &made::RAW)?;
+        Output::check_new(output, &inputs)?;
     }
     if let (Some(gs), Some(tap)) = (gs, tap)
         && FileId::of(gs).ok() == FileId::of(tap).ok()

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
-use crate::files::{FileId, is_part};
+use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::sessions::Sessions;
 use crate::logs::{self, Content, segment_name};
@@ -135,6 +135,11 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
         let before = found.places.len();
         check_seekable(input, &about)?;
+        // As the shell names it with all others.
+        if let Some(why) = why_unread(input).filter(|_| about.is_dir() && inputs.len() > 1) {
+            found.remarks.push(format!("{}: {why}", input.display()));
+            continue;
+        }
         if about.is_dir() {
             let own = logs::find::find_in(input, salvage)?;
             let mut walk = Walk::of(input, &own)?;
@@ -294,8 +299,8 @@ impl Walk {
         for entry in fs::read_dir(dir).with_context(context)? {
             let entry = entry.with_context(context)?;
             let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
-            if is_part(&path) || self.ours.contains(&path) {
-                // What a run of this program has not made whole is nobody's recording.
+            // What a run of this program has not made whole, or has replaced, is told with our own logs.
+            if why_unread(&path).is_some() || self.ours.contains(&path) {
                 continue;
             }
             let start = if kind.is_file() { start_of(&path) } else { Vec::new() };

@@ -34,7 +34,7 @@ fn role(arg: &Arg) -> Role {
 }
 
 /// A good value for an argument, where one is needed.
-fn value(command: &str, arg: &str) -> &'static str {
+pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
         ("decode" | "report" | "info" | "verify", "inputs") => "log.hum",
         (_, "input" | "gs_input") => "flight.tlog",
@@ -53,7 +53,7 @@ fn value(command: &str, arg: &str) -> &'static str {
 }
 
 /// The words of a command line: its name, what it requires, and these arguments.
-fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
+pub(crate) fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
     let mut words_more = Vec::new();
     let mut words: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
     let mut push = |arg: &Arg, value: String| {
@@ -85,7 +85,7 @@ fn flags(command: &clap::Command) -> Vec<String> {
 }
 
 /// All commands that do something, with the words that call them.
-fn leaves<'a>(
+pub(crate) fn leaves<'a>(
     command: &'a clap::Command,
     path: &[&'a str],
     found: &mut Vec<(&'a clap::Command, Vec<&'a str>)>,

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::support::{attempt, contents, flight, frames_of, hums, json, named, px4, run, until};
+use crate::support::{all_named, attempt, contents, flight, frames_of, hums, json, named, px4, run, until};
 
 /// Files and folders that are not whole.
 fn parts(dir: &Path) -> Vec<String> {
@@ -49,6 +49,7 @@ fn a_full_disk_leaves_the_old_file_or_nothing() {
         assert!(said.contains("cannot be written") && !said.contains("there is no folder"), "{line}: {said}");
         assert_eq!(fs::read(dir.path().join("old")).unwrap_or_default(), old, "{line}");
         assert_eq!(parts(dir.path()), Vec::<String>::new(), "{line}");
+        assert!(!dir.path().join("hums-kept").exists(), "{line}");
         if output == "new" {
             let left =
                 if dir.path().join("new").exists() { contents(&dir.path().join("new")) } else { Vec::new() };
@@ -111,6 +112,7 @@ fn a_killed_run_leaves_the_old_file_and_is_in_nobodys_way() {
     let said = run(dir.path(), "pack PX4 -o old.hum --replace", 0);
     assert!(String::from_utf8_lossy(&said.stderr).contains("was left by a run that was killed"));
     assert!(fs::read(&part).expect("there") == left);
+    assert!(fs::read(dir.path().join("hums-kept/1/old.hum")).expect("kept") == before);
     run(dir.path(), "verify old.hum", 0);
 }
 
@@ -142,17 +144,24 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
         for tables in [format!("{name}/"), "vehicle=".to_owned()] {
             let found = of(&now, &tables);
             assert!(
-                found == of(&few, &tables) || found == of(&whole, &tables),
+                // None between the two renames.
+                found == of(&few, &tables) || found == of(&whole, &tables) || found.is_empty(),
                 "{tables} after {after_ms} ms: {:?}",
                 found.iter().map(|(name, bytes)| (name, bytes.len())).collect::<Vec<_>>()
             );
         }
+        // The few are where they were, or kept.
+        for (name, bytes) in &few {
+            let is_it = |(other, there): &(String, Vec<u8>)| {
+                there == bytes && other.replace("hums-kept/1/", "") == *name
+            };
+            assert!(now.iter().any(is_it), "{name} after {after_ms} ms");
+        }
     }
     assert!(killed > 0);
     run(dir.path(), "decode log.hum -o out --format csv,parquet --replace", 0);
-    let made =
-        contents(&out).into_iter().filter(|(name, _)| !name.contains(".hums-part")).collect::<Vec<_>>();
-    assert_eq!(made, whole);
+    let is_made = |(name, _): &(String, Vec<u8>)| !name.contains(".hums-part") && !name.contains("hums-kept");
+    assert_eq!(contents(&out).into_iter().filter(is_made).collect::<Vec<_>>(), whole);
 }
 
 #[test]
@@ -204,18 +213,17 @@ fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
         "sim --input PX4 --sd other.img --tap tap.bin",
         "sim --input PX4 --sd other.img --gs tap.bin",
         "pack PX4 -o tap.bin",
-        "pack PX4 -o tap.bin --replace",
-        "report log.hum -o tap.bin --replace",
-        "decode log.hum -o tap.bin --format tlog --replace",
     ] {
         run(dir.path(), line, 1);
         assert!(fs::read(&tap).expect("there") == sent, "{line}");
     }
+    run(dir.path(), "report log.hum -o tap.bin --replace", 0);
+    assert!(fs::read(dir.path().join("hums-kept/1/tap.bin")).expect("kept") == sent);
     assert_eq!(parts(dir.path()), Vec::<String>::new());
 }
 
 #[test]
-fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
+fn what_is_not_whole_or_was_replaced_in_a_folder_is_passed_over_and_told() {
     let dir = tempfile::tempdir().expect("directory");
     run(dir.path(), "pack PX4 -o log.hum", 0);
     let folder = dir.path().join("folder");
@@ -223,11 +231,23 @@ fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
     for name in ["00001_00.HUM", ".00002_00.HUM.hums-part", ".00003_00.HUM.pull.hums-part"] {
         fs::copy(dir.path().join("log.hum"), folder.join(name)).expect("copied");
     }
-    for line in ["verify folder", "info folder", "check folder", "decode folder -o out --format tlog"] {
-        let said = run(dir.path(), line, 0);
+    fs::create_dir_all(folder.join("hums-kept/1")).expect("made");
+    fs::copy(dir.path().join("log.hum"), folder.join("hums-kept/1/00001_00.HUM")).expect("copied");
+    let logs = "folder/00001_00.HUM folder/hums-kept";
+    for line in ["verify IN", "info IN", "check IN", "report IN -o pages/", "decode IN -o out/ --format tlog"]
+    {
+        let said = run(dir.path(), &line.replace("IN", "folder"), 0);
         let said = String::from_utf8_lossy(&said.stderr);
         assert_eq!(said.matches("has not ended, and is passed over").count(), 3, "{line}: {said}");
+        assert_eq!(said.matches("keeps what --replace has replaced").count(), 1, "{line}: {said}");
+        // As a shell names it with all others.
+        let said = run(dir.path(), &line.replace("IN", logs), 0);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert_eq!(said.matches("keeps what --replace has replaced").count(), 1, "{line}: {said}");
     }
+    assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);
+    // Named by itself it is read.
+    run(dir.path(), "verify folder/hums-kept", 0);
 }
 
 #[test]

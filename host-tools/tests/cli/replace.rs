@@ -3,10 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use clap::CommandFactory as _;
+use hums::cli::Cli;
 use tempfile::TempDir;
 
+use crate::inputs::{leaves, words};
 use crate::support::{
-    all_named, attempt, contents, end_of, flight, frames_of, furnished, named, px4, run, stamps, text,
+    all_named, attempt, contents, end_of, frames_of, furnished, named, px4, run, stamps, text,
 };
 
 /// Two cards, each with the first session of a vehicle of its own.
@@ -99,44 +102,88 @@ fn what_is_there_is_not_replaced_by_other_content_unless_the_user_says_so() {
                 kept(&format!("decode cut/log.hum -o out --format {format}"));
             }
         }
-        // Nor by less of the same session, whatever the user says.
-        for format in ["tlog", "jsonl", "influx", "csv", "thesis"] {
-            let line = if line("", "").starts_with("decode") {
-                format!("decode cut/log.hum -o out --format {format} --replace")
-            } else {
-                line("cut", "--replace")
-            };
-            let said = String::from_utf8_lossy(&run(dir.path(), &line, 1).stderr).into_owned();
-            let words = "does not make it less; name another output, or delete it by hand";
-            assert!(said.contains(words) || said.contains("may be an original"), "{line}: {said}");
-            assert!(contents(&out) == made, "{line} changed something");
-        }
-        // The whole takes the place of a part.
-        fs::remove_dir_all(&out).expect("removed");
-        run(dir.path(), &line("cut", ""), 3);
-        assert_ne!(contents(&out), made);
+        // With it the part takes its place, and the whole is kept.
+        run(dir.path(), &line("cut", "--replace"), 3);
+        let [kept, cut] = kept_and_made(&out);
+        assert!(kept == made && cut != made);
         run(dir.path(), &line("whole", "--replace"), 0);
-        assert!(contents(&out).iter().all(|file| made.contains(file)), "a table of the part is left");
+        let [_, again] = kept_and_made(&out);
+        assert!(again == made, "a table of the part is left");
+        fs::remove_dir_all(&out).expect("removed");
     }
     // Parquet tables of two parts of a session never lie side by side: a query reads all that is there.
     run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 3);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 1);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet --replace", 0);
-    let made = contents(&dir.path().join("fleet"));
+    let fleet = dir.path().join("fleet");
+    let before = contents(&fleet);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet --message ATTITUDE", 1);
     run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 1);
-    run(dir.path(), "decode cut/log.hum -o fleet --format parquet --replace", 1);
-    assert!(contents(&dir.path().join("fleet")) == made);
-    assert_eq!(parquet_sessions(&dir.path().join("fleet")).len(), 1);
-    // A table of the user's own stays, and so does the folder that it is in.
-    run(dir.path(), "decode whole/log.hum -o out --format csv", 0);
-    let tables = out.join(named(&out, "log"));
-    fs::write(tables.join("mine.csv"), "mine").expect("written");
-    let before = contents(&out);
-    run(dir.path(), "decode whole/log.hum -o out --format csv", 0);
-    let said = run(dir.path(), "decode cut/log.hum -o out --format csv --replace", 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("mine.csv, which hums did not make"));
-    assert_eq!(contents(&out), before);
+    assert!(contents(&fleet) == before);
+    // What is kept lies deeper than `fleet/*/*/*/TABLE.parquet`, by which a query names a table.
+    let at_depth = |depth| move |session: &PathBuf| session.components().count() == depth;
+    let sessions = parquet_sessions(&fleet);
+    assert_eq!((sessions.len(), sessions.iter().filter(|session| at_depth(3)(session)).count()), (2, 1));
+}
+
+/// What a folder's outputs were before the last run with `--replace`, and what they are now. What is no folder's own lies in
+/// folders of its own below it.
+fn kept_and_made(out: &Path) -> [Vec<(String, Vec<u8>)>; 2] {
+    let all = contents(out);
+    let (kept, made): (Vec<_>, Vec<_>) = all.into_iter().partition(|(name, _)| name.contains("hums-kept/"));
+    let own = |(name, bytes): (String, Vec<u8>)| (name.replace("hums-kept/1/", ""), bytes);
+    [kept.into_iter().map(own).collect(), made]
+}
+
+/// Every command that has the flag, found by the definition of the command line, with every format of its.
+#[test]
+fn what_is_replaced_is_kept_byte_for_byte_by_every_command() {
+    let mut root = Cli::command();
+    root.build();
+    let mut commands = Vec::new();
+    leaves(&root, &[], &mut commands);
+    let mut tried = 0;
+    for (command, path) in &commands {
+        let of = |name: &str| command.get_arguments().find(|arg| arg.get_id() == name);
+        if of("replace").is_none() {
+            continue;
+        }
+        let output = of("output").expect("what replaces has an output");
+        let formats: Vec<Option<String>> = of("format").map_or(vec![None], |arg| {
+            arg.get_possible_values().iter().map(|value| Some(value.get_name().to_owned())).collect()
+        });
+        for format in formats {
+            let dir = furnished();
+            let out = dir.path().join("new");
+            let name = if of("format").is_some() { "new/" } else { "new/out" };
+            fs::create_dir(&out).expect("made");
+            let mut given = vec![(output, name.to_owned())];
+            given.extend(of("format").zip(format.clone()));
+            let line = words(command, path, &given).join(" ");
+            run(dir.path(), &line, 0);
+            // What the user has made of it, and a table of his own.
+            let made = contents(&out);
+            for (name, bytes) in &made {
+                fs::write(out.join(name), [bytes.as_slice(), b"mine"].concat()).expect("written");
+            }
+            let changed = contents(&out);
+            let said = run(dir.path(), &line, 1);
+            assert!(contents(&out) == changed, "{line}");
+            assert!(String::from_utf8_lossy(&said.stderr).contains("or say --replace"));
+            let said = run(dir.path(), &format!("{line} --replace"), 0);
+            let [kept, again] = kept_and_made(&out);
+            assert!(kept == changed && again == made, "{line}");
+            let said = String::from_utf8_lossy(&said.stderr);
+            assert_eq!(said.matches("what was there is kept as new").count(), 1, "{line}: {said}");
+            // And the same again changes nothing.
+            let before = stamps(&out);
+            let said = run(dir.path(), &format!("{line} --replace"), 0);
+            assert!(stamps(&out) == before, "{line}");
+            assert!(!String::from_utf8_lossy(&said.stderr).contains("is kept"), "{line}");
+            tried += 1;
+        }
+    }
+    assert!(tried >= 8, "{tried}");
 }
 
 #[test]
@@ -146,185 +193,61 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording_with_any_flag() {
     let at = |name: &str| dir.path().join(name);
     fs::write(at("spool"), b"HUMSPOOL and what waits").expect("written");
     fs::write(at("thesis.txt"), "months of work").expect("written");
-    fs::write(at("mine.jsonl"), "{\"time_boot\":1,\"mine\":true}\n").expect("written");
     // What a port sent, and a log off the card: originals of the kinds that the commands make.
     fs::write(at("gs"), frames_of(&px4())[..50].concat()).expect("written");
-    let image = fs::read(at("card.img")).expect("an image");
-    let first = image.chunks(512).position(|block| block.starts_with(&[0x48, 0xb2])).expect("a sector") * 512;
-    fs::write(at("00001_00.HUM"), &image[first..first + (1 << 20)]).expect("written");
-    fs::write(at("flight.ulg"), b"ULog\x01\x12\x35\x01 and so on").expect("written");
     let (before, whole) = (stamps(dir.path()), contents(dir.path()));
+    let names = ["card.img", "spool", "thesis.txt", "hums.elf", "flight.tlog", "gs", "log.hum"];
     for line in [
         "decode folder/log.hum -o OUT --format tlog",
-        "decode folder/log.hum -o OUT --format jsonl",
-        "decode folder/log.hum -o OUT --format influx",
         "report folder/log.hum -o OUT",
         "pack folder/flight.tlog -o OUT",
         "sim --input folder/flight.tlog --sd new.img --gs OUT",
         "sim --input folder/flight.tlog --sd new.img --tap OUT",
     ] {
-        let names =
-            ["card.img", "spool", "thesis.txt", "mine.jsonl", "flight.ulg", "hums.elf", "flight.tlog", "gs"];
-        for name in names.into_iter().chain(["log.hum", "00001_00.HUM"]) {
-            for flag in if line.starts_with("sim") { &[""][..] } else { &["", "--replace"] } {
-                // A log that was packed of the same recording is the same again.
-                if line.starts_with("pack") && name == "log.hum" {
-                    continue;
-                }
-                let line = format!("{} {flag}", line.replace("OUT", name));
-                run(dir.path(), &line, 1);
-                assert!(stamps(dir.path()) == before, "{line}");
+        for name in names {
+            // A log that was packed of the same recording is the same again.
+            if line.starts_with("pack") && name == "log.hum" {
+                continue;
             }
+            let line = line.replace("OUT", name);
+            let said = run(dir.path(), &line, 1);
+            assert!(stamps(dir.path()) == before, "{line}");
+            // What has no such flag does not advise it.
+            let said = String::from_utf8_lossy(&said.stderr);
+            assert_eq!(said.contains("--replace"), !line.starts_with("sim"), "{line}: {said}");
         }
     }
-    assert!(contents(dir.path()) == whole, "something was changed");
+    for name in names {
+        run(dir.path(), &format!("report folder/log.hum -o {name} --replace"), 0);
+        let (_, was) = whole.iter().find(|(other, _)| other == name).expect("it was there");
+        assert!(fs::read(at("hums-kept/1").join(name)).expect("kept") == *was, "{name}");
+    }
     let said = run(dir.path(), "sim --input PX4 --sd new.img --gs both --tap ./both", 2);
     assert!(String::from_utf8_lossy(&said.stderr).contains("are one file"));
 }
 
+/// Two cards have an equal log; the trend on its page is that of its card.
 #[test]
-fn what_was_made_of_the_same_log_is_replaced_and_what_was_made_of_another_one_is_not() {
+fn pages_of_equal_sessions_of_two_cards_replace_each_other_and_both_are_there() {
     let dir = tempfile::tempdir().expect("directory");
-    let tlog = fs::read(px4()).expect("a recording");
-    let few: usize = frames_of(&px4())[..800].iter().map(|frame| 8 + frame.len()).sum();
-    fs::write(dir.path().join("few.tlog"), &tlog[..few]).expect("written");
-    run(dir.path(), "pack few.tlog -o few.hum", 0);
-    run(dir.path(), "pack PX4 -o log.hum", 0);
-    run(dir.path(), &format!("pack {} -o other.hum", flight("ap_quad_guided.tlog").display()), 0);
-    for line in [
-        "decode LOG.hum -o OUT --format influx",
-        "report LOG.hum -o OUT",
-        // The first one is the beginning of the second one: nothing is lost.
-        "decode LOG.hum -o OUT --format tlog",
-        "pack LOG.tlog -o OUT",
-    ] {
-        let _ = fs::remove_file(dir.path().join("out"));
-        let of = |log: &str| match (log, line.starts_with("pack")) {
-            ("log", true) => line.replace("LOG.tlog", "PX4").replace("OUT", "out"),
-            ("other", true) => line
-                .replace("LOG.tlog", &flight("ap_quad_guided.tlog").display().to_string())
-                .replace("OUT", "out"),
-            _ => line.replace("LOG", log).replace("OUT", "out"),
-        };
-        run(dir.path(), &of("few"), 0);
-        run(dir.path(), &of("log"), 1);
-        run(dir.path(), &format!("{} --replace", of("log")), 0);
-        let made = fs::read(dir.path().join("out")).expect("there");
-        let said = run(dir.path(), &format!("{} --replace", of("other")), 1);
-        let said = String::from_utf8_lossy(&said.stderr).into_owned();
-        assert!(
-            said.contains("may be an original") && said.contains("name another output"),
-            "{line}: {said}"
-        );
-        assert!(fs::read(dir.path().join("out")).expect("there") == made, "{line}");
+    for folder in ["one", "two"] {
+        fs::create_dir(dir.path().join(folder)).expect("made");
     }
-    // The beginning of the recording has the same session, and takes no place of the whole.
-    let made = fs::read(dir.path().join("log.hum")).expect("there");
-    let said = run(dir.path(), "pack few.tlog -o log.hum --replace", 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("does not make it less"));
-    assert!(fs::read(dir.path().join("log.hum")).expect("there") == made);
-    // Of raw bytes nothing tells of which recording a log was packed.
-    fs::write(dir.path().join("one.raw"), frames_of(&px4())[..400].concat()).expect("written");
-    fs::write(dir.path().join("two.raw"), frames_of(&px4())[400..900].concat()).expect("written");
-    run(dir.path(), "pack one.raw -o raw.hum", 0);
-    run(dir.path(), "pack two.raw -o raw.hum --replace", 1);
-    // A shorter beginning never takes the place of a tlog.
-    let before = tlog.clone();
-    fs::write(dir.path().join("flight.tlog"), &before).expect("written");
-    run(dir.path(), "decode log.hum -o back.tlog --format tlog", 0);
-    let back = fs::read(dir.path().join("back.tlog")).expect("there");
-    run(dir.path(), "decode few.hum -o back.tlog --format tlog --replace", 1);
-    assert!(fs::read(dir.path().join("back.tlog")).expect("there") == back);
-}
-
-#[test]
-fn what_stands_in_a_file_beside_what_was_made_of_the_log_is_not_replaced() {
-    let dir = tempfile::tempdir().expect("directory");
-    let at = |name: &str| dir.path().join(name);
-    run(dir.path(), "pack PX4 -o log.hum", 0);
-    run(dir.path(), &format!("pack {} -o other.hum", flight("ap_quad_guided.tlog").display()), 0);
-    for log in ["log", "other"] {
-        run(dir.path(), &format!("decode {log}.hum -o {log}.lp --format influx --message HEARTBEAT"), 0);
-    }
-    run(dir.path(), "report log.hum -o log.html --replace", 0);
-    let read = |name: &str| fs::read(at(name)).expect("there");
-    let (points, others) = (read("log.lp"), read("other.lp"));
-    let log = &read("log.hum")[..60 * 512];
-    let page = read("log.html");
-    let kept = |line: &str, there: &[u8]| {
-        fs::write(at("out"), there).expect("written");
-        let said = run(dir.path(), &format!("{line} -o out --replace"), 1);
-        let said = String::from_utf8_lossy(&said.stderr);
-        assert!(said.contains("may be an original"), "{line}: {said}");
-        assert!(read("out") == there, "{line}");
+    run(dir.path(), "pack PX4 -o one/00002_00.HUM", 0);
+    fs::copy(dir.path().join("one/00002_00.HUM"), dir.path().join("two/00002_00.HUM")).expect("copied");
+    let other = end_of("ap_quad_guided.tlog", dir.path());
+    run(dir.path(), &format!("pack {} -o two/00001_00.HUM", other.display()), 0);
+    let page = |folder: &str, flag: &str, code| {
+        run(dir.path(), &format!("report {folder} --session 00002 -o page.html {flag}"), code);
+        fs::read(dir.path().join("page.html")).expect("a page")
     };
-    let influx = "decode log.hum --format influx";
-    kept(influx, &[points.as_slice(), &others].concat());
-    kept(influx, &[points.as_slice(), b"# what I found\n"].concat());
-    kept(influx, &points[..points.len() - 1]);
-    for behind in [&read("other.hum")[..10 * 512], b"mine"] {
-        kept("pack PX4", &[log, behind].concat());
-    }
-    kept("report log.hum", &[page.as_slice(), b"<p>bent arm"].concat());
-    // Without that it is replaced.
-    for (line, there) in [(influx, points.as_slice()), ("pack PX4", log), ("report log.hum", &page)] {
-        fs::write(at("out"), there).expect("written");
-        run(dir.path(), &format!("{line} -o out --replace"), 0);
-    }
-    // A link that has the name of the log's file leads to another one.
-    run(dir.path(), "decode log.hum -o made/ --format tlog", 0);
-    let name = format!("{}.tlog", named(&at("made"), "log"));
-    let original = fs::read(flight("ap_quad_guided.tlog")).expect("a recording");
-    fs::write(at("original.tlog"), &original[..50_000]).expect("written");
-    fs::remove_file(at("made").join(&name)).expect("removed");
-    std::os::unix::fs::symlink("../original.tlog", at("made").join(&name)).expect("a link");
-    let said = run(dir.path(), "decode log.hum -o made/ --format tlog --replace", 1);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("may be an original"));
-    assert!(read("original.tlog") == original[..50_000]);
-}
-
-#[test]
-fn a_damaged_copy_takes_the_place_of_nothing_and_the_sound_log_that_of_a_damaged_copy() {
-    let dir = tempfile::tempdir().expect("directory");
-    let out = dir.path().join("out");
-    for folder in ["whole", "damaged"] {
-        fs::create_dir(dir.path().join(folder)).expect("a directory");
-    }
-    run(dir.path(), "pack PX4 -o whole/log.hum", 0);
-    let mut log = fs::read(dir.path().join("whole/log.hum")).expect("a log");
-    // Few frames are lost, and a table of gaps comes to the others.
-    log[127 * 512 + 100] ^= 4;
-    fs::write(dir.path().join("damaged/log.hum"), log).expect("written");
-    let formats = "tlog,jsonl,influx,csv,parquet,thesis";
-    let lines = |log: &str| {
-        [format!("decode {log}/log.hum -o out --format {formats}"), format!("report {log}/log.hum -o out/")]
-    };
-    let mut each =
-        formats.split(',').map(|format| format!("decode damaged/log.hum -o out --format {format}"));
-    for line in lines("whole") {
-        run(dir.path(), &line, 0);
-    }
-    let made = contents(&out);
-    for line in each.by_ref().chain(["report damaged/log.hum -o out/".to_owned()]) {
-        let said = run(dir.path(), &format!("{line} --replace"), 1);
-        let said = String::from_utf8_lossy(&said.stderr);
-        assert!(said.contains("does not make it less"), "{line}: {said}");
-        assert!(contents(&out) == made, "{line} changed something");
-    }
-    fs::remove_dir_all(&out).expect("removed");
-    for line in lines("damaged") {
-        run(dir.path(), &line, 3);
-    }
-    // The same again is no less.
-    let damaged = contents(&out);
-    for line in lines("damaged") {
-        run(dir.path(), &format!("{line} --replace"), 3);
-    }
-    assert!(contents(&out) == damaged);
-    for line in lines("whole") {
-        run(dir.path(), &format!("{line} --replace"), 0);
-    }
-    assert!(contents(&out) == made);
+    let one = page("one", "", 0);
+    assert!(page("two", "", 1) == one);
+    let two = page("two", "--replace", 0);
+    assert!(two != one);
+    assert!(fs::read(dir.path().join("hums-kept/1/page.html")).expect("kept") == one);
+    assert!(page("one", "--replace", 0) == one);
+    assert!(fs::read(dir.path().join("hums-kept/2/page.html")).expect("kept") == two);
 }
 
 #[test]
@@ -372,8 +295,15 @@ fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
     fs::remove_file(dir.path().join("back.tlog")).expect("removed");
     run(dir.path(), line, 1);
     assert!(gaps.exists() && !dir.path().join("back.tlog").exists());
+    // What the user has noted in it is kept, and lies beside the tlog of these gaps.
+    fs::write(dir.path().join("back.tlog"), "those gaps'").expect("written");
+    fs::write(&gaps, "my remarks").expect("written");
     run(dir.path(), &format!("{line} --replace"), 0);
     assert!(!gaps.exists());
+    let kept = contents(&dir.path().join("hums-kept/1"));
+    let is = |place: usize| kept.get(place).map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
+    assert_eq!(is(0), Some(("back.tlog", &b"those gaps'"[..])));
+    assert_eq!(is(1), Some(("back.tlog.gaps.csv", &b"my remarks"[..])));
 }
 
 #[test]

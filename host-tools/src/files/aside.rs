@@ -1,0 +1,72 @@
+//! What `--replace` replaces is kept: it is renamed into the folder `hums-kept` beside it, and nothing is removed.
+//!
+//! There it keeps its name, under a number: `x.tlog` becomes `hums-kept/1/x.tlog`, the next one of this name
+//! `hums-kept/2/x.tlog`. The numbers only grow, so that what one run replaces lies together. In a folder of its own it is not
+//! read as a second recording, and its ending still says what it is.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::part::{rename_new, sync_folder_of};
+use super::paths::KEPT;
+
+/// Keeps what lies at `from` as an earlier `target`, and gives its new path. Nothing is ever written over.
+pub(super) fn set_aside(from: &Path, target: &Path) -> io::Result<PathBuf> {
+    let name = target.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+    let kept = target.with_file_name(KEPT);
+    let mut number = newest(&kept).unwrap_or(1);
+    loop {
+        let folder = kept.join(number.to_string());
+        fs::create_dir_all(&folder)?;
+        let aside = folder.join(name);
+        match rename_new(from, &aside) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                number = number.checked_add(1).ok_or(error)?;
+            }
+            Err(error) => {
+                remove_empty(&aside);
+                return Err(error);
+            }
+            Ok(()) => {
+                sync_folder_of(&aside);
+                return Ok(aside);
+            }
+        }
+    }
+}
+
+/// The part takes the name of what lies at `target`, which is kept. Where it cannot, that has its name again.
+pub(super) fn replace(part: &Path, target: &Path) -> io::Result<()> {
+    let aside = set_aside(target, target)?;
+    if let Err(error) = rename_new(part, target) {
+        return Err(match rename_new(&aside, target) {
+            Ok(()) => {
+                remove_empty(&aside);
+                error
+            }
+            Err(_) => io::Error::new(error.kind(), format!("{error}; {}", kept_as(&aside))),
+        });
+    }
+    note!("{}: {}", target.display(), kept_as(&aside));
+    Ok(())
+}
+
+/// What is said of it.
+pub(super) fn kept_as(aside: &Path) -> String {
+    format!("what was there is kept as {}", aside.display())
+}
+
+/// The highest number that is there.
+fn newest(kept: &Path) -> Option<u64> {
+    let entries = fs::read_dir(kept).ok()?;
+    entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok()).max()
+}
+
+/// Removes the folders in which nothing came to lie.
+fn remove_empty(aside: &Path) {
+    for folder in aside.ancestors().skip(1).take(2) {
+        // One with something in it stays.
+        let _ = fs::remove_dir(folder);
+    }
+}
