@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::cli;
 use crate::ending::{BlocksJson, EndJson, PowerOn, SessionBefore, among_words, behind_words};
+use crate::files::Inputs;
 use crate::followed::Followed;
 use crate::info::json::images_json;
 use crate::logs::sessions::{Sessions, place};
@@ -23,6 +24,7 @@ use crate::summary::Overview;
 /// Runs `hums verify`.
 pub fn run(args: &cli::Verify) -> Result<Outcome> {
     let found = logs::find(&args.inputs, args.salvage)?;
+    Inputs::of(found.paths()).refuse_standard_output()?;
     for remark in &found.remarks {
         note!("{remark}");
     }

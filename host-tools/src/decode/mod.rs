@@ -129,7 +129,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     followed.finish().try_for_each(&mut tell)?;
     kept.end()?;
     if !written && !any_kept {
-        bail!("nothing is within --from and --to, so nothing was written");
+        bail!("nothing of what was asked for is there, so nothing was written");
     }
     Ok(outcome)
 }
@@ -281,8 +281,8 @@ impl Task<'_> {
             read = self.read(log, name, &context, parquet.as_deref());
         }
         let (summary, mut writers) = read?;
-        if writers.is_empty() && context.selection.has_limits() {
-            remarks.push(nothing_of(log, &summary));
+        if writers.is_empty() && context.selection.is_part() {
+            remarks.push(nothing_of(log, &summary, &context.selection));
             return Ok(Done { remarks, ..Done::of(log) });
         }
         let not_checked = writers.checked(summary.last)?;
@@ -392,11 +392,16 @@ impl Task<'_> {
     }
 }
 
-/// Says that nothing of a log is in the time that was asked for, and what time it has.
-fn nothing_of(log: &Place, summary: &Summary) -> String {
+/// Says that nothing that was asked for is in a log, and what time it has.
+fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
     let seconds = |at: Option<Instant>| at.map_or(0.0, |at| at.as_micros() as f64 / 1e6);
+    let names = selection.names().join(", ");
+    if !selection.has_limits() {
+        return format!("{}: no {names} is in it", log.name);
+    }
+    let what = if names.is_empty() { "nothing of it".to_owned() } else { format!("no {names} of it") };
     format!(
-        "{}: nothing of it is within --from and --to: its times go from {:.3} s to {:.3} s",
+        "{}: {what} is within --from and --to: its times go from {:.3} s to {:.3} s",
         log.name,
         seconds(summary.first),
         seconds(summary.last)

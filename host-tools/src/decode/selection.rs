@@ -42,6 +42,11 @@ impl Selection {
         self.from.is_some() || self.to.is_some()
     }
 
+    /// Whether anything less than all was asked for.
+    pub fn is_part(&self) -> bool {
+        self.has_limits() || !self.names.is_empty()
+    }
+
     /// A time in UTC selects nothing in a log that has none: that is told, not guessed.
     pub fn check_without_utc(&self, log: &str) -> Result<()> {
         if [self.from, self.to].iter().any(|when| matches!(when, Some(When::Utc(_)))) {

@@ -132,6 +132,11 @@ impl Thesis {
         settle(writeln!(file, "{}", cells.join("; ")), path)
     }
 
+    /// Whether no second has a row.
+    pub fn is_empty(&self) -> bool {
+        self.rows == 0
+    }
+
     /// All rows are there: the folder gets its name. Gives it and the number of rows.
     pub fn finish(mut self) -> Result<(PathBuf, u64)> {
         self.tables.iter_mut().try_for_each(|(file, path)| settle(file.flush(), path))?;

@@ -61,6 +61,8 @@ pub struct Written {
     pub rows_left_out: u64,
     /// Gaps of a tlog beside which no table can lie.
     pub gaps_left_out: u64,
+    /// No tlog was made, as no frame was asked for that is there.
+    pub has_no_frame: bool,
 }
 
 impl Written {
@@ -74,7 +76,8 @@ impl Written {
             let gaps = count(self.gaps_left_out, "gap");
             format!("{gaps} without a table: beside what is no file there is no place for one; name a file")
         });
-        rows.into_iter().chain(gaps)
+        let frames = "no frame of what was asked for is in it, so no tlog was written";
+        rows.into_iter().chain(gaps).chain(self.has_no_frame.then(|| frames.to_owned()))
     }
 }
 
@@ -269,7 +272,10 @@ impl<'a> Writers<'a> {
 
     /// Whether nothing was written but what every file begins with.
     pub fn is_empty(&self) -> bool {
-        self.frames == 0 && self.records == 0
+        let has_records = self.context.formats.has_records() && self.records > 0;
+        let has_points = self.influx.as_ref().is_some_and(|influx| influx.count > 0);
+        let has_rows = self.thesis.as_ref().is_some_and(|thesis| !thesis.is_empty());
+        self.frames == 0 && !has_records && !has_points && !has_rows
     }
 
     /// All of the log is there: the files get their names. Says what was written.
@@ -281,6 +287,9 @@ impl<'a> Writers<'a> {
         } else {
             format!("{frames}, {}", count(self.records, "record"))
         };
+        // An empty tlog would be taken for a log in which nothing came.
+        let has_no_frame = self.frames == 0 && self.context.selection.is_part() && self.tlog.take().is_some();
+        self.gaps = self.gaps.filter(|_| !has_no_frame);
         // None gets its name where another one of them is not what is there.
         let influx = self.influx.as_mut().map(|influx| &mut influx.file);
         for file in [&mut self.tlog, &mut self.jsonl, &mut self.gaps].into_iter().flatten().chain(influx) {
@@ -323,7 +332,8 @@ impl<'a> Writers<'a> {
             let (dir, tables) = parquet.finish()?;
             lines.push(format!("{}: {}, {rows}", dir.display(), count(tables as u64, "table")));
         }
-        Ok(Written { lines, rows_left_out: self.rows_left_out, gaps_left_out: self.gaps_left_out })
+        let Self { rows_left_out, gaps_left_out, .. } = self;
+        Ok(Written { lines, rows_left_out, gaps_left_out, has_no_frame })
     }
 }
 

@@ -136,8 +136,8 @@ impl Entries {
     }
 }
 
-/// Whether its name ends as that of a log of ours does, compressed or not.
-fn is_named_as_log(path: &Path) -> bool {
+/// Whether its name ends as that of a log of ours does, compressed or not: what is none is told with the logs of a folder.
+pub fn is_named_as_log(path: &Path) -> bool {
     is_named(path, &[".hum"])
 }
 
@@ -160,10 +160,13 @@ fn no_card(path: &Path) -> String {
 }
 
 fn nothing_of_ours(path: &Path) -> String {
-    format!(
-        "{}: has the name of a log and holds nothing of ours (one that is packed: unpack it)",
-        path.display()
-    )
+    let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy().to_lowercase());
+    let what = if PACKED.iter().any(|packed| name.ends_with(packed)) {
+        "of a compressed log, which is not read; unpack it"
+    } else {
+        "of a log and holds nothing of ours"
+    };
+    format!("{}: has the name {what}", path.display())
 }
 
 /// Says of something in a folder that it is no file.

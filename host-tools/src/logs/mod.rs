@@ -28,7 +28,7 @@ pub mod strangers;
 
 pub use card::{Room, is_card, on_card, room};
 pub use find::{Content, Found, find};
-pub use folder::passed_over;
+pub use folder::{is_named_as_log, passed_over};
 pub use places::{Log, Piece, segment_name};
 
 impl Found {

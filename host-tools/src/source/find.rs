@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::format::{KNOWN, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
-use crate::files::{FileId, why_unread};
+use crate::files::{FileId, Inputs, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::sessions::Sessions;
 use crate::logs::{self, Content, segment_name};
@@ -174,6 +174,8 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         }
     }
     make_names_unique(&mut found.places);
+    // What a command prints is not to stand in what it reads (`>> FILE`).
+    Inputs::of(found.paths()).refuse_standard_output()?;
     Ok(found)
 }
 
@@ -305,6 +307,9 @@ impl Walk {
             }
             let start = if kind.is_file() { start_of(&path) } else { Vec::new() };
             let wanted = if kind.is_dir() { depth < DEPTH_MAX } else { detect(&start).is_some() };
+            if kind.is_file() && !wanted && logs::is_named_as_log(&path) {
+                continue;
+            }
             if !wanted {
                 self.others += u64::from(kind.is_file());
                 if kind.is_file() && self.passed_over.len() < PASSED_OVER_MAX {

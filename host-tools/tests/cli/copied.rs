@@ -112,7 +112,10 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
     gzip.write_all(&fs::read(dir.path().join("copied/00001_00.HUM")).expect("there")).expect("packed");
     let path = dir.path().join("copied/00003_00.HUM.gz");
     fs::write(&path, gzip.finish().expect("packed")).expect("written");
-    all_say(dir.path(), "copied", 3, &["00003_00.HUM.gz: has the name of a log and holds nothing of ours"]);
+    let words = "00003_00.HUM.gz: has the name of a compressed log, which is not read; unpack it";
+    all_say(dir.path(), "copied", 3, &[words]);
+    let said = run(dir.path(), "info copied", 3).stderr;
+    assert_eq!(String::from_utf8_lossy(&said).matches("00003_00.HUM.gz").count(), 1);
     fs::remove_file(path).expect("removed");
     fs::copy(px4(), dir.path().join("copied/flight.tlog")).expect("copied");
     fs::write(dir.path().join("copied/notes.txt"), "mine").expect("written");

@@ -149,6 +149,31 @@ fn no_command_writes_over_any_of_its_inputs() {
 }
 
 #[test]
+fn results_are_appended_to_no_input() {
+    let dir = furnished();
+    let before = contents(dir.path());
+    for (line, input) in [
+        ("info flight.tlog", "flight.tlog"),
+        ("check folder", "folder/flight.tlog"),
+        ("verify log.hum", "log.hum"),
+        ("decode log.hum -o new --format tlog", "link-log.hum"),
+        ("report log.hum -o new.html", "hard-log.hum"),
+        ("pack flight.tlog -o new.hum", "flight.tlog"),
+        ("sim --input flight.tlog --sd new.img", "flight.tlog"),
+        ("sim --input flight.tlog --params hums.param --sd new.img", "hums.param"),
+    ] {
+        let file = fs::File::options().append(true).open(dir.path().join(input)).expect("opened");
+        let mut hums = std::process::Command::new(env!("CARGO_BIN_EXE_hums"));
+        let ended =
+            hums.args(line.split(' ')).current_dir(dir.path()).stdout(file).output().expect("it runs");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(2), "{line}: {said}");
+        assert!(said.contains("standard output: goes into"), "{line}: {said}");
+        assert!(contents(dir.path()) == before, "{line} changed something");
+    }
+}
+
+#[test]
 fn a_cards_image_is_written_over_by_no_format() {
     let dir = recorded();
     let at = dir.path();

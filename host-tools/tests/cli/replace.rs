@@ -325,6 +325,29 @@ fn a_time_in_which_there_is_nothing_is_told_and_nothing_is_written() {
 }
 
 #[test]
+fn a_message_that_is_not_there_is_told_and_makes_no_empty_tlog() {
+    let dir = tempfile::tempdir().expect("directory");
+    run(dir.path(), "pack PX4 -o log.hum", 0);
+    for line in ["decode log.hum -o out.tlog --format tlog", "decode PX4 -o out.jsonl --format jsonl"] {
+        let said = run(dir.path(), &format!("{line} --message AIRSPEED_AUTOCAL"), 1);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(
+            said.contains(": no AIRSPEED_AUTOCAL is in it") && said.contains("nothing was written"),
+            "{said}"
+        );
+        let said = run(dir.path(), &format!("{line} --message AIRSPEED_AUTOCAL --to 10"), 1);
+        assert!(String::from_utf8_lossy(&said.stderr).contains(": no AIRSPEED_AUTOCAL of it is within"));
+    }
+    assert_eq!(contents(dir.path()).len(), 1);
+    // Records are there: they are written, and no tlog.
+    let said =
+        run(dir.path(), "decode log.hum -o out --format tlog,jsonl,thesis --message AIRSPEED_AUTOCAL", 0);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("log: no frame of what was asked for is in it"));
+    let made = contents(&dir.path().join("out"));
+    assert!(made.len() > 2 && made.iter().all(|(name, bytes)| !name.contains(".tlog") && !bytes.is_empty()));
+}
+
+#[test]
 fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
     let dir = tempfile::tempdir().expect("directory");
     run(dir.path(), "pack PX4 -o log.hum", 0);
