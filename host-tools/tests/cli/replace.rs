@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::CommandFactory as _;
+use clap::builder::PossibleValue;
 use hums::cli::Cli;
 use tempfile::TempDir;
 
@@ -142,48 +143,45 @@ fn what_is_replaced_is_kept_byte_for_byte_by_every_command() {
     root.build();
     let mut commands = Vec::new();
     leaves(&root, &[], &mut commands);
-    let mut tried = 0;
+    let mut tried = Vec::new();
     for (command, path) in &commands {
         let of = |name: &str| command.get_arguments().find(|arg| arg.get_id() == name);
         if of("replace").is_none() {
             continue;
         }
         let output = of("output").expect("what replaces has an output");
-        let formats: Vec<Option<String>> = of("format").map_or(vec![None], |arg| {
-            arg.get_possible_values().iter().map(|value| Some(value.get_name().to_owned())).collect()
-        });
-        for format in formats {
-            let dir = furnished();
-            let out = dir.path().join("new");
-            let name = if of("format").is_some() { "new/" } else { "new/out" };
-            fs::create_dir(&out).expect("made");
-            let mut given = vec![(output, name.to_owned())];
-            given.extend(of("format").zip(format.clone()));
-            let line = words(command, path, &given).join(" ");
-            run(dir.path(), &line, 0);
-            // What the user has made of it, and a table of his own.
-            let made = contents(&out);
-            for (name, bytes) in &made {
-                fs::write(out.join(name), [bytes.as_slice(), b"mine"].concat()).expect("written");
-            }
-            let changed = contents(&out);
-            let said = run(dir.path(), &line, 1);
-            assert!(contents(&out) == changed, "{line}");
-            assert!(String::from_utf8_lossy(&said.stderr).contains("or say --replace"));
-            let said = run(dir.path(), &format!("{line} --replace"), 0);
-            let [kept, again] = kept_and_made(&out);
-            assert!(kept == changed && again == made, "{line}");
-            let said = String::from_utf8_lossy(&said.stderr);
-            assert_eq!(said.matches("what was there is kept as new").count(), 1, "{line}: {said}");
-            // And the same again changes nothing.
-            let before = stamps(&out);
-            let said = run(dir.path(), &format!("{line} --replace"), 0);
-            assert!(stamps(&out) == before, "{line}");
-            assert!(!String::from_utf8_lossy(&said.stderr).contains("is kept"), "{line}");
-            tried += 1;
+        let dir = furnished();
+        let out = dir.path().join("new");
+        let name = if of("format").is_some() { "new/" } else { "new/out" };
+        fs::create_dir(&out).expect("made");
+        let mut given = vec![(output, name.to_owned())];
+        given.extend(of("format").map(|arg| {
+            let all = arg.get_possible_values();
+            (arg, all.iter().map(PossibleValue::get_name).collect::<Vec<_>>().join(","))
+        }));
+        let line = words(command, path, &given).join(" ");
+        run(dir.path(), &line, 0);
+        // What the user has made of it.
+        let made = contents(&out);
+        for (name, bytes) in &made {
+            fs::write(out.join(name), [bytes.as_slice(), b"mine"].concat()).expect("written");
         }
+        let changed = contents(&out);
+        let said = run(dir.path(), &line, 1);
+        assert!(contents(&out) == changed, "{line}");
+        assert!(String::from_utf8_lossy(&said.stderr).contains("or say --replace"));
+        let said = run(dir.path(), &format!("{line} --replace"), 0);
+        let [kept, again] = kept_and_made(&out);
+        assert!(kept == changed && again == made, "{line}");
+        assert!(String::from_utf8_lossy(&said.stderr).contains("what was there is kept as new"), "{line}");
+        // And the same again changes nothing.
+        let before = stamps(&out);
+        let said = run(dir.path(), &format!("{line} --replace"), 0);
+        assert!(stamps(&out) == before, "{line}");
+        assert!(!String::from_utf8_lossy(&said.stderr).contains("is kept"), "{line}");
+        tried.push(path[0]);
     }
-    assert!(tried >= 8, "{tried}");
+    assert_eq!(tried, ["decode", "report", "pack"]);
 }
 
 #[test]
