@@ -11,7 +11,7 @@
 //! those clusters stays there until it is overwritten: readers tell it by its session.
 //!
 //! **The free count** of the information sector is set to "unknown" once, so that it can never be wrong; the hint
-//! where to look for free clusters is kept.
+//! where to look for free clusters is kept. A sector that is damaged is shown, and written, as one that knows nothing.
 //!
 //! **Bad FAT entries** would make the library compute with clusters that do not exist: they are shown to it as bad
 //! clusters, which it refuses, and the block that holds them is never written back. A chain that goes in circles ends
@@ -74,9 +74,6 @@ struct Held {
     at: u32,
     kind: Kind,
 }
-
-/// What the information sector has at which place (Microsoft, FAT32 File System Specification 1.03, "`FSInfo` Sector Structure").
-const INFO_SIGNATURES: [(usize, u32); 3] = [(0, 0x4161_5252), (484, 0x6141_7272), (508, 0xAA55_0000)];
 
 /// Blocks of log that are written with one command at most: the gain of more is small, and they take RAM.
 pub(crate) const BATCH_BLOCKS: usize = 8;
@@ -265,10 +262,16 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         }
     }
 
-    /// The information sector has hints only: a card on which it is damaged is as good as any.
+    /// The library refuses a volume whose information sector has not its signatures (Microsoft's FAT specification 1.03, `FSInfo`),
+    /// although it holds hints only: one that is damaged is one that knows nothing.
     fn correct_info(&self, block: &mut Block) {
-        for (at, signature) in INFO_SIGNATURES {
-            block[at..at + 4].copy_from_slice(&signature.to_le_bytes());
+        const SIGNATURES: [(usize, u32); 3] = [(0, 0x4161_5252), (484, 0x6141_7272), (508, 0xAA55_0000)];
+        let is_signed = |(at, signature): (usize, u32)| block[at..at + 4] == signature.to_le_bytes();
+        if !SIGNATURES.into_iter().all(is_signed) {
+            *block = Block::new();
+            for (at, signature) in SIGNATURES {
+                block[at..at + 4].copy_from_slice(&signature.to_le_bytes());
+            }
         }
         block[488..492].copy_from_slice(&u32::MAX.to_le_bytes());
         let hint = u32::from_le_bytes([block[492], block[493], block[494], block[495]]);

@@ -6,7 +6,7 @@ use common::{Broken, MIB_BLOCKS, MemCard, held};
 use embedded_sdmmc::Block;
 use hums_recorder::card::{Card, CardError, LogEntry};
 use hums_recorder::format::{BLOCKS_MIN, FormatError, format};
-use hums_recorder::layout::LayoutError;
+use hums_recorder::layout::{Layout, LayoutError};
 use hums_recorder::{CardState, CardStatus, LogName};
 
 const FIRST: LogName = LogName { session: 1, segment: 0 };
@@ -315,6 +315,25 @@ fn change(device: &MemCard, at: u32, change: impl FnOnce(&mut [u8; 512])) {
 /// The search for room begins at the first cluster again.
 fn forget_hint(device: &MemCard) {
     change(device, 2048 + 1, |info| info[488..496].fill(0xFF));
+}
+
+#[test]
+fn a_damaged_information_sector_keeps_nobody_from_recording_and_is_mended() {
+    for (at, bytes) in [(0, 512), (0, 16), (484, 4), (508, 4)] {
+        let device = MemCard::formatted(64 * MIB_BLOCKS);
+        let info = Layout::read(&device).expect("a card").info;
+        change(&device, info, |block| block[at..at + bytes].fill(0));
+        let status = CardStatus::new();
+        mount(&device, &status).create(FIRST, 1 << 20).expect("there is room");
+        // Again: now as others read it.
+        assert!(logs(&mount(&device, &status)).iter().any(|log| log.name == FIRST));
+        change(&device, info, |block| {
+            assert_eq!(
+                [&block[..4], &block[484..488], &block[508..]],
+                [b"RRaA", b"rrAa", &[0, 0, 0x55, 0xAA]]
+            );
+        });
+    }
 }
 
 #[test]

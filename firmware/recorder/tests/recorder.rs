@@ -225,21 +225,6 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
 }
 
 #[test]
-fn a_card_whose_information_sector_is_damaged_records_and_has_a_whole_one_again() {
-    let device = MemCard::formatted(40 * MIB_BLOCKS);
-    let whole = device.blocks.borrow()[&2049];
-    device.blocks.borrow_mut().insert(2049, [0x5A; 512]);
-    let status = CardStatus::new();
-    let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
-    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
-    let now = device.blocks.borrow()[&2049];
-    for place in [0..4, 484..488, 508..512] {
-        assert_eq!(now[place.clone()], whole[place]);
-    }
-    assert!(stored(&device).len() == 1, "what was recorded is read");
-}
-
-#[test]
 fn a_torn_partial_never_takes_the_older_copy_with_it() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
