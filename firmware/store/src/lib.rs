@@ -8,6 +8,9 @@
 //! at each sector's beginning: an erase is announced in the *other* sector before it begins, and the next start ends
 //! what was begun.
 //!
+//! An item that is damaged later is passed over: the value before it counts, as long as that is there. Each start looks for such
+//! places ([`Found::Damaged`]), and goes on in the other sector without them.
+//!
 //! An erase also stops the processor for up to half a second where the program runs from the same flash. So it is
 //! refused unless [`Store::allow_erase`] said otherwise, and a save that would need one leaves the flash as it is:
 //! [`Error::NotNow`]. [`Store::turn_ahead`] does it at a moment of the caller's choice.
@@ -18,6 +21,7 @@
 #![cfg_attr(not(any(test, feature = "sim")), no_std)]
 
 mod key;
+mod look;
 mod marks;
 #[cfg(test)]
 mod power_cuts;

@@ -6,6 +6,7 @@ use core::fmt;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind};
 use embedded_storage_async::nor_flash as nonblocking;
 
+use crate::look::Look;
 use crate::marks::{ERASED, GENERATION_AT, HEADER_BYTES, MAGIC, Marks, WORD, coded};
 
 /// How many sectors.
@@ -16,6 +17,8 @@ pub const SECTORS: usize = 2;
 pub enum Found {
     /// What was stored.
     Kept,
+    /// What was stored, but for places that are damaged: of an item there the value before it counts, or none.
+    Damaged,
     /// Erased flash: nothing was ever stored.
     Blank,
     /// Something that cannot be read: what was stored is lost, and the store was made anew.
@@ -48,7 +51,7 @@ pub struct Sectors<F> {
     may_erase: bool,
 }
 
-type Outcome<T, F> = Result<T, Refusal<<F as ErrorType>::Error>>;
+pub(crate) type Outcome<T, F> = Result<T, Refusal<<F as ErrorType>::Error>>;
 
 impl<F: NorFlash> Sectors<F> {
     /// Bytes of a sector that are left to the items.
@@ -64,19 +67,45 @@ impl<F: NorFlash> Sectors<F> {
         let marks = [sectors.marks(0)?, sectors.marks(1)?];
         let void = [is_void(marks, 0), is_void(marks, 1)];
         let found = match void {
-            [false, false] => Found::Kept,
+            [false, false] => {
+                let in_use = [sectors.is_in_use(0)?, sectors.is_in_use(1)?];
+                let mut found = Found::Kept;
+                for sector in 0..SECTORS {
+                    let is_begun = sectors.is_begun(sector)?;
+                    if if is_begun { in_use != [true, true] } else { sectors.is_bare(sector)? } {
+                        continue;
+                    }
+                    let mut look = Look::default();
+                    sectors.look_through(sector, &mut look)?;
+                    if !is_begun && look.items > 0 && !sectors.is_begun(other(sector))? {
+                        // The mark of the sector in use is damaged.
+                        sectors.write_word(sector, HEADER_BYTES, 0)?;
+                        found = Found::Damaged;
+                    } else if !is_begun || look.items == 0 {
+                        // Nothing is stored there, and it would be taken for a sector in use, or not be fit to be one.
+                        sectors.erase_sector(sector)?;
+                    }
+                }
+                found
+            }
             [true, true] => {
-                let blank = sectors.is_blank(0)? && sectors.is_blank(1)?;
+                let blank = sectors.is_bare(0)? && sectors.is_bare(1)?;
                 sectors.remake()?;
                 if blank { Found::Blank } else { Found::Unreadable }
             }
             [first, _] => {
                 let sector = usize::from(!first);
-                // Its erase was announced, when everything had been copied, or the store was just being made.
-                let announced = marks[other(sector)].void.is_some() && sectors.is_begun(other(sector))?;
-                let expected = announced || sectors.is_blank(sector)?;
-                sectors.erase_sector(sector)?;
-                if expected { Found::Kept } else { Found::Unreadable }
+                let other_is_begun = sectors.is_begun(other(sector))?;
+                if marks[sector].generation.is_none() && sectors.is_begun(sector)? && !other_is_begun {
+                    // No erase has begun, because nothing was copied: its marks are damaged, and all that is stored is here.
+                    Found::Damaged
+                } else {
+                    // Its erase was announced, when everything had been copied, or the store was just being made.
+                    let announced = marks[other(sector)].void.is_some() && other_is_begun;
+                    let expected = announced || sectors.is_bare(sector)?;
+                    sectors.erase_sector(sector)?;
+                    if expected { Found::Kept } else { Found::Unreadable }
+                }
             }
         };
         Ok((sectors, found))
@@ -96,8 +125,15 @@ impl<F: NorFlash> Sectors<F> {
 
     /// Bytes at the end of the sector in use that are still erased; a whole sector's where none is in use.
     pub(crate) fn room(&mut self) -> Outcome<usize, F> {
+        match self.in_use()? {
+            Some(sector) => self.room_of(sector),
+            None => Ok(Self::PAGE_BYTES - 2 * WORD),
+        }
+    }
+
+    /// Bytes at the end of a sector that are still erased.
+    pub(crate) fn room_of(&mut self, sector: usize) -> Outcome<usize, F> {
         const PIECE: usize = 64;
-        let Some(sector) = self.in_use()? else { return Ok(Self::PAGE_BYTES - 2 * WORD) };
         let begin = HEADER_BYTES + WORD;
         let (mut end, mut room) = (F::ERASE_SIZE - WORD, 0);
         let mut piece = [0; PIECE];
@@ -117,15 +153,19 @@ impl<F: NorFlash> Sectors<F> {
     /// The sector that items go into: its first word is marked and its last is not.
     pub(crate) fn in_use(&mut self) -> Outcome<Option<usize>, F> {
         for sector in 0..SECTORS {
-            if self.is_begun(sector)? && !self.is_marked(sector, F::ERASE_SIZE - 1)? {
+            if self.is_in_use(sector)? {
                 return Ok(Some(sector));
             }
         }
         Ok(None)
     }
 
+    fn is_in_use(&mut self, sector: usize) -> Outcome<bool, F> {
+        Ok(self.is_begun(sector)? && !self.is_marked(sector, F::ERASE_SIZE - 1)?)
+    }
+
     /// Whether items go or went into the sector.
-    fn is_begun(&mut self, sector: usize) -> Outcome<bool, F> {
+    pub(crate) fn is_begun(&mut self, sector: usize) -> Outcome<bool, F> {
         self.is_marked(sector, HEADER_BYTES)
     }
 
@@ -158,9 +198,10 @@ impl<F: NorFlash> Sectors<F> {
         Ok(Marks::read(&header))
     }
 
-    fn is_blank(&mut self, sector: usize) -> Outcome<bool, F> {
+    /// Whether nothing is behind a sector's marks.
+    fn is_bare(&mut self, sector: usize) -> Outcome<bool, F> {
         let mut piece = [0; HEADER_BYTES];
-        for at in (0..F::ERASE_SIZE).step_by(HEADER_BYTES) {
+        for at in (HEADER_BYTES..F::ERASE_SIZE).step_by(HEADER_BYTES) {
             let bytes = piece.get_mut(..HEADER_BYTES.min(F::ERASE_SIZE - at)).ok_or(Refusal::OutOfBounds)?;
             self.read_raw(sector, at, bytes)?;
             if bytes.chunks(WORD).any(|word| word != ERASED.to_le_bytes()) {
@@ -170,7 +211,7 @@ impl<F: NorFlash> Sectors<F> {
         Ok(true)
     }
 
-    fn read_raw(&mut self, sector: usize, at: usize, bytes: &mut [u8]) -> Outcome<(), F> {
+    pub(crate) fn read_raw(&mut self, sector: usize, at: usize, bytes: &mut [u8]) -> Outcome<(), F> {
         self.flash.read((sector * F::ERASE_SIZE + at) as u32, bytes).map_err(Refusal::Flash)
     }
 

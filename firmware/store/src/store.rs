@@ -20,6 +20,9 @@ const OVERHEAD_BYTES: usize = 8 + 4 + 1;
 /// Ends each value, so that no item ends like erased flash and what is free can be told from what is not.
 const END: u8 = 0;
 
+/// The longest filler.
+const ZEROS: [u8; VALUE_BYTES_MAX] = [0; VALUE_BYTES_MAX];
+
 /// Nothing is remembered: looking through all of 16 KiB takes the processor some 6 ms, and whoever saves has time.
 type Library<F> = MapStorage<u32, Sectors<F>, Cache<Uncached, Uncached, Uncached, u32>>;
 type Trouble<F> = sequential_storage::Error<Refusal<<F as ErrorType>::Error>>;
@@ -65,6 +68,14 @@ impl<F: NorFlash> Store<F> {
         let config = const { MapConfig::new(0..(SECTORS * Sectors::<F>::PAGE_BYTES) as u32) };
         let library = MapStorage::new(sectors, config, Cache::new_uncached());
         let mut store = Self { library, buffer: [0; BUFFER_BYTES] };
+        let look = store.library.flash().look().map_err(refused::<F>)?;
+        if look.damaged > 0 || found == Found::Damaged {
+            // Noise may look like a sector in use.
+            found = if look.items > 0 { Found::Damaged } else { Found::Unreadable };
+            if found == Found::Unreadable {
+                store.library.flash().remake().map_err(refused::<F>)?;
+            }
+        }
         let mut mounts = [0; 4];
         if let Ok(Some(length)) = store.get(Key::MOUNTS, &mut mounts)
             && length != mounts.len()
@@ -76,14 +87,13 @@ impl<F: NorFlash> Store<F> {
         match store.save(Key::MOUNTS, &count.to_le_bytes()) {
             Ok(Saved::Remade) => found = Found::Unreadable,
             // A store that is full of items may stay so.
-            Ok(_) | Err(Error::Full) if store.count()? > 0 => {}
-            // Noise that looks like a sector in use.
-            Ok(_) | Err(Error::Full) => {
-                store.library.flash().remake().map_err(refused::<F>)?;
-                store.save(Key::MOUNTS, &1_u32.to_le_bytes())?;
-                found = Found::Unreadable;
-            }
+            Ok(_) | Err(Error::Full) => {}
             Err(error) => return Err(error),
+        }
+        if found == Found::Damaged {
+            // Into the other sector, where what is damaged does not go along: it is told once. Where that fails the next start
+            // tries again.
+            let _ = store.turn_away();
         }
         store.allow_erase(false);
         Ok((store, found))
@@ -148,7 +158,6 @@ impl<F: NorFlash> Store<F> {
     /// Goes on into the other sector now if less than `room` bytes are free, so that it need not be done later; whether
     /// it did. Takes an erase.
     pub fn turn_ahead(&mut self, room: usize) -> Outcome<bool, F> {
-        const ZEROS: [u8; VALUE_BYTES_MAX] = [0; VALUE_BYTES_MAX];
         /// The shortest filler, rounded up to a word.
         const SHORTEST: usize = OVERHEAD_BYTES.next_multiple_of(4);
         let before = self.library.flash().in_use().map_err(refused::<F>)?;
@@ -173,6 +182,18 @@ impl<F: NorFlash> Store<F> {
         outcome
     }
 
+    /// Goes on into the other sector, however much of this one is free: what is damaged may lie there. Erases must be allowed.
+    fn turn_away(&mut self) -> Outcome<(), F> {
+        let before = self.library.flash().in_use().map_err(refused::<F>)?;
+        for _ in 0..F::ERASE_SIZE / VALUE_BYTES_MAX + 4 {
+            self.write(Key::FILLER, &ZEROS)?;
+            if self.library.flash().in_use().map_err(refused::<F>)? != before {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     fn for_each_stored(&mut self, mut found: impl FnMut(Key, &[u8])) -> Outcome<(), F> {
         let Self { library, buffer } = self;
         let mut items = done(library.fetch_all_items(buffer)).map_err(troubled::<F>)?;
@@ -182,16 +203,6 @@ impl<F: NorFlash> Store<F> {
             }
         }
         Ok(())
-    }
-
-    /// How many values can be read, 0 where something cannot.
-    fn count(&mut self) -> Outcome<usize, F> {
-        let mut count = 0;
-        match self.for_each_stored(|_, _| count += 1) {
-            Ok(()) => Ok(count),
-            Err(Error::Unreadable) => Ok(0),
-            Err(error) => Err(error),
-        }
     }
 
     fn stored(&mut self, key: Key) -> Outcome<Option<&[u8]>, F> {

@@ -207,3 +207,139 @@ fn flash_that_does_not_work_is_told() {
     assert_eq!(flash.erase(0, 16_384), Err(NorFlashErrorKind::Other));
     assert_eq!(Store::mount(&mut flash).map(|_| ()), Err(Error::Flash(NorFlashErrorKind::Other)));
 }
+
+/// Where these bytes stand last.
+fn last_of(bytes: &[u8], wanted: &[u8]) -> usize {
+    bytes.windows(wanted.len()).rposition(|window| window == wanted).expect("it is there")
+}
+
+#[test]
+fn an_item_that_is_damaged_is_told_once_and_the_value_before_it_counts() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    for (item, value) in
+        [(1, "an old value"), (2, "the only value"), (1, "a new value"), (3, "another value")]
+    {
+        store.save(Key::item(item), value.as_bytes()).expect("room");
+    }
+    let whole = flash.bytes().to_vec();
+    let (new, only) = (last_of(&whole, b"a new value"), last_of(&whole, b"the only value"));
+    // Of each: the check, all of it zeros, the length, its check, the key, the data.
+    for (value, place, bytes) in [
+        (new, -12, &[0x55][..]),
+        (new, -12, &[0; 4]),
+        (new, -8, &[0x77]),
+        (new, -6, &[0]),
+        (new, -4, &[2]),
+        (new, 3, b"x"),
+        (only, 3, &[0; 8]),
+    ] {
+        let mut damaged = whole.clone();
+        damaged[value.strict_add_signed(place)..][..bytes.len()].copy_from_slice(bytes);
+        let mut flash = Flash::with(&damaged);
+        let (mut store, found) = mounted(&mut flash);
+        assert_eq!(found, Found::Damaged, "{bytes:x?} at {place}");
+        let mut of = |item| {
+            let mut buffer = [0; VALUE_BYTES_MAX];
+            value_of(&mut store, item, &mut buffer).map(<[u8]>::to_vec)
+        };
+        let (first, second) = if value == new {
+            ("an old value", Some(b"the only value".to_vec()))
+        } else {
+            ("a new value", None)
+        };
+        assert_eq!((of(1), of(2)), (Some(first.into()), second), "{bytes:x?} at {place}");
+        assert_eq!(of(3), Some(b"another value".to_vec()));
+        let (mut store, found) = mounted(&mut flash);
+        assert_eq!((found, store.mounts()), (Found::Kept, Ok(3)), "{bytes:x?} at {place}");
+    }
+}
+
+fn value_of<'b>(store: &mut Store<&mut Flash>, item: u8, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
+    value(store, Key::item(item), buffer)
+}
+
+#[test]
+fn damage_of_a_sectors_marks_loses_nothing() {
+    let mut flash = Flash::blank();
+    let (mut store, _) = mounted(&mut flash);
+    store.save(Key::item(1), b"stays").expect("room");
+    let whole = flash.bytes().to_vec();
+    for (sector, found_first) in [(0, Found::Damaged), (16_384, Found::Kept)] {
+        for at in 0..8 {
+            let mut damaged = whole.clone();
+            damaged[sector + at] ^= 0x40;
+            let mut flash = Flash::with(&damaged);
+            for found_now in [found_first, Found::Kept] {
+                let (mut store, found) = mounted(&mut flash);
+                assert_eq!(found, found_now, "byte {at} of the sector at {sector}");
+                assert_eq!(value_of(&mut store, 1, &mut [0; 5]), Some(&b"stays"[..]));
+            }
+        }
+    }
+}
+
+#[test]
+fn flash_that_is_no_longer_erased_takes_no_item() {
+    for at in [9_000, 16_000, 16_384 + 200, 32_000] {
+        let mut flash = Flash::blank();
+        mounted(&mut flash).0.save(Key::item(1), b"first").expect("room");
+        let mut bytes = flash.bytes().to_vec();
+        bytes[at..at + 3].fill(0x5A);
+        let mut flash = Flash::with(&bytes);
+        for number in 0..40 {
+            let (mut store, _) = mounted(&mut flash);
+            assert!(
+                number == 0 || value_of(&mut store, 1, &mut [0; 300]) == Some(&[number; 300][..]),
+                "{at}"
+            );
+            store.allow_erase(true);
+            store.save(Key::item(1), &[number + 1; 300]).expect("room");
+        }
+    }
+}
+
+#[test]
+fn whatever_is_damaged_no_value_goes_back_without_a_word() {
+    type Small = SimFlash<2048>;
+    let mut flash = Small::blank();
+    // Every value that an item had, the newest last.
+    let mut had = vec![Vec::new(); 4];
+    for round in 0..8_u8 {
+        let (mut store, _) = Store::mount(&mut flash).expect("it works");
+        store.allow_erase(true);
+        for item in 0..4_u8 {
+            let value = vec![16 * round + item + 1; 20 + 9 * usize::from(item)];
+            store.save(Key::item(item), &value).expect("room");
+            had[usize::from(item)].push(value);
+        }
+    }
+    let whole = flash.bytes().to_vec();
+    let sector = if whole[2048 + 128] == 0 { 2048..4096 } else { 0..2048 };
+    // An item at the very end whose last byte is damaged is taken for one that power cut short.
+    let last = whole[sector].iter().rposition(|byte| *byte != 0xFF).expect("items");
+    let mut told = 0;
+    for at in (0..whole.len() - 8).step_by(4).filter(|at| !(*at..at + 8).contains(&(at / 2048 * 2048 + last)))
+    {
+        for fill in [0, 0x5A, 0xFF] {
+            let mut bytes = whole.clone();
+            bytes[at..at + 8].fill(fill);
+            let mut flash = Small::with(&bytes);
+            let (mut store, found) = Store::mount(&mut flash).expect("it works");
+            let mut newest = true;
+            for (item, had) in (0..).zip(&had) {
+                let mut buffer = [0; VALUE_BYTES_MAX];
+                let length = store.get(Key::item(item), &mut buffer).expect("readable");
+                let now = length.map(|length| buffer[..length].to_vec());
+                assert!(now.as_ref().is_none_or(|now| had.contains(now)), "{fill:x} at {at}: {now:x?}");
+                newest &= now.as_ref() == had.last();
+            }
+            assert!(newest || found != Found::Kept, "{fill:x} at {at}: {found:?}");
+            // A head that reads as erased hides all behind it.
+            assert!(fill == 0xFF || found != Found::Unreadable, "{fill:x} at {at}: other items are whole");
+            told += u32::from(found == Found::Damaged);
+            assert_eq!(Store::mount(&mut flash).map(|(_, found)| found), Ok(Found::Kept), "{fill:x} at {at}");
+        }
+    }
+    assert!(told > 100, "{told}");
+}

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use hums_core::params::ParamSpec;
 use hums_store::sim::{SimFlash, is_store};
-use hums_store::{Key, Store, param_value};
+use hums_store::{Found, Key, Store, param_value};
 
 use crate::files::lock_in_place;
 
@@ -49,7 +49,14 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
 /// Refuses what cannot be opened, before anything else is made.
 pub(super) fn check(path: &Path) -> Result<()> {
     if path.exists() {
-        return read(path).map(drop);
+        let (bytes, _) = read(path)?;
+        if found(&bytes) == Some(Found::Damaged) {
+            note!(
+                "--store {}: is damaged: a stored item was lost, its older value counts or it begins anew",
+                path.display()
+            );
+        }
+        return Ok(());
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
@@ -80,7 +87,19 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if !bytes.is_empty() && !is_store::<SECTOR>(&bytes) {
         bail!("--store {}: is no store, though it has the length of one; name a new file", path.display());
     }
+    // A board cannot refuse, and begins it anew; a file stays what it is.
+    if found(&bytes) == Some(Found::Unreadable) {
+        bail!(
+            "--store {}: is damaged: nothing in it can be read, and the run would begin it anew; move it away, or name a new file",
+            path.display()
+        );
+    }
     Ok((bytes, Some(file)))
+}
+
+/// What a board would find in these bytes.
+fn found(bytes: &[u8]) -> Option<Found> {
+    Store::mount(SimFlash::<SECTOR>::with(bytes)).ok().map(|(_, found)| found)
 }
 
 /// Flash whose content is written through to a file. Clones are the same flash.

@@ -110,6 +110,47 @@ fn an_image_that_is_removed_while_it_is_recorded_on_is_told() {
 }
 
 #[test]
+fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
+    let dir = tempfile::tempdir().expect("directory");
+    let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
+    fs::write(dir.path().join("short.raw"), &recording[..20_000]).expect("written");
+    let sim = "sim --input short.raw --sd card.img --store store";
+    let store = dir.path().join("store");
+    let boots = || {
+        let told = json(&run(dir.path(), "info card.img --json", 0));
+        let last = told["logs"].as_array().and_then(|logs| logs.last()).expect("a log");
+        last["lifetime"]["boots"].as_f64().expect("a counter")
+    };
+    for boot in 1..3 {
+        run(dir.path(), sim, 0);
+        assert_eq!(boots() as i32, boot);
+    }
+    let whole = fs::read(&store).expect("a store");
+    for (told, (at, bytes)) in (1..).zip([(0, 1), (200, 8), (400, 8), (800, 8)]) {
+        let mut damaged = whole.clone();
+        damaged[at..at + bytes].fill(0xA5);
+        fs::write(&store, &damaged).expect("written");
+        let said = run(dir.path(), sim, 0);
+        assert!((1.0..=3.0).contains(&boots()), "{at}: {}", boots());
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(said.contains("--store store: is damaged: a stored item was lost"), "{at}: {said}");
+        run(dir.path(), &format!("decode card.img -o out{at} --format jsonl"), 0);
+        let records: Vec<u8> =
+            contents(&dir.path().join(format!("out{at}"))).into_iter().flat_map(|(_, bytes)| bytes).collect();
+        let records = String::from_utf8_lossy(&records);
+        assert_eq!(records.matches("a stored item was lost: older value or anew").count(), told, "{at}");
+    }
+    let mut damaged = whole;
+    for at in [0, 16_384] {
+        damaged[at] = 0;
+    }
+    fs::write(&store, &damaged).expect("written");
+    let said = run(dir.path(), &format!("{sim} --overwrite-oldest"), 1);
+    assert!(String::from_utf8_lossy(&said.stderr).contains("move it away, or name a new file"));
+    assert!(fs::read(&store).expect("there") == damaged);
+}
+
+#[test]
 fn a_store_or_a_spool_that_is_read_only_is_refused_as_an_image_is() {
     let dir = recorded();
     run(dir.path(), "sim --input PX4 --sd new.img --store store", 0);

@@ -92,7 +92,7 @@ impl<'a> Handover<'a> {
             };
         }
         if newer(&mut told.unreadable, now.unreadable) {
-            return news(4, "HUMS: a stored item was lost and begins anew");
+            return news(4, "HUMS: a stored item was lost: older value or anew");
         }
         if newer(&mut told.remade, now.remade) {
             return news(3, "HUMS: store unreadable, made anew");

@@ -57,6 +57,10 @@ impl<'a, F: NorFlash> Keeper<'a, F> {
             };
             status.set_state(match found {
                 Found::Kept => StoreState::Kept,
+                Found::Damaged => {
+                    count(&status.unreadable);
+                    StoreState::Kept
+                }
                 Found::Blank => StoreState::New,
                 Found::Unreadable => StoreState::Remade,
             });

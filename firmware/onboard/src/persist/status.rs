@@ -53,7 +53,7 @@ pub struct StoreStatus {
 pub struct StoreReading {
     /// How it began.
     pub state: StoreState,
-    /// Items that could not be read at the start.
+    /// Items that could not be read at the start, and one more where the flash was damaged.
     pub unreadable: u32,
     /// Items saved.
     pub saved: u32,
