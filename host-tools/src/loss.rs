@@ -6,7 +6,13 @@ use hums_blackbox::record::{Loss, Lost};
 pub fn lost(loss: &Loss) -> u64 {
     match loss.what {
         Lost::NotFrames | Lost::DamagedFrames => 0,
-        Lost::UartOverrun | Lost::QueueFull | Lost::Card | Lost::Records | Lost::Other => loss.count,
+        Lost::UartOverrun
+        | Lost::QueueFull
+        | Lost::Card
+        | Lost::Records
+        | Lost::WrongChecksums
+        | Lost::DamagedPlaces
+        | Lost::Other => loss.count,
     }
 }
 

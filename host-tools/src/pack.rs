@@ -84,12 +84,12 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
     if let Some(remark) = source.remark() {
         note!("{}: {remark}", args.input);
     }
-    let ratio = done.recording_bytes as f64 / done.log_bytes.max(1) as f64;
     output::line(&format!(
-        "{}: {}, {}, {ratio:.2} times smaller than as a tlog",
+        "{}: {}, {}, {}",
         args.output.display(),
         count(done.frames, "frame"),
-        count(done.log_bytes, "byte")
+        count(done.log_bytes, "byte"),
+        beside_a_tlog(done.recording_bytes, done.log_bytes)
     ))?;
     if let Endpoint::File(_) | Endpoint::Standard = args.input
         && done.bytes_not_frames > 0
@@ -101,6 +101,16 @@ pub fn run(args: &cli::Pack) -> Result<Outcome> {
         note!("{}: {words}", args.input);
     }
     Ok(Outcome::lossy(source.damages() > 0 || done.wrong_checksums.is_some()))
+}
+
+/// How large the log is beside a tlog of the same frames, as words.
+fn beside_a_tlog(tlog_bytes: u64, log_bytes: u64) -> String {
+    let (tlog, log) = (tlog_bytes.max(1) as f64, log_bytes.max(1) as f64);
+    if tlog >= log {
+        format!("{:.2} times smaller than as a tlog", tlog / log)
+    } else {
+        format!("{:.2} times as large as a tlog of the same frames", log / tlog)
+    }
 }
 
 /// So many bytes of frames make the session's number: few, because a recording that has grown is the same one.
@@ -218,7 +228,7 @@ impl<W: Write> Packer<W> {
             return Ok(());
         }
         let (from, to) = (Instant::from_micros(before_us), Instant::from_micros(at_us));
-        self.record(to, &Record::Loss(Loss { what: Lost::Other, count, from, to }))
+        self.record(to, &Record::Loss(Loss { what: Lost::DamagedPlaces, count, from, to }))
     }
 
     fn finish(mut self, last_us: u64) -> Result<(Done, W)> {
@@ -236,7 +246,8 @@ impl<W: Write> Packer<W> {
         let wrong_checksums = self.checksums.gap();
         if let Some(gap) = &wrong_checksums {
             let (from, to) = (gap.from.unwrap_or(Instant::ZERO), Instant::from_micros(last_us));
-            self.record(to, &Record::Loss(Loss { what: Lost::Other, count: 1, from, to }))?;
+            let (what, count) = (Lost::WrongChecksums, self.checksums.damaged());
+            self.record(to, &Record::Loss(Loss { what, count, from, to }))?;
         }
         self.writer.finish(&mut self.finished);
         self.write_out()?;

@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | free fall | specific force below 0.3 g for `MIS_FALL_TIME`, and the throttle asks for thrust | on rotors |
 //! | impact | a shock above `MIS_IMPACT`, and the speed breaks off harder than legs take it or the vehicle lies on its side; then it is still | everywhere |
+//! | | a shock above 4 g of what little had carried for 0.3 s (it fell) | on rotors |
 //! | | a shock, and within 4 s it is overturned | on rotors |
 //! | | what comes down slowly without throttle lands and skids | on wings |
 //! | tumbling | body rates above `MIS_TUMBLE` for half a second, on wings for 1.5 s; not in modes made for it | everywhere |
@@ -44,8 +45,8 @@ use crate::params::{Param, Params};
 use crate::time::{Instant, Span};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 use evidence::{
-    BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, is_known,
-    is_tilted, on_rotors, throttle,
+    BREAKS_OFF, Doubt, FRESH, FULL_THROTTLE, IDLE_THROTTLE, Lasting, Pressure, Recent, Shock, THRUST_PART,
+    is_known, is_tilted, on_rotors, throttle,
 };
 
 /// How long after disarming it is watched.
@@ -110,12 +111,16 @@ pub struct Mishap {
     uncarried: Lasting,
     on_bench: bool,
     falls: Lasting,
+    /// When something carried it last.
+    carried_at: Instant,
     tumbles: Lasting,
     overturned: Lasting,
     sinks: Lasting,
     still_since: Option<Instant>,
     flies_since: Option<Instant>,
     shock: Option<Shock>,
+    /// The first of the shocks that belong together.
+    hit_at: Instant,
     speed: Recent,
     sink: Recent,
     /// The fastest sink that broke off in this mishap.
@@ -131,8 +136,8 @@ pub struct Mishap {
     /// The last height above home while it was armed.
     height_m: f32,
     hover_throttle: f32,
-    /// When it was armed with throttle last.
-    driven_at: Option<Instant>,
+    /// When it was armed with throttle last; zero for never.
+    driven_at: Instant,
     /// It was level while it was armed.
     stood: bool,
     /// Where it began, or ended.
@@ -158,12 +163,14 @@ impl Mishap {
             uncarried: Lasting::NOT,
             on_bench: false,
             falls: Lasting::NOT,
+            carried_at: Instant::ZERO,
             tumbles: Lasting::NOT,
             overturned: Lasting::NOT,
             sinks: Lasting::NOT,
             still_since: None,
             flies_since: None,
             shock: None,
+            hit_at: Instant::ZERO,
             speed: Recent::NOTHING,
             sink: Recent::NOTHING,
             touch_mps: 0.0,
@@ -175,7 +182,7 @@ impl Mishap {
             rate: 0.0,
             height_m: 0.0,
             hover_throttle: 0.0,
-            driven_at: None,
+            driven_at: Instant::ZERO,
             stood: false,
             place: Place { position: None, height_m: 0 },
         }
@@ -323,7 +330,8 @@ impl Mishap {
         let slow = speed_mps < STILL_MPS
             || (!self.armed && on_rotors(now, vehicle))
             || self.lies_on_its_back(vehicle)
-            || (self.worst[Kind::Impact as usize] > 0.0 && self.rate < STILL_RATE / 3.0);
+            || (self.worst[Kind::Impact as usize] > 0.0 && self.rate < STILL_RATE / 3.0)
+            || (self.shock.is_some_and(|shock| shock.dropped) && self.rate < STILL_RATE / 3.0);
         let still = slow && self.rate < STILL_RATE && (0.7..1.3).contains(&self.load_g);
         self.still_since = if still { self.still_since.or(Some(now)) } else { None };
         // What is carried home may be armed still, and no motor turns.
@@ -351,7 +359,7 @@ impl Mishap {
     }
 
     fn was_driven(&self, now: Instant) -> bool {
-        self.driven_at.is_some_and(|at| now.since(at) <= DRIVEN)
+        self.driven_at > Instant::ZERO && now.since(self.driven_at) <= DRIVEN
     }
 
     fn lies_on_its_back(&self, vehicle: &Vehicle) -> bool {
@@ -394,6 +402,7 @@ impl Mishap {
             && throttle(now, vehicle).is_none_or(|part| part < IDLE_THROTTLE);
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
         let hit = (shock.speed_mps >= IMPACT_MPS && shock.stopped && hard && !lands)
+            || (shock.dropped && shock.load_g > LEGS_G)
             || (on_rotors(now, vehicle) && is_tilted(now, vehicle))
             || self.lies_on_its_back(vehicle);
         let rests = self.still_since.is_some_and(|since| since >= shock.at && now.since(since) >= STILL);
@@ -410,7 +419,11 @@ impl Mishap {
             || vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround)
             || is_tilted(now, vehicle)
             || self.lies_on_its_back(vehicle)
-            || throttle(now, vehicle).is_some_and(|part| !(IDLE_THROTTLE..FULL_THROTTLE).contains(&part))
+            || throttle(now, vehicle).is_some_and(|part| {
+                // What is carried by less than half of the throttle that it hovers with stands on the ground.
+                let stands = on_rotors(now, vehicle) && part < THRUST_PART * self.hover_throttle;
+                !(IDLE_THROTTLE..FULL_THROTTLE).contains(&part) || stands
+            })
     }
 
     fn goes(&mut self, now: Instant, last: Instant, vehicle: &Vehicle) -> Option<Change> {
@@ -441,6 +454,11 @@ impl Mishap {
     /// What the ground is told of a change, at the tick of it.
     pub fn report(&self, change: Change) -> Report {
         Report { change, place: self.place, touch: (self.touch_mps * 10.0) as u16 }
+    }
+
+    /// When the first shock of the latest impact was.
+    pub const fn hit_at(&self) -> Instant {
+        self.hit_at
     }
 
     /// The height above home of the last place that was told, metres.

@@ -535,6 +535,8 @@ pub enum Observation {
     GnssIntegrity(GnssIntegrity),
     /// `SCALED_IMU*`, `RAW_IMU`, `HIGHRES_IMU`
     Imu(Imu),
+    /// A specific force that is greater than the samples that are handed on show: of a log that holds more samples, or more sensors.
+    Shock(MetresPerSecond2),
     /// `SCALED_PRESSURE*`, `HIGHRES_IMU`
     Air(Air),
     /// `SERVO_OUTPUT_RAW`

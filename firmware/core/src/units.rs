@@ -63,6 +63,6 @@ pub struct Position {
 }
 
 /// How long a vector is.
-pub(crate) fn norm([x, y, z]: [f32; 3]) -> f32 {
+pub fn norm([x, y, z]: [f32; 3]) -> f32 {
     libm::sqrtf(x * x + y * y + z * z)
 }

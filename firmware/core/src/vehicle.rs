@@ -361,7 +361,8 @@ impl Vehicle {
             | Observation::Outputs(_)
             | Observation::MissionCurrent(_)
             | Observation::Parameter(..)
-            | Observation::FlightInformation { .. } => {}
+            | Observation::FlightInformation { .. }
+            | Observation::Shock(_) => {}
         }
     }
 

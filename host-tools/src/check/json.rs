@@ -147,6 +147,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         not_proved: checked.unproved(),
         judged_by: match judged.by {
             JudgedBy::Board => "board",
+            JudgedBy::Here if judged.worst().is_none() => "nobody",
             JudgedBy::Here => "hums",
         },
         vehicle: vehicle(judged),

@@ -46,6 +46,9 @@ const SEEN: Span = Span::from_secs(3);
 /// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
 
+/// The check of an impact.
+const IMPACT: &str = "impact";
+
 /// Where a recording was heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heard {
@@ -120,7 +123,11 @@ pub struct Judge {
     damages: u64,
     losses: u64,
     restarts: u64,
+    /// When the clock began again: as many as are listed.
+    restarted: Vec<Instant>,
     joints: Vec<Instant>,
+    /// From here on the recording has no times.
+    no_times: Option<Instant>,
 }
 
 impl Judge {
@@ -149,7 +156,9 @@ impl Judge {
             damages: 0,
             losses: 0,
             restarts: 0,
+            restarted: Vec::new(),
             joints: Vec::new(),
+            no_times: None,
         }
     }
 
@@ -344,6 +353,9 @@ impl Judge {
     /// other clock that tells what passed between: what it flew before is over. (A box that is restarted in the air, or the clock of a ground station that is set, ends no flight.)
     fn restart(&mut self, at: Instant) {
         self.restarts += 1;
+        if self.restarted.len() < LISTED_MAX {
+            self.restarted.push(at);
+        }
         if matches!(self.format, Format::DataFlash | Format::Ulog | Format::Raw) {
             self.leave_off(at);
             self.monitor.begin_anew();
@@ -419,6 +431,9 @@ impl Judge {
     fn list(&mut self, gap: &Gap) -> Option<usize> {
         self.damages += u64::from(gap.cause.is_damage());
         self.losses += u64::from(gap.cause == Why::Lost);
+        if gap.cause == Why::NoTimes {
+            self.no_times.get_or_insert(gap.from.unwrap_or(Instant::ZERO));
+        }
         let place = Some(self.gaps.len()).filter(|place| *place < LISTED_MAX)?;
         self.gaps.push(gap.clone());
         Some(place)
@@ -444,14 +459,18 @@ impl Judge {
         }
         let steps = self.clock.monitor(now);
         let (link, recorder) = (self.link(steps), RecorderStatus::default());
-        let Self { monitor, here, format, wire, clock, details, .. } = self;
-        monitor.tick(steps, &link, &recorder, &mut |finding| {
-            if is_of(finding.check, *format, wire.is_some()) {
-                let at = Clock::recording(now, steps, finding.at);
-                here.take(&Finding { at, ..Finding::from(finding) }, clock.behind());
-                details.tell(finding.check, here);
+        let mut found = Vec::new();
+        self.monitor.tick(steps, &link, &recorder, &mut |finding| found.push(Finding::from(finding)));
+        for finding in found {
+            if is_of(&finding.check, self.format, self.wire.is_some()) {
+                // What hit something is seen to lie still seconds later.
+                let hit_at =
+                    if finding.check == IMPACT { self.monitor.mishap().hit_at() } else { finding.at };
+                let at = Clock::recording(now, steps, hit_at.min(finding.at));
+                self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
+                self.details.tell(&finding.check, &mut self.here);
             }
-        });
+        }
         while let Some(happening) = self.monitor.take_happening() {
             match happening {
                 Happening::TakeOff => {
@@ -553,7 +572,7 @@ impl Judge {
         });
         let unchecked = self.facts.remove(&About::Unchecked);
         let remarks = joined(&self.joints).into_iter().chain(of_vehicles).chain(unchecked).collect();
-        Judged {
+        let judged = Judged {
             by,
             monitor: self.monitor,
             facts: self.facts,
@@ -572,7 +591,16 @@ impl Judge {
             damages: self.damages,
             losses: self.losses,
             restarts: self.restarts,
-        }
+            is_timeless: false,
+        };
+        let judged = match self.no_times {
+            Some(from) => {
+                let next = self.joints.iter().copied().find(|joint| *joint > from);
+                judged.forget(from, next, &self.restarted)
+            }
+            None => judged,
+        };
+        judged.forget_unheard()
     }
 }
 

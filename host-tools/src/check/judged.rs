@@ -77,6 +77,8 @@ pub struct Judged {
     pub losses: u64,
     /// How often the recording's clock began again.
     pub restarts: u64,
+    /// It has no times, from its beginning on: nothing was judged.
+    pub is_timeless: bool,
 }
 
 impl Judged {
@@ -116,7 +118,7 @@ impl Judged {
     pub fn worst(&self) -> Option<Level> {
         match self.problems.first() {
             Some(problem) => Some(problem.level),
-            None if self.unheard().is_some() => None,
+            None if self.unheard().is_some() || self.is_timeless => None,
             None => Some(Level::Ok),
         }
     }

@@ -11,6 +11,7 @@ pub mod flights;
 pub mod json;
 pub mod judge;
 pub mod judged;
+mod no_times;
 mod overview;
 pub mod problem;
 pub mod text;

@@ -114,12 +114,13 @@ fn count(contents: &mut Contents, format: Format, summary: Summary) {
 /// What the monitor here makes of a recording.
 fn fill(contents: &mut Contents, judged: Judged) {
     contents.unheard = judged.unheard();
+    let is_judged = judged.worst().is_some();
     let Judged { monitor, findings, findings_count, span, remarks, .. } = judged;
     contents.remarks = remarks;
     contents.vehicle = vehicle(&monitor);
-    contents.checked_here = contents.vehicle.is_some();
+    contents.checked_here = contents.vehicle.is_some() && is_judged;
     if !contents.checked_here {
-        // No autopilot was heard: counters that nobody counted would look as if somebody had.
+        // No autopilot was heard, or there are no times: counters that nobody counted would look as if somebody had.
         return;
     }
     contents.findings_count = findings_count;

@@ -265,7 +265,7 @@ pub(super) fn flown(judged: &Judged) -> Span {
 fn in_air(judged: &Judged) -> String {
     let told = judged.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty());
     let armed = clock(judged.armed);
-    if judged.vehicle().source.is_none() {
+    if judged.worst().is_none() {
         return "not known".to_owned();
     }
     let text = match judged.flights.as_slice() {
@@ -305,7 +305,7 @@ fn verdict(judged: &Judged) -> String {
     let (critical, warnings) = (count(Level::Critical), count(Level::Warning));
     let all = judged.judged.len() + judged.not_judged.len();
     match judged.worst() {
-        None if judged.gaps.iter().any(|gap| gap.cause == Cause::NoTimes) => {
+        None if judged.is_timeless || judged.gaps.iter().any(|gap| gap.cause == Cause::NoTimes) => {
             "unknown: the log has no times, and nothing was judged".to_owned()
         }
         None if judged.vehicle().source.is_some() => {
@@ -476,7 +476,7 @@ fn not_judged(text: &mut String, judged: &Judged) {
             None => reasons.push((why, vec![check])),
         }
     }
-    if reasons.is_empty() || judged.unheard().is_some() {
+    if reasons.is_empty() || judged.worst().is_none() {
         return;
     }
     let all = judged.judged.len() + judged.not_judged.len();

@@ -154,7 +154,7 @@ const PACK_EXAMPLES: &str = "Examples:
 #[derive(Args, Clone, Debug)]
 #[command(after_help = PACK_EXAMPLES)]
 pub struct Pack {
-    /// A tlog or raw MAVLink bytes
+    /// A tlog or raw MAVLink bytes, also as .gz
     #[arg(value_name = "TLOG")]
     pub input: Endpoint,
     /// The log file to write

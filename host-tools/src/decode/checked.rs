@@ -16,7 +16,7 @@ use crate::source::told::Finding;
 pub const BOARD: &str = "board";
 /// The word for this program.
 const HUMS: &str = "hums";
-/// The word where no autopilot was heard.
+/// The word where nothing could be judged.
 const NOBODY: &str = "nobody";
 
 /// What this program found in a recording whose recorder ran no checks.
@@ -28,6 +28,7 @@ pub struct Checked {
     count: u64,
     judged: u64,
     not_judged: u64,
+    is_timeless: bool,
 }
 
 impl Checked {
@@ -42,14 +43,19 @@ impl Checked {
             return None;
         }
         let (by, verdict) = (if judged.worst().is_some() { HUMS } else { NOBODY }, judged.verdict());
-        let Judged { findings, findings_count: count, judged, not_judged, .. } = judged;
+        let Judged { findings, findings_count: count, judged, not_judged, is_timeless, .. } = judged;
         let (judged, not_judged) = (judged.len() as u64, not_judged.len() as u64);
-        Some(Self { by, verdict, findings, count, judged, not_judged })
+        Some(Self { by, verdict, findings, count, judged, not_judged, is_timeless })
     }
 
     /// Why there are no findings of anybody, as a part of a sentence; `None` where it was checked.
     pub fn not_checked(&self) -> Option<&'static str> {
-        (self.by == NOBODY).then_some("not checked: no autopilot was heard in it")
+        let why = if self.is_timeless {
+            "not checked: it has no times"
+        } else {
+            "not checked: no autopilot was heard in it"
+        };
+        (self.by == NOBODY).then_some(why)
     }
 
     /// Its findings with their times.

@@ -129,7 +129,7 @@ impl<S: Source> Source for Booted<S> {
     }
 
     fn damages(&self) -> u64 {
-        u64::from(self.blocks.bytes() > 0) + u64::from(self.is_cut)
+        self.line.damages() + u64::from(self.blocks.bytes() > 0) + u64::from(self.is_cut)
     }
 
     fn remark(&self) -> Option<String> {

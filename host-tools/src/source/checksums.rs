@@ -7,6 +7,15 @@ use super::item::{Cause, Gap};
 use crate::mavlink::frame::{Peek, peek};
 use crate::plural::count;
 
+/// So many frames have a checksum that does not fit, as words.
+pub fn wrong_checksums(frames: u64) -> String {
+    format!(
+        "{} with a wrong checksum, which {} not read",
+        count(frames, "frame"),
+        if frames == 1 { "is" } else { "are" }
+    )
+}
+
 /// Which records' frames have a checksum that does not fit. Of an id that is not known, or is known by another definition, nobody
 /// can say.
 #[derive(Debug, Default)]
@@ -48,10 +57,15 @@ impl Checksums {
         }
     }
 
+    /// How many are damaged.
+    pub const fn damaged(&self) -> u64 {
+        self.damaged
+    }
+
     /// Those that are damaged.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
-        let words = format!("{} with a wrong checksum, which are not read", count(self.damaged, "frame"));
+        let words = wrong_checksums(self.damaged);
         Some(Gap { from: Some(at), to: None, cause: Cause::Damaged, place: Some(place), bytes: 0, words })
     }
 

@@ -73,8 +73,13 @@ impl Reader for TlogReader {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut times = Times::default();
         let mut checksums = Checksums::default();
-        let mut place = 0_u64;
+        let (mut place, mut noise) = (0_u64, None::<Noise>);
         while let Some(record) = self.records.next_record()? {
+            if let Record::Frame { .. } = record
+                && let Some(noise) = noise.take()
+            {
+                noise.tell(take)?;
+            }
             let bytes = match record {
                 Record::Frame { time_us, bytes } => {
                     let told = times.take(time_us, &bytes, place, &self.records);
@@ -96,14 +101,10 @@ impl Reader for TlogReader {
                     bytes
                 }
                 Record::Noise(bytes) => {
-                    let (cause, what) = if self.records.is_cut(&bytes) {
-                        (Cause::Cut, "a record that the end cuts off")
-                    } else {
-                        (Cause::Damaged, "of no record of the tlog")
-                    };
-                    let words = format!("{what}: {}", count(bytes.len(), "byte"));
-                    let now = times.now();
-                    take(now, Item::Gap(&gap(now, cause, place, bytes.len(), words)))?;
+                    let new = Noise { at: times.now(), place, bytes: 0, is_cut: false };
+                    let noise = noise.get_or_insert(new);
+                    noise.is_cut = noise.bytes == 0 && self.records.is_cut(&bytes);
+                    noise.bytes += bytes.len();
                     bytes
                 }
             };
@@ -116,17 +117,42 @@ impl Reader for TlogReader {
             })?;
             checksums.end();
         }
+        if let Some(noise) = noise {
+            noise.tell(take)?;
+        }
         if let Some(gap) = checksums.gap() {
             take(times.now(), Item::Gap(&gap))?;
         }
         if let Some(words) = checksums.words() {
             take(times.now(), Item::Fact(Fact { about: About::Unchecked, words: &words }))?;
         }
-        for gap in times.gaps() {
+        let summary = counts.summary();
+        let frames = summary.messages.iter().map(|message| message.count).sum();
+        for gap in times.gaps().chain(times.none_of(frames)) {
             take(times.now(), Item::Gap(&gap))?;
         }
         said.end(take)?;
-        Ok(counts.summary())
+        Ok(summary)
+    }
+}
+
+/// Bytes of a tlog that are no record, as one place, however many there are.
+struct Noise {
+    at: Instant,
+    place: u64,
+    bytes: usize,
+    is_cut: bool,
+}
+
+impl Noise {
+    fn tell(self, take: &mut Take<'_>) -> Result<()> {
+        let (cause, what) = if self.is_cut {
+            (Cause::Cut, "a record that the end cuts off")
+        } else {
+            (Cause::Damaged, "of no record of the tlog")
+        };
+        let words = format!("{what}: {}", count(self.bytes, "byte"));
+        take(self.at, Item::Gap(&gap(self.at, cause, self.place, self.bytes, words)))
     }
 }
 

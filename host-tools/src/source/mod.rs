@@ -26,6 +26,7 @@ mod boot;
 pub mod booted;
 pub mod checksums;
 pub mod clock;
+mod compressed;
 pub mod dataflash;
 pub mod doubt;
 pub mod epochs;
@@ -39,7 +40,6 @@ pub mod noise;
 pub mod own;
 pub mod pace;
 pub mod paced;
-mod packed;
 pub mod raw;
 pub mod recording;
 mod said;
@@ -120,7 +120,10 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
         bail!("{endpoint}: {what}");
     }
     if let Some(format) = format::format_of(start).filter(|format| !format.is_of_link()) {
-        bail!("{endpoint}: is {}, in which there is no MAVLink; hums check reads it", format.with_article());
+        bail!(
+            "{endpoint}: is {}, which has no MAVLink frames; hums check, info, report and decode read it",
+            format.with_article()
+        );
     }
     let is_file = matches!(endpoint, Endpoint::File(_));
     let source: Box<dyn Source> = match (kind, timing.line_rate) {
@@ -135,7 +138,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
             Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
         }
     };
-    Ok(Box::new(packed::Packed::new(source, progress)))
+    Ok(Box::new(compressed::Compressed::new(source, progress)))
 }
 
 /// What HUMS itself has recorded is full of frames, but not as they came.

@@ -1,12 +1,13 @@
 //! Logs of HUMS as the one stream. Groups are decoded side by side ([`crate::logs::reader`]) and handed on in order.
 
 use anyhow::Result;
-use hums_blackbox::record::Note;
+use hums_blackbox::record::{Loss, Lost, Note};
 use hums_blackbox::{Cause as OwnCause, Entry, Gap as OwnGap, Record};
 use hums_core::observation::{Observation, Source};
 use hums_core::time::Instant;
 use hums_link::{Check, Frame, observe};
 
+use super::checksums::wrong_checksums;
 use super::input::Progress;
 use super::item::{Cause, Gap, Item, MessageCount, Reader, Summary, Take, Want};
 use super::said::Said;
@@ -15,6 +16,7 @@ use crate::ending::Ending;
 use crate::logs::Log;
 use crate::logs::reader::{Collect, Deliver, epoch, read};
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
+use crate::plural::count;
 
 /// The note in a packed log behind which another recording goes on: the input was joined of several.
 pub const JOINED: &str = "another recording begins here: the input was joined of several";
@@ -76,6 +78,8 @@ enum Kept {
     Told(Told),
     /// Another recording begins, in a packed log.
     Joint,
+    /// What was packed was damaged.
+    Damaged(Loss),
 }
 
 impl Collect for Collected {
@@ -95,6 +99,10 @@ impl Collect for Collected {
             Entry::Record { at, record: Record::Note(Note { text: JOINED, .. }) } => {
                 self.entries.push((at, Kept::Joint));
             }
+            Entry::Record {
+                at,
+                record: Record::Loss(loss @ Loss { what: Lost::WrongChecksums | Lost::DamagedPlaces, .. }),
+            } => self.entries.push((at, Kept::Damaged(loss))),
             Entry::Record { at, record } => {
                 self.entries.extend(Told::of(&record).map(|told| (at, Kept::Told(told))));
             }
@@ -139,6 +147,7 @@ impl Deliver<Collected> for Hand<'_, '_> {
                     (self.take)(*at, Item::Observation(*source, observation))?;
                 }
                 Kept::Told(told) => (self.take)(*at, Item::Record(told))?,
+                Kept::Damaged(loss) => (self.take)(*at, Item::Gap(&of_packed(loss)))?,
                 Kept::Joint => {
                     std::mem::take(&mut self.said).end(self.take)?;
                     (self.take)(*at, Item::Joint)?;
@@ -147,6 +156,16 @@ impl Deliver<Collected> for Hand<'_, '_> {
         }
         Ok(())
     }
+}
+
+/// What was damaged in the recording that was packed, as a loss: the log itself is whole.
+fn of_packed(loss: &Loss) -> Gap {
+    let (words, to) = match loss.what {
+        // Counted over the whole recording.
+        Lost::WrongChecksums => (wrong_checksums(loss.count), Some(loss.to)),
+        _ => (format!("{} in the recording that was packed", count(loss.count, "damaged place")), None),
+    };
+    Gap { from: Some(loss.from), to, cause: Cause::Lost, place: None, bytes: 0, words }
 }
 
 /// A gap in the stream's words.

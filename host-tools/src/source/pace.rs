@@ -31,6 +31,14 @@ const FALLS: u32 = 8;
 /// ... with less than this between, runs backwards.
 const BETWEEN: Span = Span::from_secs(5);
 
+/// Falls of a clock in a row: when and where it fell first, when last, and how often.
+#[derive(Clone, Copy, Debug)]
+struct Falls {
+    first: (Instant, u64),
+    last: Instant,
+    count: u32,
+}
+
 /// Follows a recording's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pace {
@@ -44,8 +52,8 @@ pub struct Pace {
     since: Option<(Instant, u64)>,
     /// The recording's time and the other clock's, when the first of them was not yet too slow.
     witness: Option<(Instant, u64)>,
-    /// When the clock fell last, and how often in a row.
-    fell: Option<(Instant, u32)>,
+    /// The clock's falls in a row.
+    falls: Option<Falls>,
     /// When and where it was first that the clock does not run.
     stands: Option<(Instant, u64)>,
 }
@@ -93,11 +101,12 @@ impl Pace {
 
     /// The clock fell, or was set, and it is this time now.
     pub fn fell(&mut self, now: Instant) {
-        let in_a_row =
-            self.fell.filter(|(before, _)| now.since(*before) < BETWEEN).map_or(0, |(_, count)| count);
-        self.fell = Some((now, in_a_row + 1));
-        if in_a_row + 1 >= FALLS {
-            self.stands.get_or_insert((now, self.place));
+        let in_a_row = self.falls.filter(|falls| now.since(falls.last) < BETWEEN);
+        let before = in_a_row.unwrap_or(Falls { first: (now, self.place), last: now, count: 0 });
+        let falls = Falls { last: now, count: before.count.saturating_add(1), ..before };
+        self.falls = Some(falls);
+        if falls.count >= FALLS {
+            self.stands.get_or_insert(falls.first);
         }
     }
 

@@ -687,6 +687,9 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     let told = run(dir.path(), "pack wrong.tlog -o wrong.hum", 3);
     let told = String::from_utf8_lossy(&told.stderr).into_owned();
     assert!(told.contains("1 frame with a wrong checksum"), "{told}");
+    let checked = json(&run(dir.path(), "check --json wrong.hum", 3));
+    assert_eq!((&checked["loss_count"], &checked["damage_count"]), (&1.into(), &0.into()));
+    assert_eq!(checked["gaps"][0]["why"], "1 frame with a wrong checksum, which is not read");
 }
 
 #[test]

@@ -65,7 +65,7 @@ fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_i
     for (input, why) in [
         ("text", "has no MAVLink frame, so nothing was written"),
         ("text.gz", "has no MAVLink frame"),
-        ("log.bin", "is an ArduPilot log (DataFlash), in which there is no MAVLink"),
+        ("log.bin", "is an ArduPilot log (DataFlash), which has no MAVLink frames"),
         ("twice.gz", "is compressed twice"),
         ("-", "has no MAVLink frame"),
     ] {

@@ -1,8 +1,12 @@
 //! Reading: every format, filters, damage and what is no log at all.
 
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
 
 use crate::support::{flight, frames, frames_of, hums, json, named, px4, recorded, run, text};
 
@@ -93,6 +97,29 @@ fn what_has_no_frame_is_not_packed() {
     let output = run(dir.path(), "pack text -o out.hum", 1);
     assert!(String::from_utf8_lossy(&output.stderr).contains("no MAVLink frame"));
     assert!(!dir.path().join("out.hum").exists());
+    // An autopilot's log has a frame by chance.
+    let frame = &fs::read(px4()).expect("a recording")[8..];
+    fs::write(dir.path().join("log.bin"), [&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", frame].concat())
+        .expect("written");
+    let output = run(dir.path(), "pack log.bin -o out.hum", 1);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("is an ArduPilot log"), "{output:?}");
+    assert!(!dir.path().join("out.hum").exists());
+}
+
+#[test]
+fn a_compressed_recording_is_packed_as_it_is_unpacked() {
+    let dir = tempfile::tempdir().expect("directory");
+    let mut gz = GzEncoder::new(Vec::new(), Compression::fast());
+    gz.write_all(&fs::read(px4()).expect("a recording")).expect("memory");
+    let gz = gz.finish().expect("memory");
+    fs::write(dir.path().join("flight.tlog.gz"), &gz).expect("written");
+    fs::write(dir.path().join("cut.tlog.gz"), &gz[..gz.len() / 2]).expect("written");
+    packed(dir.path());
+    run(dir.path(), "pack flight.tlog.gz -o of_gz.hum", 0);
+    let of = |name: &str| fs::read(dir.path().join(name)).expect("a log");
+    assert!(of("flight.hum") == of("of_gz.hum"));
+    let cut = run(dir.path(), "pack cut.tlog.gz -o cut.hum", 3);
+    assert!(String::from_utf8_lossy(&cut.stderr).contains("ends too soon"), "{cut:?}");
 }
 
 #[test]

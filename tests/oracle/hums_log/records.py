@@ -10,7 +10,7 @@ MOMENTS = ["start", "periodic", "end"]
 LEVELS = ["ok", "advisory", "warning", "critical", "stale"]
 SUBSYSTEMS = ["power", "propulsion", "engine", "structure", "navigation", "link", "computer", "attitude",
               "recorder", "mishap"]
-LOSSES = ["uart_overrun", "bytes_not_frames", "damaged_frames", "queue_full", "card", "records"]
+LOSSES = ["uart_overrun", "bytes_not_frames", "damaged_frames", "queue_full", "card", "records", "wrong_checksums", "damaged_places"]
 EVENTS = ["", "armed", "disarmed", "take_off", "landing", "snapshot", "card_in", "card_out", "critical", "phase",
           "autopilot_reboot", "other_airframe", "by_link", "other_vehicle", "flight_resumed",
           "mishap", "mishap_down", "mishap_over", "mishap_on_bench"]

@@ -21,6 +21,10 @@ pub enum Lost {
     Card = 4,
     /// Records for which there was no room.
     Records = 5,
+    /// Frames of a recording that was packed whose checksum did not fit.
+    WrongChecksums = 6,
+    /// Damaged places of a recording that was packed.
+    DamagedPlaces = 7,
     /// A cause that this reader does not know.
     Other = 255,
 }
@@ -35,6 +39,8 @@ impl Lost {
             Self::QueueFull => "queue_full",
             Self::Card => "card",
             Self::Records => "records",
+            Self::WrongChecksums => "wrong_checksums",
+            Self::DamagedPlaces => "damaged_places",
             Self::Other => "other",
         }
     }
@@ -47,6 +53,8 @@ impl Lost {
             3 => Self::QueueFull,
             4 => Self::Card,
             5 => Self::Records,
+            6 => Self::WrongChecksums,
+            7 => Self::DamagedPlaces,
             _ => Self::Other,
         }
     }

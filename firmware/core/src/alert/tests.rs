@@ -44,6 +44,8 @@ fn texts_are_told_by_what_they_mean() {
         (4, "Crash check disabled", None),
         (4, "Terrain: clamping offset -22 to -15", None),
         (2, "Flux capacitor drained", warn(Cause::Other)),
+        (2, "script error", warn(Cause::Other)),
+        (2, "Lua: a.lua:1: attempt to index a nil value", warn(Cause::Other)),
         (4, "Flux capacitor low", None),
         (6, "EKF3 IMU0 is using GPS", None),
     ] {

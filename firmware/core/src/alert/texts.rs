@@ -95,8 +95,6 @@ const TEXTS: &[Row] = &[
     fine("command received"),
     fine("throttle not zero"),
     fine("not landed"),
-    fine("lua"),
-    fine("script"),
     // Mishaps and what ends a flight.
     act("crash", Cause::Crash),
     act("ditching", Cause::Crash),

@@ -233,12 +233,12 @@ vocabulary! {
     "The autopilot said that vibration or clipping disturbed it.";
     "Balance propellers and motors, and check the autopilot's mounting.";
 
-    "ekf_variance" ArduPilot "estimator variance", "", says "EKF doubts a sensor", "", needs "estimator variances";
+    "ekf_variance" ArduPilot "estimator variance", "", says "EKF doubts a sensor", "", needs "variances of the estimator that it flies by";
     "The estimator did not trust one of its sensors."; "Look at compass, GNSS and vibration at that time.";
-    "ekf_failsafe" ArduPilot "estimator, two sensors", "", says "EKF failing", "LAND, MANUAL", needs "estimator variances";
+    "ekf_failsafe" ArduPilot "estimator, two sensors", "", says "EKF failing", "LAND, MANUAL", needs "variances of the estimator that it flies by, of no plane";
     "The estimator did not trust two of compass, velocity and position: it could lose its position.";
     "Do not fly until compass and GNSS are checked.";
-    "ekf_compass" ArduPilot "estimator variance of the compass", "", says "EKF doubts compass", "", needs "estimator variance of the compass";
+    "ekf_compass" ArduPilot "estimator variance of the compass", "", says "EKF doubts compass", "", needs "compass variance of the estimator that it flies by";
     "The estimator did not trust the compass."; "Check the compass, its calibration and currents or magnets near it.";
     "ekf_test_ratio" Px4 "estimator test ratio", "", says "EKF rejects a sensor", "LAND", needs "estimator test ratios";
     "The estimator rejected, or nearly rejected, a sensor."; "Look at compass, GNSS and vibration at that time.";
@@ -351,9 +351,9 @@ vocabulary! {
     "autopilot_alert" Said "autopilot's alert", "", says "autopilot: severe message", "READ IT", needs "texts, events or health flags of the autopilot";
     "The autopilot gave a severe message that no table here knows."; "Read its messages of that time.";
 
-    "roll" Vehicle "roll angle", "", says "banks too far", "LEVEL OUT", needs "attitude";
+    "roll" Vehicle "roll angle", "", says "banks too far", "LEVEL OUT", needs "attitude of a vehicle on rotors";
     "The vehicle banked further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
-    "pitch" Vehicle "pitch angle", "", says "pitches too far", "LEVEL OUT", needs "attitude";
+    "pitch" Vehicle "pitch angle", "", says "pitches too far", "LEVEL OUT", needs "attitude of a vehicle on rotors";
     "The vehicle pitched further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
 
     "attitude_alert" Said "autopilot's alert: attitude", "", says "autopilot warns: attitude", "TAKE OVER", needs "texts, events or health flags of the autopilot";

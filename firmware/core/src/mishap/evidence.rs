@@ -19,6 +19,9 @@ pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
 pub(super) const IDLE_THROTTLE: f32 = 0.1;
 pub(super) const FULL_THROTTLE: f32 = 0.9;
 
+/// Below this part of the throttle that it hovers with, a fall is what the throttle asks for, and what does not fall stands.
+pub(super) const THRUST_PART: f32 = 0.5;
+
 /// How long something has been so, and in how many samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lasting {
@@ -135,6 +138,8 @@ pub(super) struct Shock {
     pub(super) sink_mps: f32,
     /// The speed broke off.
     pub(super) stopped: bool,
+    /// Little carried it just before.
+    pub(super) dropped: bool,
 }
 
 /// Disarmed out of a flight.

@@ -1,7 +1,8 @@
 //! What each observation shows of a mishap.
 
 use super::evidence::{
-    BREAKS_OFF, BROKEN_OFF, FULL_THROTTLE, IDLE_THROTTLE, Shock, is_believed, on_rotors, throttle,
+    BREAKS_OFF, BROKEN_OFF, FULL_THROTTLE, IDLE_THROTTLE, Shock, THRUST_PART, is_believed, on_rotors,
+    throttle,
 };
 use super::{Kind, Mishap, State, WATCHED};
 use crate::derived::load_factor_g;
@@ -18,6 +19,9 @@ const FALL_G: f32 = 0.3;
 /// A vehicle that was disarmed and is carried by less than this for so long falls; a bounce is shorter.
 const UNCARRIED_G: f32 = 0.5;
 const UNCARRIED: Span = Span::from_millis(200);
+/// What falls is carried by less than this for so long: nobody asks a multicopter to sink so hard, and so short before a touch.
+const DROPS_G: f32 = 0.65;
+const DROPS: Span = Span::from_millis(300);
 /// Tumbling and sinking last so long at least.
 const TUMBLES: Span = Span::from_millis(500);
 const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
@@ -38,8 +42,6 @@ const GLIDES_MPS: f32 = 1.0;
 const FULL_ON_WINGS: f32 = 0.97;
 /// Wings pull out of a dive with so much at most: the limit of CS-23 for the aerobatic category.
 const PULL_OUT_G: f32 = 6.0;
-/// Below this part of the throttle that it hovers with, a fall is what the throttle asks for.
-const THRUST_PART: f32 = 0.5;
 /// Time constant of the throttle that it hovers with.
 const HOVER_S: f32 = 10.0;
 
@@ -66,6 +68,7 @@ impl Mishap {
                     self.take_imu(at, imu, vehicle, params);
                 }
             }
+            Observation::Shock(force) => self.take_shock(at, force.0 / GRAVITY, vehicle, params),
             Observation::Air(air) if air.instance == 0 => self.take_pressure(at, air),
             Observation::Attitude(attitude) => {
                 self.take_attitude(at, attitude, vehicle, params);
@@ -111,7 +114,11 @@ impl Mishap {
         if load_g == 0.0 || load_g.to_bits() == self.load_g.to_bits() {
             return;
         }
+        self.take_shock(at, load_g, vehicle, params);
         (self.load_g, self.from_above_g) = (load_g, force[2].0 / GRAVITY);
+        if load_g >= DROPS_G {
+            self.carried_at = at;
+        }
         let falls = load_g < FALL_G && on_rotors(at, vehicle) && self.asks_for_thrust(at, vehicle);
         let least_s = params.get(Param::MisFallTime);
         if let Some(span) = self.falls.take(at, falls)
@@ -134,7 +141,11 @@ impl Mishap {
         {
             self.see(at, Kind::Overturned, tilt_deg);
         }
-        if load_g > params.get(Param::MisImpact) {
+    }
+
+    /// A shock, which may come between two samples.
+    fn take_shock(&mut self, at: Instant, load_g: f32, vehicle: &Vehicle, params: &Params) {
+        if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
             let before = self.shock.filter(|shock| at.since(shock.at) <= BREAKS_OFF);
             let shock = before.unwrap_or(Shock {
                 at,
@@ -142,7 +153,14 @@ impl Mishap {
                 speed_mps: if is_believed(vehicle, params) { self.speed.greatest() } else { 0.0 },
                 sink_mps: self.sink.greatest(),
                 stopped: false,
+                dropped: self.shock.is_some_and(|shock| shock.dropped)
+                    || (self.load_g < DROPS_G
+                        && at.since(self.carried_at) >= DROPS
+                        && on_rotors(at, vehicle)),
             });
+            if self.shock.is_none() && self.worst[Kind::Impact as usize] == 0.0 {
+                self.hit_at = at;
+            }
             // The greatest of several: what hits something bounces.
             let greatest_g = self.shock.map_or(load_g, |before| before.load_g.max(load_g));
             self.shock = Some(Shock { load_g: greatest_g, ..shock });
@@ -242,10 +260,10 @@ impl Mishap {
     fn take_throttle(&mut self, at: Instant, vehicle: &Vehicle) {
         let throttle = throttle(at, vehicle).unwrap_or(0.0);
         if self.armed && throttle > IDLE_THROTTLE {
-            self.driven_at = Some(at);
+            self.driven_at = at;
         }
         let hovers = climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < 1.0);
-        if hovers && throttle > IDLE_THROTTLE && self.state == State::Quiet {
+        if hovers && throttle > IDLE_THROTTLE && self.state == State::Quiet && self.shock.is_none() {
             let weight = if self.hover_throttle > 0.0 { 0.25 / HOVER_S } else { 1.0 };
             self.hover_throttle += weight * (throttle - self.hover_throttle);
         }

@@ -178,3 +178,25 @@ fn what_crashed_and_was_never_disarmed_begins_another_flight_where_it_hovers() {
     });
     assert_eq!(outcome.flights(), (2, 0, 1), "{:?}", outcome.changes);
 }
+
+/// Falls from less than a metre for 0.45 s, and lies.
+fn drop_low(ms: u64, quad: &mut Quad, motion: &mut Motion) {
+    if ms < 450 {
+        (motion.load_g, quad.height, quad.climb) = (0.4, 0.7, -2.0);
+    } else {
+        // Armed still, with the throttle of idling rotors; the estimator sinks on.
+        (motion.rates, quad.height, quad.climb, quad.throttle) = ([0.0; 3], 0.0, -1.5, 0.2);
+    }
+}
+
+#[test]
+fn a_shock_between_two_samples_of_what_fell_is_an_impact_at_its_own_time() {
+    let outcome = fly(&hovering(ROTORS[0]), |ms, quad, motion| {
+        drop_low(ms, quad, motion);
+        motion.shock_g = (ms == 450).then_some(17.0);
+    });
+    let impact = outcome.findings.iter().find(|finding| finding.check == "impact").expect("hit");
+    assert!((impact.value - 17.0).abs() < 0.1, "{impact:?}");
+    assert_eq!(outcome.monitor.mishap().hit_at(), Instant::from_millis(AT_MS + 450));
+    assert_eq!(fly(&hovering(ROTORS[0]), drop_low).told(), [""; 0]);
+}

@@ -35,10 +35,18 @@ struct Motion {
     pitch: f32,
     /// What the barometer says; where it says anything.
     pressure_hpa: Option<f32>,
+    /// The greatest specific force between this sample and the next, where it is a shock.
+    shock_g: Option<f32>,
 }
 
-const CALM: Motion =
-    Motion { load_g: 1.0, rates: [0.01, 0.02, 0.0], ground_mps: 0.1, pitch: 0.02, pressure_hpa: None };
+const CALM: Motion = Motion {
+    load_g: 1.0,
+    rates: [0.01, 0.02, 0.0],
+    ground_mps: 0.1,
+    pitch: 0.02,
+    pressure_hpa: None,
+    shock_g: None,
+};
 
 type Script = fn(u64, &mut Quad, &mut Motion);
 
@@ -84,6 +92,9 @@ fn fly(vehicle: &Quad, script: Script) -> Outcome {
         let rates = Some(motion.rates.map(RadiansPerSecond));
         let imu = Imu { acceleration, rate: rates, ..Imu::default() };
         monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
+        if let Some(shock_g) = motion.shock_g {
+            monitor.observe(now, AUTOPILOT, &Observation::Shock(MetresPerSecond2(shock_g * 9.806_65)));
+        }
         if now_ms.is_multiple_of(100) {
             let (roll, pitch) = (Radians(quad.roll), Radians(motion.pitch));
             let attitude = Attitude { roll, pitch, rates, ..Attitude::default() };

@@ -653,3 +653,24 @@ fn a_recording_that_ends_in_the_air_says_so_and_what_comes_last_is_a_landing() {
     assert_eq!(ends(None), (true, Some(false)));
     assert_eq!(ends(Some(LandedState::OnGround)), (false, Some(true)));
 }
+
+#[test]
+fn what_comes_where_the_recording_has_no_times_is_left_out() {
+    let judged = |from_s: u64| {
+        let mut judge = Judge::new(&Limits::default(), Format::Tlog);
+        fly(&mut judge, 0, 20, 10, 0.9);
+        fly(&mut judge, 20, 40, 10, 0.1);
+        let from = Some(Instant::from_millis(from_s * 1_000));
+        let gap = Gap { from, to: None, cause: Why::NoTimes, place: Some(1), bytes: 0, words: String::new() };
+        judge.item(Instant::from_millis(40_000), Item::Gap(&gap));
+        judge.end()
+    };
+    let late = judged(30);
+    assert_eq!((late.verdict(), late.armed, late.is_timeless), ("warning", Span::from_secs(30), false));
+    let early = judged(10);
+    assert_eq!((early.problems.len(), early.armed), (0, Span::from_secs(10)), "{:?}", early.problems);
+    assert_eq!(early.span.map(|(_, last)| last), Some(Instant::from_millis(10_000)));
+    let never = judged(0);
+    assert_eq!((never.verdict(), never.judged.len(), never.findings_count), ("unknown", 0, 0));
+    assert_eq!(never.not_judged.first().map(|(_, why)| why.as_str()), Some("the recording has no times"));
+}

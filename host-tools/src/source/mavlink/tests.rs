@@ -363,3 +363,10 @@ fn of_several_vehicles_one_is_read_where_it_is_asked_for_and_who_is_no_autopilot
     assert_eq!(heard(None), [40, 40, 40]);
     assert_eq!(heard(Some(2)), [0, 40, 40]);
 }
+
+#[test]
+fn frames_behind_times_that_can_be_none_have_no_times_and_are_one_place() {
+    let bytes: Vec<u8> = (0..5_000).flat_map(|_| [&[0xff; 8][..], &HEARTBEAT].concat()).collect();
+    let (gaps, _, last) = told_of(bytes);
+    assert_eq!((gaps, last), (vec![(Cause::Damaged, Some(0)), (Cause::NoTimes, None)], 0));
+}

@@ -218,6 +218,22 @@ impl Times {
             .chain(self.no_times().or_else(|| self.pace.gap()))
     }
 
+    /// That none of so many frames has a time that can be one.
+    pub fn none_of(&self, frames: u64) -> Option<Gap> {
+        let words = format!(
+            "{} without a time that can be one: nothing in the log can be judged",
+            count(frames, "frame")
+        );
+        (self.records == 0 && frames > 0).then_some(Gap {
+            from: None,
+            to: None,
+            cause: Cause::NoTimes,
+            place: None,
+            bytes: 0,
+            words,
+        })
+    }
+
     /// The recorded times are none.
     fn no_times(&self) -> Option<Gap> {
         if self.now != Instant::ZERO || self.records < STILL_RECORDS {

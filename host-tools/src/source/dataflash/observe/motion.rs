@@ -6,8 +6,8 @@ use hums_core::observation::{
 };
 use hums_core::time::Span;
 use hums_core::units::{
-    Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
-    RadiansPerSecond,
+    Celsius, Fraction, GRAVITY, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position,
+    Radians, RadiansPerSecond, norm,
 };
 
 use super::handler::{Given, Handler};
@@ -27,6 +27,10 @@ const FIX_2D: u8 = 2;
 const FIX_3D: u8 = 3;
 /// What belongs together in one of MAVLink's messages was logged within this.
 const TOGETHER: Span = Span::from_secs(2);
+/// A shock's specific force is greater than this: below the least limit of one, and above what nearly all flights have.
+const SHOCK_MIN: f32 = 2.0 * GRAVITY;
+/// Sensors that feel the same shock say so within this.
+const AT_ONCE: Span = Span::from_millis(100);
 /// Rates go with an attitude within this.
 const RATES_AGE: Span = Span::from_millis(500);
 
@@ -215,6 +219,17 @@ fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if rate.is_none() && acceleration.is_none() {
         return;
     }
+    if let Some(force) =
+        acceleration.map(|axes| norm(axes.map(|axis| axis.0))).filter(|force| *force > SHOCK_MIN)
+    {
+        let other = state.shaken.replace((instance, given.at));
+        // One sensor alone that says so may be broken. What the first one measures is looked at as it is.
+        let agrees = other.is_some_and(|(by, at)| by != instance && given.at.since(at) <= AT_ONCE);
+        if instance > 0 && agrees {
+            out.observe(&Observation::Shock(MetresPerSecond2(force)));
+        }
+    }
+    state.has_inertial = true;
     // A sensor without a thermometer says 0.
     let temperature = given.single(7).filter(|celsius| *celsius != 0.0).map(Celsius);
     let field = state.fields.get_mut(usize::from(instance)).and_then(Option::take);
@@ -346,14 +361,19 @@ fn air(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 }
 
 /// In mG; MAVLink tells it with the inertial sensor of the same number.
-fn compass(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+fn compass(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let instance = given.instance(0);
     // SYS_STATUS tells of the first one.
     if instance == 0 {
         state.health(0, MAGNETOMETER, given.single(1));
     }
-    if let (Some(field), Some(slot)) = (given.singles(2), state.fields.get_mut(usize::from(instance))) {
-        *slot = Some(field.map(|milli: f32| Gauss(milli / 1e3)));
+    let Some(field) = given.singles(2).map(|field: [f32; 3]| field.map(|milli| Gauss(milli / 1e3))) else {
+        return;
+    };
+    let before = state.fields.get_mut(usize::from(instance)).and_then(|slot| slot.replace(field));
+    // No inertial sensor took it along.
+    if before.is_some() && !state.has_inertial {
+        out.observe(&Observation::Imu(Imu { instance, field: before, ..Imu::default() }));
     }
 }
 

@@ -1,7 +1,6 @@
 //! What a log says in words and numbers of its own: parameters, texts, modes, events, errors, arming.
 
 use hums_core::alert;
-use hums_core::observation::{AutopilotIdentity, Observation};
 
 use super::handler::{Given, Handler};
 use super::say::{Out, Say};
@@ -83,7 +82,7 @@ fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if let Some(craft) = Craft::of_firmware(&words) {
         firmware(state, craft, &words, out);
         if let Some(version) = version_of(&words).filter(|_| !state.identified) {
-            identify(state, version, out);
+            identify(state, version);
         }
     } else if let Some(frame) = words.strip_prefix("Frame: ") {
         out.say(&Say::Frame(frame));
@@ -106,9 +105,8 @@ fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
     out.say(&Say::Firmware(words));
 }
 
-fn identify(state: &mut State, firmware: u32, out: &mut Out<'_>) {
+fn identify(state: &mut State, firmware: u32) {
     (state.facts.version, state.identified) = (firmware, true);
-    out.observe(&Observation::Identity(AutopilotIdentity { firmware, uid: 0 }));
 }
 
 fn version(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
@@ -124,7 +122,7 @@ fn version(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
     if let (Some(major), Some(minor), Some(patch)) = (given.byte(1), given.byte(2), given.byte(3)) {
         let kind = given.byte(4).unwrap_or(0);
-        identify(state, u32::from_be_bytes([major, minor, patch, kind]), out);
+        identify(state, u32::from_be_bytes([major, minor, patch, kind]));
     }
 }
 

@@ -2,7 +2,8 @@
 //! log's, and some of them are told by nothing but events.
 
 use hums_core::observation::{
-    Autopilot, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus, VehicleKind, VtolState,
+    Autopilot, AutopilotIdentity, Battery, CELLS_MAX, Heartbeat, LandedState, Observation, SystemStatus,
+    VehicleKind, VtolState,
 };
 use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Fraction, Gauss, Metres, RadiansPerSecond, Volts};
@@ -107,8 +108,10 @@ impl Facts {
 pub(in crate::source::dataflash) struct State {
     /// What the vehicle is.
     pub(super) facts: Facts,
-    /// Its version was handed on.
+    /// VER, or a text, told its version.
     pub(super) identified: bool,
+    /// The version that was handed on.
+    told_version: u32,
     /// Motors may turn, as far as that is known.
     pub(super) arming: Arming,
     pub(super) landed: LandedState,
@@ -122,6 +125,10 @@ pub(in crate::source::dataflash) struct State {
     /// Sensors that say that they are not healthy: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
     pub(super) unhealthy: [u32; INSTANCES],
     pub(super) rates: Dated<Rates>,
+    /// The inertial sensor that felt a shock last, and when.
+    pub(super) shaken: Option<(u8, Instant)>,
+    /// It logs inertial sensors.
+    pub(super) has_inertial: bool,
     /// Accuracy by receiver.
     pub(super) accuracy: [Dated<Metres>; INSTANCES],
     /// What each compass measured last, until an inertial sensor's observation takes it along.
@@ -367,6 +374,10 @@ impl State {
             out.say(&Say::Arming(word.words()));
         }
         out.observe(&Observation::Heartbeat(heartbeat));
+        let firmware = self.facts.version;
+        if std::mem::replace(&mut self.told_version, firmware) != firmware {
+            out.observe(&Observation::Identity(AutopilotIdentity { firmware, uid: 0 }));
+        }
         if self.landed != LandedState::Unknown {
             out.observe(&Observation::Landed(self.landed, VtolState::Unknown));
         }

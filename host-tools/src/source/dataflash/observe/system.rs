@@ -1,10 +1,12 @@
 //! The autopilot's processor, its radios, and what a plane says of its state.
 
 use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};
+use hums_core::time::Span;
 
 use super::handler::{Given, Handler};
 use super::say::Out;
 use super::state::State;
+use super::words::Craft;
 
 const SYSTEM: Handler =
     Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
@@ -51,10 +53,21 @@ fn rc(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 
 /// A plane's own idea of flying.
 fn status(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+    /// A brisk walk, over ground.
+    const CARRIED_MPS: f32 = 2.5;
+    const SPEED_AGE: Span = Span::from_secs(2);
     if let Some(armed) = given.unsigned(1) {
         state.arm(armed != 0);
     }
     if let Some(flying) = given.unsigned(0) {
-        state.landed = if flying == 0 { LandedState::OnGround } else { LandedState::InAir };
+        // A plane that is armed and carried by hand calls itself flying; one that takes off is faster.
+        let is_carried = state.landed != LandedState::InAir
+            && state.facts.craft == Craft::Plane
+            && !state.facts.quadplane
+            && state
+                .ground_speed
+                .within(given.at, SPEED_AGE)
+                .is_some_and(|speed_mps| speed_mps < CARRIED_MPS);
+        state.landed = if flying == 0 || is_carried { LandedState::OnGround } else { LandedState::InAir };
     }
 }

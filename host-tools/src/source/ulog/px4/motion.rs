@@ -5,27 +5,25 @@ use hums_core::observation::{
     Observation, Outputs, Vibration, VibrationScale, Wanted,
 };
 use hums_core::units::{
-    Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
-    RadiansPerSecond,
+    Celsius, Fraction, GRAVITY, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position,
+    Radians, RadiansPerSecond, norm,
 };
 
 use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Said, Topic};
+
+/// A shock's specific force is greater than this: below the least limit of one, and above what nearly all flights have.
+const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 
 pub(super) const TOPICS: &[Topic] = &[
     Topic {
         name: "sensor_combined",
         instances: 1,
-        every_us: FAST_US,
+        // Thinned by its handler, which looks for shocks in all of them.
+        every_us: 0,
         fields: &["accelerometer_m_s2", "gyro_rad"],
         take: imu,
     },
-    Topic {
-        name: "vehicle_acceleration",
-        instances: 1,
-        every_us: FAST_US,
-        fields: &["xyz"],
-        take: acceleration,
-    },
+    Topic { name: "vehicle_acceleration", instances: 1, every_us: 0, fields: &["xyz"], take: acceleration },
     Topic {
         name: "vehicle_angular_velocity",
         instances: 1,
@@ -262,7 +260,25 @@ fn inertial(px4: &mut Px4, instance: u8, acceleration: Option<[f32; 3]>, rate: O
 
 fn imu(px4: &mut Px4, said: &Said<'_>) {
     px4.motion.combined = true;
-    inertial(px4, 0, said.fields.vector(0), said.fields.vector(1));
+    if let Some(force) = thinned(px4, said) {
+        inertial(px4, 0, force, said.fields.vector(1));
+    }
+}
+
+/// The specific force of a message, where it is one of those that are handed on. Of the others only that of a shock is, as that: what
+/// hits the ground does so between two of them.
+fn thinned(px4: &mut Px4, said: &Said<'_>) -> Option<Option<[f32; 3]>> {
+    let force = said.fields.vector(0);
+    let now_us = said.recorded_us;
+    let is_due = |last: u64| now_us < last || now_us - last >= FAST_US;
+    if px4.motion.force_us.is_none_or(is_due) {
+        px4.motion.force_us = Some(now_us);
+        return Some(force);
+    }
+    if let Some(force) = force.map(norm).filter(|force| *force > SHOCK_MIN) {
+        px4.observe(Observation::Shock(MetresPerSecond2(force)));
+    }
+    None
 }
 
 /// Velocity and angle over a time, which is in microseconds.
@@ -295,8 +311,10 @@ fn outputs(px4: &mut Px4, said: &Said<'_>) {
 
 /// Where a log has no `sensor_combined`.
 fn acceleration(px4: &mut Px4, said: &Said<'_>) {
-    if !px4.motion.combined {
-        inertial(px4, 0, said.fields.vector(0), px4.motion.rate);
+    if !px4.motion.combined
+        && let Some(force) = thinned(px4, said)
+    {
+        inertial(px4, 0, force, px4.motion.rate);
     }
 }
 

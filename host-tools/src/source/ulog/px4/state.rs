@@ -138,6 +138,8 @@ pub(super) struct Status {
 #[expect(clippy::struct_excessive_bools, reason = "which topics a log has, none a state of the others")]
 pub(super) struct Motion {
     pub(super) combined: bool,
+    /// When a specific force was handed on last, microseconds.
+    pub(super) force_us: Option<u64>,
     pub(super) rate: Option<[f32; 3]>,
     /// The body rates that are wanted, about roll and pitch, and when, microseconds.
     pub(super) rates_wanted: Option<(u64, [RadiansPerSecond; 2])>,

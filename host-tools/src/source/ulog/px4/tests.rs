@@ -185,6 +185,19 @@ fn an_attitude_is_that_of_its_quaternion_and_fast_topics_are_thinned() {
 }
 
 #[test]
+fn a_shock_between_two_samples_that_are_handed_on_is_handed_on_as_one() {
+    let format = "sensor_combined:uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;";
+    let mut log = Writer::new(SECOND).format(format).subscribe(0, 0, "sensor_combined");
+    for step in 0..100 {
+        let force = if step == 40 { 170.0 } else { 9.8 };
+        log = log.data(0, 2 * SECOND + step * 4_000, &floats(&[0.0, 0.0, 0.0, 0.0, 0.0, -force]));
+    }
+    let read = read(&log.bytes);
+    assert_eq!(observations(&read, "Imu(").len(), 8);
+    assert_eq!(observations(&read, "Shock("), ["1: Shock(MetresPerSecond2(170.0))"]);
+}
+
+#[test]
 fn the_wanted_attitude_is_a_quaternion_and_before_v1_6_two_angles() {
     let half = 0.5_f32.sqrt();
     for (fields, values) in [

@@ -6,19 +6,19 @@ use super::input::Progress;
 use super::stream::{Chunk, Source};
 
 /// The source whose bytes come of an input that may be compressed.
-pub(super) struct Packed<S> {
+pub(super) struct Compressed<S> {
     inner: S,
     progress: Progress,
 }
 
-impl<S: Source> Packed<S> {
+impl<S: Source> Compressed<S> {
     /// The bytes of `inner`, which reads the input that `progress` tells of.
     pub(super) fn new(inner: S, progress: Progress) -> Self {
         Self { inner, progress }
     }
 }
 
-impl<S: Source> Source for Packed<S> {
+impl<S: Source> Source for Compressed<S> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         self.inner.next()
     }
