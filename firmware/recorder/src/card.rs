@@ -154,6 +154,17 @@ impl<'a, D: BlockDevice> Card<'a, D> {
         Ok(())
     }
 
+    /// Calls `each` for every name of a log that the root directory has, also where it is that of a folder.
+    pub(crate) fn names(&self, mut each: impl FnMut(LogName)) -> Result<(), CardError<D::Error>> {
+        self.manager()?.iterate_dir(self.root, |entry| {
+            LogName::from_short(entry.name.base_name(), entry.name.extension())
+                .into_iter()
+                .for_each(&mut each);
+            ControlFlow::Continue(())
+        })?;
+        Ok(())
+    }
+
     /// Makes a segment of `bytes` (rounded up to whole clusters) and opens it. Its contents are whatever its clusters
     /// held before. At every moment in between, the directory is as before or holds the whole segment.
     pub fn create(&mut self, name: LogName, bytes: u32) -> Result<(), CardError<D::Error>> {

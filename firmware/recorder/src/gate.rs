@@ -238,6 +238,7 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
         self.device.read(core::slice::from_mut(block), BlockIdx(at)).map_err(|error| self.fail(error))?;
         if self.layout.is_fat(at) {
             self.for_bad_entries(block, at, |entry| entry.copy_from_slice(&0x0FFF_FFF7_u32.to_le_bytes()));
+            self.take_root(block, at);
         } else if at == self.layout.info {
             self.correct_info(block);
             if self.free_from > 0 {
@@ -245,6 +246,19 @@ impl<'a, D: BlockDevice> Gate<'a, D> {
             }
         }
         Ok(())
+    }
+
+    /// Where the FAT calls the root directory's first cluster free, its part of the FAT was lost. The directory ends there then: as
+    /// a free cluster it would become a log's.
+    fn take_root(&self, block: &mut Block, at: u32) {
+        let first = (at - self.layout.fat_start) % self.layout.fat_blocks * 128;
+        let place =
+            self.layout.root.checked_sub(first).filter(|place| *place < 128).map(|place| place as usize * 4);
+        if let Some(entry) = place.and_then(|place| block.get_mut(place..place + 4))
+            && entry.iter().all(|byte| *byte == 0)
+        {
+            entry.copy_from_slice(&0x0FFF_FFFF_u32.to_le_bytes());
+        }
     }
 
     /// Calls `bad` for each FAT entry of this block that names a cluster that does not exist.

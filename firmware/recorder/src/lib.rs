@@ -68,6 +68,11 @@ pub trait CardDevice: embedded_sdmmc::BlockDevice {
         0
     }
 
+    /// Whether logs of earlier power-ons are never overwritten: a card without room is full then. No card of a board asks for that.
+    fn keeps_logs(&self) -> bool {
+        false
+    }
+
     /// What an error means.
     fn trouble(_error: &Self::Error) -> Trouble {
         Trouble::Refusing

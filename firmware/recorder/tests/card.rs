@@ -337,6 +337,22 @@ fn a_damaged_information_sector_keeps_nobody_from_recording_and_is_mended() {
 }
 
 #[test]
+fn the_root_directory_is_no_free_cluster_where_its_fat_was_lost() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    mount(&device, &status).create(FIRST, 1 << 20).expect("there is room");
+    change(&device, FAT_START, |block| block[8..12].fill(0));
+    change(&device, 2048 + 1, |info| info[492..496].copy_from_slice(&2_u32.to_le_bytes()));
+    let mut card = mount(&device, &status);
+    card.create(SECOND, 1 << 20).expect("there is room");
+    card.write(0, &[pattern(9)]).expect("in place");
+    assert_eq!(
+        logs(&mount(&device, &status)).iter().map(|log| log.name).collect::<Vec<_>>(),
+        [FIRST, SECOND]
+    );
+}
+
+#[test]
 fn a_log_whose_fat_was_lost_is_chained_again_and_not_written_over() {
     // All of it, its beginning, its middle and its end, in blocks of the FAT.
     for lost in [0..17, 0..5, 5..9, 12..17] {

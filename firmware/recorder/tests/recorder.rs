@@ -174,10 +174,16 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
         }
         recorder.finish();
     }
-    let names: Vec<_> = stored(&device).into_iter().map(|(name, ..)| name.session).collect();
-    assert_eq!(names.iter().max(), Some(&sessions));
-    assert!(*names.iter().min().unwrap() > 1, "the oldest one is gone");
+    let names = || stored(&device).into_iter().map(|(name, ..)| name.session).collect::<Vec<_>>();
+    let before = names();
+    assert_eq!(before.iter().max(), Some(&sessions));
+    assert!(*before.iter().min().unwrap() > 1, "the oldest one is gone");
     assert!(status.read().segments_overwritten > 0);
+    // One that may not go.
+    device.keeps_logs.set(true);
+    let mut recorder = Recorder::new(device.clone(), &status, held(), sessions);
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Later);
+    assert_eq!((status.read().state, names()), (CardState::Full, before));
 }
 
 #[test]
@@ -683,6 +689,26 @@ fn found_at_next_start(device: &MemCard) -> Before {
     recorder.idle();
     device.blocks.replace(whole);
     status.take_before().expect("it was looked for")
+}
+
+#[test]
+fn a_folder_with_the_name_of_the_next_log_is_passed_by() {
+    let device = MemCard::formatted(40 * MIB_BLOCKS);
+    let record = |session| {
+        let status = CardStatus::new();
+        let mut recorder = Recorder::new(device.clone(), &status, held(), session);
+        assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Written::Done);
+        recorder.log_name().expect("it records").session
+    };
+    assert_eq!((record(1), record(2)), (1, 2));
+    // The second log becomes a folder.
+    let name = LogName { session: 2, segment: 0 }.short();
+    for block in device.blocks.borrow_mut().values_mut() {
+        if let Some(at) = (0..512).step_by(32).find(|at| block[*at..].starts_with(&name)) {
+            block[at + 11] |= 0x10;
+        }
+    }
+    assert_eq!(record(3), 3);
 }
 
 #[test]

@@ -9,11 +9,8 @@
 //! written, where a whole item ends with a zero. (The last item before a start whose end itself is damaged is taken for one that
 //! power cut short.)
 
-use embedded_storage::nor_flash::NorFlash;
-
 use crate::key::Key;
 use crate::marks::{HEADER_BYTES, WORD};
-use crate::sectors::{Outcome, SECTORS, Sectors};
 
 /// Bytes of an item before its data.
 const HEAD_BYTES: usize = 8;
@@ -29,82 +26,82 @@ pub(crate) struct Look {
     pub(crate) damaged: u32,
 }
 
-impl<F: NorFlash> Sectors<F> {
-    /// Looks through all that was ever written into the sectors.
-    pub(crate) fn look(&mut self) -> Outcome<Look, F> {
-        let mut look = Look::default();
-        for sector in 0..SECTORS {
-            if self.is_begun(sector)? {
-                self.look_through(sector, &mut look)?;
-            }
+/// Looks through a sector: its items go on to `end`, and so many bytes before that are erased.
+pub(crate) fn look_through<E>(
+    end: usize,
+    erased: usize,
+    mut read: impl FnMut(usize, &mut [u8]) -> Result<(), E>,
+    look: &mut Look,
+) -> Result<(), E> {
+    let mut at = HEADER_BYTES + WORD;
+    // In a place that is no item: whether power may have left all of it, and the bytes that are no head of an item.
+    let (mut place, mut no_head) = (None, 0);
+    while at + HEAD_BYTES <= end {
+        let mut head = [0; HEAD_BYTES];
+        read(at, &mut head)?;
+        if head == [0xFF; HEAD_BYTES] {
+            break;
         }
-        Ok(look)
+        let [a, b, c, d, low, high, check @ ..] = head;
+        let length = usize::from(u16::from_le_bytes([low, high]));
+        let next = at + HEAD_BYTES + length.next_multiple_of(WORD);
+        if crc_16(&[low, high]) != u16::from_le_bytes(check) || next > end {
+            no_head += WORD;
+            place = Some(place.unwrap_or(true) && no_head <= HEADS_BYTES);
+            at += WORD;
+            continue;
+        }
+        no_head = 0;
+        let (key, check) = data(at + HEAD_BYTES, length, &mut read)?;
+        if check == u32::from_le_bytes([a, b, c, d]) {
+            look.items += 1;
+            let may_be_cut = key == Key::MOUNTS;
+            look.damaged += u32::from(place.take().is_some_and(|is_cut| !(is_cut && may_be_cut)));
+        } else {
+            place = Some(place.unwrap_or(true) && !is_ended(at + HEAD_BYTES, length, &mut read)?);
+        }
+        at = next;
     }
+    look.damaged += u32::from(place == Some(false));
+    if at + erased < end {
+        // What is free is not erased.
+        look.damaged += 1;
+    }
+    Ok(())
+}
 
-    pub(crate) fn look_through(&mut self, sector: usize, look: &mut Look) -> Outcome<(), F> {
-        let end = F::ERASE_SIZE - WORD;
-        let mut at = HEADER_BYTES + WORD;
-        // In a place that is no item: whether power may have left all of it, and the bytes that are no head of an item.
-        let (mut place, mut no_head) = (None, 0);
-        while at + HEAD_BYTES <= end {
-            let mut head = [0; HEAD_BYTES];
-            self.read_raw(sector, at, &mut head)?;
-            if head == [0xFF; HEAD_BYTES] {
-                break;
-            }
-            let [a, b, c, d, low, high, check @ ..] = head;
-            let length = usize::from(u16::from_le_bytes([low, high]));
-            let next = at + HEAD_BYTES + length.next_multiple_of(WORD);
-            if crc_16(&[low, high]) != u16::from_le_bytes(check) || next > end {
-                no_head += WORD;
-                place = Some(place.unwrap_or(true) && no_head <= HEADS_BYTES);
-                at += WORD;
-                continue;
-            }
-            no_head = 0;
-            let (key, check) = self.data(sector, at + HEAD_BYTES, length)?;
-            if check == u32::from_le_bytes([a, b, c, d]) {
-                look.items += 1;
-                let may_be_cut = key == Key::MOUNTS;
-                look.damaged += u32::from(place.take().is_some_and(|is_cut| !(is_cut && may_be_cut)));
-            } else {
-                place = Some(place.unwrap_or(true) && !self.is_ended(sector, at + HEAD_BYTES, length)?);
-            }
-            at = next;
-        }
-        look.damaged += u32::from(place == Some(false));
-        if at + self.room_of(sector)? < end {
-            // What is free is not erased.
-            look.damaged += 1;
-        }
-        Ok(())
-    }
+/// Whether an item's data was written to its end: the zero that ends it, and those up to the word.
+fn is_ended<E>(
+    at: usize,
+    length: usize,
+    read: &mut impl FnMut(usize, &mut [u8]) -> Result<(), E>,
+) -> Result<bool, E> {
+    let Some(last) = length.checked_sub(1) else { return Ok(true) };
+    let mut end = [0; WORD];
+    read(at + last / WORD * WORD, &mut end)?;
+    Ok(end.iter().skip(last % WORD).all(|byte| *byte == 0))
+}
 
-    /// Whether an item's data was written to its end: the zero that ends it, and those up to the word.
-    fn is_ended(&mut self, sector: usize, at: usize, length: usize) -> Outcome<bool, F> {
-        let Some(last) = length.checked_sub(1) else { return Ok(true) };
-        let mut end = [0; WORD];
-        self.read_raw(sector, at + last / WORD * WORD, &mut end)?;
-        Ok(end.iter().skip(last % WORD).all(|byte| *byte == 0))
-    }
-
-    /// The key and the check of an item's data.
-    fn data(&mut self, sector: usize, at: usize, length: usize) -> Outcome<(Key, u32), F> {
-        let (mut key, mut crc) = ([0xFF; WORD], CRC_32_BEGIN);
-        for place in (0..length).step_by(WORD) {
-            let mut word = [0; WORD];
-            self.read_raw(sector, at + place, &mut word)?;
-            if place == 0 {
-                key = word;
-            }
-            crc = crc_32(crc, word.get(..WORD.min(length - place)).unwrap_or_default());
+/// The key and the check of an item's data.
+fn data<E>(
+    at: usize,
+    length: usize,
+    read: &mut impl FnMut(usize, &mut [u8]) -> Result<(), E>,
+) -> Result<(Key, u32), E> {
+    let (mut key, mut crc) = ([0xFF; WORD], CRC_32_BEGIN);
+    for place in (0..length).step_by(WORD) {
+        let mut word = [0; WORD];
+        read(at + place, &mut word)?;
+        if place == 0 {
+            key = word;
         }
-        // A check is never 0, which stands for an item that was removed, and neither 0 nor erased in its first byte.
-        let check = !crc;
-        let first = check as u8;
-        let check = if first == 0 || first == 0xFF { check ^ 1 } else { check };
-        Ok((Key::from_stored(u32::from_le_bytes(key)), check))
+        crc = crc_32(crc, word.get(..WORD.min(length - place)).unwrap_or_default());
     }
+    // A check is never 0, which stands for an item that was removed, and neither 0 nor erased in its first byte.
+    let check = !crc;
+    let first = check as u8;
+    let check = if first == 0 || first == 0xFF { check ^ 1 } else { check };
+    Ok((Key::from_stored(u32::from_le_bytes(key)), check))
 }
 
 /// CRC-16F/4.2 (Koopman), bits reflected, never all ones.

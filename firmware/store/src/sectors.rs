@@ -6,7 +6,7 @@ use core::fmt;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind};
 use embedded_storage_async::nor_flash as nonblocking;
 
-use crate::look::Look;
+use crate::look::{Look, look_through};
 use crate::marks::{ERASED, GENERATION_AT, HEADER_BYTES, MAGIC, Marks, WORD, coded};
 
 /// How many sectors.
@@ -51,7 +51,7 @@ pub struct Sectors<F> {
     may_erase: bool,
 }
 
-pub(crate) type Outcome<T, F> = Result<T, Refusal<<F as ErrorType>::Error>>;
+type Outcome<T, F> = Result<T, Refusal<<F as ErrorType>::Error>>;
 
 impl<F: NorFlash> Sectors<F> {
     /// Bytes of a sector that are left to the items.
@@ -132,7 +132,7 @@ impl<F: NorFlash> Sectors<F> {
     }
 
     /// Bytes at the end of a sector that are still erased.
-    pub(crate) fn room_of(&mut self, sector: usize) -> Outcome<usize, F> {
+    fn room_of(&mut self, sector: usize) -> Outcome<usize, F> {
         const PIECE: usize = 64;
         let begin = HEADER_BYTES + WORD;
         let (mut end, mut room) = (F::ERASE_SIZE - WORD, 0);
@@ -164,8 +164,24 @@ impl<F: NorFlash> Sectors<F> {
         Ok(self.is_begun(sector)? && !self.is_marked(sector, F::ERASE_SIZE - 1)?)
     }
 
+    /// Looks through all that was ever written into the sectors.
+    pub(crate) fn look(&mut self) -> Outcome<Look, F> {
+        let mut look = Look::default();
+        for sector in 0..SECTORS {
+            if self.is_begun(sector)? {
+                self.look_through(sector, &mut look)?;
+            }
+        }
+        Ok(look)
+    }
+
+    fn look_through(&mut self, sector: usize, look: &mut Look) -> Outcome<(), F> {
+        let erased = self.room_of(sector)?;
+        look_through(F::ERASE_SIZE - WORD, erased, |at, bytes| self.read_raw(sector, at, bytes), look)
+    }
+
     /// Whether items go or went into the sector.
-    pub(crate) fn is_begun(&mut self, sector: usize) -> Outcome<bool, F> {
+    fn is_begun(&mut self, sector: usize) -> Outcome<bool, F> {
         self.is_marked(sector, HEADER_BYTES)
     }
 
@@ -211,7 +227,7 @@ impl<F: NorFlash> Sectors<F> {
         Ok(true)
     }
 
-    pub(crate) fn read_raw(&mut self, sector: usize, at: usize, bytes: &mut [u8]) -> Outcome<(), F> {
+    fn read_raw(&mut self, sector: usize, at: usize, bytes: &mut [u8]) -> Outcome<(), F> {
         self.flash.read((sector * F::ERASE_SIZE + at) as u32, bytes).map_err(Refusal::Flash)
     }
 

@@ -72,6 +72,7 @@ pub struct SimCard {
     clock_us: Cell<u64>,
     writes: Cell<u64>,
     dead: Cell<bool>,
+    keeps_logs: bool,
     image_error: RefCell<Option<io::Error>>,
     trace: RefCell<Option<Vec<Written>>>,
 }
@@ -89,9 +90,21 @@ impl SimCard {
             clock_us: Cell::new(0),
             writes: Cell::new(0),
             dead: Cell::new(false),
+            keeps_logs: false,
             image_error: RefCell::new(None),
             trace: RefCell::new(None),
         })
+    }
+
+    /// A card on which no log of an earlier power-on is overwritten, or one on which they may be.
+    #[must_use]
+    pub fn keeping_logs(self, keeps_logs: bool) -> Self {
+        Self { keeps_logs, ..self }
+    }
+
+    /// Whether no log of an earlier power-on is overwritten.
+    pub const fn keeps_logs(&self) -> bool {
+        self.keeps_logs
     }
 
     /// Sets the card's clock, in microseconds since the first input byte.
@@ -180,7 +193,10 @@ impl SimCard {
         Ok(())
     }
 
+    /// The image file failed, as on a full disk. Power goes with it: to the recorder it would be a card that refuses some
+    /// writes, on which it goes on where older logs are.
     fn keep(&self, error: io::Error) -> CardError {
+        self.dead.set(true);
         let copy = io::Error::new(error.kind(), error.to_string());
         self.image_error.borrow_mut().get_or_insert(copy);
         CardError::Image(error)
@@ -312,6 +328,17 @@ mod tests {
             assert_eq!(hums_recorder::format::format(&card, 1).is_err(), keeps_table);
             assert_eq!(card.writes() == 0, keeps_table, "nothing of it was written");
         }
+    }
+
+    #[test]
+    fn an_image_that_fails_is_a_card_whose_power_has_gone() {
+        let image = tempfile::NamedTempFile::new().expect("temporary file");
+        image.as_file().set_len(64 * 512).expect("64 blocks");
+        let card =
+            SimCard::new(File::open(image.path()).expect("for reading"), Faults::default()).expect("card");
+        assert!(matches!(card.write(&[block(1)], BlockIdx(3)), Err(CardError::Image(_))));
+        assert!(matches!(card.read(&mut [block(1)], BlockIdx(3)), Err(CardError::PowerGone)));
+        assert!(card.take_image_error().is_some());
     }
 
     #[test]

@@ -593,14 +593,7 @@ impl Judge {
             restarts: self.restarts,
             is_timeless: false,
         };
-        let judged = match self.no_times {
-            Some(from) => {
-                let next = self.joints.iter().copied().find(|joint| *joint > from);
-                judged.forget(from, next, &self.restarted)
-            }
-            None => judged,
-        };
-        judged.forget_unheard()
+        judged.what_is_known(self.no_times, &self.joints, &self.restarted)
     }
 }
 

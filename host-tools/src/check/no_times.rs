@@ -10,8 +10,21 @@ use crate::source::item::Cause;
 const WHY: &str = "the recording has no times";
 
 impl Judged {
+    /// Without what was seen from this place on, where there are no times up to the next recording that was joined on, and without what was
+    /// seen of a vehicle of which nothing is known.
+    pub(super) fn what_is_known(
+        self,
+        no_times: Option<Instant>,
+        joints: &[Instant],
+        restarts: &[Instant],
+    ) -> Self {
+        let Some(from) = no_times else { return self.forget_unheard() };
+        let next = joints.iter().copied().find(|joint| *joint > from);
+        self.forget(from, next, restarts).forget_unheard()
+    }
+
     /// Leaves out all that was seen between these two times, which are none, and what says how long it lasted.
-    pub(super) fn forget(mut self, from: Instant, to: Option<Instant>, restarts: &[Instant]) -> Self {
+    fn forget(mut self, from: Instant, to: Option<Instant>, restarts: &[Instant]) -> Self {
         let is_out = |at: Instant| at >= from && to.is_none_or(|to| at < to);
         self.restarts -= restarts.iter().filter(|at| is_out(**at)).count() as u64;
         self.problems.retain(|problem| !is_out(problem.at));
@@ -52,7 +65,7 @@ impl Judged {
     }
 
     /// Leaves out what was seen of a vehicle of which nothing is known.
-    pub(super) fn forget_unheard(mut self) -> Self {
+    fn forget_unheard(mut self) -> Self {
         if self.worst().is_none() {
             (self.findings, self.findings_count) = (Vec::new(), 0);
             (self.flights, self.ends_in_air, self.armed) = (Vec::new(), None, Span::ZERO);

@@ -205,6 +205,9 @@ impl Output {
     /// What is no regular file is written as it is. Appending does no harm where it leads to a regular file after all.
     fn direct(path: &Path) -> Result<Self> {
         descriptor(path).map_or(Ok(()), refuse_overwriting)?;
+        if is_pipe(path) {
+            note!("{}: is a pipe, into which is written once something reads it", path.display());
+        }
         let file = File::options().append(true).open(path).with_context(|| cannot_write(path))?;
         // The results that the command prints are not to stand in what it makes.
         if is_standard_output(&file) {
@@ -380,6 +383,18 @@ fn check(path: &Path, about: &Metadata) -> Result<()> {
         return Err(usage(format!("{shown}: is a disk or a card, and hums writes files only; name a file")));
     }
     Ok(())
+}
+
+/// A pipe with a name, whose other end may not be there yet.
+#[cfg(unix)]
+fn is_pipe(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+    descriptor(path).is_none() && fs::metadata(path).is_ok_and(|about| about.file_type().is_fifo())
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: &Path) -> bool {
+    false
 }
 
 #[cfg(unix)]

@@ -5,7 +5,6 @@
 use std::path::Path;
 
 use anyhow::Result;
-use hums_core::params::ParamSpec;
 use hums_recorder::recorder::SEGMENT_BYTES_MAX;
 
 use crate::cli;
@@ -17,8 +16,6 @@ use crate::source::input::Input;
 
 /// The recorder makes a segment as long as this part of a card at most, so that a small card holds several.
 const SEGMENTS_MIN: u64 = 16;
-/// The parameter by which only what is around an arming is kept, in segments that are shorter.
-const BY_ARMING: &str = "REC_MODE";
 
 /// A session by its name on the card and by what its sectors name, with how many files it has.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,13 +44,13 @@ pub struct EarlierSessions {
 }
 
 impl EarlierSessions {
-    /// Looks at a card. A usage error where the run may have to overwrite a session.
-    pub fn of(run: &cli::Run, params: &[(&ParamSpec, f32)]) -> Result<Self> {
+    /// Looks at a card. A usage error where the run may have to overwrite a session; `unknown` is how much comes of an input
+    /// that has no length.
+    pub fn of(run: &cli::Run, unknown: u64) -> Result<Self> {
         let logs = logs::on_card(&run.sd);
         let sessions: Vec<Session> = logs.iter().map(Session::of).collect();
-        let by_arming = params.iter().any(|(spec, value)| spec.name == BY_ARMING && *value > 0.0);
-        let oldest = oldest(&logs).filter(|_| !by_arming && !run.overwrite_oldest);
-        if let Some(oldest) = oldest.filter(|_| !has_room(run)) {
+        let oldest = oldest(&logs).filter(|_| !run.overwrite_oldest);
+        if let Some(oldest) = oldest.filter(|_| !has_room(run, unknown)) {
             return Err(usage(format!(
                 "{}: the card is full or may become so, and the run would overwrite its oldest session ({}); name another \
                  image, or say --overwrite-oldest",
@@ -97,13 +94,13 @@ fn oldest(logs: &[Log]) -> Option<&Log> {
 
 /// Whether a card has room for what a run may write: as much as it reads, and a segment that is begun at each of its starts. A card
 /// that cannot be read has no session to lose. Writing errors may use up any room: segments are left early.
-fn has_room(run: &cli::Run) -> bool {
+fn has_room(run: &cli::Run, unknown: u64) -> bool {
     if run.faults.write_error.is_some_and(|probability| probability > 0.0) {
         return false;
     }
     let read = match &run.input {
         Endpoint::File(path) => Input::bytes_of(path),
-        _ => 0,
+        _ => unknown,
     };
     let starts = 1 + run.faults.reboot_at_us.len() + run.faults.card_out.len();
     logs::room(&run.sd).is_none_or(|Room { free, all }| {

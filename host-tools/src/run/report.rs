@@ -58,6 +58,9 @@ pub struct Report {
     /// The command line allows that.
     #[serde(skip)]
     pub may_overwrite: bool,
+    /// The card had no room in the end, and no session that may be overwritten.
+    #[serde(skip)]
+    pub card_full: bool,
     /// Power went at a block write that the command line chose.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub power_cut: bool,
@@ -196,6 +199,11 @@ impl Report {
             eprintln!("{}", self.text());
         } else {
             output::line(&self.text())?;
+        }
+        if self.card_full {
+            note!(
+                "the card is full, and earlier sessions were kept: name another image, or say --overwrite-oldest"
+            );
         }
         if !self.overwritten.is_empty() {
             note!(

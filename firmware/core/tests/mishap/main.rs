@@ -35,7 +35,7 @@ struct Motion {
     pitch: f32,
     /// What the barometer says; where it says anything.
     pressure_hpa: Option<f32>,
-    /// The greatest specific force between this sample and the next, where it is a shock.
+    /// The greatest specific force between the sample before and this one, where it is a shock.
     shock_g: Option<f32>,
 }
 
@@ -91,10 +91,10 @@ fn fly(vehicle: &Quad, script: Script) -> Outcome {
         let acceleration = Some([0.0, 0.0, -(motion.load_g + noise) * 9.806_65].map(MetresPerSecond2));
         let rates = Some(motion.rates.map(RadiansPerSecond));
         let imu = Imu { acceleration, rate: rates, ..Imu::default() };
-        monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
         if let Some(shock_g) = motion.shock_g {
             monitor.observe(now, AUTOPILOT, &Observation::Shock(MetresPerSecond2(shock_g * 9.806_65)));
         }
+        monitor.observe(now, AUTOPILOT, &Observation::Imu(imu));
         if now_ms.is_multiple_of(100) {
             let (roll, pitch) = (Radians(quad.roll), Radians(motion.pitch));
             let attitude = Attitude { roll, pitch, rates, ..Attitude::default() };

@@ -63,7 +63,7 @@ impl<'a> Segments<'a> {
         card: &mut Card<'_, D>,
     ) -> Result<bool, CardError<D::Error>> {
         let volume_id = card.layout().volume_id;
-        let newest = survey(card, LogName { session: 0, segment: 0 })?.newest;
+        let newest = survey(card, LogName { session: 0, segment: 0 }, None)?.newest;
         let resumed = self.log.filter(|log| log.volume_id == volume_id && newest == Some(log.name));
         let log = if let Some(log) = resumed {
             log
@@ -182,7 +182,8 @@ impl<'a> Segments<'a> {
             Err(CardError::Full) => {}
             Err(error) => return Err(error),
         }
-        let oldest = survey(card, name)?.oldest.ok_or(CardError::Full)?;
+        let of = card.device(D::keeps_logs).unwrap_or_default().then_some(name.session);
+        let oldest = survey(card, name, of)?.oldest.ok_or(CardError::Full)?;
         self.look_before(card);
         self.ring.forget(oldest.name);
         card.recycle(&oldest, name)?;
@@ -195,15 +196,20 @@ struct Survey {
     oldest: Option<LogEntry>,
 }
 
-/// The newest log on the card, and the oldest one that may be overwritten.
-fn survey<D: CardDevice>(card: &Card<'_, D>, except: LogName) -> Result<Survey, CardError<D::Error>> {
+/// The newest name on the card, and the oldest log that may be overwritten: one of session `of`, where only these may.
+fn survey<D: CardDevice>(
+    card: &Card<'_, D>,
+    except: LogName,
+    of: Option<u32>,
+) -> Result<Survey, CardError<D::Error>> {
     let mut survey = Survey { newest: None, oldest: None };
     let open = card.open_name();
+    card.names(|name| survey.newest = survey.newest.max(Some(name)))?;
     card.logs(|entry| {
-        survey.newest = survey.newest.max(Some(entry.name));
         let usable = entry.bytes as usize >= 2 * GROUP_SECTORS * SECTOR_BYTES;
         let older = survey.oldest.is_none_or(|oldest| entry.name < oldest.name);
-        if usable && older && entry.name != except && Some(entry.name) != open {
+        let allowed = of.is_none_or(|session| session == entry.name.session);
+        if usable && older && allowed && entry.name != except && Some(entry.name) != open {
             survey.oldest = Some(entry);
         }
     })?;

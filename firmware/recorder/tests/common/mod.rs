@@ -43,6 +43,8 @@ pub struct MemCard {
     /// So many of a thousand block writes are refused, at random.
     pub refused_permille: Rc<Cell<u64>>,
     random: Rc<Cell<u64>>,
+    /// No log of an earlier power-on is overwritten.
+    pub keeps_logs: Rc<Cell<bool>>,
 }
 
 impl MemCard {
@@ -62,6 +64,7 @@ impl MemCard {
             fail_after: Rc::default(),
             refused_permille: Rc::default(),
             random: Rc::default(),
+            keeps_logs: Rc::default(),
         }
     }
 
@@ -116,7 +119,11 @@ impl BlockDevice for MemCard {
     }
 }
 
-impl CardDevice for MemCard {}
+impl CardDevice for MemCard {
+    fn keeps_logs(&self) -> bool {
+        self.keeps_logs.get()
+    }
+}
 
 /// Room for a gate to hold blocks back in, for as long as the test runs.
 pub fn held() -> &'static HeldBlocks {

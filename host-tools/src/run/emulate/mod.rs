@@ -45,7 +45,7 @@ pub fn run(args: &cli::Emulate) -> Result<Outcome> {
     })?;
     let in_place = InPlace::of(run);
     flash.prepare()?;
-    let earlier = EarlierSessions::of(run, &params)?;
+    let earlier = EarlierSessions::of(run, u64::MAX)?;
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
     let (mut ground, gs) = ground::open(run, &inputs)?;

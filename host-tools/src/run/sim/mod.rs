@@ -53,8 +53,10 @@ pub fn run(args: &cli::Sim) -> Result<Outcome> {
     if let Some(step) = run.faults.cut_store_after {
         flash.cut_after(step, run.faults.seed);
     }
-    let earlier = EarlierSessions::of(run, &params)?;
+    // The recorder itself keeps them, however much comes.
+    let earlier = EarlierSessions::of(run, 0)?;
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
+    let card = card.keeping_logs(!run.overwrite_oldest);
     let (mut ground, gs) = ground::open(run, &inputs)?;
     let entropy = salt::salt(run, &mut arrivals)?;
     let mut world = World {
@@ -226,6 +228,7 @@ impl World<'_> {
         }
         let stats = pipeline.stats();
         self.overwritten |= pipeline.has_overwritten();
+        self.report.card_full |= pipeline.is_full();
         self.add(&stats, lost);
         let cut = self.card.is_dead() || self.flash.is_dead();
         self.report.power_cut |= cut;

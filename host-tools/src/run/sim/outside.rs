@@ -83,6 +83,10 @@ impl BlockDevice for Slot<'_> {
 }
 
 impl CardDevice for Slot<'_> {
+    fn keeps_logs(&self) -> bool {
+        self.0.keeps_logs()
+    }
+
     fn trouble(error: &CardError) -> Trouble {
         match error {
             CardError::PowerGone | CardError::Absent => Trouble::Gone,

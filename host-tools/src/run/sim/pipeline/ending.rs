@@ -70,6 +70,11 @@ impl Pipeline<'_, '_> {
         *self.monitoring.monitor().params()
     }
 
+    /// Whether the card had no room in the end.
+    pub(in crate::run::sim) fn is_full(&self) -> bool {
+        self.slot_status.read().state == CardState::Full
+    }
+
     /// Whether the card no longer holds all that was logged: old segments were overwritten.
     pub(in crate::run::sim) fn has_overwritten(&self) -> bool {
         let card = self.slot_status.read();

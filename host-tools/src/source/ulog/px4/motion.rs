@@ -260,25 +260,24 @@ fn inertial(px4: &mut Px4, instance: u8, acceleration: Option<[f32; 3]>, rate: O
 
 fn imu(px4: &mut Px4, said: &Said<'_>) {
     px4.motion.combined = true;
-    if let Some(force) = thinned(px4, said) {
-        inertial(px4, 0, force, said.fields.vector(1));
+    if is_due(px4, said) {
+        inertial(px4, 0, said.fields.vector(0), said.fields.vector(1));
     }
 }
 
-/// The specific force of a message, where it is one of those that are handed on. Of the others only that of a shock is, as that: what
+/// Whether the specific force of a message is one of those that are handed on. Of the others only that of a shock is, as that: what
 /// hits the ground does so between two of them.
-fn thinned(px4: &mut Px4, said: &Said<'_>) -> Option<Option<[f32; 3]>> {
-    let force = said.fields.vector(0);
+fn is_due(px4: &mut Px4, said: &Said<'_>) -> bool {
     let now_us = said.recorded_us;
-    let is_due = |last: u64| now_us < last || now_us - last >= FAST_US;
-    if px4.motion.force_us.is_none_or(is_due) {
+    let long_ago = |last: u64| now_us < last || now_us - last >= FAST_US;
+    if px4.motion.force_us.is_none_or(long_ago) {
         px4.motion.force_us = Some(now_us);
-        return Some(force);
+        return true;
     }
-    if let Some(force) = force.map(norm).filter(|force| *force > SHOCK_MIN) {
+    if let Some(force) = said.fields.vector(0).map(norm).filter(|force| *force > SHOCK_MIN) {
         px4.observe(Observation::Shock(MetresPerSecond2(force)));
     }
-    None
+    false
 }
 
 /// Velocity and angle over a time, which is in microseconds.
@@ -311,10 +310,8 @@ fn outputs(px4: &mut Px4, said: &Said<'_>) {
 
 /// Where a log has no `sensor_combined`.
 fn acceleration(px4: &mut Px4, said: &Said<'_>) {
-    if !px4.motion.combined
-        && let Some(force) = thinned(px4, said)
-    {
-        inertial(px4, 0, force, px4.motion.rate);
+    if !px4.motion.combined && is_due(px4, said) {
+        inertial(px4, 0, said.fields.vector(0), px4.motion.rate);
     }
 }
 
