@@ -47,12 +47,14 @@ pub fn is_card(path: &Path) -> Result<bool> {
 
 /// The logs that a card's file system knows; none where it has none. No block is searched for more.
 pub fn on_card(path: &Path) -> Vec<Log> {
-    let read = || -> Result<Vec<Log>> {
-        let file = File::open(path)?;
-        let layout = layout(&ReadOnlyImage::new(file.try_clone()?)?).ok().context("no file system")?;
-        Ok(sessions_of(path, &Volume::new(&file, layout)?.walk()?.files))
-    };
-    read().unwrap_or_default()
+    walk(path).map_or_else(Vec::new, |(_, walk)| sessions_of(path, &walk.files))
+}
+
+/// What a card's file system has, and where it lies; none where it cannot be read.
+fn walk(path: &Path) -> Option<(Layout, Walk)> {
+    let file = File::open(path).ok()?;
+    let layout = layout(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
+    Some((layout, Volume::new(&file, layout).and_then(Volume::walk).ok()?))
 }
 
 /// How much room a card has for files, in bytes.
@@ -66,11 +68,14 @@ pub struct Room {
 
 /// The room on a card; none where its file system cannot be read.
 pub fn room(path: &Path) -> Option<Room> {
-    let file = File::open(path).ok()?;
-    let layout = layout(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
+    let (layout, walk) = walk(path)?;
     let (all, clusters) = (layout.data_bytes(), u64::from(layout.clusters));
-    let walk = Volume::new(&file, layout).and_then(Volume::walk).ok()?;
     Some(Room { free: all / clusters.max(1) * walk.free_clusters, all })
+}
+
+/// What is wrong with a card's file system, in its first place.
+pub fn damage(path: &Path) -> Option<String> {
+    walk(path)?.1.damage.into_iter().next()
 }
 
 /// The logs on a card: by its file system, or where that does not tell, by looking at every block.

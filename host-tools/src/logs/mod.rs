@@ -26,7 +26,7 @@ pub mod sessions;
 pub mod side_by_side;
 pub mod strangers;
 
-pub use card::{Room, is_card, on_card, room};
+pub use card::{Room, damage, is_card, on_card, room};
 pub use find::{Content, Found, find};
 pub use folder::{is_named_as_log, passed_over};
 pub use places::{Log, Piece, segment_name};

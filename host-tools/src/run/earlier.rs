@@ -47,6 +47,13 @@ impl EarlierSessions {
     /// Looks at a card. A usage error where the run may have to overwrite a session; `unknown` is how much comes of an input
     /// that has no length.
     pub fn of(run: &cli::Run, unknown: u64) -> Result<Self> {
+        if let Some(damage) = logs::damage(&run.sd).filter(|_| !run.overwrite_oldest) {
+            return Err(usage(format!(
+                "{}: the card's file system is damaged ({damage}), and the run might overwrite what lies on it; name another image, \
+                 or say --overwrite-oldest",
+                run.sd.display()
+            )));
+        }
         let logs = logs::on_card(&run.sd);
         let sessions: Vec<Session> = logs.iter().map(Session::of).collect();
         let oldest = oldest(&logs).filter(|_| !run.overwrite_oldest);

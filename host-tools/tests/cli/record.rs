@@ -97,6 +97,24 @@ fn parameters_come_from_a_file_and_slips_in_it_are_told() {
 }
 
 #[test]
+fn a_card_whose_file_system_is_damaged_stays_as_it_is() {
+    let dir = tempfile::tempdir().expect("directory");
+    let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
+    fs::write(dir.path().join("short.raw"), &recording[..20_000]).expect("written");
+    let sim = "sim --input short.raw --sd card.img";
+    run(dir.path(), &format!("{sim} --card-size 34"), 0);
+    let image = dir.path().join("card.img");
+    let mut bytes = fs::read(&image).expect("an image");
+    // The first sector of the FAT, with the root directory's entry.
+    bytes[(2048 + 32) * 512..][..512].fill(0);
+    fs::write(&image, &bytes).expect("written");
+    let refused = attempt(dir.path(), sim);
+    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(refused.status.code() == Some(2) && told.contains("file system is damaged"), "{told}");
+    assert!(fs::read(&image).expect("an image") == bytes, "it was changed");
+}
+
+#[test]
 fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goes_is_told() {
     let dir = tempfile::tempdir().expect("directory");
     let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
