@@ -11,7 +11,6 @@ use crate::chain::Chain;
 use crate::gate::{Gate, GateError, HeldBlocks};
 use crate::layout::{Layout, LayoutError};
 use crate::name::{EXTENSION, LogName};
-use crate::recorder::SEGMENT_BYTES_MAX;
 use crate::room::Room;
 use crate::status::{CardStatus, FatClock};
 
@@ -19,6 +18,9 @@ type Manager<'a, D> = VolumeManager<Gate<'a, D>, FatClock<'a>, 1, 1, 1>;
 
 /// Directory blocks that a root directory may have before it counts as going in circles: 64 K entries.
 const DIRECTORY_BLOCKS_MAX: u32 = 4_096;
+
+/// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
+pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
 
 /// The attribute of a file that lists do not show.
 const HIDDEN: u8 = 2;

@@ -31,7 +31,6 @@ use crate::format::FormatError;
 use crate::gate::HeldBlocks;
 use crate::name::LogName;
 use crate::status::{CardState, CardStatus};
-pub use segments::SEGMENT_BYTES_MAX;
 use segments::{Log, Segments};
 use slot::Slot;
 use trouble::may_work_elsewhere;

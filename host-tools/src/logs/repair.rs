@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use hums_blackbox::Header;
 use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS};
-use hums_recorder::recorder::SEGMENT_BYTES_MAX;
+use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::places::{BLOCK_BYTES, Log};
 

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use hums_recorder::recorder::SEGMENT_BYTES_MAX;
+use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use crate::cli;
 use crate::endpoint::Endpoint;

@@ -6,13 +6,11 @@ use hums_core::time::Instant;
 
 use super::before;
 use crate::CardDevice;
-use crate::card::{Card, CardError, LogEntry};
+use crate::card::{Card, CardError, LogEntry, SEGMENT_BYTES_MAX};
 use crate::name::LogName;
 use crate::ring::{self, Ring};
 use crate::status::{CardState, CardStatus};
 
-/// Bytes of a segment on a card with room for many: an hour of a busy vehicle.
-pub const SEGMENT_BYTES_MAX: u32 = 8 * 1024 * 1024;
 /// Segments that even a small card should hold, so that overwriting the oldest loses little.
 const SEGMENTS_MIN: u64 = 16;
 

@@ -92,7 +92,9 @@ impl Queue {
             inner.tell_full();
             inner = self.wait(inner, LOOK);
         }
-        inner.put(batch, self.memory_bytes_max);
+        // The end of a recording that nobody waits for any longer takes the place of nothing older: it can be written again.
+        let fits = !self.patient || has_room(&inner);
+        inner.put(batch, fits, self.memory_bytes_max);
         drop(inner);
         self.changed.notify_all();
     }
@@ -169,9 +171,10 @@ impl Inner {
         }
     }
 
-    fn put(&mut self, batch: Batch, memory_bytes_max: usize) {
+    /// Puts a batch into the file, where it `fits`, else into memory.
+    fn put(&mut self, batch: Batch, fits: bool, memory_bytes_max: usize) {
         // In order: what is in memory is younger than what is in the file.
-        if self.memory.is_empty() {
+        if fits && self.memory.is_empty() {
             match self.spool.put(&batch) {
                 Ok(lost) => return self.lose_oldest(lost),
                 Err(error) => {
@@ -330,6 +333,20 @@ mod tests {
         });
         let figures = queue.figures();
         assert_eq!((figures.written, figures.lost, figures.waiting), (2_000, 0, 0), "{figures:?}");
+    }
+
+    #[test]
+    fn the_end_of_a_recording_takes_the_place_of_nothing_that_waits() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let queue = Queue { patient: true, ..queue(&dir, 10_000) };
+        queue.put(batch(0));
+        let stored = queue.figures().stored;
+        queue.close(Wall::now());
+        (1..20).for_each(|number| queue.put(batch(number)));
+        let figures = queue.figures();
+        assert!(figures.stored > stored && figures.stored < figures.waiting, "{figures:?}");
+        assert_eq!((figures.waiting, figures.lost), (2_000, 0), "{figures:?}");
+        assert_eq!(queue.take(), Some(batch(0)), "the oldest is there");
     }
 
     #[test]

@@ -42,7 +42,12 @@ enum Answer {
 
 /// Starts the thread; it ends when the queue is closed and empty, or its time is up.
 pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
-    let config = Agent::config_builder().timeout_global(Some(LIMIT)).http_status_as_error(false);
+    // A server that sends elsewhere is told of: what is there would get no points, and may say that it took them.
+    let config = Agent::config_builder()
+        .timeout_global(Some(LIMIT))
+        .http_status_as_error(false)
+        .max_redirects(0)
+        .max_redirects_will_error(false);
     let agent: Agent = config.build().into();
     let thread = std::thread::Builder::new().name("influx".to_owned());
     thread.spawn(move || write_all(&agent, &target, &queue)).context("--influx: no thread")
